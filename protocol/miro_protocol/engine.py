@@ -1,0 +1,147 @@
+"""Which twin of a hot module runs: the compiled one, or the source it was compiled from.
+
+A hot module is an `x.py` with an `x.pxd` beside it. Both twins give the same bits; this file decides which of
+them an import gets, keeps the two from being mixed, and refuses a compiled module whose source has changed since.
+Nothing about frames, chips or physics belongs here; it lives in the lowest package because all the others need it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import sys
+from collections.abc import Sequence
+from functools import cache
+from importlib.abc import MetaPathFinder
+from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec, SourceFileLoader
+from pathlib import Path
+from types import ModuleType
+
+PACKAGES = ("miro_protocol", "miro_robot", "miro_host", "miro_sim")
+ENGINES = ("compiled", "python")
+REMEDY = "reinstall with `pip install -e .` (or `pip install .`), or run with `--engine python`"
+
+
+class EngineError(ImportError):
+    """A compiled module that does not belong to its source, or an engine that is not there."""
+
+
+def hot_sources(package_dirs: dict[str, Path]) -> dict[str, Path]:
+    """Dotted name -> source file of every hot module below the given package folders."""
+    found = {}
+    for package, folder in package_dirs.items():
+        for pxd in sorted(folder.rglob("*.pxd")):
+            source = pxd.with_suffix(".py")
+            if source.exists():
+                relative = source.relative_to(folder).with_suffix("")
+                found[".".join((package, *relative.parts))] = source
+    return found
+
+
+def source_hashes(package_dirs: dict[str, Path]) -> dict[str, str]:
+    """Dotted name -> SHA-256 over the module's source and *all* `.pxd` files, which fix its C layout."""
+    layout = hashlib.sha256()
+    for package, folder in sorted(package_dirs.items()):
+        for pxd in sorted(folder.rglob("*.pxd")):
+            layout.update(f"{package}/{pxd.relative_to(folder).as_posix()}\n".encode())
+            layout.update(_text(pxd))
+    return {
+        name: hashlib.sha256(layout.digest() + _text(source)).hexdigest()
+        for name, source in hot_sources(package_dirs).items()
+    }
+
+
+def _text(path: Path) -> bytes:
+    return path.read_bytes().replace(b"\r\n", b"\n")
+
+
+@cache
+def installed_dirs() -> dict[str, Path]:
+    """Package name -> folder, for those of our packages that are installed."""
+    dirs = {}
+    for package in PACKAGES:
+        spec = importlib.util.find_spec(package)
+        if spec is not None and spec.submodule_search_locations:
+            dirs[package] = Path(next(iter(spec.submodule_search_locations)))
+    return dirs
+
+
+@cache
+def _installed_hashes() -> dict[str, str]:
+    return source_hashes(installed_dirs())
+
+
+def refuse_if_stale(name: str, stamp: str) -> None:
+    """Called by every compiled module at import with the hash it was built from."""
+    expected = _installed_hashes().get(name)
+    if expected != stamp:
+        raise EngineError(f"compiled {name} is stale: its source has changed since it was built; {REMEDY}")
+
+
+def compiled_file(source: Path) -> Path | None:
+    """The extension module that stands for this source, if one was built."""
+    for suffix in EXTENSION_SUFFIXES:
+        candidate = source.with_name(source.stem + suffix)
+        if candidate.exists():
+            return candidate
+    return None
+
+
+class EngineFinder(MetaPathFinder):
+    """First on `sys.meta_path`: sends hot modules to their source when the engine is `python`."""
+
+    def __init__(self) -> None:
+        self.engine: str | None = None
+        self.sources = hot_sources(installed_dirs())
+
+    def missing(self) -> list[str]:
+        """Hot modules that have no compiled twin."""
+        return [name for name, source in self.sources.items() if compiled_file(source) is None]
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        source = self.sources.get(fullname)
+        if source is None:
+            return None
+        if self.engine is None:
+            self.engine = "python" if self.missing() else "compiled"
+        if self.engine == "compiled":
+            return None
+        return importlib.util.spec_from_file_location(
+            fullname, source, loader=SourceFileLoader(fullname, str(source))
+        )
+
+
+def install() -> EngineFinder:
+    """Puts the finder in place once; later calls return the one that is there."""
+    for finder in sys.meta_path:
+        if isinstance(finder, EngineFinder):
+            return finder
+    finder = EngineFinder()
+    sys.meta_path.insert(0, finder)
+    return finder
+
+
+def select(engine: str) -> None:
+    """Chooses the engine of this process. Must come before the first hot module is imported.
+
+    Raises EngineError when another engine is already in use, or when `compiled` is asked for and a hot module
+    has no compiled twin.
+    """
+    if engine not in ENGINES:
+        raise EngineError(f"unknown engine {engine!r}: choose one of {', '.join(ENGINES)}")
+    finder = install()
+    if finder.engine not in (None, engine):
+        raise EngineError(f"engine {finder.engine} is already in use in this process, cannot change to {engine}")
+    if engine == "compiled" and finder.missing():
+        raise EngineError(f"no compiled module for {', '.join(finder.missing())}; {REMEDY}")
+    finder.engine = engine
+
+
+def active() -> str:
+    """`compiled` or `python`: what hot modules run as (deciding it now if nothing has yet)."""
+    finder = install()
+    if finder.engine is None:
+        finder.engine = "python" if finder.missing() else "compiled"
+    return finder.engine

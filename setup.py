@@ -1,0 +1,108 @@
+"""Compiles the hot modules: every `x.py` that has an `x.pxd` beside it.
+
+What belongs here: finding them, stamping each with the hash of its source, and handing them to Cython.
+What does not: anything about a single module (its types stand in its own `.pxd`).
+
+Every extension is optional: with no C compiler the package installs all the same and runs from source,
+slowly and with the same bits. Each compiled module checks its stamp when it is imported
+(`miro_protocol.engine`), so one that no longer matches its source is refused.
+"""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+from setuptools import Extension, setup
+from setuptools.command.build_ext import build_ext
+
+HERE = Path(__file__).parent
+ROOTS = {"miro_protocol": "protocol", "miro_robot": "robot_fw", "miro_host": "host", "miro_sim": "sim"}
+STAMP = """
+
+from miro_protocol.engine import refuse_if_stale as _refuse_if_stale
+__source_sha256__ = "{sha}"
+_refuse_if_stale(__name__, __source_sha256__)
+"""
+
+DIRECTIVES = {
+    "language_level": 3,
+    "annotation_typing": False,  # C types come from the .pxd alone
+    "boundscheck": False,
+    "wraparound": False,
+    "initializedcheck": False,
+    "cdivision": False,  # // and % as Python has them
+}
+# No contraction to FMA, no reassociation: the same doubles on every machine.
+FLAGS = {"unix": ["-O2", "-ffp-contract=off", "-fno-fast-math", "-w"], "msvc": ["/O2", "/fp:strict"]}
+
+
+def engine():
+    """The module that defines what is hot and how it is hashed, loaded from its file (nothing is installed yet)."""
+    spec = importlib.util.spec_from_file_location("engine", HERE / "protocol/miro_protocol/engine.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["engine"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def package_dirs():
+    return {name: HERE / root / name for name, root in ROOTS.items()}
+
+
+def hot_extensions():
+    dirs = package_dirs()
+    return [
+        Extension(name, [str(path.relative_to(HERE))], optional=True)
+        for name, path in engine().hot_sources(dirs).items()
+    ]
+
+
+class BuildHot(build_ext):
+    """Translates stamped copies, so that the hash stands in the module and not in the source."""
+
+    user_options = [*build_ext.user_options, ("only=", None, "build only the modules whose name starts so")]
+
+    def initialize_options(self):
+        super().initialize_options()
+        self.only = ""
+
+    def build_extensions(self):
+        from Cython.Build import cythonize
+
+        folder = Path(self.build_temp).absolute() / "stamped"
+        stamped = self._stamp(folder)
+        self.extensions = [extension for extension in self.extensions if extension.name.startswith(self.only)]
+        translated = cythonize(
+            [Extension(extension.name, [str(stamped[extension.name])]) for extension in self.extensions],
+            compiler_directives=DIRECTIVES,
+            include_path=[str(folder)],
+        )
+        sources = {extension.name: extension.sources for extension in translated}
+        for extension in self.extensions:
+            extension.sources = sources[extension.name]
+            extension.extra_compile_args = FLAGS.get(self.compiler.compiler_type, [])
+        super().build_extensions()
+
+    def _stamp(self, target):
+        """Copies packages to `target` with the stamp appended to each hot module; unchanged files keep their time."""
+        hashes = engine().source_hashes(package_dirs())
+        hot = {}
+        for package, folder in package_dirs().items():
+            for path in sorted([*folder.rglob("*.py"), *folder.rglob("*.pxd")]):
+                relative = Path(package) / path.relative_to(folder)
+                name = ".".join(relative.with_suffix("").parts)
+                is_hot = path.suffix == ".py" and name in hashes
+                if path.suffix == ".py" and not is_hot and path.name != "__init__.py":
+                    continue
+                text = path.read_text(encoding="utf-8")
+                copy = target / relative
+                if is_hot:
+                    text += STAMP.format(sha=hashes[name])
+                    hot[name] = copy
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                if not copy.exists() or copy.read_text(encoding="utf-8") != text:
+                    copy.write_text(text, encoding="utf-8")
+        return hot
+
+
+setup(ext_modules=hot_extensions(), cmdclass={"build_ext": BuildHot})
