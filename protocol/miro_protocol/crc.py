@@ -1,0 +1,48 @@
+"""The frame's check: CRC-16 5935h, reflected. Only arithmetic belongs here, not what the bytes mean.
+
+5935h (the M17 CRC) is the one 16-bit polynomial among the usual candidates with Hamming distance 5 for
+every length from 5 to 30 bytes, so any 1 to 4 wrong bits are refused; the reflected form catches bursts of
+up to 20 wire bits because a UART sends the low bit first (link.md section 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import cast
+
+from crcmod import mkCrcFun
+
+POLYNOMIAL = 0x5935
+POLYNOMIAL_REFLECTED = 0xAC9A
+INITIAL = 0xFFFF
+XOR_OUT = 0xFFFF
+CHECK_TEXT = b"123456789"
+CHECK_VALUE = 0xCD72
+
+# crcmod states its start value after the final XOR: 0 here is a register of FFFFh.
+_crc = cast("Callable[..., int]", mkCrcFun(0x10000 | POLYNOMIAL, initCrc=0, rev=True, xorOut=XOR_OUT))
+
+
+def crc16(data: bytes | bytearray, start: int = 0) -> int:
+    """CRC of `data` as 0..FFFFh. `start` is the CRC of what came before it, to compute it in pieces."""
+    return _crc(data, start)
+
+
+def register(data: bytes) -> int:
+    """The shift register after `data`: what firmware holds before the closing XOR."""
+    return crc16(data) ^ XOR_OUT
+
+
+def nibble_table() -> tuple[int, ...]:
+    """16 words t: `register = register >> 4 ^ t[(register ^ nibble) & 15]`, low nibble of a byte first."""
+    table = []
+    for value in range(16):
+        for _ in range(4):
+            value = value >> 1 ^ (POLYNOMIAL_REFLECTED if value & 1 else 0)
+        table.append(value)
+    return tuple(table)
+
+
+def residue() -> int:
+    """The register after any intact message and its CRC, low byte first: one constant to compare with."""
+    return register(crc16(b"").to_bytes(2, "little"))

@@ -1,0 +1,223 @@
+"""Messages and their bytes: what is said, and how it is written down.
+
+What belongs here: the message types, `encode`, `decode_fields`. What does not: finding a frame among
+received bytes (`decoder.py`) and whether it is new (`freshness.py`). Every size, range and offset comes
+from `table.py`.
+
+Who is to blame is a type: a value that may not be sent is a ValueError at the caller; bytes whose CRC is
+good but which no rightful sender would send are a `ContentError`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from operator import index
+
+from miro_protocol.crc import crc16
+from miro_protocol.table import (
+    SEQ,
+    SEQ_MODULUS,
+    SERVICE,
+    SERVICE_DATA,
+    SLOT_MASK,
+    TELEMETRY,
+    TELEMETRY_FIELDS,
+    VELOCITY,
+    Field,
+    Flags,
+    Format,
+    FrameType,
+    Opcode,
+    downlink,
+)
+from miro_protocol.whitening import whiten
+
+
+class ContentError(Exception):
+    """A frame with a good CRC that says nothing the table knows: the sender, not the link, is wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class TeamFrame:
+    """Velocities of all robots, slot 0 first: (left, right) in 1/256 count per LM629 sample.
+
+    With `type` TEAM_ASK, robot (seq mod N) answers with telemetry.
+    """
+
+    type: int
+    seq: int
+    velocities: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceFrame:
+    """One setting of one robot; `values` in the order of `table.SERVICE_DATA[opcode]`."""
+
+    seq: int
+    slot: int
+    opcode: int
+    values: tuple[int, ...] = ()
+
+    @classmethod
+    def ping(cls, seq: int, slot: int) -> ServiceFrame:
+        return cls(seq, slot, Opcode.PING)
+
+    @classmethod
+    def filter(cls, seq: int, slot: int, kp: int, ki: int, kd: int, il: int) -> ServiceFrame:
+        """LM629 filter words of both wheels, 0..32767 each."""
+        return cls(seq, slot, Opcode.FILTER, (kp, ki, kd, il))
+
+    @classmethod
+    def acceleration(cls, seq: int, slot: int, value: int) -> ServiceFrame:
+        """Acceleration of both wheels in 1/65536 count per sample^2; in motion it waits for standstill."""
+        return cls(seq, slot, Opcode.ACCELERATION, (value,))
+
+
+@dataclass(frozen=True, slots=True)
+class TelemetryFrame:
+    """One robot's answer. Positions are the low 16 bits of counts, the counters wrap at 256."""
+
+    seq: int
+    slot: int
+    flags: int = 0
+    status_left: int = 0
+    status_right: int = 0
+    position_left: int = 0
+    position_right: int = 0
+    accepted: int = 0
+    rejected: int = 0
+
+
+Message = TeamFrame | ServiceFrame | TelemetryFrame
+
+
+def checked(field: Field, value: int, where: str = "", high: int | None = None) -> int:
+    """`value` as a plain int; ValueError naming field, value and limits when it may not be sent."""
+    number = index(value)
+    limit = field.high if high is None else high
+    if not field.low <= number <= limit:
+        unit = f" ({field.unit})" if field.unit else ""
+        raise ValueError(f"{where}{field.name} = {number}: must be {field.low}..{limit}{unit}")
+    return number
+
+
+def pack(field: Field, value: int, where: str = "", high: int | None = None) -> bytes:
+    return checked(field, value, where, high).to_bytes(field.size, "little", signed=field.signed)
+
+
+def unpack(fields: Iterable[Field], payload: bytes, offset: int = 0) -> list[int]:
+    """The numbers of `fields`, which follow each other from `offset` on, unchecked."""
+    values = []
+    for field in fields:
+        raw = payload[offset : offset + field.size]
+        values.append(int.from_bytes(raw, "little", signed=field.signed))
+        offset += field.size
+    return values
+
+
+def format_of(message: Message, n: int) -> Format:
+    """The wire format `message` travels in on a network of `n` robots."""
+    below = downlink(n)
+    return TELEMETRY if isinstance(message, TelemetryFrame) else below
+
+
+def encode(message: Message, n: int) -> bytes:
+    """All characters of the frame as they are sent, preamble first, in a network of `n` robots (3 or 5).
+
+    Raises ValueError naming field, value and limits when something may not be sent, TypeError for a
+    number that is not whole.
+    """
+    form = format_of(message, n)
+    if isinstance(message, TeamFrame):
+        kind, payload = _team_type(message.type), _team_payload(message, n)
+    elif isinstance(message, ServiceFrame):
+        kind, payload = FrameType.SERVICE, _service_payload(message, n)
+    else:
+        kind, payload = FrameType.TELEMETRY, _telemetry_payload(message, n)
+    header = kind * SEQ_MODULUS + checked(SEQ, message.seq)
+    return seal(form, bytes([header]) + payload.ljust(form.payload_size, b"\0"))
+
+
+def seal(form: Format, body: bytes) -> bytes:
+    """Wire bytes around any `body` (HDR and payload in clear): CRC, whitening, sync and preamble."""
+    return form.lead + form.sync + whiten(body + crc(form, body).to_bytes(2, "little"))
+
+
+def crc(form: Format, body: bytes) -> int:
+    """The CRC a frame of this format must carry behind `body`."""
+    return crc16(body, crc16(bytes([form.layout])))
+
+
+def decode_fields(body: bytes, n: int) -> Message:
+    """The message in `body`: HDR and payload in clear, CRC already checked and taken off.
+
+    Raises ContentError when the bytes are not what `encode` would have made of any message.
+    """
+    kind, seq = divmod(body[0], SEQ_MODULUS)
+    payload = bytes(body[1:])
+    if kind == FrameType.TELEMETRY:
+        first, *rest = unpack(TELEMETRY_FIELDS, payload)
+        message: Message = TelemetryFrame(seq, first & SLOT_MASK, first & ~SLOT_MASK, *rest)
+    elif kind == FrameType.SERVICE:
+        message = _service_message(seq, payload)
+    else:
+        values = unpack(VELOCITY * n, payload)
+        message = TeamFrame(kind, seq, tuple(zip(values[::2], values[1::2], strict=True)))
+    _require_sendable(message, body, n)
+    return message
+
+
+def _require_sendable(message: Message, body: bytes, n: int) -> None:
+    try:
+        form = format_of(message, n)
+        same = encode(message, n) == seal(form, bytes(body))
+    except ValueError as error:
+        raise ContentError(str(error)) from None
+    if not same:
+        raise ContentError(f"{message!r} does not account for all of {bytes(body).hex(' ')}")
+
+
+def _team_type(kind: int) -> int:
+    if kind not in (FrameType.TEAM, FrameType.TEAM_ASK):
+        raise ValueError(
+            f"type = {kind!r}: a team frame has type {FrameType.TEAM:d} or {FrameType.TEAM_ASK:d}"
+        )
+    return kind
+
+
+def _team_payload(message: TeamFrame, n: int) -> bytes:
+    if len(message.velocities) != n:
+        raise ValueError(f"velocities for {len(message.velocities)} robots: this network has {n}")
+    return b"".join(
+        pack(field, value, f"slot {slot} ")
+        for slot, pair in enumerate(message.velocities)
+        for field, value in zip(VELOCITY, pair, strict=True)
+    )
+
+
+def _service_payload(message: ServiceFrame, n: int) -> bytes:
+    slot, opcode = SERVICE
+    head = pack(slot, message.slot, high=n - 1) + pack(opcode, message.opcode)
+    name = Opcode(message.opcode).name.lower()
+    fields = SERVICE_DATA[message.opcode]
+    if len(message.values) != len(fields):
+        raise ValueError(f"{name} with {len(message.values)} values: it takes {len(fields)}")
+    return head + b"".join(pack(*pair) for pair in zip(fields, message.values, strict=True))
+
+
+def _service_message(seq: int, payload: bytes) -> ServiceFrame:
+    slot, opcode = unpack(SERVICE, payload)
+    fields = SERVICE_DATA.get(opcode)
+    if fields is None:
+        raise ContentError(f"service opcode {opcode} is not known")
+    return ServiceFrame(seq, slot, opcode, tuple(unpack(fields, payload, sum(f.size for f in SERVICE))))
+
+
+def _telemetry_payload(message: TelemetryFrame, n: int) -> bytes:
+    slot = checked(SERVICE[0], message.slot, high=n - 1)
+    allowed = sum(Flags)
+    if message.flags & ~allowed:
+        raise ValueError(f"flags = {message.flags:#04x}: only bits of {allowed:#04x} are defined")
+    values = (slot | message.flags, *(getattr(message, field.name) for field in TELEMETRY_FIELDS[1:]))
+    return b"".join(pack(*pair) for pair in zip(TELEMETRY_FIELDS, values, strict=True))
