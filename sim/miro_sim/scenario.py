@@ -1,0 +1,174 @@
+"""The scenario: everything about a run that is chosen rather than drawn, as frozen structs.
+
+What belongs here: the keys a scenario file may have, with unit, default and range, and the rules between
+them. What does not: reading files and reporting what is wrong in them (`scenario_file`), and what the keys
+do (`miro_host`, `radio`, `plant`, `world`).
+
+Every key carries its unit. Defaults are the "realistic" set: the paper's measurement error (2.40 cm and
+4.83 degrees as 3 sigma), one camera frame of vision delay, 3 ms of computing, a keyed carrier and a
+bit-error rate of 1e-4.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+PERIOD_TICKS = 800_800
+CHARACTER_TICKS = 25_000  # 10 bits at 9600 baud
+FRAME_CHARACTERS = {3: 23, 5: 31}
+
+Positive = Annotated[float, Meta(gt=0.0, le=1e6)]
+Duration = Annotated[float, Meta(gt=0.0, le=86_400.0)]
+Seconds = Annotated[float, Meta(ge=0.0, le=1e3)]
+PitchCm = Annotated[float, Meta(ge=-1_000.0, le=1_000.0)]
+TurnRad = Annotated[float, Meta(ge=-3.141592653589793, le=3.141592653589793)]
+TurnDeg = Annotated[float, Meta(ge=-180.0, le=180.0)]
+Gain = Annotated[float, Meta(ge=0.0, le=1e6)]
+Name = Annotated[str, Meta(pattern=r"\A[a-z0-9][a-z0-9_-]{0,63}\Z")]
+
+
+class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The camera and what the tracker makes of it: noise per axis, pixels, whole frames of delay.
+
+    `position_error_cm` and `heading_error_deg` are three standard deviations (paper section IV: 2.40 cm,
+    4.83 degrees). `pixel_cm` 0 measures without quantisation; 0.4375 is a pitch of 140 x 105 cm on 320 x
+    240 pixels.
+    """
+
+    noise: Literal["gaussian", "none"] = "gaussian"
+    position_error_cm: Annotated[float, Meta(ge=0.0, le=100.0)] = 2.40
+    heading_error_deg: Annotated[float, Meta(ge=0.0, le=180.0)] = 4.83
+    pixel_cm: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.4375
+    delay_frames: Annotated[int, Meta(ge=0, le=30)] = 1
+
+
+class HostTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How long the PC computes between the camera frame and the key-up of the transmitter."""
+
+    compute_s: Annotated[float, Meta(ge=0.0, le=0.030)] = 0.003
+
+
+class Radio(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One radio network: 9600 baud down to the robots and, with `telemetry`, a second band up.
+
+    `carrier` keyed is a transmitter that is on per frame only, `keyup_s` before its first start bit;
+    between frames the receiver's slicer makes noise, unless `squelch` holds it at mark.
+    """
+
+    latency_s: Annotated[float, Meta(ge=0.0, le=0.030)] = 0.0
+    bit_error_rate: Annotated[float, Meta(ge=0.0, le=0.5)] = 1e-4
+    carrier: Literal["keyed", "on"] = "keyed"
+    keyup_s: Annotated[float, Meta(ge=0.0, le=0.030)] = 0.001
+    squelch: bool = False
+    telemetry: bool = True
+
+
+class LineRef(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="line"
+):
+    """A straight line from the origin, run with a speed ramp: s = v t^2 / (2 t_r), then v (t - t_r / 2)."""
+
+    heading_deg: TurnDeg = 0.0
+    speed_m_s: Annotated[float, Meta(ge=0.0, le=1.46)] = 0.20
+    ramp_s: Seconds = 0.5
+
+
+class ArcRef(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="arc"
+):
+    """A circular arc from the origin: heading theta_0 + kappa s, the same speed ramp as the line."""
+
+    heading_deg: TurnDeg = 60.0
+    curvature_per_m: Annotated[float, Meta(ge=-100.0, le=100.0)] = -1.0
+    speed_m_s: Annotated[float, Meta(ge=0.0, le=1.46)] = 0.20
+    ramp_s: Seconds = 0.5
+
+
+class YangKim(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="law", tag="yang_kim"
+):
+    """The sliding-mode law of the paper, equations (13) and (16), with the guards it needs in a sampled loop.
+
+    `switching` sign is the paper's law to the letter; saturation replaces each sign by a boundary layer of
+    the width given beside it. `cosine_guard` is d in c (1 + d^2) / (c^2 + d^2), which stands for 1 / c;
+    `rho_floor_m` the smallest rho_c used as a divisor. The limits clamp the integrator (15) itself.
+    """
+
+    gamma1_per_s: Gain = 1.7
+    gamma2_per_s: Gain = 3.0
+    q1_per_s: Gain = 0.53
+    q2_per_s: Gain = 0.72
+    p1_m_s2: Gain = 0.19
+    p2_rad_s2: Gain = 0.69
+    switching: Literal["sign", "saturation"] = "saturation"
+    layer_s1_m_s: Positive = 0.022
+    layer_s2_rad_s: Positive = 0.19
+    layer_theta_rad: Positive = 0.015
+    cosine_guard: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.086
+    rho_floor_m: Positive = 0.024
+    max_v_m_s: Positive = 0.95
+    max_w_rad_s: Positive = 3.7
+    max_v_dot_m_s2: Positive = 8.0
+    max_w_dot_rad_s2: Positive = 120.0
+
+
+class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One robot: its slot on the network, where it starts, what it follows and who steers it.
+
+    The start is the start of the reference plus the errors (captions of the paper's Figs. 6 and 8). Each
+    wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `drive` overrides parameters of
+    the motors and the chassis by name.
+    """
+
+    slot: Annotated[int, Meta(ge=0, le=4)] = 0
+    start_error_x_cm: PitchCm = 0.0
+    start_error_y_cm: PitchCm = 0.0
+    start_error_theta_rad: TurnRad = 0.0
+    wheel_radius_mismatch: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.015
+    reference: LineRef | ArcRef
+    controller: YangKim = YangKim()
+    drive: dict[str, float] = {}
+
+
+class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One radio frequency: one host, `robots` slots (the layout of its frames), and the robots that are
+    present.
+    """
+
+    robots: Literal[3, 5] = 3
+    radio: Radio = Radio()
+    robot: Annotated[tuple[Robot, ...], Meta(min_length=1)]
+
+    def __post_init__(self) -> None:
+        slots = [robot.slot for robot in self.robot]
+        for index, slot in enumerate(slots):
+            if slot >= self.robots:
+                raise ValueError(
+                    f"robot[{index}]: slot {slot} does not exist on a network of {self.robots} robots;"
+                    f" use 0 to {self.robots - 1}, or robots = 5"
+                )
+            if slot in slots[:index]:
+                raise ValueError(
+                    f"robot[{index}]: slot {slot} is taken by robot[{slots.index(slot)}];"
+                    " give each robot its own slot"
+                )
+        characters = FRAME_CHARACTERS[self.robots]
+        needed = characters * CHARACTER_TICKS + round(self.radio.keyup_s * 24e6)
+        if self.radio.carrier == "keyed" and needed > PERIOD_TICKS:
+            raise ValueError(
+                f"radio.keyup_s: {self.radio.keyup_s} s and a frame of {characters} characters do"
+                f" not fit the camera period; at most {(PERIOD_TICKS - characters * CHARACTER_TICKS) / 24e6:.6f} s"
+            )
+
+
+class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A whole run. `stop_on_fault` ends it at the first firmware fault; otherwise faults are counted."""
+
+    name: Name
+    title: Annotated[str, Meta(max_length=200)] = ""
+    duration_s: Duration
+    stop_on_fault: bool = True
+    camera: Camera = Camera()
+    host: HostTimes = HostTimes()
+    networks: Annotated[tuple[Network, ...], Meta(min_length=1)] = msgspec.field(name="network")
