@@ -37,7 +37,7 @@ FLAGS = {"unix": ["-O2", "-ffp-contract=off", "-fno-fast-math", "-w"], "msvc": [
 
 
 def engine():
-    """The module that defines what is hot and how it is hashed, loaded from its file (nothing is installed yet)."""
+    """The module that knows what is hot and how it is hashed, loaded from its file: nothing is installed yet."""
     spec = importlib.util.spec_from_file_location("engine", HERE / "protocol/miro_protocol/engine.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules["engine"] = module
@@ -84,7 +84,7 @@ class BuildHot(build_ext):
         super().build_extensions()
 
     def _stamp(self, target):
-        """Copies packages to `target` with the stamp appended to each hot module; unchanged files keep their time."""
+        """Copies packages to `target` , hot modules with their stamp; unchanged files keep their time."""
         hashes = engine().source_hashes(package_dirs())
         hot = {}
         for package, folder in package_dirs().items():

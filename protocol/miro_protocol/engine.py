@@ -133,7 +133,9 @@ def select(engine: str) -> None:
         raise EngineError(f"unknown engine {engine!r}: choose one of {', '.join(ENGINES)}")
     finder = install()
     if finder.engine not in (None, engine):
-        raise EngineError(f"engine {finder.engine} is already in use in this process, cannot change to {engine}")
+        raise EngineError(
+            f"engine {finder.engine} is already in use in this process, cannot change to {engine}"
+        )
     if engine == "compiled" and finder.missing():
         raise EngineError(f"no compiled module for {', '.join(finder.missing())}; {REMEDY}")
     finder.engine = engine
