@@ -2,7 +2,7 @@
 
 5935h (the M17 CRC) is the one 16-bit polynomial among the usual candidates with Hamming distance 5 for
 every length from 5 to 30 bytes, so any 1 to 4 wrong bits are refused; the reflected form catches bursts of
-up to 20 wire bits because a UART sends the low bit first (link.md section 3).
+up to 20 wire bits because a UART sends the low bit first (README.md, "Why").
 """
 
 from __future__ import annotations

@@ -146,7 +146,12 @@ def seal(form: Format, body: bytes) -> bytes:
 
 def crc(form: Format, body: bytes) -> int:
     """The CRC a frame of this format must carry behind `body`."""
-    return crc16(body, crc16(bytes([form.layout])))
+    return crc16(body, layout_crc(form))
+
+
+def layout_crc(form: Format) -> int:
+    """Where the CRC of a frame of this format starts: after the layout byte, which is never sent."""
+    return crc16(bytes([form.layout]))
 
 
 def decode_fields(body: bytes, n: int) -> Message:

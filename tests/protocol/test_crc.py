@@ -7,7 +7,7 @@ from miro_protocol import crc, whitening
 
 from tests.naive import crc as naive
 
-LINK_SHEET = bytes.fromhex(
+LITERAL = bytes.fromhex(
     "FF E1 1D 9A ED 85 33 24 EA 7A D2 39 70 97 57 0A 54 7D 2D D8 6D 0D BA 8F 67 59 C7 A2 BF 34 CA"
 )
 
@@ -49,15 +49,15 @@ def test_the_nibble_table_gives_the_same_crc(data):
     assert register ^ crc.XOR_OUT == crc.crc16(data)
 
 
-def test_the_whitening_string_is_the_one_in_the_link_sheet_and_the_pn9_sequence():
-    assert whitening.STRING == LINK_SHEET == naive.pn9(31)
+def test_the_whitening_string_is_the_one_written_out_and_the_pn9_sequence():
+    assert whitening.STRING == LITERAL == naive.pn9(31)
 
 
 @settings(deadline=None)
 @given(st.binary(max_size=31))
 def test_whitening_twice_gives_the_bytes_back(data):
     assert whitening.whiten(whitening.whiten(data)) == data
-    assert whitening.whiten(data) == bytes(a ^ b for a, b in zip(data, LINK_SHEET, strict=False))
+    assert whitening.whiten(data) == bytes(a ^ b for a, b in zip(data, LITERAL, strict=False))
 
 
 def test_more_bytes_than_the_string_has_cannot_be_whitened():

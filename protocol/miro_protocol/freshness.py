@@ -1,0 +1,59 @@
+"""Is a valid frame news? Sits above the decoder: it sees sequence numbers and ticks, never bytes.
+
+The rule (README.md, "Freshness"): a frame is fresh if its number is 1 to 8 steps (mod 64) past the last
+fresh one. 150 ms or more after that one, any other number is fresh; before the first frame, any at all.
+Repeating one frame for ever is never fresh again, so a stuck host does not re-arm a robot whose failsafe
+has stopped it.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+from miro_protocol.table import FRESH_AGAIN_TICKS, FRESH_STEPS, SEQ_MODULUS
+
+
+class Freshness:
+    """Counts `accepted` (fresh) and `stale` frames; only fresh ones act and restart the failsafe."""
+
+    def __init__(self) -> None:
+        self.accepted = 0
+        self.stale = 0
+        self.last_seq: int | None = None
+        self.last_tick = 0
+
+    def __repr__(self) -> str:
+        return f"<freshness: {self.accepted} accepted, {self.stale} stale, last seq {self.last_seq}>"
+
+    def judge(self, seq: int, tick: int) -> bool:
+        """Whether the valid frame `seq`, complete at `tick` (24 MHz), is fresh; once for every one."""
+        fresh = self._is_fresh(seq, tick)
+        if fresh:
+            self.accepted += 1
+            self.last_seq = seq
+            self.last_tick = tick
+        else:
+            self.stale += 1
+        return fresh
+
+    def _is_fresh(self, seq: int, tick: int) -> bool:
+        if self.last_seq is None:
+            return True
+        step = (seq - self.last_seq) % SEQ_MODULUS
+        if tick - self.last_tick >= FRESH_AGAIN_TICKS:
+            return step != 0
+        return 1 <= step <= FRESH_STEPS
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "accepted": self.accepted,
+            "stale": self.stale,
+            "last_seq": self.last_seq,
+            "last_tick": self.last_tick,
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        self.accepted = cast(int, state["accepted"])
+        self.stale = cast(int, state["stale"])
+        self.last_seq = cast("int | None", state["last_seq"])
+        self.last_tick = cast(int, state["last_tick"])

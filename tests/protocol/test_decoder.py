@@ -1,0 +1,238 @@
+"""The sliding window: events equal its naive twin's, however the input is cut, and no character is lost."""
+
+from itertools import pairwise
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from miro_protocol import decoder as module
+from miro_protocol import table
+from miro_protocol.decoder import Damaged, Decoder, Reason, Received, TelemetryDecoder
+from miro_protocol.frames import TeamFrame, encode
+from miro_protocol.strategies import Heard, damaged_streams, team_frames, valid_streams
+
+from tests.naive.decoder import NaiveDecoder
+
+FRAMES = {n: encode(TeamFrame(0, 7, ((100, -100),) * n), n) for n in (3, 5)}
+LEAD = b"\x55" * 5 + b"\xff"
+
+
+def decoder_for(heard: Heard, telemetry: bool):
+    return TelemetryDecoder() if telemetry else Decoder(heard.n)
+
+
+def naive_for(heard: Heard, telemetry: bool, run_limit: int = module.RUN_LIMIT):
+    if telemetry:
+        return NaiveDecoder(14, 0x1E, LEAD[1:], run_limit)
+    return NaiveDecoder(5 + 4 * heard.n, 0x10 | heard.n, LEAD, run_limit)
+
+
+def messages(events, n):
+    return [event.message(n) for event in events if isinstance(event, Received)]
+
+
+streams = st.booleans().flatmap(lambda up: st.tuples(damaged_streams(telemetry=up), st.just(up)))
+
+
+@settings(deadline=None, max_examples=300)
+@given(streams, st.sampled_from([1, 3, 10, module.RUN_LIMIT]))
+def test_events_and_counters_equal_the_naive_twins(stream, run_limit):
+    heard, telemetry = stream
+    naive = naive_for(heard, telemetry, run_limit)
+    for symbol in heard.symbols:
+        naive.character(*symbol)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "RUN_LIMIT", run_limit)
+        decoder = decoder_for(heard, telemetry)
+        events = decoder.feed_symbols(heard.symbols) + decoder.flush()
+    assert events == naive.flush()
+    assert decoder.rejected == naive.rejected
+    assert decoder.valid == sum(isinstance(event, Received) for event in events)
+
+
+@settings(deadline=None)
+@given(streams, st.lists(st.integers(0, 200)))
+def test_any_chunking_gives_the_same_events_and_the_same_state(stream, cuts):
+    heard, telemetry = stream
+    whole, cut = decoder_for(heard, telemetry), decoder_for(heard, telemetry)
+    expected = whole.feed_symbols(heard.symbols)
+    places = [0, *sorted(min(place, len(heard.symbols)) for place in cuts), len(heard.symbols)]
+    events = []
+    for start, end in pairwise(places):
+        events += cut.feed_symbols(heard.symbols[start:end])
+    assert events == expected
+    assert cut.snapshot() == whole.snapshot()
+    assert cut.flush() == whole.flush()
+
+
+@settings(deadline=None)
+@given(streams)
+def test_every_character_belongs_to_exactly_one_event(stream):
+    heard, telemetry = stream
+    decoder = decoder_for(heard, telemetry)
+    events = decoder.feed_symbols(heard.symbols) + decoder.flush()
+    assert b"".join(event.data for event in events) == bytes(byte for byte, *_ in heard.symbols)
+    ticks = [tick for *_, tick in heard.symbols]
+    place = 0
+    for event in events:
+        assert event.start_tick == ticks[place]
+        place += len(event.data)
+        assert isinstance(event, Damaged) or event.last_tick == ticks[place - 1]
+
+
+@settings(deadline=None)
+@given(streams, st.integers(0, 200))
+def test_a_restored_snapshot_goes_on_as_the_decoder_would_have(stream, place):
+    heard, telemetry = stream
+    decoder, other = decoder_for(heard, telemetry), decoder_for(heard, telemetry)
+    decoder.feed_symbols(heard.symbols[:place])
+    other.feed(b"something else\x2d\xd4")
+    other.restore(decoder.snapshot())
+    assert other.feed_symbols(heard.symbols[place:]) == decoder.feed_symbols(heard.symbols[place:])
+    assert other.flush() == decoder.flush()
+    assert other.snapshot() == decoder.snapshot()
+
+
+@settings(deadline=None)
+@given(st.booleans().flatmap(lambda up: st.tuples(valid_streams(telemetry=up), st.just(up))))
+def test_undamaged_frames_all_come_out_in_order_with_their_preambles(stream):
+    heard, telemetry = stream
+    decoder = decoder_for(heard, telemetry)
+    events = decoder.feed_symbols(heard.symbols)
+    assert messages(events, heard.n) == list(heard.sent)
+    assert b"".join(event.data for event in events).count(b"\xff\x2d\xd4") >= len(heard.sent)
+    assert decoder.flush() == []
+    assert decoder.rejected == 0
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(st.booleans(), st.binary(max_size=60))), st.sampled_from([3, 5]))
+@example(noise=[(False, b"\x55\xff\x2d\xd4")], n=3)
+@example(noise=[(False, b"\x2d\xd4" * 20)], n=5)
+def test_the_first_undamaged_frame_after_any_garbage_is_taken(noise, n):
+    decoder, naive = Decoder(n), NaiveDecoder(5 + 4 * n, 0x10 | n, LEAD, module.RUN_LIMIT)
+    tick, events = 0, []
+    for pause, data in [*noise, (False, FRAMES[n])]:
+        if pause:
+            decoder.gap()
+            tick += 25000
+        events += decoder.feed(data)
+        for place, byte in enumerate(data):
+            naive.character(byte, True, tick, after_gap=pause and place == 0)
+            tick += 25000
+    assert isinstance(events[-1], Received)
+    assert messages(events, n)[-1] == TeamFrame(0, 7, ((100, -100),) * n)
+    assert [(type(event), event.data) for event in events] == [
+        (type(event), event.data) for event in naive.flush()
+    ]
+
+
+@pytest.mark.parametrize("n", [3, 5])
+def test_a_preamble_cut_short_by_key_up_is_taken_as_far_as_it_is_intact(n):
+    damaged, frame = Decoder(n).feed(b"\x12" + FRAMES[n][2:])
+    assert damaged == Damaged(b"\x12", Reason.NO_SYNC, 0)
+    assert frame.data == FRAMES[n][2:]
+    assert frame.start_tick == 25000
+
+
+def one_reason(symbols, n=3):
+    decoder = Decoder(n)
+    assert decoder.feed_symbols(symbols) == []
+    (event,) = decoder.flush()
+    assert isinstance(event, Damaged)
+    return event.reason, decoder.rejected
+
+
+def on_time(data, bit=2500):
+    return [(byte, True, place * 10 * bit) for place, byte in enumerate(data)]
+
+
+def test_garbage_without_a_sync_is_called_so():
+    assert one_reason(on_time(b"\x55\xff\x2dnothing here at all, whatever\xd4")) == (Reason.NO_SYNC, 0)
+
+
+def test_a_frame_that_the_input_ends_in_is_cut_short():
+    assert one_reason(on_time(FRAMES[3][:-1])) == (Reason.CUT_SHORT, 0)
+
+
+def test_a_bad_stop_bit_in_the_window_is_named_and_not_counted_as_rejected():
+    for place in range(6, 23):
+        symbols = on_time(FRAMES[3])
+        symbols[place] = (symbols[place][0], False, symbols[place][2])
+        assert one_reason(symbols) == (Reason.BAD_STOP_BIT, 0)
+
+
+def test_a_bad_stop_bit_in_the_preamble_harms_nothing():
+    symbols = [(byte, place >= 6, tick) for place, (byte, _, tick) in enumerate(on_time(FRAMES[3]))]
+    events = Decoder(3).feed_symbols(symbols)
+    assert [type(event) for event in events] == [Damaged, Received]
+    assert events[1].data == FRAMES[3][6:]
+
+
+def test_a_wrong_crc_is_named_and_counted_as_rejected():
+    assert one_reason(on_time(FRAMES[3][:-1] + b"\0")) == (Reason.BAD_CRC, 1)
+
+
+def test_a_pause_anywhere_inside_the_window_is_bad_spacing():
+    for place in range(7, 23):
+        symbols = [
+            (byte, good, tick + 1920 * (at >= place))
+            for at, (byte, good, tick) in enumerate(on_time(FRAMES[3]))
+        ]
+        assert one_reason(symbols) == (Reason.BAD_SPACING, 0)
+
+
+def test_a_pause_before_the_sync_harms_nothing():
+    decoder = Decoder(3)
+    first = decoder.feed(FRAMES[3][:6])
+    decoder.gap()
+    events = first + decoder.feed(FRAMES[3][6:])
+    assert [type(event) for event in events] == [Damaged, Received]
+
+
+@pytest.mark.parametrize(
+    ("spacing", "accepted"), [(23759, 0), (23760, 1), (24960, 1), (26160, 1), (26161, 0)]
+)
+def test_the_spacing_limits_are_1040_us_and_50_us_either_side_inclusive(spacing, accepted):
+    for late in range(7, 23):  # one spacing differs, the others are the robot's own character
+        decoder, tick, symbols = Decoder(3), 0, []
+        for place, byte in enumerate(FRAMES[3]):
+            tick += spacing if place == late else 24960
+            symbols.append((byte, True, tick))
+        decoder.feed_symbols(symbols)
+        assert decoder.valid == accepted
+
+
+@settings(deadline=None)
+@given(team_frames(3))
+def test_a_robot_of_another_network_size_takes_no_frame(frame):
+    decoder = Decoder(5)
+    decoder.feed(encode(frame, 3) * 3)
+    assert decoder.valid == 0
+
+
+def test_feeding_bytes_at_a_tick_measures_the_pause_before_them():
+    decoder = Decoder(3)
+    head, tail = FRAMES[3][:10], FRAMES[3][10:]
+    decoder.feed(head, 1000)
+    (frame,) = decoder.feed(tail, 1000 + 250_000 + 480)
+    assert (frame.start_tick, frame.last_tick) == (1000, 1000 + 250_480 + 12 * 25000)
+    decoder.feed(head, 2_000_000)
+    assert decoder.feed(tail, 2_000_000 + 250_000 + 1920) == []
+
+
+def test_a_run_of_garbage_is_given_out_in_pieces_so_that_memory_stays_bounded():
+    decoder = Decoder(5)
+    events = [event for _ in range(100) for event in decoder.feed(b"\x2d\xd4" * 500)]
+    assert {len(event.data) for event in events} == {module.RUN_LIMIT}
+    assert {event.reason for event in events} == {Reason.BAD_CRC}
+    assert len(decoder.snapshot()["_data"]) < module.RUN_LIMIT + table.DOWNLINK[5].size
+
+
+def test_a_flushed_decoder_starts_afresh_but_keeps_its_counters():
+    decoder = Decoder(3)
+    decoder.feed(FRAMES[3] + FRAMES[3][:10])
+    decoder.flush()
+    assert decoder.feed(FRAMES[3][10:]) == []
+    assert decoder.valid == 1
+    assert "1 valid, 0 rejected, 13 characters pending" in repr(decoder)

@@ -1,0 +1,116 @@
+"""The codec: what is sent comes back, what may not be sent is refused by name, sizes are the contract's."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_protocol import frames, table
+from miro_protocol.frames import ContentError, ServiceFrame, TeamFrame, TelemetryFrame, encode
+from miro_protocol.strategies import host_frames, robot_counts, telemetry_frames
+from miro_protocol.whitening import whiten
+
+STOPPED = ((0, 0),) * 3
+
+
+def body_of(wire: bytes) -> bytes:
+    return whiten(wire[wire.index(b"\x2d\xd4") + 2 :])[:-2]
+
+
+@settings(deadline=None)
+@given(st.data(), robot_counts())
+def test_every_message_comes_back_as_it_was_sent(data, n):
+    message = data.draw(st.one_of(host_frames(n), telemetry_frames(n)))
+    assert frames.decode_fields(body_of(encode(message, n)), n) == message
+
+
+@settings(deadline=None)
+@given(st.data(), robot_counts())
+def test_all_host_frames_of_a_network_have_the_same_length(data, n):
+    assert len(encode(data.draw(host_frames(n)), n)) == {3: 23, 5: 31}[n]
+
+
+def test_frames_last_as_long_on_the_air_as_the_contract_says():
+    air_ms = {name: form.air_ticks / table.TICKS_PER_MS for name, form in table.DOWNLINK.items()}
+    assert air_ms[3] == pytest.approx(24.0, abs=0.05)
+    assert air_ms[5] == pytest.approx(32.3, abs=0.05)
+    assert table.TELEMETRY.wire_size == 19
+    assert table.TELEMETRY.air_ticks / table.TICKS_PER_MS == pytest.approx(19.8, abs=0.05)
+
+
+def test_the_longest_frame_with_key_up_fits_one_camera_frame():
+    assert table.DOWNLINK[5].air_ticks + table.KEYUP_TICKS < 800_800
+
+
+def test_a_frame_written_out_by_hand():
+    wire = encode(TeamFrame(0, 3, ((1, -2), (300, -300), (32767, -32767))), 3)
+    assert wire[:8] == bytes.fromhex("55 55 55 55 55 ff 2d d4")
+    assert body_of(wire) == bytes.fromhex("03  01 00 fe ff  2c 01 d4 fe  ff 7f 01 80")
+
+
+def test_a_service_payload_is_slot_opcode_data_and_zeros():
+    wire = encode(ServiceFrame.filter(9, 2, 0x1234, 5, 6, 7), 3)
+    assert body_of(wire) == bytes.fromhex("49  02 01  34 12  05 00  06 00  07 00  00 00")
+
+
+def test_a_telemetry_payload_carries_slot_and_flags_in_its_first_byte():
+    frame = TelemetryFrame(
+        1, 2, int(table.Flags.STOPPED | table.Flags.MOTORS_OFF), 3, 4, 0x1234, 0x5678, 9, 10
+    )
+    assert body_of(encode(frame, 3)) == bytes.fromhex("81  1a 03 04  34 12  78 56  09 0a")
+
+
+REFUSED = [
+    (TeamFrame(0, 0, ((0, 0), (-32768, 0), (0, 0))), 3, r"slot 1 left = -32768: must be -32767\.\.32767"),
+    (TeamFrame(0, 0, ((0, 0), (0, 0), (0, 32768))), 3, r"slot 2 right = 32768: must be -32767\.\.32767"),
+    (TeamFrame(0, 64, STOPPED), 3, r"seq = 64: must be 0\.\.63"),
+    (TeamFrame(0, -1, STOPPED), 3, r"seq = -1: must be 0\.\.63"),
+    (TeamFrame(1, 0, STOPPED), 3, r"type = 1: a team frame has type 0 or 3"),
+    (TeamFrame(0, 0, STOPPED), 5, r"velocities for 3 robots: this network has 5"),
+    (TeamFrame(0, 0, STOPPED), 4, r"n = 4: a network has 3 or 5"),
+    (TelemetryFrame(0, 0), 11, r"n = 11: a network has 3 or 5"),
+    (ServiceFrame.ping(0, 3), 3, r"slot = 3: must be 0\.\.2"),
+    (ServiceFrame(0, 0, 3), 3, r"opcode = 3: must be 0\.\.2"),
+    (ServiceFrame.filter(0, 0, 0x8000, 0, 0, 0), 3, r"kp = 32768: must be 0\.\.32767"),
+    (ServiceFrame.acceleration(0, 0, 0), 3, r"acceleration = 0: must be 1\.\.1073741823"),
+    (ServiceFrame(0, 0, 0, (1,)), 3, r"ping with 1 values: it takes 0"),
+    (TelemetryFrame(0, 5), 5, r"slot = 5: must be 0\.\.4"),
+    (TelemetryFrame(0, 0, flags=0x40), 3, r"flags = 0x40: only bits of 0x38"),
+    (TelemetryFrame(0, 0, position_left=65536), 3, r"position_left = 65536: must be 0\.\.65535"),
+]
+
+
+@pytest.mark.parametrize(("message", "n", "complaint"), REFUSED)
+def test_what_may_not_be_sent_is_refused_by_field_value_and_limits(message, n, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        encode(message, n)
+
+
+def test_a_number_that_is_not_whole_is_a_type_error():
+    with pytest.raises(TypeError):
+        encode(TeamFrame(0, 0, ((0.5, 0), (0, 0), (0, 0))), 3)
+
+
+@pytest.mark.parametrize(
+    ("body", "complaint"),
+    [
+        ("00" + "0080" + "00" * 10, "left = -32768"),
+        ("40" + "0003" + "00" * 10, "opcode 3"),
+        ("40" + "0300" + "00" * 10, "slot = 3"),
+        ("40" + "0000" + "00" * 9 + "01", "does not account for all"),
+        ("80" + "00" * 12, "does not account for all"),
+    ],
+)
+def test_a_body_that_no_rightful_host_sends_is_a_content_error(body, complaint):
+    with pytest.raises(ContentError, match=complaint):
+        frames.decode_fields(bytes.fromhex(body), 3)
+
+
+@settings(deadline=None)
+@given(robot_counts(), st.data())
+def test_any_body_at_all_is_a_message_or_a_content_error(n, data):
+    size = table.DOWNLINK[n].body_size
+    body = data.draw(st.binary(min_size=size, max_size=size))
+    try:
+        message = frames.decode_fields(body, n)
+    except ContentError:
+        return
+    assert body_of(encode(message, n)) == body
