@@ -1,0 +1,51 @@
+"""What firmware must not do: the kinds of fault, and the record of one.
+
+What belongs here: naming them. Finding them is the job of the chip that sees them (CPU, LM629, board);
+whether one stops the run is the scenario's.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import msgspec
+
+
+class FaultKind(IntEnum):
+    """Numbers are part of recordings: append, never renumber."""
+
+    UNDEFINED_OPCODE = 1
+    STACK_OVERFLOW = 2
+    STACK_UNDERFLOW = 3
+    OUTSIDE_IMAGE = 4
+    BUS_CONTENTION = 5
+    LM629_BUSY = 6
+    LM629_TIMING = 7
+    MAIN_LOOP_STARVED = 8
+    POWER_DOWN = 9
+
+
+DESCRIPTIONS = {
+    FaultKind.UNDEFINED_OPCODE: "executed the undefined opcode A5",
+    FaultKind.STACK_OVERFLOW: "pushed past the end of internal RAM (SP FF to 00)",
+    FaultKind.STACK_UNDERFLOW: "popped below the start of internal RAM (SP 00 to FF)",
+    FaultKind.OUTSIDE_IMAGE: "executed outside the loaded image",
+    FaultKind.BUS_CONTENTION: "let two chips drive the data bus",
+    FaultKind.LM629_BUSY: "wrote to an LM629 while it was busy",
+    FaultKind.LM629_TIMING: "broke an LM629 bus timing limit",
+    FaultKind.MAIN_LOOP_STARVED: "left the main loop no time",
+    FaultKind.POWER_DOWN: "entered power-down, which only a reset leaves",
+}
+
+
+class FirmwareFault(msgspec.Struct, frozen=True):
+    """One fault: what, when (tick of 24 MHz), at which instruction, inside which symbol ("" if unknown)."""
+
+    kind: FaultKind
+    tick: int
+    pc: int
+    symbol: str = ""
+
+    def __str__(self) -> str:
+        place = f"{self.pc:#06x}" + (f" in {self.symbol}" if self.symbol else "")
+        return f"firmware {DESCRIPTIONS[self.kind]} at {place}, tick {self.tick}"

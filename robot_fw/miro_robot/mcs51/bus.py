@@ -1,0 +1,30 @@
+"""What the CPU can reach: the only way from it to the outside.
+
+What belongs here: the calls a CPU makes, with their default (nothing connected). What the calls do belongs to
+the board. Input goes the other way, pushed by the board: `Cpu.set_external` and the `rxd` Line.
+All ticks are those of the 24 MHz crystal; a machine cycle is 12 of them.
+"""
+
+from __future__ import annotations
+
+
+class Bus:
+    """A CPU on an empty board. Boards override what they have wired."""
+
+    NOT_STATE = ()
+
+    def port_written(self, port: int, latch: int, tick: int) -> None:
+        """The latch of P0..P3 (`port` 0..3) became `latch`; the pins follow at `tick`, S1P1 of the next cycle."""
+
+    def movx_read(self, address: int, tick: int) -> int:
+        """Byte (0..255) on P0 when the CPU samples it at `tick`, end of S3P1 of the second MOVX cycle."""
+        return 0xFF
+
+    def movx_write(self, address: int, value: int, tick: int) -> None:
+        """/WR goes high at `tick` with `value` on P0."""
+
+    def fault(self, kind: int, pc: int, tick: int) -> None:
+        """The firmware did what it must not (`miro_robot.faults.FaultKind`) at the instruction at `pc`."""
+
+    def byte_sent(self, value: int, tick: int) -> None:
+        """The serial port set TI for the character `value` (its 8 data bits)."""
