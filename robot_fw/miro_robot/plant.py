@@ -1,0 +1,53 @@
+"""What the robot's electronics are wired to: the seam between the board and the physical world.
+
+What belongs here: the base class `Plant`, which is also the plant of a robot on the bench with its motors
+unplugged: nothing turns, no encoder edge ever comes. What does not: physics, which lives above the
+electronics. Time is in ticks of the 24 MHz crystal.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+FAR = 1 << 62  # "never", in ticks
+LEFT = 0
+RIGHT = 1
+
+
+class Plant:
+    """Two motors with encoders, driven by two halves of an L298 and read by two LM629.
+
+    The board calls `advance` at every tick at which one of its own outputs may change (PWM edges, samples)
+    and at `next_tick`, then `set_bridge` for what has changed: the grid of steps is fixed by the robot
+    alone, so the bits do not depend on who looks when. A plant calls `left.set_encoder(tick, a, b)` and
+    `right.set_encoder(tick, a, b)` for every encoder edge, in tick order, left before right on one tick.
+    """
+
+    NOT_STATE = ("left", "right")  # wiring
+
+    def __init__(self) -> None:
+        self.left: Any = None
+        self.right: Any = None
+        self.next_tick = FAR
+
+    def attach(self, left: Any, right: Any) -> None:
+        """Wires the encoder outputs to the two LM629."""
+        self.left = left
+        self.right = right
+
+    def advance(self, tick: int) -> None:
+        """Integrates to `tick` and reports every encoder edge up to and including it."""
+
+    def set_bridge(self, tick: int, side: int, enable: int, forward: int) -> None:
+        """L298 inputs of one side (0 left, 1 right) from `tick` on: enable pin; 1 forward, 0 backward."""
+
+    def snapshot(self) -> dict[str, object]:
+        """All mutable state."""
+        return {"next_tick": self.next_tick}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Takes back what `snapshot` gave."""
+        self.next_tick = state["next_tick"]
+
+    def __repr__(self) -> str:
+        return "Plant(motors unplugged)"

@@ -1,0 +1,102 @@
+"""What a robot's drive is made of: the figures of the default robot, each with its source.
+
+What belongs here: frozen, checked parameter structures in SI units and what follows from them by plain
+arithmetic. What does not: equations of motion, state.
+
+Sources: Faulhaber 2224 006 SR catalogue figures, which close on themselves (no-load speed, stall torque and
+the 11 ms time constant follow from them); ST L298 data sheet, total saturation drop; the robot is a MiroSot
+cube of 7.5 cm and 0.5 kg.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+GRAVITY_M_S2 = 9.81
+
+
+MAY_BE_ZERO = ("friction_nm", "rolling_resistance", "drop_v", "drop_ohm", "diode_v")
+
+
+class _Positive(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Numbers that must be finite and above zero (those in MAY_BE_ZERO: not below)."""
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            if isinstance(value, msgspec.Struct):
+                continue
+            zero_is_fine = name in MAY_BE_ZERO
+            limit = "0 or above" if zero_is_fine else "above 0"
+            if not (0.0 <= value < 1e12) or (value == 0 and not zero_is_fine):
+                raise ValueError(f"{name} must be {limit}, got {value!r}")
+
+
+class Motor(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A DC motor with precious-metal commutation: Faulhaber 2224 006 SR."""
+
+    resistance_ohm: float = 1.94
+    inductance_h: float = 45e-6
+    torque_constant_nm_a: float = 6.92e-3  # also V s / rad
+    rotor_inertia_kg_m2: float = 2.7e-7
+    friction_nm: float = 0.2e-3  # Coulomb, at the motor shaft: torque constant times 29 mA
+
+
+class Bridge(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """L298 with external fast diodes: total drop (source + sink) = drop_v + drop_ohm * |current|."""
+
+    drop_v: float = 1.0
+    drop_ohm: float = 1.35  # 2.35 V at 1 A, 3.7 V at 2 A (typical)
+    diode_v: float = 1.0  # each of the two that conduct
+
+
+class Battery(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Six NiCd cells. Each motor sees the internal resistance by itself (no mutual sag)."""
+
+    voltage_v: float = 7.2
+    resistance_ohm: float = 0.15
+
+
+class Chassis(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Two driven wheels on one axle through the centre of mass, two low-friction skids."""
+
+    mass_kg: float = 0.5
+    yaw_inertia_kg_m2: float = 4.7e-4  # 0.5 kg * (0.075**2 + 0.075**2) / 12
+    track_m: float = 0.068
+    wheel_radius_m: float = 0.020
+    left_radius_factor: float = 1.0  # real radius of this wheel / wheel_radius_m
+    right_radius_factor: float = 1.0
+    gear_ratio: float = 8.0
+    gear_efficiency: float = 0.8  # acts on the rolling resistance only
+    rolling_resistance: float = 0.03  # force / weight
+
+
+class Encoder(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Optical encoder on the motor shaft; the LM629 counts every state change, 4 per line."""
+
+    lines: int = 512
+
+
+class DriveParams(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Everything `DifferentialDrive` needs to know about a robot."""
+
+    motor: Motor = Motor()
+    bridge: Bridge = Bridge()
+    battery: Battery = Battery()
+    chassis: Chassis = Chassis()
+    encoder: Encoder = Encoder()
+
+    def radius_m(self, side: int) -> float:
+        """Wheel radius of side 0 (left) or 1 (right)."""
+        body = self.chassis
+        return body.wheel_radius_m * (body.right_radius_factor if side else body.left_radius_factor)
+
+    def friction_nm(self) -> float:
+        """Coulomb friction of one motor and half the robot's rolling resistance, at the motor shaft."""
+        body = self.chassis
+        rolling = 0.5 * body.rolling_resistance * body.mass_kg * GRAVITY_M_S2 * body.wheel_radius_m
+        return self.motor.friction_nm + rolling / (body.gear_ratio * body.gear_efficiency)
+
+    def counts_per_radian(self) -> float:
+        """Encoder counts per radian of the motor shaft."""
+        return 4.0 * self.encoder.lines / 6.283185307179586
