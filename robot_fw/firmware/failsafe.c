@@ -1,0 +1,88 @@
+/* The age of the last fresh frame: which frame is fresh, when the wheels stop, when the motors go off.
+ *
+ * What belongs here: Timer 1 as the tick, the contract's 150, 110 and 500 ms. What does not: how to stop (motion.c).
+ *
+ * Every fresh frame restarts Timer 1, so the age does not depend on where the frame fell between two ticks.
+ */
+
+#include "failsafe.h"
+
+#include "decode.h"
+#include "motion.h"
+#include "protocol.h"
+#include "uart.h"
+
+/* Cycles for which the interrupt holds Timer 1; counted in failsafe.asm, checked by test_failsafe.py. */
+#define HELD_CYCLES     6
+#define RELOAD          (65536UL - CYCLES_PER_MS)
+#define AGE_MAX         1000
+
+u16 frames_accepted, frames_stale;
+u8 last_hdr;
+u8 failsafe_flags;
+volatile u8 ticks;                  /* milliseconds, wraps */
+u8 ticks_taken;
+
+static u16 age;                     /* ms since the last fresh frame, stays at AGE_MAX */
+static __bit heard;                 /* there was one */
+
+static void restart(void)
+{
+    TR1 = 0;
+    TF1 = 0;
+    TL1 = RELOAD & 0xFF;
+    TH1 = RELOAD >> 8;
+    ticks_taken = ticks;
+    age = 0;
+    TR1 = 1;
+}
+
+void failsafe_start(void)
+{
+    restart();
+    ET1 = 1;
+}
+
+/* Whether the valid frame in `body` is fresh; if so it restarts the failsafe. */
+bool failsafe_fresh(void)
+{
+    u8 step = (HDR - last_hdr) & SEQ_MASK;
+
+    if (heard && (!step || (step > FRESH_STEPS && age + (u8)(ticks - ticks_taken) < FRESH_AGAIN_MS))) {
+        ++frames_stale;
+        return false;
+    }
+    restart();
+    heard = 1;
+    last_hdr = HDR;
+    ++frames_accepted;
+    return true;
+}
+
+/* A millisecond has passed. */
+void failsafe_tick(void)
+{
+    ++ticks_taken;
+    if (age != AGE_MAX)
+        ++age;
+    if (age == FAILSAFE_STOP_MS) {
+        motion_stop();
+        failsafe_flags |= FLAG_STOPPED;
+    } else if (age == FAILSAFE_OFF_MS) {
+        motion_off();
+        failsafe_flags |= FLAG_MOTORS_OFF;
+    }
+    motion_tick();
+}
+
+/* Adds the reload to what Timer 1 has counted since it overflowed, so the latency does not add up. The low bytes must
+ * not carry: latency below 200 cycles. */
+void failsafe_interrupt(void) __interrupt(TF1_VECTOR)
+{
+    TR1 = 0;
+    TL1 += (RELOAD + HELD_CYCLES) & 0xFF;
+    TH1 = RELOAD >> 8;
+    TR1 = 1;
+    ++ticks;
+    sleep = 0;
+}
