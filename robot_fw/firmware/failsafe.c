@@ -2,7 +2,9 @@
  *
  * What belongs here: Timer 1 as the tick, the contract's 150, 110 and 500 ms. What does not: how to stop (motion.c).
  *
- * Every fresh frame restarts Timer 1, so the age does not depend on where the frame fell between two ticks.
+ * Every fresh frame restarts Timer 1, so the age does not depend on where the frame fell between two ticks. It counts
+ * from the frame's last character, not from the end of its decoding, and it runs ahead by the time that the command to
+ * stop takes: the wheels are told to stop 110 ms after that character, not later.
  */
 
 #include "failsafe.h"
@@ -17,6 +19,15 @@
 #define RELOAD          (65536UL - CYCLES_PER_MS)
 #define AGE_MAX         1000
 
+/* Cycles from a frame's last character to failsafe_fresh(), and from failsafe_tick() to the STT of a stop. */
+#define DECODING_3      2200
+#define DECODING_5      3300
+#define STOPPING        300
+/* What the age is when a frame turns out to be fresh: a full millisecond and a part of the next. */
+#define AGE_AT_RESTART  1
+#define FIRST_TICK_3    (65536UL - 2 * CYCLES_PER_MS + DECODING_3 + STOPPING)
+#define FIRST_TICK_5    (65536UL - 2 * CYCLES_PER_MS + DECODING_5 + STOPPING)
+
 u16 frames_accepted, frames_stale;
 u8 last_hdr;
 u8 failsafe_flags;
@@ -28,12 +39,14 @@ static __bit heard;                 /* there was one */
 
 static void restart(void)
 {
+    u16 first = robots == 3 ? FIRST_TICK_3 : FIRST_TICK_5;
+
     TR1 = 0;
     TF1 = 0;
-    TL1 = RELOAD & 0xFF;
-    TH1 = RELOAD >> 8;
+    TL1 = first & 0xFF;
+    TH1 = first >> 8;
     ticks_taken = ticks;
-    age = 0;
+    age = AGE_AT_RESTART;
     TR1 = 1;
 }
 
@@ -43,12 +56,18 @@ void failsafe_start(void)
     ET1 = 1;
 }
 
+/* Time since the last fresh frame is FRESH_AGAIN_MS or more. By now the age runs ahead by up to 2 ms. */
+static bool fresh_again(void)
+{
+    return age + (u8)(ticks - ticks_taken) >= FRESH_AGAIN_MS + 2;
+}
+
 /* Whether the valid frame in `body` is fresh; if so it restarts the failsafe. */
 bool failsafe_fresh(void)
 {
     u8 step = (HDR - last_hdr) & SEQ_MASK;
 
-    if (heard && (!step || (step > FRESH_STEPS && age + (u8)(ticks - ticks_taken) < FRESH_AGAIN_MS))) {
+    if (heard && (!step || (step > FRESH_STEPS && !fresh_again()))) {
         ++frames_stale;
         return false;
     }
@@ -76,7 +95,7 @@ void failsafe_tick(void)
 }
 
 /* Adds the reload to what Timer 1 has counted since it overflowed, so the latency does not add up. The low bytes must
- * not carry: latency below 200 cycles. */
+ * not carry: the latency stays below 200 cycles. */
 void failsafe_interrupt(void) __interrupt(TF1_VECTOR)
 {
     TR1 = 0;

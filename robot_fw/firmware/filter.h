@@ -3,10 +3,10 @@
 #ifndef FILTER_H
 #define FILTER_H
 
-#define FILTER_DS       0       /* derivative interval: every sample */
-#define FILTER_KP       60
-#define FILTER_KI       20
-#define FILTER_KD       400
-#define FILTER_IL       4000
+#define FILTER_DS       3       /* derivative over 4 samples: a quarter of the noise for the same damping */
+#define FILTER_KP       400
+#define FILTER_KI       40
+#define FILTER_KD       3000
+#define FILTER_IL       2000
 
 #endif
