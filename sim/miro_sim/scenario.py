@@ -156,9 +156,10 @@ class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         characters = FRAME_CHARACTERS[self.robots]
         needed = characters * CHARACTER_TICKS + round(self.radio.keyup_s * 24e6)
         if self.radio.carrier == "keyed" and needed > PERIOD_TICKS:
+            longest_s = (PERIOD_TICKS - characters * CHARACTER_TICKS) / 24e6
             raise ValueError(
                 f"radio.keyup_s: {self.radio.keyup_s} s and a frame of {characters} characters do"
-                f" not fit the camera period; at most {(PERIOD_TICKS - characters * CHARACTER_TICKS) / 24e6:.6f} s"
+                f" not fit the camera period; at most {longest_s:.6f} s"
             )
 
 

@@ -1,0 +1,201 @@
+"""What is wrong with a scenario, in one line: file, key path, what, and what to write instead.
+
+What belongs here: the words. msgspec finds the faults and says where; this file turns that into the file's
+own terms. What does not: reading files (`scenario_file`) and the rules themselves (`scenario`).
+"""
+
+import re
+from difflib import get_close_matches
+from typing import Any
+
+import msgspec
+
+from miro_sim.scenario import Scenario
+
+UNITS = {
+    "s": "seconds",
+    "cm": "centimetres",
+    "m": "metres",
+    "rad": "radians",
+    "deg": "degrees",
+    "hz": "hertz",
+    "db": "decibels",
+    "m_s": "metres per second",
+    "rad_s": "radians per second",
+    "m_s2": "metres per second squared",
+    "rad_s2": "radians per second squared",
+    "per_s": "1/s",
+    "per_m": "1/m",
+}
+MORE_UNITS = ("ms", "us", "ns", "min", "mm", "km", "turns", "khz", "mhz", "ticks", "cm_s", "deg_s", "pct")
+TYPE_NAMES = {
+    "float": "a number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "str": "a string",
+    "array": "an array of tables",
+    "object": "a table",
+}
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be used: `origin` (file or built-in name), `place` (key path or line), what,
+    remedy.
+    """
+
+    def __init__(self, origin: str, place: str, what: str, remedy: str = "") -> None:
+        self.origin = origin
+        self.place = place
+        self.what = what
+        self.remedy = remedy
+        head = f"{origin}: {place}: {what}" if place else f"{origin}: {what}"
+        super().__init__(one_line(f"{head}; {remedy}" if remedy else head))
+
+
+def one_line(text: str) -> str:
+    """The text with everything that a terminal would not print as it stands escaped."""
+    return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)
+
+
+def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError:
+    """What msgspec found, in the words of the file: path without `$`, and a remedy."""
+    match = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
+    assert match is not None
+    what, path = match[1], match[2] or ""
+    unknown = re.fullmatch(r"(?s)Object contains unknown field `(.*)`", what)
+    if unknown:
+        known = _keys_at(raw, path)
+        place = f"{path}.{unknown[1]}" if path else unknown[1]
+        return ScenarioError(origin, place, "unknown key", remedy_for_key(unknown[1], known))
+    missing = re.fullmatch(r"Object missing required field `(.*)`", what)
+    if missing:
+        place = f"{path}.{missing[1]}" if path else missing[1]
+        return ScenarioError(origin, place, "this key is missing", _choices_of(missing[1]))
+    inner = re.fullmatch(r"(?s)([a-z_.]+(?:\[\d+\])?(?:\.[a-z_]+)*): (.*)", what)
+    if inner:  # a rule between keys (`Network.__post_init__`) names the place below its own table
+        path = f"{path}.{inner[1]}" if path else inner[1]
+        what = inner[2]
+    what, _, remedy = what.partition("; ")
+    value = _value_at(raw, path)
+    return ScenarioError(origin, path, *_explain(what, path, value, remedy))
+
+
+def _explain(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
+    wrong_type = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", what)
+    if wrong_type:
+        want = " or ".join(TYPE_NAMES.get(name, name) for name in wrong_type[1].split(" | "))
+        got = TYPE_NAMES.get(wrong_type[2], f"a {wrong_type[2]}")
+        what = f"expected {want}{_unit_of(path)}, got {got}{_shown(value)}"
+        if wrong_type[1] == "array" and isinstance(value, dict):
+            return what, "write its header in double brackets"
+        return what, _quoted_number(wrong_type[1], value)
+    limit = re.fullmatch(r"Expected `\w+` (>=|>|<=|<) (\S+)", what)
+    if limit:
+        return f"{value} is out of range", f"must be {limit[1]} {limit[2]}{_unit_of(path)}"
+    if what.startswith(("Invalid enum value", "Invalid value")):
+        return f"{value!r} is not one of the choices", _choices_of(path.rpartition(".")[2])
+    if "matching regex" in what:
+        return f"{value!r} is not a name", "use a-z, 0-9, - and _, at most 64 characters"
+    return what[:1].lower() + what[1:], remedy
+
+
+def remedy_for_key(key: str, known: list[str]) -> str:
+    """What to write instead of an unknown key: the same quantity in its own unit, or the nearest spelling."""
+    stem = _stem(key)
+    for candidate in known:
+        if _stem(candidate) == stem and candidate != key and unit_name(candidate):
+            return f"use {candidate}, in {unit_name(candidate)}"
+    close = get_close_matches(key, known, n=1)
+    if close:
+        return f"did you mean {close[0]}?"
+    return f"keys here: {', '.join(known)}" if known else "remove it"
+
+
+def unit_name(key: str) -> str:
+    """The unit that ends a key, in words, or the empty string."""
+    for unit in sorted(UNITS, key=len, reverse=True):
+        if key.endswith(f"_{unit}"):
+            return UNITS[unit]
+    return ""
+
+
+def _stem(key: str) -> str:
+    for unit in sorted((*UNITS, *MORE_UNITS), key=len, reverse=True):
+        if key.endswith(f"_{unit}"):
+            return key[: -len(unit) - 1]
+    return key
+
+
+def _unit_of(path: str) -> str:
+    unit = unit_name(path)
+    return f" in {unit}" if unit else ""
+
+
+def _shown(value: Any) -> str:
+    return f" ({value!r})" if isinstance(value, (str, int, float)) else ""
+
+
+def _quoted_number(want: str, value: Any) -> str:
+    """The commonest slip has a remedy of its own: a number, perhaps with its unit, inside quotes."""
+    if want not in ("float", "int") or not isinstance(value, str):
+        return ""
+    number = re.match(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?", value)
+    return "write the number without quotes; the unit stands in the key" if number else ""
+
+
+def _value_at(raw: Any, path: str) -> Any:
+    """What stands at a key path like `network[0].radio.keyup_s`, or None."""
+    for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
+        try:
+            raw = raw[int(index)] if index else raw[key]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return raw
+
+
+def _struct_at(raw: Any, path: str) -> type[msgspec.Struct] | None:
+    """The struct that describes the table at a key path, choosing among tagged ones as the file does."""
+    found: msgspec.inspect.Type = msgspec.inspect.type_info(Scenario)
+    for key, _ in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
+        if key and isinstance(found, msgspec.inspect.StructType):
+            fields = {field.encode_name: field.type for field in found.fields}
+            if key not in fields:
+                return None
+            found = fields[key]
+        if isinstance(found, msgspec.inspect.Metadata):
+            found = found.type
+        if not key and isinstance(found, msgspec.inspect.VarTupleType):
+            found = found.item_type
+    return _chosen(found, _value_at(raw, path))
+
+
+def _chosen(found: msgspec.inspect.Type, value: Any) -> type[msgspec.Struct] | None:
+    options = found.types if isinstance(found, msgspec.inspect.UnionType) else (found,)
+    for option in options:
+        if isinstance(option, msgspec.inspect.StructType):
+            if option.tag_field is None or value.get(option.tag_field) == option.tag:
+                return option.cls
+    return None
+
+
+def _keys_at(raw: Any, path: str) -> list[str]:
+    struct = _struct_at(raw, path)
+    if struct is None:
+        return []
+    tag = struct.__struct_config__.tag_field
+    return [*([tag] if tag else []), *struct.__struct_encode_fields__]
+
+
+CHOICES = {
+    "robots": "3 or 5, the two layouts of a frame",
+    "noise": "gaussian or none",
+    "carrier": "keyed or on",
+    "kind": "line or arc",
+    "law": "yang_kim",
+    "switching": "sign or saturation",
+}
+
+
+def _choices_of(key: str) -> str:
+    choices = CHOICES.get(key)
+    return f"use {choices}" if choices else "add it"

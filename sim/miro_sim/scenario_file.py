@@ -1,0 +1,109 @@
+"""Scenario files: finding one, reading it, and saying in one line what is wrong with it.
+
+What belongs here: TOML text to `Scenario`, and the built-in scenarios. What does not: which keys there are
+(`scenario`), and the words of an error (`scenario_errors`). Nothing but `ScenarioError` leaves these
+functions, whatever the text.
+"""
+
+import math
+import tomllib
+from difflib import get_close_matches
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from miro_sim.scenario import Scenario
+from miro_sim.scenario_errors import ScenarioError, value_error
+
+
+class ScenarioText(msgspec.Struct, frozen=True):
+    """A scenario together with the text it was read from, which is what a recording keeps."""
+
+    origin: str
+    text: str
+    scenario: Scenario
+
+
+def builtin_names() -> list[str]:
+    """Names of the scenarios that come with the package, sorted."""
+    folder = resources.files("miro_sim") / "scenarios"
+    return sorted(entry.name[: -len(".toml")] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def builtin_text(name: str) -> str:
+    """The file of a built-in scenario. Raises ScenarioError for a name that is not one."""
+    names = builtin_names()
+    if name not in names:
+        close = get_close_matches(name, names, n=1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        remedy = f"{hint}built-in scenarios: {', '.join(names)}; a file needs a path that ends in .toml"
+        raise ScenarioError(name, "", "no such scenario", remedy)
+    return (resources.files("miro_sim") / "scenarios" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def load(source: str) -> ScenarioText:
+    """The scenario that `source` names: a file if it ends in .toml or has a path separator, else a
+    built-in.
+    """
+    if not (source.endswith(".toml") or "/" in source or "\\" in source):
+        text = builtin_text(source)
+        return ScenarioText(source, text, parse(text, source))
+    try:
+        raw = Path(source).read_bytes()
+    except FileNotFoundError:
+        raise ScenarioError(
+            source, "", "no such file", "`mirotwin scenarios` lists the built-in ones"
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise ScenarioError(source, "", f"cannot be read: {reason}") from None
+    text = decode(raw, source)
+    return ScenarioText(source, text, parse(text, source))
+
+
+def decode(raw: bytes, origin: str) -> str:
+    """The text of a scenario file. Raises ScenarioError with the line that is not UTF-8."""
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise ScenarioError(origin, f"line {line}", "not UTF-8 text", "save the file as UTF-8") from None
+
+
+def parse(text: str, origin: str) -> Scenario:
+    """TOML text to a Scenario. Raises ScenarioError (and nothing else) naming `origin` and the place."""
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_error(origin, text, str(error)) from None
+    except RecursionError:
+        raise ScenarioError(origin, "", "nested too deeply") from None
+    except ValueError:  # an integer with more digits than Python converts
+        raise ScenarioError(origin, "", "an integer of thousands of digits") from None
+    _check_finite(raw, "", origin)
+    try:
+        return msgspec.convert(raw, Scenario)
+    except msgspec.ValidationError as error:
+        raise value_error(origin, raw, str(error)) from None
+
+
+def _syntax_error(origin: str, text: str, message: str) -> ScenarioError:
+    what, _, place = message.partition(" (at ")
+    place = place.rstrip(")")
+    if place == "end of document":
+        place = f"line {text.count(chr(10)) + 1}"
+    return ScenarioError(origin, place, f"not TOML: {what}")
+
+
+def _check_finite(value: Any, path: str, origin: str) -> None:
+    """Refuses NaN and infinities, which TOML has and no key takes."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            _check_finite(item, f"{path}.{key}" if path else key, origin)
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            _check_finite(item, f"{path}[{index}]", origin)
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise ScenarioError(origin, path, f"{value} is not a number that can be used", "give a finite number")

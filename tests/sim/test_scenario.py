@@ -1,0 +1,207 @@
+"""Scenario files: what is accepted, and the one line that says what is wrong."""
+
+import math
+from pathlib import Path
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_sim.scenario import ArcRef, LineRef, Scenario
+from miro_sim.scenario_file import ScenarioError, builtin_names, builtin_text, load, parse
+
+SMALL = """
+name = "small"
+duration_s = 1
+[[network]]
+[[network.robot]]
+reference.kind = "line"
+"""
+
+
+def refusal(text: str) -> str:
+    with pytest.raises(ScenarioError) as caught:
+        parse(text, "my.toml")
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("my.toml: ")
+    return message
+
+
+def edited(old: str, new: str) -> str:
+    text = builtin_text("fig6")
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+def test_the_built_in_scenarios_are_the_two_figures_of_the_paper() -> None:
+    assert builtin_names() == ["fig6", "fig8"]
+    line, arc = (load(name).scenario.networks[0].robot[0] for name in ("fig6", "fig8"))
+    assert isinstance(line.reference, LineRef)
+    assert (line.start_error_x_cm, line.start_error_y_cm, line.start_error_theta_rad) == (7.09, 1.72, -0.38)
+    assert isinstance(arc.reference, ArcRef)
+    assert (arc.start_error_x_cm, arc.start_error_y_cm, arc.start_error_theta_rad) == (11.20, 28.92, -1.31)
+
+
+@pytest.mark.parametrize("name", ["fig6", "fig8"])
+def test_a_built_in_scenario_names_itself_and_spells_out_every_key(name: str) -> None:
+    loaded = load(name)
+    assert loaded.scenario.name == name
+    raw = msgspec.to_builtins(loaded.scenario)
+    keys = {line.partition("=")[0].strip() for line in loaded.text.splitlines() if "=" in line}
+    robot = raw["network"][0]["robot"][0]
+    tables = [raw, raw["camera"], raw["host"], raw["network"][0]["radio"], robot]
+    tables += [robot["reference"], robot["controller"]]
+    for table in tables:
+        leaves = {key for key, value in table.items() if not isinstance(value, (dict, list, tuple))}
+        assert leaves <= keys
+
+
+def test_what_is_left_out_is_the_realistic_loop() -> None:
+    scenario = parse(SMALL, "small")
+    camera, radio = scenario.camera, scenario.networks[0].radio
+    assert (camera.position_error_cm, camera.heading_error_deg, camera.delay_frames) == (2.40, 4.83, 1)
+    assert scenario.host.compute_s == 0.003
+    assert (radio.carrier, radio.bit_error_rate, radio.keyup_s) == ("keyed", 1e-4, 0.001)
+    assert scenario.networks[0].robot[0].wheel_radius_mismatch == 0.015
+
+
+def test_a_whole_number_is_a_number() -> None:
+    assert parse(SMALL, "small").duration_s == 1.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("duration_s = 6.0", "duration_ms = 6000", "duration_ms: unknown key; use duration_s, in seconds"),
+        (
+            "heading_deg = 0.0",
+            "heading_rad = 0.0",
+            "reference.heading_rad: unknown key; use heading_deg, in degrees",
+        ),
+        ("pixel_cm", "pixels_cm", "camera.pixels_cm: unknown key; did you mean pixel_cm?"),
+        ("[camera]", "[cammera]", "cammera: unknown key; did you mean camera?"),
+        ("duration_s = 6.0", "", "duration_s: this key is missing; add it"),
+        (
+            "duration_s = 6.0",
+            "duration_s = '6 s'",
+            "duration_s: expected a number in seconds, got a string ('6 s')",
+        ),
+        (
+            "duration_s = 6.0",
+            "duration_s = -6.0",
+            "duration_s: -6.0 is out of range; must be > 0.0 in seconds",
+        ),
+        ("duration_s = 6.0", "duration_s = nan", "duration_s: nan is not a number"),
+        ("duration_s = 6.0", "duration_s = inf", "duration_s: inf is not a number"),
+        ("robots = 3", "robots = 4", "network[0].robots: 4 is not one of the choices; use 3 or 5"),
+        (
+            "slot = 0",
+            "slot = 3",
+            "network[0].robot[0]: slot 3 does not exist on a network of 3 robots; use 0 to 2",
+        ),
+        ("slot = 0", "slot = 5", "network[0].robot[0].slot: 5 is out of range; must be <= 4"),
+        ("kind = ", "kid = ", "reference.kind: this key is missing; use line or arc"),
+        ('"line"', '"spiral"', "reference.kind: 'spiral' is not one of the choices; use line or arc"),
+        ("squelch = false", "squelch = 0", "radio.squelch: expected true or false, got a whole number (0)"),
+        (
+            "keyup_s = 0.001",
+            "keyup_s = 0.03",
+            "radio.keyup_s: 0.03 s and a frame of 23 characters do not fit",
+        ),
+        (
+            "[[network]]",
+            "[network]",
+            "network: expected an array of tables, got a table; write its header in double",
+        ),
+        ('name = "fig6"', 'name = "a/b"', "name: 'a/b' is not a name"),
+        ("stop_on_fault = true", "stop_on_fault = yes", "line 9, column 17: not TOML: Invalid value"),
+    ],
+)
+def test_a_bad_key_is_named_with_its_place_and_its_remedy(old: str, new: str, expected: str) -> None:
+    assert expected in refusal(edited(old, new))
+
+
+def test_two_robots_in_one_slot_are_refused() -> None:
+    twice = SMALL + "[[network.robot]]\nreference.kind = 'arc'\n"
+    assert "network[0].robot[1]: slot 0 is taken by robot[0]" in refusal(twice)
+
+
+def test_a_frame_of_five_robots_leaves_no_time_for_a_long_key_up() -> None:
+    five = SMALL.replace("[[network]]", "[[network]]\nrobots = 5\nradio.keyup_s = {}")
+    assert parse(five.replace("{}", "0.001"), "five").networks[0].robots == 5
+    assert "at most 0.001075 s" in refusal(five.replace("{}", "0.0011"))
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "a = " + "9" * 10_000, "\0", "a = 1\na = 2"])
+def test_text_that_breaks_a_toml_parser_is_refused_in_one_line(text: str) -> None:
+    refusal(text)
+
+
+def test_a_name_that_is_no_scenario_gets_the_list_and_the_nearest_one() -> None:
+    with pytest.raises(ScenarioError, match=r"fig7: no such scenario; did you mean fig8\? .*fig6, fig8"):
+        load("fig7")
+
+
+def test_a_path_is_a_file_and_its_text_is_kept_as_it_stands(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(SMALL + "# ä\n", encoding="utf-8")
+    loaded = load(str(path))
+    assert loaded.text == SMALL + "# ä\n"
+    assert loaded.scenario == parse(SMALL, "small")
+    with pytest.raises(ScenarioError, match="no such file"):
+        load(str(tmp_path / "absent.toml"))
+    with pytest.raises(ScenarioError, match="directory"):
+        load(f"{tmp_path}/")
+
+
+def test_a_file_that_is_not_text_is_refused_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "binary.toml"
+    path.write_bytes(b"# one\n# \xff\n")
+    with pytest.raises(ScenarioError, match=r"line 2: not UTF-8 text"):
+        load(str(path))
+
+
+VALUES = st.one_of(
+    st.sampled_from(
+        ["nan", "-inf", "0", "-1", "1e308", "9" * 30, "true", '"x"', "[]", "{}", "1979-05-27", "{a=1}"]
+    ),
+    st.integers().map(str),
+    st.floats().map(str),
+    st.text(max_size=6),
+)
+LINES = builtin_text("fig8").splitlines()
+
+
+@st.composite
+def damaged(draw: st.DrawFn) -> str:
+    """A built-in scenario with some keys renamed, revalued, dropped, or new lines put in."""
+    lines = list(LINES)
+    for _ in range(draw(st.integers(1, 3))):
+        at = draw(st.integers(0, len(lines) - 1))
+        key, _, value = lines[at].partition(" = ")
+        kind = draw(st.sampled_from(["value", "key", "drop", "insert"]))
+        if kind == "value":
+            lines[at] = f"{key} = {draw(VALUES)}"
+        elif kind == "key":
+            lines[at] = f"{draw(st.text(max_size=12))} = {value}"
+        elif kind == "insert":
+            lines.insert(at, f'"{draw(st.text(max_size=12))}" = {draw(VALUES)}')
+        else:
+            del lines[at]
+    return "\n".join(lines)
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.one_of(damaged(), st.text(), st.text(alphabet='[]{}="\n.a1')))
+def test_any_text_is_a_scenario_or_one_line_of_refusal(text: str) -> None:
+    outcome: Scenario | ScenarioError
+    try:
+        outcome = parse(text, "any")
+    except ScenarioError as error:
+        outcome = error
+    if isinstance(outcome, Scenario):
+        assert 0.0 < outcome.duration_s < math.inf
+    else:
+        assert str(outcome).startswith("any: ")
+        assert str(outcome).isprintable()
