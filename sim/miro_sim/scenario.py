@@ -14,6 +14,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from miro_sim.plant.params import DriveParams
+
 PERIOD_TICKS = 800_800
 CHARACTER_TICKS = 25_000  # 10 bits at 9600 baud
 FRAME_CHARACTERS = {3: 23, 5: 31}
@@ -117,8 +119,8 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """One robot: its slot on the network, where it starts, what it follows and who steers it.
 
     The start is the start of the reference plus the errors (captions of the paper's Figs. 6 and 8). Each
-    wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `drive` overrides parameters of
-    the motors and the chassis by name.
+    wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `drive` replaces single
+    parameters of motors, bridges, battery, chassis and encoders (`plant.params`).
     """
 
     slot: Annotated[int, Meta(ge=0, le=4)] = 0
@@ -128,7 +130,7 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     wheel_radius_mismatch: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.015
     reference: LineRef | ArcRef
     controller: YangKim = YangKim()
-    drive: dict[str, float] = {}
+    drive: DriveParams = DriveParams()
 
 
 class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

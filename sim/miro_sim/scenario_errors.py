@@ -26,8 +26,32 @@ UNITS = {
     "rad_s2": "radians per second squared",
     "per_s": "1/s",
     "per_m": "1/m",
+    "kg": "kilograms",
+    "kg_m2": "kilogram square metres",
+    "v": "volts",
+    "ohm": "ohms",
+    "h": "henries",
+    "nm": "newton metres",
 }
-MORE_UNITS = ("ms", "us", "ns", "min", "mm", "km", "turns", "khz", "mhz", "ticks", "cm_s", "deg_s", "pct")
+MORE_UNITS = (
+    "ms",
+    "us",
+    "ns",
+    "min",
+    "mm",
+    "km",
+    "turns",
+    "khz",
+    "mhz",
+    "ticks",
+    "cm_s",
+    "deg_s",
+    "g",
+    "gcm2",
+    "mv",
+    "uh",
+    "mnm",
+)
 TYPE_NAMES = {
     "float": "a number",
     "int": "a whole number",
@@ -75,6 +99,11 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
     if inner:  # a rule between keys (`Network.__post_init__`) names the place below its own table
         path = f"{path}.{inner[1]}" if path else inner[1]
         what = inner[2]
+    limit = re.fullmatch(r"(\w+) must be (.*), got (.*)", what)
+    if limit:  # a parameter of the drive
+        return ScenarioError(
+            origin, f"{path}.{limit[1]}", f"{limit[3]} is out of range", f"must be {limit[2]}"
+        )
     what, _, remedy = what.partition("; ")
     value = _value_at(raw, path)
     return ScenarioError(origin, path, *_explain(what, path, value, remedy))

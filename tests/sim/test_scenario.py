@@ -122,6 +122,18 @@ def test_a_bad_key_is_named_with_its_place_and_its_remedy(old: str, new: str, ex
     assert expected in refusal(edited(old, new))
 
 
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        ("motor.resistance_ohm = -2.0", "drive.motor.resistance_ohm: -2.0 is out of range; must be above 0"),
+        ("chassis.mass_g = 500", "drive.chassis.mass_g: unknown key; use mass_kg, in kilograms"),
+        ("battery.voltage_v = '7.2 V'", "drive.battery.voltage_v: expected a number in volts, got a string"),
+    ],
+)
+def test_parameters_of_the_drive_are_checked_like_keys(lines: str, expected: str) -> None:
+    assert expected in refusal(builtin_text("fig6") + f"[network.robot.drive]\n{lines}\n")
+
+
 def test_two_robots_in_one_slot_are_refused() -> None:
     twice = SMALL + "[[network.robot]]\nreference.kind = 'arc'\n"
     assert "network[0].robot[1]: slot 0 is taken by robot[0]" in refusal(twice)
