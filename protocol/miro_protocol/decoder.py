@@ -230,7 +230,6 @@ class WindowDecoder:
         if start > head:
             self._give_out_damaged(head, start, events)
         end = sync + self.format.size
-        self._reason = Reason.NO_SYNC
         events.append(Received(bytes(self._data[start:end]), self._ticks[start], self._ticks[end - 1], body))
 
     def _lead_start(self, head: int, sync: int) -> int:

@@ -12,7 +12,7 @@ WHITE = pn9(31)
 
 
 class NaiveDecoder:
-    """`size` characters a window, `layout` first in the CRC, `lead` before the sync, garbage cut at `run_limit`."""
+    """Windows of `size`, `layout` first in the CRC, `lead` before the sync, garbage cut at `run_limit`."""
 
     def __init__(self, size, layout, lead, run_limit):
         self.size, self.layout, self.lead, self.run_limit = size, layout, lead, run_limit

@@ -10,6 +10,7 @@ from miro_protocol import table
 from miro_protocol.decoder import Damaged, Decoder, Reason, Received, TelemetryDecoder
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.strategies import Heard, damaged_streams, team_frames, valid_streams
+from miro_protocol.whitening import whiten
 
 from tests.naive.decoder import NaiveDecoder
 
@@ -180,6 +181,16 @@ def test_a_pause_anywhere_inside_the_window_is_bad_spacing():
             for at, (byte, good, tick) in enumerate(on_time(FRAMES[3]))
         ]
         assert one_reason(symbols) == (Reason.BAD_SPACING, 0)
+
+
+def test_a_sync_inside_a_taken_frame_is_not_looked_at_again():
+    left = int.from_bytes(whiten(b"\0\x2d\xd4")[1:], "little", signed=True)
+    wire = encode(TeamFrame(0, 7, ((left, 0), (0, 0), (0, 0))), 3)
+    assert wire[9:11] == b"\x2d\xd4"
+    decoder = Decoder(3)
+    events = decoder.feed(wire + b"\0" * 40) + decoder.flush()
+    assert events[1:] == [Damaged(b"\0" * 40, Reason.NO_SYNC, 23 * 25000)]
+    assert (decoder.valid, decoder.rejected) == (1, 0)
 
 
 def test_a_pause_before_the_sync_harms_nothing():
