@@ -1,0 +1,155 @@
+"""Double buffering: what LTRJ and LFIL load, and what STT and UDF take from it.
+
+A buffer has three faces: the primary registers (written word by word, kept for ever), the copy that an
+accepted STT / UDF has taken of them, and, outside this file, the working registers that get that copy at
+the next sample. Called at the host's pace only, so nothing here is hot.
+"""
+
+from __future__ import annotations
+
+MOTOR_OFF, STOP_ABRUPTLY, STOP_SMOOTHLY = 0x0100, 0x0200, 0x0400
+STOPS = MOTOR_OFF | STOP_ABRUPTLY | STOP_SMOOTHLY
+VELOCITY_MODE, FORWARD = 0x0800, 0x1000
+ACCELERATION, VELOCITY, POSITION = 0x0020, 0x0008, 0x0002
+MASK_30 = 0x3FFFFFFF
+
+
+def signed_31(value: int) -> int:
+    """Sign-extended from bit 30: the chip's position space."""
+    return ((value + 0x40000000) & 0x7FFFFFFF) - 0x40000000
+
+
+class TrajectoryBuffer:
+    """LTRJ's primary registers and the copy an STT has taken.
+
+    `due` holds the parameter bits of the control word that are still to come, `half` the high word of the
+    next one (-1: none yet).
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        self.due = 0
+        self.half = -1
+        self.control = 0
+        self.relative_bits = 0
+        self.acceleration = 0
+        self.velocity = 0
+        self.position = 0
+        self.relative = False
+        self.newer_position = False
+        self.taken = (0, 0, 0, 0, False)
+
+    def begin(self, control: int) -> int:
+        """The control word arrived. Returns how many words follow."""
+        self.control = control & (STOPS | VELOCITY_MODE | FORWARD)
+        self.relative_bits = control
+        self.due = control & (ACCELERATION | VELOCITY | POSITION)
+        self.half = -1
+        return 2 * self.due.bit_count()
+
+    def word(self, word: int, acceleration: int, velocity: int) -> bool:
+        """The next parameter word; the working values are what relative ones add to.
+
+        Returns True when this completed an acceleration.
+        """
+        if self.half < 0:
+            self.half = word
+            return False
+        value = self.half << 16 | word
+        self.half = -1
+        bit = next(bit for bit in (ACCELERATION, VELOCITY, POSITION) if self.due & bit)
+        self.due &= ~bit
+        relative = bool(self.relative_bits & bit >> 1)
+        if bit == ACCELERATION:
+            self.acceleration = (value + (acceleration if relative else 0)) & MASK_30
+        elif bit == VELOCITY:
+            self.velocity = (value + (velocity if relative else 0)) & MASK_30
+        else:
+            self.position = signed_31(value)
+            self.relative = relative
+            self.newer_position = True
+        return bit == ACCELERATION
+
+    def abandon(self) -> None:
+        """Another command came first: a parameter that is not complete is dropped."""
+        self.due = 0
+        self.half = -1
+
+    def take(self) -> None:
+        """STT was accepted: it will act on the registers as they are now; stop bits serve once."""
+        self.taken = (self.control, self.acceleration, self.velocity, self.position, self.relative)
+        self.control &= ~STOPS
+        self.newer_position = False
+
+    def resolve(self, base: int) -> int:
+        """The absolute target of the STT that executes now, kept for the next one."""
+        _, _, _, position, relative = self.taken
+        target = signed_31(base + position) if relative else position
+        if not self.newer_position:
+            self.position = target
+            self.relative = False
+        return target
+
+    def snapshot(self) -> dict[str, object]:
+        return dict(vars(self))
+
+    def restore(self, state: dict[str, object]) -> None:
+        for name, value in state.items():
+            setattr(self, name, value)
+        control, acceleration, velocity, position, relative = self.taken
+        self.taken = (control, acceleration, velocity, position, relative)
+
+
+class FilterBuffer:
+    """LFIL's primary registers and the copy a UDF has taken: (kp, ki, kd, il, ds)."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        self.due = 0
+        self.kp = 0
+        self.ki = 0
+        self.kd = 0
+        self.il = 0
+        self.ds = 0
+        self.taken = (0, 0, 0, 0, 0)
+
+    def begin(self, control: int) -> int:
+        """The control word arrived. Returns how many words follow."""
+        self.ds = control >> 8
+        self.due = control & 0x000F
+        return self.due.bit_count()
+
+    def word(self, word: int) -> None:
+        """The next coefficient, 15 bits, in the order kp, ki, kd, il."""
+        value = word & 0x7FFF
+        bit = 1 << self.due.bit_length() - 1
+        self.due &= ~bit
+        if bit == 8:
+            self.kp = value
+        elif bit == 4:
+            self.ki = value
+        elif bit == 2:
+            self.kd = value
+        else:
+            self.il = value
+
+    def abandon(self) -> None:
+        """Another command came first."""
+        self.due = 0
+
+    def take(self) -> None:
+        """UDF was accepted: it will act on the registers as they are now."""
+        self.taken = (self.kp, self.ki, self.kd, self.il, self.ds)
+
+    def snapshot(self) -> dict[str, object]:
+        return dict(vars(self))
+
+    def restore(self, state: dict[str, object]) -> None:
+        for name, value in state.items():
+            setattr(self, name, value)
+        kp, ki, kd, il, ds = self.taken
+        self.taken = (kp, ki, kd, il, ds)

@@ -1,0 +1,35 @@
+cimport cython
+
+
+cdef long long _FAR
+
+
+@cython.final
+cdef class InputFilter:
+    cdef readonly int direct
+    cdef readonly long long wait
+    cdef public int level, run_level, pin
+    cdef public long long run_tick, pin_tick, due
+
+    cpdef void take(self, int level) noexcept
+    @cython.locals(clock=cython.longlong)
+    cpdef void set(self, long long tick, int level) noexcept
+    cpdef void accept(self) noexcept
+
+
+@cython.final
+cdef class Encoder:
+    cdef readonly InputFilter quadrature, index
+    cdef public int seen, armed, caught
+    cdef public long long counts, caught_counts
+
+    cpdef void clear(self) noexcept
+    @cython.locals(clock=cython.longlong, place=cython.int)
+    cpdef void set_phases(self, long long tick, int a, int b) noexcept
+    cpdef void set_index(self, long long tick, int level) noexcept
+    cpdef void arm(self, long long tick) noexcept
+    @cython.locals(now=cython.longlong)
+    cpdef void settle(self, long long tick) noexcept
+    @cython.locals(before=cython.int, step=cython.int)
+    cdef void _count(self) noexcept
+    cdef void _watch(self) noexcept

@@ -1,0 +1,170 @@
+"""The encoder inputs: digital filter, quadrature decoder, index capture.
+
+Nothing is done per clock: a level is known to count from the moment it has been there long enough, so every
+input keeps the tick at which that will be (`due`). What is made of the counts (positions, flags) is in
+`chip.py`.
+"""
+
+from __future__ import annotations
+
+_FAR = 1 << 62
+
+
+class InputFilter:
+    """One input (A and B together are one): a level counts once `clocks` samples in a row have shown it.
+
+    Samples are taken at multiples of 4 ticks and see the level that was there just before. With 0 clocks
+    there is no sampling at all: a level counts at once. `level` is what counts, `due` the tick at which
+    that will change.
+    """
+
+    NOT_STATE = ("wait", "direct")
+
+    def __init__(self, clocks: int, level: int) -> None:
+        self.wait = 4 * (clocks - 1) if clocks > 0 else 0
+        self.direct = 1 if clocks == 0 else 0
+        self.take(level)
+
+    def take(self, level: int) -> None:
+        """This level has been there for ever."""
+        self.level = level
+        self.run_level = level
+        self.run_tick = 0
+        self.pin = level
+        self.pin_tick = 0
+        self.due = _FAR
+
+    def set(self, tick: int, level: int) -> None:
+        """The pin changes at `tick`. What was due before that must have been taken already (`accept`)."""
+        if self.direct:
+            self.pin = level
+            self.due = tick if level != self.level else _FAR
+            return
+        clock = (tick & -4) + 4
+        if clock > self.pin_tick:
+            if self.pin != self.run_level:
+                self.run_level = self.pin
+                self.run_tick = self.pin_tick
+            self.pin_tick = clock
+        self.pin = level
+        if level == self.level:
+            self.due = _FAR
+        elif level == self.run_level:
+            self.due = self.run_tick + self.wait
+        else:
+            self.due = clock + self.wait
+
+    def accept(self) -> None:
+        """The level at the pin counts from now on."""
+        self.level = self.pin
+        self.due = _FAR
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "level": self.level,
+            "run_level": self.run_level,
+            "run_tick": self.run_tick,
+            "pin": self.pin,
+            "pin_tick": self.pin_tick,
+            "due": self.due,
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        for name, value in state.items():
+            setattr(self, name, value)
+
+
+class Encoder:
+    """Counts quadrature states and catches the index.
+
+    `counts`: counts since the chip last took them (the chip sets it back to 0). While `armed`, the first
+    moment at which A, B and /IN are all low puts `counts` into `caught_counts`, sets `caught` and disarms.
+    Quadrature states are held as their place in the forward order: (A,B) = 00, 10, 11, 01 -> 0, 1, 2, 3.
+    """
+
+    def __init__(self, filter_clocks: int) -> None:
+        self.quadrature = InputFilter(filter_clocks, 0)
+        self.index = InputFilter(filter_clocks, 1)
+        self.seen = 0
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget counts and captures (reset); the inputs go on being watched."""
+        self.counts = 0
+        self.armed = 0
+        self.caught = 0
+        self.caught_counts = 0
+
+    def set_phases(self, tick: int, a: int, b: int) -> None:
+        """Levels of A and B from `tick` on. The first call tells where the wheel stands, nothing counts."""
+        place = (b + b) | (a ^ b)
+        if not self.seen:
+            self.seen = 1
+            self.quadrature.take(place)
+            return
+        if self.quadrature.direct:
+            self.quadrature.set(tick, place)
+            self.settle(tick)
+            return
+        clock = tick & -4
+        if self.quadrature.due <= clock or self.index.due <= clock:
+            self.settle(clock)
+        self.quadrature.set(tick, place)
+
+    def set_index(self, tick: int, level: int) -> None:
+        """Level of /IN from `tick` on."""
+        self.settle(tick & -4)
+        self.index.set(tick, level)
+        if self.index.direct:
+            self.settle(tick)
+
+    def arm(self, tick: int) -> None:
+        """Catch the next index; it is caught at once if all three inputs are low."""
+        self.settle(tick)
+        self.armed = 1
+        self.caught = 0
+        self._watch()
+
+    def settle(self, tick: int) -> None:
+        """Take everything that counts at or before `tick`, in the order in which it happened."""
+        while self.quadrature.due <= tick or self.index.due <= tick:
+            now = min(self.quadrature.due, self.index.due)
+            if self.quadrature.due == now:
+                self._count()
+            if self.index.due == now:
+                self.index.accept()
+            if self.armed:
+                self._watch()
+
+    def _count(self) -> None:
+        before = self.quadrature.level
+        self.quadrature.accept()
+        step = (self.quadrature.level - before) & 3
+        if step == 1:
+            self.counts += 1
+        elif step == 3:
+            self.counts -= 1
+
+    def _watch(self) -> None:
+        if self.quadrature.level == 0 and self.index.level == 0:
+            self.caught = 1
+            self.caught_counts = self.counts
+            self.armed = 0
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "quadrature": self.quadrature.snapshot(),
+            "index": self.index.snapshot(),
+            "seen": self.seen,
+            "counts": self.counts,
+            "armed": self.armed,
+            "caught": self.caught,
+            "caught_counts": self.caught_counts,
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        for name, value in state.items():
+            if isinstance(value, dict):
+                getattr(self, name).restore(value)
+            else:
+                setattr(self, name, value)

@@ -1,0 +1,30 @@
+cimport cython
+
+
+cdef int _OPEN, _SOFTWARE_RESET
+cdef int _NOTHING, _COMMAND, _WORD, _ANSWERED, _MISUSE
+cdef int _IGNORED, _ACCEPTED, _REFUSED
+
+
+@cython.final
+cdef class HostPort:
+    cdef readonly long long busy_ticks
+    cdef public int ps, data, writing, reading, fate, drive
+    cdef public long long busy_until
+    cdef public long long writes_while_busy
+    cdef public int buffer, lock, command, abandoned, words_left, incoming, low_next, word
+    cdef public long long answer
+    cdef public bytearray record
+
+    cpdef reset(self, int lock)
+    cpdef bint is_busy(self, long long tick) noexcept
+    cpdef int status(self, long long tick, int flags) noexcept
+    @cython.locals(writing=cython.int, reading=cython.int, outcome=cython.int)
+    cpdef int pins(self, long long tick, int cs, int rd, int wr, int ps, int data, int flags) except -1
+    cdef void _write_begins(self, long long tick) noexcept
+    cdef void _read_begins(self, long long tick, int flags) noexcept
+    cdef int _write_ends(self, long long tick) except -1
+    cdef int _read_ends(self, long long tick) except -1
+    cdef void _word_is_over(self, long long tick) noexcept
+    cpdef void expect(self, int words) noexcept
+    cpdef void reply(self, int words, long long value) noexcept

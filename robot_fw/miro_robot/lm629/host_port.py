@@ -1,0 +1,185 @@
+"""The host port: strobes, byte phase, busy bit. Bytes in, words out.
+
+It knows how bytes make words and when the chip does not listen; what a command or a word means is in
+`chip.py`. Bus cycles (data sheet, host interface): /CS and /WR low is a write, latched when either goes
+high; /CS and /RD low is a read, whose byte is fixed when the strobe begins. With both strobes low the write
+wins.
+"""
+
+from __future__ import annotations
+
+NOTHING, COMMAND, WORD, ANSWERED, MISUSE = 0, 1, 2, 3, 4
+"""What a change of the pins led to: nothing yet; a
+command byte; a data word from the host (`word`); the host has read the last word of an answer; the host
+read or wrote when that was not due (command error)."""
+
+OPEN, HARDWARE_RESET, SOFTWARE_RESET = 0, 1, 2
+"""`lock`: whether the port works, or answers 00h / 01h to everything until a reset is over."""
+
+_OPEN, _SOFTWARE_RESET = 0, 2
+_NOTHING, _COMMAND, _WORD, _ANSWERED, _MISUSE = 0, 1, 2, 3, 4
+_IGNORED, _ACCEPTED, _REFUSED = 0, 1, 2  # what will become of the strobe that is in progress
+
+
+class HostPort:
+    """The bus side of the chip.
+
+    `words_left` words are due, from the host if `incoming`. `answer` holds what a reading command says, 16
+    bits per word. `buffer` is the last data byte that passed. `record` collects the data bytes of the
+    command in progress. `writes_while_busy` counts writes that were lost because the chip was busy or in
+    reset.
+    """
+
+    NOT_STATE = ("busy_ticks",)
+
+    def __init__(self, busy_ticks: int) -> None:
+        self.busy_ticks = busy_ticks
+        self.ps = 1
+        self.data = 0xFF
+        self.writing = 0
+        self.reading = 0
+        self.fate = _IGNORED
+        self.drive = 0
+        self.writes_while_busy = 0
+        self.buffer = 0
+        self.reset(OPEN)
+
+    def reset(self, lock: int) -> None:
+        """Forget the command in progress, and whatever strobe is on its way."""
+        self.lock = lock
+        self.busy_until = 0
+        self.fate = _IGNORED
+        self.command = 0
+        self.abandoned = 0
+        self.words_left = 0
+        self.incoming = 0
+        self.low_next = 0
+        self.word = 0
+        self.answer = 0
+        self.record = bytearray()
+
+    def is_busy(self, tick: int) -> bool:
+        return self.lock != _OPEN or tick < self.busy_until
+
+    def status(self, tick: int, flags: int) -> int:
+        """The status byte, given the flags of bits 7..1."""
+        if self.lock != _OPEN:
+            return 1 if self.lock == _SOFTWARE_RESET else 0
+        return flags | 1 if tick < self.busy_until else flags
+
+    def pins(self, tick: int, cs: int, rd: int, wr: int, ps: int, data: int, flags: int) -> int:
+        """New pin levels from `tick` on; returns what that led to. `flags`: status bits 7..1 just now."""
+        writing = 1 if cs == 0 and wr == 0 else 0
+        reading = 1 if cs == 0 and rd == 0 and wr != 0 else 0
+        outcome = _NOTHING
+        if self.writing and not writing:
+            outcome = self._write_ends(tick)
+        elif self.reading and not reading:
+            outcome = self._read_ends(tick)
+        # The byte that counts is the one that was there up to the edge: the data sheet asks for hold times.
+        self.ps = ps
+        self.data = data
+        if writing and not self.writing:
+            self._write_begins(tick)
+        elif reading and not self.reading:
+            self._read_begins(tick, flags)
+        self.writing = writing
+        self.reading = reading
+        return outcome
+
+    def _write_begins(self, tick: int) -> None:
+        self.fate = _ACCEPTED
+        if self.is_busy(tick):
+            self.fate = _IGNORED
+            self.writes_while_busy += 1
+
+    def _read_begins(self, tick: int, flags: int) -> None:
+        self.fate = _IGNORED
+        if self.ps == 0:
+            self.drive = self.status(tick, flags)
+        elif self.is_busy(tick):
+            self.drive = self.buffer
+        elif self.words_left > 0 and not self.incoming:
+            self.fate = _ACCEPTED
+            self.drive = self.answer >> (16 * self.words_left - 8 * self.low_next - 8) & 0xFF
+        else:
+            self.fate = _REFUSED
+            self.drive = self.buffer
+
+    def _write_ends(self, tick: int) -> int:
+        if self.fate == _IGNORED:
+            return _NOTHING
+        if self.ps == 0:
+            self.abandoned = 1 if self.words_left > 0 else 0
+            self.command = self.data
+            self.words_left = 0
+            self.low_next = 0
+            self.record = bytearray()
+            self.busy_until = tick + self.busy_ticks
+            return _COMMAND
+        if self.words_left == 0 or not self.incoming:
+            return _MISUSE
+        self.buffer = self.data
+        self.record.append(self.data)
+        if not self.low_next:
+            self.word = self.data << 8
+            self.low_next = 1
+            return _NOTHING
+        self.word |= self.data
+        self._word_is_over(tick)
+        return _WORD
+
+    def _read_ends(self, tick: int) -> int:
+        if self.fate == _REFUSED:
+            return _MISUSE
+        if self.fate == _IGNORED:
+            return _NOTHING
+        self.buffer = self.drive
+        self.record.append(self.drive)
+        if not self.low_next:
+            self.low_next = 1
+            return _NOTHING
+        self._word_is_over(tick)
+        return _ANSWERED if self.words_left == 0 else _NOTHING
+
+    def _word_is_over(self, tick: int) -> None:
+        self.low_next = 0
+        self.words_left -= 1
+        self.busy_until = tick + self.busy_ticks
+
+    def expect(self, words: int) -> None:
+        """The command in progress wants `words` more words from the host."""
+        self.words_left = words
+        self.incoming = 1
+
+    def reply(self, words: int, value: int) -> None:
+        """The command in progress answers with `words` words, high word first."""
+        self.words_left = words
+        self.incoming = 0
+        self.answer = value & (0xFFFFFFFF if words == 2 else 0xFFFF)
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "ps": self.ps,
+            "data": self.data,
+            "writing": self.writing,
+            "reading": self.reading,
+            "fate": self.fate,
+            "drive": self.drive,
+            "busy_until": self.busy_until,
+            "writes_while_busy": self.writes_while_busy,
+            "buffer": self.buffer,
+            "lock": self.lock,
+            "command": self.command,
+            "abandoned": self.abandoned,
+            "words_left": self.words_left,
+            "incoming": self.incoming,
+            "low_next": self.low_next,
+            "word": self.word,
+            "answer": self.answer,
+            "record": bytes(self.record),
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        for name, value in state.items():
+            setattr(self, name, bytearray(value) if isinstance(value, bytes) else value)

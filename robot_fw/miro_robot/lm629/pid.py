@@ -1,0 +1,88 @@
+"""The digital filter: error in, 16-bit drive out, once per sample.
+
+Order and widths follow the sheet's 7.4 (data sheet: "PID Compensation Filter"); which coefficients are in
+force when is in `buffers.py`, the excessive-error test in `chip.py`.
+"""
+
+from __future__ import annotations
+
+
+def _saturated(value: int) -> int:
+    """Limited to 16 bits, two's complement."""
+    if value > 32767:
+        return 32767
+    if value < -32768:
+        return -32768
+    return value
+
+
+def _bottom(value: int) -> int:
+    """The bottom 16 bits, two's complement."""
+    return ((value + 32768) & 65535) - 32768
+
+
+class Pid:
+    """u(n) = kp*e(n) + ki*sum(e) + kd*(e(n') - e(n'-1)), n' = every (ds+1)-th sample."""
+
+    NOT_STATE = ("saturates",)
+
+    def __init__(self, saturates: bool = True) -> None:
+        self.saturates = 1 if saturates else 0
+        self.load(0, 0, 0, 0, 0)
+        self.open_loop()
+
+    def load(self, kp: int, ki: int, kd: int, il: int, ds: int) -> None:
+        """New coefficients (UDF). Sum and error history stay; the derivative interval starts afresh."""
+        self.kp = kp
+        self.ki = ki
+        self.kd = kd
+        self.il = il
+        self.ds = ds
+        self.phase = 0
+
+    def open_loop(self) -> None:
+        """Motor off: nothing is remembered."""
+        self.error_sum = 0
+        self.previous = 0
+        self.derivative = 0
+        self.integral = 0
+        self.phase = 0
+
+    def step(self, position_error: int) -> int:
+        """One sample of the closed loop. `position_error` in counts, any width; returns -32768..32767."""
+        e = _saturated(position_error)
+        self.error_sum = max(-0x800000, min(self.error_sum + e, 0x7FFFFF))
+        self.integral = self._limited(self._narrow(self.ki * (self.error_sum >> 8)))
+        if self.phase == 0:
+            self.derivative = self._narrow(self.kd * _saturated(e - self.previous))
+            self.previous = e
+        self.phase = self.phase + 1 if self.phase < self.ds else 0
+        return self._narrow(self._narrow(self.kp * e) + self.integral + self.derivative)
+
+    def top_of_sum(self) -> int:
+        """The top 16 bits of the 24-bit error sum, limited like the integral term."""
+        return self._limited(self.error_sum >> 8)
+
+    def _narrow(self, value: int) -> int:
+        return _saturated(value) if self.saturates else _bottom(value)
+
+    def _limited(self, value: int) -> int:
+        return max(-self.il, min(value, self.il))
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "kp": self.kp,
+            "ki": self.ki,
+            "kd": self.kd,
+            "il": self.il,
+            "ds": self.ds,
+            "error_sum": self.error_sum,
+            "previous": self.previous,
+            "derivative": self.derivative,
+            "integral": self.integral,
+            "phase": self.phase,
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        for name, value in state.items():
+            setattr(self, name, value)

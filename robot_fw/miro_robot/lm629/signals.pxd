@@ -1,0 +1,17 @@
+cimport cython
+
+
+cdef int _INTERRUPTS
+
+
+@cython.final
+cdef class Signals:
+    cdef public int word, mask
+
+    cpdef void during_reset(self) noexcept
+    cpdef void after_reset(self) noexcept
+    cpdef void raise_flags(self, int flags) noexcept
+    cpdef void reset_interrupts(self, int keep) noexcept
+    cpdef void mask_interrupts(self, int mask) noexcept
+    cpdef void set_bits(self, int bits) noexcept
+    cpdef void clear_bits(self, int bits) noexcept

@@ -1,0 +1,71 @@
+"""The signals register, the interrupt mask and what drives the HI pin.
+
+Bits 7..1 are those of the status byte; bit 0 is not the busy bit but "a SIP is pending". When a bit is set is
+decided in `chip.py`.
+"""
+
+from __future__ import annotations
+
+INTERRUPT = 0x8000
+ACCELERATION_LOADED = 0x4000
+UPDATE_PENDING = 0x2000
+FORWARD = 0x1000
+VELOCITY_MODE = 0x0800
+ON_TARGET = 0x0400
+STOP_ON_ERROR = 0x0200
+OUTPUT_8_BIT = 0x0100
+MOTOR_OFF = 0x0080
+BREAKPOINT = 0x0040
+EXCESSIVE_ERROR = 0x0020
+WRAP_AROUND = 0x0010
+INDEX_ACQUIRED = 0x0008
+TRAJECTORY_COMPLETE = 0x0004
+COMMAND_ERROR = 0x0002
+ACQUIRE_INDEX = 0x0001
+
+_INTERRUPTS = 0x7E
+
+
+class Signals:
+    """`word`: the 16 bits as RDSIGS answers them. `mask`: 1 = the flag of that bit may raise HI."""
+
+    def __init__(self) -> None:
+        self.word = 0
+        self.mask = 0
+
+    def during_reset(self) -> None:
+        self.word = 0
+        self.mask = 0
+
+    def after_reset(self) -> None:
+        """All but the breakpoint may interrupt. Motor off counts as a trajectory that is complete."""
+        self.mask = 0x3E
+        self.word = 0x0180
+        self.raise_flags(0x04)
+
+    def raise_flags(self, flags: int) -> None:
+        """Set flags of bits 6..1. HI follows where one was 0 and is not masked."""
+        if flags & ~self.word & self.mask:
+            self.word |= 0x8000
+        self.word |= flags
+
+    def reset_interrupts(self, keep: int) -> None:
+        """RSTI: flags whose bit in `keep` is 0 are reset, and so is HI, whatever flags remain."""
+        self.word &= keep & _INTERRUPTS | ~(_INTERRUPTS | 0x8000)
+
+    def mask_interrupts(self, mask: int) -> None:
+        """MSKI."""
+        self.mask = mask & _INTERRUPTS
+
+    def set_bits(self, bits: int) -> None:
+        self.word |= bits
+
+    def clear_bits(self, bits: int) -> None:
+        self.word &= ~bits
+
+    def snapshot(self) -> dict[str, object]:
+        return {"word": self.word, "mask": self.mask}
+
+    def restore(self, state: dict[str, object]) -> None:
+        for name, value in state.items():
+            setattr(self, name, value)

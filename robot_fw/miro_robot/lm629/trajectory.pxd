@@ -1,0 +1,34 @@
+cimport cython
+
+
+cdef long long _NEVER
+
+
+cdef long long _wrapped(long long position) noexcept
+
+
+@cython.locals(n=cython.longlong)
+cdef long long _stopping_distance(long long speed, long long acceleration) noexcept
+
+
+cdef class Trajectory:
+    cdef public long long position, velocity, acceleration, max_velocity, target
+    cdef public int velocity_mode, forward, stopping, moving, crossed
+
+    cpdef void reset(self) noexcept
+    cpdef void start(self) noexcept
+    cpdef void stop_smoothly(self) noexcept
+    cpdef void stop_abruptly(self, long long real_position) noexcept
+    cpdef void follow(self, long long real_position) noexcept
+    cpdef void define_home(self, long long real_position) noexcept
+    cpdef int step(self) noexcept
+    cdef int _slow_to_rest(self) noexcept
+    @cython.locals(velocity=cython.longlong)
+    cdef void _approach(self, long long goal) noexcept
+    @cython.locals(a=cython.longlong, distance=cython.longlong, v=cython.longlong, backwards=cython.int)
+    cdef int _towards_target(self) noexcept
+    @cython.locals(a=cython.longlong, up=cython.longlong)
+    cdef long long _speed(self, long long v, long long distance) noexcept
+    @cython.locals(moved=cython.longlong)
+    cdef void _move(self, long long velocity) noexcept
+    cdef void _arrive(self) noexcept

@@ -1,0 +1,164 @@
+"""The trapezoidal profile generator: working registers and one step per sample.
+
+All integers: positions are 1/65536 counts, velocities 1/65536 counts per sample, accelerations 1/65536 counts
+per sample^2. What the host loads and when it takes effect is in `buffers.py`. The data sheet names only the
+outer properties; the algorithm is the sheet's section 9.3 and always ends exactly on the target.
+"""
+
+from __future__ import annotations
+
+_NEVER = 1 << 62
+
+
+def _wrapped(position: int) -> int:
+    """A 47-bit position: the integer part lives in -2^30 .. 2^30-1."""
+    return ((position + 0x400000000000) & 0x7FFFFFFFFFFF) - 0x400000000000
+
+
+def _stopping_distance(speed: int, acceleration: int) -> int:
+    """What a move at `speed` covers from now on, if every later sample is slower by `acceleration`."""
+    if speed == 0:
+        return 0
+    if acceleration == 0:
+        return _NEVER
+    n = speed // acceleration
+    return (n + 1) * speed - acceleration * n * (n + 1) // 2
+
+
+class Trajectory:
+    """Desired position and velocity, and the working copies of what the host asked for.
+
+    `moving` is 1 while the profile has not finished. `crossed` is 1 when the last step left the 31-bit space.
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        self.position = 0
+        self.velocity = 0
+        self.acceleration = 0
+        self.max_velocity = 0
+        self.target = 0
+        self.velocity_mode = 0
+        self.forward = 0
+        self.stopping = 0
+        self.moving = 0
+        self.crossed = 0
+
+    def start(self) -> None:
+        """The working registers were loaded: run them."""
+        self.moving = 1
+        self.stopping = 0
+
+    def stop_smoothly(self) -> None:
+        self.moving = 1
+        self.stopping = 1
+
+    def stop_abruptly(self, real_position: int) -> None:
+        """The target becomes the real position, and is reached."""
+        self.follow(real_position)
+        self.target = real_position
+
+    def follow(self, real_position: int) -> None:
+        """Stand at the real position (motor off)."""
+        self.position = real_position * 65536
+        self.velocity = 0
+        self.moving = 0
+        self.stopping = 0
+
+    def define_home(self, real_position: int) -> None:
+        """Shift the axis so that `real_position` is 0; the move in progress ends where it would have."""
+        self.position = _wrapped(self.position - real_position * 65536)
+        self.target = _wrapped((self.target - real_position) * 65536) >> 16
+
+    def step(self) -> int:
+        """One sample. Returns 1 in the sample that ends the profile."""
+        self.crossed = 0
+        if self.stopping:
+            return self._slow_to_rest()
+        if self.velocity_mode:
+            self._approach(self.max_velocity if self.forward else -self.max_velocity)
+            return 0
+        return self._towards_target()
+
+    def _slow_to_rest(self) -> int:
+        self._approach(0)
+        if self.velocity != 0:
+            return 0
+        self.target = self.position >> 16
+        self._arrive()
+        return 1
+
+    def _approach(self, goal: int) -> None:
+        """Velocity moves towards `goal` by at most the acceleration, the position by the new velocity."""
+        velocity = self.velocity
+        if velocity < goal:
+            velocity = min(velocity + self.acceleration, goal)
+        else:
+            velocity = max(velocity - self.acceleration, goal)
+        self._move(velocity)
+
+    def _towards_target(self) -> int:
+        a = self.acceleration
+        distance = self.target * 65536 - self.position
+        if distance == 0 and self.velocity == 0:
+            self._arrive()
+            return 1
+        backwards = distance < 0 or (distance == 0 and self.velocity < 0)
+        v = -self.velocity if backwards else self.velocity
+        if backwards:
+            distance = -distance
+        if 0 <= v <= a and distance <= min(a, self.max_velocity):
+            self._arrive()
+            return 1
+        if v < 0:
+            v = min(v + a, 0)
+        else:
+            v = self._speed(v, distance)
+        self._move(-v if backwards else v)
+        return 0
+
+    def _speed(self, v: int, distance: int) -> int:
+        """The fastest of speeding up, holding and slowing down that can still stop at the target."""
+        a = self.acceleration
+        if v < self.max_velocity:
+            up = min(v + a, self.max_velocity)
+        else:
+            up = max(v - a, self.max_velocity)
+        if _stopping_distance(up, a) <= distance:
+            return up
+        if up >= v and _stopping_distance(v, a) <= distance:
+            return v
+        return max(v - a, 0)
+
+    def _move(self, velocity: int) -> None:
+        moved = self.position + velocity
+        self.velocity = velocity
+        self.position = _wrapped(moved)
+        if self.position != moved:
+            self.crossed = 1
+
+    def _arrive(self) -> None:
+        self.position = self.target * 65536
+        self.velocity = 0
+        self.moving = 0
+        self.stopping = 0
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "position": self.position,
+            "velocity": self.velocity,
+            "acceleration": self.acceleration,
+            "max_velocity": self.max_velocity,
+            "target": self.target,
+            "velocity_mode": self.velocity_mode,
+            "forward": self.forward,
+            "stopping": self.stopping,
+            "moving": self.moving,
+            "crossed": self.crossed,
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        for name, value in state.items():
+            setattr(self, name, value)

@@ -1,0 +1,128 @@
+"""A chip on the bench: bus cycles as a host drives them, with the chip's own events run on the way.
+
+Only what several tests need; the sequences under test stand in the tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
+from miro_robot.lm629.commands import BY_NAME
+from miro_robot.lm629.options import Lm629Options
+
+CYCLE = 12
+"""One machine cycle of the host's CPU, the shortest time between two changes of a pin."""
+
+
+class Bench:
+    """`edges` collects (tick, pwm, sign, hi) at every change of the output pins."""
+
+    def __init__(self, chip: Lm629 | None = None, tick: int = 0) -> None:
+        self.chip = Lm629() if chip is None else chip
+        self.tick = tick
+        self.edges: list[tuple[int, int, int, int]] = []
+        self.pins = (1, 1, 1, 1, 0xFF)
+
+    @classmethod
+    def running(cls, **options: object) -> Bench:
+        """A bench whose chip has gone through the reset handshake."""
+        bench = cls(Lm629(Lm629Options(**options)))  # type: ignore[arg-type]
+        bench.reset()
+        bench.command("RSTI", 0)
+        return bench
+
+    def wait(self, ticks: int) -> None:
+        end = self.tick + ticks
+        while self.chip.next_tick <= end:
+            now = self.chip.next_tick
+            self.chip.advance(now)
+            self.note(now)
+        self.tick = end
+
+    def note(self, tick: int) -> None:
+        state = (self.chip.pwm, self.chip.sign, self.chip.hi)
+        if not self.edges or self.edges[-1][1:] != state:
+            self.edges.append((tick, *state))
+
+    def drive(self, **levels: int) -> None:
+        """Change pins now, then let one machine cycle pass."""
+        cs, rd, wr, ps, data = self.pins
+        named = {"cs": cs, "rd": rd, "wr": wr, "ps": ps, "data": data} | levels
+        self.pins = (named["cs"], named["rd"], named["wr"], named["ps"], named["data"])
+        self.chip.set_bus(self.tick, *self.pins)
+        self.note(self.tick)
+        self.wait(CYCLE)
+
+    def reset(self, wait: bool = True) -> None:
+        self.chip.set_reset(self.tick, 0)
+        self.wait(5 * CYCLE)
+        self.chip.set_reset(self.tick, 1)
+        if wait:
+            self.wait(3 * SAMPLE_TICKS + 4)
+
+    def write(self, ps: int, byte: int) -> None:
+        self.drive(ps=ps, data=byte, cs=0)
+        self.drive(wr=0)
+        self.drive(wr=1)
+        self.drive(cs=1)
+
+    def read(self, ps: int) -> int:
+        self.drive(ps=ps, data=0xFF, cs=0)
+        self.drive(rd=0)
+        byte = self.chip.data_out(self.tick)
+        self.drive(rd=1)
+        self.drive(cs=1)
+        return byte
+
+    def status(self) -> int:
+        return self.read(0)
+
+    def ready(self) -> None:
+        while self.status() & 1:
+            pass
+
+    def word(self, word: int) -> None:
+        self.ready()
+        self.write(1, word >> 8)
+        self.write(1, word & 0xFF)
+
+    def command(self, name: str, *words: int) -> None:
+        self.ready()
+        self.write(0, BY_NAME[name].opcode)
+        for word in words:
+            self.word(word)
+
+    def ask(self, name: str, signed: bool = True) -> int:
+        """A reading command and its answer."""
+        self.command(name)
+        answer = bytearray()
+        for _ in range(BY_NAME[name].words_out):
+            self.ready()
+            answer += bytes((self.read(1), self.read(1)))
+        return int.from_bytes(answer, "big", signed=signed)
+
+    def signals(self) -> int:
+        return self.ask("RDSIGS", signed=False)
+
+    def load(self, control: int, *values: int) -> None:
+        """LTRJ with 32-bit parameters."""
+        words = [word for value in values for word in (value >> 16 & 0xFFFF, value & 0xFFFF)]
+        self.command("LTRJ", control, *words)
+
+    def filter(self, kp: int = 0, ki: int = 0, kd: int = 0, il: int = 0, ds: int = 0) -> None:
+        self.command("LFIL", ds << 8 | 0x0F, kp, ki, kd, il)
+        self.command("UDF")
+
+    def sample(self, count: int = 1) -> None:
+        """To the next sample boundary, `count` times."""
+        for _ in range(count):
+            self.wait(self.chip.sample_tick - self.tick)
+
+    def turn(self, counts: int) -> None:
+        """Turn the encoder, as fast as the chip can follow, from a place that is a multiple of 4 counts."""
+        states: Sequence[tuple[int, int]] = ((0, 0), (1, 0), (1, 1), (0, 1))
+        for n in range(1, abs(counts) + 1):
+            a, b = states[(n if counts > 0 else -n) % 4]
+            self.chip.set_encoder(self.tick, a, b)
+            self.wait(32)
