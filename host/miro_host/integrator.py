@@ -1,0 +1,70 @@
+"""Equation (15) on the host: the LM629 takes speeds, so the law's accelerations are summed up here.
+
+What belongs here: z_cmd and its limits. What does not: the law (`yang_kim`) and wheel speeds (`wheels`).
+
+The integrator's state is also the robot's velocity as the law sees it: differences of noisy postures are
+useless (0.8 cm of noise is 0.34 m/s after one frame).
+"""
+
+import msgspec
+
+
+class Limits(msgspec.Struct, frozen=True):
+    """Bounds of the commanded velocity and of its rate, all greater than 0.
+
+    Both are clamped: z_cmd, which is the anti-windup, and z', so that one noisy frame near
+    cos(phi_c - theta_c) = 0 does not saturate the wheels.
+    """
+
+    max_v_m_s: float = 0.95
+    max_w_rad_s: float = 3.7
+    max_v_dot_m_s2: float = 8.0
+    max_w_dot_rad_s2: float = 120.0
+
+    def __post_init__(self) -> None:
+        for name in ("max_v_m_s", "max_w_rad_s", "max_v_dot_m_s2", "max_w_dot_rad_s2"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} = {getattr(self, name)!r}: must be greater than 0")
+
+
+def clamp(x: float, limit: float) -> float:
+    """x limited to -limit..limit."""
+    if x > limit:
+        return limit
+    if x < -limit:
+        return -limit
+    return x
+
+
+class Integrator:
+    """z_cmd = (v, w), advanced once per control period by z' = z_r' + u (equation 15 without f)."""
+
+    NOT_STATE = ("limits", "period_s")
+
+    def __init__(self, limits: Limits, period_s: float) -> None:
+        if not period_s > 0.0:
+            raise ValueError(f"period_s = {period_s!r}: must be greater than 0")
+        self.limits = limits
+        self.period_s = period_s
+        self.v_m_s = 0.0
+        self.w_rad_s = 0.0
+
+    def __repr__(self) -> str:
+        return f"Integrator(v_m_s={self.v_m_s!r}, w_rad_s={self.w_rad_s!r})"
+
+    def step(self, v_dot_m_s2: float, w_dot_rad_s2: float) -> None:
+        """Add one period of acceleration (v_r' + u1, w_r' + u2), clamped on both levels."""
+        limits = self.limits
+        v_dot = clamp(v_dot_m_s2, limits.max_v_dot_m_s2)
+        w_dot = clamp(w_dot_rad_s2, limits.max_w_dot_rad_s2)
+        self.v_m_s = clamp(self.v_m_s + self.period_s * v_dot, limits.max_v_m_s)
+        self.w_rad_s = clamp(self.w_rad_s + self.period_s * w_dot, limits.max_w_rad_s)
+
+    def snapshot(self) -> dict[str, object]:
+        return {"v_m_s": self.v_m_s, "w_rad_s": self.w_rad_s}
+
+    def restore(self, state: dict[str, object]) -> None:
+        v, w = state["v_m_s"], state["w_rad_s"]
+        assert isinstance(v, float)
+        assert isinstance(w, float)
+        self.v_m_s, self.w_rad_s = v, w

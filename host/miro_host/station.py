@@ -1,0 +1,76 @@
+"""The radio end of the PC: one frame per control period for all robots of a network.
+
+What belongs here: sequence numbers, whose turn it is to answer, and when a service frame may replace a team
+frame. What does not: the frame's bytes (`miro_protocol.frames`), the radio, what the velocities mean
+(`wheels`).
+"""
+
+from collections import deque
+from collections.abc import Sequence
+
+from miro_protocol.frames import ServiceFrame, TeamFrame, encode
+from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_EVERY, FrameType
+
+
+class Station:
+    """Sender of one network of `n` robots (3 or 5).
+
+    Every frame takes the next of 64 sequence numbers, whatever its type. With telemetry every team frame is
+    of type 3 and asks robot (seq mod n) to answer; 64 is no multiple of n, so at the wrap some robot's turn
+    comes early. A queued service frame replaces a team frame; between two of
+    them at least seven team frames go out, so that velocities stay fresh. ValueError for another n.
+    """
+
+    NOT_STATE = ("n", "telemetry")
+
+    def __init__(self, n: int, telemetry: bool = True) -> None:
+        if n not in ROBOT_COUNTS:
+            raise ValueError(f"n = {n}: a network has {' or '.join(map(str, ROBOT_COUNTS))} robots")
+        self.n = n
+        self.telemetry = telemetry
+        self.seq = 0
+        self.team_frames_since_service = SERVICE_EVERY - 1
+        self.services: deque[ServiceFrame] = deque()
+
+    def __repr__(self) -> str:
+        return f"Station(n={self.n}, telemetry={self.telemetry}, seq={self.seq}, queued={len(self.services)})"
+
+    def request(self, slot: int, opcode: int, values: Sequence[int] = ()) -> None:
+        """Queue a service frame; ValueError (from the codec) here and now if it could not be sent."""
+        service = ServiceFrame(0, slot, opcode, tuple(values))
+        encode(service, self.n)
+        self.services.append(service)
+
+    def frame(self, commands: Sequence[tuple[int, int]]) -> bytes:
+        """The next frame's bytes, preamble first. `commands` are (left, right) per slot, slot 0 first.
+
+        In a period whose frame is a service frame the commands are checked and dropped; robots keep theirs.
+        ValueError naming slot, value and limits when a command may not be sent; nothing is used up then.
+        """
+        kind = FrameType.TEAM_ASK if self.telemetry else FrameType.TEAM
+        data = encode(TeamFrame(kind, self.seq, tuple(commands)), self.n)
+        if self.services and self.team_frames_since_service >= SERVICE_EVERY - 1:
+            service = self.services.popleft()
+            data = encode(ServiceFrame(self.seq, service.slot, service.opcode, service.values), self.n)
+            self.team_frames_since_service = 0
+        else:
+            self.team_frames_since_service = min(self.team_frames_since_service + 1, SERVICE_EVERY - 1)
+        self.seq = (self.seq + 1) % SEQ_MODULUS
+        return data
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "seq": self.seq,
+            "team_frames_since_service": self.team_frames_since_service,
+            "services": [(s.slot, s.opcode, s.values) for s in self.services],
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        seq, since, services = state["seq"], state["team_frames_since_service"], state["services"]
+        assert isinstance(seq, int)
+        assert isinstance(since, int)
+        assert isinstance(services, list)
+        self.seq, self.team_frames_since_service = seq, since
+        self.services = deque(
+            ServiceFrame(0, slot, opcode, tuple(values)) for slot, opcode, values in services
+        )

@@ -1,0 +1,100 @@
+"""What the camera says about a posture: true posture in, noisy, gridded and late posture out.
+
+What belongs here: the error model of a measurement and the queue of frames under way. What does not:
+drawing random numbers (the caller hands in standard normals) and light, lenses or patches.
+
+The heading is not put on a grid. Patch centroids are averages over some 64 pixels; if they were whole
+pixels, two of them 4 cm (9 pixels) apart would give headings in steps of more than 6 degrees, more than the
+paper's whole error of 4.83 degrees. Its quantisation is part of that figure. The position is gridded to
+whole pixels, the coarser reading of "320 x 240" in section V-A.
+"""
+
+import math
+from collections import deque
+
+import msgspec
+
+from miro_host.dmath import wrap_pi
+from miro_host.posture import Posture
+
+DEGREE = 0.017453292519943295
+SIGMAS = 3.0
+
+
+class VisionErrors(msgspec.Struct, frozen=True):
+    """Bounds of the measurement error (3 sigma, per axis) and the pixel size; 0 switches one off.
+
+    Defaults: paper section V-A (2.40 cm, 4.83 degrees) and a view of 140 x 105 cm on its 320 x 240 pixels.
+    """
+
+    position_m: float = 0.0240
+    heading_rad: float = 4.83 * DEGREE
+    pixel_m: float = 0.004375
+
+    def __post_init__(self) -> None:
+        for name in ("position_m", "heading_rad", "pixel_m"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} = {getattr(self, name)!r}: must be 0 or greater")
+
+
+NO_ERRORS = VisionErrors(position_m=0.0, heading_rad=0.0, pixel_m=0.0)
+
+
+def error_of(normal: float, bound: float) -> float:
+    """A standard normal scaled so that `bound` is 3 sigma, and cut off there: the paper gives a bound."""
+    return bound * (min(max(normal, -SIGMAS), SIGMAS) / SIGMAS)
+
+
+def to_grid(x: float, step: float) -> float:
+    """The multiple of `step` nearest to x, halves upwards; x itself for step 0. The origin is on the grid."""
+    if step == 0.0:
+        return x
+    return step * math.floor(x / step + 0.5)
+
+
+def measure(true: Posture, normals: tuple[float, float, float], errors: VisionErrors) -> Posture:
+    """The posture as the tracker reports it, heading wrapped to (-pi, pi].
+
+    `normals` are three standard normals for x, y and heading. Off by at most the bound plus half a pixel per
+    axis, and by at most the heading bound.
+    """
+    return Posture(
+        to_grid(true.x_m + error_of(normals[0], errors.position_m), errors.pixel_m),
+        to_grid(true.y_m + error_of(normals[1], errors.position_m), errors.pixel_m),
+        wrap_pi(true.theta_rad + error_of(normals[2], errors.heading_rad)),
+    )
+
+
+class Vision:
+    """Camera, grabber and tracker of one robot: an exposure in, a measurement out, `delay_frames` later."""
+
+    NOT_STATE = ("delay_frames", "errors")
+
+    def __init__(self, errors: VisionErrors, delay_frames: int = 1) -> None:
+        if delay_frames < 0:
+            raise ValueError(f"delay_frames = {delay_frames}: must be 0 or greater")
+        self.errors = errors
+        self.delay_frames = delay_frames
+        self.under_way: deque[Posture | None] = deque([None] * delay_frames)
+
+    def __repr__(self) -> str:
+        return (
+            f"Vision({self.errors!r}, delay_frames={self.delay_frames}, under_way={list(self.under_way)!r})"
+        )
+
+    def frame(self, true: Posture | None, normals: tuple[float, float, float]) -> Posture | None:
+        """Expose one frame; returns what the host gets at this tick: an older frame, or None.
+
+        `true` = None is a frame in which the robot was not found. The first `delay_frames` answers are None.
+        """
+        self.under_way.append(None if true is None else measure(true, normals, self.errors))
+        return self.under_way.popleft()
+
+    def snapshot(self) -> dict[str, object]:
+        rows = [None if p is None else (p.x_m, p.y_m, p.theta_rad) for p in self.under_way]
+        return {"under_way": rows}
+
+    def restore(self, state: dict[str, object]) -> None:
+        rows = state["under_way"]
+        assert isinstance(rows, list)
+        self.under_way = deque(None if row is None else Posture(*row) for row in rows)

@@ -1,0 +1,63 @@
+"""From (v, w) to what the radio carries: two wheel speeds in 1/256 count per LM629 sample.
+
+What belongs here: the split over the track, the speed limit and the quantisation. What does not: the frame
+(`miro_protocol`) and what the robot makes of it.
+
+Rounding rule: to the nearest integer, halves away from zero. It is odd, so that forward and backward, left
+and right are mirror images. The speed limit comes first, so the greatest magnitude is 16633, the robot's
+own limit.
+"""
+
+import msgspec
+
+PI = 3.141592653589793
+TICKS_PER_S = 24_000_000
+TICKS_PER_SAMPLE = 8192  # 2048 clocks of 6 MHz
+COUNTS_PER_WHEEL_TURN = 16384  # 512 lines x 4 edges x gear 8:1
+UNITS_PER_COUNT = 256
+
+
+class Wheels(msgspec.Struct, frozen=True):
+    """What the host believes about the drive: track, nominal wheel radius, speed limit."""
+
+    track_m: float = 0.068
+    radius_m: float = 0.020
+    limit_m_s: float = 1.46
+
+    def __post_init__(self) -> None:
+        for name in ("track_m", "radius_m", "limit_m_s"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} = {getattr(self, name)!r}: must be greater than 0")
+        if self.counts(self.limit_m_s) > 32767:
+            raise ValueError(f"limit_m_s = {self.limit_m_s!r}: does not fit int16 at this radius")
+
+    @property
+    def units_per_m_s(self) -> float:
+        """1/256 count per sample in one m/s: 11392.6 for the default radius."""
+        samples_per_s = TICKS_PER_S / TICKS_PER_SAMPLE
+        return UNITS_PER_COUNT * COUNTS_PER_WHEEL_TURN / samples_per_s / (2.0 * PI * self.radius_m)
+
+    def split(self, v_m_s: float, w_rad_s: float) -> tuple[float, float]:
+        """(left, right) rim speeds in m/s of a body that moves with v and turns with w."""
+        half = 0.5 * self.track_m * w_rad_s
+        return v_m_s - half, v_m_s + half
+
+    def limit(self, left_m_s: float, right_m_s: float) -> tuple[float, float]:
+        """Both speeds scaled by one factor so that none exceeds the limit: the path keeps its curvature."""
+        greatest = max(abs(left_m_s), abs(right_m_s))
+        if greatest <= self.limit_m_s:
+            return left_m_s, right_m_s
+        # the quotient first: the greater one becomes +-1 exactly, hence never above the limit
+        return self.limit_m_s * (left_m_s / greatest), self.limit_m_s * (right_m_s / greatest)
+
+    def counts(self, speed_m_s: float) -> int:
+        """A rim speed in 1/256 count per sample, rounded half away from zero."""
+        scaled = speed_m_s * self.units_per_m_s
+        if scaled < 0.0:
+            return -int(0.5 - scaled)
+        return int(scaled + 0.5)
+
+    def command(self, v_m_s: float, w_rad_s: float) -> tuple[int, int]:
+        """(left, right) for the team frame: split, limited, quantised."""
+        left, right = self.limit(*self.split(v_m_s, w_rad_s))
+        return self.counts(left), self.counts(right)

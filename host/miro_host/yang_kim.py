@@ -1,0 +1,172 @@
+"""The paper's sliding-mode law: equations (13) and (16), literally, with the guards that a machine needs.
+
+What belongs here: the law as a function of reference, measured posture and velocity. What does not: the
+velocity's source (the integrator state, see `pilot`), equation (15) (`integrator`), the reference itself
+(`reference`).
+
+Known limits of the law, which this module does not mend (host/README.md): it has no lateral feedback on
+the surface theta_e = 0, so the robot then runs parallel to the path; V = s's/2 jumps by 2 |theta_e'|
+|phi_e| where theta_e crosses zero; it may settle on the path's mirror image through the origin.
+"""
+
+import math
+
+import msgspec
+
+from miro_host.dmath import atan2, sincos, wrap_pi
+from miro_host.posture import Posture
+from miro_host.reference import Reference
+
+NOT_NEGATIVE = (
+    "gamma1_per_s",
+    "gamma2_per_s",
+    "q1_per_s",
+    "q2_per_s",
+    "p1_m_s2",
+    "p2_rad_s2",
+    "cosine_guard",
+)
+POSITION_ERROR_M = 0.024  # rho_f of equation (11): the upper bound of the measurement error, section V-A
+
+
+class Gains(msgspec.Struct, frozen=True):
+    """Parameters of equations (13) and (16) and of their guards.
+
+    gamma, q and p are the paper's gamma_i, Q_i and P_i. With `switching` = "sign" every sgn is the sign
+    function; with "saturation" (remark 2 after Theorem 1) sgn(x) becomes x / width limited to +-1, with the
+    widths `layer_s1_m_s`, `layer_s2_rad_s`, `layer_theta_rad` for s1, s2 and theta_e. The sign of phi_e in
+    d|phi_e|/dt is not a switching term and stays a sign.
+
+    Guards: rho_c is taken as at least `rho_floor_m` where it is a denominator; 1/c, c = cos(phi_c - theta_c),
+    becomes c (1 + d^2) / (c^2 + d^2) with d = `cosine_guard`: smooth, keeps the sign, 1 at c = 1, 0 at the
+    singularity of assumption 3. d = 0 leaves 1/c as it is.
+    ValueError for a parameter outside its range.
+    """
+
+    gamma1_per_s: float
+    gamma2_per_s: float
+    q1_per_s: float
+    q2_per_s: float
+    p1_m_s2: float
+    p2_rad_s2: float
+    switching: str = "saturation"
+    layer_s1_m_s: float = 0.022
+    layer_s2_rad_s: float = 0.19
+    layer_theta_rad: float = 0.015
+    cosine_guard: float = 0.086
+    rho_floor_m: float = POSITION_ERROR_M
+
+    def __post_init__(self) -> None:
+        if self.switching not in ("sign", "saturation"):
+            raise ValueError(f"switching = {self.switching!r}: must be 'sign' or 'saturation'")
+        positive = ["rho_floor_m"]
+        if self.switching == "saturation":
+            positive += ["layer_s1_m_s", "layer_s2_rad_s", "layer_theta_rad"]
+        for name in positive:
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} = {getattr(self, name)!r}: must be greater than 0")
+        for name in NOT_NEGATIVE:
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} = {getattr(self, name)!r}: must be 0 or greater")
+
+
+class Control(msgspec.Struct, frozen=True):
+    """What the law saw and what it answers.
+
+    Errors c - r in polar coordinates (m, rad, wrapped), surfaces s1 [m/s], s2 [rad/s] of equation (13),
+    inputs u1 [m/s2], u2 [rad/s2] of equation (16).
+    """
+
+    rho_e_m: float
+    phi_e_rad: float
+    theta_e_rad: float
+    s1: float
+    s2: float
+    u1: float
+    u2: float
+
+
+def sign(x: float) -> float:
+    """sgn(x): -1, 0 or 1."""
+    if x > 0.0:
+        return 1.0
+    if x < 0.0:
+        return -1.0
+    return 0.0
+
+
+def saturation(x: float, width: float) -> float:
+    """x / width limited to -1..1, the continuous stand-in for sgn of remark 2."""
+    if x >= width:
+        return 1.0
+    if x <= -width:
+        return -1.0
+    return x / width
+
+
+def curvature_term(v: float, w: float, rho: float, sin_alpha: float) -> float:
+    """R(q, z) before Theorem 1 in m/s2: v^2/rho sin^2(alpha) + v w sin(alpha), alpha = phi - theta."""
+    return v * v / rho * sin_alpha * sin_alpha + v * w * sin_alpha
+
+
+class YangKim:
+    """Equations (13) and (16) with one set of gains; without memory: the same inputs give the same output."""
+
+    NOT_STATE = ("gains",)
+
+    def __init__(self, gains: Gains) -> None:
+        self.gains = gains
+
+    def __repr__(self) -> str:
+        return f"YangKim({self.gains!r})"
+
+    def control(self, reference: Reference, measured: Posture, v_m_s: float, w_rad_s: float) -> Control:
+        """u1, u2 for a robot at `measured` that moves with (v_c, w_c) = (`v_m_s`, `w_rad_s`).
+
+        ValueError at c = 0 exactly when there is no cosine guard (equation 12 is violated).
+        """
+        g, r = self.gains, reference
+        rho = math.sqrt(measured.x_m * measured.x_m + measured.y_m * measured.y_m)
+        phi = atan2(measured.y_m, measured.x_m)
+        sin_alpha, cos_alpha = sincos(phi - measured.theta_rad)
+        rho_floor = max(rho, g.rho_floor_m)
+        rho_e = rho - r.rho_m
+        phi_e = wrap_pi(phi - r.phi_rad)
+        theta_e = wrap_pi(measured.theta_rad - r.posture.theta_rad)
+        # rates by equation (9)
+        rho_e_rate = v_m_s * cos_alpha - r.rho_rate_m_s
+        phi_e_rate = -(v_m_s / rho_floor) * sin_alpha - r.phi_rate_rad_s
+        theta_e_rate = w_rad_s - r.w_rad_s
+        abs_phi_e_rate = sign(phi_e) * phi_e_rate  # d|phi_e|/dt, not |phi_e'|
+        side = self._switch(theta_e, g.layer_theta_rad)
+        s1 = rho_e_rate + g.gamma1_per_s * rho_e  # (13)
+        s2 = theta_e_rate + g.gamma2_per_s * theta_e + side * abs(phi_e)  # (13)
+        braces = (
+            -g.q1_per_s * s1
+            - g.p1_m_s2 * self._switch(s1, g.layer_s1_m_s)
+            - g.gamma1_per_s * rho_e_rate
+            + r.rho_accel_m_s2  # v_r' cos(phi_r - theta_r) + R(q_r, z_r)
+            - curvature_term(v_m_s, w_rad_s, rho_floor, sin_alpha)
+        )
+        u1 = self._inverse(cos_alpha) * braces - r.v_dot_m_s2  # (16)
+        u2 = (  # (16)
+            -g.q2_per_s * s2
+            - g.p2_rad_s2 * self._switch(s2, g.layer_s2_rad_s)
+            - g.gamma2_per_s * theta_e_rate
+            - side * abs_phi_e_rate
+        )
+        return Control(rho_e, phi_e, theta_e, s1, s2, u1, u2)
+
+    def _switch(self, x: float, width: float) -> float:
+        if self.gains.switching == "sign":
+            return sign(x)
+        return saturation(x, width)
+
+    def _inverse(self, cos_alpha: float) -> float:
+        """The factor 1/cos(phi_c - theta_c) of equation (16), guarded."""
+        d = self.gains.cosine_guard
+        if d == 0.0:
+            if cos_alpha == 0.0:
+                raise ValueError("cos(phi_c - theta_c) = 0: assumption 3 (equation 12) is violated")
+            return 1.0 / cos_alpha
+        return cos_alpha * (1.0 + d * d) / (cos_alpha * cos_alpha + d * d)
