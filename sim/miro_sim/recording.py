@@ -1,0 +1,120 @@
+"""Writes a run to MCAP: everything that is needed to look at it, and to run it again, in one file.
+
+What belongs here: the file's header, attachments, channels and messages. What does not: what the messages say
+(`channels`), reading them (`recording_reader`).
+
+Two runs of one scenario, seed and firmware give the same bytes: no wall clock, no version, no compression;
+log time is the tick in nanoseconds, rounded down.
+"""
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import IO, Protocol
+
+import msgspec
+from mcap.writer import CompressionType, Writer
+
+from miro_sim import channels
+from miro_sim.clock import nanoseconds
+from miro_sim.records import Period
+
+METADATA = "mirotwin"
+FORMAT = "1"
+SCENARIO_ATTACHMENT = "scenario.toml"
+FIRMWARE_ATTACHMENT = "firmware.ihx"
+SYMBOLS_ATTACHMENT = "symbols.json"
+
+
+class Fault(Protocol):
+    """What a recording keeps of a firmware fault (`miro_robot.faults.FirmwareFault`)."""
+
+    @property
+    def kind(self) -> int: ...
+    @property
+    def tick(self) -> int: ...
+    @property
+    def pc(self) -> int: ...
+    @property
+    def symbol(self) -> str: ...
+
+
+class Source(msgspec.Struct, frozen=True):
+    """What a run was made from: scenario text, seed, firmware file, and its symbols (name -> address,
+    space).
+    """
+
+    scenario_name: str
+    scenario_text: str
+    seed: int
+    firmware: bytes
+    firmware_sha256: str
+    symbols: dict[str, tuple[int, str]] = {}
+    record: str = "default"
+
+
+class Recorder:
+    """An open recording. Use as a context manager; what was written up to an error is a complete file."""
+
+    def __init__(self, stream: IO[bytes], source: Source) -> None:
+        self._writer = Writer(stream, compression=CompressionType.NONE, enable_data_crcs=True)
+        self._encoder = msgspec.json.Encoder()
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._writer.start(profile=METADATA, library=METADATA)
+        self._writer.add_metadata(
+            METADATA,
+            {
+                "format": FORMAT,
+                "scenario": source.scenario_name,
+                "seed": str(source.seed),
+                "firmware_sha256": source.firmware_sha256,
+                "record": source.record,
+            },
+        )
+        self._attach(SCENARIO_ATTACHMENT, "application/toml", source.scenario_text.encode())
+        self._attach(FIRMWARE_ATTACHMENT, "text/plain", source.firmware)
+        symbols = msgspec.json.encode(source.symbols, order="deterministic")
+        self._attach(SYMBOLS_ATTACHMENT, "application/json", symbols)
+
+    def __enter__(self) -> "Recorder":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
+    def write(self, period: Period) -> None:
+        """Adds everything in a control period."""
+        for topic, tick, message in channels.messages(period):
+            self._add(topic, tick, message)
+
+    def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
+        """Adds one LM629 sample of a robot (full recordings)."""
+        self._add(channels.robot_topic(network, slot, "samples"), sample.tick, sample)
+
+    def write_faults(self, network: int, slot: int, faults: Sequence[Fault]) -> None:
+        """Adds a robot's firmware faults."""
+        topic = channels.robot_topic(network, slot, "fault")
+        for fault in faults:
+            message = channels.FaultMessage(fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault))
+            self._add(topic, fault.tick, message)
+
+    def _attach(self, name: str, media_type: str, data: bytes) -> None:
+        self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+
+    def _add(self, topic: str, tick: int, message: msgspec.Struct) -> None:
+        channel = self._channels.get(topic)
+        if channel is None:
+            channel = self._register(topic, type(message))
+        time_ns = nanoseconds(tick)
+        self._writer.add_message(channel, time_ns, self._encoder.encode(message), time_ns)
+
+    def _register(self, topic: str, kind: type[msgspec.Struct]) -> int:
+        name = f"mirotwin.{kind.__name__.removesuffix('Message')}"
+        if name not in self._schemas:
+            text = msgspec.json.encode(channels.schema(kind))
+            self._schemas[name] = self._writer.register_schema(name, "jsonschema", text)
+        channel = self._writer.register_channel(topic, "json", self._schemas[name])
+        self._channels[topic] = channel
+        return channel

@@ -1,0 +1,143 @@
+"""Recordings: what goes in comes out, the same run gives the same bytes, nothing else is taken for one."""
+
+import io
+import json
+import time
+from pathlib import Path
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from miro_sim import channels
+from miro_sim.recording import Recorder, Source
+from miro_sim.recording_reader import RecordingError, parse, read
+
+from tests.sim.synthetic import periods
+
+SOURCE = Source(
+    scenario_name="fig6",
+    scenario_text="# ä\nname = 'fig6'\n",
+    seed=(1 << 63) - 1,
+    firmware=b":00000001FF\r\n",
+    firmware_sha256="ab" * 32,
+    symbols={"_main": (0x62, "code"), "_frames_accepted": (0x30, "iram")},
+)
+
+
+def recorded(count: int = 3, source: Source = SOURCE) -> bytes:
+    stream = io.BytesIO()
+    with Recorder(stream, source) as recorder:
+        for period in periods(count, [(0, 0), (0, 2), (1, 0)]):
+            recorder.write(period)
+    return stream.getvalue()
+
+
+RECORDED = recorded()
+
+
+def test_what_goes_in_comes_out_to_the_last_bit() -> None:
+    recording = parse(RECORDED, "run.mcap")
+    assert recording.source == SOURCE
+    assert recording.periods == tuple(periods(3, [(0, 0), (0, 2), (1, 0)]))
+    assert recording.digest == recording.periods[-1].digest
+
+
+def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(time, "time", lambda: 4e9)
+    monkeypatch.setattr(time, "time_ns", lambda: 4 * 10**18)
+    assert recorded() == RECORDED
+
+
+def test_an_ordinary_mcap_reader_finds_channels_schemas_and_attachments() -> None:
+    reader = make_reader(io.BytesIO(RECORDED))
+    summary = reader.get_summary()
+    assert summary is not None
+    topics = {channel.topic for channel in summary.channels.values()}
+    names = ("reference", "truth", "measurement", "control", "firmware", "lm629", "pwm")
+    assert topics >= {f"/net0/robot0/{name}" for name in names} | {"/net0/wire", "/period"}
+    assert {attachment.name for attachment in reader.iter_attachments()} == {
+        "scenario.toml",
+        "firmware.ihx",
+        "symbols.json",
+    }
+    for schema, _, message in reader.iter_messages():
+        assert schema is not None
+        tree = json.loads(schema.data)
+        assert tree["type"] == "object"
+        assert "$ref" not in schema.data.decode()
+        content = json.loads(message.data)
+        assert set(content) == set(tree["properties"])
+        assert message.log_time == content["tick"] * 125 // 3
+
+
+def test_every_channel_has_a_message_type_and_foreign_topics_have_none() -> None:
+    for name, kind in channels.ROBOT_CHANNELS.items():
+        assert channels.message_type(channels.robot_topic(1, 2, name)) is kind
+    assert channels.message_type(channels.wire_topic(7)) is channels.WireMessage
+    assert channels.message_type("/camera") is None
+    assert channels.message_type("/net0/robot0/unknown") is None
+
+
+def test_samples_and_faults_are_for_people_and_do_not_disturb_the_periods() -> None:
+    stream = io.BytesIO()
+    with Recorder(stream, SOURCE) as recorder:
+        recorder.write_sample(0, 0, channels.SampleMessage(8192, 1, 2, 3, -4, 5, 6, 7, 8))
+        for period in periods(2):
+            recorder.write(period)
+    assert parse(stream.getvalue(), "run.mcap").periods == tuple(periods(2))
+
+
+def broken_off(recorder: Recorder) -> None:
+    recorder.write(next(periods(1)))
+    raise ZeroDivisionError
+
+
+def test_what_was_written_up_to_an_error_is_a_whole_recording() -> None:
+    stream = io.BytesIO()
+    with pytest.raises(ZeroDivisionError), Recorder(stream, SOURCE) as recorder:
+        broken_off(recorder)
+    assert len(parse(stream.getvalue(), "run.mcap").periods) == 1
+
+
+def test_a_file_that_is_no_recording_is_named_with_its_place(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"PK\x03\x04")
+    with pytest.raises(RecordingError, match=r"run\.mcap: offset 0: not an MCAP file; give a run\.mcap"):
+        read(path)
+    path.write_bytes(b"")
+    with pytest.raises(RecordingError, match="offset 0: empty file"):
+        read(path)
+
+
+def test_somebody_elses_mcap_file_is_not_taken_for_a_recording() -> None:
+    stream = io.BytesIO()
+    writer = Writer(stream)
+    writer.start()
+    writer.finish()
+    with pytest.raises(RecordingError, match="not a recording of this program"):
+        parse(stream.getvalue(), "run.mcap")
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.integers(0, len(RECORDED) - 1))
+def test_a_recording_cut_short_anywhere_is_refused_with_its_offset(size: int) -> None:
+    with pytest.raises(RecordingError, match=r"run\.mcap: offset \d+: "):
+        parse(RECORDED[:size], "run.mcap")
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.integers(0, len(RECORDED) - 1), st.integers(1, 255))
+def test_a_damaged_byte_is_refused_or_changes_nothing(at: int, flip: int) -> None:
+    data = bytearray(RECORDED)
+    data[at] ^= flip
+    try:
+        recording = parse(bytes(data), "run.mcap")
+    except RecordingError:
+        return
+    assert msgspec.structs.replace(recording.source) == SOURCE
+    assert recording.periods == tuple(periods(3, [(0, 0), (0, 2), (1, 0)]))
