@@ -1,0 +1,28 @@
+cimport cython
+
+ctypedef unsigned long long u64_t
+ctypedef (u64_t, u64_t, u64_t, u64_t) words_t
+
+cdef u64_t _WORD, _M0, _M1, _W0, _W1, _PAIRS, _BITS, _GAUSS, _NO_BLOCK
+cdef long long _INDICES
+
+
+@cython.locals(p0=u64_t, p1=u64_t)
+cpdef words_t philox4x32(u64_t c0, u64_t c1, u64_t c2, u64_t c3, u64_t k0, u64_t k1)
+
+
+cdef class Stream:
+    cdef readonly object seed
+    cdef readonly str name
+    cdef u64_t k0, k1, name0, name1, block, w0, w1, w2, w3
+
+    cdef void load(self, u64_t block)
+    cpdef u64_t u32(self, long long index) except? 1
+    cpdef bint below(self, long long index, u64_t threshold) except? -1
+    cpdef u64_t u64(self, long long index) except? 1
+    cdef u64_t pair(self, u64_t kind, long long index) except? 1
+    @cython.locals(word=u64_t, part=int)
+    cpdef int bit(self, long long index) except -1
+    cpdef double uniform(self, long long index) except? -1.0
+    @cython.locals(draw=u64_t, magnitude=u64_t, cell=int, fraction=double, middle=double, place=double, z=double)
+    cpdef double gauss(self, long long index) except? -1000.0
