@@ -173,6 +173,18 @@ def decode_fields(body: bytes, n: int) -> Message:
     return message
 
 
+def describe(message: Message) -> str:
+    """One line for people, the comment in a stream file: `team seq=3`."""
+    if isinstance(message, TeamFrame):
+        return f"{FrameType(message.type).name.lower()} seq={message.seq}"
+    if isinstance(message, ServiceFrame):
+        name, fields, values = Opcode(message.opcode).name, SERVICE_DATA[message.opcode], message.values
+        numbers = [f" {field.name}={value}" for field, value in zip(fields, values, strict=True)]
+        return f"{name.lower()} seq={message.seq} slot={message.slot}" + "".join(numbers)
+    numbers = [f" {name}={getattr(message, name)}" for name in ("accepted", "rejected")]
+    return f"telemetry seq={message.seq} slot={message.slot} flags={message.flags:02x}h" + "".join(numbers)
+
+
 def _require_sendable(message: Message, body: bytes, n: int) -> None:
     try:
         form = format_of(message, n)

@@ -56,7 +56,11 @@ class Opcode(IntEnum):
 
 
 class Flags(IntFlag):
-    """The bits above the slot in telemetry's first byte. Bits 6 and 7 are sent as 0."""
+    """The bits above the slot in telemetry's first byte. Bits 6 and 7 are sent as 0.
+
+    A robot answers fresh frames only, and those end the failsafe: hence its flags tell of the time since the
+    last answer, and answering clears them.
+    """
 
     STOPPED = 0x08
     MOTORS_OFF = 0x10
@@ -65,8 +69,8 @@ class Flags(IntFlag):
 
 SLOT_MASK = 0x07
 FLAG_MEANINGS = {
-    Flags.STOPPED: "failsafe: smooth stop under way or done, no fresh frame for 110 ms",
-    Flags.MOTORS_OFF: "failsafe: motors off, no fresh frame for 500 ms",
+    Flags.STOPPED: "since its last answer: 110 ms without a fresh frame, smooth stop",
+    Flags.MOTORS_OFF: "since its last answer: 500 ms without a fresh frame, motors off",
     Flags.INIT_FAILED: "an LM629 did not come out of reset as it should; its motor stays off",
 }
 

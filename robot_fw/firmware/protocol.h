@@ -83,8 +83,8 @@
 
 /* Telemetry: first payload byte = slot | flags */
 #define SLOT_MASK                    0x07
-#define FLAG_STOPPED                 0x08    /* failsafe: smooth stop under way or done, no fresh frame for 110 ms */
-#define FLAG_MOTORS_OFF              0x10    /* failsafe: motors off, no fresh frame for 500 ms */
+#define FLAG_STOPPED                 0x08    /* since its last answer: 110 ms without a fresh frame, smooth stop */
+#define FLAG_MOTORS_OFF              0x10    /* since its last answer: 500 ms without a fresh frame, motors off */
 #define FLAG_INIT_FAILED             0x20    /* an LM629 did not come out of reset as it should; its motor stays off */
 
 /* CRC-16 5935h reflected over layout byte, HDR, payload in clear; sent low byte first, before whitening.

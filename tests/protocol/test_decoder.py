@@ -35,7 +35,7 @@ def messages(events, n):
 streams = st.booleans().flatmap(lambda up: st.tuples(damaged_streams(telemetry=up), st.just(up)))
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=200)
 @given(streams, st.sampled_from([1, 3, 10, module.RUN_LIMIT]))
 def test_events_and_counters_equal_the_naive_twins(stream, run_limit):
     heard, telemetry = stream

@@ -114,3 +114,18 @@ def test_any_body_at_all_is_a_message_or_a_content_error(n, data):
     except ContentError:
         return
     assert body_of(encode(message, n)) == body
+
+
+@pytest.mark.parametrize(
+    ("message", "line"),
+    [
+        (TeamFrame(0, 3, STOPPED), "team seq=3"),
+        (TeamFrame(3, 63, STOPPED), "team_ask seq=63"),
+        (ServiceFrame.ping(1, 2), "ping seq=1 slot=2"),
+        (ServiceFrame.filter(1, 0, 4, 5, 6, 7), "filter seq=1 slot=0 kp=4 ki=5 kd=6 il=7"),
+        (ServiceFrame.acceleration(2, 1, 5973), "acceleration seq=2 slot=1 acceleration=5973"),
+        (TelemetryFrame(9, 1, 0x18, accepted=4), "telemetry seq=9 slot=1 flags=18h accepted=4 rejected=0"),
+    ],
+)
+def test_a_message_is_described_in_one_line(message, line):
+    assert frames.describe(message) == line
