@@ -5,6 +5,7 @@ cdef long long _saturated(long long value) noexcept
 cdef long long _bottom(long long value) noexcept
 
 
+@cython.final
 cdef class Pid:
     cdef readonly int saturates
     cdef public long long kp, ki, kd, il, ds

@@ -1,7 +1,7 @@
 cimport cython
 
 
-cdef long long _NEVER
+cdef long long _NEVER, _HALF_SPACE, _SPACE_MASK
 
 
 cdef long long _wrapped(long long position) noexcept
@@ -11,6 +11,7 @@ cdef long long _wrapped(long long position) noexcept
 cdef long long _stopping_distance(long long speed, long long acceleration) noexcept
 
 
+@cython.final
 cdef class Trajectory:
     cdef public long long position, velocity, acceleration, max_velocity, target
     cdef public int velocity_mode, forward, stopping, moving, crossed

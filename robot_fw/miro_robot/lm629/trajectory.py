@@ -8,11 +8,13 @@ outer properties; the algorithm is the sheet's section 9.3 and always ends exact
 from __future__ import annotations
 
 _NEVER = 1 << 62
+_HALF_SPACE = 1 << 46
+_SPACE_MASK = (1 << 47) - 1
 
 
 def _wrapped(position: int) -> int:
     """A 47-bit position: the integer part lives in -2^30 .. 2^30-1."""
-    return ((position + 0x400000000000) & 0x7FFFFFFFFFFF) - 0x400000000000
+    return ((position + _HALF_SPACE) & _SPACE_MASK) - _HALF_SPACE
 
 
 def _stopping_distance(speed: int, acceleration: int) -> int:
