@@ -23,7 +23,7 @@ class Plant:
     `right.set_encoder(tick, a, b)` for every encoder edge, in tick order, left before right on one tick.
     """
 
-    NOT_STATE = ("left", "right")  # wiring
+    NOT_STATE: tuple[str, ...] = ("left", "right")  # wiring
 
     def __init__(self) -> None:
         self.left: Any = None

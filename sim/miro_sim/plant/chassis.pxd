@@ -1,0 +1,20 @@
+# C layout of miro_sim.plant.chassis.
+cimport cython
+from miro_host cimport dmath
+
+cdef double TICK_S
+cdef int SWEEPS
+
+@cython.final
+cdef class Body:
+    cdef readonly double left_m_rad, right_m_rad, track_m, friction_nm
+    cdef readonly double mass_ll, mass_lr, mass_rr, inverse_ll, inverse_lr, inverse_rr
+    cdef public double left_rad_s, right_rad_s, x_m, y_m, theta_rad
+    cdef readonly double turned_left_rad, turned_right_rad
+
+    @cython.locals(half_s=double, old_left=double, old_right=double)
+    cpdef void push(self, double left_nms, double right_nms, int ticks)
+    @cython.locals(left=double, right=double, left_rub=double, right_rub=double, new_left=double, new_right=double)
+    cdef void _rub(self, double most) noexcept
+    @cython.locals(left_m=double, right_m=double, half=double, chord_m=double, sine=double, cosine=double)
+    cdef void _roll(self)

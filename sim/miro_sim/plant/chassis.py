@@ -1,0 +1,172 @@
+"""The rigid robot on two wheels: impulses on the motor shafts in, shaft speeds and posture out.
+
+What belongs here: the inertia that couples the two shafts, Coulomb friction, the posture. What does not:
+where the impulses come from, encoders. Wheels roll without slipping (keep below 7.8 m/s2).
+
+With the shaft speeds w = (left, right) and c = wheel radius / gear ratio the robot goes at
+v = (cl wl + cr wr) / 2 and turns at (cr wr - cl wl) / b; its energy is w' M w / 2 with
+
+    M = | Jm + cl2 (m/4 + Jz/b2)   cl cr (m/4 - Jz/b2)    |
+        | cl cr (m/4 - Jz/b2)      Jm + cr2 (m/4 + Jz/b2) |
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_host import dmath
+
+from miro_sim.plant.params import DriveParams
+
+TICK_S = 1.0 / 24e6
+SWEEPS = 8
+
+
+class Body:
+    """Shaft speeds (rad/s) and posture (m, m, rad; the heading is not wrapped) of one robot."""
+
+    NOT_STATE: tuple[str, ...] = (
+        "left_m_rad",
+        "right_m_rad",
+        "track_m",
+        "friction_nm",
+        "mass_ll",
+        "mass_lr",
+        "mass_rr",
+        "inverse_ll",
+        "inverse_lr",
+        "inverse_rr",
+        "turned_left_rad",
+        "turned_right_rad",
+    )
+
+    def __init__(self, params: DriveParams, x_m: float, y_m: float, theta_rad: float) -> None:
+        body = params.chassis
+        self.left_m_rad = params.radius_m(0) / body.gear_ratio
+        self.right_m_rad = params.radius_m(1) / body.gear_ratio
+        self.track_m = body.track_m
+        self.friction_nm = params.friction_nm()
+        straight = 0.25 * body.mass_kg
+        yaw = body.yaw_inertia_kg_m2 / (body.track_m * body.track_m)
+        rotor = params.motor.rotor_inertia_kg_m2
+        self.mass_ll = rotor + self.left_m_rad * self.left_m_rad * (straight + yaw)
+        self.mass_lr = self.left_m_rad * self.right_m_rad * (straight - yaw)
+        self.mass_rr = rotor + self.right_m_rad * self.right_m_rad * (straight + yaw)
+        determinant = self.mass_ll * self.mass_rr - self.mass_lr * self.mass_lr
+        self.inverse_ll = self.mass_rr / determinant
+        self.inverse_lr = -self.mass_lr / determinant
+        self.inverse_rr = self.mass_ll / determinant
+        self.left_rad_s = 0.0
+        self.right_rad_s = 0.0
+        self.x_m = x_m
+        self.y_m = y_m
+        self.theta_rad = theta_rad
+        self.turned_left_rad = 0.0  # by the last push
+        self.turned_right_rad = 0.0
+
+    def push(self, left_nms: float, right_nms: float, ticks: int) -> None:
+        """Applies motor impulses and friction over `ticks`; the robot moves by the mean of old and new speed."""
+        half_s = 0.5 * TICK_S * ticks
+        old_left = self.left_rad_s
+        old_right = self.right_rad_s
+        if old_left == 0.0 and old_right == 0.0 and left_nms == 0.0 and right_nms == 0.0:
+            self.turned_left_rad = 0.0
+            self.turned_right_rad = 0.0
+            return
+        self.left_rad_s = old_left + self.inverse_ll * left_nms + self.inverse_lr * right_nms
+        self.right_rad_s = old_right + self.inverse_lr * left_nms + self.inverse_rr * right_nms
+        self._rub(2.0 * half_s * self.friction_nm)
+        self.turned_left_rad = half_s * (old_left + self.left_rad_s)
+        self.turned_right_rad = half_s * (old_right + self.right_rad_s)
+        if self.turned_left_rad != 0.0 or self.turned_right_rad != 0.0:
+            self._roll()
+
+    def _rub(self, most: float) -> None:
+        """Friction impulses of at most `most` on each shaft, opposing the speed that is left after them.
+
+        They minimise the kinetic energy within the box |impulse| <= most (maximum dissipation): a shaft that
+        can be held is held at exactly zero. The two easy cases are solved directly, the rest by projected
+        Gauss-Seidel sweeps; each of these lowers the energy: friction never drives, however many there are.
+        """
+        left = self.left_rad_s
+        right = self.right_rad_s
+        left_rub = most if left < 0.0 else -most
+        right_rub = most if right < 0.0 else -most
+        new_left = left + self.inverse_ll * left_rub + self.inverse_lr * right_rub
+        new_right = right + self.inverse_lr * left_rub + self.inverse_rr * right_rub
+        if new_left * left > 0.0 and new_right * right > 0.0:  # both go on sliding as they did
+            self.left_rad_s = new_left
+            self.right_rad_s = new_right
+            return
+        left_rub = -(self.mass_ll * left + self.mass_lr * right)
+        right_rub = -(self.mass_lr * left + self.mass_rr * right)
+        if -most <= left_rub <= most and -most <= right_rub <= most:  # both stick
+            self.left_rad_s = 0.0
+            self.right_rad_s = 0.0
+            return
+        left_rub = 0.0
+        right_rub = 0.0
+        for _ in range(SWEEPS):
+            new_left = left + self.inverse_ll * left_rub + self.inverse_lr * right_rub
+            left_rub = min(most, max(-most, left_rub - new_left / self.inverse_ll))
+            new_right = right + self.inverse_lr * left_rub + self.inverse_rr * right_rub
+            right_rub = min(most, max(-most, right_rub - new_right / self.inverse_rr))
+        new_left = left + self.inverse_ll * left_rub + self.inverse_lr * right_rub
+        new_right = right + self.inverse_lr * left_rub + self.inverse_rr * right_rub
+        self.left_rad_s = 0.0 if -most < left_rub < most else new_left
+        self.right_rad_s = 0.0 if -most < right_rub < most else new_right
+
+    def _roll(self) -> None:
+        """Moves the posture along the arc that both wheels have rolled (chord, exact to the 4th power)."""
+        left_m = self.left_m_rad * self.turned_left_rad
+        right_m = self.right_m_rad * self.turned_right_rad
+        half = 0.5 * (right_m - left_m) / self.track_m
+        chord_m = 0.5 * (left_m + right_m) * (1.0 - half * half / 6.0)
+        sine, cosine = dmath.sincos(self.theta_rad + half)
+        self.x_m = self.x_m + chord_m * cosine
+        self.y_m = self.y_m + chord_m * sine
+        self.theta_rad = self.theta_rad + 2.0 * half
+
+    def pose_after(self, ticks: int) -> tuple[float, float, float]:
+        """Posture (m, m, rad) `ticks` after the last push at the speeds of now; changes nothing."""
+        v, w = self.velocity()
+        time_s = TICK_S * ticks
+        half = 0.5 * w * time_s
+        chord_m = v * time_s * (1.0 - half * half / 6.0)
+        sine, cosine = dmath.sincos(self.theta_rad + half)
+        return (self.x_m + chord_m * cosine, self.y_m + chord_m * sine, self.theta_rad + 2.0 * half)
+
+    def velocity(self) -> tuple[float, float]:
+        """(m/s forward, rad/s counter-clockwise)."""
+        left_m_s = self.left_m_rad * self.left_rad_s
+        right_m_s = self.right_m_rad * self.right_rad_s
+        return (0.5 * (left_m_s + right_m_s), (right_m_s - left_m_s) / self.track_m)
+
+    def kinetic_energy_j(self) -> float:
+        """Energy of translation, rotation and both rotors."""
+        left = self.left_rad_s
+        right = self.right_rad_s
+        both = self.mass_ll * left * left + 2.0 * self.mass_lr * left * right + self.mass_rr * right * right
+        return 0.5 * both
+
+    def snapshot(self) -> dict[str, object]:
+        """All mutable state."""
+        return {
+            "left_rad_s": self.left_rad_s,
+            "right_rad_s": self.right_rad_s,
+            "x_m": self.x_m,
+            "y_m": self.y_m,
+            "theta_rad": self.theta_rad,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Takes back what `snapshot` gave."""
+        self.left_rad_s = state["left_rad_s"]
+        self.right_rad_s = state["right_rad_s"]
+        self.x_m = state["x_m"]
+        self.y_m = state["y_m"]
+        self.theta_rad = state["theta_rad"]
+
+    def __repr__(self) -> str:
+        v, w = self.velocity()
+        return f"Body(x={self.x_m!r} y={self.y_m!r} theta={self.theta_rad!r} v={v!r} w={w!r})"

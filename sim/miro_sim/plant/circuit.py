@@ -1,0 +1,122 @@
+"""One motor winding and its half of the H-bridge: the current through an interval with frozen back-EMF.
+
+What belongs here: the piecewise linear circuit and its exact solution. What does not: torque, speed, who
+switches the bridge and when.
+
+The winding's time constant (13 us driven, 22 us through the diodes) is shorter than a PWM period (85 us):
+the current ripples fully and stands at zero for part of the period at light load, so no average-voltage model
+holds. With the current i positive the bridge puts a voltage `up` on the winding, with i negative a voltage `down`:
+
+    bridge               up                      down
+    driving forward      VS - drop (transistors) VS + 2 Vf (diodes)
+    driving backward     -(VS + 2 Vf) (diodes)   -(VS - drop) (transistors)
+    off                  -(VS + 2 Vf) (diodes)   VS + 2 Vf (diodes)
+
+and L di/dt = voltage - emf - R i, R being that of winding, battery and, where transistors conduct, bridge.
+As up < down, the current that reaches zero stays there while up <= emf <= down, else it goes on with the
+other sign: at most one change of sign in an interval. Source: L298 data sheet (no internal diodes).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_host import dmath
+
+from miro_sim.plant.params import DriveParams
+
+MAX_TICKS = 2048  # longest interval: one PWM period
+TICK_S = 1.0 / 24e6
+
+
+class Winding:
+    """Current (A, positive drives forward) in one motor and the state of its bridge."""
+
+    NOT_STATE: tuple[str, ...] = (
+        "drive_v",
+        "diode_v",
+        "drive_ohm",
+        "diode_ohm",
+        "drive_tau",
+        "diode_tau",
+        "drive_decay",
+        "diode_decay",
+        "up_v",
+        "down_v",
+    )
+
+    def __init__(self, params: DriveParams) -> None:
+        motor = params.motor
+        self.drive_v = params.battery.voltage_v - params.bridge.drop_v
+        self.diode_v = params.battery.voltage_v + 2.0 * params.bridge.diode_v
+        self.diode_ohm = motor.resistance_ohm + params.battery.resistance_ohm
+        self.drive_ohm = self.diode_ohm + params.bridge.drop_ohm
+        self.drive_tau = motor.inductance_h / (self.drive_ohm * TICK_S)  # in ticks
+        self.diode_tau = motor.inductance_h / (self.diode_ohm * TICK_S)
+        self.drive_decay = [dmath.exp(-ticks / self.drive_tau) for ticks in range(MAX_TICKS + 1)]
+        self.diode_decay = [dmath.exp(-ticks / self.diode_tau) for ticks in range(MAX_TICKS + 1)]
+        self.current_a = 0.0
+        self.set_bridge(0, 1)
+
+    def set_bridge(self, enable: int, forward: int) -> None:
+        """Inputs of the L298 half: enable pin and direction (1 forward, 0 backward), from now on."""
+        self.drive = 0
+        if enable:
+            self.drive = 1 if forward else -1
+        self.up_v = self.drive_v if self.drive > 0 else -self.diode_v
+        self.down_v = -self.drive_v if self.drive < 0 else self.diode_v
+
+    def step(self, ticks: int, emf_v: float) -> float:
+        """Advances by 1..2048 ticks with the back-EMF held; returns the charge that passed, in A * ticks."""
+        start = self.current_a
+        if start == 0.0 and self.up_v <= emf_v <= self.down_v:
+            return 0.0  # blocked
+        positive = start > 0.0 or (start == 0.0 and emf_v < self.up_v)
+        voltage = self.up_v if positive else self.down_v
+        if (positive and self.drive > 0) or (not positive and self.drive < 0):
+            ohm = self.drive_ohm
+            tau = self.drive_tau
+            decay = self.drive_decay[ticks]
+        else:
+            ohm = self.diode_ohm
+            tau = self.diode_tau
+            decay = self.diode_decay[ticks]
+        final = (voltage - emf_v) / ohm
+        end = final + (start - final) * decay
+        if (end >= 0.0) == positive or end == 0.0:
+            self.current_a = end
+            return final * ticks + tau * (start - end)
+        crossing = tau * dmath.log(1.0 - start / final)
+        self.current_a = 0.0
+        return final * crossing + tau * start + self._onward(ticks - crossing, emf_v)
+
+    def _onward(self, ticks: float, emf_v: float) -> float:
+        """The rest of an interval in which the current came to zero: blocked, or on with the other sign."""
+        if ticks <= 0.0:
+            return 0.0
+        if emf_v < self.up_v:
+            voltage = self.up_v
+            driven = self.drive > 0
+        elif emf_v > self.down_v:
+            voltage = self.down_v
+            driven = self.drive < 0
+        else:
+            return 0.0
+        ohm = self.drive_ohm if driven else self.diode_ohm
+        tau = self.drive_tau if driven else self.diode_tau
+        final = (voltage - emf_v) / ohm
+        self.current_a = final * (1.0 - dmath.exp(-ticks / tau))
+        return final * ticks - tau * self.current_a
+
+    def snapshot(self) -> dict[str, object]:
+        """All mutable state."""
+        return {"current_a": self.current_a, "drive": self.drive}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Takes back what `snapshot` gave."""
+        self.current_a = state["current_a"]
+        self.set_bridge(1 if state["drive"] != 0 else 0, 1 if state["drive"] > 0 else 0)
+
+    def __repr__(self) -> str:
+        mode = ("off", "forward", "backward")[self.drive]
+        return f"Winding({mode}, {self.current_a!r} A)"

@@ -1,0 +1,24 @@
+# C layout of miro_sim.plant.drive.
+cimport cython
+from miro_robot.plant cimport Plant
+from miro_sim.plant.chassis cimport Body
+from miro_sim.plant.circuit cimport Winding
+from miro_sim.plant.encoder cimport Quadrature
+
+cdef long long LONGEST_STEP, NONE_LEFT
+cdef double TICK_S
+
+cdef class DifferentialDrive(Plant):
+    cdef readonly object params
+    cdef readonly double torque_constant_nm_a
+    cdef readonly long long tick
+    cdef readonly Winding left_winding, right_winding
+    cdef readonly Quadrature left_encoder, right_encoder
+    cdef readonly Body body
+
+    cpdef void advance(self, long long tick)
+    cpdef void set_bridge(self, long long tick, int side, int enable, int forward)
+    @cython.locals(constant=double, start_tick=cython.longlong, left_charge=double, right_charge=double)
+    cdef void _step(self, int ticks)
+    @cython.locals(left_tick=cython.longlong, right_tick=cython.longlong)
+    cdef void _report(self)
