@@ -7,7 +7,10 @@ electronics. Time is in ticks of the 24 MHz crystal.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
+
+from miro_robot.lm629.chip import Lm629
 
 FAR = 1 << 62  # "never", in ticks
 LEFT = 0
@@ -23,15 +26,15 @@ class Plant:
     `right.set_encoder(tick, a, b)` for every encoder edge, in tick order, left before right on one tick.
     """
 
-    NOT_STATE: tuple[str, ...] = ("left", "right")  # wiring
+    NOT_STATE: Sequence[str] = ("left", "right")  # wiring
 
     def __init__(self) -> None:
-        self.left: Any = None
-        self.right: Any = None
+        self.left: Lm629 | None = None
+        self.right: Lm629 | None = None
         self.next_tick = FAR
 
-    def attach(self, left: Any, right: Any) -> None:
-        """Wires the encoder outputs to the two LM629."""
+    def attach(self, left: Lm629, right: Lm629) -> None:
+        """Wires the encoder outputs to the two LM629 and shows these the levels of now."""
         self.left = left
         self.right = right
 

@@ -25,7 +25,7 @@ SWEEPS = 8
 class Body:
     """Shaft speeds (rad/s) and posture (m, m, rad; the heading is not wrapped) of one robot."""
 
-    NOT_STATE: tuple[str, ...] = (
+    NOT_STATE = (
         "left_m_rad",
         "right_m_rad",
         "track_m",
@@ -65,7 +65,7 @@ class Body:
         self.turned_right_rad = 0.0
 
     def push(self, left_nms: float, right_nms: float, ticks: int) -> None:
-        """Applies motor impulses and friction over `ticks`; the robot moves by the mean of old and new speed."""
+        """Applies motor impulses and friction over `ticks`; moves on at the mean of old and new speed."""
         half_s = 0.5 * TICK_S * ticks
         old_left = self.left_rad_s
         old_right = self.right_rad_s

@@ -5,7 +5,7 @@ switches the bridge and when.
 
 The winding's time constant (13 us driven, 22 us through the diodes) is shorter than a PWM period (85 us):
 the current ripples fully and stands at zero for part of the period at light load, so no average-voltage model
-holds. With the current i positive the bridge puts a voltage `up` on the winding, with i negative a voltage `down`:
+holds. With the current i positive the bridge puts a voltage `up` on the winding, with i negative `down`:
 
     bridge               up                      down
     driving forward      VS - drop (transistors) VS + 2 Vf (diodes)
@@ -32,7 +32,7 @@ TICK_S = 1.0 / 24e6
 class Winding:
     """Current (A, positive drives forward) in one motor and the state of its bridge."""
 
-    NOT_STATE: tuple[str, ...] = (
+    NOT_STATE = (
         "drive_v",
         "diode_v",
         "drive_ohm",

@@ -1,5 +1,6 @@
 # C layout of miro_sim.plant.drive.
 cimport cython
+from miro_robot.lm629.chip cimport Lm629
 from miro_robot.plant cimport Plant
 from miro_sim.plant.chassis cimport Body
 from miro_sim.plant.circuit cimport Winding
@@ -16,6 +17,7 @@ cdef class DifferentialDrive(Plant):
     cdef readonly Quadrature left_encoder, right_encoder
     cdef readonly Body body
 
+    cpdef void attach(self, Lm629 left, Lm629 right)
     cpdef void advance(self, long long tick)
     cpdef void set_bridge(self, long long tick, int side, int enable, int forward)
     @cython.locals(constant=double, start_tick=cython.longlong, left_charge=double, right_charge=double)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_robot.lm629.chip import Lm629
 from miro_robot.plant import Plant
 
 from miro_sim.plant.chassis import Body
@@ -28,7 +29,7 @@ TICK_S = 1.0 / 24e6
 class DifferentialDrive(Plant):
     """A robot that stands at (x_m, y_m) with heading theta_rad at tick 0, bridges off, A = B = 0."""
 
-    NOT_STATE: tuple[str, ...] = ("left", "right", "params", "torque_constant_nm_a", "next_tick")
+    NOT_STATE = ("left", "right", "params", "torque_constant_nm_a", "next_tick")
 
     def __init__(
         self, params: DriveParams, x_m: float = 0.0, y_m: float = 0.0, theta_rad: float = 0.0
@@ -43,6 +44,13 @@ class DifferentialDrive(Plant):
         self.left_encoder = Quadrature(params.counts_per_radian())
         self.right_encoder = Quadrature(params.counts_per_radian())
         self.body = Body(params, x_m, y_m, theta_rad)
+
+    def attach(self, left: Lm629, right: Lm629) -> None:
+        """Wires the encoder outputs to the two LM629 and shows these the levels of now."""
+        self.left = left
+        self.right = right
+        left.set_encoder(self.tick, self.left_encoder.a(), self.left_encoder.b())
+        right.set_encoder(self.tick, self.right_encoder.a(), self.right_encoder.b())
 
     def advance(self, tick: int) -> None:
         """Integrates to `tick` (a tick that is past already: nothing)."""

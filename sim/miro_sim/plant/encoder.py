@@ -17,7 +17,7 @@ FAR = 1 << 62
 class Quadrature:
     """Position (counts, float) of one shaft and what A and B show of it."""
 
-    NOT_STATE: tuple[str, ...] = (
+    NOT_STATE = (
         "counts_per_radian",
         "edge_tick",
         "_start",
