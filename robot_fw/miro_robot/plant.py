@@ -7,7 +7,6 @@ electronics. Time is in ticks of the 24 MHz crystal.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from miro_robot.lm629.chip import Lm629
@@ -15,6 +14,7 @@ from miro_robot.lm629.chip import Lm629
 FAR = 1 << 62  # "never", in ticks
 LEFT = 0
 RIGHT = 1
+_WIRES: tuple[str, ...] = ("left", "right")
 
 
 class Plant:
@@ -26,7 +26,7 @@ class Plant:
     `right.set_encoder(tick, a, b)` for every encoder edge, in tick order, left before right on one tick.
     """
 
-    NOT_STATE: Sequence[str] = ("left", "right")  # wiring
+    NOT_STATE = _WIRES
 
     def __init__(self) -> None:
         self.left: Lm629 | None = None
