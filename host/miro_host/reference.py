@@ -109,7 +109,8 @@ class Arc(msgspec.Struct, frozen=True):
         turn = abs(self.curvature_per_m) * self.ramp.at(self.ramp.duration_s)[0]
         if turn >= 6.283185307179586:
             raise ValueError(
-                f"curvature_per_m = {self.curvature_per_m!r}: turns by {turn:.3f} rad and comes back to the origin"
+                f"curvature_per_m = {self.curvature_per_m!r}: the path turns by {turn:.3f} rad, back to the"
+                " origin; shorten the drive or make the arc flatter"
             )
 
     def at(self, t_s: float) -> Reference:

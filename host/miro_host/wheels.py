@@ -17,6 +17,17 @@ COUNTS_PER_WHEEL_TURN = 16384  # 512 lines x 4 edges x gear 8:1
 UNITS_PER_COUNT = 256
 
 
+def nearest(x: float) -> int:
+    """The integer nearest to x, halves away from zero. Exact: x minus its whole part is."""
+    whole = int(x)
+    rest = x - whole
+    if rest >= 0.5:
+        return whole + 1
+    if rest <= -0.5:
+        return whole - 1
+    return whole
+
+
 class Wheels(msgspec.Struct, frozen=True):
     """What the host believes about the drive: track, nominal wheel radius, speed limit."""
 
@@ -33,7 +44,7 @@ class Wheels(msgspec.Struct, frozen=True):
 
     @property
     def units_per_m_s(self) -> float:
-        """1/256 count per sample in one m/s: 11392.6 for the default radius."""
+        """1/256 count per sample in one m/s: 11392.75 for the default radius."""
         samples_per_s = TICKS_PER_S / TICKS_PER_SAMPLE
         return UNITS_PER_COUNT * COUNTS_PER_WHEEL_TURN / samples_per_s / (2.0 * PI * self.radius_m)
 
@@ -52,10 +63,7 @@ class Wheels(msgspec.Struct, frozen=True):
 
     def counts(self, speed_m_s: float) -> int:
         """A rim speed in 1/256 count per sample, rounded half away from zero."""
-        scaled = speed_m_s * self.units_per_m_s
-        if scaled < 0.0:
-            return -int(0.5 - scaled)
-        return int(scaled + 0.5)
+        return nearest(speed_m_s * self.units_per_m_s)
 
     def command(self, v_m_s: float, w_rad_s: float) -> tuple[int, int]:
         """(left, right) for the team frame: split, limited, quantised."""

@@ -1,0 +1,131 @@
+"""One robot's chain: order of the steps, missing measurements, clamps, and that nothing is forgotten."""
+
+import json
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_host.integrator import Integrator, Limits
+from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
+from miro_host.posture import Posture
+from miro_host.reference import Arc, Line
+from miro_host.station import Station
+from miro_host.vision import Vision, VisionErrors
+from miro_host.yang_kim import Gains, YangKim
+
+LAW = YangKim(Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69))
+START = Posture(0.07, 0.02, -0.38)
+ACCELERATIONS = st.floats(-1e4, 1e4)
+
+
+def pilot(**options):
+    return Pilot(Line(), LAW, Limits(), **options)
+
+
+def test_before_the_first_measurement_the_command_is_zero():
+    one = pilot()
+    assert [one.update(None, k * PERIOD_S) for k in range(3)] == [STANDSTILL] * 3
+
+
+def test_a_lost_measurement_repeats_the_command_and_leaves_the_integrator_alone():
+    one = pilot()
+    command = one.update(START, 0.4)
+    before = one.snapshot()
+    assert one.update(None, 0.5) == command != STANDSTILL
+    assert one.snapshot() == before
+
+
+def test_the_command_is_the_integral_of_reference_acceleration_and_input():
+    one = pilot()
+    first = one.update(START, 0.1)
+    assert first.v_m_s == pytest.approx(PERIOD_S * (0.4 + first.u1))
+    assert first.w_rad_s == pytest.approx(PERIOD_S * first.u2)
+    second = one.update(START, 0.1 + PERIOD_S)
+    assert second.v_m_s == pytest.approx(first.v_m_s + PERIOD_S * (0.4 + second.u1))
+
+
+def test_the_law_is_given_the_commanded_velocity_of_the_period_before():
+    one = pilot()
+    first = one.update(START, 1.0)
+    expected = LAW.control(Line().at(1.1), START, first.v_m_s, first.w_rad_s)
+    assert one.update(START, 1.1).u1 == expected.u1
+
+
+def test_the_lead_shifts_the_reference_and_nothing_else():
+    plain, led = pilot(), pilot(reference_lead_s=0.125)
+    assert led.update(START, 1.0) == plain.update(START, 1.125)
+
+
+def test_the_wheel_commands_are_those_of_the_integrator():
+    one = pilot()
+    command = one.update(START, 2.0)
+    assert (command.left, command.right) == one.wheels.command(command.v_m_s, command.w_rad_s)
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(ACCELERATIONS, ACCELERATIONS), max_size=30))
+def test_the_integrator_stays_within_its_limits_and_comes_back_at_once(inputs):
+    limits = Limits()
+    one = Integrator(limits, PERIOD_S)
+    for v_dot, w_dot in inputs:
+        before = (one.v_m_s, one.w_rad_s)
+        one.step(v_dot, w_dot)
+        assert abs(one.v_m_s) <= limits.max_v_m_s
+        assert abs(one.w_rad_s) <= limits.max_w_rad_s
+        assert abs(one.v_m_s - before[0]) <= PERIOD_S * limits.max_v_dot_m_s2 * (1 + 1e-12)
+    for _ in range(100):
+        one.step(1e9, 1e9)
+    one.step(-1.0, -1.0)  # no wind-up: the first opposite input shows
+    assert one.v_m_s == limits.max_v_m_s - PERIOD_S
+    assert one.w_rad_s == limits.max_w_rad_s - PERIOD_S
+
+
+@pytest.mark.parametrize("name", ["max_v_m_s", "max_w_rad_s", "max_v_dot_m_s2", "max_w_dot_rad_s2"])
+def test_limits_name_what_is_wrong_with_them(name):
+    with pytest.raises(ValueError, match=name):
+        Limits(**{name: 0.0})
+    with pytest.raises(ValueError, match="period_s"):
+        Integrator(Limits(), 0.0)
+
+
+def chain():
+    return Pilot(Arc(), LAW, Limits()), Vision(VisionErrors(), 2), Station(3)
+
+
+def run(parts, frames):
+    steering, vision, station = parts
+    sent = []
+    for k in frames:
+        if k == 3:
+            station.request(1, 0)
+            station.request(2, 2, (5973,))
+        seen = vision.frame(Posture(0.01 * k, 0.02, 0.9), (0.3 * (k % 5), -0.2, 0.1))
+        command = steering.update(seen, k * PERIOD_S)
+        sent.append(station.frame([(command.left, command.right)] * 3))
+    return sent
+
+
+@pytest.mark.parametrize("cut", [0, 1, 2, 4, 5, 11])
+def test_saved_after_any_frame_and_continued_the_bytes_are_the_same(cut):
+    whole = run(chain(), range(20))
+    parts = chain()
+    run(parts, range(cut))
+    states = [part.snapshot() for part in parts]
+    copies = chain()
+    for copy, state in zip(copies, states, strict=True):
+        copy.restore(state)
+        assert copy.snapshot() == state
+    assert run(copies, range(cut, 20)) == whole[cut:]
+
+
+def test_every_field_of_a_stateful_object_is_in_its_snapshot_or_declared_constant():
+    parts = chain()
+    for part in (*parts, parts[0].integrator):
+        assert set(vars(part)) == set(part.snapshot()) | set(part.NOT_STATE), repr(part)
+
+
+def test_a_snapshot_holds_plain_values_only():
+    parts = chain()
+    run(parts, range(6))
+    for part in parts:
+        json.dumps(part.snapshot())

@@ -1,0 +1,82 @@
+"""Reference trajectories against Cartesian formulas in 40 digits, and their ends."""
+
+import math
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from miro_host.reference import Arc, Line, Ramp
+
+from tests.naive import host_control as naive
+
+ANGLES = st.floats(-3.1, 3.1)
+
+
+def numbers(r):
+    return (
+        *(r.posture.x_m, r.posture.y_m, r.posture.theta_rad, r.v_m_s, r.w_rad_s, r.v_dot_m_s2),
+        *(r.w_dot_rad_s2, r.rho_m, r.phi_rad, r.rho_rate_m_s, r.phi_rate_rad_s, r.rho_accel_m_s2),
+    )
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(0.01, 6.0), ANGLES, st.floats(-2.5, 2.5), st.floats(0.05, 0.4), st.floats(0.1, 1.0))
+def test_an_arc_and_all_its_derivatives_equal_the_cartesian_path(t, heading, curvature, speed, ramp):
+    assume(abs(t - ramp) > 1e-3)
+    assume(abs(curvature) > 1e-3)  # below, the twin's differences cancel
+    path = Arc(Ramp(speed, ramp), heading, curvature)
+    assert numbers(path.at(t)) == pytest.approx(
+        [float(x) for x in naive.reference(t, speed, ramp, heading, curvature)], rel=1e-9, abs=1e-11
+    )
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.floats(0.01, 6.0), ANGLES)
+def test_a_line_and_all_its_derivatives_equal_the_cartesian_path(t, heading):
+    assume(abs(t - 0.5) > 1e-3)
+    expected = [float(x) for x in naive.reference(t, 0.2, 0.5, heading, 0)]
+    assert numbers(Line(heading_rad=heading).at(t)) == pytest.approx(expected, rel=1e-9, abs=1e-11)
+
+
+def test_an_arc_without_curvature_is_a_line():
+    assert numbers(Arc(heading_rad=0.3, curvature_per_m=0.0).at(2.0)) == pytest.approx(
+        numbers(Line(heading_rad=0.3).at(2.0)), rel=1e-15, abs=1e-16
+    )
+
+
+def test_the_polar_form_has_its_limit_values_in_the_origin():
+    start = Arc().at(0.0)
+    assert (start.rho_m, start.phi_rad, start.phi_rate_rad_s) == (0.0, math.radians(60.0), 0.0)
+    assert (start.v_dot_m_s2, start.w_dot_rad_s2, start.rho_accel_m_s2) == (0.4, -0.4, 0.4)
+
+
+def test_the_arc_of_the_curve_scenario_ends_where_it_should():
+    end = Arc().at(6.0).posture
+    assert (end.x_m, end.y_m, math.degrees(end.theta_rad)) == pytest.approx((0.969, 0.495, -5.9), abs=0.02)
+
+
+@pytest.mark.parametrize("path", [Line(), Arc()], ids=["line", "arc"])
+@pytest.mark.parametrize(("t", "same_place_as"), [(-1e-9, 0.0), (-5.0, 0.0), (6.0 + 1e-9, 6.0), (60.0, 6.0)])
+def test_outside_its_time_the_reference_stands_still_at_its_end(path, t, same_place_as):
+    r = path.at(t)
+    assert r.posture == path.at(same_place_as).posture
+    assert (r.v_m_s, r.w_rad_s, r.v_dot_m_s2, r.w_dot_rad_s2) == (0.0, 0.0, 0.0, 0.0)
+    assert (r.rho_rate_m_s, r.phi_rate_rad_s, r.rho_accel_m_s2) == (0.0, 0.0, 0.0)
+
+
+def test_the_speed_is_steady_from_the_end_of_the_ramp_on():
+    assert Ramp().at(0.5) == (0.05, 0.2, 0.0)
+    assert Ramp().at(6.0) == pytest.approx((1.15, 0.2, 0.0))
+    assert Ramp(ramp_s=0.0).at(0.0) == (0.0, 0.2, 0.0)
+
+
+def test_an_arc_back_to_the_origin_is_refused():
+    with pytest.raises(ValueError, match=r"curvature_per_m = 6\.0"):
+        Arc(curvature_per_m=6.0)
+
+
+@pytest.mark.parametrize("name", ["speed_m_s", "ramp_s", "duration_s"])
+@pytest.mark.parametrize("value", [-0.1, math.nan])
+def test_a_ramp_names_what_is_wrong_with_it(name, value):
+    with pytest.raises(ValueError, match=name):
+        Ramp(**{name: value})

@@ -1,0 +1,85 @@
+"""From (v, w) to int16: the split, the limit that keeps the curvature, the rounding."""
+
+from fractions import Fraction
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_host.wheels import Wheels, nearest
+from miro_protocol.table import VELOCITY_SATURATION
+
+WHEELS = Wheels()
+SPEEDS = st.floats(-20.0, 20.0)
+TURNS = st.floats(-500.0, 500.0)
+LIMIT = 16633
+
+
+def test_the_greatest_command_is_the_robots_own_limit():
+    assert WHEELS.command(1.46, 0.0) == (LIMIT, LIMIT)
+    assert LIMIT == VELOCITY_SATURATION
+    assert WHEELS.command(-99.0, 0.0) == (-LIMIT, -LIMIT)
+    assert WHEELS.units_per_m_s == pytest.approx(11392.75, abs=0.01)
+
+
+def test_turning_left_slows_the_left_wheel():
+    assert WHEELS.split(0.2, 1.0) == pytest.approx((0.166, 0.234))
+
+
+@settings(deadline=None)
+@given(SPEEDS, TURNS)
+def test_no_command_exceeds_the_limit(v, w):
+    left, right = WHEELS.command(v, w)
+    assert type(left) is type(right) is int
+    assert max(abs(left), abs(right)) <= LIMIT
+
+
+@settings(deadline=None)
+@given(SPEEDS, TURNS)
+def test_the_limit_scales_both_wheels_by_one_factor(v, w):
+    left, right = WHEELS.split(v, w)
+    limited_left, limited_right = WHEELS.limit(left, right)
+    factor = min(1.0, WHEELS.limit_m_s / max(abs(left), abs(right), 1e-300))
+    assert (limited_left, limited_right) == pytest.approx((left * factor, right * factor), rel=1e-14)
+    assert max(abs(limited_left), abs(limited_right)) <= WHEELS.limit_m_s
+    if factor == 1.0:
+        assert (limited_left, limited_right) == (left, right)
+
+
+@settings(deadline=None)
+@given(st.floats(-1.46, 1.46))
+def test_a_command_is_the_nearest_quantum(speed):
+    exact = Fraction(speed) * Fraction(WHEELS.units_per_m_s)
+    assert abs(WHEELS.counts(speed) - exact) <= Fraction(1, 2) + Fraction(1, 10**9)
+
+
+@settings(deadline=None)
+@given(SPEEDS, TURNS)
+def test_backwards_and_the_other_way_round_are_mirror_images(v, w):
+    left, right = WHEELS.command(v, w)
+    assert WHEELS.command(-v, -w) == (-left, -right)
+    assert WHEELS.command(v, -w) == (right, left)
+
+
+@settings(deadline=None)
+@given(st.integers(-LIMIT, LIMIT))
+def test_every_integer_is_its_own_quantum(count):
+    assert WHEELS.counts(count / WHEELS.units_per_m_s) == count
+
+
+@settings(deadline=None)
+@given(st.floats(-1e6, 1e6))
+def test_rounding_is_to_the_nearest(x):
+    assert abs(nearest(x) - Fraction(x)) <= Fraction(1, 2)
+
+
+def test_halves_go_away_from_zero():
+    assert [nearest(x) for x in (0.5, 1.5, 2.5, -0.5, -1.5, -0.0)] == [1, 2, 3, -1, -2, 0]
+    assert nearest(0.49999999999999994) == 0  # where x + 0.5 rounds up to 1
+
+
+@pytest.mark.parametrize("name", ["track_m", "radius_m", "limit_m_s"])
+def test_wheels_name_what_is_wrong_with_them(name):
+    with pytest.raises(ValueError, match=name):
+        Wheels(**{name: 0.0})
+    with pytest.raises(ValueError, match="int16"):
+        Wheels(radius_m=0.010)

@@ -1,0 +1,145 @@
+"""The law against the paper: its twin in 40 digits, its algebra, and its guards."""
+
+import math
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from miro_host.posture import Posture
+from miro_host.reference import Arc, Line
+from miro_host.yang_kim import Gains, YangKim, curvature_term, saturation, sign
+
+from tests.naive import host_control as naive
+
+SATURATING = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69)
+SWITCHING = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69, switching="sign", cosine_guard=0.0, rho_floor_m=1e-9)
+PATHS = st.sampled_from([Line(), Line(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)])
+POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))
+TIMES = st.floats(0.02, 5.9)
+SPEEDS = st.floats(-0.9, 0.9)
+TURNS = st.floats(-4.0, 4.0)
+
+
+def twin(gains):
+    widths = (gains.layer_s1_m_s, gains.layer_s2_rad_s, gains.layer_theta_rad)
+    if gains.switching == "sign":
+        widths = (None, None, None)
+    names = ("g1", "g2", "q1", "q2", "p1", "p2", "d", "floor", "w1", "w2", "wt")
+    paper = (
+        gains.gamma1_per_s,
+        gains.gamma2_per_s,
+        gains.q1_per_s,
+        gains.q2_per_s,
+        gains.p1_m_s2,
+        gains.p2_rad_s2,
+    )
+    return dict(zip(names, (*paper, gains.cosine_guard, gains.rho_floor_m, *widths), strict=True))
+
+
+def away_from_switches(c):
+    return min(abs(c.theta_e_rad), abs(c.s1), abs(c.s2), abs(c.phi_e_rad)) > 1e-9 and all(
+        abs(abs(angle) - math.pi) > 1e-9 for angle in (c.theta_e_rad, c.phi_e_rad)
+    )
+
+
+@pytest.mark.parametrize("gains", [SATURATING, SWITCHING], ids=["saturation", "sign"])
+@settings(deadline=None, max_examples=80)
+@given(PATHS, TIMES, POSTURES, SPEEDS, TURNS)
+def test_surfaces_and_inputs_equal_the_papers_formulas(gains, path, t, posture, v, w):
+    r = path.at(t)
+    assume(math.hypot(posture.x_m, posture.y_m) > 0.01)
+    alpha = math.atan2(posture.y_m, posture.x_m) - posture.theta_rad
+    assume(gains.cosine_guard > 0.0 or abs(math.cos(alpha)) > 0.01)
+    got = YangKim(gains).control(r, posture, v, w)
+    assume(away_from_switches(got))
+    reference = (r.rho_m, r.phi_rad, r.posture.theta_rad, r.v_m_s, r.w_rad_s, r.v_dot_m_s2)
+    expected = naive.law(twin(gains), reference, (posture.x_m, posture.y_m, posture.theta_rad), v, w)
+    assert (got.s1, got.s2, got.u1, got.u2) == pytest.approx([float(x) for x in expected], rel=1e-9, abs=1e-9)
+
+
+@settings(deadline=None)
+@given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, st.floats(-0.3, 0.3), st.floats(-1.0, 1.0))
+def test_inserting_16_into_18_gives_21_and_22(path, t, posture, v, w, f1, f2):
+    g, r = SWITCHING, path.at(t)
+    rho, phi = math.hypot(posture.x_m, posture.y_m), math.atan2(posture.y_m, posture.x_m)
+    alpha = phi - posture.theta_rad
+    assume(rho > 0.02)
+    assume(abs(math.cos(alpha)) > 0.02)
+    c = YangKim(g).control(r, posture, v, w)
+    v_c_dot = r.v_dot_m_s2 + c.u1 - f1  # (15)
+    rho_e_rate = v * math.cos(alpha) - r.rho_rate_m_s
+    rho_e_accel = (  # (18)
+        v_c_dot * math.cos(alpha) + curvature_term(v, w, rho, math.sin(alpha)) - r.rho_accel_m_s2
+    )
+    by_21 = -g.q1_per_s * c.s1 - g.p1_m_s2 * sign(c.s1) - g.gamma1_per_s * rho_e_rate - f1 * math.cos(alpha)
+    assert rho_e_accel == pytest.approx(by_21, rel=1e-7, abs=1e-7)
+    # the second law: theta_e'' = u2 - f2 is (22) by definition; what is to be shown is d|phi_e|/dt
+    phi_e_rate = -v / rho * math.sin(alpha) - r.phi_rate_rad_s
+    by_22 = -g.q2_per_s * c.s2 - g.p2_rad_s2 * sign(c.s2) - g.gamma2_per_s * (w - r.w_rad_s)
+    by_22 -= sign(c.theta_e_rad) * sign(c.phi_e_rad) * phi_e_rate + f2
+    assert c.u2 - f2 == pytest.approx(by_22, rel=1e-9, abs=1e-9)
+
+
+def test_the_derivative_of_the_absolute_angle_error_has_the_sign_of_the_change():
+    """Not |phi_e'|: seen from an approaching and from a departing robot it differs in sign."""
+    r = Line().at(3.0)
+    gains = Gains(1.0, 1.0, 0.0, 0.0, 0.0, 0.0, switching="sign")
+    here, ahead = Posture(0.5, 0.1, 0.3), Posture(0.5, 0.1, 0.1)
+    inwards = YangKim(gains).control(r, here, -0.2, 0.0)
+    outwards = YangKim(gains).control(r, here, 0.2, 0.0)
+    assert inwards.u2 == -outwards.u2 != 0.0
+    assert YangKim(gains).control(r, ahead, 0.2, 0.0).u2 > 0.0  # |phi_e| falls: s2's switching term rises
+
+
+@settings(deadline=None)
+@given(TIMES, POSTURES, SPEEDS, TURNS, st.sampled_from([SATURATING, SWITCHING]))
+def test_the_mirrored_robot_on_the_line_gets_the_mirrored_answer(t, posture, v, w, gains):
+    assume(abs(posture.y_m) > 1e-6)  # not on the seam of phi_e, where one side is as good as the other
+    assume(abs(math.cos(math.atan2(posture.y_m, posture.x_m) - posture.theta_rad)) > 1e-6)
+    law, r = YangKim(gains), Line().at(t)
+    one = law.control(r, posture, v, w)
+    other = law.control(r, Posture(posture.x_m, -posture.y_m, -posture.theta_rad), v, -w)
+    assert (other.s1, other.u1, other.s2, other.u2) == (one.s1, one.u1, -one.s2, -one.u2)
+
+
+@settings(deadline=None)
+@given(PATHS, st.floats(-1.0, 7.0), POSTURES, SPEEDS, TURNS)
+def test_with_the_guards_every_posture_has_a_bounded_answer(path, t, posture, v, w):
+    c = YangKim(SATURATING).control(path.at(t), posture, v, w)
+    assert abs(c.u1) < 600.0
+    assert abs(c.u2) < 300.0
+
+
+def test_the_guarded_factor_keeps_the_sign_and_vanishes_at_the_singularity():
+    law = YangKim(SATURATING)
+    r = Line().at(2.0)
+    across = law.control(r, Posture(0.3, 0.0, math.pi / 2), 0.0, 0.0)
+    assert abs(across.u1) < 1e-12
+    towards, away = (law.control(r, Posture(0.3, 0.0, angle), 0.0, 0.0) for angle in (0.0, math.pi))
+    assert away.u1 == pytest.approx(-towards.u1, rel=1e-12)
+
+
+def test_without_guard_the_singularity_is_named():
+    with pytest.raises(ValueError, match="assumption 3"):
+        YangKim(SWITCHING)._inverse(0.0)
+
+
+def test_sign_and_saturation_at_their_corners():
+    assert [sign(x) for x in (-2.0, -0.0, 0.0, 1e-300)] == [-1.0, 0.0, 0.0, 1.0]
+    assert [saturation(x, 0.5) for x in (-0.6, -0.5, -0.25, 0.0, 0.5)] == [-1.0, -1.0, -0.5, 0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("p1_m_s2", -0.1),
+        ("layer_s1_m_s", 0.0),
+        ("rho_floor_m", 0.0),
+        ("switching", "relay"),
+        ("q2_per_s", math.nan),
+    ],
+)
+def test_gains_name_what_is_wrong_with_them(name, value):
+    names = ("gamma1_per_s", "gamma2_per_s", "q1_per_s", "q2_per_s", "p1_m_s2", "p2_rad_s2")
+    with pytest.raises(ValueError, match=name):
+        Gains(**{**dict.fromkeys(names, 1.0), name: value})
