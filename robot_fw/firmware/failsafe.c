@@ -22,7 +22,7 @@
 /* Cycles from a frame's last character to failsafe_fresh(), and from failsafe_tick() to the STT of a stop. */
 #define DECODING_3      2200
 #define DECODING_5      3300
-#define STOPPING        300
+#define STOPPING        600
 /* What the age is when a frame turns out to be fresh: a full millisecond and a part of the next. */
 #define AGE_AT_RESTART  1
 #define FIRST_TICK_3    (65536UL - 2 * CYCLES_PER_MS + DECODING_3 + STOPPING)

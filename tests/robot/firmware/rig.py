@@ -1,0 +1,182 @@
+"""A robot on the bench: the real image on the board, a transmitter on RXD, a receiver on TXD, no motors.
+
+What belongs here: putting characters on the wire, reading the firmware's variables and what it told the chips. What
+does not: expectations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from miro_protocol.decoder import Symbol
+from miro_protocol.frames import ServiceFrame, TeamFrame, encode
+from miro_robot.board import Board
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_robot.lm629.chip import Lm629
+from miro_robot.plant import Plant
+from miro_robot.wiring import Wiring, load_wiring
+
+MS = 24_000
+US = 24
+CYCLE = 12
+BIT = 2500  # host UART
+CHARACTER = 10 * BIT
+SAMPLE = 8192
+FAR = 1 << 62
+IMAGE = load_hex(image_path())
+BOOTED = 4 * MS
+
+
+class Probe(Board):
+    """Notes every change of a port the firmware makes."""
+
+    def __init__(self, *args: object, **kwargs: object) -> None:
+        self.writes: list[tuple[int, int, int]] = []
+        super().__init__(*args, **kwargs)  # type: ignore[arg-type]
+
+    def port_written(self, port: int, latch: int, tick: int) -> None:
+        self.writes.append((tick, port, latch))
+        super().port_written(port, latch, tick)
+
+
+@dataclass
+class Command:
+    """A command that one LM629 got, complete with its data."""
+
+    tick: int
+    opcode: int
+    data: bytes
+
+
+class Rig:
+    """One robot, `slot` of `n`. Time is `now`; characters are sent from then on and run by `run_to`."""
+
+    def __init__(self, slot: int = 0, n: int = 3, wiring: Wiring | None = None, boot: bool = True) -> None:
+        self.n = n
+        self.board = Probe(wiring or load_wiring(), Plant(), slot, n)
+        self.cpu = self.board.cpu
+        self.cpu.load(IMAGE.code, IMAGE.ranges)
+        self.now = 0
+        self.line_free = 0
+        self.pending: list[tuple[int, int]] = []
+        self.edges: list[tuple[int, int]] = []
+        self.received = 0
+        if boot:
+            self.run_to(BOOTED)
+            self.told(self.board.left)
+            self.told(self.board.right)
+
+    # ---- time ----------------------------------------------------------------------------------------------
+
+    def run_to(self, tick: int) -> None:
+        """Runs the board; no fault may come up."""
+        while self.now < tick:
+            until = min(tick, self.now + 100 * MS)
+            while self.pending and self.pending[0][0] < until:
+                self.cpu.rxd.append(*self.pending.pop(0))
+            self.cpu.rxd.settled_tick = until + MS
+            self.board.run(until)
+            self.now = until
+            self._listen()
+        assert self.board.faults == [], self.board.faults
+
+    def run_ms(self, ms: float) -> None:
+        self.run_to(self.now + int(ms * MS))
+
+    # ---- radio -------------------------------------------------------------------------------------------
+
+    def send(self, data: bytes, at: int | None = None, bit: int = BIT, pauses: Iterable[int] = ()) -> int:
+        """Puts characters on RXD from tick `at` (default: as soon as the line is free). `pauses[i]` ticks follow
+        character i. Returns the tick of the last start bit."""
+        extra = list(pauses)
+        tick = max(self.now + CYCLE, self.line_free) if at is None else at
+        for index, byte in enumerate(data):
+            start = tick
+            self.send_symbol((byte, True, tick), bit)
+            tick += 10 * bit + (extra[index] if index < len(extra) else 0)
+        return start
+
+    def send_symbol(self, symbol: Symbol, bit: int = BIT) -> None:
+        """One character. A damaged one has its line low through the middle of the stop bit, high before its end."""
+        byte, stop_good, tick = symbol
+        assert tick >= self.line_free
+        bits = [0] + [byte >> i & 1 for i in range(8)]
+        self.pending += [(tick + i * bit, level) for i, level in enumerate(bits)]
+        self.pending.append((tick + 9 * bit + (0 if stop_good else 3 * bit // 4), 1))
+        if not stop_good:
+            self.pending.insert(-1, (tick + 9 * bit, 0))
+        self.line_free = tick + 10 * bit
+
+    def team(self, seq: int, left: int, right: int, ask: bool = False, slot: int = 0) -> int:
+        """Sends a team frame in which `slot` gets these velocities; runs until it has been dealt with."""
+        pairs = [(0, 0)] * self.n
+        pairs[slot] = (left, right)
+        return self.frame(encode(TeamFrame(3 if ask else 0, seq, tuple(pairs)), self.n))
+
+    def service(self, seq: int, slot: int, opcode: int, *values: int) -> int:
+        return self.frame(encode(ServiceFrame(seq, slot, opcode, values), self.n))
+
+    def frame(self, data: bytes, settle_ms: float = 4) -> int:
+        """Sends one frame and runs until it has been dealt with; returns the start of its last character."""
+        last = self.send(data)
+        self.run_to(last + CHARACTER + int(settle_ms * MS))
+        return last
+
+    # ---- what came of it -----------------------------------------------------------------------------------
+
+    def _listen(self) -> None:
+        """Takes over the edges of TXD."""
+        line = self.cpu.txd
+        self.edges += [edge for edge in line.edges() if not self.edges or edge[0] > self.edges[-1][0]]
+
+    def sent(self) -> list[Symbol]:
+        """Characters on TXD so far, sampled in the middle of 2500-tick bits from each start edge."""
+        level_at = _levels(self.edges)
+        symbols, free = [], 0
+        for tick, level in self.edges:
+            if level or tick < free:
+                continue
+            bits = [level_at(tick + BIT // 2 + i * BIT) for i in range(10)]
+            byte = sum(bit << i for i, bit in enumerate(bits[1:9]))
+            symbols.append((byte, bits[9] == 1, tick))
+            free = tick + 9 * BIT + BIT // 2
+        return symbols
+
+    def told(self, chip: Lm629) -> list[Command]:
+        """The commands that `chip` got since the last call."""
+        commands = [Command(*command) for command in chip.commands]
+        chip.commands.clear()
+        return commands
+
+    def u8(self, name: str) -> int:
+        address = IMAGE.symbols.address(name, "iram")
+        assert address is not None, name
+        return self.cpu.peek_iram(address)
+
+    def u16(self, name: str) -> int:
+        address = IMAGE.symbols.address(name, "iram")
+        assert address is not None, name
+        return self.cpu.peek_iram(address) | self.cpu.peek_iram(address + 1) << 8
+
+    def i16(self, name: str) -> int:
+        value = self.u16(name)
+        return value - 0x10000 if value & 0x8000 else value
+
+    @property
+    def counters(self) -> tuple[int, int, int]:
+        """(accepted, rejected, stale)"""
+        return self.u16("_frames_accepted"), self.u16("_frames_rejected"), self.u16("_frames_stale")
+
+
+def _levels(edges: list[tuple[int, int]]):  # type: ignore[no-untyped-def]
+    def level_at(tick: int) -> int:
+        level = 1
+        for at, after in edges:
+            if at > tick:
+                break
+            level = after
+        return level
+
+    return level_at

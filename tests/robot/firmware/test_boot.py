@@ -1,0 +1,78 @@
+"""From power-on to the first sleep: the handshake with the two LM629, and a board where it fails."""
+
+import msgspec
+import pytest
+from miro_protocol.decoder import Received, TelemetryDecoder
+from miro_protocol.frames import TelemetryFrame
+from miro_protocol.table import Flags
+from miro_robot.wiring import load_wiring
+
+from tests.robot.firmware.rig import MS, Rig
+
+RSTI, MSKI, LFIL, UDF, LTRJ = 0x1D, 0x1C, 0x1E, 0x04, 0x1F
+START_UP = [
+    (RSTI, "0000"),
+    (MSKI, "0000"),
+    (LFIL, "030f 0190 0028 0bb8 07d0"),  # ds 3; kp 400, ki 40, kd 3000, il 2000
+    (UDF, ""),
+    (LTRJ, "0020 0000 1755"),  # acceleration 5973
+]
+EXPECTED = [(opcode, bytes.fromhex(data)) for opcode, data in START_UP]
+RESET_PINS = 0x20
+
+
+@pytest.fixture
+def cold() -> Rig:
+    return Rig(boot=False)
+
+
+def test_both_chips_are_set_up_alike(cold: Rig) -> None:
+    cold.run_to(4 * MS)
+    for chip in (cold.board.left, cold.board.right):
+        assert [(command.opcode, command.data) for command in cold.told(chip)] == EXPECTED
+        assert chip.status == 0x80  # motor off, no flags
+
+
+def test_reset_lasts_eight_lm629_clocks_and_is_given_once(cold: Rig) -> None:
+    cold.run_to(4 * MS)
+    control = [(tick, latch) for tick, port, latch in cold.board.writes if port == 2]
+    falls = [tick for tick, latch in control if not latch & RESET_PINS]
+    rises = [tick for tick, latch in control if tick > falls[0] and latch & RESET_PINS]
+    assert rises[0] - falls[0] >= 8 * 4
+    assert not [tick for tick in falls if tick > rises[0]]
+
+
+def test_the_robot_is_ready_within_three_milliseconds_and_sleeps(cold: Rig) -> None:
+    cold.run_to(3 * MS)
+    idle = cold.cpu.idle_cycles
+    cold.run_ms(10)
+    assert cold.cpu.idle_cycles - idle > 0.9 * 20_000
+
+
+def broken_board(**nets: str) -> Rig:
+    wiring = load_wiring()
+    changed = {net.replace("_", "."): source for net, source in nets.items()}
+    return Rig(wiring=msgspec.structs.replace(wiring, nets={**wiring.nets, **changed}), boot=False)
+
+
+def test_a_chip_that_never_leaves_reset_keeps_both_motors_off_and_is_reported() -> None:
+    rig = broken_board(right_rst="0")
+    rig.run_to(100 * MS)
+    assert rig.cpu.sfr(0xA0) & RESET_PINS == 0
+    rig.team(0, 5000, 5000, ask=True)
+    rig.run_ms(25)
+    events = TelemetryDecoder().feed_symbols(rig.sent())
+    frames = [event for event in events if isinstance(event, Received)]
+    message = frames[0].message(3)
+    assert isinstance(message, TelemetryFrame)
+    assert message.flags & Flags.INIT_FAILED
+    assert rig.cpu.sfr(0xA0) & RESET_PINS == 0
+    assert rig.board.left.desired_velocity == 0
+
+
+def test_the_reset_is_tried_again_eight_times_before_it_gives_up() -> None:
+    rig = broken_board(left_rst="0")
+    rig.run_to(100 * MS)
+    levels = [latch & RESET_PINS for _, port, latch in rig.board.writes if port == 2]
+    rises = sum(1 for before, after in zip(levels, levels[1:], strict=False) if after and not before)
+    assert rises == 8

@@ -1,0 +1,107 @@
+"""What happens without fresh frames, measured at the LM629."""
+
+import pytest
+
+from tests.robot.firmware.rig import CHARACTER, MS, SAMPLE, Rig
+
+STT, LTRJ = 0x01, 0x1F
+STOP, OFF = bytes.fromhex("0400"), bytes.fromhex("0100")
+PLACES = [(0, 3), (4, 5)]
+
+
+def driving(place: tuple[int, int], velocity: int = 2279) -> tuple[Rig, int]:
+    """A robot just told to drive at 0.2 m/s, and the tick of the last start bit."""
+    rig = Rig(*place)
+    last = rig.team(0, velocity, -velocity, slot=place[0])
+    rig.told(rig.board.left)
+    rig.told(rig.board.right)
+    return rig, last
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_both_wheels_stop_smoothly_after_110_ms_and_go_off_after_500(place: tuple[int, int]) -> None:
+    rig, last = driving(place)
+    end = last + CHARACTER
+    rig.run_to(end + 600 * MS)
+    for chip in (rig.board.left, rig.board.right):
+        stop, start, off, open_loop = rig.told(chip)
+        assert (stop.opcode, stop.data, start.opcode) == (LTRJ, STOP, STT)
+        assert (off.opcode, off.data, open_loop.opcode) == (LTRJ, OFF, STT)
+        assert 109.7 * MS <= start.tick - end <= 110 * MS
+        assert 499.7 * MS <= open_loop.tick - end <= 500 * MS
+        assert chip.status & 0x80
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_the_wheels_stand_by_110_ms_and_the_ramp_and_one_sample(place: tuple[int, int]) -> None:
+    rig, last = driving(place)
+    rig.run_to(last + CHARACTER + 110 * MS)
+    assert rig.board.left.desired_velocity == 2279 << 8
+    ramp = -(-(2279 << 8) // 5973)
+    rig.run_to(last + CHARACTER + 110 * MS + (ramp + 1) * SAMPLE)
+    assert rig.board.left.desired_velocity == rig.board.right.desired_velocity == 0
+
+
+def test_fresh_frames_keep_it_driving() -> None:
+    rig, _ = driving((0, 3))
+    for seq in range(1, 6):
+        rig.run_ms(75)  # a frame takes 24 ms and 4 to settle
+        rig.team(seq, 2279, -2279)
+    commands = rig.told(rig.board.left)
+    assert [command.data for command in commands if command.opcode == LTRJ and command.data in (STOP, OFF)] == []
+    assert rig.board.left.desired_velocity == 2279 << 8
+
+
+def test_stale_frames_do_not_keep_it_driving() -> None:
+    rig, last = driving((0, 3))
+    for _ in range(4):
+        rig.team(0, 2279, -2279)
+    assert rig.counters == (1, 0, 4)
+    rig.run_to(last + 112 * MS)
+    assert [command.data for command in rig.told(rig.board.left)][:1] == [STOP]
+
+
+def test_a_frame_during_the_stop_resumes_driving() -> None:
+    rig, last = driving((0, 3))
+    rig.run_to(last + 112 * MS)
+    rig.team(1, 1000, 1000)
+    assert [c.opcode for c in rig.told(rig.board.left)] == [LTRJ, STT, LTRJ, STT]
+    rig.run_ms(40)
+    assert rig.board.left.desired_velocity == 1000 << 8
+
+
+def test_a_frame_after_motors_off_closes_the_loop_again() -> None:
+    rig, last = driving((0, 3))
+    rig.run_to(last + 700 * MS)
+    assert rig.board.left.status & 0x80
+    rig.team(1, 1000, 1000)
+    assert not rig.board.left.status & 0x80
+    rig.run_ms(40)
+    assert rig.board.left.desired_velocity == rig.board.right.desired_velocity == 1000 << 8
+
+
+def test_the_same_frame_repeated_never_rearms_a_stopped_robot() -> None:
+    rig, last = driving((0, 3))
+    rig.run_to(last + 700 * MS)
+    for _ in range(3):
+        rig.team(0, 2279, 2279)
+    assert rig.counters == (1, 0, 3)
+    assert rig.board.left.status & 0x80
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_long_step_is_fresh_again_from_150_ms_on(place: tuple[int, int]) -> None:
+    for age, accepted in ((148, 1), (149.9, 1), (151, 2), (170, 2)):
+        rig, last = driving(place)
+        length = (17 + 6 if place[1] == 3 else 25 + 6) * CHARACTER
+        rig.run_to(last + int(age * MS) - length)
+        rig.line_free = 0
+        final = rig.team(40, 0, 0)
+        assert abs(final - last - age * MS) < MS / 10
+        assert rig.counters == (accepted, 0, 2 - accepted), age
+
+
+def test_no_wheel_moves_before_the_first_frame() -> None:
+    rig = Rig()
+    rig.run_ms(700)
+    assert rig.told(rig.board.left) == rig.told(rig.board.right) == []

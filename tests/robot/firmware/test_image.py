@@ -1,0 +1,51 @@
+"""The committed image: it is what the source builds, it fits, and observers find their symbols."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from miro_robot.firmware import image_path
+
+from tests.robot.firmware.rig import IMAGE
+
+SOURCE = Path(__file__).parents[3] / "robot_fw" / "firmware"
+VERSION = (SOURCE / "sdcc.version").read_text("utf-8").strip()
+
+
+def sdcc_version() -> str:
+    if shutil.which("sdcc") is None or shutil.which("make") is None:
+        return ""
+    return subprocess.run(["sdcc", "--version"], capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.skipif(VERSION not in sdcc_version(), reason=f"needs make and SDCC {VERSION}")
+def test_the_source_builds_the_committed_image_byte_for_byte(tmp_path: Path) -> None:
+    make = ["make", "-s", "-C", str(SOURCE), f"OUT={tmp_path / 'out'}", f"BUILD={tmp_path / 'build'}"]
+    subprocess.run(make, check=True, capture_output=True)
+    assert (tmp_path / "out" / "miro.ihx").read_bytes() == image_path().read_bytes()
+
+
+def test_the_image_fits_the_chip() -> None:
+    assert IMAGE.size <= 8192
+
+
+@pytest.mark.parametrize("name", ["_frames_accepted", "_frames_rejected", "_frames_stale"])
+def test_observers_find_the_counters_in_internal_ram(name: str) -> None:
+    address = IMAGE.symbols.address(name, "iram")
+    assert address is not None
+    assert 0x08 <= address < 0x100
+
+
+def test_it_falls_asleep_by_copying_a_byte_that_interrupts_clear() -> None:
+    """MOV PCON,sleep: one instruction from the decision to IDL, so no interrupt fits in between."""
+    sleep = IMAGE.symbols.address("_sleep", "iram")
+    assert sleep is not None
+    assert IMAGE.code.count(bytes([0x85, sleep, 0x87])) == 1
+    assert IMAGE.code.count(bytes([0x75, sleep, 0x00])) == 2  # both interrupts
+
+
+def test_interrupts_are_enabled_once_and_never_disabled() -> None:
+    assert IMAGE.code.count(bytes([0xD2, 0xAF])) == 1  # SETB EA
+    for disabling in (b"\xc2\xaf", b"\xc2\xac", b"\x75\xa8", b"\x53\xa8", b"\xf5\xa8"):  # CLR EA, CLR ES, IE
+        assert disabling not in IMAGE.code[: IMAGE.size + 0x100]
