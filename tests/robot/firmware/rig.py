@@ -1,7 +1,7 @@
 """A robot on the bench: the real image on the board, a transmitter on RXD, a receiver on TXD, no motors.
 
-What belongs here: putting characters on the wire, reading the firmware's variables and what it told the chips. What
-does not: expectations.
+What belongs here: putting characters on the wire, reading the firmware's variables and what it told the chips.
+What does not: expectations.
 """
 
 from __future__ import annotations
@@ -88,8 +88,9 @@ class Rig:
     # ---- radio -------------------------------------------------------------------------------------------
 
     def send(self, data: bytes, at: int | None = None, bit: int = BIT, pauses: Iterable[int] = ()) -> int:
-        """Puts characters on RXD from tick `at` (default: as soon as the line is free). `pauses[i]` ticks follow
-        character i. Returns the tick of the last start bit."""
+        """Puts characters on RXD from tick `at` (default: as soon as the line is free).
+
+        `pauses[i]` ticks follow character i. Returns the tick of the last start bit."""
         extra = list(pauses)
         tick = max(self.now + CYCLE, self.line_free) if at is None else at
         for index, byte in enumerate(data):
@@ -99,7 +100,7 @@ class Rig:
         return start
 
     def send_symbol(self, symbol: Symbol, bit: int = BIT) -> None:
-        """One character. A damaged one has its line low through the middle of the stop bit, high before its end."""
+        """One character. A damaged one is low through the middle of its stop bit and high before its end."""
         byte, stop_good, tick = symbol
         assert tick >= self.line_free
         bits = [0] + [byte >> i & 1 for i in range(8)]

@@ -1,5 +1,7 @@
 """From power-on to the first sleep: the handshake with the two LM629, and a board where it fails."""
 
+from itertools import pairwise
+
 import msgspec
 import pytest
 from miro_protocol.decoder import Received, TelemetryDecoder
@@ -74,5 +76,5 @@ def test_the_reset_is_tried_again_eight_times_before_it_gives_up() -> None:
     rig = broken_board(left_rst="0")
     rig.run_to(100 * MS)
     levels = [latch & RESET_PINS for _, port, latch in rig.board.writes if port == 2]
-    rises = sum(1 for before, after in zip(levels, levels[1:], strict=False) if after and not before)
+    rises = sum(1 for before, after in pairwise(levels) if after and not before)
     assert rises == 8

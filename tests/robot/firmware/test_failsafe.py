@@ -48,7 +48,9 @@ def test_fresh_frames_keep_it_driving() -> None:
         rig.run_ms(75)  # a frame takes 24 ms and 4 to settle
         rig.team(seq, 2279, -2279)
     commands = rig.told(rig.board.left)
-    assert [command.data for command in commands if command.opcode == LTRJ and command.data in (STOP, OFF)] == []
+    assert [
+        command.data for command in commands if command.opcode == LTRJ and command.data in (STOP, OFF)
+    ] == []
     assert rig.board.left.desired_velocity == 2279 << 8
 
 

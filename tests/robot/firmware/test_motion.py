@@ -71,8 +71,13 @@ def test_velocities_saturate_at_the_top_speed(rig: Rig, sent: int, used: int) ->
 
 
 @settings(max_examples=8, deadline=None)
-@given(st.lists(st.tuples(VELOCITIES, VELOCITIES), min_size=1, max_size=4), st.sampled_from([(0, 3), (2, 3), (4, 5)]))
-def test_any_velocities_reach_the_registers_of_any_slot(pairs: list[tuple[int, int]], place: tuple[int, int]) -> None:
+@given(
+    st.lists(st.tuples(VELOCITIES, VELOCITIES), min_size=1, max_size=4),
+    st.sampled_from([(0, 3), (2, 3), (4, 5)]),
+)
+def test_any_velocities_reach_the_registers_of_any_slot(
+    pairs: list[tuple[int, int]], place: tuple[int, int]
+) -> None:
     slot, n = place
     rig = Rig(slot=slot, n=n)
     for seq, (left, right) in enumerate(pairs):

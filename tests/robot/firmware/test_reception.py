@@ -1,4 +1,4 @@
-"""The receiver: spacing, stop bits, window, freshness; and its decoder against `miro_protocol`'s on damaged streams."""
+"""The receiver: spacing, stop bits, window, freshness; and the decoder in C against the one in Python."""
 
 import random
 
@@ -44,7 +44,9 @@ def test_the_gauge_holds_while_telemetry_is_sent(pause_us: int) -> None:
     rig = Rig()
     rig.team(0, 0, 0, ask=True)
     for seq in range(1, 9):
-        last = rig.send(frame(seq, kind=3 if seq % 3 == 0 else 0), pauses=[0] * (LEAD + 2) + [pause_us * US] * 14)
+        last = rig.send(
+            frame(seq, kind=3 if seq % 3 == 0 else 0), pauses=[0] * (LEAD + 2) + [pause_us * US] * 14
+        )
         rig.run_to(last + 5 * CHARACTER + seq * 37)
     assert rig.counters == (9 if pause_us == 20 else 1, 0, 0)
 

@@ -1,5 +1,7 @@
 """The answer to a poll, as it comes out of TXD."""
 
+from itertools import pairwise
+
 import pytest
 from miro_protocol.decoder import Received, TelemetryDecoder
 from miro_protocol.frames import TelemetryFrame
@@ -66,7 +68,7 @@ def test_the_characters_of_an_answer_follow_each_other_without_a_gap() -> None:
     rig.run_ms(25)
     ticks = [tick for _, _, tick in rig.sent()]
     assert len(ticks) == 19
-    assert {after - before for before, after in zip(ticks, ticks[1:], strict=False)} == {10 * 2496}
+    assert {after - before for before, after in pairwise(ticks)} == {10 * 2496}
 
 
 def test_it_hears_the_next_frame_while_it_answers() -> None:
