@@ -1,6 +1,6 @@
 """A robot on the bench: the real image on the board, a transmitter on RXD, a receiver on TXD, no motors.
 
-What belongs here: putting characters on the wire, reading the firmware's variables and what it told the chips.
+What belongs here: putting characters on the wire, reading variables and what the chips were told.
 What does not: expectations.
 """
 
