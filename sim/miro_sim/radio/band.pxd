@@ -1,0 +1,28 @@
+cimport cython
+
+from miro_robot.mcs51.line cimport Line
+from miro_sim.rng cimport Stream
+
+cdef long long _FAR, _BIT, _HOLD
+
+
+cdef class Transmitter:
+    cdef readonly Line line
+    cdef long long last_edge
+
+
+cdef class Band:
+    cdef Stream errors
+    cdef long long latency
+    cdef unsigned long long threshold
+    cdef list transmitters
+
+    cpdef add(self, Line line)
+    @cython.locals(transmitter=Transmitter, limit='long long')
+    cpdef long long limit(self) except? -1
+    @cython.locals(transmitter=Transmitter, sent='long long', edge='long long', level=int, carrier=int)
+    cpdef int level(self, long long tick) except -1
+    @cython.locals(transmitter=Transmitter, sent='long long', change='long long')
+    cpdef long long next_change(self, long long tick) except? -1
+    @cython.locals(transmitter=Transmitter)
+    cpdef forget(self)

@@ -1,0 +1,103 @@
+"""The band up, as the PC's receiver hears it: the TXD wires of all robots of a network mixed into one level.
+
+What belongs here: the level as a function of time. At tick t, with u = t - latency,
+
+* a robot's carrier is up while its TXD had an edge in (u - 50000, u]: from its first start bit until two
+characters
+  after its last edge;
+* the level is the AND of the TXD levels of the robots whose carrier is up (two at once: space wins);
+* with any carrier up it is inverted if the `errors` stream is below the threshold at index u // 2500;
+* with none it is mark: this band's receiver is always squelched.
+
+Sampling it as a UART is the business of `uplink`.
+"""
+
+from __future__ import annotations
+
+from miro_robot.mcs51.line import Line
+from msgspec import convert
+
+from miro_sim.clock import FAR, HOST_BIT_TICKS, HOST_CHARACTER_TICKS
+from miro_sim.radio.params import RadioParams
+from miro_sim.rng import Stream
+
+_FAR = 1 << 62
+_BIT = 2500
+_HOLD = 50_000
+assert (FAR, HOST_BIT_TICKS, 2 * HOST_CHARACTER_TICKS) == (_FAR, _BIT, _HOLD)
+
+
+class Transmitter:
+    """One robot's TXD wire and the tick of the last edge that the receiver has come past (-1: none yet)."""
+
+    NOT_STATE = ("line",)
+
+    def __init__(self, line: Line) -> None:
+        self.line = line
+        self.last_edge = -1
+
+
+class Band:
+    """The mixed level. Ticks are the receiver's; queries come in ascending order, below `limit`."""
+
+    NOT_STATE = ("errors", "latency", "threshold")
+
+    def __init__(self, params: RadioParams, seed: int, name: str) -> None:
+        self.errors = Stream(seed, f"{name}/errors")
+        self.latency = params.latency_ticks
+        self.threshold = params.error_threshold
+        self.transmitters: list[Transmitter] = []
+
+    def add(self, line: Line) -> None:
+        self.transmitters.append(Transmitter(line))
+
+    def limit(self) -> int:
+        """The tick up to which the robots' wires, and so the level, are final."""
+        limit = _FAR
+        for transmitter in self.transmitters:
+            limit = min(limit, transmitter.line.settled_tick + self.latency)
+        return limit
+
+    def level(self, tick: int) -> int:
+        """The level at `tick` in bit 0; bit 1 is set if it is inverted by an error."""
+        sent = tick - self.latency
+        level = 1
+        carrier = 0
+        for transmitter in self.transmitters:
+            edge = transmitter.line.next_edge(transmitter.last_edge)
+            while edge <= sent:
+                transmitter.last_edge = edge
+                edge = transmitter.line.next_edge(edge)
+            if transmitter.last_edge >= 0 and sent < transmitter.last_edge + _HOLD:
+                carrier = 1
+                level &= transmitter.line.level_at(sent)
+        if carrier and self.errors.below(sent // _BIT, self.threshold):
+            return (level ^ 1) | 2
+        return level
+
+    def next_change(self, tick: int) -> int:
+        """The first tick after `tick`, where the level was just asked for, at which it may be another."""
+        sent = tick - self.latency
+        change = _FAR
+        for transmitter in self.transmitters:
+            change = min(change, transmitter.line.next_edge(sent))
+            if transmitter.last_edge >= 0 and sent < transmitter.last_edge + _HOLD:
+                change = min(change, transmitter.last_edge + _HOLD)
+                if self.threshold:
+                    change = min(change, (sent // _BIT + 1) * _BIT)
+        if change == _FAR:
+            return _FAR
+        return change + self.latency
+
+    def forget(self) -> None:
+        """Drops edges from the robots' wires that no later query needs."""
+        for transmitter in self.transmitters:
+            transmitter.line.forget(transmitter.last_edge)
+
+    def snapshot(self) -> dict[str, object]:
+        return {"last_edges": [transmitter.last_edge for transmitter in self.transmitters]}
+
+    def restore(self, state: dict[str, object]) -> None:
+        edges = convert(state["last_edges"], list[int])
+        for transmitter, edge in zip(self.transmitters, edges, strict=True):
+            transmitter.last_edge = edge

@@ -1,0 +1,19 @@
+cimport cython
+
+from miro_sim.radio.band cimport Band
+
+cdef long long _BIT, _HALF_BIT, _STOP
+
+
+cdef class Uplink:
+    cdef readonly str name
+    cdef readonly Band band
+    cdef readonly long long now, start_tick, bit_errors
+    cdef int before, bit, shift
+
+    @cython.locals(until='long long')
+    cpdef list receive(self, long long until_tick)
+    @cython.locals(level=int)
+    cdef void hunt(self, long long until) except *
+    @cython.locals(level=int, middle='long long')
+    cdef void sample(self, long long until, list symbols) except *

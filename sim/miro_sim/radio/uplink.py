@@ -1,0 +1,118 @@
+"""The PC's end of the band up: a UART that turns the level into symbols.
+
+What belongs here: the receiver of a 9600-baud 8N1 UART. It waits for a falling edge, samples the start bit
+in its middle (1250 ticks on; mark there is a false start), then eight data bits and the stop bit 2500 ticks
+apart, and waits for the next falling edge after the stop bit's sample. A symbol is known at that sample.
+How the level comes about is the business of `band`, what the symbols mean that of `miro_protocol`.
+"""
+
+from __future__ import annotations
+
+from miro_robot.mcs51.line import Line
+from msgspec import convert
+
+from miro_sim.clock import CHARACTER_BITS, HOST_BIT_TICKS
+from miro_sim.radio.band import Band
+from miro_sim.radio.params import RadioParams
+
+_BIT = 2500
+_HALF_BIT = 1250
+_STOP = 9  # number of the stop bit, the start bit being 0
+assert (HOST_BIT_TICKS, CHARACTER_BITS) == (_BIT, _STOP + 1)
+
+
+class Uplink:
+    """What the PC hears from the robots of one network; the errors come from the stream NAME/errors.
+
+    `now`: everything below this tick has been received. `bit_errors`: samples taken of an inverted level.
+    The robots' wires are this object's to forget: edges that it has come past are dropped from them.
+    """
+
+    NOT_STATE = ("name",)
+
+    def __init__(self, params: RadioParams, seed: int, name: str) -> None:
+        self.name = name
+        self.band = Band(params, seed, name)
+        self.now = 0
+        self.before = 1  # level just before `now`, while waiting for a start bit
+        self.start_tick = -1  # falling edge of the character being received, -1 while waiting for one
+        self.bit = 0  # number of the bit to be sampled next
+        self.shift = 0  # data bits so far, first one lowest
+        self.bit_errors = 0
+
+    def __repr__(self) -> str:
+        return f"Uplink({self.name!r}, now={self.now}, start_tick={self.start_tick}, bit={self.bit})"
+
+    def listen(self, line: Line) -> None:
+        """Adds a robot's TXD wire, before anything is received. Raises ValueError later."""
+        if self.now:
+            raise ValueError(f"{self.name}: a robot joins after tick 0")
+        self.band.add(line)
+
+    def receive(self, until_tick: int) -> list[tuple[int, bool, int]]:
+        """Symbols (byte, stop bit good, tick of the start bit's edge) whose stop bit was sampled before
+        `until_tick`.
+
+        Never looks past the ticks up to which the wires are settled; what comes later is left for the next
+        call.
+        """
+        until = min(until_tick, self.band.limit())
+        symbols: list[tuple[int, bool, int]] = []
+        while self.now < until:
+            if self.start_tick < 0:
+                self.hunt(until)
+            else:
+                self.sample(until, symbols)
+        self.band.forget()
+        return symbols
+
+    def hunt(self, until: int) -> None:
+        """Goes on to the next falling edge, or a place without one."""
+        level = self.band.level(self.now) & 1
+        if self.before == 1 and level == 0:
+            self.start_tick = self.now
+            self.bit = 0
+            self.shift = 0
+        else:
+            self.now = min(self.band.next_change(self.now), until)
+        self.before = level
+
+    def sample(self, until: int, symbols: list[tuple[int, bool, int]]) -> None:
+        """Goes on to the middle of the next bit and takes it."""
+        middle = self.start_tick + _HALF_BIT + self.bit * _BIT
+        if middle >= until:
+            self.now = until
+            return
+        self.now = middle + 1
+        level = self.band.level(middle)
+        self.bit_errors += level >> 1
+        level &= 1
+        if 0 < self.bit < _STOP:
+            self.shift |= level << (self.bit - 1)
+        elif self.bit == _STOP:
+            symbols.append((self.shift, level == 1, self.start_tick))
+        if self.bit == _STOP or (self.bit == 0 and level == 1):
+            self.start_tick = -1
+            self.before = level
+        self.bit += 1
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "now": self.now,
+            "before": self.before,
+            "start_tick": self.start_tick,
+            "bit": self.bit,
+            "shift": self.shift,
+            "bit_errors": self.bit_errors,
+            "band": self.band.snapshot(),
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        """Raises ValueError when the snapshot is of a network with another number of robots."""
+        self.now = convert(state["now"], int)
+        self.before = convert(state["before"], int)
+        self.start_tick = convert(state["start_tick"], int)
+        self.bit = convert(state["bit"], int)
+        self.shift = convert(state["shift"], int)
+        self.bit_errors = convert(state["bit_errors"], int)
+        self.band.restore(convert(state["band"], dict[str, object]))
