@@ -36,6 +36,12 @@ class Transmitter:
         self.line = line
         self.last_edge = -1
 
+    def snapshot(self) -> dict[str, object]:
+        return {"last_edge": self.last_edge}
+
+    def restore(self, state: dict[str, object]) -> None:
+        self.last_edge = convert(state["last_edge"], int)
+
 
 class Band:
     """The mixed level. Ticks are the receiver's; queries come in ascending order, below `limit`."""
@@ -95,9 +101,9 @@ class Band:
             transmitter.line.forget(transmitter.last_edge)
 
     def snapshot(self) -> dict[str, object]:
-        return {"last_edges": [transmitter.last_edge for transmitter in self.transmitters]}
+        return {"transmitters": [transmitter.snapshot() for transmitter in self.transmitters]}
 
     def restore(self, state: dict[str, object]) -> None:
-        edges = convert(state["last_edges"], list[int])
-        for transmitter, edge in zip(self.transmitters, edges, strict=True):
-            transmitter.last_edge = edge
+        states = convert(state["transmitters"], list[dict[str, object]])
+        for transmitter, its_state in zip(self.transmitters, states, strict=True):
+            transmitter.restore(its_state)

@@ -1,0 +1,39 @@
+"""One busy network, run for half a second, as a digest of everything heard: the same for both engines."""
+
+import hashlib
+
+from miro_robot.mcs51.line import Line
+from miro_sim.radio import Downlink, RadioParams, Uplink
+from miro_sim.rng import Stream
+
+from tests.naive.radio import wire_bits
+
+ROBOTS = 3
+PERIOD = 800_800
+
+
+def exercise(seed: int) -> str:
+    radio = RadioParams.of(latency_s=0.0001, bit_error_rate=1e-2)
+    down, up = Downlink(radio, seed, "down"), Uplink(radio, seed, "up")
+    rxd, txd = [Line() for _ in range(ROBOTS)], [Line() for _ in range(ROBOTS)]
+    for robot in range(ROBOTS):
+        down.listen(robot, rxd[robot])
+        up.listen(txd[robot])
+    payload = Stream(seed, "payload")
+    heard = hashlib.sha256()
+    for period in range(15):
+        begin = period * PERIOD
+        data = bytes(payload.u32(period * 23 + i) & 255 for i in range(23))
+        down.send(begin + 96_000, data)
+        for i, level in enumerate(wire_bits(data[:19])):
+            txd[period % ROBOTS].append(begin + 1000 + 2496 * i, level)
+        for until in (begin + 123_456, begin + PERIOD):
+            down.settle(until)
+            for line in txd:
+                line.settled_tick = until
+            heard.update(repr(up.receive(until)).encode())
+        for line in rxd:
+            heard.update(repr(line.edges()).encode())
+            line.forget(begin + PERIOD)
+        heard.update(repr([down.snapshot(), up.snapshot()]).encode())
+    return heard.hexdigest()

@@ -1,0 +1,164 @@
+"""The band down: levels as defined, whatever the chunks, and errors and noise as often as they should be."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_robot.mcs51.line import Line
+from miro_sim.radio import Downlink, RadioParams
+
+from tests.naive import radio as naive
+from tests.sim.radio.strategies import cuts, params, seeds, transmissions
+
+UNTIL = 1_500_000
+
+
+def band(radio, seed=0, robots=(0,)):
+    downlink = Downlink(radio, seed, "net")
+    lines = {robot: Line() for robot in robots}
+    for robot, line in lines.items():
+        downlink.listen(robot, line)
+    return downlink, lines
+
+
+@settings(deadline=None, max_examples=60)
+@given(params, seeds, transmissions())
+def test_every_robot_hears_what_the_naive_twin_evaluates_tick_by_tick(radio, seed, sent):
+    downlink, lines = band(radio, seed, (0, 2))
+    for start, data in sent:
+        downlink.send(start, data)
+    downlink.settle(UNTIL)
+    for robot, line in lines.items():
+        assert line.edges() == naive.downlink_edges(UNTIL, radio, seed, f"net/robot{robot}", sent)
+        assert line.settled_tick == UNTIL
+
+
+@settings(deadline=None)
+@given(params, seeds, transmissions(), cuts(UNTIL), st.data())
+def test_edges_errors_and_snapshots_do_not_depend_on_how_settling_is_cut(radio, seed, sent, ticks, data):
+    whole, whole_lines = band(radio, seed)
+    cut, cut_lines = band(radio, seed)
+    for start, text in sent:
+        whole.send(start, text)
+    whole.settle(UNTIL)
+    waiting = list(sent)
+    for tick in ticks:
+        lead = 0 if radio.carrier == "on" else radio.keyup_ticks
+        while waiting and (waiting[0][0] - lead + radio.latency_ticks < tick or data.draw(st.booleans())):
+            cut.send(*waiting.pop(0))
+        cut.settle(tick)
+    for start, text in waiting:
+        cut.send(start, text)
+    assert cut_lines[0].edges() == whole_lines[0].edges()
+    assert cut.snapshot() == whole.snapshot()
+
+
+@settings(deadline=None)
+@given(params, seeds, transmissions(), st.integers(1, UNTIL))
+def test_a_snapshot_at_any_tick_carries_the_bytes_in_the_air(radio, seed, sent, tick):
+    first, first_lines = band(radio, seed)
+    for start, data in sent:
+        first.send(start, data)
+    first.settle(tick)
+    second, second_lines = band(radio, seed)
+    second.restore(first.snapshot())
+    second_lines[0].restore(first_lines[0].snapshot())
+    for downlink in (first, second):
+        downlink.settle(UNTIL)
+    assert second_lines[0].edges() == first_lines[0].edges()
+    assert second.snapshot() == first.snapshot()
+
+
+def test_a_snapshot_does_not_fit_a_network_of_another_size():
+    with pytest.raises(ValueError, match="zip"):
+        band(RadioParams())[0].restore(band(RadioParams(), robots=(0, 1))[0].snapshot())
+
+
+def test_a_keyed_carrier_is_noise_then_mark_then_data_then_noise():
+    radio = RadioParams(latency_ticks=100)
+    downlink, lines = band(radio, seed=4)
+    downlink.send(100_000, b"\x55")
+    downlink.settle(250_000)
+    edges = lines[0].edges()
+    assert [tick for tick, _ in edges if 76_100 < tick < 125_100] == [100_100 + 2500 * i for i in range(10)]
+    assert lines[0].level_at(76_100) == 1
+    assert all(tick % 2500 == 0 for tick, _ in edges if tick < 76_100 or tick > 125_100)
+    assert [tick for tick, _ in edges if tick < 76_100]
+    assert [tick for tick, _ in edges if tick > 125_100]
+
+
+@pytest.mark.parametrize("radio", [RadioParams(squelch=True), RadioParams(carrier="on")])
+def test_a_squelched_or_an_idle_carrier_is_mark(radio):
+    downlink, lines = band(radio)
+    downlink.settle(UNTIL)
+    assert lines[0].edges() == []
+
+
+def test_errors_hit_each_robot_on_its_own_and_as_often_as_the_rate_says():
+    radio = RadioParams.of(bit_error_rate=1e-2, carrier="on")
+    downlink, lines = band(radio, seed=9, robots=(0, 1, 2))
+    for start in range(0, 400 * 25_000 * 25, 25_000 * 25):
+        downlink.send(start, bytes(25))
+        downlink.settle(start + 25_000 * 25)
+        for line in lines.values():
+            line.forget(downlink.settled_tick)
+    counts = [listener.bit_errors for listener in downlink.listeners.values()]
+    assert all(abs(count - 1000) < 4 * 31.5 for count in counts)
+    assert len(set(counts)) == 3
+
+
+def test_latency_moves_the_errors_with_the_bits():
+    heard = []
+    for latency in (0, 1234):
+        radio = RadioParams(latency_ticks=latency, error_threshold=2**32 // 20, squelch=True)
+        downlink, lines = band(radio, seed=5)
+        downlink.send(50_000, bytes(range(20)))
+        downlink.settle(700_000)
+        heard.append([(tick - latency, level) for tick, level in lines[0].edges()])
+    assert heard[0] == heard[1]
+
+
+def test_noise_is_balanced():
+    downlink, lines = band(RadioParams(), seed=8)
+    marks = 0
+    for until in range(2_500_000, 25_000_001, 2_500_000):
+        downlink.settle(until)
+        marks += sum(lines[0].level_at(tick) for tick in range(until - 2_500_000, until, 2500))
+        lines[0].forget(until)
+    assert abs(marks - 5000) < 4 * 50
+
+
+def test_a_transmission_must_be_announced_before_its_carrier_comes_up():
+    downlink, _ = band(RadioParams(keyup_ticks=1000, latency_ticks=10))
+    downlink.settle(50_010)
+    with pytest.raises(ValueError, match=r"tick 50999 reaches the robots at tick 50009.*settled up to 50010"):
+        downlink.send(50_999, b"x")
+    assert downlink.send(51_000, b"x") == 76_000
+
+
+def test_a_carrier_that_is_always_on_needs_no_announcement_before_the_start_bit():
+    downlink, _ = band(RadioParams(carrier="on"))
+    downlink.settle(50_000)
+    downlink.send(50_000, b"x")
+    with pytest.raises(ValueError, match="busy until 75000"):
+        downlink.send(74_999, b"y")
+    downlink.send(75_000, b"y")
+
+
+def test_an_empty_transmission_is_refused():
+    with pytest.raises(ValueError, match="at least one byte"):
+        band(RadioParams())[0].send(100_000, b"")
+
+
+def test_a_robot_joins_once_and_before_the_start():
+    downlink, _ = band(RadioParams())
+    with pytest.raises(ValueError, match="robot 0"):
+        downlink.listen(0, Line())
+    downlink.settle(1)
+    with pytest.raises(ValueError, match="robot 1"):
+        downlink.listen(1, Line())
+
+
+def test_a_downlink_shows_what_it_is_about_to_send():
+    downlink, _ = band(RadioParams())
+    downlink.send(100_000, b"\x55\xff")
+    assert repr(downlink) == "Downlink('net', robots [0], settled_tick=0, [(100000, '55 ff')])"
