@@ -14,7 +14,7 @@ class Bus:
     NOT_STATE = ()
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
-        """The latch of P0..P3 (`port` 0..3) became `latch`; the pins follow at `tick`, S1P1 of the next cycle."""
+        """Latch of P0..P3 (`port` 0..3) is now `latch`; the pins follow at `tick`, S1P1 of the next cycle."""
 
     def movx_read(self, address: int, tick: int) -> int:
         """Byte (0..255) on P0 when the CPU samples it at `tick`, end of S3P1 of the second MOVX cycle."""

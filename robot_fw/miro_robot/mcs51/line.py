@@ -1,13 +1,15 @@
 """A wire's level over time: what one chip drove and another one samples.
 
-What belongs here: edges with their ticks, and the queries a sampling receiver needs. What a level means (a UART
-bit, a strobe) belongs to the chips at both ends.
+What belongs here: edges with their ticks, and the queries a sampling receiver needs. What a level means (a
+UART bit, a strobe) belongs to the chips at both ends.
 
 A Line has one producer, which appends edges in order and says up to where its content is final, and consumers
-that never look beyond that tick. Edges live in a ring; whoever owns the Line forgets what is no longer needed.
+that never look beyond that tick. Edges live in a ring; the consumer forgets what is no longer needed.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 FAR = 1 << 62  # "never", for everybody
 _FAR = 1 << 62  # the same as a C constant
@@ -31,8 +33,8 @@ class Line:
     def append(self, tick: int, level: int) -> None:
         """The wire has `level` from `tick` on.
 
-        No edge if that is no change; replaces an edge on the same tick. Raises ValueError on a tick before the
-        last edge, OverflowError when 4096 edges are waiting to be forgotten.
+        No edge if that is no change; replaces an edge on the same tick. Raises ValueError on a tick before
+        the last edge, OverflowError when 4096 edges are waiting to be forgotten.
         """
         if self._end > self._first:
             last = self._ticks[(self._end - 1) & _MASK]
@@ -96,19 +98,17 @@ class Line:
             "ticks": [tick for tick, _ in self.edges()],
         }
 
-    def restore(self, state: dict[str, object]) -> None:
+    def restore(self, state: dict[str, Any]) -> None:
         ticks = state["ticks"]
-        settled, before = state["settled_tick"], state["before"]
-        assert isinstance(ticks, (list, tuple)) and isinstance(settled, int) and isinstance(before, int)
-        self.settled_tick = settled
-        self._before = before
-        self._first = self._cursor = 0
+        self.settled_tick = state["settled_tick"]
+        self._before = state["before"]
+        self._first = 0
+        self._cursor = 0
         self._end = len(ticks)
         for serial, tick in enumerate(ticks):
             self._ticks[serial] = tick
 
     def __repr__(self) -> str:
-        edges = ", ".join(
-            f"{tick}:{level}" for tick, level in self.edges()[max(0, self._end - self._first - 4) :]
-        )
+        kept = self.edges()
+        edges = ", ".join(f"{tick}:{level}" for tick, level in kept[max(0, len(kept) - 4) :])
         return f"Line(settled_tick={self.settled_tick}, level={self._last_level()}, last edges [{edges}])"

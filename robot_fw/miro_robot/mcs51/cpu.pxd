@@ -1,0 +1,59 @@
+cimport cython
+
+from miro_robot.mcs51.execute cimport Executor
+from miro_robot.mcs51.line cimport Line
+from miro_robot.mcs51.peripherals cimport Peripherals
+
+cdef long long _FAR
+cdef int _OUTSIDE
+cdef int _MARK
+cdef int _STOP_REQUESTED
+cdef int _POWER_DOWN
+cdef int _P0, _SP, _DPL, _DPH, _PCON, _P1, _P2, _P3
+cdef int _IE, _IP, _PSW, _ACC, _B
+cdef int _SMOD, _PD, _IDL
+cdef int _PCON_BITS
+cdef int _READ_SAMPLE, _WRITE_RISES
+cdef int _FLOATING
+
+cdef class Cpu(Executor):
+    cdef readonly Peripherals chip
+    cdef readonly Line rxd
+    cdef readonly Line txd
+    cdef readonly int pcon
+    cdef readonly int idle
+    cdef readonly int powered_down
+    cdef long long next_event
+    cdef long long blocked
+    cdef readonly int code_limit
+
+    @cython.locals(address=int)
+    cpdef load(self, bytes image, used=*)
+    cpdef int write_code(self, int address, int value) except -1
+    @cython.locals(now='long long', port=int)
+    cpdef reset(self)
+    cpdef int step(self) except -1
+    @cython.locals(row=int)
+    cpdef int run_until_pc(self, int address, long long until_cycle) except -1
+    cpdef request_stop(self)
+    cpdef int set_external(self, int port, int levels, long long tick) except -1
+    cpdef int peek_iram(self, int address) noexcept
+    cpdef int sfr(self, int address) except -1
+    @cython.locals(now='long long')
+    cdef int end_run(self) except -1
+    @cython.locals(now='long long', event='long long')
+    cdef int boundary(self) except -1
+    @cython.locals(chip=Peripherals, earliest='long long', source=int)
+    cdef int _attend(self, long long now) except -1
+    cdef int _enter(self, int source) except -1
+    cdef int _block(self) except -1
+    cdef int register(self, int address, long long cycle) except -1
+    @cython.locals(value=int)
+    cdef int write_sfr_bit(self, int address, int mask, int level) except -1
+    @cython.locals(folded=int, parity=int)
+    cpdef int psw(self) noexcept
+    cdef int write_psw(self, int value) except -1
+    cdef int write_pcon(self, int value) except -1
+    cdef int write_port(self, int port, int value) except -1
+    @cython.locals(value=int)
+    cdef int movx_read(self, int address) except -1

@@ -1,0 +1,386 @@
+"""The AT89C52 as a board sees it: reset, run, pins in and out, observers, snapshots.
+
+What belongs here: the registers of the core (ACC, B, PSW, SP, DPTR, PCON), when interrupts are taken, idle
+and power-down, MOVX, and the public face. Instructions are in `execute.py`, the rest of the chip in
+`peripherals.py`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_robot.faults import FaultKind
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.execute import BREAKPOINT, REACHED, STOPPED, Executor
+from miro_robot.mcs51.peripherals import Peripherals
+
+__all__ = ["BREAKPOINT", "REACHED", "STOPPED", "Cpu"]
+
+_FAR = 1 << 62
+_OUTSIDE = 0xFE
+_MARK = 0xFF  # breakpoint
+_STOP_REQUESTED = 1
+_POWER_DOWN = int(FaultKind.POWER_DOWN)
+_P0, _SP, _DPL, _DPH, _PCON, _P1, _P2, _P3 = 0x80, 0x81, 0x82, 0x83, 0x87, 0x90, 0xA0, 0xB0
+_IE, _IP, _PSW, _ACC, _B = 0xA8, 0xB8, 0xD0, 0xE0, 0xF0
+_SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
+_PCON_BITS = 0x8F  # the others are not implemented and read as 0
+_READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end
+_FLOATING = 0xFF  # what an undriven external bus reads as
+
+
+class Cpu(Executor):
+    """An AT89C52 at 24 MHz. `bus` is what it is soldered to; input is pushed through `set_external` and
+    `rxd`.
+    """
+
+    NOT_STATE = (
+        "bus",
+        "rom",  # the image: constant while it runs, unless code lies in RAM, whose owner then restores it
+        "rows",
+        "row_of",
+        "length_of",
+        "cycles_of",
+        "code_limit",
+        "start",  # the instruction in progress: snapshots are taken between two
+        "limit",
+        "until",
+        "stop",
+        "next_event",
+    )
+
+    def __init__(self, bus: Bus | None = None) -> None:
+        Executor.__init__(self, Bus() if bus is None else bus)
+        self.chip = Peripherals(self.bus)
+        self.rxd = self.chip.uart.rxd
+        self.txd = self.chip.uart.txd
+        self.pcon = 0
+        self.idle = 0
+        self.powered_down = 0
+        self.next_event = 0
+        self.blocked = -1  # boundary at which no interrupt is taken: after RETI and writes to IE, IP
+        self.code_limit = 0x10000
+        for address in range(0x10000):
+            self.write_code(address, 0xFF)
+            self.rows[address] = _OUTSIDE
+
+    # Image
+
+    def load(self, image: bytes, used: tuple[tuple[int, int], ...] | None = None) -> None:
+        """Puts `image` at address 0; executing outside `used` ((first, end) ranges; default: all of it) is
+        a fault.
+        """
+        for address in range(0x10000):
+            self.write_code(address, image[address] if address < len(image) else 0xFF)
+            self.rows[address] = _OUTSIDE
+        self.code_limit = 0
+        for first, end in ((0, len(image)),) if used is None else used:
+            for address in range(first, end):
+                self.rows[address] = self.row_of[self.rom[address]]
+            self.code_limit = max(self.code_limit, end)
+
+    def write_code(self, address: int, value: int) -> None:
+        """One byte of code memory, which from now on counts as loaded."""
+        self.rom[address] = value
+        if address < 2:
+            self.rom[0x10000 + address] = value
+        self.rows[address] = self.row_of[value]
+
+    @property
+    def code(self) -> bytes:
+        """The 64 KB of code memory."""
+        return bytes([self.rom[address] for address in range(0x10000)])
+
+    # Control
+
+    def reset(self) -> None:
+        """RST: registers and PC as after power-on, ports FF; RAM and time stay."""
+        now = self.cycles
+        self.chip.clear(now)
+        self.pc = 0
+        self.a = 0
+        self.b = 0
+        self.sp = 7
+        self.dptr = 0
+        self.write_psw(0)
+        self.pcon = 0
+        self.idle = 0
+        self.powered_down = 0
+        self.blocked = -1
+        for port in range(4):
+            self.write_port(port, 0xFF)
+        self.chip.clock_serial()
+
+    def step(self) -> int:
+        """One instruction or interrupt entry; an idle CPU advances by a cycle."""
+        return self.run(self.cycles + 1)
+
+    def run_until_pc(self, address: int, until_cycle: int) -> int:
+        """Like `run`, but returns BREAKPOINT before the instruction at `address` is executed."""
+        row = self.rows[address]
+        self.rows[address] = _MARK
+        try:
+            return self.run(until_cycle)
+        finally:
+            self.rows[address] = row
+
+    def request_stop(self) -> None:
+        """Ends the run after the instruction in progress; for callbacks of the bus."""
+        self.stop = _STOP_REQUESTED
+        self.limit = 0
+
+    def set_external(self, port: int, levels: int, tick: int) -> None:
+        """From `tick` on the outside puts `levels` on the pins of P0..P3 (1: released or high)."""
+        if self.chip.ports.next_cycle == _FAR and (port == 0 or port == 2) and tick <= 12 * self.cycles + 9:
+            self.chip.ports.outside[port] = levels
+        else:
+            self.chip.ports.push(port, levels, tick)
+            self.next_event = 0
+            self.limit = 0
+
+    # Observers
+
+    def peek_iram(self, address: int) -> int:
+        """A byte of internal RAM (0..255)."""
+        return self.iram[address & 0xFF]
+
+    def sfr(self, address: int) -> int:
+        """A special function register (80h..FFh; ports: their latch) as of now, without side effects."""
+        return self.register(address, self.cycles)
+
+    # The run loop's view of time
+
+    def begin_run(self) -> None:
+        self.next_event = 0
+        self.limit = 0
+
+    def end_run(self) -> None:
+        """TXD is final up to now; RXD before it is no longer needed."""
+        self.chip.sync(self.cycles)
+        now = 12 * self.cycles
+        if self.txd.settled_tick < now:
+            self.txd.settled_tick = now
+        self.rxd.forget(now - 24)
+
+    def boundary(self) -> int:
+        """Between two instructions with something to look after; 1 ends the run."""
+        now = self.cycles
+        if self.stop or now >= self.until:
+            return 1
+        if now >= self.next_event and self._attend(now):
+            return 0
+        event = self.next_event if self.next_event < self.until else self.until
+        if (self.idle or self.powered_down) and now < event:
+            self.idle_cycles += event - now
+            self.cycles = event
+        self.limit = event
+        return 0
+
+    def _attend(self, now: int) -> int:
+        """Everything due at the begin of cycle `now`: 1 if that was an interrupt."""
+        chip = self.chip
+        chip.apply_pushes(now)
+        chip.sample_pins(now)
+        chip.sync(now)
+        if self.powered_down:
+            self.next_event = chip.ports.next_cycle
+            return 0
+        earliest = now + 1
+        if self.blocked != now:
+            source = chip.interrupts.choose(now)
+            if source >= 0:
+                self._enter(source)
+                return 1
+            earliest = now
+        self.next_event = chip.next_event(earliest)
+        return 0
+
+    def _enter(self, source: int) -> None:
+        """The hardware LCALL: two cycles, and the end of idle mode."""
+        self.idle = 0
+        self.pcon &= 0xFF ^ _IDL
+        self.chip.taken(source, self.cycles)
+        self.start = self.cycles
+        self.cycles += 2
+        self.call(8 * source + 3)
+        self.next_event = 0
+        self.limit = 0
+
+    def end_of_interrupt(self) -> None:
+        self.chip.interrupts.leave()
+        self._block()
+
+    def _block(self) -> None:
+        """No interrupt before one more instruction has been executed."""
+        self.blocked = self.cycles
+        self.next_event = 0
+        self.limit = 0
+
+    # Special function registers
+
+    def register(self, address: int, cycle: int) -> int:
+        """A register, ports at their latches, with everything below `cycle` done."""
+        if address == _ACC:
+            return self.a
+        if address == _B:
+            return self.b
+        if address == _PSW:
+            return self.psw()
+        if address == _SP:
+            return self.sp
+        if address == _DPL:
+            return self.dptr & 0xFF
+        if address == _DPH:
+            return self.dptr >> 8
+        if address == _PCON:
+            return self.pcon
+        return self.chip.read(address, cycle)
+
+    def read_sfr(self, address: int) -> int:
+        if address & 0xCF == 0x80:
+            return self.chip.pin_levels((address - _P0) >> 4, self.start)
+        return self.register(address, self.start + 1)
+
+    def read_latch(self, address: int) -> int:
+        return self.register(address, self.start + 1)
+
+    def write_sfr_bit(self, address: int, mask: int, level: int) -> None:
+        """Only the one bit changes; the others keep what hardware may have set meanwhile."""
+        value = self.register(address, self.cycles)
+        self.write_sfr(address, value | mask if level else value & (0xFF ^ mask))
+
+    def write_sfr(self, address: int, value: int) -> None:
+        if address == _ACC:
+            self.a = value
+        elif address == _B:
+            self.b = value
+        elif address == _PSW:
+            self.write_psw(value)
+        elif address == _SP:
+            self.sp = value
+        elif address == _DPL:
+            self.dptr = (self.dptr & 0xFF00) | value
+        elif address == _DPH:
+            self.dptr = (self.dptr & 0x00FF) | (value << 8)
+        elif address == _PCON:
+            self.write_pcon(value)
+        elif address & 0xCF == 0x80:
+            self.write_port((address - _P0) >> 4, value)
+        else:
+            self.chip.write(address, value, self.cycles)
+            if address in (_IE, _IP):
+                self._block()
+            self.next_event = 0
+            self.limit = 0
+
+    def psw(self) -> int:
+        """P is the parity of ACC, whatever was written."""
+        folded = self.a ^ (self.a >> 4)
+        parity = (0x6996 >> (folded & 0x0F)) & 1
+        return (self.cy << 7) | (self.ac << 6) | self.user_flags | self.bank | (self.ov << 2) | parity
+
+    def write_psw(self, value: int) -> None:
+        self.cy = value >> 7
+        self.ac = (value >> 6) & 1
+        self.ov = (value >> 2) & 1
+        self.bank = value & 0x18
+        self.user_flags = value & 0x22
+
+    def write_pcon(self, value: int) -> None:
+        """Power-down wins over idle; the AT89C52 leaves it by reset only."""
+        if (value ^ self.pcon) & _SMOD:
+            self.chip.write_smod(value >> 7, self.cycles)
+        self.pcon = value & _PCON_BITS
+        if value & _PD:
+            self.chip.sync(self.cycles)
+            self.chip.frozen = 1
+            self.powered_down = 1
+            self.fault(_POWER_DOWN)
+        elif value & _IDL:
+            self.idle = 1
+        self.next_event = 0
+        self.limit = 0
+
+    def write_port(self, port: int, value: int) -> None:
+        if value != self.chip.ports.latches[port]:
+            self.chip.write_port(port, value, self.cycles)
+            if port & 1:  # P1 and P3 carry sampled inputs
+                self.next_event = 0
+                self.limit = 0
+            self.bus.port_written(port, value, 12 * self.cycles)
+
+    # External bus
+
+    def page(self) -> int:
+        return self.chip.ports.latches[2] << 8
+
+    def movx_read(self, address: int) -> int:
+        """Without a strobe (P3.7 latched low) nobody drives the bus."""
+        value = _FLOATING
+        if self.chip.ports.latches[3] & 0x80:
+            value = self.bus.movx_read(address, 12 * self.start + _READ_SAMPLE) & 0xFF
+        self.write_port(0, 0xFF)
+        return value
+
+    def movx_write(self, address: int, value: int) -> None:
+        """Without a strobe (P3.6 latched low) nothing is written."""
+        if self.chip.ports.latches[3] & 0x40:
+            self.bus.movx_write(address, value, 12 * self.start + _WRITE_RISES)
+        self.write_port(0, 0xFF)
+
+    # State
+
+    def snapshot(self) -> dict[str, object]:
+        """All state, between two runs; the image is not part of it."""
+        self.chip.sync(self.cycles)
+        return {
+            "iram": bytes([self.iram[address] for address in range(256)]),
+            "pc": self.pc,
+            "a": self.a,
+            "b": self.b,
+            "sp": self.sp,
+            "dptr": self.dptr,
+            "cy": self.cy,
+            "ac": self.ac,
+            "ov": self.ov,
+            "user_flags": self.user_flags,
+            "bank": self.bank,
+            "cycles": self.cycles,
+            "instructions": self.instructions,
+            "idle_cycles": self.idle_cycles,
+            "faults": self.faults,
+            "pcon": self.pcon,
+            "idle": self.idle,
+            "powered_down": self.powered_down,
+            "blocked": self.blocked,
+            "chip": self.chip.snapshot(),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        for address in range(256):
+            self.iram[address] = state["iram"][address]
+        self.pc = state["pc"]
+        self.a = state["a"]
+        self.b = state["b"]
+        self.sp = state["sp"]
+        self.dptr = state["dptr"]
+        self.cy = state["cy"]
+        self.ac = state["ac"]
+        self.ov = state["ov"]
+        self.user_flags = state["user_flags"]
+        self.bank = state["bank"]
+        self.cycles = state["cycles"]
+        self.instructions = state["instructions"]
+        self.idle_cycles = state["idle_cycles"]
+        self.faults = state["faults"]
+        self.pcon = state["pcon"]
+        self.idle = state["idle"]
+        self.powered_down = state["powered_down"]
+        self.blocked = state["blocked"]
+        self.chip.restore(state["chip"])
+
+    def __repr__(self) -> str:
+        return (
+            f"Cpu(pc={self.pc:04X}h, cycles={self.cycles}, a={self.a:02X}h, psw={self.psw():02X}h, "
+            f"sp={self.sp:02X}h, dptr={self.dptr:04X}h{', idle' if self.idle else ''})"
+        )

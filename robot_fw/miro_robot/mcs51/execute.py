@@ -1,0 +1,507 @@
+"""The instructions: registers, internal RAM, ALU, and the loop that executes code.
+
+What belongs here: what each line of `opcodes.TABLE` does to registers and memory. Special function
+registers, time passing in peripherals, interrupts and idling are `Cpu`'s (cpu.py), which fills in the hooks
+at the end of the class.
+
+Timing inside an instruction (sections 1 and 11 of the AT89C52 sheet; where silicon is not pinned down this
+is the choice made): operands are read in the instruction's first cycle, `start`; results are written at the
+end of its last, `cycles`. The loop compares `cycles` with `limit` once per instruction and knows nothing
+else about time.
+"""
+
+from __future__ import annotations
+
+from miro_robot.faults import FaultKind
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.opcodes import CYCLES, LENGTH, ROW
+
+_OUTSIDE = 0xFE  # row of an address that no image byte was loaded to
+_BREAKPOINT = 0xFF  # row that ends a run before its instruction
+_SPECIAL = 0xFE  # the lowest of these two
+_UNDEFINED_OPCODE = int(FaultKind.UNDEFINED_OPCODE)
+_STACK_OVERFLOW = int(FaultKind.STACK_OVERFLOW)
+_STACK_UNDERFLOW = int(FaultKind.STACK_UNDERFLOW)
+_OUTSIDE_IMAGE = int(FaultKind.OUTSIDE_IMAGE)
+
+REACHED, STOPPED, BREAKPOINT = 0, 1, 2  # why a run ended
+
+
+class Executor:
+    """Registers, memory and instructions of an 80C52 core."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus = bus
+        self.rom = bytearray(0x10002)  # 64 KB, and the first two bytes again for operands that wrap
+        self.rows = bytearray(0x10000)  # per address: its opcode's line in the table, or a special row
+        self.row_of = ROW
+        self.length_of = LENGTH
+        self.cycles_of = CYCLES
+        self.iram = bytearray(256)
+        self.pc = 0
+        self.a = 0
+        self.b = 0
+        self.sp = 7
+        self.dptr = 0
+        self.cy = 0
+        self.ac = 0
+        self.ov = 0
+        self.user_flags = 0  # F0 and UD, in their places in PSW
+        self.bank = 0  # address of R0: 00, 08, 10 or 18
+        self.cycles = 0  # machine cycles since power-on; during an instruction: its end
+        self.start = 0  # first cycle of the instruction in progress
+        self.limit = 0  # cycle at which the loop has to look up
+        self.until = 0
+        self.stop = 0
+        self.instructions = 0
+        self.idle_cycles = 0
+        self.faults = 0
+
+    def run(self, until_cycle: int) -> int:
+        """Executes until `cycles` >= `until_cycle`; may end up to 3 cycles late, when an instruction does.
+
+        Returns REACHED, STOPPED (`request_stop`) or BREAKPOINT.
+        """
+        self.until = until_cycle
+        self.stop = REACHED
+        self.begin_run()
+        iram = self.iram
+        rom = self.rom
+        while True:
+            if self.cycles >= self.limit:
+                if self.boundary():
+                    break
+                continue
+            pc = self.pc
+            row = self.rows[pc]
+            op = rom[pc]
+            if row >= _SPECIAL:
+                if row == _BREAKPOINT:
+                    self.stop = BREAKPOINT
+                    break
+                self.fault(_OUTSIDE_IMAGE)
+                row = self.row_of[op]
+            first = rom[pc + 1]
+            second = rom[pc + 2]
+            self.start = self.cycles
+            self.cycles += self.cycles_of[op]
+            self.instructions += 1
+            after = (pc + self.length_of[op]) & 0xFFFF
+            self.pc = after
+            rn = self.bank + (op & 7)
+            if row == 0x00:  # NOP
+                pass
+            elif row == 0x01:  # AJMP addr11
+                self.pc = (after & 0xF800) | ((op & 0xE0) << 3) | first
+            elif row == 0x02:  # LJMP addr16
+                self.pc = (first << 8) | second
+            elif row == 0x03:  # RR A
+                self.a = (self.a >> 1) | ((self.a & 1) << 7)
+            elif row == 0x04:  # INC A
+                self.a = (self.a + 1) & 0xFF
+            elif row == 0x05:  # INC dir
+                self.write(first, (self.read_latched(first) + 1) & 0xFF)
+            elif row == 0x06:  # INC @Ri
+                address = iram[self.bank + (op & 1)]
+                iram[address] = (iram[address] + 1) & 0xFF
+            elif row == 0x08:  # INC Rn
+                iram[rn] = (iram[rn] + 1) & 0xFF
+            elif row == 0x10:  # JBC bit,rel
+                if self.latched_bit(first):
+                    self.write_bit(first, 0)
+                    self.branch(second)
+            elif row == 0x11:  # ACALL addr11
+                self.call((after & 0xF800) | ((op & 0xE0) << 3) | first)
+            elif row == 0x12:  # LCALL addr16
+                self.call((first << 8) | second)
+            elif row == 0x13:  # RRC A
+                value = self.a
+                self.a = (value >> 1) | (self.cy << 7)
+                self.cy = value & 1
+            elif row == 0x14:  # DEC A
+                self.a = (self.a - 1) & 0xFF
+            elif row == 0x15:  # DEC dir
+                self.write(first, (self.read_latched(first) - 1) & 0xFF)
+            elif row == 0x16:  # DEC @Ri
+                address = iram[self.bank + (op & 1)]
+                iram[address] = (iram[address] - 1) & 0xFF
+            elif row == 0x18:  # DEC Rn
+                iram[rn] = (iram[rn] - 1) & 0xFF
+            elif row == 0x20:  # JB bit,rel
+                if self.read_bit(first):
+                    self.branch(second)
+            elif row == 0x22:  # RET
+                value = self.pop() << 8
+                self.pc = value | self.pop()
+            elif row == 0x23:  # RL A
+                self.a = ((self.a << 1) & 0xFF) | (self.a >> 7)
+            elif row == 0x24:  # ADD A,#imm
+                self.add(first, 0)
+            elif row == 0x25:  # ADD A,dir
+                self.add(self.read(first), 0)
+            elif row == 0x26:  # ADD A,@Ri
+                self.add(iram[iram[self.bank + (op & 1)]], 0)
+            elif row == 0x28:  # ADD A,Rn
+                self.add(iram[rn], 0)
+            elif row == 0x30:  # JNB bit,rel
+                if not self.read_bit(first):
+                    self.branch(second)
+            elif row == 0x32:  # RETI
+                value = self.pop() << 8
+                self.pc = value | self.pop()
+                self.end_of_interrupt()
+            elif row == 0x33:  # RLC A
+                value = self.a
+                self.a = ((value << 1) & 0xFF) | self.cy
+                self.cy = value >> 7
+            elif row == 0x34:  # ADDC A,#imm
+                self.add(first, self.cy)
+            elif row == 0x35:  # ADDC A,dir
+                value = self.read(first)  # which may be PSW: CY is taken after
+                self.add(value, self.cy)
+            elif row == 0x36:  # ADDC A,@Ri
+                self.add(iram[iram[self.bank + (op & 1)]], self.cy)
+            elif row == 0x38:  # ADDC A,Rn
+                self.add(iram[rn], self.cy)
+            elif row == 0x40:  # JC rel
+                if self.cy:
+                    self.branch(first)
+            elif row == 0x42:  # ORL dir,A
+                self.write(first, self.read_latched(first) | self.a)
+            elif row == 0x43:  # ORL dir,#imm
+                self.write(first, self.read_latched(first) | second)
+            elif row == 0x44:  # ORL A,#imm
+                self.a |= first
+            elif row == 0x45:  # ORL A,dir
+                self.a |= self.read(first)
+            elif row == 0x46:  # ORL A,@Ri
+                self.a |= iram[iram[self.bank + (op & 1)]]
+            elif row == 0x48:  # ORL A,Rn
+                self.a |= iram[rn]
+            elif row == 0x50:  # JNC rel
+                if not self.cy:
+                    self.branch(first)
+            elif row == 0x52:  # ANL dir,A
+                self.write(first, self.read_latched(first) & self.a)
+            elif row == 0x53:  # ANL dir,#imm
+                self.write(first, self.read_latched(first) & second)
+            elif row == 0x54:  # ANL A,#imm
+                self.a &= first
+            elif row == 0x55:  # ANL A,dir
+                self.a &= self.read(first)
+            elif row == 0x56:  # ANL A,@Ri
+                self.a &= iram[iram[self.bank + (op & 1)]]
+            elif row == 0x58:  # ANL A,Rn
+                self.a &= iram[rn]
+            elif row == 0x60:  # JZ rel
+                if self.a == 0:
+                    self.branch(first)
+            elif row == 0x62:  # XRL dir,A
+                self.write(first, self.read_latched(first) ^ self.a)
+            elif row == 0x63:  # XRL dir,#imm
+                self.write(first, self.read_latched(first) ^ second)
+            elif row == 0x64:  # XRL A,#imm
+                self.a ^= first
+            elif row == 0x65:  # XRL A,dir
+                self.a ^= self.read(first)
+            elif row == 0x66:  # XRL A,@Ri
+                self.a ^= iram[iram[self.bank + (op & 1)]]
+            elif row == 0x68:  # XRL A,Rn
+                self.a ^= iram[rn]
+            elif row == 0x70:  # JNZ rel
+                if self.a != 0:
+                    self.branch(first)
+            elif row == 0x72:  # ORL C,bit
+                self.cy |= self.read_bit(first)
+            elif row == 0x73:  # JMP @A+DPTR
+                self.pc = (self.a + self.dptr) & 0xFFFF
+            elif row == 0x74:  # MOV A,#imm
+                self.a = first
+            elif row == 0x75:  # MOV dir,#imm
+                self.write(first, second)
+            elif row == 0x76:  # MOV @Ri,#imm
+                iram[iram[self.bank + (op & 1)]] = first
+            elif row == 0x78:  # MOV Rn,#imm
+                iram[rn] = first
+            elif row == 0x80:  # SJMP rel
+                self.branch(first)
+            elif row == 0x82:  # ANL C,bit
+                self.cy &= self.read_bit(first)
+            elif row == 0x83:  # MOVC A,@A+PC
+                self.a = rom[(after + self.a) & 0xFFFF]
+            elif row == 0x84:  # DIV AB
+                self.divide()
+            elif row == 0x85:  # MOV dst,src
+                self.write(second, self.read(first))
+            elif row == 0x86:  # MOV dir,@Ri
+                self.write(first, iram[iram[self.bank + (op & 1)]])
+            elif row == 0x88:  # MOV dir,Rn
+                self.write(first, iram[rn])
+            elif row == 0x90:  # MOV DPTR,#imm16
+                self.dptr = (first << 8) | second
+            elif row == 0x92:  # MOV bit,C
+                self.write_bit(first, self.cy)
+            elif row == 0x93:  # MOVC A,@A+DPTR
+                self.a = rom[(self.dptr + self.a) & 0xFFFF]
+            elif row == 0x94:  # SUBB A,#imm
+                self.subtract(first)
+            elif row == 0x95:  # SUBB A,dir
+                self.subtract(self.read(first))
+            elif row == 0x96:  # SUBB A,@Ri
+                self.subtract(iram[iram[self.bank + (op & 1)]])
+            elif row == 0x98:  # SUBB A,Rn
+                self.subtract(iram[rn])
+            elif row == 0xA0:  # ORL C,/bit
+                self.cy |= self.read_bit(first) ^ 1
+            elif row == 0xA2:  # MOV C,bit
+                self.cy = self.read_bit(first)
+            elif row == 0xA3:  # INC DPTR
+                self.dptr = (self.dptr + 1) & 0xFFFF
+            elif row == 0xA4:  # MUL AB
+                value = self.a * self.b
+                self.a = value & 0xFF
+                self.b = value >> 8
+                self.cy = 0
+                self.ov = 1 if value > 0xFF else 0
+            elif row == 0xA5:  # undefined: runs as NOP
+                self.fault(_UNDEFINED_OPCODE)
+            elif row == 0xA6:  # MOV @Ri,dir
+                value = self.read(first)
+                iram[iram[self.bank + (op & 1)]] = value
+            elif row == 0xA8:  # MOV Rn,dir
+                value = self.read(first)
+                iram[rn] = value
+            elif row == 0xB0:  # ANL C,/bit
+                self.cy &= self.read_bit(first) ^ 1
+            elif row == 0xB2:  # CPL bit
+                self.write_bit(first, self.latched_bit(first) ^ 1)
+            elif row == 0xB3:  # CPL C
+                self.cy ^= 1
+            elif row == 0xB4:  # CJNE A,#imm,rel
+                self.compare(self.a, first, second)
+            elif row == 0xB5:  # CJNE A,dir,rel
+                value = self.read(first)
+                self.compare(self.a, value, second)
+            elif row == 0xB6:  # CJNE @Ri,#imm,rel
+                self.compare(iram[iram[self.bank + (op & 1)]], first, second)
+            elif row == 0xB8:  # CJNE Rn,#imm,rel
+                self.compare(iram[rn], first, second)
+            elif row == 0xC0:  # PUSH dir: SP counts first, so PUSH SP stores the new one
+                self.claim()
+                value = self.read(first)
+                iram[self.sp] = value
+            elif row == 0xC2:  # CLR bit
+                self.write_bit(first, 0)
+            elif row == 0xC3:  # CLR C
+                self.cy = 0
+            elif row == 0xC4:  # SWAP A
+                self.a = ((self.a << 4) & 0xF0) | (self.a >> 4)
+            elif row == 0xC5:  # XCH A,dir
+                value = self.read(first)
+                address = self.a
+                self.a = value
+                self.write(first, address)
+            elif row == 0xC6:  # XCH A,@Ri
+                address = iram[self.bank + (op & 1)]
+                value = iram[address]
+                iram[address] = self.a
+                self.a = value
+            elif row == 0xC8:  # XCH A,Rn
+                value = iram[rn]
+                iram[rn] = self.a
+                self.a = value
+            elif row == 0xD0:  # POP dir: SP counts first, so POP SP ends with the byte popped
+                value = self.pop()
+                self.write(first, value)
+            elif row == 0xD2:  # SETB bit
+                self.write_bit(first, 1)
+            elif row == 0xD3:  # SETB C
+                self.cy = 1
+            elif row == 0xD4:  # DA A
+                self.decimal_adjust()
+            elif row == 0xD5:  # DJNZ dir,rel
+                value = (self.read_latched(first) - 1) & 0xFF
+                self.write(first, value)
+                if value:
+                    self.branch(second)
+            elif row == 0xD6:  # XCHD A,@Ri
+                address = iram[self.bank + (op & 1)]
+                value = iram[address]
+                iram[address] = (value & 0xF0) | (self.a & 0x0F)
+                self.a = (self.a & 0xF0) | (value & 0x0F)
+            elif row == 0xD8:  # DJNZ Rn,rel
+                value = (iram[rn] - 1) & 0xFF
+                iram[rn] = value
+                if value:
+                    self.branch(first)
+            elif row == 0xE0:  # MOVX A,@DPTR
+                self.a = self.movx_read(self.dptr)
+            elif row == 0xE2:  # MOVX A,@Ri
+                self.a = self.movx_read(self.page() | iram[self.bank + (op & 1)])
+            elif row == 0xE4:  # CLR A
+                self.a = 0
+            elif row == 0xE5:  # MOV A,dir
+                self.a = self.read(first)
+            elif row == 0xE6:  # MOV A,@Ri
+                self.a = iram[iram[self.bank + (op & 1)]]
+            elif row == 0xE8:  # MOV A,Rn
+                self.a = iram[rn]
+            elif row == 0xF0:  # MOVX @DPTR,A
+                self.movx_write(self.dptr, self.a)
+            elif row == 0xF2:  # MOVX @Ri,A
+                self.movx_write(self.page() | iram[self.bank + (op & 1)], self.a)
+            elif row == 0xF4:  # CPL A
+                self.a ^= 0xFF
+            elif row == 0xF5:  # MOV dir,A
+                self.write(first, self.a)
+            elif row == 0xF6:  # MOV @Ri,A
+                iram[iram[self.bank + (op & 1)]] = self.a
+            elif row == 0xF8:  # MOV Rn,A
+                iram[rn] = self.a
+        self.end_run()
+        return self.stop
+
+    # Addressing
+
+    def read(self, address: int) -> int:
+        """Direct address, ports at their pins."""
+        return self.iram[address] if address < 0x80 else self.read_sfr(address)
+
+    def read_latched(self, address: int) -> int:
+        """Direct address as read-modify-write instructions see it: ports at their latches."""
+        return self.iram[address] if address < 0x80 else self.read_latch(address)
+
+    def write(self, address: int, value: int) -> None:
+        if address < 0x80:
+            self.iram[address] = value
+        else:
+            self.write_sfr(address, value)
+
+    def read_bit(self, bit: int) -> int:
+        byte = self.iram[0x20 + (bit >> 3)] if bit < 0x80 else self.read_sfr(bit & 0xF8)
+        return (byte >> (bit & 7)) & 1
+
+    def latched_bit(self, bit: int) -> int:
+        byte = self.iram[0x20 + (bit >> 3)] if bit < 0x80 else self.read_latch(bit & 0xF8)
+        return (byte >> (bit & 7)) & 1
+
+    def write_bit(self, bit: int, level: int) -> None:
+        if bit < 0x80:
+            address = 0x20 + (bit >> 3)
+            kept = self.iram[address] & (0xFF ^ (1 << (bit & 7)))
+            self.iram[address] = kept | (level << (bit & 7))
+        else:
+            self.write_sfr_bit(bit & 0xF8, 1 << (bit & 7), level)
+
+    # Flow
+
+    def branch(self, offset: int) -> None:
+        self.pc = (self.pc + (offset ^ 0x80) - 0x80) & 0xFFFF
+
+    def call(self, target: int) -> None:
+        """PCL first, then PCH: LCALL, ACALL and interrupts alike."""
+        self.claim()
+        self.iram[self.sp] = self.pc & 0xFF
+        self.claim()
+        self.iram[self.sp] = self.pc >> 8
+        self.pc = target
+
+    def claim(self) -> None:
+        """SP counts up; a byte is about to be stored there."""
+        self.sp = (self.sp + 1) & 0xFF
+        if self.sp == 0:
+            self.fault(_STACK_OVERFLOW)
+
+    def pop(self) -> int:
+        value = self.iram[self.sp]
+        if self.sp == 0:
+            self.fault(_STACK_UNDERFLOW)
+        self.sp = (self.sp - 1) & 0xFF
+        return value
+
+    # ALU
+
+    def add(self, operand: int, carry: int) -> None:
+        a = self.a
+        total = a + operand + carry
+        self.ac = ((a ^ operand ^ total) >> 4) & 1
+        self.ov = (((a ^ total) & (operand ^ total)) >> 7) & 1
+        self.cy = total >> 8
+        self.a = total & 0xFF
+
+    def subtract(self, operand: int) -> None:
+        a = self.a
+        total = (a - operand - self.cy) & 0x1FF
+        self.ac = ((a ^ operand ^ total) >> 4) & 1
+        self.ov = (((a ^ operand) & (a ^ total)) >> 7) & 1
+        self.cy = total >> 8
+        self.a = total & 0xFF
+
+    def compare(self, left: int, right: int, offset: int) -> None:
+        self.cy = 1 if left < right else 0
+        if left != right:
+            self.branch(offset)
+
+    def divide(self) -> None:
+        """Dividing by zero leaves A and B as they were (silicon: undefined) and sets OV."""
+        self.cy = 0
+        self.ov = 1 if self.b == 0 else 0
+        if self.b:
+            quotient = self.a // self.b
+            self.b = self.a - quotient * self.b
+            self.a = quotient
+
+    def decimal_adjust(self) -> None:
+        value = self.a
+        if self.ac or (value & 0x0F) > 9:
+            value += 0x06
+        if self.cy or value > 0x9F:  # also when the first step carried
+            value += 0x60
+        if value > 0xFF:
+            self.cy = 1
+        self.a = value & 0xFF
+
+    def fault(self, kind: int) -> None:
+        self.faults += 1
+        self.bus.fault(kind, self.pc, 12 * self.cycles)
+
+    # Hooks: what `Cpu` adds to the bare instructions
+
+    def begin_run(self) -> None:
+        """Before the first instruction of a run: set `limit`."""
+        self.limit = self.until
+
+    def end_run(self) -> None:
+        """After the last instruction of a run."""
+
+    def boundary(self) -> int:
+        """`cycles` reached `limit`: 1 ends the run."""
+        return 1 if self.cycles >= self.until else 0
+
+    def end_of_interrupt(self) -> None:
+        """RETI was executed."""
+
+    def read_sfr(self, address: int) -> int:
+        """Direct 80..FF in cycle `start`, ports at their pins."""
+        return 0
+
+    def read_latch(self, address: int) -> int:
+        """Direct 80..FF for read-modify-write."""
+        return 0
+
+    def write_sfr(self, address: int, value: int) -> None:
+        """Direct 80..FF at the end of the instruction."""
+
+    def write_sfr_bit(self, address: int, mask: int, level: int) -> None:
+        """One bit of direct 80..FF at the end of the instruction."""
+
+    def page(self) -> int:
+        """High address byte of MOVX @Ri, in place."""
+        return 0
+
+    def movx_read(self, address: int) -> int:
+        """Byte from the external data bus."""
+        return 0xFF
+
+    def movx_write(self, address: int, value: int) -> None:
+        """Byte to the external data bus."""

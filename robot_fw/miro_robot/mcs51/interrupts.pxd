@@ -1,0 +1,35 @@
+cimport cython
+
+cdef long long _FAR
+
+cdef class Interrupts:
+    cdef public int ie
+    cdef public int ip
+    cdef public int in_service
+    cdef long long since[6]
+    cdef long long until[6]
+
+    @cython.locals(source=int)
+    cpdef void clear(self) noexcept
+    cpdef void ask(self, int source, long long cycle) noexcept
+    cpdef void withdraw(self, int source, long long cycle) noexcept
+    @cython.locals(source=int, chosen=int, latched='long long')
+    cpdef int choose(self, long long boundary) noexcept
+    @cython.locals(source=int, earliest='long long', boundary='long long')
+    cpdef long long next_boundary(self, long long now) noexcept
+    cpdef void enter(self, int source) noexcept
+    cpdef void leave(self) noexcept
+
+cdef class ExternalInterrupts:
+    cdef Interrupts interrupts
+    cdef readonly int control
+    cdef public int levels
+
+    cpdef void clear(self, long long cycle) noexcept
+    @cython.locals(bit=int)
+    cpdef void sample(self, int number, int level, long long cycle) noexcept
+    @cython.locals(number=int)
+    cpdef void write(self, int value, long long cycle) noexcept
+    cpdef void taken(self, int number, long long cycle) noexcept
+    @cython.locals(flag=int)
+    cdef void _follow(self, int number, long long cycle) noexcept

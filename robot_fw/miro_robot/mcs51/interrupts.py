@@ -1,0 +1,162 @@
+"""Interrupts: the six sources, their priorities, and the two external inputs.
+
+What belongs here: which source is asking since when, and which one the CPU has to take at an instruction's
+end. Who raises a flag (timers, serial port) is elsewhere; the two-cycle LCALL itself is `Cpu`'s.
+
+Timing (AT89C52 sheet section 6): flags are latched at S5P2 of every cycle and the latched copies are polled
+in the next one; an LCALL follows the polling cycle if that was the last of an instruction. So at the
+boundary after cycle b - 1 those sources count that were latched in cycle b - 2. Each source is therefore
+kept as the window [since, until) of cycles whose S5P2 saw it. A cleared flag still counts in the poll of
+its last cycle.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+_FAR = 1 << 62
+SOURCES = 6  # in polling order: INT0, timer 0, INT1, timer 1, serial, timer 2
+INT0, TIMER0, INT1, TIMER1, SERIAL, TIMER2 = range(SOURCES)
+
+
+class Interrupts:
+    """IE, IP, the sources' windows and the two in-service flip-flops."""
+
+    def __init__(self) -> None:
+        self.ie = 0
+        self.ip = 0
+        self.in_service = 0  # bit 0 a low-priority, bit 1 a high-priority routine
+        self.since = [0] * 6
+        self.until = [0] * 6
+
+    def clear(self) -> None:
+        """As after reset."""
+        self.ie = 0
+        self.ip = 0
+        self.in_service = 0
+        for source in range(6):
+            self.since[source] = 0
+            self.until[source] = 0
+
+    def ask(self, source: int, cycle: int) -> None:
+        """The source's flag is first seen at S5P2 of `cycle`; nothing new if it is up already."""
+        if self.until[source] != _FAR:
+            self.since[source] = cycle
+            self.until[source] = _FAR
+
+    def withdraw(self, source: int, cycle: int) -> None:
+        """The source's flag is no longer seen at S5P2 of `cycle`."""
+        if self.until[source] == _FAR:
+            self.until[source] = cycle
+
+    def choose(self, boundary: int) -> int:
+        """The source whose LCALL begins in cycle `boundary`, or -1."""
+        if not self.ie & 0x80 or self.in_service & 2:
+            return -1
+        latched = boundary - 2
+        chosen = -1
+        for source in range(6):
+            if (self.ie >> source) & 1 and self.since[source] <= latched < self.until[source]:
+                if (self.ip >> source) & 1:
+                    return source  # the first of the high level wins over every low one
+                if chosen < 0 and not self.in_service:
+                    chosen = source
+        return chosen
+
+    def next_boundary(self, now: int) -> int:
+        """The first cycle >= `now` in which `choose` may find something among the flags known, or FAR."""
+        if not self.ie & 0x80 or self.in_service & 2:
+            return _FAR
+        earliest = _FAR
+        for source in range(6):
+            if (self.ie >> source) & 1 and (not self.in_service or (self.ip >> source) & 1):
+                boundary = max(self.since[source] + 2, now)
+                if boundary - 2 < self.until[source] and boundary < earliest:
+                    earliest = boundary
+        return earliest
+
+    def enter(self, source: int) -> None:
+        """Its routine is called."""
+        self.in_service |= 1 + ((self.ip >> source) & 1)
+
+    def leave(self) -> None:
+        """RETI: the highest routine in service is over."""
+        if self.in_service & 2:
+            self.in_service &= 1
+        else:
+            self.in_service = 0
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "ie": self.ie,
+            "ip": self.ip,
+            "in_service": self.in_service,
+            "since": [self.since[source] for source in range(6)],
+            "until": [self.until[source] for source in range(6)],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.ie = state["ie"]
+        self.ip = state["ip"]
+        self.in_service = state["in_service"]
+        for source in range(6):
+            self.since[source] = state["since"][source]
+            self.until[source] = state["until"][source]
+
+
+class ExternalInterrupts:
+    """INT0, INT1 and their half of TCON: level mode follows the inverted pin, edge mode latches a fall."""
+
+    NOT_STATE = ("interrupts",)
+
+    def __init__(self, interrupts: Interrupts) -> None:
+        self.interrupts = interrupts
+        self.control = 0  # TCON.3:0 = IE1 IT1 IE0 IT0
+        self.levels = 3  # pins INT1, INT0 as last sampled
+
+    def clear(self, cycle: int) -> None:
+        """TCON as after reset; the pins stay what they are."""
+        self.write(0, cycle)
+
+    def sample(self, number: int, level: int, cycle: int) -> None:
+        """The pin of INT`number` changed to `level` for the sample at S5P2 of `cycle`."""
+        bit = 1 << number
+        self.levels = (self.levels & (3 ^ bit)) | (level << number)
+        if (self.control >> (2 * number)) & 1 == 0:
+            self._follow(number, cycle)
+        elif level == 0:
+            self.control |= 2 << (2 * number)
+            self.interrupts.ask(2 * number, cycle)
+
+    def write(self, value: int, cycle: int) -> None:
+        """TCON.3:0 is written; `cycle` is the first to see it."""
+        self.control = value & 0x0F
+        for number in range(2):
+            if (value >> (2 * number)) & 1 == 0:
+                self._follow(number, cycle)
+            elif (value >> (2 * number)) & 2:
+                self.interrupts.ask(2 * number, cycle)
+            else:
+                self.interrupts.withdraw(2 * number, cycle)
+
+    def taken(self, number: int, cycle: int) -> None:
+        """The CPU vectors: an edge flag is cleared, a level flag stays."""
+        if (self.control >> (2 * number)) & 1:
+            self.control &= 0x0F ^ (2 << (2 * number))
+            self.interrupts.withdraw(2 * number, cycle)
+
+    def _follow(self, number: int, cycle: int) -> None:
+        flag = 2 << (2 * number)
+        if (self.levels >> number) & 1:
+            self.control &= 0x0F ^ flag
+            self.interrupts.withdraw(2 * number, cycle)
+        else:
+            self.control |= flag
+            self.interrupts.ask(2 * number, cycle)
+
+    def snapshot(self) -> dict[str, object]:
+        return {"control": self.control, "levels": self.levels}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.control = state["control"]
+        self.levels = state["levels"]

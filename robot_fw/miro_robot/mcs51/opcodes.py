@@ -1,0 +1,172 @@
+"""The instruction set, one line per instruction: its name, its operands, its length and its time.
+
+What belongs here: the table and what follows from it (lengths, cycle counts, rows, disassembly). What an
+instruction does is in `execute.py`. Source: Atmel 8051 Hardware Manual, instruction table.
+"""
+
+from __future__ import annotations
+
+# first opcode, how many, opcode step, mnemonic, operands, bytes, machine cycles.
+# Operands: dir direct byte, bit bit address, imm/imm16 constants, rel branch offset, addr11/addr16 targets,
+# src/dst the direct bytes of opcode 85, whose source comes first in code.
+TABLE: tuple[tuple[int, int, int, str, str, int, int], ...] = (
+    (0x00, 1, 1, "NOP", "", 1, 1),
+    (0x01, 8, 0x20, "AJMP", "addr11", 2, 2),
+    (0x02, 1, 1, "LJMP", "addr16", 3, 2),
+    (0x03, 1, 1, "RR", "A", 1, 1),
+    (0x04, 1, 1, "INC", "A", 1, 1),
+    (0x05, 1, 1, "INC", "dir", 2, 1),
+    (0x06, 2, 1, "INC", "@Ri", 1, 1),
+    (0x08, 8, 1, "INC", "Rn", 1, 1),
+    (0x10, 1, 1, "JBC", "bit,rel", 3, 2),
+    (0x11, 8, 0x20, "ACALL", "addr11", 2, 2),
+    (0x12, 1, 1, "LCALL", "addr16", 3, 2),
+    (0x13, 1, 1, "RRC", "A", 1, 1),
+    (0x14, 1, 1, "DEC", "A", 1, 1),
+    (0x15, 1, 1, "DEC", "dir", 2, 1),
+    (0x16, 2, 1, "DEC", "@Ri", 1, 1),
+    (0x18, 8, 1, "DEC", "Rn", 1, 1),
+    (0x20, 1, 1, "JB", "bit,rel", 3, 2),
+    (0x22, 1, 1, "RET", "", 1, 2),
+    (0x23, 1, 1, "RL", "A", 1, 1),
+    (0x24, 1, 1, "ADD", "A,#imm", 2, 1),
+    (0x25, 1, 1, "ADD", "A,dir", 2, 1),
+    (0x26, 2, 1, "ADD", "A,@Ri", 1, 1),
+    (0x28, 8, 1, "ADD", "A,Rn", 1, 1),
+    (0x30, 1, 1, "JNB", "bit,rel", 3, 2),
+    (0x32, 1, 1, "RETI", "", 1, 2),
+    (0x33, 1, 1, "RLC", "A", 1, 1),
+    (0x34, 1, 1, "ADDC", "A,#imm", 2, 1),
+    (0x35, 1, 1, "ADDC", "A,dir", 2, 1),
+    (0x36, 2, 1, "ADDC", "A,@Ri", 1, 1),
+    (0x38, 8, 1, "ADDC", "A,Rn", 1, 1),
+    (0x40, 1, 1, "JC", "rel", 2, 2),
+    (0x42, 1, 1, "ORL", "dir,A", 2, 1),
+    (0x43, 1, 1, "ORL", "dir,#imm", 3, 2),
+    (0x44, 1, 1, "ORL", "A,#imm", 2, 1),
+    (0x45, 1, 1, "ORL", "A,dir", 2, 1),
+    (0x46, 2, 1, "ORL", "A,@Ri", 1, 1),
+    (0x48, 8, 1, "ORL", "A,Rn", 1, 1),
+    (0x50, 1, 1, "JNC", "rel", 2, 2),
+    (0x52, 1, 1, "ANL", "dir,A", 2, 1),
+    (0x53, 1, 1, "ANL", "dir,#imm", 3, 2),
+    (0x54, 1, 1, "ANL", "A,#imm", 2, 1),
+    (0x55, 1, 1, "ANL", "A,dir", 2, 1),
+    (0x56, 2, 1, "ANL", "A,@Ri", 1, 1),
+    (0x58, 8, 1, "ANL", "A,Rn", 1, 1),
+    (0x60, 1, 1, "JZ", "rel", 2, 2),
+    (0x62, 1, 1, "XRL", "dir,A", 2, 1),
+    (0x63, 1, 1, "XRL", "dir,#imm", 3, 2),
+    (0x64, 1, 1, "XRL", "A,#imm", 2, 1),
+    (0x65, 1, 1, "XRL", "A,dir", 2, 1),
+    (0x66, 2, 1, "XRL", "A,@Ri", 1, 1),
+    (0x68, 8, 1, "XRL", "A,Rn", 1, 1),
+    (0x70, 1, 1, "JNZ", "rel", 2, 2),
+    (0x72, 1, 1, "ORL", "C,bit", 2, 2),
+    (0x73, 1, 1, "JMP", "@A+DPTR", 1, 2),
+    (0x74, 1, 1, "MOV", "A,#imm", 2, 1),
+    (0x75, 1, 1, "MOV", "dir,#imm", 3, 2),
+    (0x76, 2, 1, "MOV", "@Ri,#imm", 2, 1),
+    (0x78, 8, 1, "MOV", "Rn,#imm", 2, 1),
+    (0x80, 1, 1, "SJMP", "rel", 2, 2),
+    (0x82, 1, 1, "ANL", "C,bit", 2, 2),
+    (0x83, 1, 1, "MOVC", "A,@A+PC", 1, 2),
+    (0x84, 1, 1, "DIV", "AB", 1, 4),
+    (0x85, 1, 1, "MOV", "dst,src", 3, 2),
+    (0x86, 2, 1, "MOV", "dir,@Ri", 2, 2),
+    (0x88, 8, 1, "MOV", "dir,Rn", 2, 2),
+    (0x90, 1, 1, "MOV", "DPTR,#imm16", 3, 2),
+    (0x92, 1, 1, "MOV", "bit,C", 2, 2),
+    (0x93, 1, 1, "MOVC", "A,@A+DPTR", 1, 2),
+    (0x94, 1, 1, "SUBB", "A,#imm", 2, 1),
+    (0x95, 1, 1, "SUBB", "A,dir", 2, 1),
+    (0x96, 2, 1, "SUBB", "A,@Ri", 1, 1),
+    (0x98, 8, 1, "SUBB", "A,Rn", 1, 1),
+    (0xA0, 1, 1, "ORL", "C,/bit", 2, 2),
+    (0xA2, 1, 1, "MOV", "C,bit", 2, 1),
+    (0xA3, 1, 1, "INC", "DPTR", 1, 2),
+    (0xA4, 1, 1, "MUL", "AB", 1, 4),
+    (0xA5, 1, 1, "?", "", 1, 1),  # undefined: a one-cycle NOP and a firmware fault
+    (0xA6, 2, 1, "MOV", "@Ri,dir", 2, 2),
+    (0xA8, 8, 1, "MOV", "Rn,dir", 2, 2),
+    (0xB0, 1, 1, "ANL", "C,/bit", 2, 2),
+    (0xB2, 1, 1, "CPL", "bit", 2, 1),
+    (0xB3, 1, 1, "CPL", "C", 1, 1),
+    (0xB4, 1, 1, "CJNE", "A,#imm,rel", 3, 2),
+    (0xB5, 1, 1, "CJNE", "A,dir,rel", 3, 2),
+    (0xB6, 2, 1, "CJNE", "@Ri,#imm,rel", 3, 2),
+    (0xB8, 8, 1, "CJNE", "Rn,#imm,rel", 3, 2),
+    (0xC0, 1, 1, "PUSH", "dir", 2, 2),
+    (0xC2, 1, 1, "CLR", "bit", 2, 1),
+    (0xC3, 1, 1, "CLR", "C", 1, 1),
+    (0xC4, 1, 1, "SWAP", "A", 1, 1),
+    (0xC5, 1, 1, "XCH", "A,dir", 2, 1),
+    (0xC6, 2, 1, "XCH", "A,@Ri", 1, 1),
+    (0xC8, 8, 1, "XCH", "A,Rn", 1, 1),
+    (0xD0, 1, 1, "POP", "dir", 2, 2),
+    (0xD2, 1, 1, "SETB", "bit", 2, 1),
+    (0xD3, 1, 1, "SETB", "C", 1, 1),
+    (0xD4, 1, 1, "DA", "A", 1, 1),
+    (0xD5, 1, 1, "DJNZ", "dir,rel", 3, 2),
+    (0xD6, 2, 1, "XCHD", "A,@Ri", 1, 1),
+    (0xD8, 8, 1, "DJNZ", "Rn,rel", 2, 2),
+    (0xE0, 1, 1, "MOVX", "A,@DPTR", 1, 2),
+    (0xE2, 2, 1, "MOVX", "A,@Ri", 1, 2),
+    (0xE4, 1, 1, "CLR", "A", 1, 1),
+    (0xE5, 1, 1, "MOV", "A,dir", 2, 1),
+    (0xE6, 2, 1, "MOV", "A,@Ri", 1, 1),
+    (0xE8, 8, 1, "MOV", "A,Rn", 1, 1),
+    (0xF0, 1, 1, "MOVX", "@DPTR,A", 1, 2),
+    (0xF2, 2, 1, "MOVX", "@Ri,A", 1, 2),
+    (0xF4, 1, 1, "CPL", "A", 1, 1),
+    (0xF5, 1, 1, "MOV", "dir,A", 2, 1),
+    (0xF6, 2, 1, "MOV", "@Ri,A", 1, 1),
+    (0xF8, 8, 1, "MOV", "Rn,A", 1, 1),
+)
+
+
+def _by_opcode(column: int) -> bytes:
+    """One column of the table, spread over the 256 opcodes."""
+    spread = bytearray(256)
+    for row in TABLE:
+        first, count, step = row[:3]
+        for number in range(count):
+            value = row[column]
+            assert isinstance(value, int)
+            spread[first + number * step] = value
+    return bytes(spread)
+
+
+ROW = _by_opcode(0)  # opcode -> first opcode of its line in TABLE
+LENGTH = _by_opcode(5)
+CYCLES = _by_opcode(6)
+_TEXT = {row[0]: (row[3], row[4]) for row in TABLE}
+
+
+def disassemble(code: bytes, address: int) -> str:
+    """The instruction at `address` of a 64 KB image in the notation of the data sheet, targets absolute."""
+    opcode, first, second = (code[(address + offset) & 0xFFFF] for offset in range(3))
+    mnemonic, operands = _TEXT[ROW[opcode]]
+    after = (address + LENGTH[opcode]) & 0xFFFF
+    last = second if LENGTH[opcode] == 3 else first
+    fields = {
+        "addr16": f"{first << 8 | second:04X}h",
+        "addr11": f"{after & 0xF800 | (opcode & 0xE0) << 3 | first:04X}h",
+        "imm16": f"{first << 8 | second:04X}h",
+        "imm": f"{second if 'dir,#' in operands else first:02X}h",
+        "rel": f"{(after + (last ^ 0x80) - 0x80) & 0xFFFF:04X}h",
+        "src": f"{first:02X}h",
+        "dst": f"{second:02X}h",
+        "dir": f"{first:02X}h",
+        "bit": _bit_name(first),
+        "Rn": f"R{opcode & 7}",
+        "Ri": f"R{opcode & 1}",
+    }
+    for name, text in fields.items():
+        operands = operands.replace(name, text)
+    return f"{mnemonic} {operands}".rstrip()
+
+
+def _bit_name(bit: int) -> str:
+    byte = bit & 0xF8 if bit & 0x80 else 0x20 + (bit >> 3)
+    return f"{byte:02X}h.{bit & 7}"

@@ -1,0 +1,64 @@
+cimport cython
+
+from miro_robot.mcs51.bus cimport Bus
+from miro_robot.mcs51.interrupts cimport ExternalInterrupts, Interrupts
+from miro_robot.mcs51.ports cimport Ports
+from miro_robot.mcs51.shift cimport Shift
+from miro_robot.mcs51.timer2 cimport Timer2
+from miro_robot.mcs51.timers cimport Timers
+from miro_robot.mcs51.uart cimport Uart
+
+cdef long long _FAR
+cdef int _UNIMPLEMENTED
+cdef int _P0, _P1, _P2, _P3
+cdef int _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1
+cdef int _SCON, _SBUF, _IE, _IP
+cdef int _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2
+cdef int _TF2, _RCLK, _TCLK
+cdef int _S5P2
+cdef int _SERIAL, _TIMER2
+
+cdef class Peripherals:
+    cdef Bus bus
+    cdef readonly Interrupts interrupts
+    cdef readonly ExternalInterrupts external
+    cdef readonly Timers timers
+    cdef readonly Timer2 timer2
+    cdef readonly Uart uart
+    cdef readonly Shift shift
+    cdef readonly Ports ports
+    cdef readonly int smod
+    cdef int p1
+    cdef int p3
+    cdef public int frozen
+    cdef int pulsed
+
+    cpdef int clear(self, long long cycle) except -1
+    cpdef int sync(self, long long cycle) except -1
+    @cython.locals(pulse1='long long', pulse2='long long', first='long long', second='long long')
+    cdef int _sync_pulsed(self, long long cycle) except -1
+    @cython.locals(halved=int, ticks1=int, rx=int, tx=int)
+    cdef int _pulse(self, int timer1, int timer2, long long cycle) except -1
+    @cython.locals(event='long long', enabled=int, timer=int, flag='long long')
+    cpdef long long next_event(self, long long now) noexcept
+    @cython.locals(tick='long long', received='long long', shifted='long long')
+    cdef long long serial_tick(self) noexcept
+    @cython.locals(mode=int, next1='long long', period1='long long', next2='long long', period2='long long',
+                   rx2=int, tx2=int)
+    cdef void clock_serial(self) noexcept
+    @cython.locals(cycle='long long')
+    cdef long long _timer1_tick(self) noexcept
+    @cython.locals(cycle='long long')
+    cdef int apply_pushes(self, long long now) except -1
+    @cython.locals(p1=int, p3=int, changed1=int, changed3=int)
+    cdef int sample_pins(self, long long cycle) except -1
+    @cython.locals(p1=int, p3=int, number=int)
+    cdef int _inputs_changed(self, int changed1, int changed3, long long cycle) except -1
+    cdef int _external_pin(self, int number, int level, long long cycle) except -1
+    @cython.locals(levels=int, tick='long long')
+    cpdef int pin_levels(self, int port, long long cycle) except -1
+    cpdef int read(self, int address, long long cycle) except -1
+    cpdef int write(self, int address, int value, long long cycle) except -1
+    cdef int write_smod(self, int smod, long long cycle) except -1
+    cdef int write_port(self, int port, int value, long long cycle) except -1
+    cdef void taken(self, int source, long long cycle) noexcept

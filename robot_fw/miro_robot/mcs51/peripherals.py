@@ -1,0 +1,348 @@
+"""Everything on the chip beside the core, wired together: timers, serial port, interrupts, port pins.
+
+What belongs here: which register address is whose, which pin goes where, which timer clocks the serial
+port, and the event horizon: `sync(cycle)` does all that happens below a cycle, `next_event` says when the
+core has to ask again. Registers of the core itself (ACC, PSW, PCON ...) are `Cpu`'s.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.interrupts import ExternalInterrupts, Interrupts
+from miro_robot.mcs51.ports import Ports
+from miro_robot.mcs51.shift import Shift
+from miro_robot.mcs51.timer2 import Timer2
+from miro_robot.mcs51.timers import Timers
+from miro_robot.mcs51.uart import Uart
+
+_FAR = 1 << 62
+_UNIMPLEMENTED = 0xFF  # what a register address without a register reads as; undefined on silicon
+_P0, _P1, _P2, _P3 = 0x80, 0x90, 0xA0, 0xB0
+_TCON, _TMOD, _TL0, _TL1, _TH0, _TH1 = 0x88, 0x89, 0x8A, 0x8B, 0x8C, 0x8D
+_SCON, _SBUF, _IE, _IP = 0x98, 0x99, 0xA8, 0xB8
+_T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2 = 0xC8, 0xC9, 0xCA, 0xCB, 0xCC, 0xCD
+_TF2, _RCLK, _TCLK = 0x80, 0x20, 0x10
+_S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows
+_SERIAL, _TIMER2 = 0x10, 0x20  # in IE
+
+
+class Peripherals:
+    """All special function registers but the core's; time in machine cycles."""
+
+    NOT_STATE = ("bus", "pulsed")  # pulsed follows from the registers
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus = bus
+        self.interrupts = Interrupts()
+        self.external = ExternalInterrupts(self.interrupts)
+        self.timers = Timers(self.interrupts)
+        self.timer2 = Timer2(self.interrupts)
+        self.uart = Uart(bus, self.interrupts)
+        self.shift = Shift(self.uart)
+        self.ports = Ports()
+        self.smod = 0
+        self.p1 = 0xFF  # pins as last sampled
+        self.p3 = 0xFF
+        self.frozen = 0  # power-down: the oscillator stands
+        self.pulsed = 0  # a timer that counts a pin clocks the serial port
+
+    def clear(self, cycle: int) -> None:
+        """Reset: all registers but the port latches, which `Cpu` writes."""
+        self.sync(cycle)
+        self.frozen = 0
+        self.smod = 0
+        self.interrupts.clear()
+        self.external.clear(cycle)
+        self.timers.clear(cycle)
+        self.timer2.clear(cycle)
+        self.uart.clear(cycle)
+        self.shift.abort()
+        self.external.levels = (self.p3 >> 2) & 3  # pins moved on while the oscillator stood
+        self.timers.gates = self.external.levels
+        self.timer2.up = (self.p1 >> 1) & 1
+        self.clock_serial()
+
+    # Time
+
+    def sync(self, cycle: int) -> None:
+        """Does everything that happens in cycles below `cycle`."""
+        if self.pulsed and not self.frozen:
+            self._sync_pulsed(cycle)
+        elif not self.frozen:
+            self.timers.sync(cycle)
+            self.timer2.sync(cycle)
+            self.uart.sync(12 * cycle)
+            if self.shift.flag:
+                self.shift.sync(12 * cycle)
+
+    def _sync_pulsed(self, cycle: int) -> None:
+        """The serial port gets its 16x ticks one by one from the overflows of a timer that counts a pin."""
+        pulse1 = self.timers.next_overflow(1) if self.timers.counts_pin(1) else _FAR
+        pulse2 = self.timer2.next_pin_overflow()
+        self.timers.sync(cycle)
+        self.timer2.sync(cycle)
+        first = pulse1 if pulse1 < pulse2 else pulse2
+        second = pulse1 if pulse1 > pulse2 else pulse2
+        if first < cycle:
+            self._pulse(first == pulse1, first == pulse2, first)
+        if second < cycle and second != first:
+            self._pulse(second == pulse1, second == pulse2, second)
+        self.uart.sync(12 * cycle)
+
+    def _pulse(self, timer1: int, timer2: int, cycle: int) -> None:
+        """One overflow of timer 1 and/or timer 2 in `cycle`."""
+        halved = timer1 and not self.smod and self.timers.overflows1 & 1
+        ticks1 = 1 if timer1 and not halved else 0
+        rx = timer2 if self.timer2.control & _RCLK else ticks1
+        tx = timer2 if self.timer2.control & _TCLK else ticks1
+        self.uart.pulse(rx, tx, 12 * cycle + _S5P2)
+
+    def next_event(self, now: int) -> int:
+        """The next cycle >= `now` at whose begin an interrupt may be due or a push takes effect, or FAR."""
+        event = self.interrupts.next_boundary(now)
+        if self.ports.next_cycle < event:
+            event = self.ports.next_cycle
+        enabled = self.interrupts.ie
+        if self.frozen or not enabled & 0x80:
+            return event
+        for timer in range(2):
+            if enabled & (2 << (2 * timer)):
+                flag = self.timers.next_flag(timer) + 2
+                if flag < event:
+                    event = flag
+        if enabled & _TIMER2:
+            flag = self.timer2.next_flag() + 2
+            if flag < event:
+                event = flag
+        if enabled & _SERIAL:
+            flag = (self.serial_tick() + 2) // 12 + 2
+            if flag < event:
+                event = flag
+        return event
+
+    def serial_tick(self) -> int:
+        """A tick before which neither TI nor RI will go up."""
+        tick = self.uart.ti_tick()
+        received = self.uart.ri_tick()
+        if received < tick:
+            tick = received
+        shifted = self.shift.flag_tick()
+        return shifted if shifted < tick else tick
+
+    def clock_serial(self) -> None:
+        """Works out the serial port's 16x ticks anew; called with all parts at the same cycle."""
+        mode = self.uart.mode()
+        self.pulsed = 0
+        if mode == 0:
+            self.uart.set_clock(_FAR, 0, _FAR, 0)
+            return
+        next1 = 12 * self.timers.synced + 1  # mode 2: fosc/32 or fosc/64, in phase with the cycle
+        period1 = 2 if self.smod else 4
+        next2 = next1
+        period2 = period1
+        if mode != 2:
+            next1 = self._timer1_tick()
+            period1 = 12 * (self.timers.top(1) - self.timers.reload(1)) * (1 if self.smod else 2)
+            next2 = self.timer2.next_overflow_tick()
+            period2 = 2 * self.timer2.span()
+            self.pulsed = self.timers.counts_pin(1) | (1 if self.timer2.counts_pin() else 0)
+        rx2 = self.timer2.control & _RCLK
+        tx2 = self.timer2.control & _TCLK
+        self.uart.set_clock(
+            next2 if rx2 else next1,
+            period2 if rx2 else period1,
+            next2 if tx2 else next1,
+            period2 if tx2 else period1,
+        )
+
+    def _timer1_tick(self) -> int:
+        """The next overflow of timer 1 that is a 16x tick: with SMOD = 0 every second one is."""
+        if self.timers.counts_pin(1):
+            return _FAR
+        cycle = self.timers.next_overflow(1)
+        if cycle < _FAR and not self.smod and not self.timers.overflows1 & 1:
+            cycle += self.timers.top(1) - self.timers.reload(1)
+        return 12 * cycle + _S5P2 if cycle < _FAR else _FAR
+
+    # Pins
+
+    def apply_pushes(self, now: int) -> None:
+        """Lets the outside's pushes up to cycle `now` take effect, each in its own cycle."""
+        while self.ports.next_cycle <= now:
+            cycle = self.ports.next_cycle
+            self.ports.apply(cycle)
+            self.sample_pins(cycle)
+
+    def sample_pins(self, cycle: int) -> None:
+        """S5P2 of `cycle`: what timers and interrupts see of P1 and P3."""
+        p1 = self.ports.level(1)
+        p3 = self.ports.level(3)
+        changed1 = p1 ^ self.p1
+        changed3 = p3 ^ self.p3
+        self.p1 = p1
+        self.p3 = p3
+        if not self.frozen and (changed1 & 0x03 or changed3 & 0x3C):
+            self._inputs_changed(changed1, changed3, cycle)
+
+    def _inputs_changed(self, changed1: int, changed3: int, cycle: int) -> None:
+        p1 = self.p1
+        p3 = self.p3
+        self.sync(cycle)
+        for number in range(2):
+            if (changed3 >> (2 + number)) & 1:
+                self._external_pin(number, (p3 >> (2 + number)) & 1, cycle)
+            if (changed3 >> (4 + number)) & 1 and not (p3 >> (4 + number)) & 1:
+                self.timers.fall(number, cycle)
+        if changed1 & 1 and not p1 & 1:
+            self.timer2.fall(cycle)
+        if changed1 & 2:
+            self.sync(cycle + 1)
+            self.timer2.external((p1 >> 1) & 1, cycle + 1)
+        self.clock_serial()
+
+    def _external_pin(self, number: int, level: int, cycle: int) -> None:
+        """INT0, INT1: the interrupt sees the sample itself, a gate acts on the cycle after it."""
+        self.external.sample(number, level, cycle)
+        self.sync(cycle + 1)
+        self.timers.gates = (self.timers.gates & (3 ^ (1 << number))) | (level << number)
+
+    def pin_levels(self, port: int, cycle: int) -> int:
+        """The pins of a port at S5P2 of `cycle`, alternate outputs included."""
+        levels = self.ports.level(port)
+        if port == 3:
+            tick = 12 * cycle + _S5P2
+            self.sync(cycle + 1)
+            levels &= (
+                0xFC | (self.uart.level(tick) & self.shift.data.level_at(tick)) | (self.uart.tx_level << 1)
+            )
+        elif port == 1 and self.timer2.drives_pin():
+            self.sync(cycle + 1)
+            levels &= 0xFE | self.timer2.clock_out
+        return levels
+
+    # Registers
+
+    def read(self, address: int, cycle: int) -> int:
+        """A register (port: its latch) with everything below `cycle` done."""
+        if address in (_P0, _P1, _P2, _P3):
+            return self.ports.latches[(address - _P0) >> 4]
+        if address == _IE:
+            return self.interrupts.ie
+        if address == _IP:
+            return self.interrupts.ip
+        self.sync(cycle)
+        if address == _TCON:
+            return self.timers.control | self.external.control
+        if address == _SCON:
+            return self.uart.scon
+        if address == _SBUF:
+            return self.uart.received
+        if address == _TMOD:
+            return self.timers.tmod
+        if address in (_TL0, _TL1):
+            return self.timers.tl[address - _TL0]
+        if address in (_TH0, _TH1):
+            return self.timers.th[address - _TH0]
+        if address == _T2CON:
+            return self.timer2.control
+        if address == _T2MOD:
+            return self.timer2.t2mod
+        if address in (_RCAP2L, _RCAP2H):
+            return (self.timer2.capture >> (8 * (address - _RCAP2L))) & 0xFF
+        if address in (_TL2, _TH2):
+            return (self.timer2.count >> (8 * (address - _TL2))) & 0xFF
+        return _UNIMPLEMENTED
+
+    def write(self, address: int, value: int, cycle: int) -> None:
+        """A register that is no port; `cycle` is the first to see it."""
+        self.sync(cycle)
+        if address == _IE:
+            self.interrupts.ie = value & 0xBF
+        elif address == _IP:
+            self.interrupts.ip = value & 0x3F
+        elif address == _TCON:
+            self.timers.write_control(value, cycle)
+            self.external.write(value, cycle)
+        elif address == _TMOD:
+            self.timers.tmod = value
+        elif address in (_TL0, _TL1):
+            self.timers.tl[address - _TL0] = value
+        elif address in (_TH0, _TH1):
+            self.timers.th[address - _TH0] = value
+        elif address == _SCON:
+            if (value ^ self.uart.scon) & 0xC0:
+                self.shift.abort()
+            self.uart.write_scon(value, cycle)
+            if self.uart.mode() == 0:
+                self.shift.begin_reception(cycle)
+        elif address == _SBUF:
+            if self.uart.mode() == 0:
+                self.shift.send(value, cycle)
+            else:
+                self.uart.write_sbuf(value)
+        elif address == _T2CON:
+            self.timer2.write_control(value, cycle)
+        elif address == _T2MOD:
+            self.timer2.write_mode(value, cycle)
+        elif address == _RCAP2L:
+            self.timer2.capture = (self.timer2.capture & 0xFF00) | value
+        elif address == _RCAP2H:
+            self.timer2.capture = (self.timer2.capture & 0x00FF) | (value << 8)
+        elif address == _TL2:
+            self.timer2.count = (self.timer2.count & 0xFF00) | value
+        elif address == _TH2:
+            self.timer2.count = (self.timer2.count & 0x00FF) | (value << 8)
+        self.clock_serial()
+
+    def write_smod(self, smod: int, cycle: int) -> None:
+        self.sync(cycle)
+        self.smod = smod
+        self.clock_serial()
+
+    def write_port(self, port: int, value: int, cycle: int) -> None:
+        """A latch; the pins follow with `cycle`, and so does what samples them."""
+        if port == 3:
+            self.sync(cycle)
+            self.uart.write_latch(value & 3, 12 * cycle)
+        self.ports.latches[port] = value
+
+    def taken(self, source: int, cycle: int) -> None:
+        """The core vectors to a source: the flags that hardware clears."""
+        self.interrupts.enter(source)
+        if source == 0 or source == 2:
+            self.external.taken(source >> 1, cycle)
+        elif source == 1 or source == 3:
+            self.timers.taken(source >> 1, cycle)
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "interrupts": self.interrupts.snapshot(),
+            "external": self.external.snapshot(),
+            "timers": self.timers.snapshot(),
+            "timer2": self.timer2.snapshot(),
+            "uart": self.uart.snapshot(),
+            "shift": self.shift.snapshot(),
+            "ports": self.ports.snapshot(),
+            "smod": self.smod,
+            "p1": self.p1,
+            "p3": self.p3,
+            "frozen": self.frozen,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.interrupts.restore(state["interrupts"])
+        self.external.restore(state["external"])
+        self.timers.restore(state["timers"])
+        self.timer2.restore(state["timer2"])
+        self.uart.restore(state["uart"])
+        self.shift.restore(state["shift"])
+        self.ports.restore(state["ports"])
+        self.smod = state["smod"]
+        self.p1 = state["p1"]
+        self.p3 = state["p3"]
+        self.frozen = state["frozen"]
+        self.pulsed = 0
+        if self.uart.mode() & 1:
+            self.pulsed = self.timers.counts_pin(1) | (1 if self.timer2.counts_pin() else 0)

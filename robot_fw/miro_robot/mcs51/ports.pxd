@@ -1,0 +1,14 @@
+cimport cython
+
+cdef long long _FAR
+
+cdef class Ports:
+    cdef int latches[4]
+    cdef int outside[4]
+    cdef list pending
+    cdef readonly long long next_cycle
+
+    cpdef int level(self, int port) noexcept
+    @cython.locals(cycle='long long')
+    cpdef int push(self, int port, int levels, long long tick) except -1
+    cpdef int apply(self, long long cycle) except -1

@@ -1,0 +1,28 @@
+cimport cython
+
+from miro_robot.mcs51.line cimport Line
+from miro_robot.mcs51.uart cimport Uart
+
+cdef int _REN, _TI, _RI
+cdef long long _FAR
+cdef int _SAMPLE
+cdef int _CLOCK_FALLS, _CLOCK_RISES
+
+cdef class Shift:
+    cdef Uart uart
+    cdef readonly Line data
+    cdef readonly int flag
+    cdef int value
+    cdef int number
+    cdef long long cycle
+
+    cdef void abort(self) noexcept
+    cdef void send(self, int value, long long cycle) noexcept
+    cdef void begin_reception(self, long long cycle) noexcept
+    cdef void _begin(self, int flag, int value, long long cycle) noexcept
+    cdef int sync(self, long long tick) except -1
+    @cython.locals(uart=Uart)
+    cdef int _bit(self, long long tick) except -1
+    @cython.locals(tick='long long', flag=int)
+    cdef int _finish(self) except -1
+    cdef long long flag_tick(self) noexcept

@@ -1,0 +1,105 @@
+"""The serial port in mode 0: a shift register clocked at fosc/12.
+
+What belongs here: its eight bit cycles. Registers and flags are the `Uart`'s.
+
+Timing (AT89C52 sheet section 9): one full cycle lies between the write that starts it and the first bit;
+each bit takes one cycle, lowest first, sampled at S5P2; the shift clock on TXD is low from S3P1 to S6P1; TI
+or RI goes up at S1P1 of the tenth cycle after the write. Data leave on RXD: `data` is what the chip drives
+there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_robot.mcs51.line import Line
+from miro_robot.mcs51.uart import Uart
+
+_REN, _TI, _RI = 0x10, 0x02, 0x01
+_FAR = 1 << 62
+_SAMPLE = 9  # S5P2
+_CLOCK_FALLS, _CLOCK_RISES = 4, 10  # S3P1, S6P1
+
+
+class Shift:
+    """At most one byte on its way, out or in."""
+
+    NOT_STATE = ("uart",)
+
+    def __init__(self, uart: Uart) -> None:
+        self.uart = uart
+        self.data = Line()
+        self.flag = 0  # what its end sets: TI sending, RI receiving, 0 idle
+        self.value = 0
+        self.number = 0  # bits done
+        self.cycle = 0  # cycle of the next bit
+
+    def abort(self) -> None:
+        self.flag = 0
+
+    def send(self, value: int, cycle: int) -> None:
+        """SBUF was written at the end of the cycle before `cycle`."""
+        self._begin(_TI, value, cycle + 1)
+
+    def begin_reception(self, cycle: int) -> None:
+        """SCON was written at the end of the cycle before `cycle`: REN without RI starts a reception."""
+        if self.flag == 0 and self.uart.scon & _REN and not self.uart.scon & _RI:
+            self._begin(_RI, 0, cycle + 1)
+
+    def _begin(self, flag: int, value: int, cycle: int) -> None:
+        self.flag = flag
+        self.value = value
+        self.number = 0
+        self.cycle = cycle
+
+    def sync(self, tick: int) -> None:
+        """Everything below `tick`, which begins a cycle."""
+        while self.flag and 12 * self.cycle < tick:
+            if self.number == 8:
+                self._finish()
+            else:
+                self._bit(12 * self.cycle)
+
+    def _bit(self, tick: int) -> None:
+        """One bit cycle that begins at `tick`."""
+        uart = self.uart
+        if self.flag == _TI:
+            self.data.append(tick, (self.value >> self.number) & 1)
+        else:
+            self.value |= uart.level(tick + _SAMPLE) << self.number
+        if uart.latch & 2:
+            uart.txd.append(tick + _CLOCK_FALLS, 0)
+            uart.txd.append(tick + _CLOCK_RISES, 1)
+        self.number += 1
+        self.cycle += 1
+
+    def _finish(self) -> None:
+        tick = 12 * self.cycle
+        flag = self.flag
+        self.flag = 0
+        self.data.append(tick, 1)
+        if flag == _RI:
+            self.uart.received = self.value
+        self.uart.raise_flag(flag, tick)
+        if flag == _TI:
+            self.uart.bus.byte_sent(self.value, tick)
+
+    def flag_tick(self) -> int:
+        """Tick at which TI or RI goes up, FAR when idle."""
+        return 12 * (self.cycle + 8 - self.number) if self.flag else _FAR
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "data": self.data.snapshot(),
+            "flag": self.flag,
+            "value": self.value,
+            "number": self.number,
+            "cycle": self.cycle,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.data.restore(state["data"])
+        self.flag = state["flag"]
+        self.value = state["value"]
+        self.number = state["number"]
+        self.cycle = state["cycle"]

@@ -1,0 +1,48 @@
+cimport cython
+
+from miro_robot.mcs51.interrupts cimport Interrupts
+
+cdef long long _FAR
+cdef long long _NONE
+cdef int _TIMER2
+cdef int _TF2, _EXF2, _RCLK, _TCLK, _EXEN2, _TR2, _C_T2, _CP_RL2
+cdef int _T2OE, _DCEN
+cdef int _STATES
+
+cdef class Timer2:
+    cdef Interrupts interrupts
+    cdef readonly int control
+    cdef readonly int t2mod
+    cdef public int count
+    cdef public int capture
+    cdef public int up
+    cdef long long edge_cycle
+    cdef readonly int clock_out
+    cdef readonly long long synced
+
+    cpdef void clear(self, long long cycle) noexcept
+    cpdef int drives_pin(self) noexcept
+    cdef int generates_baud(self) noexcept
+    cdef int silent(self) noexcept
+    cdef int up_down(self) noexcept
+    cdef int rate(self) noexcept
+    cdef int left(self) noexcept
+    @cython.locals(captures=int)
+    cdef int span(self) noexcept
+    @cython.locals(rate=int)
+    cpdef void sync(self, long long cycle) noexcept
+    @cython.locals(left=int, down=int, step=int, span=int, overflows='long long', beyond='long long')
+    cdef void _pass(self, long long counts, int rate, long long first) noexcept
+    cdef void _overflowed(self, long long overflows, long long cycle) noexcept
+    @cython.locals(overflow='long long')
+    cpdef long long next_flag(self) noexcept
+    cpdef long long next_overflow_tick(self) noexcept
+    cdef int counts_pin(self) noexcept
+    @cython.locals(waiting=int)
+    cdef long long next_pin_overflow(self) noexcept
+    cpdef void fall(self, long long cycle) noexcept
+    cpdef void external(self, int level, long long cycle) noexcept
+    cpdef void write_control(self, int value, long long cycle) noexcept
+    cpdef void write_mode(self, int value, long long cycle) noexcept
+    @cython.locals(flags=int)
+    cdef void _ask_or_withdraw(self, long long cycle) noexcept

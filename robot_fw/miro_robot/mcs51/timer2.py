@@ -1,0 +1,199 @@
+"""Timer 2: capture, auto-reload up and down, baud rate generator, clock output.
+
+What belongs here: T2CON, T2MOD, TL2 TH2, RCAP2L RCAP2H, computed lazily like timers 0 and 1: `sync(cycle)`
+does all that happens in the cycles below `cycle`. Dividing its overflows down to bits is the serial port's.
+
+Timing (AT89C52 sheet section 8): as a timer it counts once per cycle, as a baud rate generator or clock
+output six times (fosc/2). TF2 is set at S2P2 and polled in the same cycle, a cycle sooner than TF0. Pins
+are sampled at S5P2 and act in the next cycle: a count, or a capture or reload that goes before that cycle's
+own count.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_robot.mcs51.interrupts import Interrupts
+
+_FAR = 1 << 62
+_NONE = -1
+_TIMER2 = 5  # its place in the polling order
+_TF2, _EXF2, _RCLK, _TCLK, _EXEN2, _TR2, _C_T2, _CP_RL2 = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02, 0x01
+_T2OE, _DCEN = 0x02, 0x01  # T2MOD
+_STATES = 6  # per machine cycle
+
+
+class Timer2:
+    """The 16-bit counter with its reload and capture register."""
+
+    NOT_STATE = ("interrupts",)
+
+    def __init__(self, interrupts: Interrupts) -> None:
+        self.interrupts = interrupts
+        self.control = 0  # T2CON
+        self.t2mod = 0
+        self.count = 0
+        self.capture = 0  # RCAP2
+        self.up = 1  # pin T2EX as last sampled
+        self.edge_cycle = -1  # cycle in which a fall of T2 counts
+        self.clock_out = 0  # level on T2 while T2OE
+        self.synced = 0
+
+    def clear(self, cycle: int) -> None:
+        """As after reset in `cycle`."""
+        self.control = 0
+        self.t2mod = 0
+        self.count = 0
+        self.capture = 0
+        self.edge_cycle = _NONE
+        self.clock_out = 0
+        self.synced = cycle
+        self.interrupts.withdraw(_TIMER2, cycle)
+
+    def drives_pin(self) -> int:
+        """Clock output on P1.0."""
+        return 1 if self.t2mod & _T2OE and not self.control & _C_T2 else 0
+
+    def generates_baud(self) -> int:
+        return 1 if self.control & (_RCLK | _TCLK) else 0
+
+    def silent(self) -> int:
+        """Overflows set no TF2: baud rate generator and clock output."""
+        return 1 if self.generates_baud() or self.drives_pin() else 0
+
+    def up_down(self) -> int:
+        return 1 if self.t2mod & _DCEN and not self.silent() and not self.control & _CP_RL2 else 0
+
+    def rate(self) -> int:
+        """Counts per cycle from the crystal; 0 when stopped or counting a pin."""
+        if not self.control & _TR2 or self.control & _C_T2:
+            return 0
+        return _STATES if self.silent() else 1
+
+    def left(self) -> int:
+        """Counts to the next overflow or underflow."""
+        if self.up_down() and not self.up:
+            return ((self.count - self.capture) & 0xFFFF) + 1
+        return 0x10000 - self.count
+
+    def span(self) -> int:
+        """Counts from one overflow to the next."""
+        captures = self.control & _CP_RL2 and not self.silent()
+        return 0x10000 if captures else 0x10000 - self.capture
+
+    def sync(self, cycle: int) -> None:
+        """Counts through all cycles below `cycle`."""
+        if cycle <= self.synced:
+            return
+        rate = self.rate()
+        if rate:
+            self._pass((cycle - self.synced) * rate, rate, self.synced)
+        elif self.counts_pin() and self.synced <= self.edge_cycle < cycle:
+            self._pass(1, 1, self.edge_cycle)
+        self.synced = cycle
+
+    def _pass(self, counts: int, rate: int, first: int) -> None:
+        """`counts` counts, `rate` of them per cycle, starting with cycle `first`."""
+        left = self.left()
+        down = self.up_down() and not self.up
+        step = -1 if down else 1
+        if counts < left:
+            self.count = (self.count + step * counts) & 0xFFFF
+            return
+        span = self.span()
+        overflows = (counts - left) // span + 1
+        beyond = counts - left - (overflows - 1) * span
+        if down:
+            self.count = 0xFFFF - beyond
+        else:
+            self.count = 0x10000 - span + beyond
+        self._overflowed(overflows, first + (left - 1) // rate)
+
+    def _overflowed(self, overflows: int, cycle: int) -> None:
+        if self.drives_pin():
+            self.clock_out ^= overflows & 1
+        if self.silent():
+            return
+        self.control |= _TF2
+        if self.up_down():
+            self.control ^= _EXF2 if overflows & 1 else 0
+        self.interrupts.ask(_TIMER2, cycle - 1)
+
+    def next_flag(self) -> int:
+        """The `since` with which TF2 will ask if nothing changes, or FAR."""
+        if self.control & _TF2 or self.silent():
+            return _FAR
+        if self.rate():
+            return self.synced + self.left() - 2
+        overflow = self.next_pin_overflow()
+        return overflow - 1 if overflow < _FAR else _FAR
+
+    def next_overflow_tick(self) -> int:
+        """Tick at which the state ends that overflows next as a baud rate generator, or FAR."""
+        if self.rate() != _STATES:
+            return _FAR
+        return 12 * self.synced + 2 * self.left() - 1
+
+    def counts_pin(self) -> int:
+        return 1 if self.control & _TR2 and self.control & _C_T2 else 0
+
+    def next_pin_overflow(self) -> int:
+        """Cycle in which a fall of T2 that was seen already overflows, or FAR."""
+        waiting = self.counts_pin() and self.left() == 1 and self.edge_cycle >= self.synced
+        return self.edge_cycle if waiting else _FAR
+
+    def fall(self, cycle: int) -> None:
+        """T2 was high in one sample and low in the next, that of `cycle`."""
+        self.edge_cycle = cycle + 1
+
+    def external(self, level: int, cycle: int) -> None:
+        """T2EX changed; called with everything below `cycle`, the one after the sample, done."""
+        self.up = level
+        if level or not self.control & _EXEN2 or self.up_down():
+            return
+        if not self.silent():
+            if self.control & _CP_RL2:
+                self.capture = self.count
+            else:
+                self.count = self.capture
+        self.control |= _EXF2
+        self.interrupts.ask(_TIMER2, cycle)
+
+    def write_control(self, value: int, cycle: int) -> None:
+        """T2CON is written; `cycle` is the first to see it."""
+        self.control = value
+        self._ask_or_withdraw(cycle)
+
+    def write_mode(self, value: int, cycle: int) -> None:
+        """T2MOD is written: DCEN decides whether EXF2 interrupts."""
+        self.t2mod = value & 0x03
+        self._ask_or_withdraw(cycle)
+
+    def _ask_or_withdraw(self, cycle: int) -> None:
+        flags = _TF2 if self.up_down() else _TF2 | _EXF2
+        if self.control & flags:
+            self.interrupts.ask(_TIMER2, cycle)
+        else:
+            self.interrupts.withdraw(_TIMER2, cycle)
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "control": self.control,
+            "t2mod": self.t2mod,
+            "count": self.count,
+            "capture": self.capture,
+            "up": self.up,
+            "edge_cycle": self.edge_cycle,
+            "clock_out": self.clock_out,
+            "synced": self.synced,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.control = state["control"]
+        self.t2mod = state["t2mod"]
+        self.count = state["count"]
+        self.capture = state["capture"]
+        self.up = state["up"]
+        self.edge_cycle = state["edge_cycle"]
+        self.clock_out = state["clock_out"]
+        self.synced = state["synced"]

@@ -1,0 +1,45 @@
+cimport cython
+
+from miro_robot.mcs51.interrupts cimport Interrupts
+
+cdef long long _FAR
+cdef long long _NONE
+
+cdef class Timers:
+    cdef Interrupts interrupts
+    cdef public int tmod
+    cdef readonly int control
+    cdef unsigned char tl[2]
+    cdef unsigned char th[2]
+    cdef public int gates
+    cdef long long edge_cycle[2]
+    cdef readonly long long synced
+    cdef readonly long long overflows1
+
+    @cython.locals(timer=int)
+    cpdef void clear(self, long long cycle) noexcept
+    @cython.locals(part=int)
+    cpdef void sync(self, long long cycle) noexcept
+    @cython.locals(split=int, gated=int)
+    cdef int enabled(self, int part) noexcept
+    cdef inline int mode(self, int timer) noexcept
+    cdef int counts_pin(self, int part) noexcept
+    @cython.locals(mode=int)
+    cdef int value(self, int part) noexcept
+    @cython.locals(mode=int)
+    cdef int top(self, int part) noexcept
+    cdef int reload(self, int part) noexcept
+    @cython.locals(left=int)
+    cpdef long long next_overflow(self, int part) noexcept
+    cpdef long long next_flag(self, int timer) noexcept
+    cpdef void fall(self, int timer, long long cycle) noexcept
+    @cython.locals(timer=int)
+    cpdef void write_control(self, int value, long long cycle) noexcept
+    cpdef void taken(self, int timer, long long cycle) noexcept
+    @cython.locals(first='long long', counts='long long', left='long long', reload='long long', span='long long',
+                   overflows='long long')
+    cdef void _pass(self, int part, long long cycle) noexcept
+    @cython.locals(mode=int)
+    cdef void _store(self, int part, int value) noexcept
+    @cython.locals(timer=int)
+    cdef void _overflowed(self, int part, long long overflows, long long cycle) noexcept

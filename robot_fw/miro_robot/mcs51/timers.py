@@ -1,0 +1,201 @@
+"""Timers 0 and 1: modes 0 to 3, gates, counting on pins.
+
+What belongs here: TMOD, the upper half of TCON, TL0 TH0 TL1 TH1, computed lazily: `sync(cycle)` does
+everything that happens in the cycles below `cycle` in one calculation. Timer 2 is in `timer2.py`.
+
+Timing (AT89C52 sheet section 7): TR and TMOD written at the end of cycle n act from n + 1 on, which counts.
+A gate and a counter input are sampled at S5P2, and the register counts at S3P1 of the following cycle. TF
+is seen at S5P2 of the cycle that overflows.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_robot.mcs51.interrupts import Interrupts
+
+_FAR = 1 << 62
+_NONE = -1  # no counter edge waiting
+
+
+class Timers:
+    """Timers 0 and 1. Index 0 and 1 are the timers, 2 is TH0 when mode 3 splits it off."""
+
+    NOT_STATE = ("interrupts",)
+
+    def __init__(self, interrupts: Interrupts) -> None:
+        self.interrupts = interrupts
+        self.tmod = 0
+        self.control = 0  # TCON.7:4 = TF1 TR1 TF0 TR0, in place
+        self.tl = [0] * 2
+        self.th = [0] * 2
+        self.gates = 3  # pins INT1, INT0 as last sampled
+        self.edge_cycle = [-1] * 2  # cycle in which a fall of T0, T1 counts
+        self.synced = 0  # everything below this cycle is done
+        self.overflows1 = 0  # of timer 1 since reset: the serial port halves them
+
+    def clear(self, cycle: int) -> None:
+        """As after reset in `cycle`."""
+        self.tmod = 0
+        self.control = 0
+        self.synced = cycle
+        self.overflows1 = 0
+        for timer in range(2):
+            self.tl[timer] = 0
+            self.th[timer] = 0
+            self.edge_cycle[timer] = _NONE
+            self.interrupts.withdraw(1 + 2 * timer, cycle)
+
+    def sync(self, cycle: int) -> None:
+        """Counts through all cycles below `cycle`."""
+        if cycle <= self.synced:
+            return
+        for part in range(3):
+            if self.enabled(part):
+                self._pass(part, cycle)
+        self.synced = cycle
+
+    def enabled(self, part: int) -> int:
+        """Whether it counts, on cycles or on a pin."""
+        split = self.mode(0) == 3
+        if part == 2:
+            return 1 if split and self.control & 0x40 else 0
+        if part == 1:
+            if self.mode(1) == 3:
+                return 0
+            if split:
+                return 1
+        if not self.control & (0x10 << (2 * part)):
+            return 0
+        gated = (self.tmod >> (4 * part)) & 8
+        return 0 if gated and not (self.gates >> part) & 1 else 1
+
+    def mode(self, timer: int) -> int:
+        return (self.tmod >> (4 * timer)) & 3
+
+    def counts_pin(self, part: int) -> int:
+        return 1 if part < 2 and (self.tmod >> (4 * part)) & 4 else 0
+
+    def value(self, part: int) -> int:
+        """The count, as wide as its mode makes it."""
+        if part == 2:
+            return self.th[0]
+        mode = self.mode(part)
+        if mode == 0:
+            return (self.th[part] << 5) | (self.tl[part] & 0x1F)
+        if mode == 1 or (mode == 3 and part == 1):
+            return (self.th[part] << 8) | self.tl[part]
+        return self.tl[part]
+
+    def top(self, part: int) -> int:
+        """The count that overflows."""
+        mode = 2 if part == 2 else self.mode(part)
+        if mode == 0:
+            return 0x2000
+        return 0x10000 if mode == 1 else 0x100
+
+    def reload(self, part: int) -> int:
+        """The count that an overflow leaves."""
+        return self.th[part] if part < 2 and self.mode(part) == 2 else 0
+
+    def next_overflow(self, part: int) -> int:
+        """Cycle of the next overflow if nothing changes, or FAR. A counter is known one edge ahead only."""
+        if not self.enabled(part):
+            return _FAR
+        left = self.top(part) - self.value(part)
+        if self.counts_pin(part):
+            return self.edge_cycle[part] if left == 1 and self.edge_cycle[part] >= self.synced else _FAR
+        return self.synced + left - 1
+
+    def next_flag(self, timer: int) -> int:
+        """Cycle in which TF0, TF1 will be seen set, or FAR if it is up already or not in sight."""
+        if self.control & (0x20 << (2 * timer)):
+            return _FAR
+        if timer == 1 and self.mode(0) == 3:
+            return self.next_overflow(2)
+        return self.next_overflow(timer)
+
+    def fall(self, timer: int, cycle: int) -> None:
+        """T0, T1 was high in one sample and low in the next, that of `cycle`."""
+        self.edge_cycle[timer] = cycle + 1
+
+    def write_control(self, value: int, cycle: int) -> None:
+        """TCON.7:4 is written; `cycle` is the first to see it."""
+        self.control = value & 0xF0
+        for timer in range(2):
+            if value & (0x20 << (2 * timer)):
+                self.interrupts.ask(1 + 2 * timer, cycle)
+            else:
+                self.interrupts.withdraw(1 + 2 * timer, cycle)
+
+    def taken(self, timer: int, cycle: int) -> None:
+        """The CPU vectors: TF is cleared."""
+        self.control &= 0xF0 ^ (0x20 << (2 * timer))
+        self.interrupts.withdraw(1 + 2 * timer, cycle)
+
+    def _pass(self, part: int, cycle: int) -> None:
+        """The counts of one part in the cycles `synced` .. `cycle` - 1."""
+        first = self.synced
+        counts = cycle - first
+        if self.counts_pin(part):
+            first = self.edge_cycle[part]
+            if not self.synced <= first < cycle:
+                return
+            counts = 1
+        left = self.top(part) - self.value(part)
+        if counts < left:
+            self._store(part, self.value(part) + counts)
+            return
+        reload = self.reload(part)
+        span = self.top(part) - reload
+        overflows = (counts - left) // span + 1
+        self._store(part, reload + (counts - left) - (overflows - 1) * span)
+        self._overflowed(part, overflows, first + left - 1)
+
+    def _store(self, part: int, value: int) -> None:
+        """TL.7:5 of mode 0, undefined on silicon, keeps what was written there."""
+        if part == 2:
+            self.th[0] = value
+            return
+        mode = self.mode(part)
+        if mode == 0:
+            self.tl[part] = (self.tl[part] & 0xE0) | (value & 0x1F)
+            self.th[part] = value >> 5
+        elif mode == 1:
+            self.tl[part] = value & 0xFF
+            self.th[part] = value >> 8
+        else:
+            self.tl[part] = value
+
+    def _overflowed(self, part: int, overflows: int, cycle: int) -> None:
+        """TF1 belongs to TH0 while timer 0 is split; timer 1 then only clocks the serial port."""
+        if part == 1:
+            self.overflows1 += overflows
+            if self.mode(0) == 3:
+                return
+        timer = 0 if part == 0 else 1
+        self.control |= 0x20 << (2 * timer)
+        self.interrupts.ask(1 + 2 * timer, cycle)
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "tmod": self.tmod,
+            "control": self.control,
+            "tl": [self.tl[0], self.tl[1]],
+            "th": [self.th[0], self.th[1]],
+            "gates": self.gates,
+            "edge_cycle": [self.edge_cycle[0], self.edge_cycle[1]],
+            "synced": self.synced,
+            "overflows1": self.overflows1,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.tmod = state["tmod"]
+        self.control = state["control"]
+        self.gates = state["gates"]
+        self.synced = state["synced"]
+        self.overflows1 = state["overflows1"]
+        for timer in range(2):
+            self.tl[timer] = state["tl"][timer]
+            self.th[timer] = state["th"][timer]
+            self.edge_cycle[timer] = state["edge_cycle"][timer]

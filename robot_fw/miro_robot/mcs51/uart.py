@@ -1,0 +1,349 @@
+"""The serial port in modes 1 to 3: transmitter and receiver on line levels.
+
+What belongs here: SCON, SBUF, the two divide-by-16 counters, start bit search and majority vote. Where the
+16x ticks come from (timer 1, timer 2, crystal) is worked out by `Cpu`, which calls `set_clock`; mode 0 is
+in `shift.py`.
+
+Timing (AT89C52 sheet section 9), all in crystal ticks: `sync(tick)` does everything below `tick`.
+Transmitter: a free-running divide-by-16 counter; the start bit begins at S1P1 after the first rollover that
+follows the write to SBUF, further bits one rollover apart, TI with the stop bit. Receiver: tests RXD on
+every 16x tick for a fall, samples each bit in counter states 7, 8, 9, acts in state 10; RI shows at the
+next S3P1. Between bits nothing is stepped: an idle receiver asks the Line for its next edge.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.interrupts import Interrupts
+from miro_robot.mcs51.line import Line
+
+_FAR = 1 << 62
+_STOPPED = 1 << 61  # next tick of a clock that does not run
+_STOPPED_PERIOD = 1 << 40
+_SERIAL = 4  # its place in the polling order
+_SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02, 0x01
+_ROLLOVERS = 16
+_VOTE_FIRST, _VOTE_LAST, _ACTION = 7, 9, 10  # states of the receiver's counter
+
+
+class Uart:
+    """Serial port. `rxd` and `txd` are the wires; `latch` bits 0 and 1 are P3.0 and P3.1, which gate them."""
+
+    NOT_STATE = ("bus", "interrupts")
+
+    def __init__(self, bus: Bus, interrupts: Interrupts) -> None:
+        self.bus = bus
+        self.interrupts = interrupts
+        self.rxd = Line()
+        self.rxd.settled_tick = _FAR  # nothing connected: mark for ever, until a producer says otherwise
+        self.txd = Line()
+        self.latch = 3
+        self.scon = 0
+        self.received = 0  # SBUF as read
+        # transmitter
+        self.tx_next = _STOPPED  # next 16x tick and their distance
+        self.tx_period = _STOPPED_PERIOD
+        self.tx_phase = 0  # 16x ticks since the last rollover
+        self.tx_bits = 0  # what is still to be sent, next bit lowest
+        self.tx_left = 0  # how many bits that is; 0 idle
+        self.tx_value = 0
+        self.tx_delay = 0  # from rollover to pin; 0 before the start bit
+        self.tx_level = 1  # what the transmitter puts on TXD
+        self.tx_edge = _FAR  # tick at which tx_coming replaces it
+        self.tx_coming = 1
+        # receiver
+        self.rx_next = _STOPPED
+        self.rx_period = _STOPPED_PERIOD
+        self.rx_count = 0  # 16x ticks since the fall; 0 searching
+        self.rx_last = 1  # RXD at the last 16x tick
+        self.rx_votes = 0
+        self.rx_bits = 0
+        self.rx_done = _FAR  # tick at which rx_frame is delivered
+        self.rx_frame = 0  # data, and the bit after them in bit 8
+
+    def clear(self, cycle: int) -> None:
+        """As after reset in `cycle`: registers and both state machines; SBUF is left as it was."""
+        self.scon = 0
+        self.tx_phase = 0
+        self.abort(12 * cycle)
+        self.interrupts.withdraw(_SERIAL, cycle)
+
+    def abort(self, tick: int) -> None:
+        """Both state machines to idle: reset, and a change of mode; with everything below `tick` done."""
+        self.txd.append(tick, self.latch >> 1)
+        self.tx_left = 0
+        self.tx_edge = _FAR
+        self.tx_level = 1
+        self.rx_count = 0
+        self.rx_done = _FAR
+
+    def mode(self) -> int:
+        return self.scon >> 6
+
+    def nine_bits(self) -> int:
+        return self.scon >> 7
+
+    def set_clock(self, rx_next: int, rx_period: int, tx_next: int, tx_period: int) -> None:
+        """16x ticks from now on: the next one and their distance, for both directions. FAR stops one."""
+        self.rx_next = rx_next if rx_next < _STOPPED else _STOPPED
+        self.rx_period = rx_period if rx_next < _STOPPED else _STOPPED_PERIOD
+        self.tx_next = tx_next if tx_next < _STOPPED else _STOPPED
+        self.tx_period = tx_period if tx_next < _STOPPED else _STOPPED_PERIOD
+
+    def sync(self, tick: int) -> None:
+        """Sends and receives everything below `tick`."""
+        self._transmit(tick)
+        self._receive(tick)
+
+    def pulse(self, rx: int, tx: int, tick: int) -> None:
+        """One 16x tick for either direction, from a clock that has no regular ones."""
+        if rx:
+            self.rx_next = tick
+        if tx:
+            self.tx_next = tick
+        self.sync(tick + 1)
+        if rx:
+            self.rx_next = _STOPPED
+        if tx:
+            self.tx_next = _STOPPED
+
+    def level(self, tick: int) -> int:
+        """RXD as the pin has it: the wire ANDed with the latch of P3.0."""
+        return self.rxd.level_at(tick) if self.latch & 1 else 0
+
+    # Registers
+
+    def write_scon(self, value: int, cycle: int) -> None:
+        """SCON is written; `cycle` is the first to see it. Another mode aborts what is on its way."""
+        if (value ^ self.scon) & (_SM0 | _SM1):
+            self.abort(12 * cycle)
+        self.scon = value
+        self.ask_or_withdraw(cycle)
+
+    def ask_or_withdraw(self, cycle: int) -> None:
+        if self.scon & (_RI | _TI):
+            self.interrupts.ask(_SERIAL, cycle)
+        else:
+            self.interrupts.withdraw(_SERIAL, cycle)
+
+    def write_sbuf(self, value: int) -> None:
+        """Loads the transmitter; a character on its way is cut off and the new one begins at the next
+        rollover.
+        """
+        self.tx_value = value
+        if self.nine_bits():
+            ninth = 1 if self.scon & _TB8 else 0
+            self.tx_bits = (value << 1) | (ninth << 9) | (1 << 10)
+            self.tx_left = 11
+        else:
+            self.tx_bits = (value << 1) | (1 << 9)
+            self.tx_left = 10
+        self.tx_delay = 0
+
+    def write_latch(self, latch: int, tick: int) -> None:
+        """P3.1:0 is written; called with everything below `tick` done."""
+        self.latch = latch
+        self.txd.append(tick, self.tx_level & (latch >> 1))
+
+    def raise_flag(self, flag: int, tick: int) -> None:
+        """TI or RI goes up at `tick`, and is seen at the next S5P2."""
+        self.scon |= flag
+        self.interrupts.ask(_SERIAL, (tick + 2) // 12)
+
+    # Transmitter
+
+    def _transmit(self, tick: int) -> None:
+        while True:
+            if self.tx_edge < tick:
+                self._edge()
+            if self.tx_left == 0:
+                break
+            rollover = self.tx_next + (_ROLLOVERS - 1 - self.tx_phase) * self.tx_period
+            if rollover >= tick:
+                break
+            self.tx_next = rollover + self.tx_period
+            self.tx_phase = 0
+            if self.tx_delay == 0:
+                self.tx_delay = 12 - rollover % 12
+            self.tx_edge = rollover + self.tx_delay
+            self.tx_coming = self.tx_bits & 1
+            self.tx_bits >>= 1
+            self.tx_left -= 1
+        if self.tx_next < tick:
+            passed = (tick - 1 - self.tx_next) // self.tx_period + 1
+            self.tx_next += passed * self.tx_period
+            self.tx_phase = (self.tx_phase + passed) % _ROLLOVERS
+
+    def _edge(self) -> None:
+        """One bit appears on TXD; with the stop bit comes TI."""
+        self.tx_level = self.tx_coming
+        self.txd.append(self.tx_edge, self.tx_level & (self.latch >> 1))
+        if self.tx_left == 0:
+            self.raise_flag(_TI, self.tx_edge)
+            self.bus.byte_sent(self.tx_value, self.tx_edge)
+        self.tx_edge = _FAR
+
+    def ti_tick(self) -> int:
+        """Tick at which TI goes up if nothing changes, FAR if nothing is being sent."""
+        if self.tx_left == 0:
+            return self.tx_edge
+        rollover = self.tx_next + (_ROLLOVERS - 1 - self.tx_phase) * self.tx_period
+        last = rollover + (self.tx_left - 1) * _ROLLOVERS * self.tx_period
+        delay = self.tx_delay if self.tx_delay else 12 - rollover % 12
+        return last + delay
+
+    # Receiver
+
+    def _receive(self, tick: int) -> None:
+        while True:
+            if self.rx_done < tick and self.rx_done <= self.rx_next:
+                self._deliver()
+            if self.rx_next >= tick:
+                break
+            if self.rx_count == 0:
+                self._search(tick)
+            else:
+                self._bit(tick)
+        if self.rx_done < tick:
+            self._deliver()
+
+    def _search(self, tick: int) -> None:
+        """From 16x tick to 16x tick below `tick`, jumping over constant level, until a 1 is followed by a
+        0.
+        """
+        now = self.rx_next
+        enabled = self.scon & _REN
+        while now < tick:
+            level = self.level(now)
+            if enabled and self.rx_last and not level:
+                self.rx_last = 0
+                self.rx_count = 1
+                self.rx_votes = 0
+                self.rx_bits = 0
+                self.rx_next = now + self.rx_period
+                return
+            self.rx_last = level
+            change = self.rxd.next_edge(now) if self.latch & 1 else _FAR
+            if change > tick:
+                change = tick
+            now += ((change - now + self.rx_period - 1) // self.rx_period) * self.rx_period
+        self.rx_next = now
+
+    def _bit(self, tick: int) -> None:
+        """16x ticks of one bit below `tick`: only counter states 7 to 10 do anything."""
+        while self.rx_next < tick and self.rx_count:
+            state = self.rx_count % _ROLLOVERS
+            idle = (_VOTE_FIRST - state) % _ROLLOVERS if state < _VOTE_FIRST or state > _ACTION else 0
+            if idle:
+                within = (tick - 1 - self.rx_next) // self.rx_period + 1
+                if idle > within:
+                    idle = within
+                self.rx_count += idle
+                self.rx_next += idle * self.rx_period
+                continue
+            now = self.rx_next
+            self.rx_next = now + self.rx_period
+            self.rx_last = self.level(now)
+            self.rx_count += 1
+            if state < _ACTION:
+                self.rx_votes += self.rx_last
+            else:
+                self._act(now)
+
+    def _act(self, now: int) -> None:
+        """State 10 of a bit: take the vote. Bit 0 is the start bit; the last one ends the frame."""
+        number = self.rx_count // _ROLLOVERS
+        bit = 1 if self.rx_votes >= 2 else 0
+        self.rx_votes = 0
+        if number == 0:
+            if bit:
+                self.rx_count = 0
+        elif number <= 8:
+            self.rx_bits |= bit << (number - 1)
+        elif number == 9:
+            self.rx_frame = self.rx_bits | (bit << 8)
+            self.rx_done = (now + 7) // 12 * 12 + 4
+            if not self.nine_bits():
+                self.rx_count = 0
+        else:  # the stop bit of a nine-bit frame: ignored, but the search begins only now
+            self.rx_count = 0
+
+    def _deliver(self) -> None:
+        """Into SBUF and RB8, if RI is down and SM2 lets it pass; otherwise the frame is lost for good."""
+        tick = self.rx_done
+        self.rx_done = _FAR
+        last = self.rx_frame >> 8
+        if self.scon & _RI or (self.scon & _SM2 and not last):
+            return
+        self.received = self.rx_frame & 0xFF
+        self.scon = (self.scon & (0xFF ^ _RB8)) | (_RB8 if last else 0)
+        self.raise_flag(_RI, tick)
+
+    def ri_tick(self) -> int:
+        """A tick before which RI will not go up, FAR if no character can come."""
+        if self.rx_done != _FAR:
+            return self.rx_done
+        if self.rx_count:
+            return self.rx_next + (9 * _ROLLOVERS + _ACTION - self.rx_count) * self.rx_period
+        if not self.scon & _REN or not self.latch & 1:
+            return _FAR
+        fall = self.rxd.next_edge(self.rx_next - self.rx_period)
+        if fall > self.rxd.settled_tick:
+            fall = self.rxd.settled_tick
+        if fall < self.rx_next:
+            fall = self.rx_next
+        return fall + (9 * _ROLLOVERS + _ACTION) * self.rx_period if fall < _STOPPED else _FAR
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "rxd": self.rxd.snapshot(),
+            "txd": self.txd.snapshot(),
+            "latch": self.latch,
+            "scon": self.scon,
+            "received": self.received,
+            "tx_next": self.tx_next,
+            "tx_period": self.tx_period,
+            "tx_phase": self.tx_phase,
+            "tx_bits": self.tx_bits,
+            "tx_left": self.tx_left,
+            "tx_value": self.tx_value,
+            "tx_delay": self.tx_delay,
+            "tx_level": self.tx_level,
+            "tx_edge": self.tx_edge,
+            "tx_coming": self.tx_coming,
+            "rx_next": self.rx_next,
+            "rx_period": self.rx_period,
+            "rx_count": self.rx_count,
+            "rx_last": self.rx_last,
+            "rx_votes": self.rx_votes,
+            "rx_bits": self.rx_bits,
+            "rx_done": self.rx_done,
+            "rx_frame": self.rx_frame,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.rxd.restore(state["rxd"])
+        self.txd.restore(state["txd"])
+        self.latch = state["latch"]
+        self.scon = state["scon"]
+        self.received = state["received"]
+        self.tx_next = state["tx_next"]
+        self.tx_period = state["tx_period"]
+        self.tx_phase = state["tx_phase"]
+        self.tx_bits = state["tx_bits"]
+        self.tx_left = state["tx_left"]
+        self.tx_value = state["tx_value"]
+        self.tx_delay = state["tx_delay"]
+        self.tx_level = state["tx_level"]
+        self.tx_edge = state["tx_edge"]
+        self.tx_coming = state["tx_coming"]
+        self.rx_next = state["rx_next"]
+        self.rx_period = state["rx_period"]
+        self.rx_count = state["rx_count"]
+        self.rx_last = state["rx_last"]
+        self.rx_votes = state["rx_votes"]
+        self.rx_bits = state["rx_bits"]
+        self.rx_done = state["rx_done"]
+        self.rx_frame = state["rx_frame"]
