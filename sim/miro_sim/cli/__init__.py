@@ -1,0 +1,29 @@
+"""The `mirotwin` command.
+
+What belongs here: the entry point and the list of commands. What does not: what a command does (one file
+each), and anything that could be done without a command line (`miro_sim`). Simulation code is imported
+inside the commands, because the engine has to be chosen first.
+"""
+
+import click
+
+from miro_sim.cli.fw import fw
+from miro_sim.cli.info import info, version_of
+from miro_sim.cli.program import Program
+from miro_sim.cli.replay import replay
+from miro_sim.cli.run import run
+from miro_sim.cli.scenarios import scenarios
+
+
+@click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(version_of("mirotwin"), prog_name="mirotwin")
+def main() -> None:
+    """A bit-exact twin of a vision-guided soccer robot.
+
+    Exit codes: 0 done, 1 expectation failed, 2 bad input, 3 firmware fault, 4 divergence,
+    42 cycle limit reached.
+    """
+
+
+for command in (run, replay, scenarios, info, fw):
+    main.add_command(command)

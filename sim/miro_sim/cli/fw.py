@@ -1,0 +1,116 @@
+"""`mirotwin fw run`: an image on the bare processor, with nothing but its serial port connected."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+import msgspec
+
+from miro_sim.cli.options import choose_engine, engine_option, load_image
+from miro_sim.cli.program import DONE, FIRMWARE_FAULT, LIMIT_REACHED, UserError, complain
+from miro_sim.cli.progress import ProgressBar
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+
+FLASH_BYTES = 8192
+SPACE_BYTES = 65536
+
+
+@click.group()
+def fw() -> None:
+    """Firmware on the bare processor, without the robot."""
+
+
+@fw.command("run")
+@click.argument("image", metavar="IMAGE.ihx", type=click.Path())
+@click.option(
+    "--until", metavar="SYMBOL|ADDRESS", help="Stop before the instruction there (0x.. or a symbol's name)."
+)
+@click.option(
+    "--max-cycles", type=click.IntRange(1), metavar="N", help="Give up after N machine cycles, exit code 42."
+)
+@click.option("--stdin", "stdin", type=click.Path(), metavar="FILE", help="Bytes for the serial port.")
+@click.option(
+    "--baud", type=click.IntRange(1, 2_000_000), help="Bit rate of --stdin. Default: what the firmware sets."
+)
+@click.option(
+    "--code-in-xram", is_flag=True, help="EA low: program and data share 64 KB; lifts the 8 KB limit."
+)
+@click.option(
+    "--dump", type=click.Path(), metavar="FILE.json", help="Write registers and memories there at the end."
+)
+@engine_option
+def run_bare(
+    image: str,
+    until: str | None,
+    max_cycles: int | None,
+    stdin: str | None,
+    baud: int | None,
+    code_in_xram: bool,
+    dump: str | None,
+    engine: str | None,
+) -> int:
+    """Runs IMAGE.ihx on a bare AT89C52; what it sends goes to stdout as it is.
+
+    Exit codes: 0 --until was reached, 3 firmware fault, 42 --max-cycles was reached.
+    """
+    choose_engine(engine)
+    loaded = load_image(image, SPACE_BYTES if code_in_xram else FLASH_BYTES)
+    target = None if until is None else address_of(until, loaded, image)
+    given = b"" if stdin is None else Path(stdin).read_bytes()
+    if target is None and max_cycles is None:
+        raise UserError(f"{image}: nothing would end the run; give --until, --max-cycles or both")
+    from miro_robot.bare import BareMachine
+
+    out = click.get_binary_stream("stdout")
+    with ProgressBar("running", max_cycles) as bar:
+        machine = BareMachine(loaded, code_in_xram=code_in_xram, stdin=given, baud=baud, stdout=out.write)
+        reached = machine.run(until=target, max_cycles=max_cycles, progress=bar.to)
+    out.flush()
+    if dump is not None:
+        Path(dump).write_bytes(msgspec.json.format(msgspec.json.encode(machine.dump()), indent=2) + b"\n")
+    for fault in machine.faults:
+        complain(f"firmware fault: {fault}")
+    if machine.faults:
+        return FIRMWARE_FAULT
+    if reached:
+        return DONE
+    complain(f"gave up after {machine.cpu.cycles} machine cycles, at {place_of(machine.cpu.pc, loaded)}")
+    return LIMIT_REACHED
+
+
+def address_of(text: str, image: Image, path: str) -> int:
+    """A code address from 0x.. or from a symbol's name, with or without the underscore that C puts before
+    it.
+    """
+    if text[:2].lower() == "0x":
+        try:
+            address = int(text, 16)
+        except ValueError:
+            raise UserError(f"--until: {text} is not a hexadecimal number") from None
+        if address >= SPACE_BYTES:
+            raise UserError(f"--until: {text} is beyond the last code address; use 0x0000 to 0xffff")
+        return address
+    for name in (text, f"_{text}", text.removeprefix("_")):
+        found = image.symbols.address(name, "code")
+        if found is not None:
+            return found
+    names = [name for name, (_, space) in image.symbols.items() if space == "code"]
+    close = get_close_matches(text, names, n=1) or get_close_matches(f"_{text}", names, n=1)
+    if close:
+        remedy = f"did you mean {close[0]}?"
+    elif names:
+        remedy = "see the map beside the image"
+    else:
+        remedy = "put its .map or .cdb beside it, or give an address as 0x.."
+    raise UserError(f"{path}: --until: no symbol {text} in the code; {remedy}")
+
+
+def place_of(address: int, image: Image) -> str:
+    """An address for people."""
+    name = image.symbols.name_at(address)
+    return f"{address:#06x} in {name}" if name else f"{address:#06x}"

@@ -1,0 +1,55 @@
+"""A progress bar for what takes more than a second, on stderr, and only where somebody looks at it.
+
+What belongs here: when to show it. What does not: what is counted. This is one of the few places that know
+the wall clock.
+"""
+
+import sys
+import time
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+PATIENCE_S = 1.0
+
+
+class ProgressBar:
+    """`bar.to(done)` out of `total`. Draws nothing in the first second, nor when stderr is not a terminal."""
+
+    def __init__(self, what: str, total: float | None, quiet: bool = False) -> None:
+        self.what = what
+        self.total = total
+        self._shown = not quiet and sys.stderr.isatty()
+        self._began_s = time.monotonic()
+        self._progress: Progress | None = None
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> "ProgressBar":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._progress is not None:
+            self._progress.stop()
+
+    def to(self, done: float) -> None:
+        """Moves the bar. Cheap enough to call once a control period."""
+        if not self._shown:
+            return
+        if self._progress is None:
+            if time.monotonic() - self._began_s < PATIENCE_S:
+                return
+            self._progress = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                TaskProgressColumn(),
+                TimeRemainingColumn(),
+                console=Console(stderr=True),
+                transient=True,
+            )
+            self._task = self._progress.add_task(self.what, total=self.total)
+            self._progress.start()
+        assert self._task is not None
+        self._progress.update(self._task, completed=done)

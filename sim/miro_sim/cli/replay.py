@@ -1,0 +1,162 @@
+"""`mirotwin replay`: what was sent, sent again, and whether the robot answers as it did."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+import msgspec
+from miro_protocol import stream
+from rich.table import Table
+
+from miro_sim import runner
+from miro_sim.cli.options import choose_engine, engine_option, firmware_option, load_image
+from miro_sim.cli.program import DIVERGENCE, DONE, UserError, complain, output
+from miro_sim.cli.progress import ProgressBar
+from miro_sim.cli.run import report_faults
+from miro_sim.clock import seconds
+from miro_sim.frame_list import FrameLine, frame_lines
+from miro_sim.recording_reader import MAGIC, Recording, parse
+from miro_sim.records import Period, WireRun
+from miro_sim.replay import (
+    Difference,
+    ScriptRun,
+    compare,
+    scenario_of_stream,
+    script_of,
+    script_of_stream,
+)
+from miro_sim.scenario import Scenario
+from miro_sim.scenario_file import parse as parse_scenario
+
+SHOWN = 20
+
+
+class Job(msgspec.Struct, frozen=True):
+    """What is to be replayed: a recording, or a text stream (then `recorded` is empty)."""
+
+    scenario: Scenario
+    seed: int
+    script: list[ScriptRun]
+    recorded: Sequence[Period]
+
+
+@click.command(short_help="Sends recorded bytes again and compares.")
+@click.argument("file", type=click.Path())
+@firmware_option("Image to run instead of the recorded one (of the robot's own, for a text stream).")
+@engine_option
+@click.option("--all", "everything", is_flag=True, help=f"List all frames, not only the first {SHOWN}.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no list of frames.")
+def replay(file: str, firmware: str | None, engine: str | None, everything: bool, quiet: bool) -> int:
+    """Sends the bytes of FILE (run.mcap, or a text stream) again and compares what the robot does.
+
+    Exit code 4 when it differs from the recording. A text stream runs over an ideal link in the default
+    scenario, and there is nothing to compare.
+    """
+    data = Path(file).read_bytes()
+    choose_engine(engine)
+    with tempfile.TemporaryDirectory() as folder:
+        if data.startswith(MAGIC) or b"\0" in data[:4096] or not data:
+            recording = parse(data, file)
+            job = _job_of_recording(recording, file)
+            image = load_image(firmware or _unpack(recording, Path(folder)))
+            if firmware is None and recording.source.symbols:
+                image = msgspec.structs.replace(image, symbols=_symbols(recording))
+        else:
+            job = _job_of_stream(file)
+            image = load_image(firmware)
+    from miro_sim.world import World
+
+    world = World(job.scenario, job.seed, image, script=job.script)
+    replayed: list[Period] = []
+    difference: Difference | None = None
+    with ProgressBar("replaying", world.periods, quiet) as bar:
+
+        def check(period: Period) -> bool:
+            nonlocal difference
+            replayed.append(period)
+            bar.to(len(replayed))
+            if len(replayed) <= len(job.recorded):
+                difference = compare(job.recorded[period.index], period)
+            return difference is not None or len(replayed) == len(job.recorded)
+
+        runner.run(world, None, False, check)
+    if not quiet:
+        _print_frames(job, replayed, everything)
+    faults = report_faults(world)
+    return _verdict(job, replayed, difference) or faults
+
+
+def _job_of_recording(recording: Recording, path: str) -> Job:
+    source = recording.source
+    if not recording.periods:
+        raise UserError(f"{path}: the recording holds no control period; nothing can be replayed")
+    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml")
+    return Job(scenario, source.seed, script_of(recording.periods), recording.periods)
+
+
+def _job_of_stream(path: str) -> Job:
+    sent = stream.read(path)
+    return Job(scenario_of_stream(sent, path), 0, script_of_stream(sent), ())
+
+
+def _unpack(recording: Recording, folder: Path) -> Path:
+    """The recorded firmware as a file."""
+    path = folder / "firmware.ihx"
+    path.write_bytes(recording.source.firmware)
+    return path
+
+
+def _print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> None:
+    robots = {index: network.robots for index, network in enumerate(job.scenario.networks)}
+    runs: list[WireRun] = [run for period in job.recorded or replayed for run in period.wire]
+    lines = sorted(frame_lines(runs, robots), key=lambda line: line.tick)
+    shown: Sequence[FrameLine] = lines if everything else lines[:SHOWN]
+    table = Table(box=None, pad_edge=False)
+    table.add_column("tick", justify="right")
+    table.add_column("t [s]", justify="right")
+    table.add_column("")
+    table.add_column("from")
+    table.add_column("frame", overflow="fold")
+    for line in shown:
+        sender = "host" if line.slot < 0 else f"robot {line.slot}"
+        if len(robots) > 1:
+            sender = f"net{line.network} {sender}"
+        table.add_row(str(line.tick), f"{seconds(line.tick):.4f}", line.direction, sender, line.text)
+    console = output()
+    console.print(table)
+    if len(shown) < len(lines):
+        console.print(f"{len(lines) - len(shown)} more of {len(lines)} frames; --all lists them")
+
+
+def _verdict(job: Job, replayed: Sequence[Period], difference: Difference | None) -> int:
+    if not job.recorded:
+        _print_response(replayed)
+        return DONE
+    if difference is not None:
+        complain(f"the replay differs in control period {len(replayed) - 1}, {difference}")
+        return DIVERGENCE
+    if len(replayed) < len(job.recorded):
+        complain(f"the replay ended after {len(replayed)} of {len(job.recorded)} recorded control periods")
+        return DIVERGENCE
+    output().print(f"the robots' response equals the recorded one in all {len(replayed)} control periods")
+    return DONE
+
+
+def _print_response(replayed: Sequence[Period]) -> None:
+    """What the robots made of a stream: there is no recording to compare with."""
+    table = Table(box=None, pad_edge=False)
+    for name in ("robot", "accepted", "rejected", "stale", "commands", "left [counts]", "right [counts]"):
+        table.add_column(name, justify="right")
+    for index, robot in enumerate(replayed[-1].robots):
+        seen = [period.robots[index] for period in replayed]
+        commands = sum(len(one.left.commands) + len(one.right.commands) for one in seen)
+        counters = [
+            str(count) if count is not None else "?"
+            for count in (robot.accepted, robot.rejected, robot.stale)
+        ]
+        positions = (str(robot.left.real_position), str(robot.right.real_position))
+        table.add_row(f"{robot.slot}", *counters, str(commands), *positions)
+    output().print(table)

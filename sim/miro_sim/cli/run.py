@@ -1,0 +1,166 @@
+"""`mirotwin run`: a scenario from its first control period to its files."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from rich.table import Table
+
+from miro_sim import runner
+from miro_sim.cli.options import choose_engine, engine_option, firmware_option, load_image
+from miro_sim.cli.program import DONE, FIRMWARE_FAULT, MAX_SEED, complain, output
+from miro_sim.cli.progress import ProgressBar
+from miro_sim.figure import draw
+from miro_sim.outdir import OutputFolder
+from miro_sim.recording import Recorder, Source
+from miro_sim.records import Period
+from miro_sim.scenario_file import ScenarioText, load
+from miro_sim.summary import Summary, summarise, to_json
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+
+    from miro_sim.world import World
+
+
+@click.command(short_help="Runs a scenario and writes its files.")
+@click.argument("scenario")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder for the files. Default: runs/SCENARIO-SEED."
+)
+@click.option(
+    "--seed", type=click.IntRange(0, MAX_SEED), default=1, show_default=True, help="Master seed of all noise."
+)
+@firmware_option("Image to run instead of the robot's own.")
+@engine_option
+@click.option(
+    "--record",
+    type=click.Choice(["default", "full"]),
+    default="default",
+    help="full: also every LM629 sample. Default: every control period and all bytes on the wire.",
+)
+@click.option("--force", is_flag=True, help="Replace the files of an earlier run in the folder.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no table.")
+def run(
+    scenario: str,
+    out: Path | None,
+    seed: int,
+    firmware: str | None,
+    engine: str | None,
+    record: str,
+    force: bool,
+    quiet: bool,
+) -> int:
+    """Runs SCENARIO (a built-in name, or a .toml file) and writes run.mcap, figure.png and summary.json."""
+    text = load(scenario)
+    folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force)
+    active = choose_engine(engine)
+    image = load_image(firmware)
+    from miro_sim.world import World
+
+    source = source_of(text, seed, image, record)
+    world = World(text.scenario, seed, image)
+    failure: Exception | None = None
+    with folder as staging:
+        periods: list[Period] = []
+        wall_s = 0.0
+        with (staging / "run.mcap").open("wb") as stream, Recorder(stream, source) as recorder:
+            began_s = time.perf_counter()
+            try:
+                _simulate(world, recorder, record == "full", quiet, periods)
+            except Exception as error:  # the files up to here are kept before it is reported
+                failure = error
+            wall_s = time.perf_counter() - began_s
+        summary = summarise(
+            scenario=text.scenario.name,
+            seed=seed,
+            engine=active,
+            periods=periods,
+            simulated_ticks=world.tick,
+            wall_s=wall_s,
+            counters=world.counters(),
+            firmware_sha256=image.sha256,
+        )
+        (staging / "summary.json").write_bytes(to_json(summary))
+        if periods:
+            title = text.scenario.title
+            draw(periods, staging / "figure.png", scenario=text.scenario.name, seed=seed, title=title)
+    if failure is not None:
+        complain(f"the simulation broke off; the files up to tick {world.tick} are in {folder.path}")
+        raise failure
+    if not quiet:
+        _print(summary, folder.path)
+    return report_faults(world)
+
+
+def source_of(text: ScenarioText, seed: int, image: Image, record: str) -> Source:
+    """What a recording says that a run was made from."""
+    return Source(
+        scenario_name=text.scenario.name,
+        scenario_text=text.text,
+        seed=seed,
+        firmware=Path(image.path).read_bytes(),
+        firmware_sha256=image.sha256,
+        symbols=dict(image.symbols.items()),
+        record=record,
+    )
+
+
+def _simulate(world: World, recorder: Recorder, full: bool, quiet: bool, periods: list[Period]) -> None:
+    with ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet) as bar:
+
+        def keep(period: Period) -> None:
+            periods.append(period)
+            bar.to(len(periods))
+
+        runner.run(world, recorder, full, keep)
+
+
+def report_faults(world: World) -> int:
+    """Says on stderr what the firmware did wrong; returns the exit code."""
+    found = runner.faults_by_robot(world)
+    for network, slot, faults in found:
+        more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+        complain(f"firmware fault: net{network}/robot{slot}: {faults[0]}{more}")
+    return FIRMWARE_FAULT if found else DONE
+
+
+def _print(summary: Summary, folder: Path) -> None:
+    tracking, link, firmware = summary.tracking, summary.link, summary.firmware
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(style="bold")
+    table.add_column()
+    table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
+    table.add_row(
+        "time",
+        f"{summary.simulated_s:.2f} s in {summary.wall_s:.2f} s ({summary.realtime_factor:.1f} x real time, "
+        f"engine {summary.engine})",
+    )
+    if tracking.rms_position_cm is not None:
+        settled = "not settled" if tracking.settling_s is None else f"settled at {tracking.settling_s:.2f} s"
+        table.add_row(
+            "tracking",
+            f"rms of the last second {tracking.rms_position_cm:.2f} cm "
+            f"(x {tracking.rms_x_cm:.2f}, y {tracking.rms_y_cm:.2f}), {tracking.rms_theta_deg:.2f} deg; {settled}",
+        )
+    table.add_row(
+        "link",
+        f"{link.frames_sent} frames sent, {_known(link.frames_accepted)} accepted, "
+        f"{_known(link.frames_rejected)} rejected, {_known(link.frames_stale)} stale; {link.bit_errors} bit errors",
+    )
+    idle = 100.0 * firmware.idle_cycles / firmware.machine_cycles if firmware.machine_cycles else 0.0
+    table.add_row(
+        "firmware",
+        f"{firmware.instructions} instructions, {firmware.machine_cycles} cycles ({idle:.0f} % idle), "
+        f"{firmware.faults} faults",
+    )
+    table.add_row("digest", summary.digest)
+    table.add_row("files", str(folder))
+    output().print(table)
+
+
+def _known(count: int | None) -> str:
+    return "?" if count is None else str(count)

@@ -1,0 +1,32 @@
+"""`mirotwin scenarios`: the built-in ones, and their files to copy from."""
+
+import click
+from rich.table import Table
+
+from miro_sim import scenario_file
+from miro_sim.cli.program import output
+
+
+@click.group(invoke_without_command=True)
+@click.pass_context
+def scenarios(context: click.Context) -> None:
+    """Lists the built-in scenarios."""
+    if context.invoked_subcommand is not None:
+        return
+    table = Table(box=None, pad_edge=False)
+    table.add_column("scenario", style="bold")
+    table.add_column("duration", justify="right")
+    table.add_column("robots", justify="right")
+    table.add_column("what it shows")
+    for name in scenario_file.builtin_names():
+        scenario = scenario_file.load(name).scenario
+        robots = len([robot for network in scenario.networks for robot in network.robot])
+        table.add_row(name, f"{scenario.duration_s:g} s", str(robots), scenario.title)
+    output().print(table)
+
+
+@scenarios.command()
+@click.argument("name")
+def show(name: str) -> None:
+    """Prints the file of the built-in scenario NAME, to read or to start one's own from."""
+    click.echo(scenario_file.builtin_text(name), nl=False)
