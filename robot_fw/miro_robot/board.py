@@ -1,0 +1,287 @@
+"""The robot's board: one AT89C52, two LM629, the L298 inputs, wired as a board file says.
+
+What belongs here: carrying levels from pin to pin, and the order in which the parts move on. What does not: what a
+part does with its pins (`mcs51/`, `lm629/`), what the motors make of the bridge (`Plant`), and how a board is
+described (`wiring.py`).
+
+Order on one tick: the plant moves first (its encoder edges reach the decoders), then the left LM629, the right
+LM629, the bridge inputs, the interrupt lines, and last what the CPU did to its port pins on that tick. Everything
+but the CPU is advanced at its own events only, never "up to now", so who looks when does not change a bit.
+"""
+
+from __future__ import annotations
+
+from miro_robot.faults import FaultKind, FirmwareFault
+from miro_robot.lm629.chip import Lm629
+from miro_robot.lm629.options import Lm629Options
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.plant import Plant
+from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
+
+CYCLE_TICKS = 12
+FAR = 1 << 62
+FAULTS_KEPT = 1000
+"""A firmware that faults in a loop must not fill the memory: after so many, faults are counted only."""
+
+
+class Board(Bus):
+    """A robot's electronics, from RXD to the pins of the L298.
+
+    `slot` (0..robots-1) and `robots` (3 or 5) are set by straps. `plant` is what the bridge drives and the encoders
+    see. `run(tick)` moves everything on; `cpu.rxd` must be settled beyond that tick.
+    """
+
+    NOT_STATE = (
+        "wiring", "plant", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
+        "data_bank", "watched", "pin_bank", "pin_bit", "pin_inverted", "hi_port", "hi_bit", "hi_inverted",
+        "hi_count", "hi_side", "stop_on_fault", "faults",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        wiring: Wiring,
+        plant: Plant,
+        slot: int = 0,
+        robots: int = 3,
+        options: Lm629Options | None = None,
+        stop_on_fault: bool = True,
+    ) -> None:
+        self.wiring = wiring
+        self.plant = plant
+        self.cpu = Cpu(self)
+        self.left = Lm629(options or Lm629Options())
+        self.right = Lm629(options or Lm629Options())
+        self.stop_on_fault = stop_on_fault
+        self.faults: list[FirmwareFault] = []
+        self.fault_count = 0
+        self.busy_writes = 0
+        self.contention = 0
+        self.bus_levels = 0xFF
+        self.bank = bytearray([0xFF] * (CONSTANT_BANK + 1))
+        self.external = bytearray([0xFF] * PORTS)
+        self.bridge_enable = bytearray(2)
+        self.bridge_sign = bytearray(2)
+        self._resolve_outputs(wiring)
+        self._resolve_inputs(wiring, slot, robots)
+        plant.attach(self.left, self.right)
+        self._drive_chips(0)
+        self._drive_interrupts(0)
+
+    def _resolve_outputs(self, wiring: Wiring) -> None:
+        """Turns nets into (bank, bit, inverted) per LM629 input, and the external bus into address tables."""
+        self.data_bank = wiring.data_bank()
+        self.pin_bank = [0] * 10
+        self.pin_bit = [0] * 10
+        self.pin_inverted = [0] * 10
+        self.watched = bytearray(CONSTANT_BANK + 1)
+        self.watched[self.data_bank] = 0xFF
+        for index, (side, pin) in enumerate((side, pin) for side in SIDES for pin in CHIP_INPUTS):
+            bank, bit, inverted = wiring.chip_input(side, pin)
+            self.pin_bank[index], self.pin_bit[index], self.pin_inverted[index] = bank, bit, inverted
+            self.watched[bank] |= 1 << bit
+        self.latches = len(wiring.latch)
+        self.latch_address = [latch.address for latch in wiring.latch] + [0] * (8 - len(wiring.latch))
+        self.latch_mask = [latch.mask for latch in wiring.latch] + [0] * (8 - len(wiring.latch))
+        for index, latch in enumerate(wiring.latch):
+            self.bank[PORTS + index] = latch.initial
+        self.buffers = min(len(wiring.buffer), 8)
+        self.buffer_address = [part.address for part in wiring.buffer[:8]] + [0] * (8 - self.buffers)
+        self.buffer_mask = [part.mask for part in wiring.buffer[:8]] + [0] * (8 - self.buffers)
+
+    def _resolve_inputs(self, wiring: Wiring, slot: int, robots: int) -> None:
+        """Puts the straps on the CPU's pins and notes which pins follow an LM629's HI."""
+        self.hi_port = [0] * 8
+        self.hi_bit = [0] * 8
+        self.hi_inverted = [0] * 8
+        self.hi_side = [0] * 8
+        self.hi_count = 0
+        straps = {f"slot.{bit}": slot >> bit & 1 for bit in range(3)}
+        straps.update({"three": int(robots == 3), "0": 0, "1": 1})
+        for port, bit, source, inverted in wiring.cpu_inputs():
+            if source in straps:
+                if not straps[source] ^ inverted:
+                    self.external[port] &= ~(1 << bit) & 0xFF
+                continue
+            index = self.hi_count
+            self.hi_port[index], self.hi_bit[index] = port, bit
+            self.hi_inverted[index], self.hi_side[index] = inverted, SIDES.index(source[:-3])
+            self.hi_count += 1
+        for port in range(PORTS):
+            self.cpu.set_external(port, self.external[port], 0)
+
+    # ---- time ----------------------------------------------------------------------------------------------
+
+    def run(self, until_tick: int) -> int:
+        """Moves the whole robot on to `until_tick`. Returns 0, or the CPU's reason for stopping early."""
+        stopped = 0
+        while self.cpu.cycles * CYCLE_TICKS < until_tick:
+            horizon = min(until_tick, self._next_interrupt(self.left), self._next_interrupt(self.right))
+            stopped = self.cpu.run((horizon + CYCLE_TICKS - 1) // CYCLE_TICKS)
+            self.sync(min(horizon, self.cpu.cycles * CYCLE_TICKS) if stopped else horizon)
+            if stopped:
+                break
+        return stopped
+
+    def _next_interrupt(self, chip: Lm629) -> int:
+        """The next tick at which the chip may raise HI by itself: a sample, or the end of its reset."""
+        return chip.next_tick if chip.sample_tick == FAR else chip.sample_tick
+
+    def sync(self, tick: int) -> None:
+        """Does everything the plant and the LM629 have to do by themselves up to and including `tick`."""
+        while True:
+            now = min(self.left.next_tick, self.right.next_tick, self.plant.next_tick)
+            if now > tick:
+                break
+            self.plant.advance(now)
+            if self.left.next_tick <= now:
+                self.left.advance(now)
+            if self.right.next_tick <= now:
+                self.right.advance(now)
+            self._drive_bridge(now)
+            self._drive_interrupts(now)
+
+    # ---- from chip to bridge and CPU ----------------------------------------------------------------------
+
+    def _drive_bridge(self, tick: int) -> None:
+        """L298: EN = PWM magnitude, IN1/IN2 = sign."""
+        if self.left.pwm != self.bridge_enable[0] or self.left.sign != self.bridge_sign[0]:
+            self.bridge_enable[0] = self.left.pwm
+            self.bridge_sign[0] = self.left.sign
+            self.plant.set_bridge(tick, 0, self.left.pwm, 1 - self.left.sign)
+        if self.right.pwm != self.bridge_enable[1] or self.right.sign != self.bridge_sign[1]:
+            self.bridge_enable[1] = self.right.pwm
+            self.bridge_sign[1] = self.right.sign
+            self.plant.set_bridge(tick, 1, self.right.pwm, 1 - self.right.sign)
+
+    def _drive_interrupts(self, tick: int) -> None:
+        """HI of each LM629 to the CPU pins that it is wired to."""
+        index = 0
+        while index < self.hi_count:
+            hi = self.right.hi if self.hi_side[index] else self.left.hi
+            level = hi ^ self.hi_inverted[index]
+            port = self.hi_port[index]
+            mask = 1 << self.hi_bit[index]
+            levels = self.external[port] & (0xFF ^ mask)
+            if level:
+                levels |= mask
+            if levels != self.external[port]:
+                self.external[port] = levels
+                self.cpu.set_external(port, levels, tick)
+            index += 1
+
+    # ---- from CPU to chip ---------------------------------------------------------------------------------
+
+    def port_written(self, port: int, latch: int, tick: int) -> None:
+        """The CPU's port pins changed: carry them to the LM629."""
+        changed = self.bank[port] ^ latch
+        self.bank[port] = latch
+        if changed & self.watched[port]:
+            self.sync(tick)
+            self._drive_chips(tick)
+
+    def movx_write(self, address: int, value: int, tick: int) -> None:
+        """Stores into every output latch that decodes the address."""
+        index = 0
+        changed = False
+        while index < self.latches:
+            if address & self.latch_mask[index] == self.latch_address[index]:
+                changed = changed or self.bank[PORTS + index] != value
+                self.bank[PORTS + index] = value
+            index += 1
+        if changed:
+            self.sync(tick)
+            self._drive_chips(tick)
+
+    def movx_read(self, address: int, tick: int) -> int:
+        """The LM629 data bus if an input buffer decodes the address, else the pulled-up external bus."""
+        index = 0
+        while index < self.buffers:
+            if address & self.buffer_mask[index] == self.buffer_address[index]:
+                return self.bank[self.data_bank] & self.bus_levels
+            index += 1
+        return 0xFF
+
+    def _level(self, index: int) -> int:
+        return (self.bank[self.pin_bank[index]] >> self.pin_bit[index] & 1) ^ self.pin_inverted[index]
+
+    def _drive_chips(self, tick: int) -> None:
+        """Puts the present levels on both chips' pins, then what they answer on the bus."""
+        data = self.bank[self.data_bank]
+        self.left.set_reset(tick, self._level(4))
+        self.right.set_reset(tick, self._level(9))
+        self.left.set_bus(tick, self._level(0), self._level(1), self._level(2), self._level(3), data)
+        self.right.set_bus(tick, self._level(5), self._level(6), self._level(7), self._level(8), data)
+        from_left = self.left.data_out(tick)
+        from_right = self.right.data_out(tick)
+        levels = 0xFF
+        if from_left >= 0:
+            levels &= from_left
+        if from_right >= 0:
+            levels &= from_right
+        self._watch_bus(from_left >= 0 and from_right >= 0, tick)
+        if levels != self.bus_levels:
+            self.bus_levels = levels
+            if self.data_bank < PORTS:
+                self.external[self.data_bank] = levels
+                self.cpu.set_external(self.data_bank, levels, tick)
+        self._drive_bridge(tick)
+        self._drive_interrupts(tick)
+
+    def _watch_bus(self, both_drive: bool, tick: int) -> None:
+        """What the firmware must not do to the LM629: write while busy, read two chips at once."""
+        busy_writes = self.left.writes_while_busy + self.right.writes_while_busy
+        if busy_writes != self.busy_writes:
+            self.busy_writes = busy_writes
+            self.fault(FaultKind.LM629_BUSY, self.cpu.pc, tick)
+        if both_drive and not self.contention:
+            self.fault(FaultKind.BUS_CONTENTION, self.cpu.pc, tick)
+        self.contention = int(both_drive)
+
+    def fault(self, kind: int, pc: int, tick: int) -> None:
+        """Notes a firmware fault; the run ends after this instruction when the scenario says so."""
+        self.fault_count += 1
+        if len(self.faults) < FAULTS_KEPT:
+            self.faults.append(FirmwareFault(FaultKind(kind), tick, pc))
+        if self.stop_on_fault:
+            self.cpu.request_stop()
+
+    # ---- state --------------------------------------------------------------------------------------------
+
+    def snapshot(self) -> dict[str, object]:
+        """All mutable state of the board and of the chips on it."""
+        return {
+            "cpu": self.cpu.snapshot(),
+            "left": self.left.snapshot(),
+            "right": self.right.snapshot(),
+            "plant": self.plant.snapshot(),
+            "bank": bytes(self.bank),
+            "external": bytes(self.external),
+            "bus_levels": self.bus_levels,
+            "bridge_enable": bytes(self.bridge_enable),
+            "bridge_sign": bytes(self.bridge_sign),
+            "fault_count": self.fault_count,
+            "busy_writes": self.busy_writes,
+            "contention": self.contention,
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        """Puts back what `snapshot` gave."""
+        self.cpu.restore(state["cpu"])
+        self.left.restore(state["left"])
+        self.right.restore(state["right"])
+        self.plant.restore(state["plant"])
+        self.bank = bytearray(state["bank"])
+        self.external = bytearray(state["external"])
+        self.bus_levels = state["bus_levels"]
+        self.bridge_enable = bytearray(state["bridge_enable"])
+        self.bridge_sign = bytearray(state["bridge_sign"])
+        self.fault_count = state["fault_count"]
+        self.busy_writes = state["busy_writes"]
+        self.contention = state["contention"]
+
+    def __repr__(self) -> str:
+        return (
+            f"Board({self.wiring.name}, cycle={self.cpu.cycles}, pc={self.cpu.pc:04X}h, "
+            f"left={self.left!r}, right={self.right!r}, faults={self.fault_count})"
+        )

@@ -1,0 +1,128 @@
+"""A board as data: reads a board file and resolves every net to its source.
+
+What belongs here: the form of board files and their errors. What does not: behaviour (`board.py`).
+
+Nets are point to point: an input pin of an LM629 or of the CPU on the left, its source on the right. Sources are
+port pins (`P2.3`), bits of an output latch that MOVX writes (`CTRL.3`), outputs of an LM629 (`left.hi`), straps
+(`slot.0`, `three`), or the constants `0` and `1`; a leading `!` inverts. The data bus of the LM629 is one shared,
+pulled-up bus whose drivers can only pull low.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from importlib import resources
+from pathlib import Path
+
+import msgspec
+
+SIDES = ("left", "right")
+CHIP_INPUTS = ("cs", "rd", "wr", "ps", "rst")
+PORTS = 4
+MAX_LATCHES = 8
+CONSTANT_BANK = PORTS + MAX_LATCHES
+"""Banks of eight levels a chip input can be taken from: four ports, the latches, and one of constant ones."""
+
+_PORT_PIN = re.compile(r"P([0-3])\.([0-7])$")
+
+
+class WiringError(ValueError):
+    """A board file that cannot be built; the message names file, net and remedy."""
+
+
+class Latch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Eight output bits that a MOVX write with `address & mask` equal to `address` stores."""
+
+    name: str
+    address: int
+    mask: int = 0xFFFF
+    initial: int = 0xFF
+
+
+class InputBuffer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Puts the LM629 data bus on the external bus when a MOVX read addresses it."""
+
+    address: int
+    mask: int = 0xFFFF
+
+
+class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A board file as read: clocks, nets and what hangs on the external bus."""
+
+    name: str
+    crystal_hz: int
+    data: str
+    nets: dict[str, str]
+    latch: tuple[Latch, ...] = ()
+    buffer: tuple[InputBuffer, ...] = ()
+
+    def data_bank(self) -> int:
+        """The bank that drives the LM629 data bus."""
+        if re.fullmatch(r"P[0-3]", self.data):
+            return int(self.data[1])
+        return self._latch_bank(self.data, "data")
+
+    def chip_input(self, side: str, pin: str) -> tuple[int, int, int]:
+        """(bank, bit, inverted) that drives an LM629 input."""
+        net = f"{side}.{pin}"
+        if net not in self.nets:
+            raise WiringError(f"{self.name}: nets: {net} is not connected; add a line for it")
+        source = self.nets[net]
+        inverted = int(source.startswith("!"))
+        name = source.lstrip("!")
+        if name in ("0", "1"):
+            return CONSTANT_BANK, 0, inverted ^ int(name == "0")
+        if match := _PORT_PIN.match(name):
+            return int(match[1]), int(match[2]), inverted
+        latch, dot, bit = name.partition(".")
+        if not dot or bit not in tuple("01234567"):
+            raise WiringError(f"{self.name}: nets: {net} = {source!r} is no source of an LM629 input")
+        return self._latch_bank(latch, net), int(bit), inverted
+
+    def cpu_inputs(self) -> list[tuple[int, int, str, int]]:
+        """(port, bit, source, inverted) for every port pin that something outside drives."""
+        inputs = []
+        for net, source in self.nets.items():
+            if match := _PORT_PIN.match(net):
+                inputs.append((int(match[1]), int(match[2]), source.lstrip("!"), int(source.startswith("!"))))
+            elif net.partition(".")[0] not in SIDES or net.partition(".")[2] not in CHIP_INPUTS:
+                raise WiringError(f"{self.name}: nets: {net} is neither a port pin nor an LM629 input")
+        for port, _, source, _ in inputs:
+            if source not in ("left.hi", "right.hi", "slot.0", "slot.1", "slot.2", "three", "0", "1"):
+                raise WiringError(f"{self.name}: nets: {source!r} cannot drive a pin of P{port}")
+            if f"P{port}" == self.data:
+                raise WiringError(
+                    f"{self.name}: nets: P{port} is the data bus, nothing else can drive its pins"
+                )
+        return inputs
+
+    def _latch_bank(self, name: str, net: str) -> int:
+        for index, latch in enumerate(self.latch):
+            if latch.name == name:
+                return PORTS + index
+        raise WiringError(f"{self.name}: {net}: there is no latch called {name!r}")
+
+
+def load_wiring(path: Path | None = None) -> Wiring:
+    """Reads a board file; the MIRO board when no path is given. Raises WiringError naming file and place."""
+    origin = str(path) if path else "miro.toml"
+    try:
+        text = path.read_text("utf-8") if path else _builtin("miro.toml")
+        wiring = msgspec.convert(tomllib.loads(text), Wiring)
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        raise WiringError(f"{origin}: {error}") from error
+    if len(wiring.latch) > MAX_LATCHES:
+        raise WiringError(f"{origin}: latch: {len(wiring.latch)} latches, at most {MAX_LATCHES} fit")
+    if wiring.crystal_hz != 24_000_000:
+        raise WiringError(f"{origin}: crystal_hz: only 24000000 is supported, time is counted in its ticks")
+    wiring.data_bank()
+    wiring.cpu_inputs()
+    for side in SIDES:
+        for pin in CHIP_INPUTS:
+            wiring.chip_input(side, pin)
+    return wiring
+
+
+def _builtin(name: str) -> str:
+    return resources.files("miro_robot.boards").joinpath(name).read_text("utf-8")

@@ -1,0 +1,72 @@
+"""From the keys of a scenario to the objects that they describe.
+
+What belongs here: unit changes and names, nothing else: what a key means stands in `scenario.py`, what an object
+does in its own module.
+"""
+
+from __future__ import annotations
+
+import msgspec
+from miro_host.integrator import Limits
+from miro_host.pilot import Pilot
+from miro_host.reference import Arc, Line, Ramp, Trajectory
+from miro_host.vision import NO_ERRORS, Vision, VisionErrors
+from miro_host.yang_kim import Gains, YangKim
+
+from miro_sim import scenario as sc
+from miro_sim.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_sim.plant.params import DriveParams
+from miro_sim.radio import RadioParams
+
+DEGREE = 0.017453292519943295
+
+
+def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
+    """The reference trajectory in the paper's axes, which start at its own start."""
+    path = robot.reference
+    ramp = Ramp(speed_m_s=path.speed_m_s, ramp_s=path.ramp_s, duration_s=max(duration_s, path.ramp_s))
+    if isinstance(path, sc.LineRef):
+        return Line(ramp, path.heading_deg * DEGREE)
+    return Arc(ramp, path.heading_deg * DEGREE, path.curvature_per_m)
+
+
+def pilot_for(robot: sc.Robot, reference: Trajectory) -> Pilot:
+    """The controller, its integrator and the wheel split."""
+    law = robot.controller
+    gains = Gains(**{name: getattr(law, name) for name in Gains.__struct_fields__})
+    limits = Limits(**{name: getattr(law, name) for name in Limits.__struct_fields__})
+    return Pilot(reference, YangKim(gains), limits, period_s=seconds(CONTROL_PERIOD_TICKS))
+
+
+def vision_for(camera: sc.Camera) -> Vision:
+    """Camera, grabber and tracker."""
+    if camera.noise == "none":
+        errors = msgspec.structs.replace(NO_ERRORS, pixel_m=camera.pixel_cm / 100.0)
+    else:
+        errors = VisionErrors(
+            camera.position_error_cm / 100.0, camera.heading_error_deg * DEGREE, camera.pixel_cm / 100.0
+        )
+    return Vision(errors, camera.delay_frames)
+
+
+def drive_for(robot: sc.Robot, left: float, right: float) -> DriveParams:
+    """The drive with this seed's wheels; `left`, `right` are the draws, uniform in [0, 1)."""
+    spread = robot.wheel_radius_mismatch
+    body = robot.drive.chassis
+    drawn = msgspec.structs.replace(
+        body,
+        left_radius_factor=body.left_radius_factor * (1.0 + spread * (2.0 * left - 1.0)),
+        right_radius_factor=body.right_radius_factor * (1.0 + spread * (2.0 * right - 1.0)),
+    )
+    return msgspec.structs.replace(robot.drive, chassis=drawn)
+
+
+def radio_for(radio: sc.Radio) -> RadioParams:
+    """The air of one network."""
+    return RadioParams.of(
+        latency_s=radio.latency_s,
+        bit_error_rate=radio.bit_error_rate,
+        carrier=radio.carrier,
+        keyup_s=radio.keyup_s,
+        squelch=radio.squelch,
+    )

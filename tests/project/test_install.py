@@ -1,0 +1,93 @@
+"""Building with and without a C compiler, and what happens when source and compiled module drift apart.
+
+A copy of the tree is built in place and run through PYTHONPATH: the same steps as an installation, without a
+package index.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from miro_protocol import engine
+
+ROOT = Path(__file__).parents[2]
+GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
+SOURCES = ("protocol", "robot_fw", "host", "sim")
+
+
+@pytest.fixture
+def tree(tmp_path):
+    """A copy of what an installation builds from, without compiled modules."""
+    copy = tmp_path / "tree"
+    copy.mkdir()
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, copy / name)
+    for name in SOURCES:
+        shutil.copytree(
+            ROOT / name, copy / name, ignore=shutil.ignore_patterns("*.so", "*.pyd", "__pycache__")
+        )
+    return copy
+
+
+def with_compiled_modules(tree):
+    for source in engine.hot_sources(dict.fromkeys(("",), ROOT)).values():
+        built = engine.compiled_file(source)
+        if built is not None and ".venv" not in built.parts and "build" not in built.parts:
+            shutil.copy(built, tree / built.relative_to(ROOT))
+    return tree
+
+
+def python(tree, *arguments, **env):
+    """Runs Python on the copy; -S would lose the dependencies, so the copy only comes first on the path."""
+    path = os.pathsep.join(str(tree / name) for name in SOURCES)
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=tree,
+        env={**os.environ, "PYTHONPATH": path, **env},
+        capture_output=True,
+        text=True,
+    )
+
+
+def run_short(tree, *options):
+    text = (tree / "sim/miro_sim/scenarios/fig6.toml").read_text()
+    lines = ["duration_s = 0.5" if line.startswith("duration_s") else line for line in text.splitlines()]
+    (tree / "short.toml").write_text("\n".join(lines))
+    return python(
+        tree, "-m", "miro_sim.cli", "run", "short.toml", "--seed", "7", "--out", "out", "--quiet", *options
+    )
+
+
+def test_without_a_compiler_the_package_builds_and_gives_the_golden_digest(tree):
+    built = python(tree, "setup.py", "-q", "build_ext", "--inplace", CC="no-such-compiler")
+    assert built.returncode == 0, built.stderr
+    assert not list(tree.rglob("*.so"))
+    done = run_short(tree)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((tree / "out" / "summary.json").read_text())
+    assert summary["engine"] == "python"
+    assert summary["digest"] == json.loads(GOLDEN.read_text())["fig6 0.5 s seed 7"]
+
+
+def test_asking_for_compiled_modules_that_are_not_there_is_an_error_with_a_remedy(tree):
+    done = run_short(tree, "--engine", "compiled")
+    assert done.returncode == 2
+    assert "no compiled module" in done.stderr
+    assert "pip install" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(engine.active() != "compiled", reason="no compiled modules here")
+def test_a_compiled_module_whose_source_has_changed_is_refused(tree):
+    with_compiled_modules(tree)
+    with (tree / "robot_fw/miro_robot/mcs51/cpu.py").open("a") as source:
+        source.write("\n# changed\n")
+    done = run_short(tree)
+    assert done.returncode == 2
+    assert "stale" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert run_short(tree, "--engine", "python", "--force").returncode == 0
