@@ -104,7 +104,6 @@ class Network:
         stopped = False
         for robot in self.robots:
             stopped = robot.board.run(tick) != 0 or stopped
-            robot.board.cpu.txd.settled_tick = tick
         return stopped
 
     def end_period(self, tick: int) -> list[WireRun]:
