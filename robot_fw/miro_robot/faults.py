@@ -22,7 +22,6 @@ class FaultKind(IntEnum):
     LM629_BUSY = 6
     LM629_TIMING = 7
     MAIN_LOOP_STARVED = 8
-    POWER_DOWN = 9
 
 
 DESCRIPTIONS = {
@@ -34,7 +33,6 @@ DESCRIPTIONS = {
     FaultKind.LM629_BUSY: "wrote to an LM629 while it was busy",
     FaultKind.LM629_TIMING: "broke an LM629 bus timing limit",
     FaultKind.MAIN_LOOP_STARVED: "left the main loop no time",
-    FaultKind.POWER_DOWN: "entered power-down, which only a reset leaves",
 }
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 class Bus:
     """A CPU on an empty board. Boards override what they have wired."""
 
-    NOT_STATE = ()
+    NOT_STATE: tuple[str, ...] = ()
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
         """Latch of P0..P3 (`port` 0..3) is now `latch`; the pins follow at `tick`, S1P1 of the next cycle."""

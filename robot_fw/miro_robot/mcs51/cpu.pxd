@@ -8,7 +8,6 @@ cdef long long _FAR
 cdef int _OUTSIDE
 cdef int _MARK
 cdef int _STOP_REQUESTED
-cdef int _POWER_DOWN
 cdef int _P0, _SP, _DPL, _DPH, _PCON, _P1, _P2, _P3
 cdef int _IE, _IP, _PSW, _ACC, _B
 cdef int _SMOD, _PD, _IDL
@@ -30,6 +29,8 @@ cdef class Cpu(Executor):
     @cython.locals(address=int)
     cpdef load(self, bytes image, used=*)
     cpdef int write_code(self, int address, int value) except -1
+    cpdef is_loaded(self, int address)
+    cpdef int code_at(self, int address) noexcept
     @cython.locals(now='long long', port=int)
     cpdef reset(self)
     cpdef int step(self) except -1
@@ -37,6 +38,7 @@ cdef class Cpu(Executor):
     cpdef int run_until_pc(self, int address, long long until_cycle) except -1
     cpdef request_stop(self)
     cpdef int set_external(self, int port, int levels, long long tick) except -1
+    cpdef asleep(self)
     cpdef int peek_iram(self, int address) noexcept
     cpdef int sfr(self, int address) except -1
     @cython.locals(now='long long')

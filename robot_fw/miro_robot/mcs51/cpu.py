@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from miro_robot.faults import FaultKind
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.execute import BREAKPOINT, REACHED, STOPPED, Executor
 from miro_robot.mcs51.peripherals import Peripherals
@@ -20,7 +19,6 @@ _FAR = 1 << 62
 _OUTSIDE = 0xFE
 _MARK = 0xFF  # breakpoint
 _STOP_REQUESTED = 1
-_POWER_DOWN = int(FaultKind.POWER_DOWN)
 _P0, _SP, _DPL, _DPH, _PCON, _P1, _P2, _P3 = 0x80, 0x81, 0x82, 0x83, 0x87, 0x90, 0xA0, 0xB0
 _IE, _IP, _PSW, _ACC, _B = 0xA8, 0xB8, 0xD0, 0xE0, 0xF0
 _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
@@ -86,6 +84,13 @@ class Cpu(Executor):
             self.rom[0x10000 + address] = value
         self.rows[address] = self.row_of[value]
 
+    def is_loaded(self, address: int) -> bool:
+        """Whether executing at `address` is legal."""
+        return self.rows[address & 0xFFFF] != _OUTSIDE
+
+    def code_at(self, address: int) -> int:
+        return self.rom[address & 0xFFFF]
+
     @property
     def code(self) -> bytes:
         """The 64 KB of code memory."""
@@ -139,6 +144,12 @@ class Cpu(Executor):
             self.limit = 0
 
     # Observers
+
+    def asleep(self) -> bool:
+        """Whether only a reset or a new input can make it execute another instruction."""
+        if self.powered_down:
+            return True
+        return bool(self.idle) and self.chip.next_event(self.cycles) == _FAR
 
     def peek_iram(self, address: int) -> int:
         """A byte of internal RAM (0..255)."""
@@ -295,7 +306,6 @@ class Cpu(Executor):
             self.chip.sync(self.cycles)
             self.chip.frozen = 1
             self.powered_down = 1
-            self.fault(_POWER_DOWN)
         elif value & _IDL:
             self.idle = 1
         self.next_event = 0

@@ -17,6 +17,8 @@ cdef int _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2
 cdef int _TF2, _RCLK, _TCLK
 cdef int _S5P2
 cdef int _SERIAL, _TIMER2
+cdef int _REN
+cdef long long _NO_PERIOD
 
 cdef class Peripherals:
     cdef Bus bus
@@ -32,6 +34,7 @@ cdef class Peripherals:
     cdef int p3
     cdef public int frozen
     cdef int pulsed
+    cdef readonly long long p3_reads
 
     cpdef int clear(self, long long cycle) except -1
     cpdef int sync(self, long long cycle) except -1
@@ -59,6 +62,7 @@ cdef class Peripherals:
     cpdef int pin_levels(self, int port, long long cycle) except -1
     cpdef int read(self, int address, long long cycle) except -1
     cpdef int write(self, int address, int value, long long cycle) except -1
+    cpdef long long bit_ticks(self) noexcept
     cdef int write_smod(self, int smod, long long cycle) except -1
     cdef int write_port(self, int port, int value, long long cycle) except -1
     cdef void taken(self, int source, long long cycle) noexcept

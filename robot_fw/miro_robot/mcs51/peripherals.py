@@ -26,6 +26,8 @@ _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2 = 0xC8, 0xC9, 0xCA, 0xCB, 0xCC, 0xC
 _TF2, _RCLK, _TCLK = 0x80, 0x20, 0x10
 _S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows
 _SERIAL, _TIMER2 = 0x10, 0x20  # in IE
+_REN = 0x10  # in SCON
+_NO_PERIOD = 1 << 40  # of a clock that stands
 
 
 class Peripherals:
@@ -47,6 +49,7 @@ class Peripherals:
         self.p3 = 0xFF
         self.frozen = 0  # power-down: the oscillator stands
         self.pulsed = 0  # a timer that counts a pin clocks the serial port
+        self.p3_reads = 0  # how often the pins of P3 were read: whether software listens on RXD itself
 
     def clear(self, cycle: int) -> None:
         """Reset: all registers but the port latches, which `Cpu` writes."""
@@ -213,6 +216,7 @@ class Peripherals:
         levels = self.ports.level(port)
         if port == 3:
             tick = 12 * cycle + _S5P2
+            self.p3_reads += 1
             self.sync(cycle + 1)
             levels &= (
                 0xFC | (self.uart.level(tick) & self.shift.data.level_at(tick)) | (self.uart.tx_level << 1)
@@ -296,6 +300,12 @@ class Peripherals:
             self.timer2.count = (self.timer2.count & 0x00FF) | (value << 8)
         self.clock_serial()
 
+    def bit_ticks(self) -> int:
+        """Length of a bit that the receiver expects, 0 while it is off or has no regular clock."""
+        if not self.uart.scon & _REN or self.uart.mode() == 0 or self.uart.rx_period >= _NO_PERIOD:
+            return 0
+        return 16 * self.uart.rx_period
+
     def write_smod(self, smod: int, cycle: int) -> None:
         self.sync(cycle)
         self.smod = smod
@@ -329,6 +339,7 @@ class Peripherals:
             "p1": self.p1,
             "p3": self.p3,
             "frozen": self.frozen,
+            "p3_reads": self.p3_reads,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -343,6 +354,7 @@ class Peripherals:
         self.p1 = state["p1"]
         self.p3 = state["p3"]
         self.frozen = state["frozen"]
+        self.p3_reads = state["p3_reads"]
         self.pulsed = 0
         if self.uart.mode() & 1:
             self.pulsed = self.timers.counts_pin(1) | (1 if self.timer2.counts_pin() else 0)

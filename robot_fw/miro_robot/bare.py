@@ -1,0 +1,203 @@
+"""A bare board for `mirotwin fw run`: the CPU, 64 KB of external RAM, a terminal on the serial port.
+
+What belongs here: running an image to an address, a limit or its end, feeding its serial input, and dumping
+its memory. The robot's board with its motion controllers is `board.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Any
+
+from miro_robot.faults import FaultKind, FirmwareFault
+from miro_robot.image import Image
+from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
+from miro_robot.mcs51.line import FAR
+from miro_robot.mcs51.xram import XramBus
+
+CRYSTAL_HZ = 24_000_000
+_SLICE = 200_000  # cycles between two looks at the world when nothing is to be fed
+_LISTENING_SLICE = 1_000  # ... while input waits for somebody to listen
+_POLLS = 32  # reads of P3 within such a slice that count as listening on RXD
+_MARGIN_TICKS = 240  # the CPU may look this far beyond the end of a run
+_FAULTS_KEPT = 100
+_RI = 0x01
+_SJMP_SELF = b"\x80\xfe"
+_CHARACTER_BITS = 10
+
+
+class Ended(StrEnum):
+    """Why a run ended."""
+
+    UNTIL = "until"  # the address asked for is next
+    CYCLES = "cycles"  # the limit is reached
+    FAULT = "fault"
+    HALTED = "halted"  # nothing can ever make it go on: SJMP to itself or asleep, with no interrupt to come
+
+
+class BareMachine:
+    """One AT89C52 with RAM and a terminal.
+
+    `stdin` is sent to the serial port byte by byte: the first as soon as the receiver is on, or software
+    polls P3 for a start bit; each next one when RI of the one before was cleared. The rate is the one the
+    receiver is programmed for, or `baud`, which also serves a program that measures its first character.
+    `output` gets the characters sent. With `code_in_xram`, program and data share one 64 KB space (EA low).
+    """
+
+    NOT_STATE = ("image", "output", "stop_on_fault")
+
+    def __init__(
+        self,
+        image: Image,
+        code_in_xram: bool = False,
+        stdin: bytes = b"",
+        baud: int | None = None,
+        output: Callable[[bytes], object] | None = None,
+        stop_on_fault: bool = True,
+    ) -> None:
+        if baud is not None and not 50 <= baud <= 750_000:
+            raise ValueError(f"baud {baud} is outside 50..750000")
+        self.image = image
+        self.output = output
+        self.stop_on_fault = stop_on_fault
+        self.faults: list[FirmwareFault] = []
+        self.stdin = stdin
+        self.baud = baud
+        self.fed = 0  # bytes of stdin sent so far
+        self.char_end = 0  # tick at which the last of them ends
+        self.polls = 0  # reads of P3 seen so far
+        self.bus = XramBus(self._sent, self._faulted)
+        self.cpu = Cpu(self.bus)
+        self.cpu.load(image.code, image.used)
+        if code_in_xram:
+            self.bus.fill(image.code)
+            self.bus.code_of = self.cpu
+
+    def run(
+        self,
+        until: int | None = None,
+        max_cycles: int | None = None,
+        progress: Callable[[int], object] | None = None,
+    ) -> Ended:
+        """Until the instruction at `until` is next, or `cycles` >= `max_cycles`, or a fault, or a dead end.
+
+        `progress` is called with the cycle count every now and then.
+        """
+        limit = FAR if max_cycles is None else max_cycles
+        faults = len(self.faults)
+        while True:
+            if self.cpu.cycles >= limit:
+                return Ended.CYCLES
+            end = min(self._feed(), limit)
+            reason = self.cpu.run(end) if until is None else self.cpu.run_until_pc(until, end)
+            if reason == BREAKPOINT:
+                return Ended.UNTIL
+            if self.stop_on_fault and len(self.faults) > faults:
+                return Ended.FAULT
+            if self._halted():
+                return Ended.HALTED
+            if progress is not None:
+                progress(self.cpu.cycles)
+
+    def dump(self) -> dict[str, object]:
+        """Registers and memories; SFRs by two hex digits, ports at their latches."""
+        cpu = self.cpu
+        return {
+            "pc": cpu.pc,
+            "cycles": cpu.cycles,
+            "instructions": cpu.instructions,
+            "iram_hex": bytes(cpu.peek_iram(address) for address in range(0x100)).hex(),
+            "sfr": {f"{address:02x}": cpu.sfr(address) for address in range(0x80, 0x100)},
+            "xram_hex": self.bus.content().hex(),
+        }
+
+    def _sent(self, value: int, tick: int) -> None:
+        if self.output is not None:
+            self.output(bytes([value]))
+
+    def _faulted(self, kind: int, pc: int, tick: int) -> None:
+        if len(self.faults) < _FAULTS_KEPT:
+            symbol = self.image.symbols.name_at(pc)
+            self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol))
+        if self.stop_on_fault:
+            self.cpu.request_stop()
+
+    def _halted(self) -> bool:
+        """Nothing is being sent or waits to be received, and no instruction will ever change a thing."""
+        cpu = self.cpu
+        if self.fed < len(self.stdin) or 12 * cpu.cycles < self.char_end or cpu.chip.uart.ti_tick() < FAR:
+            return False
+        if cpu.asleep():
+            return True
+        looping = cpu.code_at(cpu.pc) == _SJMP_SELF[0] and cpu.code_at(cpu.pc + 1) == _SJMP_SELF[1]
+        return looping and not cpu.sfr(0xA8) & 0x80
+
+    def _feed(self) -> int:
+        """Puts the next character on RXD if it is time, and says how far to run now."""
+        now = self.cpu.cycles
+        rxd = self.cpu.rxd
+        if self.fed == len(self.stdin):
+            rxd.settled_tick = FAR
+            return now + _SLICE
+        if 12 * now >= self.char_end and self._listening():
+            self._send(self.stdin[self.fed], 12 * now + _MARGIN_TICKS)
+            self.fed += 1
+        end = now + _LISTENING_SLICE
+        rxd.settled_tick = 12 * end + _MARGIN_TICKS
+        return end
+
+    def _listening(self) -> bool:
+        """Whether a character sent now would be heard: by the receiver with RI down, or by software
+        polling.
+        """
+        reads = self.cpu.chip.p3_reads
+        polling = reads - self.polls >= _POLLS
+        self.polls = reads
+        if self.cpu.chip.bit_ticks():
+            return not self.cpu.sfr(0x98) & _RI
+        return polling and self.baud is not None
+
+    def _send(self, value: int, start: int) -> None:
+        """Start bit, eight data bits, stop bit."""
+        bits = value << 1 | 1 << (_CHARACTER_BITS - 1)
+        for number in range(_CHARACTER_BITS):
+            self.cpu.rxd.append(start + self._bit_offset(number), bits >> number & 1)
+        self.char_end = start + self._bit_offset(_CHARACTER_BITS)
+
+    def _bit_offset(self, number: int) -> int:
+        """Ticks from the start of a character to its bit `number`."""
+        if self.baud is None:
+            return number * self.cpu.chip.bit_ticks()
+        return (2 * number * CRYSTAL_HZ + self.baud) // (2 * self.baud)
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "cpu": self.cpu.snapshot(),
+            "bus": self.bus.snapshot(),
+            "loaded": bytes(self.cpu.is_loaded(address) for address in range(0x10000)),
+            "faults": [(int(fault.kind), fault.tick, fault.pc) for fault in self.faults],
+            "stdin": self.stdin,
+            "baud": self.baud,
+            "fed": self.fed,
+            "char_end": self.char_end,
+            "polls": self.polls,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.bus.restore(state["bus"])
+        self.cpu.load(self.image.code, ())
+        code = self.bus.content() if self.bus.code_of is not None else self.image.code
+        for address, loaded in enumerate(state["loaded"]):
+            if loaded:
+                self.cpu.write_code(address, code[address])
+        self.cpu.restore(state["cpu"])
+        names = self.image.symbols
+        self.faults = [
+            FirmwareFault(FaultKind(k), tick, pc, names.name_at(pc)) for k, tick, pc in state["faults"]
+        ]
+        self.stdin = state["stdin"]
+        self.baud = state["baud"]
+        self.fed = state["fed"]
+        self.char_end = state["char_end"]
+        self.polls = state["polls"]
