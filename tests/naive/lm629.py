@@ -1,0 +1,471 @@
+"""A slow, obvious LM629: the same rules as `miro_robot.lm629`, put down a second time in another shape.
+
+Positions are fractions of a count, the stopping distance is added up term by term, commands are generators
+that wait for their words, the encoder is sampled clock by clock. It shares nothing with the package but its
+options.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from fractions import Fraction
+
+from miro_robot.lm629.options import Lm629Options
+
+from tests.naive.lm629_encoder import NaiveEncoder
+
+Words = Generator[None, int, None]
+LSB = Fraction(1, 65536)
+HIGH_WORD_READS = {0x07: 2, 0x08: 2, 0x09: 2, 0x0A: 2, 0x0B: 1, 0x0C: 1, 0x0D: 1}
+INTERRUPTS = range(1, 7)
+
+
+def modular(value: int, bits: int) -> int:
+    """Two's complement of `bits` bits."""
+    value %= 1 << bits
+    return value - (1 << bits) if value >= 1 << (bits - 1) else value
+
+
+def between(low: int, value: int, high: int) -> int:
+    return sorted((low, value, high))[1]
+
+
+def stopping_distance(speed: int, acceleration: int) -> int | float:
+    """In LSBs: speed + (speed - a) + (speed - 2a) + ... down to the last that is not negative."""
+    if speed == 0:
+        return 0
+    if acceleration == 0:
+        return math.inf
+    terms = range(speed, -1, -acceleration)
+    if len(terms) > 5000:
+        return len(terms) * (terms[0] + terms[-1]) // 2
+    return sum(terms)
+
+
+def profile_speed(v: int, a: int, limit: int, distance: Fraction) -> int:
+    """The new speed towards the target (steps 4 and 5 of the algorithm), all speeds in LSBs."""
+    if v < 0:
+        return min(v + a, 0)
+    up = min(v + a, limit) if v < limit else max(v - a, limit)
+    if stopping_distance(up, a) * LSB <= distance:
+        return up
+    if up >= v and stopping_distance(v, a) * LSB <= distance:
+        return v
+    return max(v - a, 0)
+
+
+class NaivePid:
+    def __init__(self, saturates: bool) -> None:
+        self.kp = self.ki = self.kd = self.il = self.ds = 0
+        self.saturates = saturates
+        self.forget()
+
+    def forget(self) -> None:
+        self.errors: list[int] = []
+        self.sum = self.last_taken = self.held = self.integral = 0
+        self.until_next = 0
+
+    def load(self, kp: int, ki: int, kd: int, il: int, ds: int) -> None:
+        self.kp, self.ki, self.kd, self.il, self.ds = kp, ki, kd, il, ds
+        self.until_next = 0
+
+    def fit(self, value: int) -> int:
+        return between(-32768, value, 32767) if self.saturates else modular(value, 16)
+
+    def step(self, error: int) -> int:
+        e = between(-32768, error, 32767)
+        self.sum = between(-(2**23), self.sum + e, 2**23 - 1)
+        self.integral = between(-self.il, self.fit(self.ki * math.floor(Fraction(self.sum, 256))), self.il)
+        if self.until_next == 0:
+            self.held = self.fit(self.kd * between(-32768, e - self.last_taken, 32767))
+            self.last_taken = e
+            self.until_next = self.ds + 1
+        self.until_next -= 1
+        return self.fit(self.fit(self.kp * e) + self.integral + self.held)
+
+
+class NaiveLm629:
+    """Same inputs as the chip. `run_to(tick)` does what is due by then; outputs are asked for by tick."""
+
+    def __init__(self, options: Lm629Options) -> None:
+        self.options = options
+        self.encoder = NaiveEncoder(options.filter_clocks, hurry=True)
+        self.pins = {"cs": 1, "rd": 1, "wr": 1, "ps": 1, "data": 0xFF}
+        self.rst = 1
+        self.rst_fell = 0
+        self.threshold = 0x7FFF
+        self.lost = 0
+        self.port_byte = 0
+        self.driven = 0
+        self.alive_at: int | None = None
+        self.clear("hard")
+
+    def clear(self, reset: str) -> None:
+        self.reset: str | None = reset
+        self.pid = NaivePid(self.options.pid_saturates)
+        self.buffer = {"control": 0, "a": 0, "v": 0, "p": 0}
+        self.relative = self.newer_position = False
+        self.filter = {"kp": 0, "ki": 0, "kd": 0, "il": 0, "ds": 0}
+        self.start: dict[str, int] | None = None
+        self.start_relative = False
+        self.update: dict[str, int] | None = None
+        self.signals: set[int] = set()
+        self.mask: set[int] = set()
+        self.real = self.velocity_counts = self.index_position = 0
+        self.desired = Fraction(0)
+        self.speed = self.a = self.limit = self.target = 0
+        self.activity = "none"
+        self.mode_bits = 0
+        self.breakpoint: tuple[int, int] | None = None
+        self.magnitude = self.sign = 0
+        self.busy_until = 0
+        self.words: Words | None = None
+        self.answer = b""
+        self.half: int | None = None
+        self.strobe = ""
+        self.strobe_counts = "no"
+        self.encoder.drop()
+
+    # -------------------------------------------------------------------------------------- time
+
+    def run_to(self, tick: int) -> None:
+        while self.alive_at is not None:
+            if self.reset and self.alive_at <= tick:
+                self.reset = None
+                self.next_sample = self.alive_at + 8192
+                self.encoder.run_to(self.alive_at)
+                self.clear_after_reset()
+            elif not self.reset and self.next_sample <= tick:
+                self.sample(self.next_sample)
+                self.next_sample += 8192
+            else:
+                return
+
+    def clear_after_reset(self) -> None:
+        self.encoder.drop()
+        self.mask = {1, 2, 3, 4, 5}
+        self.signals = {8, 7}
+        self.flag(2)
+
+    def flag(self, bit: int) -> None:
+        if bit not in self.signals and bit in self.mask:
+            self.signals.add(15)
+        self.signals.add(bit)
+
+    def sample(self, tick: int) -> None:
+        events: set[int] = set()
+        counts, index = self.encoder.take(tick)
+        if index is not None:
+            self.index_position = modular(self.real + index, 31)
+            self.signals.discard(0)
+            events.add(3)
+        self.velocity_counts = counts
+        if self.real + counts != modular(self.real + counts, 31):
+            events.add(4)
+        self.real = modular(self.real + counts, 31)
+        if 7 in self.signals:
+            self.stand_at_real()
+        if self.start is not None:
+            self.begin_motion(events)
+        if self.update is not None:
+            self.pid.load(**self.update)
+            self.update = None
+            self.signals.discard(13)
+        drive = 0
+        if 7 not in self.signals:
+            self.profile(events)
+            error = modular(math.floor(self.desired) - self.real, 31)
+            if abs(error) > self.threshold:
+                events.add(5)
+                if 9 in self.signals:
+                    self.signals.add(7)
+                    events.add(2)
+            if 7 not in self.signals:
+                drive = self.pid.step(error)
+        if 7 in self.signals:
+            self.stand_at_real()
+            self.pid.forget()
+        top = math.floor(Fraction(drive, 256))
+        self.sign, self.magnitude = int(top < 0), min(127, abs(top))
+        if self.breakpoint is not None:
+            place, side = self.breakpoint
+            if self.real == place or (self.real > place) - (self.real < place) != side:
+                events.add(6)
+                self.breakpoint = None
+        for bit in sorted(events):
+            self.flag(bit)
+
+    def stand_at_real(self) -> None:
+        self.desired = Fraction(self.real)
+        self.speed = 0
+        self.activity = "none"
+
+    def begin_motion(self, events: set[int]) -> None:
+        assert self.start is not None
+        bases = {
+            "real": self.real,
+            "desired": math.floor(self.desired),
+            "target": math.floor(self.desired) if self.mode_bits & 0x0800 else self.target,
+        }
+        self.target = self.start["p"]
+        if self.start_relative:
+            self.target = modular(self.target + bases[self.options.relative_base], 31)
+        if not self.newer_position:
+            self.buffer["p"], self.relative = self.target, False
+        self.a, self.limit = self.start["a"], self.start["v"]
+        control = self.start["control"]
+        self.mode_bits = control & 0x1800
+        self.signals -= {7, 10, 11, 12}
+        self.signals |= {bit for bit in (11, 12) if control >> bit & 1}
+        self.start = None
+        if control & 0x0100:
+            self.signals.add(7)
+            events.add(2)
+        elif control & 0x0200:
+            self.target = self.real
+            self.arrive(events)
+        else:
+            self.activity = "stop" if control & 0x0400 else "velocity" if control & 0x0800 else "position"
+
+    def arrive(self, events: set[int]) -> None:
+        self.desired = Fraction(self.target)
+        self.speed = 0
+        self.activity = "none"
+        self.signals.add(10)
+        events.add(2)
+
+    def move(self, speed: int, events: set[int]) -> None:
+        self.speed = speed
+        self.desired += speed * LSB
+        wrapped = modular(math.floor(self.desired), 31)
+        if wrapped != math.floor(self.desired):
+            events.add(4)
+            self.desired += wrapped - math.floor(self.desired)
+
+    def profile(self, events: set[int]) -> None:
+        if self.activity in ("velocity", "stop"):
+            goal = 0 if self.activity == "stop" else self.limit * (1 if self.mode_bits & 0x1000 else -1)
+            self.move(between(self.speed - self.a, goal, self.speed + self.a), events)
+            if self.activity == "stop" and self.speed == 0:
+                self.target = math.floor(self.desired)
+                self.arrive(events)
+        elif self.activity == "position":
+            left = self.target - self.desired
+            if left == 0 and self.speed == 0:
+                self.arrive(events)
+                return
+            s = 1 if left > 0 or (left == 0 and self.speed > 0) else -1
+            v, distance = s * self.speed, abs(left)
+            if 0 <= v <= self.a and distance <= min(self.a, self.limit) * LSB:
+                self.arrive(events)
+            else:
+                self.move(s * profile_speed(v, self.a, self.limit, distance), events)
+
+    # -------------------------------------------------------------------------------------- pins
+
+    def set_reset(self, tick: int, level: int) -> None:
+        self.run_to(tick)
+        if self.rst and not level:
+            self.rst_fell = tick
+            self.threshold = 0x7FFF
+            self.alive_at = None
+            self.clear("hard")
+        elif level and not self.rst and tick - self.rst_fell >= 4 * self.options.reset_pulse_clocks:
+            self.alive_at = math.ceil(Fraction(tick, 4)) * 4 + 4 * self.options.reset_clocks
+        self.rst = level
+
+    def set_encoder(self, tick: int, a: int, b: int) -> None:
+        self.encoder.set_phases(tick, a, b)
+
+    def set_index(self, tick: int, level: int) -> None:
+        self.encoder.set_index(tick, level)
+
+    def set_bus(self, tick: int, cs: int, rd: int, wr: int, ps: int, data: int) -> None:
+        self.run_to(tick)
+        flags = self.status_at(tick) & 0xFE
+        new = "write" if not cs and not wr else "read" if not cs and not rd else ""
+        old = "write" if not self.pins["cs"] and not self.pins["wr"] else ""
+        old = old or ("read" if not self.pins["cs"] and not self.pins["rd"] else "")
+        before = self.pins
+        self.pins = {"cs": cs, "rd": rd, "wr": wr, "ps": ps, "data": data}
+        ends = bool(old) and new != old
+        late = self.strobe_ends(tick, old, before) if ends else None
+        if new and new != old:
+            self.strobe_begins(tick, new, flags)
+        if late is not None:
+            late()
+
+    def strobe_begins(self, tick: int, kind: str, flags: int) -> None:
+        busy = self.status_at(tick) & 1 or self.reset is not None
+        if kind == "write":
+            self.strobe_counts = "no" if busy else "yes"
+            self.lost += bool(busy)
+        elif self.pins["ps"] == 0:
+            self.strobe_counts = "no"
+            self.driven = int(self.reset == "soft") if self.reset else flags | self.status_at(tick) & 1
+        else:
+            self.strobe_counts = "no" if busy else "yes" if self.answer else "error"
+            self.driven = self.answer[0] if self.answer and not busy else self.port_byte
+
+    def strobe_ends(self, tick: int, kind: str, pins: dict[str, int]) -> Callable[[], None]:
+        """What the end of a strobe does to the port at once; returns what it does to the chip."""
+        if self.strobe_counts == "no":
+            return lambda: None
+        if self.strobe_counts == "error":
+            return lambda: self.flag(1)
+        if kind == "read":
+            self.answer = self.answer[1:]
+            self.port_byte = self.driven
+            if len(self.answer) % 2 == 0:
+                self.busy_until = tick + 4 * self.options.busy_clocks
+            return lambda: None
+        if pins["ps"] == 0:
+            unfinished = self.words is not None or bool(self.answer)
+            self.words, self.half, self.answer = None, None, b""
+            self.busy_until = tick + 4 * self.options.busy_clocks
+            return lambda: self.command(tick, pins["data"], unfinished)
+        if self.words is None:
+            return lambda: self.flag(1)
+        self.port_byte = pins["data"]
+        if self.half is None:
+            self.half = pins["data"]
+            return lambda: None
+        word, self.half = self.half << 8 | pins["data"], None
+        self.busy_until = tick + 4 * self.options.busy_clocks
+        return lambda: self.give(word)
+
+    def give(self, word: int) -> None:
+        assert self.words is not None
+        try:
+            self.words.send(word)
+        except StopIteration:
+            self.words = None
+
+    def data_out(self, tick: int) -> int:
+        reading = not self.pins["cs"] and not self.pins["rd"] and self.pins["wr"]
+        return self.driven if reading else -1
+
+    def status_at(self, tick: int) -> int:
+        if self.reset:
+            return int(self.reset == "soft")
+        return sum(1 << bit for bit in self.signals if 0 < bit < 8) | (tick < self.busy_until)
+
+    def signals_word(self) -> int:
+        return sum(1 << bit for bit in self.signals)
+
+    def pwm_at(self, tick: int) -> int:
+        if self.reset or self.alive_at is None:
+            return 0
+        return int((tick - self.next_sample) % 2048 < 16 * self.magnitude)
+
+    # -------------------------------------------------------------------------------------- commands
+
+    def command(self, tick: int, opcode: int, unfinished: bool) -> None:
+        if unfinished:
+            self.flag(1)
+        words: dict[int, Callable[[], Words]] = {
+            0x1A: lambda: self.load_threshold(stop=True),
+            0x1B: lambda: self.load_threshold(stop=False),
+            0x1C: self.mask_interrupts,
+            0x1D: self.reset_interrupts,
+            0x1E: self.load_filter,
+            0x1F: self.load_trajectory,
+            0x20: lambda: self.set_breakpoint(0),
+            0x21: lambda: self.set_breakpoint(self.target),
+        }
+        if opcode in words:
+            self.words = words[opcode]()
+            next(self.words)
+        elif opcode in HIGH_WORD_READS:
+            length = 2 * HIGH_WORD_READS[opcode]
+            self.answer = (self.reading(opcode) % (1 << 8 * length)).to_bytes(length, "big")
+        elif opcode == 0x00:
+            self.alive_at = math.ceil(Fraction(tick, 4)) * 4 + 4 * self.options.reset_clocks
+            self.clear("soft")
+        elif opcode == 0x01:
+            self.start_motion()
+        elif opcode == 0x02:
+            self.desired = self.home(self.desired)
+            self.target = modular(self.target - self.real, 31)
+            self.real = 0
+        elif opcode == 0x03:
+            self.signals.add(0)
+            self.encoder.arm(tick)
+        elif opcode == 0x04:
+            self.update = dict(self.filter)
+            self.signals.add(13)
+        elif opcode not in (0x05, 0x06):
+            self.flag(1)
+
+    def home(self, position: Fraction) -> Fraction:
+        moved = position - self.real
+        return moved + modular(math.floor(moved), 31) - math.floor(moved)
+
+    def reading(self, opcode: int) -> int:
+        limited_sum = between(-self.pid.il, math.floor(Fraction(self.pid.sum, 256)), self.pid.il)
+        return {
+            0x07: self.speed,
+            0x08: math.floor(self.desired),
+            0x09: self.index_position,
+            0x0A: self.real,
+            0x0B: self.velocity_counts,
+            0x0C: self.signals_word(),
+            0x0D: self.pid.integral if self.options.sum_reading == "term" else limited_sum,
+        }[opcode]
+
+    def start_motion(self) -> None:
+        in_motion = not self.signals & {7, 10}
+        if 14 in self.signals and in_motion and not self.buffer["control"] & 0x0700:
+            self.flag(1)
+            return
+        self.start = dict(self.buffer)
+        self.start_relative = self.relative
+        self.buffer["control"] &= 0x1800
+        self.newer_position = False
+        self.signals.discard(14)
+
+    def load_threshold(self, stop: bool) -> Words:
+        self.threshold = (yield) & 0x7FFF
+        self.signals.discard(9)
+        if stop:
+            self.signals.add(9)
+
+    def mask_interrupts(self) -> Words:
+        word = yield
+        self.mask = {bit for bit in INTERRUPTS if word >> bit & 1}
+
+    def reset_interrupts(self) -> Words:
+        word = yield
+        self.signals -= {15} | {bit for bit in INTERRUPTS if not word >> bit & 1}
+
+    def load_filter(self) -> Words:
+        control = yield
+        self.filter["ds"] = control >> 8
+        for bit, name in ((3, "kp"), (2, "ki"), (1, "kd"), (0, "il")):
+            if control >> bit & 1:
+                self.filter[name] = (yield) & 0x7FFF
+
+    def load_trajectory(self) -> Words:
+        control = yield
+        self.buffer["control"] = control & 0x1F00
+        for bit, name, working in ((5, "a", self.a), (3, "v", self.limit), (1, "p", 0)):
+            if not control >> bit & 1:
+                continue
+            high = yield
+            value = high << 16 | (yield)
+            relative = bool(control >> bit - 1 & 1)
+            if name == "p":
+                self.buffer["p"] = modular(value, 31)
+                self.relative, self.newer_position = relative, True
+            else:
+                working = self.a if name == "a" else self.limit
+                self.buffer[name] = (value + (working if relative else 0)) % 2**30
+            if name == "a":
+                self.signals.add(14)
+
+    def set_breakpoint(self, base: int) -> Words:
+        high = yield
+        low = yield
+        place = modular(base + (high << 16 | low), 31)
+        self.breakpoint = (place, (self.real > place) - (self.real < place))

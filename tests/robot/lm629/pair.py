@@ -1,0 +1,72 @@
+"""The chip and its slow twin on one bench, compared after every step."""
+
+from __future__ import annotations
+
+from miro_robot.lm629.chip import Lm629
+from miro_robot.lm629.options import Lm629Options
+
+from tests.naive.lm629 import NaiveLm629
+
+
+class Pair:
+    """Looks like a chip to a `Bench`."""
+
+    def __init__(self, options: Lm629Options) -> None:
+        self.chip = Lm629(options)
+        self.naive = NaiveLm629(options)
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.chip, name)
+
+    def compare(self, tick: int) -> None:
+        chip, naive = self.chip, self.naive
+        ours = {
+            "status": chip.status_at(tick),
+            "signals": chip.signals.word,
+            "hi": chip.hi,
+            "pwm": chip.pwm,
+            "sign": chip.sign,
+            "magnitude": chip.pwm_magnitude,
+            "data": chip.data_out(tick),
+            "lost": chip.writes_while_busy,
+            "real": (chip.real_position, chip.real_velocity, chip.index_position),
+            "desired": (chip.trajectory.position, chip.desired_velocity),
+            "integral": chip.pid.integral,
+        }
+        theirs = {
+            "status": naive.status_at(tick),
+            "signals": naive.signals_word(),
+            "hi": naive.signals_word() >> 15,
+            "pwm": naive.pwm_at(tick),
+            "sign": naive.sign,
+            "magnitude": naive.magnitude,
+            "data": naive.data_out(tick),
+            "lost": naive.lost,
+            "real": (naive.real, naive.velocity_counts, naive.index_position),
+            "desired": (naive.desired * 65536, naive.speed),
+            "integral": naive.pid.integral,
+        }
+        assert ours == theirs, f"at tick {tick}"
+
+    def advance(self, tick: int) -> None:
+        self.chip.advance(tick)
+        self.naive.run_to(tick)
+        self.compare(tick)
+
+    def set_bus(self, tick: int, cs: int, rd: int, wr: int, ps: int, data: int) -> None:
+        self.chip.set_bus(tick, cs, rd, wr, ps, data)
+        self.naive.set_bus(tick, cs, rd, wr, ps, data)
+        self.compare(tick)
+
+    def set_reset(self, tick: int, level: int) -> None:
+        self.chip.set_reset(tick, level)
+        self.naive.set_reset(tick, level)
+        self.compare(tick)
+
+    def set_encoder(self, tick: int, a: int, b: int) -> None:
+        self.chip.set_encoder(tick, a, b)
+        self.naive.set_encoder(tick, a, b)
+
+    def set_index(self, tick: int, level: int) -> None:
+        self.chip.set_index(tick, level)
+        self.naive.set_index(tick, level)
