@@ -2,6 +2,9 @@
 cimport cython
 from miro_host cimport dmath
 
+cdef int MAX_TICKS
+cdef double TICK_S
+
 @cython.final
 cdef class Winding:
     cdef public double current_a

@@ -68,6 +68,8 @@ class Winding:
 
     def step(self, ticks: int, emf_v: float) -> float:
         """Advances by 1..2048 ticks with the back-EMF held; returns the charge that passed, in A * ticks."""
+        if ticks < 1 or ticks > MAX_TICKS:
+            raise ValueError(f"an interval lasts 1..2048 ticks, got {ticks}")
         start = self.current_a
         if start == 0.0 and self.up_v <= emf_v <= self.down_v:
             return 0.0  # blocked
@@ -118,5 +120,5 @@ class Winding:
         self.set_bridge(1 if state["drive"] != 0 else 0, 1 if state["drive"] > 0 else 0)
 
     def __repr__(self) -> str:
-        mode = ("off", "forward", "backward")[self.drive]
+        mode = "forward" if self.drive > 0 else "backward" if self.drive < 0 else "off"
         return f"Winding({mode}, {self.current_a!r} A)"

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-FAR = 1 << 62
+_FAR = 1 << 62
 
 
 class Quadrature:
@@ -31,7 +31,7 @@ class Quadrature:
         self.counts_per_radian = counts_per_radian
         self.position = 0.5  # the rotor stands in the middle of a quarter line
         self.count = 0
-        self.edge_tick = FAR  # of the next edge of the step being reported
+        self.edge_tick = _FAR  # of the next edge of the step being reported
         self._start = 0.5
         self._start_tick = 0
         self._ticks = 0
@@ -48,7 +48,7 @@ class Quadrature:
             last -= 1
         self._last = last
         if last == self.count:
-            self.edge_tick = FAR
+            self.edge_tick = _FAR
             return
         self._start_tick = start_tick
         self._ticks = ticks
@@ -62,7 +62,7 @@ class Quadrature:
         else:
             self.count -= 1
         if self._last == self.count:
-            self.edge_tick = FAR
+            self.edge_tick = _FAR
         else:
             self._aim()
 
@@ -95,7 +95,7 @@ class Quadrature:
         """Takes back what `snapshot` gave."""
         self.position = state["position"]
         self.count = state["count"]
-        self.edge_tick = FAR
+        self.edge_tick = _FAR
 
     def __repr__(self) -> str:
         return f"Quadrature(position={self.position!r} A={self.a()} B={self.b()})"
