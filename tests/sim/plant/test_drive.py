@@ -1,0 +1,225 @@
+"""The whole drive: figures of the data sheets, tiny Euler steps, energy, determinism."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_robot.lm629.chip import Lm629
+from miro_sim.plant.circuit import Winding
+from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Motor
+
+from tests.naive.plant import NaiveDrive
+from tests.sim.plant.runs import pwm, trace
+
+PARAMS = DriveParams()
+MAGNITUDES = st.integers(-128, 128)
+SECOND = 24_000_000
+
+
+def speed_after(params, magnitude, seconds=1.5):
+    drive = DifferentialDrive(params)
+    pwm(drive, magnitude, magnitude, round(seconds * SECOND / 2048))
+    return drive.velocity_at(drive.tick)[0]
+
+
+@pytest.mark.parametrize(("volts", "sheet_m_s"), [(6.0, 1.75), (7.2, 2.18)])
+def test_full_duty_reaches_the_speed_of_the_sheet(volts, sheet_m_s):
+    params = DriveParams(battery=Battery(voltage_v=volts))
+    friction_a = params.friction_nm() / params.motor.torque_constant_nm_a
+    rad_s = (volts - 1.0 - friction_a * (1.94 + 1.35 + 0.15)) / params.motor.torque_constant_nm_a
+    speed = speed_after(params, 128)
+    assert speed == pytest.approx(rad_s * 0.020 / 8, rel=1e-4)
+    assert speed == pytest.approx(sheet_m_s, rel=0.015)
+
+
+def test_the_bare_motor_runs_at_its_catalogue_speed():
+    ideal = DriveParams(
+        battery=Battery(voltage_v=6.0, resistance_ohm=1e-9),
+        bridge=Bridge(drop_v=0.0, drop_ohm=0.0),
+        chassis=Chassis(rolling_resistance=0.0),
+    )
+    rpm = speed_after(ideal, 128) / 0.020 * 8 * 60 / (2 * math.pi)
+    assert rpm == pytest.approx(8200, rel=0.002)
+
+
+def test_the_loaded_time_constant_is_74_milliseconds_on_an_ideal_supply():
+    ideal = DriveParams(
+        motor=Motor(friction_nm=0.0),
+        battery=Battery(resistance_ohm=1e-9),
+        bridge=Bridge(drop_v=0.0, drop_ohm=0.0),
+        chassis=Chassis(rolling_resistance=0.0),
+    )
+    final = 7.2 / 6.92e-3 * 0.020 / 8
+    reached = speed_after(ideal, 128, 0.074)
+    assert -0.074 / math.log(1 - reached / final) == pytest.approx(0.074, rel=0.01)
+
+
+def test_speed_rises_with_duty_and_small_duties_do_not_move_the_robot():
+    speeds = [speed_after(PARAMS, magnitude, 0.6) for magnitude in (0, 4, 8, 32, 64, 96, 128)]
+    assert speeds[:3] == [0.0, 0.0, 0.0]
+    assert speeds[2:] == sorted(speeds[2:])
+    assert 0.3 < speeds[3] < speeds[4] < speeds[6]
+
+
+def test_with_zero_duty_the_robot_stands_exactly_still():
+    drive = DifferentialDrive(PARAMS, 0.3, -0.1, 1.0)
+    before = drive.snapshot()
+    pwm(drive, 0, 0, 500)
+    after = drive.snapshot()
+    before.pop("tick")
+    after.pop("tick")
+    assert after == before
+    assert drive.pose_at(drive.tick) == (0.3, -0.1, 1.0)
+
+
+def test_coasting_slows_by_friction_alone_and_ends_exactly_at_rest():
+    drive = DifferentialDrive(PARAMS)
+    pwm(drive, 40, 40, 3000)
+    pwm(drive, 0, 0, 100)
+    v0 = drive.velocity_at(drive.tick)[0]
+    pwm(drive, 0, 0, 1000)
+    v1 = drive.velocity_at(drive.tick)[0]
+    roll = 0.020 / 8
+    mass = 0.5 + 2 * 2.7e-7 / roll**2
+    assert (v0 - v1) / (1000 * 2048 / 24e6) == pytest.approx(2 * PARAMS.friction_nm() / roll / mass, rel=1e-9)
+    pwm(drive, 0, 0, 30000)
+    assert drive.velocity_at(drive.tick) == (0.0, 0.0)
+
+
+def test_unequal_duties_drive_a_circle_to_the_left_round_the_slower_wheel():
+    drive = DifferentialDrive(PARAMS)
+    pwm(drive, 40, 50, 60000)
+    v, w = drive.velocity_at(drive.tick)
+    x, y, theta = drive.pose_at(drive.tick)
+    centre = (x - v / w * math.sin(theta), y + v / w * math.cos(theta))
+    assert w > 0.0
+    for _ in range(20):
+        pwm(drive, 40, 50, 200)
+        x, y, _ = drive.pose_at(drive.tick)
+        assert math.hypot(x - centre[0], y - centre[1]) == pytest.approx(v / w, rel=3e-3)
+
+
+def test_a_larger_wheel_turns_the_robot_away_from_its_side():
+    drive = DifferentialDrive(
+        DriveParams(chassis=Chassis(left_radius_factor=1.015, right_radius_factor=0.985))
+    )
+    pwm(drive, 64, 64, 20000)
+    v, w = drive.velocity_at(drive.tick)
+    assert w == pytest.approx(-0.03 * v / 0.068, rel=0.1)
+
+
+@pytest.mark.parametrize("magnitudes", [(60, 60), (128, -128), (-30, 90), (20, 128)])
+def test_tiny_euler_steps_go_the_same_way(magnitudes):
+    drive, naive = DifferentialDrive(PARAMS), NaiveDrive(PARAMS)
+    for stretch in (magnitudes, (0, 0), tuple(-m for m in magnitudes)):
+        pwm(drive, *stretch, 60)
+        pwm(naive, *stretch, 60)
+    v, w = drive.velocity_at(drive.tick)
+    naive_v, naive_w = naive.velocity()
+    assert v == pytest.approx(naive_v, abs=1.5e-3)
+    assert w == pytest.approx(naive_w, abs=0.05)
+    assert drive.pose_at(drive.tick) == pytest.approx((naive.x, naive.y, naive.theta), abs=2e-4)
+
+
+def battery_work_j(winding, charge_c):
+    return 7.2 * (winding.drive * charge_c if winding.drive else -abs(charge_c))
+
+
+def energy_j(drive):
+    currents = (drive.left_winding.current_a, drive.right_winding.current_a)
+    return drive.body.kinetic_energy_j() + sum(0.5 * 45e-6 * i * i for i in currents)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.lists(st.tuples(MAGNITUDES, MAGNITUDES, st.integers(1, 2048)), min_size=1, max_size=150))
+def test_no_step_ends_with_more_energy_than_it_had_and_the_battery_gave(steps):
+    drive = DifferentialDrive(PARAMS)
+    for left, right, ticks in steps:
+        for side, value in enumerate((left, right)):
+            drive.set_bridge(drive.tick, side, 1 if value else 0, 1 if value >= 0 else 0)
+        before, work = energy_j(drive), 0.0
+        for winding, speed in (
+            (drive.left_winding, drive.body.left_rad_s),
+            (drive.right_winding, drive.body.right_rad_s),
+        ):
+            copy = Winding(PARAMS)
+            copy.restore(winding.snapshot())
+            work += battery_work_j(copy, copy.step(ticks, 6.92e-3 * speed) / 24e6)
+        drive.advance(drive.tick + ticks)
+        assert energy_j(drive) <= before + work + 1e-15
+
+
+def test_both_chips_count_what_the_shafts_have_turned():
+    drive, left, right = DifferentialDrive(PARAMS), Lm629(), Lm629()
+    drive.attach(left, right)
+    pwm(drive, 40, -70, 2000)
+    pwm(drive, -30, 30, 300)
+    pwm(drive, 0, 0, 20000)  # until everything stands
+    drive.left.set_encoder(drive.tick, drive.left_encoder.a(), drive.left_encoder.b())
+    drive.right.set_encoder(drive.tick, drive.right_encoder.a(), drive.right_encoder.b())
+    assert drive.velocity_at(drive.tick) == (0.0, 0.0)
+    assert left.encoder.counts == drive.left_encoder.count > 10_000
+    assert right.encoder.counts == drive.right_encoder.count < -10_000
+
+
+def test_looking_changes_nothing_and_a_past_tick_is_no_step():
+    drive = DifferentialDrive(PARAMS)
+    pwm(drive, 60, 61, 100)
+    before = drive.snapshot()
+    x, *_ = drive.pose_at(drive.tick)
+    later, *_ = drive.pose_at(drive.tick + 1000)
+    drive.velocity_at(drive.tick + 5)
+    drive.advance(drive.tick - 7)
+    assert later > x
+    assert drive.snapshot() == before
+    assert drive.next_tick == drive.tick + 2048
+
+
+def test_a_long_advance_is_cut_into_pwm_periods():
+    one, other = DifferentialDrive(PARAMS), DifferentialDrive(PARAMS)
+    for drive in (one, other):
+        drive.set_bridge(0, 0, 1, 1)
+    one.advance(10 * 2048 + 100)
+    for _ in range(10):
+        other.advance(other.next_tick)
+    other.advance(10 * 2048 + 100)
+    assert one.snapshot() == other.snapshot()
+
+
+@settings(deadline=None, max_examples=20)
+@given(MAGNITUDES, MAGNITUDES, MAGNITUDES, MAGNITUDES)
+def test_a_restored_drive_goes_on_with_the_same_bits(left, right, next_left, next_right):
+    drive = DifferentialDrive(PARAMS)
+    pwm(drive, left, right, 50)
+    other = DifferentialDrive(PARAMS, 9.0, 9.0, 9.0)
+    other.restore(drive.snapshot())
+    assert repr(other) == repr(drive)
+    for each in (drive, other):
+        pwm(each, next_left, next_right, 50)
+    assert other.snapshot() == drive.snapshot()
+
+
+SCRIPT = """
+from miro_protocol import engine
+engine.select("python")
+from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.plant.params import DriveParams
+from tests.sim.plant.runs import trace
+print("\\n".join(trace(lambda: DifferentialDrive(DriveParams(), 0.1, 0.2, -1.0), 60)))
+"""
+
+
+def test_the_drive_in_use_and_its_uncompiled_source_give_the_same_bits():
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[3],
+    )
+    assert trace(lambda: DifferentialDrive(PARAMS, 0.1, 0.2, -1.0), 60) == done.stdout.splitlines()
