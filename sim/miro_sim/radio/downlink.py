@@ -102,17 +102,16 @@ class Downlink:
         return f"Downlink({self.name!r}, robots {robots}, settled_tick={self.settled_tick}, {waiting})"
 
     def listen(self, robot: int, line: Line) -> Listener:
-        """Connects a robot's RXD wire, before anything is settled. Raises ValueError later or for a second
-        time."""
+        """Connects a robot's RXD wire: once and before anything is settled, else ValueError."""
         if self.settled_tick or robot in self.listeners:
             raise ValueError(f"{self.name}: robot {robot} is connected twice, or after tick 0")
         listener = Listener(line, self.params, self.seed, f"{self.name}/robot{robot}")
         self.listeners[robot] = listener
+        line.settled_tick = 0  # an open wire is mark for ever
         return listener
 
     def send(self, start_tick: int, data: bytes) -> int:
-        """Transmits `data`, characters without a gap, the first start bit at `start_tick`; returns
-        `free_tick`.
+        """Transmits `data` without a gap, the first start bit at `start_tick`; returns `free_tick`.
 
         Raises ValueError when nothing is to be sent, when the previous transmission is not over by then,
         and when the wires are settled past the tick at which the carrier comes up.

@@ -50,8 +50,7 @@ class Uplink:
         self.band.add(line)
 
     def receive(self, until_tick: int) -> list[tuple[int, bool, int]]:
-        """Symbols (byte, stop bit good, tick of the start bit's edge) whose stop bit was sampled before
-        `until_tick`.
+        """Symbols (byte, stop bit good, tick of the start bit's edge) known before `until_tick`.
 
         Never looks past the ticks up to which the wires are settled; what comes later is left for the next
         call.

@@ -158,6 +158,13 @@ def test_a_robot_joins_once_and_before_the_start():
         downlink.listen(1, Line())
 
 
+def test_a_wire_that_was_open_is_settled_by_nobody_but_the_downlink():
+    line = Line()
+    line.settled_tick = 1 << 62
+    Downlink(RadioParams(), 0, "net").listen(0, line)
+    assert line.settled_tick == 0
+
+
 def test_a_downlink_shows_what_it_is_about_to_send():
     downlink, _ = band(RadioParams())
     downlink.send(100_000, b"\x55\xff")
