@@ -37,9 +37,14 @@ u8 ticks_taken;
 static u16 age;                     /* ms since the last fresh frame, stays at AGE_MAX */
 static __bit heard;                 /* there was one */
 
+static u16 first_tick(void)
+{
+    return robots == 3 ? FIRST_TICK_3 : FIRST_TICK_5;
+}
+
 static void restart(void)
 {
-    u16 first = robots == 3 ? FIRST_TICK_3 : FIRST_TICK_5;
+    u16 first = first_tick();
 
     TR1 = 0;
     TF1 = 0;
@@ -56,10 +61,22 @@ void failsafe_start(void)
     ET1 = 1;
 }
 
-/* Time since the last fresh frame is FRESH_AGAIN_MS or more. By now the age runs ahead by up to 2 ms. */
+/* Whether FRESH_AGAIN_MS have passed from the last character of the last fresh frame to that of this one, whose decoding
+ * has taken time too: in ticks one millisecond and what Timer 1 then shows. */
 static bool fresh_again(void)
 {
-    return age + (u8)(ticks - ticks_taken) >= FRESH_AGAIN_MS + 2;
+    u8 before, high, low;
+    u16 whole, first = first_tick();
+
+    do {
+        before = ticks;
+        whole = age + (u8)(before - ticks_taken);
+        high = TH1;
+        low = TL1;
+    } while (high != TH1 || before != ticks);
+    if (whole != FRESH_AGAIN_MS + AGE_AT_RESTART)
+        return whole > FRESH_AGAIN_MS + AGE_AT_RESTART;
+    return ((u16)high << 8 | low) >= first;
 }
 
 /* Whether the valid frame in `body` is fresh; if so it restarts the failsafe. */

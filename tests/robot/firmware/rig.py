@@ -15,6 +15,7 @@ from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_robot.lm629.chip import Lm629
+from miro_robot.lm629.options import Lm629Options
 from miro_robot.plant import Plant
 from miro_robot.wiring import Wiring, load_wiring
 
@@ -30,15 +31,16 @@ BOOTED = 4 * MS
 
 
 class Probe(Board):
-    """Notes every change of a port the firmware makes."""
+    """Notes every change of a port the firmware makes. With `deaf` the wire /RD is broken: the bus reads FFh."""
 
     def __init__(self, *args: object, **kwargs: object) -> None:
         self.writes: list[tuple[int, int, int]] = []
+        self.deaf = False
         super().__init__(*args, **kwargs)  # type: ignore[arg-type]
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
         self.writes.append((tick, port, latch))
-        super().port_written(port, latch, tick)
+        super().port_written(port, latch | 0x02 if port == 2 and self.deaf else latch, tick)
 
 
 @dataclass
@@ -53,9 +55,17 @@ class Command:
 class Rig:
     """One robot, `slot` of `n`. Time is `now`; characters are sent from then on and run by `run_to`."""
 
-    def __init__(self, slot: int = 0, n: int = 3, wiring: Wiring | None = None, boot: bool = True) -> None:
+    def __init__(
+        self,
+        slot: int = 0,
+        n: int = 3,
+        wiring: Wiring | None = None,
+        options: Lm629Options | None = None,
+        plant: Plant | None = None,
+        boot: bool = True,
+    ) -> None:
         self.n = n
-        self.board = Probe(wiring or load_wiring(), Plant(), slot, n)
+        self.board = Probe(wiring or load_wiring(), plant or Plant(), slot, n, options)
         self.cpu = self.board.cpu
         self.cpu.load(IMAGE.code, IMAGE.ranges)
         self.now = 0
@@ -102,7 +112,7 @@ class Rig:
     def send_symbol(self, symbol: Symbol, bit: int = BIT) -> None:
         """One character. A damaged one is low through the middle of its stop bit and high before its end."""
         byte, stop_good, tick = symbol
-        assert tick >= self.line_free
+        assert tick >= self.line_free - bit // 4  # a stop bit may be cut, not left out
         bits = [0] + [byte >> i & 1 for i in range(8)]
         self.pending += [(tick + i * bit, level) for i, level in enumerate(bits)]
         self.pending.append((tick + 9 * bit + (0 if stop_good else 3 * bit // 4), 1))

@@ -7,11 +7,12 @@ import pytest
 from miro_protocol.decoder import Received, TelemetryDecoder
 from miro_protocol.frames import TelemetryFrame
 from miro_protocol.table import Flags
+from miro_robot.lm629.options import Lm629Options
 from miro_robot.wiring import load_wiring
 
 from tests.robot.firmware.rig import MS, Rig
 
-RSTI, MSKI, LFIL, UDF, LTRJ = 0x1D, 0x1C, 0x1E, 0x04, 0x1F
+RSTI, MSKI, LFIL, UDF, LTRJ, STT = 0x1D, 0x1C, 0x1E, 0x04, 0x1F, 0x01
 START_UP = [
     (RSTI, "0000"),
     (MSKI, "0000"),
@@ -78,3 +79,34 @@ def test_the_reset_is_tried_again_eight_times_before_it_gives_up() -> None:
     levels = [latch & RESET_PINS for _, port, latch in rig.board.writes if port == 2]
     rises = sum(1 for before, after in pairwise(levels) if after and not before)
     assert rises == 8
+
+
+@pytest.mark.parametrize(("busy_clocks", "works"), [(600, True), (6000, False)])
+def test_a_chip_may_be_busy_for_100_us_and_not_for_1_ms(busy_clocks: int, works: bool) -> None:
+    rig = Rig(options=Lm629Options(busy_clocks=busy_clocks), boot=False)
+    rig.run_to(100 * MS)
+    assert bool(rig.cpu.sfr(0xA0) & RESET_PINS) == works
+    rig.team(0, 5000, 5000)
+    assert (rig.told(rig.board.left)[-1:] != []) == works
+
+
+def test_chips_that_stop_answering_are_reset_and_set_up_again() -> None:
+    rig = Rig()
+    rig.service(0, 0, 1, 11, 22, 33, 44)
+    rig.service(1, 0, 2, 4000)
+    rig.team(2, 5000, 5000)
+    rig.board.deaf = True
+    rig.team(3, 5000, 5000)
+    assert rig.cpu.sfr(0xA0) & RESET_PINS == 0  # held in reset: both motors are off
+    rig.team(4, 5000, 5000)
+    rig.run_ms(5)  # the one try that a frame gives them
+    assert rig.cpu.sfr(0xA0) & RESET_PINS == 0
+    rig.board.deaf = False
+    rig.told(rig.board.left)
+    rig.team(5, 6000, 6000)
+    rig.run_ms(5)
+    commands = [(command.opcode, command.data) for command in rig.told(rig.board.left)]
+    assert (LFIL, bytes.fromhex("030f 000b 0016 0021 002c")) in commands
+    assert (LTRJ, bytes.fromhex("0020 00000fa0")) in commands
+    assert commands[-2:] == [(LTRJ, bytes.fromhex("1808 00177000")), (STT, b"")]
+    assert not rig.board.left.status & 0x80

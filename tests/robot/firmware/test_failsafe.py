@@ -93,13 +93,13 @@ def test_the_same_frame_repeated_never_rearms_a_stopped_robot() -> None:
 
 @pytest.mark.parametrize("place", PLACES)
 def test_a_long_step_is_fresh_again_from_150_ms_on(place: tuple[int, int]) -> None:
-    for age, accepted in ((148, 1), (149.9, 1), (151, 2), (170, 2)):
+    for age, accepted in ((140, 1), (149.95, 1), (150.05, 2), (170, 2)):
         rig, last = driving(place)
-        length = (17 + 6 if place[1] == 3 else 25 + 6) * CHARACTER
+        length = (17 + 5 if place[1] == 3 else 25 + 5) * CHARACTER  # first to last start bit
         rig.run_to(last + int(age * MS) - length)
         rig.line_free = 0
         final = rig.team(40, 0, 0)
-        assert abs(final - last - age * MS) < MS / 10
+        assert abs(final - last - age * MS) < MS / 100
         assert rig.counters == (accepted, 0, 2 - accepted), age
 
 
