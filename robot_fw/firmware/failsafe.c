@@ -65,12 +65,13 @@ void failsafe_start(void)
  * has taken time too: in ticks one millisecond and what Timer 1 then shows. */
 static bool fresh_again(void)
 {
-    u8 before, high, low;
+    u8 before, waiting, high, low;
     u16 whole, first = first_tick();
 
     do {
         before = ticks;
-        whole = age + (u8)(before - ticks_taken);
+        waiting = before - ticks_taken;     /* on its own: SDCC 4.2.0 drops the cast in age + (u8)(...) */
+        whole = age + waiting;
         high = TH1;
         low = TL1;
     } while (high != TH1 || before != ticks);

@@ -1,6 +1,7 @@
 """What happens without fresh frames, measured at the LM629."""
 
 import pytest
+from miro_protocol.frames import TeamFrame, encode
 
 from tests.robot.firmware.rig import CHARACTER, MS, SAMPLE, Rig
 
@@ -101,6 +102,18 @@ def test_a_long_step_is_fresh_again_from_150_ms_on(place: tuple[int, int]) -> No
         final = rig.team(40, 0, 0)
         assert abs(final - last - age * MS) < MS / 100
         assert rig.counters == (accepted, 0, 2 - accepted), age
+
+
+@pytest.mark.parametrize("quarter", range(-8, 9))
+def test_a_long_step_is_stale_wherever_the_millisecond_counter_wraps(quarter: int) -> None:
+    rig = Rig()
+    while rig.u8("_ticks") != 170:
+        rig.run_ms(0.1)
+    wrap = rig.now + 86 * MS
+    rig.frame(encode(TeamFrame(0, 0, ((0, 0),) * 3), 3))
+    rig.send(encode(TeamFrame(0, 30, ((0, 0),) * 3), 3), at=wrap - 22 * CHARACTER + quarter * MS // 4)
+    rig.run_to(wrap + 10 * MS)
+    assert rig.counters == (1, 0, 1)
 
 
 def test_no_wheel_moves_before_the_first_frame() -> None:
