@@ -10,7 +10,7 @@ import click
 import msgspec
 
 from miro_sim.cli.options import choose_engine, engine_option, load_image
-from miro_sim.cli.program import DONE, FIRMWARE_FAULT, LIMIT_REACHED, UserError, complain
+from miro_sim.cli.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, UserError, complain
 from miro_sim.cli.progress import ProgressBar
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def fw() -> None:
 )
 @click.option("--stdin", "stdin", type=click.Path(), metavar="FILE", help="Bytes for the serial port.")
 @click.option(
-    "--baud", type=click.IntRange(1, 2_000_000), help="Bit rate of --stdin. Default: what the firmware sets."
+    "--baud", type=click.IntRange(50, 750_000), help="Bit rate of --stdin. Default: what the firmware sets."
 )
 @click.option(
     "--code-in-xram", is_flag=True, help="EA low: program and data share 64 KB; lifts the 8 KB limit."
@@ -56,31 +56,33 @@ def run_bare(
 ) -> int:
     """Runs IMAGE.ihx on a bare AT89C52; what it sends goes to stdout as it is.
 
-    Exit codes: 0 --until was reached, 3 firmware fault, 42 --max-cycles was reached.
+    Exit codes: 0 --until was reached (or, without it, the firmware ended), 1 the firmware ended before it,
+    3 firmware fault, 42 --max-cycles was reached.
     """
     choose_engine(engine)
     loaded = load_image(image, SPACE_BYTES if code_in_xram else FLASH_BYTES)
     target = None if until is None else address_of(until, loaded, image)
     given = b"" if stdin is None else Path(stdin).read_bytes()
-    if target is None and max_cycles is None:
-        raise UserError(f"{image}: nothing would end the run; give --until, --max-cycles or both")
-    from miro_robot.bare import BareMachine
+    from miro_robot.bare import BareMachine, Ended
 
     out = click.get_binary_stream("stdout")
+    machine = BareMachine(loaded, code_in_xram=code_in_xram, stdin=given, baud=baud, output=out.write)
     with ProgressBar("running", max_cycles) as bar:
-        machine = BareMachine(loaded, code_in_xram=code_in_xram, stdin=given, baud=baud, stdout=out.write)
-        reached = machine.run(until=target, max_cycles=max_cycles, progress=bar.to)
+        ended = machine.run(until=target, max_cycles=max_cycles, progress=bar.to)
     out.flush()
     if dump is not None:
         Path(dump).write_bytes(msgspec.json.format(msgspec.json.encode(machine.dump()), indent=2) + b"\n")
-    for fault in machine.faults:
-        complain(f"firmware fault: {fault}")
-    if machine.faults:
+    place = f"{place_of(machine.cpu.pc, loaded)} after {machine.cpu.cycles} machine cycles"
+    if ended is Ended.FAULT:
+        complain(f"firmware fault: {machine.faults[0]}")
         return FIRMWARE_FAULT
-    if reached:
-        return DONE
-    complain(f"gave up after {machine.cpu.cycles} machine cycles, at {place_of(machine.cpu.pc, loaded)}")
-    return LIMIT_REACHED
+    if ended is Ended.CYCLES:
+        complain(f"gave up at {place}")
+        return LIMIT_REACHED
+    if ended is Ended.HALTED:
+        complain(f"the firmware ended at {place}; no interrupt can wake it")
+        return DONE if target is None else EXPECTATION_FAILED
+    return DONE
 
 
 def address_of(text: str, image: Image, path: str) -> int:
@@ -95,11 +97,11 @@ def address_of(text: str, image: Image, path: str) -> int:
         if address >= SPACE_BYTES:
             raise UserError(f"--until: {text} is beyond the last code address; use 0x0000 to 0xffff")
         return address
-    for name in (text, f"_{text}", text.removeprefix("_")):
-        found = image.symbols.address(name, "code")
-        if found is not None:
-            return found
-    names = [name for name, (_, space) in image.symbols.items() if space == "code"]
+    for name in (text, text.removeprefix("_")):
+        found = image.symbols.find(name)
+        if found is not None and found.space == "code":
+            return found.address
+    names = [name for name, symbol in image.symbols.names.items() if symbol.space == "code"]
     close = get_close_matches(text, names, n=1) or get_close_matches(f"_{text}", names, n=1)
     if close:
         remedy = f"did you mean {close[0]}?"

@@ -21,6 +21,7 @@ from miro_sim.replay import StreamContentError
 from miro_sim.scenario_errors import ScenarioError, one_line
 
 DONE = 0
+EXPECTATION_FAILED = 1
 BAD_INPUT = 2
 FIRMWARE_FAULT = 3
 DIVERGENCE = 4

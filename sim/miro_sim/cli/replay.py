@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 import msgspec
@@ -30,6 +30,9 @@ from miro_sim.replay import (
 )
 from miro_sim.scenario import Scenario
 from miro_sim.scenario_file import parse as parse_scenario
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
 
 SHOWN = 20
 
@@ -57,16 +60,13 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
     """
     data = Path(file).read_bytes()
     choose_engine(engine)
-    with tempfile.TemporaryDirectory() as folder:
-        if data.startswith(MAGIC) or b"\0" in data[:4096] or not data:
-            recording = parse(data, file)
-            job = _job_of_recording(recording, file)
-            image = load_image(firmware or _unpack(recording, Path(folder)))
-            if firmware is None and recording.source.symbols:
-                image = msgspec.structs.replace(image, symbols=_symbols(recording))
-        else:
-            job = _job_of_stream(file)
-            image = load_image(firmware)
+    if data.startswith(MAGIC) or b"\0" in data[:4096] or not data:
+        recording = parse(data, file)
+        job = _job_of_recording(recording, file)
+        image = _recorded_image(recording, file) if firmware is None else load_image(firmware)
+    else:
+        job = _job_of_stream(file)
+        image = load_image(firmware)
     from miro_sim.world import World
 
     world = World(job.scenario, job.seed, image, script=job.script)
@@ -102,11 +102,17 @@ def _job_of_stream(path: str) -> Job:
     return Job(scenario_of_stream(sent, path), 0, script_of_stream(sent), ())
 
 
-def _unpack(recording: Recording, folder: Path) -> Path:
-    """The recorded firmware as a file."""
-    path = folder / "firmware.ihx"
-    path.write_bytes(recording.source.firmware)
-    return path
+def _recorded_image(recording: Recording, path: str) -> Image:
+    """The image in the recording, with the symbols it had when it was recorded."""
+    from miro_robot.image import ImageError, Symbol, Symbols, parse_hex
+
+    source = recording.source
+    try:
+        image = parse_hex(source.firmware, Path(path) / "firmware.ihx")
+    except ImageError as error:
+        raise UserError(str(error)) from None
+    symbols = Symbols({name: Symbol(address, space) for name, (address, space) in source.symbols.items()})
+    return msgspec.structs.replace(image, symbols=symbols)
 
 
 def _print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from rich.table import Table
 
 from miro_sim import runner
 from miro_sim.cli.options import choose_engine, engine_option, firmware_option, load_image
-from miro_sim.cli.program import DONE, FIRMWARE_FAULT, MAX_SEED, complain, output
+from miro_sim.cli.program import DONE, FIRMWARE_FAULT, MAX_SEED, UserError, complain, output
 from miro_sim.cli.progress import ProgressBar
 from miro_sim.figure import draw
 from miro_sim.outdir import OutputFolder
@@ -98,13 +99,16 @@ def run(
 
 def source_of(text: ScenarioText, seed: int, image: Image, record: str) -> Source:
     """What a recording says that a run was made from."""
+    firmware = image.path.read_bytes()
+    if hashlib.sha256(firmware).hexdigest() != image.sha256:
+        raise UserError(f"{image.path}: changed while it was read; start again once it is built")
     return Source(
         scenario_name=text.scenario.name,
         scenario_text=text.text,
         seed=seed,
-        firmware=Path(image.path).read_bytes(),
+        firmware=firmware,
         firmware_sha256=image.sha256,
-        symbols=dict(image.symbols.items()),
+        symbols={name: (at.address, at.space) for name, at in image.symbols.names.items()},
         record=record,
     )
 
