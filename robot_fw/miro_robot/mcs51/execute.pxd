@@ -38,7 +38,7 @@ cdef class Executor:
     cdef readonly long long faults
 
     @cython.locals(iram='unsigned char *', rom='unsigned char *', pc=int, row=int, op=int, first=int, second=int,
-                   after=int, rn=int, address=int, value=int)
+                   after=int, length=int, address=int, value=int)
     cpdef int run(self, long long until_cycle) except -1
 
     @cython.final

@@ -67,6 +67,8 @@ class Executor:
         self.begin_run()
         iram = self.iram
         rom = self.rom
+        first = 0
+        second = 0
         while True:
             if self.cycles >= self.limit:
                 if self.boundary():
@@ -81,14 +83,19 @@ class Executor:
                     break
                 self.fault(_OUTSIDE_IMAGE)
                 row = self.row_of[op]
-            first = rom[pc + 1]
-            second = rom[pc + 2]
+            length = self.length_of[op]
+            after = pc + 1
+            if length != 1:
+                first = rom[after]
+                after = pc + 2
+                if length != 2:
+                    second = rom[after]
+                    after = pc + 3
+            after &= 0xFFFF
             self.start = self.cycles
             self.cycles += self.cycles_of[op]
             self.instructions += 1
-            after = (pc + self.length_of[op]) & 0xFFFF
             self.pc = after
-            rn = self.bank + (op & 7)
             if row == 0x00:  # NOP
                 pass
             elif row == 0x01:  # AJMP addr11
@@ -105,7 +112,7 @@ class Executor:
                 address = iram[self.bank + (op & 1)]
                 iram[address] = (iram[address] + 1) & 0xFF
             elif row == 0x08:  # INC Rn
-                iram[rn] = (iram[rn] + 1) & 0xFF
+                iram[self.bank + (op & 7)] = (iram[self.bank + (op & 7)] + 1) & 0xFF
             elif row == 0x10:  # JBC bit,rel
                 if self.latched_bit(first):
                     self.write_bit(first, 0)
@@ -126,7 +133,7 @@ class Executor:
                 address = iram[self.bank + (op & 1)]
                 iram[address] = (iram[address] - 1) & 0xFF
             elif row == 0x18:  # DEC Rn
-                iram[rn] = (iram[rn] - 1) & 0xFF
+                iram[self.bank + (op & 7)] = (iram[self.bank + (op & 7)] - 1) & 0xFF
             elif row == 0x20:  # JB bit,rel
                 if self.read_bit(first):
                     self.branch(second)
@@ -142,7 +149,7 @@ class Executor:
             elif row == 0x26:  # ADD A,@Ri
                 self.add(iram[iram[self.bank + (op & 1)]], 0)
             elif row == 0x28:  # ADD A,Rn
-                self.add(iram[rn], 0)
+                self.add(iram[self.bank + (op & 7)], 0)
             elif row == 0x30:  # JNB bit,rel
                 if not self.read_bit(first):
                     self.branch(second)
@@ -162,7 +169,7 @@ class Executor:
             elif row == 0x36:  # ADDC A,@Ri
                 self.add(iram[iram[self.bank + (op & 1)]], self.cy)
             elif row == 0x38:  # ADDC A,Rn
-                self.add(iram[rn], self.cy)
+                self.add(iram[self.bank + (op & 7)], self.cy)
             elif row == 0x40:  # JC rel
                 if self.cy:
                     self.branch(first)
@@ -177,7 +184,7 @@ class Executor:
             elif row == 0x46:  # ORL A,@Ri
                 self.a |= iram[iram[self.bank + (op & 1)]]
             elif row == 0x48:  # ORL A,Rn
-                self.a |= iram[rn]
+                self.a |= iram[self.bank + (op & 7)]
             elif row == 0x50:  # JNC rel
                 if not self.cy:
                     self.branch(first)
@@ -192,7 +199,7 @@ class Executor:
             elif row == 0x56:  # ANL A,@Ri
                 self.a &= iram[iram[self.bank + (op & 1)]]
             elif row == 0x58:  # ANL A,Rn
-                self.a &= iram[rn]
+                self.a &= iram[self.bank + (op & 7)]
             elif row == 0x60:  # JZ rel
                 if self.a == 0:
                     self.branch(first)
@@ -207,7 +214,7 @@ class Executor:
             elif row == 0x66:  # XRL A,@Ri
                 self.a ^= iram[iram[self.bank + (op & 1)]]
             elif row == 0x68:  # XRL A,Rn
-                self.a ^= iram[rn]
+                self.a ^= iram[self.bank + (op & 7)]
             elif row == 0x70:  # JNZ rel
                 if self.a != 0:
                     self.branch(first)
@@ -222,7 +229,7 @@ class Executor:
             elif row == 0x76:  # MOV @Ri,#imm
                 iram[iram[self.bank + (op & 1)]] = first
             elif row == 0x78:  # MOV Rn,#imm
-                iram[rn] = first
+                iram[self.bank + (op & 7)] = first
             elif row == 0x80:  # SJMP rel
                 self.branch(first)
             elif row == 0x82:  # ANL C,bit
@@ -236,7 +243,7 @@ class Executor:
             elif row == 0x86:  # MOV dir,@Ri
                 self.write(first, iram[iram[self.bank + (op & 1)]])
             elif row == 0x88:  # MOV dir,Rn
-                self.write(first, iram[rn])
+                self.write(first, iram[self.bank + (op & 7)])
             elif row == 0x90:  # MOV DPTR,#imm16
                 self.dptr = (first << 8) | second
             elif row == 0x92:  # MOV bit,C
@@ -250,7 +257,7 @@ class Executor:
             elif row == 0x96:  # SUBB A,@Ri
                 self.subtract(iram[iram[self.bank + (op & 1)]])
             elif row == 0x98:  # SUBB A,Rn
-                self.subtract(iram[rn])
+                self.subtract(iram[self.bank + (op & 7)])
             elif row == 0xA0:  # ORL C,/bit
                 self.cy |= self.read_bit(first) ^ 1
             elif row == 0xA2:  # MOV C,bit
@@ -270,7 +277,7 @@ class Executor:
                 iram[iram[self.bank + (op & 1)]] = value
             elif row == 0xA8:  # MOV Rn,dir
                 value = self.read(first)
-                iram[rn] = value
+                iram[self.bank + (op & 7)] = value
             elif row == 0xB0:  # ANL C,/bit
                 self.cy &= self.read_bit(first) ^ 1
             elif row == 0xB2:  # CPL bit
@@ -285,7 +292,7 @@ class Executor:
             elif row == 0xB6:  # CJNE @Ri,#imm,rel
                 self.compare(iram[iram[self.bank + (op & 1)]], first, second)
             elif row == 0xB8:  # CJNE Rn,#imm,rel
-                self.compare(iram[rn], first, second)
+                self.compare(iram[self.bank + (op & 7)], first, second)
             elif row == 0xC0:  # PUSH dir: SP counts first, so PUSH SP stores the new one
                 self.claim()
                 value = self.read(first)
@@ -307,8 +314,8 @@ class Executor:
                 iram[address] = self.a
                 self.a = value
             elif row == 0xC8:  # XCH A,Rn
-                value = iram[rn]
-                iram[rn] = self.a
+                value = iram[self.bank + (op & 7)]
+                iram[self.bank + (op & 7)] = self.a
                 self.a = value
             elif row == 0xD0:  # POP dir: SP counts first, so POP SP ends with the byte popped
                 value = self.pop()
@@ -330,8 +337,8 @@ class Executor:
                 iram[address] = (value & 0xF0) | (self.a & 0x0F)
                 self.a = (self.a & 0xF0) | (value & 0x0F)
             elif row == 0xD8:  # DJNZ Rn,rel
-                value = (iram[rn] - 1) & 0xFF
-                iram[rn] = value
+                value = (iram[self.bank + (op & 7)] - 1) & 0xFF
+                iram[self.bank + (op & 7)] = value
                 if value:
                     self.branch(first)
             elif row == 0xE0:  # MOVX A,@DPTR
@@ -345,7 +352,7 @@ class Executor:
             elif row == 0xE6:  # MOV A,@Ri
                 self.a = iram[iram[self.bank + (op & 1)]]
             elif row == 0xE8:  # MOV A,Rn
-                self.a = iram[rn]
+                self.a = iram[self.bank + (op & 7)]
             elif row == 0xF0:  # MOVX @DPTR,A
                 self.movx_write(self.dptr, self.a)
             elif row == 0xF2:  # MOVX @Ri,A
@@ -357,7 +364,7 @@ class Executor:
             elif row == 0xF6:  # MOV @Ri,A
                 iram[iram[self.bank + (op & 1)]] = self.a
             elif row == 0xF8:  # MOV Rn,A
-                iram[rn] = self.a
+                iram[self.bank + (op & 7)] = self.a
         self.end_run()
         return self.stop
 
@@ -365,7 +372,9 @@ class Executor:
 
     def read(self, address: int) -> int:
         """Direct address, ports at their pins."""
-        return self.iram[address] if address < 0x80 else self.read_sfr(address)
+        if address < 0x80:
+            return self.iram[address]
+        return self.a if address == 0xE0 else self.read_sfr(address)
 
     def read_latched(self, address: int) -> int:
         """Direct address as read-modify-write instructions see it: ports at their latches."""
@@ -378,7 +387,7 @@ class Executor:
             self.write_sfr(address, value)
 
     def read_bit(self, bit: int) -> int:
-        byte = self.iram[0x20 + (bit >> 3)] if bit < 0x80 else self.read_sfr(bit & 0xF8)
+        byte = self.iram[0x20 + (bit >> 3)] if bit < 0x80 else self.read(bit & 0xF8)
         return (byte >> (bit & 7)) & 1
 
     def latched_bit(self, bit: int) -> int:
