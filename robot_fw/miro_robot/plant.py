@@ -14,7 +14,7 @@ from miro_robot.lm629.chip import Lm629
 FAR = 1 << 62  # "never", in ticks
 LEFT = 0
 RIGHT = 1
-_WIRES: tuple[str, ...] = ("left", "right")
+_MORE: tuple[str, ...] = ()  # what a subclass adds
 
 
 class Plant:
@@ -26,7 +26,7 @@ class Plant:
     `right.set_encoder(tick, a, b)` for every encoder edge, in tick order, left before right on one tick.
     """
 
-    NOT_STATE = _WIRES
+    NOT_STATE = ("left", "right", *_MORE)
 
     def __init__(self) -> None:
         self.left: Lm629 | None = None

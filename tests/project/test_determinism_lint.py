@@ -11,8 +11,8 @@ PACKAGES = ("protocol/miro_protocol", "robot_fw/miro_robot", "host/miro_host", "
 
 # The edge: what people see of a run, never what the run is made of.
 EDGE = ("sim/miro_sim/cli/", "sim/miro_sim/figure.py")
-# Frames are integers from end to end, so the order of a sum cannot matter.
-INTEGERS_ONLY = ("protocol/miro_protocol/",)
+# Frames and chips are integers from end to end, so the order of a sum cannot matter.
+INTEGERS_ONLY = ("protocol/miro_protocol/", "robot_fw/miro_robot/")
 
 MODULES = sorted(
     path.relative_to(ROOT).as_posix()
