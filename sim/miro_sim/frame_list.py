@@ -7,14 +7,17 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import msgspec
 from miro_protocol.decoder import Damaged, Decoder, Event, TelemetryDecoder, WindowDecoder
-from miro_protocol.frames import ContentError, TeamFrame, describe
+from miro_protocol.frames import ContentError, TeamFrame, TelemetryFrame, describe
 from miro_protocol.stream import DOWN
 
 from miro_sim.records import WireRun
 
 
 class FrameLine(msgspec.Struct, frozen=True):
-    """A frame or a damaged run: first start bit, direction, network, slot (-1: the host's), what it says."""
+    """A frame or a damaged run: first start bit, direction, network, sender's slot, what it says.
+
+    `slot` is -1 for the host's, and for what a robot sent that cannot be told from its bytes.
+    """
 
     tick: int
     direction: str
@@ -28,10 +31,10 @@ def frame_lines(runs: Iterable[WireRun], robots: Mapping[int, int]) -> Iterator[
 
     One decoder a network and direction; a run of the host's bytes is as sent, before the radio.
     """
-    decoders: dict[tuple[int, int], WindowDecoder] = {}
-    pending: dict[tuple[int, int], WireRun] = {}
+    decoders: dict[tuple[int, str], WindowDecoder] = {}
+    pending: dict[tuple[int, str], WireRun] = {}
     for run in runs:
-        place = (run.network, run.slot)
+        place = (run.network, run.direction)
         layout = robots[run.network]
         if place not in decoders:
             decoders[place] = Decoder(layout) if run.direction == DOWN else TelemetryDecoder()
@@ -44,6 +47,7 @@ def frame_lines(runs: Iterable[WireRun], robots: Mapping[int, int]) -> Iterator[
 
 def _lines(events: Iterable[Event], run: WireRun, layout: int) -> Iterator[FrameLine]:
     for event in events:
+        slot = run.slot
         if isinstance(event, Damaged):
             reason = event.reason.name.lower().replace("_", " ")
             text = f"{len(event.data)} bytes, {reason}: {event.data[:16].hex(' ')}"
@@ -52,9 +56,11 @@ def _lines(events: Iterable[Event], run: WireRun, layout: int) -> Iterator[Frame
             try:
                 message = event.message(layout)
                 text = describe(message)
+                if isinstance(message, TelemetryFrame):
+                    slot = message.slot
             except ContentError as error:
                 text = f"frame that says nothing known: {error}"
             else:
                 if isinstance(message, TeamFrame):
                     text += "  " + " ".join(f"{left:+d}/{right:+d}" for left, right in message.velocities)
-        yield FrameLine(event.start_tick, run.direction, run.network, run.slot, text)
+        yield FrameLine(event.start_tick, run.direction, run.network, slot, text)

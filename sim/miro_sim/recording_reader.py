@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from mcap.exceptions import McapError
+from mcap.exceptions import McapError, RecordLengthLimitExceeded
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata
 from mcap.stream_reader import CRCValidationError, StreamReader
 
@@ -84,7 +84,7 @@ def parse(data: bytes, path: str) -> Recording:
         MemoryError,
         OverflowError,
     ) as error:
-        truncated = stream.tell() >= len(data)
+        truncated = stream.tell() >= len(data) or isinstance(error, RecordLengthLimitExceeded)
         what = "the file ends in the middle of a record" if truncated else f"damaged record ({_brief(error)})"
         remedy = "record the run again; a recording cut short cannot be trusted"
         raise RecordingError(path, f"offset {start}", what, remedy) from None

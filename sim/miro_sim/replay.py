@@ -32,7 +32,7 @@ class StreamContentError(ValueError):
 
 
 class Difference(msgspec.Struct, frozen=True):
-    """The first value that a replay has otherwise. `slot` -1: not one robot's."""
+    """The first value that a replay has otherwise. `slot` -1: of a whole network."""
 
     tick: int
     network: int
@@ -42,8 +42,8 @@ class Difference(msgspec.Struct, frozen=True):
     replayed: str
 
     def __str__(self) -> str:
-        robot = f"/net{self.network}/robot{self.slot}/" if self.slot >= 0 else "/"
-        place = f"tick {self.tick} ({seconds(self.tick):.6f} s), {robot}{self.channel}"
+        robot = f"/robot{self.slot}" if self.slot >= 0 else ""
+        place = f"tick {self.tick} ({seconds(self.tick):.6f} s), /net{self.network}{robot}/{self.channel}"
         return f"{place}: recorded {self.recorded}, replayed {self.replayed}"
 
 
@@ -96,7 +96,8 @@ def _compare_robot(tick: int, one: RobotPeriod, other: RobotPeriod) -> Differenc
             at = min(when[0] for when in command if when is not None)
             return differs(at, f"lm629 {side} command", *command)
     for name, value in ROBOT_FIELDS:
-        if value(one) != value(other):
+        known = value(one) is not None and value(other) is not None  # other firmware may export no counters
+        if known and value(one) != value(other):
             return differs(tick, name, value(one), value(other))
     for side, axis, twin in (("left", one.left, other.left), ("right", one.right, other.right)):
         for name, register in AXIS_FIELDS:

@@ -22,8 +22,9 @@ class Simulation(Protocol):
     tick: int
     index: int
     periods: int
-    networks: Sequence[Any]
 
+    @property
+    def networks(self) -> Sequence[Any]: ...
     @property
     def finished(self) -> bool: ...
     def step(self) -> Period: ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -65,7 +66,7 @@ def run_bare(
     given = b"" if stdin is None else Path(stdin).read_bytes()
     from miro_robot.bare import BareMachine, Ended
 
-    out = click.get_binary_stream("stdout")
+    out = sys.stdout.buffer
     machine = BareMachine(loaded, code_in_xram=code_in_xram, stdin=given, baud=baud, output=out.write)
     with ProgressBar("running", max_cycles) as bar:
         ended = machine.run(until=target, max_cycles=max_cycles, progress=bar.to)

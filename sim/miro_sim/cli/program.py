@@ -55,7 +55,7 @@ def complain(message: str) -> None:
 
 def output() -> Console:
     """The console for results, on stdout; what goes to a file or a pipe is not folded at 80 columns."""
-    return Console(highlight=False, width=None if sys.stdout.isatty() else PIPE_COLUMNS)
+    return Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else PIPE_COLUMNS)
 
 
 class Program(click.Group):

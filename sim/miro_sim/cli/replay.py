@@ -127,7 +127,9 @@ def _print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> Non
     table.add_column("from")
     table.add_column("frame", overflow="fold")
     for line in shown:
-        sender = "host" if line.slot < 0 else f"robot {line.slot}"
+        sender = (
+            "host" if line.direction == stream.DOWN else "robot ?" if line.slot < 0 else f"robot {line.slot}"
+        )
         if len(robots) > 1:
             sender = f"net{line.network} {sender}"
         table.add_row(str(line.tick), f"{seconds(line.tick):.4f}", line.direction, sender, line.text)
