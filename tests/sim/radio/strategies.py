@@ -29,5 +29,6 @@ def transmissions(draw, most=4):
 
 
 def cuts(until):
-    """Ticks in ascending order that end with `until`."""
-    return st.lists(st.integers(0, until), max_size=12).map(lambda ticks: [*sorted(ticks), until])
+    """Ticks in ascending order that end with `until`; some on the edges of the slots."""
+    ticks = st.one_of(st.integers(0, until), st.integers(0, until // 2500).map(lambda slot: slot * 2500))
+    return st.lists(ticks, max_size=12).map(lambda ticks: [*sorted(ticks), until])
