@@ -11,6 +11,8 @@ but the CPU is advanced at its own events only, never "up to now", so who looks 
 
 from __future__ import annotations
 
+from typing import Any
+
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.options import Lm629Options
@@ -255,17 +257,17 @@ class Board(Bus):
             "left": self.left.snapshot(),
             "right": self.right.snapshot(),
             "plant": self.plant.snapshot(),
-            "bank": bytes(self.bank),
-            "external": bytes(self.external),
+            "bank": bytes([self.bank[index] for index in range(CONSTANT_BANK + 1)]),
+            "external": bytes([self.external[index] for index in range(PORTS)]),
             "bus_levels": self.bus_levels,
-            "bridge_enable": bytes(self.bridge_enable),
-            "bridge_sign": bytes(self.bridge_sign),
+            "bridge_enable": bytes([self.bridge_enable[index] for index in range(2)]),
+            "bridge_sign": bytes([self.bridge_sign[index] for index in range(2)]),
             "fault_count": self.fault_count,
             "busy_writes": self.busy_writes,
             "contention": self.contention,
         }
 
-    def restore(self, state: dict[str, object]) -> None:
+    def restore(self, state: dict[str, Any]) -> None:
         """Puts back what `snapshot` gave."""
         self.cpu.restore(state["cpu"])
         self.left.restore(state["left"])

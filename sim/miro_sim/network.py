@@ -28,7 +28,15 @@ SETTLE_TICKS = 120
 class Network:
     """Station, radio and robots of one frequency. `script` replaces what the station would send."""
 
-    NOT_STATE = ("spec", "index", "compute_ticks", "keyup_ticks", "script")
+    NOT_STATE = (
+        "spec",
+        "index",
+        "compute_ticks",
+        "keyup_ticks",
+        "script",
+        "sent",
+        "seen",
+    )  # the last two: records
 
     def __init__(
         self,

@@ -30,7 +30,14 @@ COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
 class Robot:
     """A robot on the pitch and its pilot. `network` and `spec.slot` name it in records and noise streams."""
 
-    NOT_STATE = ("spec", "network", "reference", "camera_noise", "counter_addresses")
+    NOT_STATE = (
+        "spec",
+        "network",
+        "reference",
+        "camera_noise",
+        "counter_addresses",
+        "drive",
+    )  # the board saves it
 
     def __init__(
         self, spec: sc.Robot, scenario: sc.Scenario, network: int, robots: int, seed: int, image: Image

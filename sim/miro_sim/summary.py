@@ -42,7 +42,7 @@ class Tracking(msgspec.Struct, frozen=True):
 
     `rms_*`: root mean square over the last second of the run (all of it, if shorter), one value a control
     period; position is the distance. `settling_s`: the last time at which the robot was outside 3 cm or
-    0.15 rad; 0 if it never was, None if it still is at the end.
+    0.15 rad; 0 if it never was, None if it never was inside.
     """
 
     rms_x_cm: float | None
@@ -154,7 +154,7 @@ def _rms(values: Sequence[float]) -> float:
 
 
 def _settling_s(samples: Sequence[ErrorSample]) -> float | None:
-    if not samples[-1].settled:
+    if not any(sample.settled for sample in samples):
         return None
     outside = [sample.tick for sample in samples if not sample.settled]
     return seconds(outside[-1]) if outside else 0.0

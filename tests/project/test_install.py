@@ -34,7 +34,7 @@ def tree(tmp_path):
 
 
 def with_compiled_modules(tree):
-    for source in engine.hot_sources(dict.fromkeys(("",), ROOT)).values():
+    for source in engine.hot_sources({"": ROOT}).values():
         built = engine.compiled_file(source)
         if built is not None and ".venv" not in built.parts and "build" not in built.parts:
             shutil.copy(built, tree / built.relative_to(ROOT))
@@ -58,7 +58,9 @@ def run_short(tree, *options):
     lines = ["duration_s = 0.5" if line.startswith("duration_s") else line for line in text.splitlines()]
     (tree / "short.toml").write_text("\n".join(lines))
     return python(
-        tree, "-m", "miro_sim.cli", "run", "short.toml", "--seed", "7", "--out", "out", "--quiet", *options
+        tree,
+        *("-c", "from miro_sim.cli import main; main()"),
+        *("run", "short.toml", "--seed", "7", "--out", "out", "--quiet", *options),
     )
 
 

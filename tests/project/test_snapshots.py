@@ -46,21 +46,31 @@ def class_level_strings(node):
 
 
 def mentioned_in_snapshot(node):
-    method = next(part for part in node.body if isinstance(part, ast.FunctionDef) and part.name == "snapshot")
-    names = set()
-    for part in ast.walk(method):
-        if isinstance(part, ast.Attribute) and isinstance(part.value, ast.Name) and part.value.id == "self":
-            names.add(part.attr)
+    """Names X of every `self.X` in `snapshot` and in the methods of the class that it calls."""
+    methods = {part.name: part for part in node.body if isinstance(part, ast.FunctionDef)}
+    names, waiting = set(), ["snapshot"]
+    while waiting:
+        for part in ast.walk(methods[waiting.pop()]):
+            if (
+                isinstance(part, ast.Attribute)
+                and isinstance(part.value, ast.Name)
+                and part.value.id == "self"
+            ):
+                if part.attr in methods and part.attr not in names:
+                    waiting.append(part.attr)
+                names.add(part.attr)
+            if isinstance(part, ast.Call) and ast.unparse(part) == "vars(self)":
+                names |= assigned_attributes(node)
     return names
 
 
-@pytest.mark.parametrize("node", classes_with_snapshot())
+@pytest.mark.parametrize("node", list(classes_with_snapshot()))
 def test_every_attribute_is_in_the_snapshot_or_declared_as_not_state(node):
     forgotten = assigned_attributes(node) - mentioned_in_snapshot(node) - class_level_strings(node)
     assert not forgotten, f"{node.name} forgets {sorted(forgotten)}"
 
 
-@pytest.mark.parametrize("node", classes_with_snapshot())
+@pytest.mark.parametrize("node", list(classes_with_snapshot()))
 def test_what_a_snapshot_gives_can_be_put_back(node):
     methods = {part.name for part in node.body if isinstance(part, ast.FunctionDef)}
     assert "restore" in methods

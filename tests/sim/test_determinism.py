@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 from miro_protocol import engine
-from miro_robot.firmware import builtin_image
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim import scenario_file
 from miro_sim.canonical import encode
 from miro_sim.clock import CONTROL_PERIOD_TICKS
-from miro_sim.scenario_file import load_scenario
 from miro_sim.world import World
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
@@ -49,7 +50,7 @@ def digest_of_a_process(folder, *options, env=None, name="fig6"):
 
 
 def world(folder, seed=SEED):
-    return World(load_scenario(str(short_scenario(folder))), seed, builtin_image())
+    return World(scenario_file.load(str(short_scenario(folder))).scenario, seed, load_hex(image_path()))
 
 
 def digest_of(world):

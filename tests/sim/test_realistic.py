@@ -7,7 +7,7 @@ from miro_protocol.decoder import Decoder, Received
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim import scenario_file
-from miro_sim.summary import Tracking
+from miro_sim.summary import errors_by_robot, tracking_of
 from miro_sim.world import World
 
 SEEDS = range(10)
@@ -34,7 +34,7 @@ class Observer:
         self.robots = world.networks[0].spec.robots
         symbols = world.image.symbols
         self.address = {
-            name: symbols.address(f"_{name}", "iram")
+            name: symbols.find(name).address
             for name in ("frames_accepted", "last_hdr", "last_left", "last_right")
         }
         self.accepted = 0
@@ -64,12 +64,12 @@ def test_the_figure_is_tracked_within_the_papers_measurement_error(name, image):
     for seed in SEEDS:
         world = World(scenario, seed, image)
         observer = Observer(world)
-        tracking = Tracking()
+        periods = []
         while not world.finished:
             period = world.step()
             observer.look(period)
-            tracking.add(period)
+            periods.append(period)
         assert world.faults == []
         assert observer.accepted > 150
-        errors.append(tracking.result().rms_position_cm)
+        errors.append(tracking_of(errors_by_robot(periods)[0, 0]).rms_position_cm)
     assert statistics.median(errors) <= 2.5, errors

@@ -40,6 +40,7 @@ class Cpu(Executor):
         "length_of",
         "cycles_of",
         "code_limit",
+        *("rxd", "txd"),  # the serial port's, which saves them
         "start",  # the instruction in progress: snapshots are taken between two
         "limit",
         "until",

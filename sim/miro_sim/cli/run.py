@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     "--out", type=click.Path(path_type=Path), help="Folder for the files. Default: runs/SCENARIO-SEED."
 )
 @click.option(
-    "--seed", type=click.IntRange(0, MAX_SEED), default=1, show_default=True, help="Master seed of all noise."
+    "--seed", type=click.IntRange(0, MAX_SEED), default=0, show_default=True, help="Master seed of all noise."
 )
 @firmware_option("Image to run instead of the robot's own.")
 @engine_option
