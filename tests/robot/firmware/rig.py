@@ -30,6 +30,14 @@ IMAGE = load_hex(image_path())
 BOOTED = 4 * MS
 
 
+def iram(name: str) -> int:
+    """Address of a variable of the firmware."""
+    symbol = IMAGE.symbols.find(name)
+    assert symbol is not None, name
+    assert symbol.space == "iram", symbol
+    return symbol.address
+
+
 class Probe(Board):
     """Notes every change of a port the firmware makes. With `deaf` the wire /RD is broken: the bus reads FFh."""
 
@@ -67,7 +75,7 @@ class Rig:
         self.n = n
         self.board = Probe(wiring or load_wiring(), plant or Plant(), slot, n, options)
         self.cpu = self.board.cpu
-        self.cpu.load(IMAGE.code, IMAGE.ranges)
+        self.cpu.load(IMAGE.code, IMAGE.used)
         self.now = 0
         self.line_free = 0
         self.pending: list[tuple[int, int]] = []
@@ -162,13 +170,10 @@ class Rig:
         return commands
 
     def u8(self, name: str) -> int:
-        address = IMAGE.symbols.address(name, "iram")
-        assert address is not None, name
-        return self.cpu.peek_iram(address)
+        return self.cpu.peek_iram(iram(name))
 
     def u16(self, name: str) -> int:
-        address = IMAGE.symbols.address(name, "iram")
-        assert address is not None, name
+        address = iram(name)
         return self.cpu.peek_iram(address) | self.cpu.peek_iram(address + 1) << 8
 
     def i16(self, name: str) -> int:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from miro_robot.firmware import image_path
 
-from tests.robot.firmware.rig import IMAGE
+from tests.robot.firmware.rig import IMAGE, iram
 
 SOURCE = Path(__file__).parents[3] / "robot_fw" / "firmware"
 VERSION = (SOURCE / "sdcc.version").read_text("utf-8").strip()
@@ -32,15 +32,12 @@ def test_the_image_fits_the_chip() -> None:
 
 @pytest.mark.parametrize("name", ["_frames_accepted", "_frames_rejected", "_frames_stale"])
 def test_observers_find_the_counters_in_internal_ram(name: str) -> None:
-    address = IMAGE.symbols.address(name, "iram")
-    assert address is not None
-    assert 0x08 <= address < 0x100
+    assert 0x08 <= iram(name) < 0x100
 
 
 def test_it_falls_asleep_by_copying_a_byte_that_interrupts_clear() -> None:
     """MOV PCON,sleep: one instruction from the decision to IDL, so no interrupt fits in between."""
-    sleep = IMAGE.symbols.address("_sleep", "iram")
-    assert sleep is not None
+    sleep = iram("_sleep")
     assert IMAGE.code.count(bytes([0x85, sleep, 0x87])) == 1
     assert IMAGE.code.count(bytes([0x75, sleep, 0x00])) == 2  # both interrupts
 
@@ -48,4 +45,4 @@ def test_it_falls_asleep_by_copying_a_byte_that_interrupts_clear() -> None:
 def test_interrupts_are_enabled_once_and_never_disabled() -> None:
     assert IMAGE.code.count(bytes([0xD2, 0xAF])) == 1  # SETB EA
     for disabling in (b"\xc2\xaf", b"\xc2\xac", b"\x75\xa8", b"\x53\xa8", b"\xf5\xa8"):  # CLR EA, CLR ES, IE
-        assert disabling not in IMAGE.code[: IMAGE.size + 0x100]
+        assert disabling not in IMAGE.code

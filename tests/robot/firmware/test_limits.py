@@ -44,8 +44,9 @@ def test_two_chips_are_never_selected_for_a_read() -> None:
 
 def test_the_stack_stays_far_from_the_end_of_memory() -> None:
     rig = busy_rig()
-    start = IMAGE.symbols.address("__start__stack", "iram")
-    assert start is not None
+    symbol = IMAGE.symbols.find("__start__stack")
+    assert symbol is not None
+    start = symbol.address
     highest = 0
     end = min(rig.line_free, rig.now + 250 * MS)
     while rig.pending and rig.pending[0][0] < end:
