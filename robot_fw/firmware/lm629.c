@@ -16,8 +16,8 @@
 #define STATUS_READY    0x80
 #define STATUS_BIT6     0x40
 
-#define BUSY_POLLS      40      /* about 10 us each: four times the 100 us that a chip may take */
-#define BOOT_POLLS      200     /* about 25 us each: 5 ms, the chip may take 1.5 ms */
+#define BUSY_POLLS      25      /* 16 us each: four times the 100 us that a chip may take */
+#define BOOT_POLLS      200     /* 17 us each: twice the 1.5 ms that a chip may take */
 
 __bit lm629_ready;
 static u8 selected;
@@ -130,7 +130,7 @@ static bool boots(u8 chip)
 
 static bool handshake(void)
 {
-    /* The accesses of the loop alone outlast the 8 LM629 clocks (1.33 us) that RST must be low. */
+    /* One access in between outlasts the 8 LM629 clocks (1.33 us) that RST must be low. */
     LM629_RST = 0;
     lm629_status(LEFT);
     LM629_RST = 1;
