@@ -32,20 +32,14 @@ class Cpu(Executor):
     `rxd`.
     """
 
-    NOT_STATE = (
-        "bus",
-        "rom",  # the image: constant while it runs, unless code lies in RAM, whose owner then restores it
-        "rows",
-        "row_of",
-        "length_of",
-        "cycles_of",
+    NOT_STATE: tuple[str, ...] = (
+        *Executor.NOT_STATE,
         "code_limit",
-        *("rxd", "txd"),  # the serial port's, which saves them
-        "start",  # the instruction in progress: snapshots are taken between two
         "limit",
-        "until",
-        "stop",
         "next_event",
+        "rxd",
+        "stop",
+        "txd",
     )
 
     def __init__(self, bus: Bus | None = None) -> None:
@@ -345,21 +339,7 @@ class Cpu(Executor):
         """All state, between two runs; the image is not part of it."""
         self.chip.sync(self.cycles)
         return {
-            "iram": bytes([self.iram[address] for address in range(256)]),
-            "pc": self.pc,
-            "a": self.a,
-            "b": self.b,
-            "sp": self.sp,
-            "dptr": self.dptr,
-            "cy": self.cy,
-            "ac": self.ac,
-            "ov": self.ov,
-            "user_flags": self.user_flags,
-            "bank": self.bank,
-            "cycles": self.cycles,
-            "instructions": self.instructions,
-            "idle_cycles": self.idle_cycles,
-            "faults": self.faults,
+            **Executor.snapshot(self),
             "pcon": self.pcon,
             "idle": self.idle,
             "powered_down": self.powered_down,
@@ -368,22 +348,7 @@ class Cpu(Executor):
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        for address in range(256):
-            self.iram[address] = state["iram"][address]
-        self.pc = state["pc"]
-        self.a = state["a"]
-        self.b = state["b"]
-        self.sp = state["sp"]
-        self.dptr = state["dptr"]
-        self.cy = state["cy"]
-        self.ac = state["ac"]
-        self.ov = state["ov"]
-        self.user_flags = state["user_flags"]
-        self.bank = state["bank"]
-        self.cycles = state["cycles"]
-        self.instructions = state["instructions"]
-        self.idle_cycles = state["idle_cycles"]
-        self.faults = state["faults"]
+        Executor.restore(self, state)
         self.pcon = state["pcon"]
         self.idle = state["idle"]
         self.powered_down = state["powered_down"]

@@ -1,6 +1,6 @@
 """The instructions: registers, internal RAM, ALU, and the loop that executes code.
 
-What belongs here: what each line of `opcodes.TABLE` does to registers and memory. Special function
+What belongs here: what each line of `opcodes.TABLE` does. Special function
 registers, time passing in peripherals, interrupts and idling are `Cpu`'s (cpu.py), which fills in the hooks
 at the end of the class.
 
@@ -13,10 +13,8 @@ else about time.
 from __future__ import annotations
 
 from miro_robot.faults import FaultKind
-from miro_robot.mcs51.bus import Bus
-from miro_robot.mcs51.opcodes import CYCLES, LENGTH, ROW
+from miro_robot.mcs51.core import Core
 
-_OUTSIDE = 0xFE  # row of an address that no image byte was loaded to
 _BREAKPOINT = 0xFF  # row that ends a run before its instruction
 _SPECIAL = 0xFE  # the lowest of these two
 _UNDEFINED_OPCODE = int(FaultKind.UNDEFINED_OPCODE)
@@ -27,35 +25,8 @@ _OUTSIDE_IMAGE = int(FaultKind.OUTSIDE_IMAGE)
 REACHED, STOPPED, BREAKPOINT = 0, 1, 2  # why a run ended
 
 
-class Executor:
-    """Registers, memory and instructions of an 80C52 core."""
-
-    def __init__(self, bus: Bus) -> None:
-        self.bus = bus
-        self.rom = bytearray(0x10002)  # 64 KB, and the first two bytes again for operands that wrap
-        self.rows = bytearray(0x10000)  # per address: its opcode's line in the table, or a special row
-        self.row_of = ROW
-        self.length_of = LENGTH
-        self.cycles_of = CYCLES
-        self.iram = bytearray(256)
-        self.pc = 0
-        self.a = 0
-        self.b = 0
-        self.sp = 7
-        self.dptr = 0
-        self.cy = 0
-        self.ac = 0
-        self.ov = 0
-        self.user_flags = 0  # F0 and UD, in their places in PSW
-        self.bank = 0  # address of R0: 00, 08, 10 or 18
-        self.cycles = 0  # machine cycles since power-on; during an instruction: its end
-        self.start = 0  # first cycle of the instruction in progress
-        self.limit = 0  # cycle at which the loop has to look up
-        self.until = 0
-        self.stop = 0
-        self.instructions = 0
-        self.idle_cycles = 0
-        self.faults = 0
+class Executor(Core):
+    """A core that executes instructions."""
 
     def run(self, until_cycle: int) -> int:
         """Executes until `cycles` >= `until_cycle`; may end up to 3 cycles late, when an instruction does.
@@ -473,44 +444,3 @@ class Executor:
     def fault(self, kind: int) -> None:
         self.faults += 1
         self.bus.fault(kind, self.pc, 12 * self.cycles)
-
-    # Hooks: what `Cpu` adds to the bare instructions
-
-    def begin_run(self) -> None:
-        """Before the first instruction of a run: set `limit`."""
-        self.limit = self.until
-
-    def end_run(self) -> None:
-        """After the last instruction of a run."""
-
-    def boundary(self) -> int:
-        """`cycles` reached `limit`: 1 ends the run."""
-        return 1 if self.cycles >= self.until else 0
-
-    def end_of_interrupt(self) -> None:
-        """RETI was executed."""
-
-    def read_sfr(self, address: int) -> int:
-        """Direct 80..FF in cycle `start`, ports at their pins."""
-        return 0
-
-    def read_latch(self, address: int) -> int:
-        """Direct 80..FF for read-modify-write."""
-        return 0
-
-    def write_sfr(self, address: int, value: int) -> None:
-        """Direct 80..FF at the end of the instruction."""
-
-    def write_sfr_bit(self, address: int, mask: int, level: int) -> None:
-        """One bit of direct 80..FF at the end of the instruction."""
-
-    def page(self) -> int:
-        """High address byte of MOVX @Ri, in place."""
-        return 0
-
-    def movx_read(self, address: int) -> int:
-        """Byte from the external data bus."""
-        return 0xFF
-
-    def movx_write(self, address: int, value: int) -> None:
-        """Byte to the external data bus."""

@@ -1,0 +1,40 @@
+from miro_robot.mcs51.bus cimport Bus
+
+cdef class Core:
+    cdef readonly Bus bus
+    cdef unsigned char rom[65538]
+    cdef unsigned char rows[65536]
+    cdef unsigned char row_of[256]
+    cdef unsigned char length_of[256]
+    cdef unsigned char cycles_of[256]
+    cdef unsigned char iram[256]
+    cdef public int pc
+    cdef public int a
+    cdef public int b
+    cdef public int sp
+    cdef public int dptr
+    cdef public int cy
+    cdef public int ac
+    cdef public int ov
+    cdef public int user_flags
+    cdef public int bank
+    cdef readonly long long cycles
+    cdef readonly long long start
+    cdef long long limit
+    cdef long long until
+    cdef int stop
+    cdef readonly long long instructions
+    cdef readonly long long idle_cycles
+    cdef readonly long long faults
+
+    cdef int begin_run(self) except -1
+    cdef int end_run(self) except -1
+    cdef int boundary(self) except -1
+    cdef int end_of_interrupt(self) except -1
+    cdef int read_sfr(self, int address) except -1
+    cdef int read_latch(self, int address) except -1
+    cdef int write_sfr(self, int address, int value) except -1
+    cdef int write_sfr_bit(self, int address, int mask, int level) except -1
+    cdef int page(self) noexcept
+    cdef int movx_read(self, int address) except -1
+    cdef int movx_write(self, int address, int value) except -1

@@ -1,0 +1,135 @@
+"""Registers and memory of the core, and what it needs from the chip around it.
+
+What belongs here: state, its snapshot, and the hooks that `Cpu` fills in. Instructions are in `execute.py`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.opcodes import CYCLES, LENGTH, ROW
+
+
+class Core:
+    """What instructions work on; `cycles` counts since power-on."""
+
+    NOT_STATE: tuple[str, ...] = (
+        "bus",
+        "rom",  # the image: constant while it runs, unless code lies in RAM, whose owner then restores it
+        "rows",
+        "row_of",
+        "length_of",
+        "cycles_of",
+        "start",  # the instruction in progress: snapshots are taken between two
+        "limit",
+        "until",
+        "stop",
+    )
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus = bus
+        self.rom = bytearray(0x10002)  # 64 KB, and the first two bytes again for operands that wrap
+        self.rows = bytearray(0x10000)  # per address: its opcode's line in the table, or a special row
+        self.row_of = ROW
+        self.length_of = LENGTH
+        self.cycles_of = CYCLES
+        self.iram = bytearray(256)
+        self.pc = 0
+        self.a = 0
+        self.b = 0
+        self.sp = 7
+        self.dptr = 0
+        self.cy = 0
+        self.ac = 0
+        self.ov = 0
+        self.user_flags = 0  # F0 and UD, in their places in PSW
+        self.bank = 0  # address of R0: 00, 08, 10 or 18
+        self.cycles = 0  # machine cycles since power-on; during an instruction: its end
+        self.start = 0  # first cycle of the instruction in progress
+        self.limit = 0  # cycle at which the loop has to look up
+        self.until = 0
+        self.stop = 0
+        self.instructions = 0
+        self.idle_cycles = 0
+        self.faults = 0
+
+    # Hooks: what `Cpu` adds to the bare instructions
+
+    def begin_run(self) -> None:
+        """Before the first instruction of a run: set `limit`."""
+        self.limit = self.until
+
+    def end_run(self) -> None:
+        """After the last instruction of a run."""
+
+    def boundary(self) -> int:
+        """`cycles` reached `limit`: 1 ends the run."""
+        return 1 if self.cycles >= self.until else 0
+
+    def end_of_interrupt(self) -> None:
+        """RETI was executed."""
+
+    def read_sfr(self, address: int) -> int:
+        """Direct 80..FF in cycle `start`, ports at their pins."""
+        return 0
+
+    def read_latch(self, address: int) -> int:
+        """Direct 80..FF for read-modify-write."""
+        return 0
+
+    def write_sfr(self, address: int, value: int) -> None:
+        """Direct 80..FF at the end of the instruction."""
+
+    def write_sfr_bit(self, address: int, mask: int, level: int) -> None:
+        """One bit of direct 80..FF at the end of the instruction."""
+
+    def page(self) -> int:
+        """High address byte of MOVX @Ri, in place."""
+        return 0
+
+    def movx_read(self, address: int) -> int:
+        """Byte from the external data bus."""
+        return 0xFF
+
+    def movx_write(self, address: int, value: int) -> None:
+        """Byte to the external data bus."""
+
+    # State
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "iram": bytes([self.iram[address] for address in range(256)]),
+            "pc": self.pc,
+            "a": self.a,
+            "b": self.b,
+            "sp": self.sp,
+            "dptr": self.dptr,
+            "cy": self.cy,
+            "ac": self.ac,
+            "ov": self.ov,
+            "user_flags": self.user_flags,
+            "bank": self.bank,
+            "cycles": self.cycles,
+            "instructions": self.instructions,
+            "idle_cycles": self.idle_cycles,
+            "faults": self.faults,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        for address in range(256):
+            self.iram[address] = state["iram"][address]
+        self.pc = state["pc"]
+        self.a = state["a"]
+        self.b = state["b"]
+        self.sp = state["sp"]
+        self.dptr = state["dptr"]
+        self.cy = state["cy"]
+        self.ac = state["ac"]
+        self.ov = state["ov"]
+        self.user_flags = state["user_flags"]
+        self.bank = state["bank"]
+        self.cycles = state["cycles"]
+        self.instructions = state["instructions"]
+        self.idle_cycles = state["idle_cycles"]
+        self.faults = state["faults"]
