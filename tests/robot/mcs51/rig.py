@@ -1,0 +1,67 @@
+"""A CPU with a recording bus, and short cuts for running assembled lines on it."""
+
+from __future__ import annotations
+
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.cpu import Cpu
+
+from tests.robot.mcs51.asm import SFRS, assemble
+
+
+class RecordingBus(Bus):
+    """Remembers every call; external memory is a dictionary."""
+
+    def __init__(self) -> None:
+        self.ports: list[tuple[int, int, int]] = []
+        self.reads: list[tuple[int, int]] = []
+        self.writes: list[tuple[int, int, int]] = []
+        self.faults: list[tuple[int, int, int]] = []
+        self.sent: list[tuple[int, int]] = []
+        self.memory: dict[int, int] = {}
+
+    def port_written(self, port, latch, tick):
+        self.ports.append((port, latch, tick))
+
+    def movx_read(self, address, tick):
+        self.reads.append((address, tick))
+        return self.memory.get(address, 0xFF)
+
+    def movx_write(self, address, value, tick):
+        self.writes.append((address, value, tick))
+        self.memory[address] = value
+
+    def fault(self, kind, pc, tick):
+        self.faults.append((kind, pc, tick))
+
+    def byte_sent(self, value, tick):
+        self.sent.append((value, tick))
+
+
+def cpu_with(text: str) -> Cpu:
+    """A CPU that has `text` assembled at 0 and a recording bus (`cpu.bus`)."""
+    cpu = Cpu(RecordingBus())
+    cpu.load(assemble(text))
+    return cpu
+
+
+def stepped(text: str, steps: int | None = None) -> Cpu:
+    """... after so many steps (default: as many as there are instructions)."""
+    cpu = cpu_with(text)
+    lines = [line.split(";")[0].strip() for line in text.splitlines()]
+    for _ in range(
+        steps if steps is not None else sum(1 for line in lines if line and not line.endswith(":"))
+    ):
+        cpu.step()
+    return cpu
+
+
+def run_to_loop(text: str, cycles: int = 100_000) -> Cpu:
+    """... run until it hangs in `end: SJMP $`, which is appended."""
+    cpu = cpu_with(text + "\nend:\nSJMP $")
+    end = len(assemble(text))
+    assert cpu.run_until_pc(end, cycles) == 2, f"never came to its end: {cpu}"
+    return cpu
+
+
+def sfr(cpu: Cpu, name: str) -> int:
+    return cpu.sfr(SFRS[name])

@@ -1,0 +1,82 @@
+"""The Line against a plain list of edges."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from miro_robot.mcs51.line import FAR, Line
+
+EDGES = st.lists(st.tuples(st.integers(0, 20), st.integers(0, 1)), max_size=40)
+
+
+def built(initial, steps):
+    """A Line and the naive level per tick, from (advance, level) steps."""
+    line = Line(initial)
+    tick, levels = 0, {}
+    for advance, level in steps:
+        tick += advance
+        line.append(tick, level)
+        levels[tick] = level
+    return line, levels
+
+
+def naive_level(initial, levels, tick):
+    before = [when for when in levels if when <= tick]
+    return levels[max(before)] if before else initial
+
+
+@given(st.integers(0, 1), EDGES, st.lists(st.integers(-5, 900), max_size=30))
+def test_levels_and_next_edges_are_those_of_a_list(initial, steps, queries):
+    line, levels = built(initial, steps)
+    for query in queries:
+        assert line.level_at(query) == naive_level(initial, levels, query)
+        later = [
+            tick
+            for tick in levels
+            if tick > query and naive_level(initial, levels, tick) != naive_level(initial, levels, tick - 1)
+        ]
+        assert line.next_edge(query) == min(later, default=FAR)
+
+
+@given(st.integers(0, 1), EDGES, st.integers(0, 400), st.lists(st.integers(0, 400), max_size=10))
+def test_forgetting_changes_no_answer_from_there_on(initial, steps, cut, queries):
+    line, levels = built(initial, steps)
+    line.forget(cut)
+    for query in queries:
+        if query >= cut:
+            assert line.level_at(query) == naive_level(initial, levels, query)
+    assert all(tick > cut for tick, _ in line.edges())
+
+
+@given(st.integers(0, 1), EDGES)
+def test_a_restored_line_equals_the_one_saved(initial, steps):
+    line, _ = built(initial, steps)
+    line.settled_tick = 77
+    other = Line()
+    other.restore(line.snapshot())
+    assert other.snapshot() == line.snapshot()
+    assert other.edges() == line.edges()
+
+
+def test_going_back_in_time_is_refused():
+    line = Line()
+    line.append(10, 0)
+    with pytest.raises(ValueError, match="edge at tick 9 comes after one at tick 10"):
+        line.append(9, 1)
+
+
+def test_the_ring_wraps_and_says_when_it_is_full():
+    line = Line()
+    for tick in range(10_000):
+        line.append(tick, tick & 1)
+        line.forget(tick - 2000)
+    assert line.level_at(9_000) == 0
+    for tick in range(10_000, 10_000 + 4096 - len(line.edges())):
+        line.append(tick, tick & 1)
+    with pytest.raises(OverflowError, match="4096 edges"):
+        line.append(20_000, 1 - line.level_at(20_000))
+
+
+def test_the_repr_shows_the_last_edges():
+    line = Line()
+    line.append(5, 0)
+    assert repr(line) == "Line(settled_tick=0, level=0, last edges [5:0])"
