@@ -1,0 +1,108 @@
+"""`mirotwin fw run` and `mirotwin info`: an image on the bare processor, and what is installed."""
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+from miro_robot.firmware import image_path
+from miro_sim.cli import main
+
+from tests.sim.cli.conftest import Result, hex_file
+
+LOOP = b"\x80\xfe"
+HELLO = bytes.fromhex("759850 758bff 758920 d28e 7599c3 80fe".replace(" ", ""))
+
+
+def test_reaching_the_address_is_success(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    image = hex_file(tmp_path / "a.ihx", b"\x00\x00\x00" + LOOP)
+    assert mirotwin("fw", "run", image, "--until", "0x0002", "--max-cycles", 100) == (0, "", "")
+
+
+def test_a_symbol_is_found_with_or_without_its_underscore(mirotwin: Callable[..., Result]) -> None:
+    for name in ("main", "_main"):
+        assert mirotwin("fw", "run", image_path(), "--until", name, "--max-cycles", 100_000) == (0, "", "")
+
+
+def test_the_cycle_limit_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result]) -> None:
+    code, out, err = mirotwin("fw", "run", image_path(), "--max-cycles", 5000)
+    assert (code, out) == (42, "")
+    assert err.startswith("mirotwin: gave up at 0x")
+
+
+def test_a_program_that_ends_is_done_unless_it_should_have_got_somewhere(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image = hex_file(tmp_path / "a.ihx", LOOP)
+    assert mirotwin("fw", "run", image)[0] == 0
+    assert mirotwin("fw", "run", image, "--until", "0x10")[0] == 1
+
+
+def test_a_fault_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    code, out, err = mirotwin("fw", "run", hex_file(tmp_path / "a.ihx", b"\xa5"), "--max-cycles", 100)
+    assert (code, out) == (3, "")
+    assert "firmware fault: firmware executed the undefined opcode A5" in err
+
+
+@pytest.mark.parametrize(
+    ("until", "expected"),
+    [
+        ("maim", "no symbol maim in the code; did you mean _main?"),
+        ("0x10000", "beyond the last code address"),
+        ("0xyz", "not a hexadecimal number"),
+    ],
+)
+def test_a_place_that_is_none_is_refused(mirotwin: Callable[..., Result], until: str, expected: str) -> None:
+    code, out, err = mirotwin("fw", "run", image_path(), "--until", until)
+    assert (code, out) == (2, "")
+    assert expected in err
+    assert err.count("\n") == 1
+
+
+def test_characters_go_to_stdout_as_they_are_and_everything_else_to_stderr(tmp_path: Path) -> None:
+    image = hex_file(tmp_path / "a.ihx", HELLO)
+    result = CliRunner().invoke(main, ["fw", "run", str(image), "--max-cycles", "300000"])
+    assert result.stdout_bytes == b"\xc3"
+
+
+def test_the_dump_holds_registers_and_memories(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    image = hex_file(tmp_path / "a.ihx", b"\x75\x40\x5a" + LOOP)
+    mirotwin("fw", "run", image, "--until", "0x0003", "--dump", tmp_path / "dump.json")
+    dump = json.loads((tmp_path / "dump.json").read_bytes())
+    assert set(dump) == {"pc", "cycles", "instructions", "iram_hex", "sfr", "xram_hex"}
+    assert (dump["pc"], dump["cycles"], dump["instructions"]) == (3, 2, 1)
+    assert bytes.fromhex(dump["iram_hex"])[0x40] == 0x5A
+    assert dump["sfr"]["81"] == 7
+
+
+def test_the_8_kb_limit_is_lifted_when_code_is_in_ram(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image = tmp_path / "a.ihx"
+    image.write_text(":0200000080FE80\n:02200000AABB79\n:00000001FF\n")
+    assert "does not fit 8192 bytes" in mirotwin("fw", "run", image)[2]
+    assert mirotwin("fw", "run", image, "--code-in-xram", "--until", "0x0000")[0] == 0
+
+
+def test_info_names_versions_engine_and_firmware(mirotwin: Callable[..., Result]) -> None:
+    code, out, err = mirotwin("info")
+    assert (code, err) == (0, "")
+    sha256 = hashlib.sha256(image_path().read_bytes()).hexdigest()
+    for word in ("mirotwin", "Python", "mcap", "engine", sha256, str(image_path()), "bytes of 8192"):
+        assert word in out
+
+
+def test_every_command_and_option_explains_itself() -> None:
+    def walk(command: click.Command) -> None:
+        assert command.help
+        for parameter in command.params:
+            if isinstance(parameter, click.Option):
+                assert parameter.help, f"{command.name} {parameter.name}"
+        if isinstance(command, click.Group):
+            for child in command.commands.values():
+                walk(child)
+
+    walk(main)

@@ -1,0 +1,134 @@
+"""`mirotwin run`: the files it writes, and that nothing is half-written whatever happens."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import NoReturn
+
+import msgspec
+import pytest
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim import recording_reader, runner
+from miro_sim.scenario_file import load
+from miro_sim.world import World
+
+from tests.sim.cli.conftest import SHORT, Result, hex_file
+
+UNDEFINED_OPCODE = b"\xa5"
+
+
+def test_a_run_writes_a_recording_a_figure_and_a_summary(finished: Path) -> None:
+    assert sorted(path.name for path in finished.iterdir()) == ["figure.png", "run.mcap", "summary.json"]
+    summary = json.loads((finished / "summary.json").read_bytes())
+    recording = recording_reader.read(finished / "run.mcap")
+    assert summary["digest"] == recording.digest
+    assert (summary["scenario"], summary["seed"]) == ("short", 5)
+    assert summary["simulated_s"] == len(recording.periods) * 800_800 / 24e6
+    assert recording.source.scenario_text == SHORT
+    assert recording.source.seed == 5
+    assert recording.source.firmware == image_path().read_bytes()
+    assert recording.source.firmware_sha256 == summary["firmware"]["sha256"]
+    assert [(one["network"], one["slot"]) for one in summary["robots"]] == [(0, 0), (0, 2)]
+
+
+def test_recording_changes_nothing_and_leaves_nothing_out(finished: Path, short: Path) -> None:
+    world = World(load(str(short)).scenario, 5, load_hex(image_path()))
+    periods = []
+    while not world.finished:
+        periods.append(world.step())
+    assert recording_reader.read(finished / "run.mcap").periods == tuple(periods)
+
+
+def test_the_same_run_gives_the_same_bytes_and_a_full_recording_the_same_digest(
+    mirotwin: Callable[..., Result], finished: Path, short: Path, tmp_path: Path
+) -> None:
+    assert mirotwin("run", short, "--seed", 5, "--out", tmp_path / "again", "--quiet") == (0, "", "")
+    assert mirotwin("run", short, "--seed", 5, "--out", tmp_path / "full", "-q", "--record", "full")[0] == 0
+    for name in ("run.mcap", "figure.png"):
+        assert (tmp_path / "again" / name).read_bytes() == (finished / name).read_bytes()
+    full = recording_reader.read(tmp_path / "full" / "run.mcap")
+    assert full.periods == recording_reader.read(finished / "run.mcap").periods
+    assert (tmp_path / "full" / "run.mcap").stat().st_size > 2 * (finished / "run.mcap").stat().st_size
+
+
+def test_the_table_names_what_matters(mirotwin: Callable[..., Result], short: Path, tmp_path: Path) -> None:
+    code, out, err = mirotwin("run", short, "--out", tmp_path / "[out]")
+    assert (code, err) == (0, "")
+    for word in ("short, seed 1", "real time", "frames sent", "instructions", "digest", "[out]"):
+        assert word in out
+
+
+def test_the_folder_is_named_after_scenario_and_seed(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert mirotwin("run", short, "--seed", 3, "-q")[0] == 0
+    assert (tmp_path / "runs" / "short-3" / "run.mcap").exists()
+    code, out, err = mirotwin("run", short, "--seed", 3)
+    assert (code, out) == (2, "")
+    assert err.startswith("mirotwin: error: runs/short-3: the folder is not empty")
+    assert mirotwin("run", short, "--seed", 3, "-q", "--force")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (":00000001FF\n", ": holds no bytes; "),
+        ("hello\n", ":1: is not Intel HEX: "),
+        (":03000000020000FC\n:00000001FF\n", ":1: bad checksum FC, expected FB; "),
+        (":01200000A53A\n:00000001FF\n", ":1: byte at 0x2000 does not fit 8192 bytes; "),
+    ],
+)
+def test_firmware_that_is_none_is_refused_before_anything_is_written(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, content: str, expected: str
+) -> None:
+    image = tmp_path / "broken.ihx"
+    image.write_text(content)
+    code, out, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert f"mirotwin: error: {image}{expected}" in err
+    assert err.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["broken.ihx"]
+
+
+def test_a_firmware_fault_ends_the_run_with_code_3_and_complete_files(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    image = hex_file(tmp_path / "faulty.ihx", UNDEFINED_OPCODE)
+    code, _, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out", "-q")
+    assert code == 3
+    assert "mirotwin: firmware fault: net0/robot0: firmware executed the undefined opcode A5 at 0x" in err
+    recording = recording_reader.read(tmp_path / "out" / "run.mcap")
+    assert len(recording.periods) == 1
+    assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["firmware"]["faults"] >= 1
+    assert (tmp_path / "out" / "figure.png").exists()
+
+
+def test_an_interrupted_run_leaves_nothing_behind(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*arguments: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runner, "run", interrupted)
+    code, out, err = mirotwin("run", short, "--out", tmp_path / "out")
+    assert (code, out, err.strip()) == (130, "", "mirotwin: interrupted")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_when_the_simulation_breaks_the_recording_up_to_then_is_kept(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step = World.step
+
+    def breaking(world: World) -> object:
+        if world.index == 2:
+            raise OverflowError("line")
+        return step(world)
+
+    monkeypatch.setattr(World, "step", breaking)
+    with pytest.raises(OverflowError, match="line"):
+        mirotwin("run", short, "--out", tmp_path / "out")
+    assert len(recording_reader.read(tmp_path / "out" / "run.mcap").periods) == 2
+    assert msgspec.json.decode((tmp_path / "out" / "summary.json").read_bytes())["digest"]
