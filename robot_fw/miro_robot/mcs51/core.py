@@ -21,6 +21,7 @@ class Core:
         "row_of",
         "length_of",
         "cycles_of",
+        "at",
         "start",  # the instruction in progress: snapshots are taken between two
         "limit",
         "until",
@@ -47,6 +48,7 @@ class Core:
         self.bank = 0  # address of R0: 00, 08, 10 or 18
         self.cycles = 0  # machine cycles since power-on; during an instruction: its end
         self.start = 0  # first cycle of the instruction in progress
+        self.at = 0  # its address
         self.limit = 0  # cycle at which the loop has to look up
         self.until = 0
         self.stop = 0

@@ -207,6 +207,7 @@ class Cpu(Executor):
         self.pcon &= 0xFF ^ _IDL
         self.chip.taken(source, self.cycles)
         self.start = self.cycles
+        self.at = self.pc
         self.cycles += 2
         self.call(8 * source + 3)
         self.next_event = 0

@@ -46,6 +46,7 @@ class Executor(Core):
                     break
                 continue
             pc = self.pc
+            self.at = pc
             row = self.rows[pc]
             op = rom[pc]
             if row >= _SPECIAL:
@@ -443,4 +444,4 @@ class Executor(Core):
 
     def fault(self, kind: int) -> None:
         self.faults += 1
-        self.bus.fault(kind, self.pc, 12 * self.cycles)
+        self.bus.fault(kind, self.at, 12 * self.cycles)

@@ -6,6 +6,8 @@ Numbers are decimal or end in h; names of registers and bits are those of the AT
 
 from __future__ import annotations
 
+import re
+
 from miro_robot.mcs51.opcodes import TABLE
 
 SFRS = {
@@ -104,6 +106,6 @@ def _bit(text: str, labels: dict[str, int]) -> int:
 def _number(text: str, labels: dict[str, int], names: dict[str, int] | None = None) -> int:
     if names and text in names:
         return names[text]
-    if text[0].isdigit() or text[0] == "-":
-        return int(text[:-1], 16) if text.endswith("h") else int(text)
-    return labels.get(text, 0)
+    if re.fullmatch(r"[0-9A-F]+h", text):
+        return int(text[:-1], 16)
+    return int(text) if re.fullmatch(r"-?\d+", text) else labels.get(text, 0)

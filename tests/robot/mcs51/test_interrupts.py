@@ -1,0 +1,220 @@
+"""Interrupts: latency to the cycle, priorities, what blocks them, what clears them."""
+
+import pytest
+
+from tests.robot.mcs51.rig import RecordingBus, cpu_with, sfr
+
+VECTORS = {"INT0": 0x03, "T0": 0x0B, "INT1": 0x13, "T1": 0x1B, "SERIAL": 0x23, "T2": 0x2B}
+ISRS = """
+LJMP main
+ORG 0003h
+CLR P1.0
+RETI
+ORG 000Bh
+CLR P1.1
+RETI
+ORG 0013h
+CLR P1.2
+RETI
+ORG 001Bh
+CLR P1.3
+RETI
+ORG 0023h
+CLR P1.4
+RETI
+ORG 002Bh
+CLR P1.5
+RETI
+ORG 0040h
+main:
+"""
+INT0_LOW, INT1_LOW, BOTH_LOW = 0xFB, 0xF7, 0xF3
+
+
+def entries(cpu):
+    """(bit of P1, first cycle of the routine) per routine entered; CLR bit is its first, one-cycle instruction."""
+    before, found = 0xFF, []
+    for port, latch, tick in cpu.bus.ports:
+        if port == 1:
+            found.append(((before ^ latch).bit_length() - 1, tick // 12 - 1))
+            before = latch
+    return found
+
+
+def ran(body, pushes, cycles=200):
+    cpu = cpu_with(ISRS + body)
+    for levels, cycle in pushes:
+        cpu.set_external(3, levels, 12 * cycle)
+    cpu.run(cycles)
+    return cpu
+
+
+def padded(instruction, event):
+    """INT0 by edge, then NOPs, and `instruction` so placed that it begins in cycle `event` + 1."""
+    setup = "MOV IE,#81h\nSETB IT0\n"  # LJMP 2 + MOV 2 + SETB 1: cycle 5 begins
+    return setup + "NOP\n" * (event + 1 - 5) + instruction + "\nloop:\nNOP\nSJMP loop"
+
+
+def test_an_edge_is_answered_three_cycles_after_its_sample():
+    cpu = ran(padded("NOP\nNOP\nNOP", 20), [(INT0_LOW, 20)])
+    assert entries(cpu) == [(0, 24)]
+
+
+@pytest.mark.parametrize(
+    ("instruction", "full_cycles"),
+    [
+        ("NOP\nNOP\nNOP\nNOP", 3),
+        ("MOV R0,30h\nNOP", 4),  # polled in the first of its two cycles
+        ("MUL AB\nNOP", 6),
+        ("MOV IE,#81h\nNOP", 5),
+        ("MOV IP,#00h\nMUL AB\nNOP", 8),
+        ("SETB EA\nMUL AB", 7),
+        ("CLR PX0\nMUL AB", 7),
+    ],
+)
+def test_latency_is_three_to_eight_full_cycles(instruction, full_cycles):
+    cpu = ran(padded(instruction, 20), [(INT0_LOW, 20)])
+    assert entries(cpu) == [(0, 20 + full_cycles + 1)]
+
+
+def test_reti_lets_one_more_instruction_run():
+    cpu = cpu_with(
+        """
+        LJMP main
+        ORG 0003h
+        INC 30h
+        RETI
+        ORG 0040h
+        main:
+        MOV IE,#81h
+        loop:
+        INC 31h
+        SJMP loop
+        """
+    )
+    cpu.set_external(3, INT0_LOW, 0)
+    cpu.run(400)
+    assert abs(cpu.peek_iram(0x30) - cpu.peek_iram(0x31) * 2) <= 2  # INC and SJMP alternate between routines
+    assert cpu.peek_iram(0x30) > 50
+
+
+def test_reading_ie_does_not_block():
+    cpu = ran(padded("MOV A,IE\nNOP\nNOP", 20), [(INT0_LOW, 20)])
+    assert entries(cpu) == [(0, 24)]
+
+
+@pytest.mark.parametrize(("ip", "order"), [(0x00, [0, 2]), (0x04, [2, 0]), (0x01, [0, 2]), (0x05, [0, 2])])
+def test_of_two_at_once_the_priority_decides_and_then_the_polling_order(ip, order):
+    body = f"MOV IP,#{ip:02X}h\nSETB IT0\nSETB IT1\nMOV IE,#85h\n" + "NOP\n" * 60
+    cpu = ran(body, [(BOTH_LOW, 30)])
+    assert [bit for bit, _ in entries(cpu)] == order
+
+
+def test_a_high_one_interrupts_a_low_one_before_its_first_instruction():
+    body = "MOV IP,#04h\nSETB IT0\nSETB IT1\nMOV IE,#85h\n" + "NOP\n" * 60
+    cpu = ran(
+        body, [(INT0_LOW, 30), (BOTH_LOW, 31)]
+    )  # INT1 latched during the first LCALL cycle at the latest
+    assert entries(cpu) == [(2, 36), (0, 39)]
+    assert cpu.sp == 7
+
+
+def test_a_low_one_does_not_interrupt_a_low_one():
+    body = "SETB IT0\nSETB IT1\nMOV IE,#85h\n" + "NOP\n" * 60
+    cpu = ran(body, [(INT0_LOW, 30), (BOTH_LOW, 33)])
+    assert entries(cpu) == [(0, 34), (2, 40)]  # RETI, one NOP, LCALL
+
+
+def test_an_edge_flag_sticks_and_is_cleared_by_the_vector():
+    cpu = ran("SETB IT0\n" + "NOP\n" * 60, [(INT0_LOW, 10), (0xFF, 12)], 50)
+    assert sfr(cpu, "TCON") == 0x03
+    cpu = ran("SETB IT0\nMOV IE,#81h\n" + "NOP\n" * 60, [(INT0_LOW, 10), (0xFF, 12)], 50)
+    assert sfr(cpu, "TCON") == 0x01
+    assert len(entries(cpu)) == 1
+
+
+def test_a_level_flag_follows_the_pin_both_ways():
+    body = "NOP\n" * 60
+    assert sfr(ran(body, [(INT0_LOW, 10)], 20), "TCON") == 0x02
+    assert sfr(ran(body, [(INT0_LOW, 10), (0xFF, 15)], 20), "TCON") == 0x00
+
+
+def test_a_level_that_went_away_before_it_was_polled_is_forgotten():
+    body = "MOV IE,#81h\n" + "NOP\n" * 16 + "MUL AB\n" + "NOP\n" * 60  # MUL in cycles 20..23
+    assert entries(ran(body, [(INT0_LOW, 19), (0xFF, 22)])) == []
+    assert entries(ran(body, [(INT0_LOW, 19), (0xFF, 23)])) == [(0, 26)]
+
+
+def test_a_level_still_low_comes_again_after_one_instruction():
+    cpu = ran("MOV IE,#81h\n" + "NOP\n" * 60, [(INT0_LOW, 20)], 60)
+    cpu.bus.ports.clear()
+    assert sfr(cpu, "TCON") & 0x02
+
+
+def test_a_flag_set_by_software_vectors_after_one_more_instruction():
+    cpu = ran("MOV IE,#82h\nNOP\nSETB TF0\nINC 30h\nINC 30h\nINC 30h\n" + "NOP\n" * 20, [], 12)
+    assert entries(cpu) == [] or entries(cpu)[0][0] == 1
+    assert cpu.peek_iram(0x30) in (1, 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "ie", "flag"),
+    [
+        ("INT0", 0x81, "SETB IT0\nSETB IE0"),
+        ("T0", 0x82, "SETB TF0"),
+        ("INT1", 0x84, "SETB IT1\nSETB IE1"),
+        ("T1", 0x88, "SETB TF1"),
+        ("SERIAL", 0x90, "SETB RI"),
+        ("SERIAL", 0x90, "SETB TI"),
+        ("T2", 0xA0, "SETB TF2"),
+        ("T2", 0xA0, "SETB EXF2"),
+    ],
+)
+def test_every_source_has_its_vector(name, ie, flag):
+    cpu = cpu_with(ISRS + f"MOV IE,#{ie:02X}h\n{flag}\n" + "NOP\n" * 20)
+    assert cpu.run_until_pc(VECTORS[name], 60) == 2
+
+
+@pytest.mark.parametrize(
+    ("ie", "flag", "name", "left"),
+    [
+        (0x82, "SETB TF0", "TCON", 0x00),
+        (0x88, "SETB TF1", "TCON", 0x00),
+        (0x90, "SETB RI", "SCON", 0x01),
+        (0x90, "SETB TI", "SCON", 0x02),
+        (0xA0, "SETB TF2", "T2CON", 0x80),
+        (0xA0, "SETB EXF2", "T2CON", 0x40),
+    ],
+)
+def test_hardware_clears_timer_flags_only(ie, flag, name, left):
+    cpu = cpu_with(ISRS + f"MOV IE,#{ie:02X}h\n{flag}\n" + "NOP\n" * 20)
+    cpu.run(9)  # within the routine
+    assert cpu.sp == 9
+    assert sfr(cpu, name) == left
+
+
+def test_exf2_does_not_interrupt_while_timer_2_counts_up_and_down():
+    cpu = cpu_with(ISRS + "MOV T2MOD,#01h\nMOV IE,#0A0h\nSETB EXF2\n" + "NOP\n" * 20)
+    assert cpu.run_until_pc(VECTORS["T2"], 40) == 0
+
+
+def test_without_ea_nothing_happens():
+    assert entries(ran("SETB IT0\nMOV IE,#7Fh\n" + "NOP\n" * 60, [(INT0_LOW, 20)])) == []
+
+
+def test_ret_ends_no_interrupt_but_reti_does():
+    text = "LJMP main\nORG 0003h\nINC 30h\n{}\nORG 0040h\nmain:\nMOV IE,#81h\nloop:\nSJMP loop"
+    for ending, runs in (("RET", {1}), ("RETI", set(range(10, 100)))):
+        cpu = cpu_with(text.format(ending))
+        cpu.set_external(3, INT0_LOW, 0)
+        cpu.run(200)
+        assert cpu.peek_iram(0x30) in runs
+
+
+def test_an_interrupt_entry_counts_as_two_cycles_and_no_instruction():
+    cpu = cpu_with(ISRS + "MOV IE,#82h\nSETB TF0\nNOP\nNOP\nNOP")
+    while cpu.pc != 0x0B:
+        cpu.step()
+    instructions, cycles = cpu.instructions, cpu.cycles
+    assert isinstance(cpu.bus, RecordingBus)
+    assert cycles == 2 + 2 + 1 + (instructions - 3) + 2
