@@ -1,0 +1,88 @@
+"""A long mixed session that depends on nothing but a number, for comparing engines and snapshots.
+
+`python -m tests.robot.lm629.session ENGINE SEED STEPS` prints the digest of everything the session saw.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Iterator
+
+from miro_protocol import engine
+
+
+def numbers(seed: int) -> Iterator[int]:
+    """A 64-bit linear congruential generator, upper half."""
+    state = seed
+    while True:
+        state = (state * 6364136223846793005 + 1442695040888963407) % 2**64
+        yield state >> 32
+
+
+def steps(seed: int, count: int) -> Iterator[tuple[int, ...]]:
+    """(kind, a, b, c, d): what the session does, one step after the other."""
+    draw = numbers(seed)
+    for _ in range(count):
+        yield tuple(next(draw) for _ in range(5))
+
+
+def play(bench: object, step: tuple[int, ...], place: int) -> int:
+    """One step on a `Bench`; returns where the wheel stands."""
+    from tests.robot.lm629.bench import Bench
+
+    assert isinstance(bench, Bench)
+    kind, a, b, c, d = step
+    running = bench.chip.mode == 2
+    kind %= 10
+    if kind == 0 and running:
+        bench.load(0x002A | (a & 0x1801), b % 0x20000, c % 0x100000, d % 2000 - 1000)
+        bench.command("STT")
+    elif kind == 1 and running:
+        bench.load(0x0828 | (a & 0x1000), 0x4000, c % 0x80000)
+        bench.command("STT")
+    elif kind == 2 and running:
+        bench.filter(a % 200, b % 200, c % 400, d % 0x8000, a % 3)
+    elif kind == 3 and running:
+        bench.load((0, 0x100, 0x200, 0x400)[a % 4])
+        bench.command("STT")
+    elif kind == 4:
+        bench.write(a % 2, b % 256)
+    elif kind == 5:
+        bench.read(a % 2)
+    elif kind == 6 and running:
+        bench.command(("MSKI", "RSTI", "LPES", "LPEI")[a % 4], b % 128)
+    elif kind == 7:
+        for _ in range(a % 100):
+            place += 1 if b % 3 else -1
+            phase_a, phase_b = ((0, 0), (1, 0), (1, 1), (0, 1))[place % 4]
+            bench.chip.set_encoder(bench.tick, phase_a, phase_b)
+            bench.wait(20 + c % 60)
+    elif kind == 8:
+        bench.chip.set_index(bench.tick, a % 2)
+        if running and b % 4 == 0:
+            bench.command("SIP")
+    else:
+        bench.wait(a % 60000)
+    return place
+
+
+def digest(seed: int, count: int) -> str:
+    from tests.robot.lm629.bench import Bench
+
+    bench, place = Bench(), 0
+    bench.chip.set_encoder(0, 0, 0)
+    bench.reset()
+    seen = hashlib.sha256()
+    for step in steps(seed, count):
+        if bench.chip.mode == 0:
+            bench.reset()
+        place = play(bench, step, place)
+        seen.update(repr((bench.tick, bench.chip.snapshot())).encode())
+    seen.update(repr((bench.edges, bench.chip.commands)).encode())
+    return seen.hexdigest()
+
+
+if __name__ == "__main__":
+    engine.select(sys.argv[1])
+    print(engine.active(), digest(int(sys.argv[2]), int(sys.argv[3])))

@@ -1,0 +1,399 @@
+"""What the commands do: published byte sequences, double buffering, flags, and what real drivers rely on."""
+
+from __future__ import annotations
+
+import pytest
+from miro_robot.lm629.commands import BY_NAME, COMMANDS
+
+from tests.robot.lm629.bench import Bench
+
+MOTOR_OFF, BREAKPOINT, EXCESS, WRAP, INDEX, COMPLETE, ERROR = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02
+
+
+def send(bench: Bench, text: str) -> None:
+    """`opcode | word word | word ...`, words in hex; several commands parted by `;`."""
+    for command in text.split(";"):
+        opcode, *words = command.replace("|", " ").split()
+        bench.ready()
+        bench.write(0, int(opcode, 16))
+        for word in words:
+            bench.word(int(word, 16))
+    bench.ready()
+
+
+def moving(acceleration: int = 0x8000, velocity: int = 0x20000, position: int = 1000) -> Bench:
+    """A position move that has run for 5 samples."""
+    bench = Bench.running()
+    bench.load(0x002A, acceleration, velocity, position)
+    bench.command("STT")
+    bench.sample(5)
+    return bench
+
+
+# ------------------------------------------------------------------------------- published byte sequences
+
+
+@pytest.mark.parametrize(
+    ("text", "registers"),
+    [
+        ("1F | 002A | 0000 000F | 0006 D1EC | 0003 0D40; 01", (0xF, 0x6D1EC, 200000)),
+        ("1F | 002A | 0000 0002 | 0000 346E | 0000 1F40; 01", (2, 13422, 8000)),
+        ("1F | 002A | 0000 0100 | 0015 0000 | 0006 1A80; 01", (0x100, 0x150000, 400000)),
+        ("1F | 000A | 0000 346E | 0000 1F40; 01", (0, 13422, 8000)),
+    ],
+)
+def test_published_trajectories_reach_the_working_registers(text: str, registers: tuple[int, int, int]):
+    bench = Bench.running()
+    send(bench, text)
+    bench.sample()
+    profile = bench.chip.trajectory
+    assert (profile.acceleration, profile.max_velocity, profile.target) == registers
+    assert bench.status() == 0
+
+
+def test_published_filters_reach_the_working_registers_with_udf_only():
+    bench = Bench.running()
+    send(bench, "1E | 0008 | 000A")
+    bench.sample()
+    assert bench.chip.pid.kp == 0
+    send(bench, "04")
+    assert bench.signals() & 0x2000
+    bench.sample()
+    assert bench.signals() & 0x2000 == 0
+    pid = bench.chip.pid
+    assert (pid.kp, pid.ki, pid.kd, pid.il, pid.ds) == (10, 0, 0, 0, 0)
+    send(bench, "1E | 060F | 0170 | 0322 | 0550 | 1510; 04")
+    bench.sample()
+    assert (pid.kp, pid.ki, pid.kd, pid.il, pid.ds) == (368, 802, 1360, 5392, 6)
+    send(bench, "1E | 0000; 04")
+    bench.sample()
+    assert (pid.kp, pid.ds) == (368, 0)
+
+
+def test_a_complete_data_sheet_move_takes_59121_samples():
+    bench = Bench.running()
+    send(bench, "1F | 002A | 0000 000F | 0006 D1EC | 0003 0D40")
+    bench.sample()
+    bench.command("STT")
+    origin = bench.chip.sample_tick
+    bench.chip.advance(origin + 59119 * 8192)
+    assert bench.chip.status == 0x20  # the motor does not turn: only the error is excessive
+    bench.chip.advance(origin + 59120 * 8192)
+    assert bench.chip.status == 0x24
+    assert bench.chip.desired_position == 200000
+
+
+def test_polarity_test_of_a_real_driver_gives_constant_full_drive():
+    bench = Bench.running()
+    send(bench, "1E | 0008 | 0870; 04; 1F | 002A | 0000 2000 | 0500 0000 | 3FFF FFFF; 01")
+    bench.sample(80)
+    assert bench.chip.desired_position >= 16
+    for _ in range(3000):
+        bench.sample()
+        assert (bench.chip.sign, bench.chip.pwm_magnitude) == (0, 127)
+
+
+def test_velocity_mode_words_of_the_field():
+    bench = Bench.running()
+    send(bench, "1F | 1828 | 0000 4000 | 0001 8000; 01")
+    bench.sample(10)
+    assert bench.signals() & 0x1800 == 0x1800
+    assert bench.ask("RDDV") == 0x18000
+    send(bench, "1F | 0808 | 0000 8000")
+    assert bench.signals() & 0x1800 == 0x1800  # changes at the STT, not at the LTRJ
+    send(bench, "01")
+    bench.sample(20)
+    assert bench.signals() & 0x1800 == 0x0800
+    assert bench.ask("RDDV") == -0x8000
+    assert bench.status() & COMPLETE == 0
+
+
+# ------------------------------------------------------------------------------- starting and stopping
+
+
+def test_position_only_reuses_acceleration_and_velocity():
+    bench = moving(position=10)
+    bench.sample(20)
+    assert bench.status() & COMPLETE
+    bench.load(0x0002, 0)
+    bench.command("STT")
+    bench.sample(30)
+    assert bench.ask("RDDP") == 0
+    assert bench.signals() & 0x0400
+
+
+def test_relative_parameters_add_to_the_working_ones():
+    bench = moving(position=10)
+    bench.sample(20)
+    bench.load(0x003F, 0x100, -0x1000, -25)
+    bench.command("STT")
+    bench.sample()
+    profile = bench.chip.trajectory
+    assert (profile.acceleration, profile.max_velocity, profile.target) == (0x8100, 0x1F000, -15)
+    bench.command("STT")
+    bench.sample()
+    assert profile.target == -15
+
+
+@pytest.mark.parametrize(("base", "target"), [("target", 1100), ("desired", 108), ("real", 104)])
+def test_relative_positions_may_be_read_in_three_ways(base: str, target: int):
+    bench = Bench.running(relative_base=base)
+    bench.chip.set_encoder(bench.tick, 0, 0)
+    bench.load(0x002A, 0x8000, 0x20000, 1000)
+    bench.command("STT")
+    bench.turn(4)
+    bench.sample(5)
+    before = bench.chip.desired_position
+    bench.load(0x0003, 100)
+    bench.command("STT")
+    bench.sample()
+    assert bench.chip.trajectory.target == (100 + before if base == "desired" else target)
+
+
+def test_acceleration_loaded_in_motion_is_refused_at_stt_until_a_stop():
+    bench = moving()
+    bench.load(0x0020, 0x4000)
+    assert bench.signals() & 0x4000
+    bench.command("STT")
+    bench.ready()
+    assert bench.status() & ERROR
+    bench.sample(3)
+    assert bench.chip.trajectory.acceleration == 0x8000
+    bench.load(0x0400)
+    bench.command("STT")
+    bench.sample(10)
+    assert bench.chip.trajectory.acceleration == 0x4000
+    assert bench.signals() & 0x4400 == 0x0400
+
+
+def test_an_stt_acts_on_what_was_loaded_when_it_was_given():
+    bench = Bench.running()
+    bench.load(0x002A, 0x8000, 0x20000, 1000)
+    bench.sample()
+    bench.command("STT")
+    bench.load(0x0002, 77)
+    assert bench.chip.sample_tick - bench.tick > 0
+    assert bench.status() & MOTOR_OFF
+    bench.sample()
+    assert bench.chip.trajectory.target == 1000
+    bench.command("STT")
+    bench.sample()
+    assert bench.chip.trajectory.target == 77
+
+
+def test_a_smooth_stop_in_position_mode_completes():
+    bench = moving()
+    bench.load(0x0400)
+    bench.command("STT")
+    bench.sample(2)
+    assert bench.status() & COMPLETE == 0
+    bench.sample(5)
+    assert bench.status() & COMPLETE
+    assert bench.ask("RDDV") == 0
+    assert bench.ask("RDDP") < 20
+
+
+def test_an_abrupt_stop_takes_the_real_position_as_target():
+    bench = moving()
+    bench.chip.set_encoder(bench.tick, 0, 0)
+    bench.turn(3)
+    bench.load(0x0200)
+    bench.command("STT")
+    bench.sample()
+    assert bench.ask("RDDP") == 3
+    bench.ready()
+    assert bench.status() == COMPLETE
+    bench.sample(3)
+    assert bench.ask("RDDP") == 3
+
+
+@pytest.mark.parametrize("word", [0x0100, 0x0900])
+def test_motor_off_drops_the_drive_and_a_new_start_begins_at_the_real_position(word: int):
+    bench = moving()
+    bench.filter(kp=1000)
+    bench.sample()
+    assert bench.chip.pwm_magnitude > 0
+    bench.load(word)
+    bench.sample()
+    assert bench.status() & MOTOR_OFF == 0
+    bench.command("STT")
+    bench.sample()
+    assert bench.status() & (MOTOR_OFF | COMPLETE) == MOTOR_OFF | COMPLETE
+    assert (bench.chip.pwm, bench.chip.sign, bench.chip.pwm_magnitude) == (0, 0, 0)
+    bench.chip.set_encoder(bench.tick, 0, 0)
+    bench.turn(50)
+    bench.sample()
+    assert bench.ask("RDDP") == 50
+    bench.load(0x0002, 50)
+    bench.command("STT")
+    bench.sample()
+    assert bench.status() & MOTOR_OFF == 0
+    assert bench.chip.desired_position == 50
+
+
+def test_define_home_shifts_the_move_in_progress():
+    bench = moving()
+    bench.chip.set_encoder(bench.tick, 0, 0)
+    bench.turn(8)
+    bench.sample()
+    desired = bench.ask("RDDP")
+    bench.command("DFH")
+    assert bench.ask("RDRP") == 0
+    assert bench.ask("RDDP") - (desired - 8) in (0, 2)  # a sample may have passed
+    assert bench.chip.trajectory.target == 992
+    assert bench.chip.trajectory_buffer.position == 1000
+
+
+def test_trajectory_complete_comes_though_the_encoder_never_moves():
+    bench = moving(position=30)
+    bench.sample(30)
+    assert bench.status() & COMPLETE
+    assert bench.ask("RDRP") == 0
+
+
+def test_the_ports_of_the_lm628_mean_nothing():
+    bench = Bench.running()
+    bench.command("PORT12")
+    bench.command("PORT8")
+    assert bench.signals() == 0x0180
+
+
+# ------------------------------------------------------------------------------- flags and interrupts
+
+
+def test_a_breakpoint_comes_before_the_end_of_the_move():
+    bench = moving(position=40)
+    bench.filter(kp=10)
+    bench.chip.set_encoder(bench.tick, 0, 0)
+    bench.command("RSTI", 0)
+    bench.command("MSKI", 0x007E)
+    bench.command("SBPA", 0, 12)
+    order = []
+    for _ in range(40):
+        bench.turn(0)
+        place = bench.chip.real_position
+        for n in range(place + 1, min(bench.chip.desired_position, place + 4) + 1):
+            a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[n % 4]
+            bench.chip.set_encoder(bench.tick, a, b)
+            bench.wait(32)
+        bench.sample()
+        order += [bench.chip.status & 0x7E] if not order or order[-1] != bench.chip.status & 0x7E else []
+    assert order == [0, BREAKPOINT, BREAKPOINT | COMPLETE]
+    assert bench.chip.hi == 1
+
+
+def test_a_relative_breakpoint_counts_from_the_target():
+    bench = moving(position=40)
+    bench.command("SBPR", 0xFFFF, 0xFFF6)
+    bench.ready()
+    assert bench.chip.breakpoint == 30
+
+
+def test_excessive_error_flags_or_stops():
+    for name, status in (("LPEI", EXCESS), ("LPES", MOTOR_OFF | EXCESS | COMPLETE)):
+        bench = moving()
+        bench.filter(kp=100)
+        bench.command(name, 30)
+        while abs(bench.chip.desired_position - bench.chip.real_position) <= 30:
+            assert bench.chip.status == 0
+            bench.sample()
+            if bench.chip.status:
+                break
+        assert bench.chip.status == status
+        assert (bench.chip.pwm_magnitude == 0) == (name == "LPES")
+        assert bench.signals() & 0x0200 == (0x0200 if name == "LPES" else 0)
+
+
+def test_an_error_that_persists_raises_its_flag_again():
+    bench = moving()
+    bench.command("LPEI", 1)
+    bench.sample()
+    assert bench.status() & EXCESS
+    bench.command("RSTI", 0)
+    bench.sample()
+    assert bench.status() & EXCESS
+
+
+def test_wrap_around_is_flagged_when_desired_or_real_leave_the_space():
+    bench = Bench.running()
+    bench.load(0x1828, 0x100000, 0x100000)
+    bench.command("STT")
+    bench.sample(2)
+    bench.chip.trajectory.position = (2**30 - 20) * 65536
+    bench.sample()
+    assert bench.status() & WRAP == 0
+    bench.sample()
+    assert bench.status() & WRAP
+    assert bench.ask("RDDP") == -(2**30) + 12
+    bench.command("RSTI", 0x006E)
+    bench.chip.set_encoder(bench.tick, 0, 0)
+    bench.chip.real_position = -(2**30)
+    bench.turn(-1)
+    bench.sample()
+    assert bench.status() & WRAP
+    assert bench.ask("RDRP") == 2**30 - 1
+
+
+def test_rsti_resets_the_flags_whose_bits_are_0_and_leaves_the_others():
+    bench = moving(position=2)
+    bench.command("LPEI", 0)
+    bench.sample(10)
+    bench.ready()
+    bench.write(0, 0x77)  # a command error
+    assert bench.chip.status == EXCESS | COMPLETE | ERROR
+    bench.command("LPEI", 0x7FFF)
+    bench.command("RSTI", ~COMPLETE & 0xFF)
+    bench.ready()
+    assert bench.chip.status == EXCESS | ERROR
+    bench.command("RSTI", ~(EXCESS | ERROR) & 0xFF)
+    bench.ready()
+    assert bench.chip.status == 0
+
+
+def test_hi_follows_unmasked_events_only_and_falls_with_any_rsti():
+    bench = moving(position=20)
+    bench.command("MSKI", 0)
+    bench.sample(20)
+    assert bench.status() & COMPLETE
+    assert bench.chip.hi == 0
+    bench.command("MSKI", COMPLETE)  # unmasking later raises nothing
+    bench.sample()
+    assert bench.chip.hi == 0
+    bench.command("RSTI", 0)
+    bench.command("STT")
+    bench.sample(3)
+    assert bench.chip.hi == 1
+    assert bench.signals() & 0x8000
+    bench.command("RSTI", 0x007E)
+    bench.ready()
+    assert bench.chip.hi == 0
+    assert bench.status() & COMPLETE
+
+
+def test_out_of_range_parameters_are_taken_modulo_their_width():
+    bench = Bench.running()
+    bench.load(0x002A, 0xC0000001, 0x80000002, 0x7FFFFFFF)
+    bench.filter(kp=0x8001)
+    bench.command("LPEI", 0xFFFF)
+    bench.ready()
+    buffer = bench.chip.trajectory_buffer
+    assert (buffer.acceleration, buffer.velocity, buffer.position) == (1, 2, -1)
+    assert bench.chip.filter_buffer.kp == 1
+    assert bench.chip.threshold == 0x7FFF
+
+
+def test_rdsum_may_be_read_as_the_sum_instead_of_the_term():
+    for reading, answer in (("term", 500), ("sum", 78)):
+        bench = Bench.running(sum_reading=reading)
+        bench.filter(ki=1000, il=500)
+        bench.load(0x0200)
+        bench.command("STT")
+        bench.sample()
+        bench.chip.trajectory.position = 10000 * 65536
+        bench.sample(2)
+        bench.chip.trajectory.position = 0
+        assert bench.ask("RDSUM") == answer
+
+
+def test_the_table_has_every_opcode_once():
+    assert len(COMMANDS) == len(BY_NAME) == len({command.opcode for command in COMMANDS}) == 22

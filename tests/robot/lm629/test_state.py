@@ -1,0 +1,106 @@
+"""State is data: snapshots are complete, go on identically, and both engines give the same bits."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_protocol import engine
+from miro_robot.lm629.chip import Lm629
+
+from tests.robot.lm629.bench import Bench
+from tests.robot.lm629.session import play, steps
+
+ROOT = Path(__file__).parents[3]
+FOLDER = ROOT / "robot_fw/miro_robot/lm629"
+
+
+def session(name: str, seed: int, count: int) -> str:
+    command = [sys.executable, "-m", "tests.robot.lm629.session", name, str(seed), str(count)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    return done.stdout
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_compiled_and_uncompiled_chips_see_the_same_session(seed: int):
+    if engine.active() != "compiled":
+        pytest.skip("nothing is compiled here")
+    compiled, python = session("compiled", seed, 400), session("python", seed, 400)
+    assert compiled.split()[0] == "compiled"
+    assert python.split()[0] == "python"
+    assert compiled.split()[1] == python.split()[1]
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32), before=st.integers(0, 40), extra=st.integers(0, 9000))
+def test_a_chip_restored_at_any_tick_goes_on_with_the_same_bits(seed: int, before: int, extra: int):
+    script = list(steps(seed, before + 15))
+    first, place = Bench(), 0
+    first.chip.set_encoder(0, 0, 0)
+    first.reset()
+    for step in script[:before]:
+        place = play(first, step, place)
+    first.drive(ps=extra & 1, data=extra & 0xFF, cs=0, wr=extra >> 1 & 1, rd=extra >> 2 & 1)
+    first.wait(extra)
+    first.edges.clear()
+    first.chip.commands.clear()
+    state = first.chip.snapshot()
+    second = Bench(Lm629(), first.tick)
+    second.chip.restore(state)
+    second.pins = first.pins
+    assert second.chip.snapshot() == state
+    other = place
+    for bench in (first, second):
+        bench.drive(cs=1)
+        bench.drive(rd=1, wr=1)
+    for step in script[before:]:
+        place, other = play(first, step, place), play(second, step, other)
+        assert second.chip.snapshot() == first.chip.snapshot()
+    assert (second.edges, second.chip.commands) == (first.edges, first.chip.commands)
+    assert (second.chip.hi, second.chip.writes_while_busy) == (first.chip.hi, first.chip.writes_while_busy)
+
+
+def test_a_snapshot_is_a_copy():
+    bench = Bench.running()
+    before = bench.chip.snapshot()
+    again = bench.chip.snapshot()
+    bench.load(0x002A, 1, 2, 3)
+    bench.chip.set_encoder(bench.tick, 0, 0)
+    bench.turn(3)
+    assert before == again
+    assert before != bench.chip.snapshot()
+
+
+def test_every_field_is_in_the_snapshot_or_named_as_no_state():
+    chip = Lm629()
+    parts = [
+        chip,
+        *(chip.port, chip.trajectory, chip.pid, chip.signals),
+        *(chip.encoder, chip.encoder.quadrature, chip.encoder.index),
+    ]
+    for part in parts:
+        name = type(part).__name__
+        layout = (FOLDER / f"{type(part).__module__.rpartition('.')[2]}.pxd").read_text()
+        body = re.split(rf"cdef class {name}:\n", layout)[1].split("\n\n\n")[0]
+        fields = {
+            field
+            for line in re.findall(
+                r"^    cdef (?:public|readonly) (?:long long|\w+) ([\w, ]+)$", body, re.MULTILINE
+            )
+            for field in line.split(", ")
+        }
+        assert fields
+        assert fields == set(part.snapshot()) | set(getattr(part, "NOT_STATE", ())), name
+
+
+def test_a_repr_tells_where_the_axis_is():
+    bench = Bench.running()
+    bench.load(0x1828, 0x8000, 0x18000)
+    bench.command("STT")
+    bench.sample(6)
+    assert re.match(r"<Lm629 status 00h real 0 desired 7 velocity \+1.50000 pwm \+0 next", repr(bench.chip))
