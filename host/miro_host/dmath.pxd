@@ -12,9 +12,12 @@ cpdef double cos(double x) except? -7.5
                high=double, low=double, z=double, w=double, v=double, r=double, half=double, top=double,
                s=double, c=double, quadrant=cython.int)
 cpdef (double, double) sincos(double x)
-@cython.locals(a=double, high=double, low=double, z=double, w=double, odd=double, even=double, result=double)
 cpdef double atan(double x) except? -7.5
-@cython.locals(angle=double, ratio=double)
+@cython.locals(high=double, low=double, rest=double, z=double, w=double, odd=double, even=double)
+cdef double _atan(double a, double more, bint supplement) except? -7.5
+@cython.locals(spread=double, q_high=double, q_low=double, x_high=double, x_low=double, product=double, error=double)
+cdef double _lost(double q, double y, double x) except? -7.5
+@cython.locals(angle=double, ratio=double, more=double)
 cpdef double atan2(double y, double x) except? -7.5
 @cython.locals(scaled=double, turns=double, result=double)
 cpdef double wrap_pi(double x) except? -7.5
