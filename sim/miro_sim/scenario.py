@@ -19,6 +19,8 @@ from miro_sim.plant.params import DriveParams
 PERIOD_TICKS = 800_800
 CHARACTER_TICKS = 25_000  # 10 bits at 9600 baud
 FRAME_CHARACTERS = {3: 23, 5: 31}
+MAX_TORQUE_CONSTANT = 10.0  # Nm/A; beyond it a motor of this size is a mistyped unit
+MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
 
 Positive = Annotated[float, Meta(gt=0.0, le=1e6)]
 Duration = Annotated[float, Meta(gt=0.0, le=86_400.0)]
@@ -48,7 +50,7 @@ class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 class HostTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """How long the PC computes between the camera frame and the key-up of the transmitter."""
 
-    compute_s: Annotated[float, Meta(ge=0.0, le=0.030)] = 0.003
+    compute_s: Annotated[float, Meta(ge=0.00001, le=0.030)] = 0.003
 
 
 class Radio(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -131,6 +133,20 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     reference: LineRef | ArcRef
     controller: YangKim = YangKim()
     drive: DriveParams = DriveParams()
+
+    def __post_init__(self) -> None:
+        motor, encoder, voltage_v = self.drive.motor, self.drive.encoder, self.drive.battery.voltage_v
+        constant = motor.torque_constant_nm_a
+        if constant > MAX_TORQUE_CONSTANT:
+            raise ValueError(
+                f"drive.motor.torque_constant_nm_a: {constant} is out of range; must be <= {MAX_TORQUE_CONSTANT}"
+            )
+        counts_per_s = voltage_v / constant * self.drive.counts_per_radian()
+        if counts_per_s > MAX_COUNTS_PER_S:
+            raise ValueError(
+                f"drive: {voltage_v} V, {constant} Nm/A and {encoder.lines} lines make {counts_per_s:.3g} counts/s"
+                f" without load; at most {MAX_COUNTS_PER_S:.0f} (the LM629 itself follows 1000000)"
+            )
 
 
 class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

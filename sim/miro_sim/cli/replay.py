@@ -69,7 +69,10 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
         image = load_image(firmware)
     from miro_sim.world import World
 
-    world = World(job.scenario, job.seed, image, script=job.script)
+    try:
+        world = World(job.scenario, job.seed, image, script=job.script)
+    except (ValueError, ArithmeticError) as error:
+        raise UserError(f"{file}: cannot be replayed: {error}") from None
     replayed: list[Period] = []
     difference: Difference | None = None
     with ProgressBar("replaying", world.periods, quiet) as bar:
@@ -82,7 +85,10 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
                 difference = compare(job.recorded[period.index], period)
             return difference is not None or len(replayed) == len(job.recorded)
 
-        runner.run(world, None, False, check)
+        try:
+            runner.run(world, None, False, check)
+        except (ValueError, ArithmeticError) as error:
+            raise UserError(f"{file}: cannot be replayed beyond tick {world.tick}: {error}") from None
     if not quiet:
         _print_frames(job, replayed, everything)
     faults = report_faults(world)

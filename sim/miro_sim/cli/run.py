@@ -91,7 +91,10 @@ def run(
             draw(periods, staging / "figure.png", scenario=text.scenario.name, seed=seed, title=title)
     if failure is not None:
         complain(f"the simulation broke off; the files up to tick {world.tick} are in {folder.path}")
-        raise failure
+        if not isinstance(failure, ArithmeticError | ValueError):
+            raise failure
+        complain(f"error: {text.origin}: {failure}; parameters far from any robot's can do this")
+        return FIRMWARE_FAULT
     if not quiet:
         _print(summary, folder.path)
     return report_faults(world)
