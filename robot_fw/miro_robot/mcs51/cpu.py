@@ -163,6 +163,7 @@ class Cpu(Executor):
     def end_run(self) -> None:
         """TXD is final up to now; RXD before it is no longer needed."""
         self.chip.sync(self.cycles)
+        self.chip.settle()
         now = 12 * self.cycles
         if self.txd.settled_tick < now:
             self.txd.settled_tick = now
@@ -300,6 +301,7 @@ class Cpu(Executor):
         self.pcon = value & _PCON_BITS
         if value & _PD:
             self.chip.sync(self.cycles)
+            self.chip.settle()
             self.chip.frozen = 1
             self.powered_down = 1
         elif value & _IDL:
@@ -339,6 +341,7 @@ class Cpu(Executor):
     def snapshot(self) -> dict[str, object]:
         """All state, between two runs; the image is not part of it."""
         self.chip.sync(self.cycles)
+        self.chip.settle()
         return {
             **Executor.snapshot(self),
             "pcon": self.pcon,

@@ -34,21 +34,25 @@ cdef class Peripherals:
     cdef int p3
     cdef public int frozen
     cdef int pulsed
+    cdef readonly long long now
+    cdef long long serial_wait
     cdef readonly long long p3_reads
 
     cpdef int clear(self, long long cycle) except -1
     cpdef int sync(self, long long cycle) except -1
+    cpdef int settle(self) except -1
     @cython.locals(pulse1='long long', pulse2='long long', first='long long', second='long long')
     cdef int _sync_pulsed(self, long long cycle) except -1
     @cython.locals(halved=int, ticks1=int, rx=int, tx=int)
     cdef int _pulse(self, int timer1, int timer2, long long cycle) except -1
     @cython.locals(event='long long', enabled=int, timer=int, flag='long long')
-    cpdef long long next_event(self, long long now) noexcept
+    cpdef long long next_event(self, long long now) except -1
     @cython.locals(tick='long long', received='long long', shifted='long long')
     cdef long long serial_tick(self) noexcept
+    cdef int clock_serial(self) except -1
     @cython.locals(mode=int, next1='long long', period1='long long', next2='long long', period2='long long',
                    rx2=int, tx2=int)
-    cdef void clock_serial(self) noexcept
+    cdef void _set_serial_clock(self) noexcept
     @cython.locals(cycle='long long')
     cdef long long _timer1_tick(self) noexcept
     @cython.locals(cycle='long long')
@@ -62,6 +66,10 @@ cdef class Peripherals:
     cpdef int pin_levels(self, int port, long long cycle) except -1
     cpdef int read(self, int address, long long cycle) except -1
     cpdef int write(self, int address, int value, long long cycle) except -1
+    @cython.locals(both=int)
+    cdef int timer1_is_idle_clock(self) noexcept
+    cdef int write_timer(self, int address, int value, long long cycle) except -1
+    cdef int write_serial(self, int address, int value, long long cycle) except -1
     cpdef long long bit_ticks(self) noexcept
     cdef int write_smod(self, int smod, long long cycle) except -1
     cdef int write_port(self, int port, int value, long long cycle) except -1

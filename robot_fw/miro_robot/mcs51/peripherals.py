@@ -1,8 +1,11 @@
 """Everything on the chip beside the core, wired together: timers, serial port, interrupts, port pins.
 
 What belongs here: which register address is whose, which pin goes where, which timer clocks the serial
-port, and the event horizon: `sync(cycle)` does all that happens below a cycle, `next_event` says when the
-core has to ask again. Registers of the core itself (ACC, PSW, PCON ...) are `Cpu`'s.
+port, and the event horizon: `sync(cycle)` does all below a cycle that the core can notice, `next_event`
+says when it has to ask again. Registers of the core itself (ACC, PSW, PCON ...) are `Cpu`'s.
+
+The serial port and a timer 2 that only clocks it are left behind until one of them could raise a flag
+(`serial_wait`) or somebody looks at them (`settle`): between two characters nothing of theirs is stepped.
 """
 
 from __future__ import annotations
@@ -33,7 +36,7 @@ _NO_PERIOD = 1 << 40  # of a clock that stands
 class Peripherals:
     """All special function registers but the core's; time in machine cycles."""
 
-    NOT_STATE = ("bus", "pulsed")  # pulsed follows from the registers
+    NOT_STATE = ("bus", "pulsed", "now", "serial_wait")  # all but the first follow from the registers
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
@@ -49,12 +52,16 @@ class Peripherals:
         self.p3 = 0xFF
         self.frozen = 0  # power-down: the oscillator stands
         self.pulsed = 0  # a timer that counts a pin clocks the serial port
+        self.now = 0  # cycle below which everything has been done that can be noticed
+        self.serial_wait = -1  # tick before which the serial port raises no flag; -1: to be worked out
         self.p3_reads = 0  # how often the pins of P3 were read: whether software listens on RXD itself
 
     def clear(self, cycle: int) -> None:
         """Reset: all registers but the port latches, which `Cpu` writes."""
         self.sync(cycle)
+        self.settle()
         self.frozen = 0
+        self.now = cycle
         self.smod = 0
         self.interrupts.clear()
         self.external.clear(cycle)
@@ -65,20 +72,31 @@ class Peripherals:
         self.external.levels = (self.p3 >> 2) & 3  # pins moved on while the oscillator stood
         self.timers.gates = self.external.levels
         self.timer2.up = (self.p1 >> 1) & 1
-        self.clock_serial()
+        self._set_serial_clock()
 
     # Time
 
     def sync(self, cycle: int) -> None:
-        """Does everything that happens in cycles below `cycle`."""
-        if self.pulsed and not self.frozen:
-            self._sync_pulsed(cycle)
-        elif not self.frozen:
-            self.timers.sync(cycle)
-            self.timer2.sync(cycle)
-            self.uart.sync(12 * cycle)
+        """Does everything that happens in cycles below `cycle` and that the core can notice."""
+        if not self.frozen:
+            self.now = cycle
+            if self.pulsed:
+                self._sync_pulsed(cycle)
+            else:
+                self.timers.sync(cycle)
+                if not self.timer2.silent():
+                    self.timer2.sync(cycle)
+                if 12 * cycle > self.serial_wait:
+                    self.settle()
+
+    def settle(self) -> None:
+        """Brings the serial port and timer 2 up to where the rest is."""
+        if not self.frozen and not self.pulsed:
+            self.timer2.sync(self.now)
+            self.uart.sync(12 * self.now)
             if self.shift.flag:
-                self.shift.sync(12 * cycle)
+                self.shift.sync(12 * self.now)
+        self.serial_wait = self.serial_tick()
 
     def _sync_pulsed(self, cycle: int) -> None:
         """The serial port gets its 16x ticks one by one from the overflows of a timer that counts a pin."""
@@ -93,6 +111,7 @@ class Peripherals:
         if second < cycle and second != first:
             self._pulse(second == pulse1, second == pulse2, second)
         self.uart.sync(12 * cycle)
+        self.serial_wait = -1
 
     def _pulse(self, timer1: int, timer2: int, cycle: int) -> None:
         """One overflow of timer 1 and/or timer 2 in `cycle`."""
@@ -120,7 +139,9 @@ class Peripherals:
             if flag < event:
                 event = flag
         if enabled & _SERIAL:
-            flag = (self.serial_tick() + 2) // 12 + 2
+            if self.serial_wait < 0:
+                self.settle()
+            flag = (self.serial_wait + 2) // 12 + 2
             if flag < event:
                 event = flag
         return event
@@ -135,7 +156,13 @@ class Peripherals:
         return shifted if shifted < tick else tick
 
     def clock_serial(self) -> None:
-        """Works out the serial port's 16x ticks anew; called with all parts at the same cycle."""
+        """Works out the serial port's 16x ticks anew, after anything that they depend on has changed."""
+        self.settle()
+        self._set_serial_clock()
+
+    def _set_serial_clock(self) -> None:
+        """With all parts at the same cycle."""
+        self.serial_wait = -1
         mode = self.uart.mode()
         self.pulsed = 0
         if mode == 0:
@@ -193,6 +220,7 @@ class Peripherals:
         p1 = self.p1
         p3 = self.p3
         self.sync(cycle)
+        self.settle()
         for number in range(2):
             if (changed3 >> (2 + number)) & 1:
                 self._external_pin(number, (p3 >> (2 + number)) & 1, cycle)
@@ -202,6 +230,7 @@ class Peripherals:
             self.timer2.fall(cycle)
         if changed1 & 2:
             self.sync(cycle + 1)
+            self.settle()
             self.timer2.external((p1 >> 1) & 1, cycle + 1)
         self.clock_serial()
 
@@ -218,11 +247,13 @@ class Peripherals:
             tick = 12 * cycle + _S5P2
             self.p3_reads += 1
             self.sync(cycle + 1)
+            self.settle()
             levels &= (
                 0xFC | (self.uart.level(tick) & self.shift.data.level_at(tick)) | (self.uart.tx_level << 1)
             )
         elif port == 1 and self.timer2.drives_pin():
             self.sync(cycle + 1)
+            self.settle()
             levels &= 0xFE | self.timer2.clock_out
         return levels
 
@@ -240,7 +271,7 @@ class Peripherals:
         if address == _TCON:
             return self.timers.control | self.external.control
         if address == _SCON:
-            return self.uart.scon
+            return self.uart.scon  # up to date: its flags never wait
         if address == _SBUF:
             return self.uart.received
         if address == _TMOD:
@@ -256,6 +287,7 @@ class Peripherals:
         if address in (_RCAP2L, _RCAP2H):
             return (self.timer2.capture >> (8 * (address - _RCAP2L))) & 0xFF
         if address in (_TL2, _TH2):
+            self.timer2.sync(cycle)
             return (self.timer2.count >> (8 * (address - _TL2))) & 0xFF
         return _UNIMPLEMENTED
 
@@ -266,7 +298,22 @@ class Peripherals:
             self.interrupts.ie = value & 0xBF
         elif address == _IP:
             self.interrupts.ip = value & 0x3F
-        elif address == _TCON:
+        elif self.timer1_is_idle_clock() and self.write_timer(address, value, cycle):
+            pass
+        else:
+            self.settle()
+            if not self.write_timer(address, value, cycle):
+                self.write_serial(address, value, cycle)
+            self.clock_serial()
+
+    def timer1_is_idle_clock(self) -> int:
+        """Timer 1 clocks neither direction of the serial port, so that writing timers does not touch it."""
+        both = _RCLK | _TCLK
+        return 1 if self.timer2.control & both == both and self.uart.mode() & 1 else 0
+
+    def write_timer(self, address: int, value: int, cycle: int) -> int:
+        """A register of timers 0 and 1; 0 if the address is none of them."""
+        if address == _TCON:
             self.timers.write_control(value, cycle)
             self.external.write(value, cycle)
         elif address == _TMOD:
@@ -275,7 +322,13 @@ class Peripherals:
             self.timers.tl[address - _TL0] = value
         elif address in (_TH0, _TH1):
             self.timers.th[address - _TH0] = value
-        elif address == _SCON:
+        else:
+            return 0
+        return 1
+
+    def write_serial(self, address: int, value: int, cycle: int) -> None:
+        """A register of the serial port or of timer 2, with both settled."""
+        if address == _SCON:
             if (value ^ self.uart.scon) & 0xC0:
                 self.shift.abort()
             self.uart.write_scon(value, cycle)
@@ -298,7 +351,6 @@ class Peripherals:
             self.timer2.count = (self.timer2.count & 0xFF00) | value
         elif address == _TH2:
             self.timer2.count = (self.timer2.count & 0x00FF) | (value << 8)
-        self.clock_serial()
 
     def bit_ticks(self) -> int:
         """Length of a bit that the receiver expects, 0 while it is off or has no regular clock."""
@@ -308,6 +360,7 @@ class Peripherals:
 
     def write_smod(self, smod: int, cycle: int) -> None:
         self.sync(cycle)
+        self.settle()
         self.smod = smod
         self.clock_serial()
 
@@ -315,7 +368,9 @@ class Peripherals:
         """A latch; the pins follow with `cycle`, and so does what samples them."""
         if port == 3:
             self.sync(cycle)
+            self.settle()
             self.uart.write_latch(value & 3, 12 * cycle)
+            self.serial_wait = -1
         self.ports.latches[port] = value
 
     def taken(self, source: int, cycle: int) -> None:
@@ -355,6 +410,8 @@ class Peripherals:
         self.p3 = state["p3"]
         self.frozen = state["frozen"]
         self.p3_reads = state["p3_reads"]
+        self.now = self.timers.synced
+        self.serial_wait = -1
         self.pulsed = 0
         if self.uart.mode() & 1:
             self.pulsed = self.timers.counts_pin(1) | (1 if self.timer2.counts_pin() else 0)
