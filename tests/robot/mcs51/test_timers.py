@@ -1,0 +1,162 @@
+"""Timers: the documented convention to the cycle, and the lazy ones against a twin that steps every cycle."""
+
+import itertools
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_robot.mcs51.cpu import Cpu
+
+from tests.naive.mcs51_timers import NaiveTimers
+from tests.robot.mcs51.asm import SFRS
+from tests.robot.mcs51.rig import RecordingBus, cpu_with, run_to_loop, sfr, stepped
+
+REGISTERS = ("TMOD", "TCON", "TL0", "TH0", "TL1", "TH1", "T2CON", "T2MOD", "TL2", "TH2", "RCAP2L", "RCAP2H")
+
+
+def test_the_first_count_is_in_the_cycle_after_setb_tr():
+    cpu = stepped("MOV TMOD,#01h\nSETB TR0\nMOV A,TL0\nMOV R0,TL0\nMOV R1,TL0")
+    assert (cpu.a, cpu.peek_iram(0), cpu.peek_iram(1)) == (1, 2, 4)  # two-cycle moves read in their first
+
+
+@pytest.mark.parametrize("between", [0, 1, 5])
+def test_setb_to_clr_with_k_instructions_between_counts_k_plus_1(between):
+    cpu = run_to_loop("MOV TMOD,#11h\nSETB TR1\n" + "NOP\n" * between + "CLR TR1")
+    assert sfr(cpu, "TL1") == between + 1
+
+
+def test_a_write_wins_over_the_counts_of_its_own_instruction():
+    cpu = stepped("MOV TMOD,#01h\nSETB TR0\nMOV TL0,#50h\nMOV A,TL0")
+    assert cpu.a == 0x51
+
+
+@pytest.mark.parametrize(
+    ("mode", "tl", "th", "cycles", "after"),
+    [
+        (0, 0x1F, 0xFF, 1, (0x00, 0x00)),
+        (0, 0xFE, 0xFF, 2, (0xE0, 0x00)),  # TL.7:5 keep what was written
+        (1, 0xFF, 0xFF, 1, (0x00, 0x00)),
+        (2, 0xFF, 0xF3, 1, (0xF3, 0xF3)),
+        (2, 0xFF, 0xF3, 14, (0xF3, 0xF3)),
+    ],
+)
+def test_modes_0_to_2_overflow_where_they_should(mode, tl, th, cycles, after):
+    lines = f"MOV TMOD,#{mode:02X}h\nMOV TL0,#{tl:02X}h\nMOV TH0,#{th:02X}h\nSETB TR0\n"
+    cpu = run_to_loop(lines + "NOP\n" * (cycles - 1) + "CLR TR0")
+    assert (sfr(cpu, "TL0"), sfr(cpu, "TH0")) == after
+    assert sfr(cpu, "TCON") == 0x20
+
+
+def test_mode_3_makes_two_timers_of_timer_0_and_leaves_timer_1_without_a_flag():
+    cpu = run_to_loop("MOV TMOD,#23h\nMOV TH1,#0FEh\nSETB TR1\nMOV TL0,#0FDh\nSETB TR0\n" + "NOP\n" * 8)
+    assert sfr(cpu, "TCON") == 0x70
+    cpu.run(cpu.cycles + 256)
+    assert sfr(cpu, "TCON") == 0xF0
+
+
+def test_timer_1_in_mode_3_stands_still():
+    cpu = run_to_loop("MOV TMOD,#30h\nMOV TL1,#12h\nSETB TR1\nNOP\nNOP")
+    assert sfr(cpu, "TL1") == 0x12
+
+
+def test_a_counter_counts_falls_one_cycle_after_their_sample():
+    cpu = cpu_with("MOV TMOD,#05h\nSETB TR0\nMOV A,TL0\nMOV A,TL0\nMOV A,TL0\nMOV A,TL0")
+    cpu.set_external(3, 0xEF, 12 * 4)  # T0 low for the sample of cycle 4
+    seen = []
+    for _ in range(6):
+        cpu.step()
+        seen.append((cpu.cycles - 1, cpu.a))
+    assert seen[2:] == [(3, 0), (4, 0), (5, 1), (6, 1)]
+
+
+def test_a_gate_is_the_pin_and_not_the_interrupt_flag():
+    cpu = cpu_with("MOV TMOD,#09h\nSETB IT0\nSETB TR0\nNOP\nNOP\nMOV A,TL0\nMOV A,TL0\nMOV A,TL0")
+    cpu.set_external(3, 0xFB, 0)
+    cpu.set_external(3, 0xFF, 12 * 6)
+    for _ in range(8):
+        cpu.step()
+    assert cpu.a == 2  # sampled high in cycle 6, counts in 7 and 8
+
+
+def test_timer_2_reloads_and_flags_a_cycle_sooner_than_the_others():
+    body = "LJMP main\nORG 000Bh\nRETI\nORG 002Bh\nRETI\nORG 0040h\nmain:\n"
+    entered = {}
+    for name, setup, vector in (
+        ("T0", "MOV TMOD,#01h\nMOV TL0,#0F0h\nMOV TH0,#0FFh\nMOV IE,#82h\nNOP\nSETB TR0\n", 0x0B),
+        ("T2", "MOV TMOD,#01h\nMOV TL2,#0F0h\nMOV TH2,#0FFh\nMOV IE,#0A0h\nNOP\nSETB TR2\n", 0x2B),
+    ):
+        cpu = cpu_with(body + setup + "NOP\n" * 60)
+        assert cpu.run_until_pc(vector, 100) == 2
+        entered[name] = cpu.cycles
+    assert entered["T2"] == entered["T0"] - 1
+
+
+def test_an_isr_sees_what_the_documents_give_after_a_mode_1_overflow():
+    cpu = cpu_with(
+        "LJMP main\nORG 000Bh\nMOV A,TL0\nSJMP $\nORG 0040h\nmain:\n"
+        "MOV TMOD,#01h\nMOV TL0,#0F0h\nMOV TH0,#0FFh\nMOV IE,#82h\nSETB TR0\n" + "NOP\n" * 60
+    )
+    cpu.run(60)
+    assert cpu.a == 4
+
+
+def test_clock_output_on_p1_0_has_the_documented_period():
+    cpu = cpu_with(
+        "MOV T2MOD,#02h\nMOV RCAP2L,#0E8h\nMOV RCAP2H,#0FFh\nSETB TR2\nloop:\nMOV C,P1.0\nSJMP loop"
+    )
+    levels = []
+    while cpu.cycles < 65536 // 6 + 600:
+        cpu.step()
+        if cpu.cycles > 65536 // 6 + 20 and cpu.code_at(cpu.pc) == 0x80:
+            levels.append((cpu.cycles, cpu.cy))
+    rises = [b[0] for a, b in itertools.pairwise(levels) if (a[1], b[1]) == (0, 1)]
+    periods = [second - first for first, second in itertools.pairwise(rises)]
+    assert sum(periods) / len(periods) == pytest.approx(4 * 24 / 12, rel=0.15)
+    assert sfr(cpu, "T2CON") == 0x04
+
+
+PINS = st.fixed_dictionaries({name: st.integers(0, 1) for name in ("int0", "int1", "t0", "t1", "t2", "t2ex")})
+NEAR_TOP = st.one_of(st.integers(0, 255), st.sampled_from([0xFF, 0xFE, 0xF0, 0x1F, 0x1E, 0xFD]))
+STEPS = st.lists(
+    st.tuples(
+        st.integers(1, 400),
+        st.one_of(
+            st.tuples(st.sampled_from(REGISTERS), NEAR_TOP),
+            st.tuples(st.just("pins"), PINS),
+            st.tuples(st.just("look"), st.none()),
+        ),
+    ),
+    max_size=40,
+)
+
+
+def push(cpu, pins):
+    p1 = 0xFC | pins["t2"] | pins["t2ex"] << 1
+    p3 = 0xC3 | pins["int0"] << 2 | pins["int1"] << 3 | pins["t0"] << 4 | pins["t1"] << 5
+    cpu.set_external(1, p1, 12 * cpu.cycles)
+    cpu.set_external(3, p3, 12 * cpu.cycles)
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.lists(st.tuples(st.sampled_from(REGISTERS), NEAR_TOP), max_size=12), STEPS)
+def test_lazy_timers_equal_those_that_step_every_cycle(setup, steps):
+    cpu = Cpu(RecordingBus())
+    cpu.load(bytes(0x10000))  # NOPs
+    naive = NaiveTimers()
+    pins = dict.fromkeys(("int0", "int1", "t0", "t1", "t2", "t2ex"), 1)
+    for advance, (kind, value) in [*((0, write) for write in setup), *steps]:
+        cpu.run(cpu.cycles + advance)
+        for _ in range(advance):
+            naive.cycle(pins)
+        if kind == "pins":
+            pins = value
+            push(cpu, pins)
+        elif kind != "look":
+            cpu.chip.write(SFRS[kind], value, cpu.cycles)
+            external = naive.tcon & 0x0F
+            setattr(naive, kind.lower(), value & 0x03 if kind == "T2MOD" else value)
+            naive.tcon = naive.tcon & 0xF0 | external
+        seen = {name: sfr(cpu, name) for name in REGISTERS}
+        seen["TCON"] &= 0xF0
+        assert seen == {name: getattr(naive, name.lower()) for name in REGISTERS}
+        assert cpu.chip.timer2.clock_out == naive.clock_out

@@ -1,0 +1,387 @@
+"""The serial port on line levels: timing of the data sheet, two CPUs joined by Lines, and the naive twin."""
+
+import itertools
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.line import FAR
+
+from tests.naive.mcs51_timers import NaiveTimers
+from tests.naive.mcs51_uart import NaiveUart
+from tests.robot.mcs51.asm import SFRS
+from tests.robot.mcs51.rig import RecordingBus, cpu_with, sfr
+
+BIT = 2496  # ticks, with timer 2 reloading 65536 - 78
+TIMER1_9600 = "MOV TMOD,#20h\nMOV TH1,#0F3h\nMOV TL1,#0F3h\nORL PCON,#80h\nSETB TR1\n"
+TIMER2_9600 = "MOV RCAP2H,#0FFh\nMOV RCAP2L,#0B2h\nMOV TL2,#0B2h\nMOV TH2,#0FFh\nMOV T2CON,#34h\n"
+BAUD = {"timer 1": TIMER1_9600, "timer 2": TIMER2_9600}
+RECEIVER = """
+MOV SCON,#{scon}
+loop:
+JNB RI,loop
+MOV @R0,SBUF
+INC R0
+MOV C,RB8
+MOV A,#00h
+RLC A
+MOV @R0,A
+INC R0
+CLR RI
+SJMP loop
+"""
+
+
+def receiver(scon="50h", baud=TIMER2_9600):
+    """A CPU that stores (SBUF, RB8) pairs from R0 = 30h on."""
+    return cpu_with("MOV R0,#30h\n" + baud + RECEIVER.format(scon=scon))
+
+
+def received(cpu):
+    count = (cpu.peek_iram(0) - 0x30) // 2
+    return [(cpu.peek_iram(0x30 + 2 * n), cpu.peek_iram(0x31 + 2 * n)) for n in range(count)]
+
+
+def put(line, start, bits, bit=BIT):
+    """Bits, then mark, from tick `start` on; the tick after the last."""
+    for number, level in enumerate(bits):
+        line.append(int(start + number * bit), level)
+    end = int(start + len(bits) * bit)
+    line.append(end, 1)
+    return end
+
+
+def character(value, stop=1):
+    return [0, *(value >> number & 1 for number in range(8)), stop]
+
+
+def test_an_idle_wire_is_mark_for_ever():
+    cpu = receiver()
+    assert cpu.rxd.settled_tick == FAR
+    cpu.run(50_000)
+    assert received(cpu) == []
+
+
+@pytest.mark.parametrize("baud", BAUD.values(), ids=BAUD)
+def test_bits_last_208_cycles_at_9600_baud(baud):
+    cpu = cpu_with(baud + "MOV SCON,#50h\nMOV SBUF,#55h\nSJMP $")
+    cpu.run(5000)
+    ticks = [tick for tick, _ in cpu.txd.edges()]
+    assert len(ticks) == 10
+    assert {second - first for first, second in itertools.pairwise(ticks)} == {BIT}
+    assert ticks[0] % 12 == 0
+    assert cpu.txd.settled_tick == 12 * cpu.cycles
+    assert cpu.bus.sent == [(0x55, ticks[-1])]  # TI comes with the stop bit
+
+
+def test_the_start_bit_waits_for_the_free_running_divider():
+    starts = []
+    for nops in (0, 50, 150):
+        cpu = cpu_with(TIMER2_9600 + "MOV SCON,#50h\n" + "NOP\n" * nops + "MOV SBUF,#55h\nSJMP $")
+        cpu.run(5000)
+        starts.append(cpu.txd.edges()[0][0])
+    assert starts[0] == starts[1] == starts[2]
+
+
+def test_a_write_during_the_stop_bit_joins_without_a_gap():
+    cpu = cpu_with(TIMER2_9600 + "MOV SCON,#50h\nMOV SBUF,#55h\nJNB TI,$\nCLR TI\nMOV SBUF,#55h\nSJMP $")
+    cpu.run(8000)
+    ticks = [tick for tick, _ in cpu.txd.edges()]
+    assert ticks[10] - ticks[0] == 10 * BIT
+
+
+def test_a_latch_at_zero_kills_txd():
+    cpu = cpu_with(TIMER2_9600 + "CLR P3.1\nMOV SCON,#50h\nMOV SBUF,#55h\nSJMP $")
+    cpu.run(5000)
+    assert [level for _, level in cpu.txd.edges()] == [0]
+
+
+@pytest.mark.parametrize("sender", BAUD.values(), ids=BAUD)
+@pytest.mark.parametrize("listener", BAUD.values(), ids=BAUD)
+def test_two_cpus_understand_each_other(sender, listener):
+    text = "HELLO \x00\xff\x55"
+    send = "".join(f"MOV SBUF,#{ord(letter):02X}h\nJNB TI,$\nCLR TI\n" for letter in text)
+    one = cpu_with(sender + "MOV SCON,#40h\n" + send + "SJMP $")
+    two = receiver(baud=listener)
+    for cycle in range(0, 22_000, 500):
+        one.run(cycle + 40)
+        for tick, level in one.txd.edges():
+            two.rxd.append(tick, level)
+        one.txd.forget(one.txd.settled_tick)
+        two.rxd.settled_tick = one.txd.settled_tick
+        two.run(cycle)
+    assert received(two) == [(ord(letter), 1) for letter in text]
+
+
+def test_ri_shows_in_the_middle_of_the_stop_bit():
+    cpu = receiver()
+    put(cpu.rxd, 12_000, character(0xA5))
+    while not sfr(cpu, "SCON") & 1:
+        cpu.step()
+    since_start = 12 * cpu.cycles - 12_000
+    assert 9.5 * BIT < since_start < 9.75 * BIT
+
+
+def test_a_missing_stop_bit_is_received_with_rb8_clear():
+    cpu = receiver()
+    end = put(cpu.rxd, 12_000, character(0x41, stop=0))
+    put(cpu.rxd, end + BIT, character(0x42))
+    cpu.run(8000)
+    assert received(cpu) == [(0x41, 0), (0x42, 1)]
+
+
+def test_sm2_drops_what_has_no_stop_bit():
+    cpu = receiver("70h")
+    end = put(cpu.rxd, 12_000, character(0x41, stop=0))
+    put(cpu.rxd, end + BIT, character(0x42))
+    cpu.run(8000)
+    assert received(cpu) == [(0x42, 1)]
+
+
+def test_sm2_in_mode_3_picks_by_the_ninth_bit():
+    cpu = receiver("0F0h")
+    end = put(cpu.rxd, 12_000, [*character(0x41)[:9], 0, 1])
+    put(cpu.rxd, end, [*character(0x42)[:9], 1, 1])
+    cpu.run(8000)
+    assert received(cpu) == [(0x42, 1)]
+
+
+def test_the_character_that_finds_ri_set_is_lost_for_good():
+    cpu = cpu_with(TIMER2_9600 + "MOV SCON,#50h\nSJMP $")
+    end = 12_000
+    for value in (0x11, 0x22, 0x33):
+        end = put(cpu.rxd, end, character(value))
+    cpu.run(12_000)
+    assert sfr(cpu, "SBUF") == 0x11
+    assert sfr(cpu, "SCON") == 0x55
+
+
+def test_a_character_may_wait_while_the_next_one_arrives():
+    cpu = cpu_with(TIMER2_9600 + "MOV SCON,#50h\nJNB RI,$\nCLR RI\nJNB RI,$\nMOV A,SBUF\nSJMP $")
+    end = put(cpu.rxd, 12_000, character(0x11))
+    put(cpu.rxd, end, character(0x22))
+    cpu.run(8000)
+    assert cpu.a == 0x22
+
+
+def test_a_start_bit_that_votes_one_is_no_start_bit():
+    cpu = receiver()
+    cpu.rxd.append(12_000, 0)
+    cpu.rxd.append(12_000 + BIT // 3, 1)
+    put(cpu.rxd, 12_000 + BIT, character(0x5A))
+    cpu.run(8000)
+    assert received(cpu) == [(0x5A, 1)]
+
+
+def test_without_ren_nothing_is_received():
+    cpu = receiver("40h")
+    put(cpu.rxd, 12_000, character(0x5A))
+    cpu.run(8000)
+    assert received(cpu) == []
+
+
+def test_a_break_is_one_frame_of_zeros():
+    cpu = receiver()
+    cpu.rxd.append(12_000, 0)
+    cpu.rxd.append(12_000 + 40 * BIT, 1)
+    cpu.run(12_000)
+    assert received(cpu) == [(0x00, 0)]
+
+
+@pytest.mark.parametrize("ratio", [0.957, 0.97, 1.0, 1.03, 1.054])
+def test_bit_lengths_from_0_956_to_1_055_are_understood(ratio):
+    values = [0x00, 0xFF, 0x55, 0xAA, 0x01, 0x80, 0xFE, 0x7F]
+    cpu = receiver()
+    tick = 12_000
+    for value in values:
+        put(cpu.rxd, tick, character(value), BIT * ratio)
+        tick += int(12.3 * BIT)
+    cpu.run(tick // 12 + 2000)
+    assert received(cpu) == [(value, 1) for value in values]
+
+
+@pytest.mark.parametrize("ratio", [0.93, 1.08])
+def test_bit_lengths_far_off_are_not(ratio):
+    cpu = receiver()
+    put(cpu.rxd, 12_000, character(0x55), BIT * ratio)
+    cpu.run(8000)
+    assert received(cpu) != [(0x55, 1)]
+
+
+def test_smod_clear_halves_the_rate():
+    lines = "MOV TMOD,#20h\nMOV TH1,#0F3h\nMOV TL1,#0F3h\nSETB TR1\nMOV SCON,#50h\nMOV SBUF,#55h\nSJMP $"
+    cpu = cpu_with(lines)
+    cpu.run(9000)
+    ticks = [tick for tick, _ in cpu.txd.edges()]
+    assert {second - first for first, second in itertools.pairwise(ticks)} == {2 * BIT}
+
+
+@pytest.mark.parametrize(("smod", "bit"), [("80h", 32), ("00h", 64)])
+def test_mode_2_divides_the_crystal(smod, bit):
+    cpu = cpu_with(f"MOV PCON,#{smod}\nMOV SCON,#88h\nMOV SBUF,#55h\nSJMP $")
+    cpu.run(200)
+    ticks = [tick for tick, _ in cpu.txd.edges()]
+    assert {second - first for first, second in itertools.pairwise(ticks)} == {bit}
+    assert len(ticks) == 10  # start .. D7 alternate, TB8 = 1 joins the stop bit
+
+
+def test_the_receive_interrupt_comes_two_cycles_after_ri_is_latched():
+    cpu = cpu_with(
+        "LJMP main\nORG 0023h\nCLR P1.0\nSJMP $\nORG 0040h\nmain:\n"
+        + TIMER2_9600
+        + "MOV SCON,#50h\nMOV IE,#90h\nORL PCON,#01h\nSJMP $"
+    )
+    put(cpu.rxd, 12_000, character(0x55))
+    cpu.run(8000)
+    polled = receiver()
+    put(polled.rxd, 12_000, character(0x55))
+    while not sfr(polled, "SCON") & 1:
+        polled.run(polled.cycles + 1)
+    assert cpu.bus.ports[0][0] == 1
+    assert abs(cpu.bus.ports[0][2] // 12 - 1 - (polled.cycles + 3)) <= 2
+
+
+def test_mode_0_sends_eight_bits_and_a_shift_clock():
+    cpu = cpu_with("MOV SBUF,#35h\nNOP\nSJMP $")
+    cpu.run(20)
+    start = 12 * 3  # written at the end of cycle 1, one full cycle, then the bits
+    assert cpu.txd.edges()[:2] == [(start + 4, 0), (start + 10, 1)]
+    assert len(cpu.txd.edges()) == 16
+    levels = [cpu.chip.shift.data.level_at(start + 12 * n) for n in range(8)]
+    assert levels == [0x35 >> n & 1 for n in range(8)]
+    assert cpu.bus.sent == [(0x35, start + 96)]
+    assert sfr(cpu, "SCON") == 0x02
+
+
+def test_mode_0_receives_at_s5p2_of_eight_cycles():
+    cpu = cpu_with("MOV SCON,#10h\nNOP\nSJMP $")
+    for number in range(8):
+        cpu.rxd.append(12 * (3 + number) + 8, 0xC9 >> number & 1)
+    cpu.run(11)
+    assert sfr(cpu, "SCON") == 0x10
+    cpu.run(13)
+    assert (sfr(cpu, "SCON"), sfr(cpu, "SBUF")) == (0x11, 0xC9)
+
+
+CONFIGURATION = st.fixed_dictionaries(
+    {
+        "scon": st.sampled_from([0x50, 0x70, 0x58, 0xD0, 0xD8, 0xF8, 0x90, 0xB8]),
+        "smod": st.integers(0, 1),
+        "t2con": st.sampled_from([0x00, 0x34, 0x24, 0x14, 0x36]),
+        "th1": st.integers(0xF9, 0xFF),
+        "tmod": st.sampled_from([0x20, 0x20, 0x23, 0x60]),
+        "rcap2l": st.integers(0xD0, 0xFF),
+    }
+)
+ACTIONS = st.lists(
+    st.tuples(
+        st.integers(200, 900),
+        st.sampled_from(["send", "clear", "clear", "clear", "scon", "th1", "pins"]),
+        st.integers(0, 255),
+    ),
+    min_size=5,
+    max_size=30,
+)
+SIXTEENTHS = st.one_of(st.integers(1, 40), st.sampled_from([7, 8, 9, 16, 24, 25, 32, 40, 48, 80, 144]))
+NOISE = st.lists(st.tuples(SIXTEENTHS, st.integers(-3, 3)), min_size=30, max_size=120)
+
+
+def bit_ticks(configuration):
+    """Roughly what a bit lasts: noise has to look like characters to get anywhere."""
+    if configuration["scon"] >> 6 == 2:
+        return 32 if configuration["smod"] else 64
+    if configuration["t2con"] & 0x20:
+        return 16 * 2 * (256 - configuration["rcap2l"])
+    return 16 * 12 * (256 - configuration["th1"]) * (2 - configuration["smod"])
+
+
+@settings(deadline=None, max_examples=60)
+@given(CONFIGURATION, ACTIONS, NOISE)
+def test_the_lazy_port_equals_the_one_that_steps_every_tick(configuration, actions, noise):
+    cpu = Cpu(RecordingBus())
+    cpu.load(bytes(0x10000))
+    edge, level = 30, 1
+    for sixteenths, jitter in noise:
+        edge += max(1, bit_ticks(configuration) * sixteenths // 16 + jitter)
+        level = 1 - level
+        cpu.rxd.append(edge, level)
+    wire = list(cpu.rxd.edges())
+    timers, uart = NaiveTimers(), NaiveUart()
+    pins = dict.fromkeys(("int0", "int1", "t0", "t1", "t2", "t2ex"), 1)
+    twin = _Twin(timers, uart, wire, configuration["smod"])
+    for name, value in (
+        ("TMOD", configuration["tmod"]),
+        ("TH1", configuration["th1"]),
+        ("TL1", configuration["th1"]),
+        ("RCAP2H", 0xFF),
+        ("RCAP2L", configuration["rcap2l"]),
+        ("T2CON", configuration["t2con"]),
+        ("TCON", 0x40),
+    ):
+        cpu.chip.write(SFRS[name], value, 0)
+        setattr(timers, name.lower(), value)
+    cpu.load(bytes([0x75, 0x87, 0x80 * configuration["smod"]]) + bytes(0xFFF0))
+    cpu.run(2)
+    twin.run(2, pins)
+    cpu.chip.write(SFRS["SCON"], configuration["scon"], cpu.cycles)
+    uart.write_scon(configuration["scon"], 12 * cpu.cycles)
+    for advance, action, value in actions:
+        cpu.run(cpu.cycles + advance)
+        twin.run(advance, pins)
+        now = cpu.cycles
+        if action == "send":
+            cpu.chip.write(SFRS["SBUF"], value, now)
+            uart.write_sbuf(value)
+        elif action == "clear":
+            cpu.chip.write(SFRS["SCON"], sfr(cpu, "SCON") & 0xFC, now)
+            uart.write_scon(uart.scon & 0xFC, 12 * now)
+        elif action == "scon":
+            cpu.chip.write(SFRS["SCON"], 0x50 | value & 0xAC, now)
+            uart.write_scon(0x50 | value & 0xAC, 12 * now)
+        elif action == "th1":
+            cpu.chip.write(SFRS["TH1"], value | 0xF0, now)
+            timers.th1 = value | 0xF0
+        elif action == "pins":
+            pins = {**pins, "t1": value & 1, "t2": value >> 1 & 1}
+            cpu.set_external(3, 0xDF | (value & 1) << 5, 12 * now)
+            cpu.set_external(1, 0xFE | value >> 1 & 1, 12 * now)
+        assert (sfr(cpu, "SCON"), sfr(cpu, "SBUF")) == (uart.scon, uart.sbuf)
+        assert cpu.txd.edges() == uart.txd[1:]
+
+
+class _Twin:
+    """Naive timers clocking the naive port, tick by tick."""
+
+    def __init__(self, timers, uart, wire, smod):
+        self.timers, self.uart, self.wire, self.smod = timers, uart, dict(wire), smod
+        self.cycle, self.level, self.overflows = 0, 1, 0
+
+    def run(self, cycles, pins):
+        for _ in range(cycles):
+            self.timers.cycle(pins)
+            for tick in range(12):
+                self._tick(12 * self.cycle + tick, tick)
+            self.cycle += 1
+
+    def _tick(self, now, tick):
+        self.level = self.wire.get(now, self.level)
+        self.uart.tick(now)
+        timer1 = self.timers.overflowed1 and tick == 9
+        if timer1:
+            self.overflows += 1
+        ticks1 = timer1 and (self.smod or self.overflows % 2 == 0)
+        ticks2 = tick in self.timers.overflowed2
+        mode = self.uart.scon >> 6
+        if mode == 2:
+            divided = tick % 2 == 1 if self.smod else tick % 4 == 1
+            rx = tx = divided
+        else:
+            rx = ticks2 if self.timers.t2con & 0x20 else ticks1
+            tx = ticks2 if self.timers.t2con & 0x10 else ticks1
+        if mode == 0:
+            return
+        if rx:
+            self.uart.clock_rx(now, self.level)
+        if tx:
+            self.uart.clock_tx(now)
