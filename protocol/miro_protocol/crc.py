@@ -35,9 +35,18 @@ def register(data: bytes) -> int:
 
 def nibble_table() -> tuple[int, ...]:
     """16 words t: `register = register >> 4 ^ t[(register ^ nibble) & 15]`, low nibble of a byte first."""
+    return _table(4)
+
+
+def byte_table() -> tuple[int, ...]:
+    """256 words t: `register = register >> 8 ^ t[(register ^ byte) & 255]`."""
+    return _table(8)
+
+
+def _table(bits: int) -> tuple[int, ...]:
     table = []
-    for value in range(16):
-        for _ in range(4):
+    for value in range(1 << bits):
+        for _ in range(bits):
             value = value >> 1 ^ (POLYNOMIAL_REFLECTED if value & 1 else 0)
         table.append(value)
     return tuple(table)

@@ -49,6 +49,16 @@ def test_the_nibble_table_gives_the_same_crc(data):
     assert register ^ crc.XOR_OUT == crc.crc16(data)
 
 
+@settings(deadline=None)
+@given(st.binary(max_size=32))
+def test_the_byte_table_gives_the_same_crc(data):
+    table = crc.byte_table()
+    register = crc.INITIAL
+    for byte in data:
+        register = register >> 8 ^ table[(register ^ byte) & 255]
+    assert register ^ crc.XOR_OUT == crc.crc16(data)
+
+
 def test_the_whitening_string_is_the_one_written_out_and_the_pn9_sequence():
     assert whitening.STRING == LITERAL == naive.pn9(31)
 

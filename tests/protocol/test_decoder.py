@@ -7,7 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from miro_protocol import decoder as module
 from miro_protocol import table
-from miro_protocol.decoder import Damaged, Decoder, Reason, Received, TelemetryDecoder
+from miro_protocol.decoder import Damaged, Decoder, Reason, Received, WindowDecoder
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.strategies import Heard, damaged_streams, team_frames, valid_streams
 from miro_protocol.whitening import whiten
@@ -18,8 +18,8 @@ FRAMES = {n: encode(TeamFrame(0, 7, ((100, -100),) * n), n) for n in (3, 5)}
 LEAD = b"\x55" * 5 + b"\xff"
 
 
-def decoder_for(heard: Heard, telemetry: bool):
-    return TelemetryDecoder() if telemetry else Decoder(heard.n)
+def decoder_for(heard: Heard, telemetry: bool, run_limit: int = module.RUN_LIMIT):
+    return WindowDecoder(table.TELEMETRY if telemetry else table.downlink(heard.n), run_limit)
 
 
 def naive_for(heard: Heard, telemetry: bool, run_limit: int = module.RUN_LIMIT):
@@ -42,10 +42,8 @@ def test_events_and_counters_equal_the_naive_twins(stream, run_limit):
     naive = naive_for(heard, telemetry, run_limit)
     for symbol in heard.symbols:
         naive.character(*symbol)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "RUN_LIMIT", run_limit)
-        decoder = decoder_for(heard, telemetry)
-        events = decoder.feed_symbols(heard.symbols) + decoder.flush()
+    decoder = decoder_for(heard, telemetry, run_limit)
+    events = decoder.feed_symbols(heard.symbols) + decoder.flush()
     assert events == naive.flush()
     assert decoder.rejected == naive.rejected
     assert decoder.valid == sum(isinstance(event, Received) for event in events)

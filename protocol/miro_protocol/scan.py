@@ -1,0 +1,296 @@
+"""The sliding window itself, character by character: the hot part of the decoder.
+
+What belongs here: which characters are a frame and which are not. What does not: the interface for users
+(`decoder.py`) and what a frame says (`frames.py`).
+
+After each character the window of the last F is looked at, as the rule is read aloud (README.md,
+"Reception"). Where the last bad stop bit and the last pause stood is remembered, so those two tests are one
+comparison each; the CRC is computed only where a sync stands. Hence at most F/2 table steps a character, on
+any input. The characters since the last event are kept, at most `run_limit` + F - 1 of them.
+
+The CRC runs over the characters as received: whitening is taken off in the same step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import cast
+
+from miro_protocol import crc
+from miro_protocol.events import Damaged, Event, Reason, Received
+from miro_protocol.table import SPACING_TICKS, SPACING_TOLERANCE_TICKS, Format
+from miro_protocol.whitening import STRING
+
+Symbol = tuple[int, bool, int]
+"""A received character: byte 0..255, stop bit good, tick of its start bit (24 MHz)."""
+
+RUN_LIMIT = 4096  # a run of garbage is reported in pieces of so many characters, so that memory stays bounded
+TICK_LIMIT = 1 << 62  # ticks beyond +- this are refused: they are 64-bit numbers here
+REASONS = tuple(Reason)
+
+_LIMIT = 1 << 62  # C constants when compiled
+_CAPACITY = 4160  # room for a run and the window that goes on behind it
+_BAD_STOP = 1  # flaws of a character
+_APART = 2  # ... does not follow its predecessor at the right distance
+_FRAME = 1  # what a character completed
+_RUN = 2
+_NO_SYNC = 0  # the members of Reason
+_BAD_STOP_BIT = 2
+_BAD_SPACING = 3
+_BAD_CRC = 4
+
+
+class Scanner:
+    """Decoder of one wire format. Counts `valid` frames and `rejected` windows: all good but the CRC.
+
+    `tolerance_ticks` other than the standard's is for measuring what the spacing rule is worth.
+    """
+
+    NOT_STATE = (
+        *("format", "_sync", "_white", "_lead", "_table", "_start", "_intact", "_size", "_step"),
+        *("_spacing", "_tolerance", "_run_limit"),
+        *("_count", "_last_bad", "_last_apart"),  # follow from _data and _flaws
+    )
+
+    def __init__(
+        self, form: Format, run_limit: int = RUN_LIMIT, tolerance_ticks: int = SPACING_TOLERANCE_TICKS
+    ) -> None:
+        if not 1 <= run_limit <= RUN_LIMIT:
+            raise ValueError(f"run_limit = {run_limit}: must be 1..{RUN_LIMIT}")
+        self.format = form
+        self._sync = form.sync
+        self._lead = form.lead
+        self._white = STRING
+        self._table = crc.byte_table()
+        self._start = crc.register(bytes([form.layout]))
+        self._intact = crc.residue()
+        self._size = form.size
+        self._step = form.character_ticks
+        self._spacing = SPACING_TICKS
+        self._tolerance = tolerance_ticks
+        self._run_limit = run_limit
+        self.valid = 0
+        self.rejected = 0
+        # The characters not yet given out, side by side: byte, flaws, time.
+        self._data = bytearray(_CAPACITY)
+        self._flaws = bytearray(_CAPACITY)
+        self._ticks = [0] * 4160
+        self._count = 0
+        self._last_bad = -1  # where among them the last bad stop bit is, and the last pause
+        self._last_apart = -1
+        self._reason = _NO_SYNC
+        self._next_tick = 0  # where a character would start that follows at once
+        self._paused = True
+
+    @property
+    def pending(self) -> int:
+        """Characters fed that belong to no event yet."""
+        return self._count
+
+    def feed(self, data: bytes | bytearray, start_tick: int | None = None) -> list[Event]:
+        """Characters that follow each other without a pause, with good stop bits.
+
+        `start_tick` is the start bit of the first; without it they follow what came before. ValueError for
+        a tick beyond +-2^62.
+        """
+        events: list[Event] = []
+        length = len(data)
+        if length == 0:
+            return events
+        tick, flaws = self._next_tick, _APART if self._paused else 0
+        if start_tick is not None:
+            tick = checked_tick(start_tick, 0)
+            flaws = _APART if self._is_apart(tick) else 0
+        checked_tick(tick, length * self._step)
+        view = memoryview(data)
+        for place in range(length):
+            found = self._put(view[place], flaws, tick)
+            if found:
+                self._give_out(found, events)
+            flaws = 0
+            tick += self._step
+        self._paused = False
+        self._next_tick = tick
+        return events
+
+    def feed_symbols(self, symbols: Iterable[Symbol]) -> list[Event]:
+        """Characters with stop bit and time, as a UART and a timer deliver them."""
+        events: list[Event] = []
+        for byte, stop_good, start_tick in symbols:
+            if not 0 <= byte <= 255:
+                raise ValueError(f"character = {byte}: must be 0..255")
+            tick = checked_tick(start_tick, self._step)
+            found = self._put_symbol(byte, not stop_good, tick)
+            if found:
+                self._give_out(found, events)
+        return events
+
+    def feed_columns(self, data: bytes, bad_stop: bytes, ticks: memoryview[int]) -> list[Event]:
+        """The same as `feed_symbols` for many characters, column by column.
+
+        `bad_stop` holds 0 for a good stop bit, `ticks` 64-bit integers (`array("q")` or numpy's int64);
+        ValueError unless all three are of one length.
+        """
+        events: list[Event] = []
+        length = len(data)
+        if len(bad_stop) != length or len(ticks) != length:
+            raise ValueError(f"columns of {length}, {len(bad_stop)} and {len(ticks)} characters")
+        bytes_view, stop_view, tick_view = memoryview(data), memoryview(bad_stop), memoryview(ticks)
+        for place in range(length):
+            tick = tick_view[place]
+            if tick < -_LIMIT or tick > _LIMIT - self._step:
+                checked_tick(tick, self._step)
+            found = self._put_symbol(bytes_view[place], stop_view[place] != 0, tick)
+            if found:
+                self._give_out(found, events)
+        return events
+
+    def gap(self) -> None:
+        """The line paused for a character's time: what comes next does not follow what came before."""
+        if not self._paused:
+            self._next_tick += self._step
+        self._paused = True
+
+    def flush(self) -> list[Event]:
+        """The input has ended: gives out what was pending. The decoder can then be fed again."""
+        events: list[Event] = []
+        if self._reason == _NO_SYNC:
+            first = max(0, self._count - self._size + 1)
+            if bytes(self._data[first : self._count]).find(self._sync) >= 0:
+                self._reason = 1  # CUT_SHORT
+        if self._count:
+            self._give_out_damaged(self._count, events)
+        self._reason = _NO_SYNC
+        self.gap()
+        return events
+
+    def snapshot(self) -> dict[str, object]:
+        """All that decides what comes next; the same however the input was cut."""
+        return {
+            "valid": self.valid,
+            "rejected": self.rejected,
+            "_data": bytes(self._data[: self._count]),
+            "_flaws": bytes(self._flaws[: self._count]),
+            "_ticks": tuple([self._ticks[place] for place in range(self._count)]),
+            "_reason": self._reason,
+            "_next_tick": self._next_tick,
+            "_paused": bool(self._paused),
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        self.valid = cast(int, state["valid"])
+        self.rejected = cast(int, state["rejected"])
+        data, flaws = cast(bytes, state["_data"]), cast(bytes, state["_flaws"])
+        ticks = cast("tuple[int, ...]", state["_ticks"])
+        self._count = 0
+        self._last_bad = -1
+        self._last_apart = -1
+        for place in range(len(data)):
+            self._keep(data[place], flaws[place], ticks[place])
+        self._reason = cast(int, state["_reason"])
+        self._next_tick = cast(int, state["_next_tick"])
+        self._paused = cast(bool, state["_paused"])
+
+    def _is_apart(self, tick: int) -> bool:
+        spacing = tick - self._next_tick + self._step
+        return self._paused or abs(spacing - self._spacing) > self._tolerance
+
+    def _put_symbol(self, byte: int, bad_stop: bool, tick: int) -> int:
+        flaws = _BAD_STOP if bad_stop else 0
+        if self._is_apart(tick):
+            flaws |= _APART
+        self._paused = False
+        self._next_tick = tick + self._step
+        return self._put(byte, flaws, tick)
+
+    def _keep(self, byte: int, flaws: int, tick: int) -> None:
+        place = self._count
+        self._data[place] = byte
+        self._flaws[place] = flaws
+        self._ticks[place] = tick
+        if flaws & _BAD_STOP:
+            self._last_bad = place
+        if flaws & _APART:
+            self._last_apart = place
+        self._count = place + 1
+
+    def _put(self, byte: int, flaws: int, tick: int) -> int:
+        """Takes a character; says whether it completed a frame, or a run that is to be given out."""
+        self._keep(byte, flaws, tick)
+        start = self._count - self._size
+        if start < 0:
+            return 0
+        if self._data[start] == self._sync[0] and self._data[start + 1] == self._sync[1]:
+            reason = self._test(start)
+            if reason == _NO_SYNC:
+                self.valid += 1
+                return _FRAME
+            if reason > self._reason:
+                self._reason = reason
+        return _RUN if start + 1 == self._run_limit else 0
+
+    def _test(self, start: int) -> int:
+        """Why the window that starts there, with a sync, is no frame; 0 if it is one."""
+        if self._last_bad >= start:
+            return _BAD_STOP_BIT
+        if self._last_apart > start:
+            return _BAD_SPACING
+        register = self._start
+        for place in range(self._size - 2):
+            byte = self._data[start + 2 + place] ^ self._white[place]
+            register = (register >> 8) ^ self._table[(register ^ byte) & 0xFF]
+        if register == self._intact:
+            return 0
+        self.rejected += 1
+        return _BAD_CRC
+
+    def _give_out(self, found: int, events: list[Event]) -> None:
+        if found == _RUN:
+            self._give_out_damaged(self._run_limit, events)
+            return
+        sync = self._count - self._size
+        start = self._lead_start(sync)
+        end = self._count
+        body = bytearray(self._size - 4)
+        for place in range(self._size - 4):
+            body[place] = self._data[sync + 2 + place] ^ self._white[place]
+        frame = Received(bytes(self._data[start:end]), self._ticks[start], self._ticks[end - 1], bytes(body))
+        if start > 0:
+            self._give_out_damaged(start, events)
+        events.append(frame)
+        self._count = 0
+        self._last_bad = -1
+        self._last_apart = -1
+        self._reason = _NO_SYNC
+
+    def _lead_start(self, sync: int) -> int:
+        """Where the preamble begins: as many of its last characters as stand intact right before the sync."""
+        start = sync
+        expected = len(self._lead) - 1
+        while start > 0 and expected >= 0:
+            if self._flaws[start] & _APART or self._flaws[start - 1] & _BAD_STOP:
+                break
+            if self._data[start - 1] != self._lead[expected]:
+                break
+            start -= 1
+            expected -= 1
+        return start
+
+    def _give_out_damaged(self, length: int, events: list[Event]) -> None:
+        """The first `length` characters are no frame; what stands behind them moves up."""
+        events.append(Damaged(bytes(self._data[:length]), REASONS[self._reason], self._ticks[0]))
+        self._reason = _NO_SYNC
+        for place in range(length, self._count):
+            self._data[place - length] = self._data[place]
+            self._flaws[place - length] = self._flaws[place]
+            self._ticks[place - length] = self._ticks[place]
+        self._count -= length
+        self._last_bad = max(-1, self._last_bad - length)
+        self._last_apart = max(-1, self._last_apart - length)
+
+
+def checked_tick(tick: int, length: int) -> int:
+    """`tick`, if that and `length` ticks later can be told in 64 bits; else ValueError."""
+    if not -TICK_LIMIT <= tick <= TICK_LIMIT - length:
+        raise ValueError(f"tick = {tick}: must be {-TICK_LIMIT}..{TICK_LIMIT}, the last character included")
+    return tick
