@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+
+from miro_protocol import files
 
 FIRST_LINE = "# mirotwin stream 1"
 DOWN = ">"
@@ -114,18 +114,7 @@ def read(path: str | os.PathLike[str]) -> list[Transmission]:
 
 def write(path: str | os.PathLike[str], sent: Iterable[Transmission]) -> None:
     """Writes a stream file whole or not at all: whoever looks finds the old content or the new."""
-    target = Path(path)
-    content = format_stream(sent).encode()
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(name, 0o644)  # mkstemp's 0600 is for secrets
-        os.replace(name, target)
-    except BaseException:
-        with suppress(FileNotFoundError):
-            os.unlink(name)
-        raise
+    files.replace(path, format_stream(sent).encode())
 
 
 @dataclass(frozen=True, slots=True)

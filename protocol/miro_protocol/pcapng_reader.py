@@ -1,0 +1,188 @@
+"""Reads pcapng captures of serial lines (link type 250), our own and other people's.
+
+What belongs here: pcapng to packets. What does not: writing (`pcapng.py`, which describes the format).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from miro_protocol.pcapng import (
+    BYTE_ORDER,
+    ENHANCED,
+    IF_TSOFFSET,
+    IF_TSRESOL,
+    INTERFACE,
+    LINK_TYPE,
+    MAX_TICK,
+    RTAC,
+    SECTION,
+    TICKS_PER_SECOND,
+    Packet,
+)
+from miro_protocol.stream import DOWN, UP
+
+MAGIC = b"\x0a\x0d\x0d\x0a"
+_OLD_PACKETS = {2: "obsolete packet", 3: "simple packet"}
+_CLASSIC_PCAP = (b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1", b"\xa1\xb2\x3c\x4d")
+_DIRECTIONS = {1: DOWN, 2: UP, 3: DOWN, 4: UP}  # DATA_TX_START, _RX_START, _TX_END, _RX_END
+
+
+class CaptureError(Exception):
+    """A capture that cannot be read on: file, offset of the block, the reason, and what to do about it."""
+
+    def __init__(self, source: str, offset: int, reason: str, remedy: str) -> None:
+        super().__init__(f"{source}: offset {offset}: {reason}; {remedy}")
+        self.source = source
+        self.offset = offset
+        self.reason = reason
+        self.remedy = remedy
+
+
+def iterate(data: bytes, source: str = "<capture>") -> Iterator[Packet]:
+    """Reads packet by packet; CaptureError at the first place that makes no sense, after all before it.
+
+    Captures by others are read too: both byte orders, any time resolution, several sections. `network` is
+    the interface's number in its section. Events that carry no characters are passed over.
+    """
+    return _Reader(data, source).packets()
+
+
+@dataclass(frozen=True, slots=True)
+class _Interface:
+    link_type: int
+    units: int  # of time, a second
+    offset: int  # seconds
+
+
+class _Reader:
+    def __init__(self, data: bytes, source: str) -> None:
+        self.data = data
+        self.source = source
+        self.place = 0  # of the block under way
+        self.order = "<"
+        self.interfaces: list[_Interface] = []
+
+    def packets(self) -> Iterator[Packet]:
+        if not self.data.startswith(MAGIC):
+            raise self.error(*self._foreign())
+        while self.place < len(self.data):
+            kind, body = self._block()
+            if kind == SECTION:
+                self.interfaces = []
+            elif kind == INTERFACE:
+                self.interfaces.append(self._interface(body))
+            elif kind == ENHANCED:
+                packet = self._enhanced(body)
+                if packet is not None:
+                    yield packet
+            elif kind in _OLD_PACKETS:
+                reason = f"{_OLD_PACKETS[kind]} block, which this program does not read"
+                raise self.error(reason, "save the capture again with Wireshark")
+            self.place += len(body) + 12
+
+    def error(self, reason: str, remedy: str) -> CaptureError:
+        return CaptureError(self.source, self.place, reason, remedy)
+
+    def cut(self) -> CaptureError:
+        return self.error(
+            "the file ends in the middle of a block", "it was cut short; capture or copy it again"
+        )
+
+    def malformed(self, what: str) -> CaptureError:
+        return self.error(f"damaged block: {what}", "copy the file again")
+
+    def _foreign(self) -> tuple[str, str]:
+        if not self.data:
+            return "empty file", "give a pcapng capture"
+        if self.data[:4] in _CLASSIC_PCAP:
+            return "a capture in the old pcap format", "convert it with `editcap -F pcapng OLD NEW`"
+        return "not a pcapng file", "give a capture that was saved as pcapng"
+
+    def _block(self) -> tuple[int, bytes]:
+        """Kind and body of the block at `place`, its lengths checked."""
+        if len(self.data) - self.place < 12:
+            raise self.cut()
+        if self.data.startswith(MAGIC, self.place):
+            self._section()
+        kind, size = struct.unpack_from(self.order + "II", self.data, self.place)
+        if size < 12 or size % 4:
+            raise self.malformed(f"length {size}")
+        end = self.place + size
+        if end > len(self.data):
+            raise self.cut()
+        (again,) = struct.unpack_from(self.order + "I", self.data, end - 4)
+        if again != size:
+            raise self.malformed(f"lengths {size} and {again} differ")
+        return kind, self.data[self.place + 8 : end - 4]
+
+    def _section(self) -> None:
+        """Byte order and version of the section that begins here."""
+        head = self.data[self.place + 8 : self.place + 16]
+        if len(head) < 8:
+            raise self.cut()
+        for order in "<>":
+            magic, major = struct.unpack(order + "IH", head[:6])
+            if magic == BYTE_ORDER:
+                self.order = order
+                break
+        else:
+            raise self.malformed(f"byte order mark {head[:4].hex()}")
+        if major != 1:
+            raise self.error(f"pcapng version {major}", "this program reads version 1")
+
+    def _interface(self, body: bytes) -> _Interface:
+        if len(body) < 8:
+            raise self.malformed("interface description too short")
+        (link_type,) = struct.unpack_from(self.order + "H", body)
+        options = dict(self._options(body[8:]))
+        resolution = options.get(IF_TSRESOL, b"\6")[:1] or b"\6"
+        units = 1
+        for _ in range(resolution[0] & 0x7F):
+            units *= 2 if resolution[0] & 0x80 else 10
+        offset = options.get(IF_TSOFFSET, bytes(8))
+        if len(offset) != 8:
+            raise self.malformed("time offset of wrong length")
+        return _Interface(link_type, units, struct.unpack(self.order + "q", offset)[0])
+
+    def _options(self, data: bytes) -> Iterator[tuple[int, bytes]]:
+        place = 0
+        while place + 4 <= len(data):
+            code, size = struct.unpack_from(self.order + "HH", data, place)
+            if code == 0:
+                return
+            if place + 4 + size > len(data):
+                raise self.malformed("option beyond the end of its block")
+            yield code, data[place + 4 : place + 4 + size]
+            place += 4 + size + -size % 4
+
+    def _enhanced(self, body: bytes) -> Packet | None:
+        """The packet, or None when it carries no characters."""
+        if len(body) < 20:
+            raise self.malformed("packet block too short")
+        number, high, low, size, original = struct.unpack_from(self.order + "IIIII", body)
+        if number >= len(self.interfaces):
+            raise self.malformed(f"interface {number} was not described")
+        interface = self.interfaces[number]
+        if interface.link_type != LINK_TYPE:
+            reason = f"link type {interface.link_type}, not {LINK_TYPE} (RTAC serial)"
+            raise self.error(reason, "give a capture of a serial line")
+        if size > len(body) - 20:
+            raise self.malformed("packet beyond the end of its block")
+        if size < original:
+            raise self.error(
+                f"only {size} of {original} bytes were captured", "capture without a snap length"
+            )
+        if size < RTAC.size:
+            raise self.malformed("packet without RTAC header")
+        event = RTAC.unpack_from(body, 20)[2]
+        data = body[20 + RTAC.size : 20 + size]
+        if event not in _DIRECTIONS or not data:
+            return None
+        tick = -(-(high << 32 | low) * TICKS_PER_SECOND // interface.units)
+        tick += interface.offset * TICKS_PER_SECOND
+        if not 0 <= tick <= MAX_TICK:
+            raise self.malformed(f"tick {tick} is not in 0..{MAX_TICK}")
+        return Packet(tick, _DIRECTIONS[event], data, number)
