@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 import msgspec
-from miro_protocol.decoder import Decoder, Received
+from miro_protocol.events import Received
 from miro_protocol.stream import DOWN, Transmission
 
 from miro_sim.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND, seconds
@@ -154,6 +154,8 @@ def robots_of_stream(sent: Sequence[Transmission]) -> int:
 
 
 def _frames(sent: Sequence[Transmission], robots: int) -> int:
+    from miro_protocol.decoder import Decoder  # a hot module: not before the engine was chosen
+
     decoder = Decoder(robots)
     events = [event for one in sent if one.direction == DOWN for event in decoder.feed(one.data, one.tick)]
     return len([event for event in events if isinstance(event, Received)])
