@@ -7,6 +7,7 @@ is returned.
 
 import re
 import struct
+from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -60,38 +61,50 @@ def read(path: str | Path) -> Recording:
 
 def parse(data: bytes, path: str) -> Recording:
     """A recording from its bytes; `path` names it in errors."""
+    collector = _Collector(path)
+    for place, record in records(data, path):
+        collector.take(record, place)
+    return collector.finish(len(data))
+
+
+def records(data: bytes, path: str) -> Iterator[tuple[int, McapRecord]]:
+    """(offset, record) of everything in an MCAP file; RecordingError at the first place that is damaged."""
     if not data.startswith(MAGIC):
         what = "empty file" if not data else "not an MCAP file"
         raise RecordingError(
             path, "offset 0", what, "give a run.mcap that `mirotwin run` wrote, or a stream file"
         )
     stream = BytesIO(data)
-    collector = _Collector(path)
     start = 0
     reader = StreamReader(stream, validate_crcs=True, record_size_limit=len(data))
-    try:
-        for record in reader.records:
-            collector.take(record, start)
-            start = stream.tell()
-    except RecordingError:
-        raise
-    except (
-        McapError,
-        CRCValidationError,
-        struct.error,
-        ValueError,
-        KeyError,
-        MemoryError,
-        OverflowError,
-    ) as error:
-        truncated = stream.tell() >= len(data) or isinstance(error, RecordLengthLimitExceeded)
-        what = "the file ends in the middle of a record" if truncated else f"damaged record ({_brief(error)})"
-        remedy = "record the run again; a recording cut short cannot be trusted"
-        raise RecordingError(path, f"offset {start}", what, remedy) from None
+    found = iter(reader.records)
+    while True:
+        try:
+            record = next(found, None)
+        except (
+            McapError,
+            CRCValidationError,
+            struct.error,
+            ValueError,
+            KeyError,
+            MemoryError,
+            OverflowError,
+        ) as error:
+            truncated = stream.tell() >= len(data)
+            what = (
+                "the file ends in the middle of a record"
+                if truncated
+                else f"damaged record ({_brief(error)})"
+            )
+            remedy = "record the run again; a recording cut short cannot be trusted"
+            raise RecordingError(path, f"offset {start}", what, remedy) from None
+        if record is None:
+            break
+        yield start, record
+        start = stream.tell()
     if stream.tell() < len(data):
         what = f"{len(data) - stream.tell()} bytes after the end of the recording"
         raise RecordingError(path, f"offset {stream.tell()}", what, "remove them")
-    return collector.finish(len(data))
 
 
 def _brief(error: Exception) -> str:
