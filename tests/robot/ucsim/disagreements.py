@@ -1,0 +1,108 @@
+"""Where ucsim 0.6.4 does not do what the data sheets say; there the data sheets win.
+
+What belongs here: the list. How a random walk keeps away from these is in `exclusions.py`, what is tested in
+their place in `tests/vectors/README.md`, which repeats each entry. Sources: Atmel's 8051 Hardware Manual
+(4316E) and the AT89S52 data sheet (1919D).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Disagreement(NamedTuple):
+    """What both do, and who says so."""
+
+    name: str
+    ucsim: str
+    data_sheet: str
+    source: str
+
+
+DISAGREEMENTS: tuple[Disagreement, ...] = (
+    Disagreement(
+        "bank-by-bit",
+        "SETB, CLR, CPL and JBC of RS0 or RS1, and MOV RS0/RS1,C, leave the register bank as it was",
+        "the bank is what PSW.4:3 says",
+        "4316E, program status word; fixed in ucsim 0.9.9 (issue 11)",
+    ),
+    Disagreement(
+        "parity-write",
+        "P keeps what was written to PSW until ACC is written",
+        "P is the parity of ACC in every cycle",
+        "4316E, program status word",
+    ),
+    Disagreement(
+        "p0-after-movx",
+        "keeps the P0 latch",
+        "any external access writes FFh to it",
+        "4316E section 2.6",
+    ),
+    Disagreement(
+        "movx-strobe",
+        "reads and writes external RAM whatever P3 holds",
+        "/RD and /WR are ANDed with the latches of P3.7 and P3.6: with 0 there, no strobe",
+        "4316E section 2.5, alternate functions",
+    ),
+    Disagreement(
+        "stack-wrap",
+        "stops with an error",
+        "SP is an 8-bit counter",
+        "4316E, stack pointer",
+    ),
+    Disagreement(
+        "movc-wrap",
+        "MOVC beyond FFFFh reads 0",
+        "16-bit addition, so that it goes on at 0000h",
+        "4316E, MOVC",
+    ),
+    Disagreement(
+        "level-interrupt",
+        "IE0 and IE1 are sticky in level mode",
+        "they follow the inverted pin, sampled at S5P2",
+        "4316E section 2.16",
+    ),
+    Disagreement(
+        "timer-start",
+        "a timer's registers show the count one instruction early, and one that is started counts all cycles "
+        "of the instruction that starts it",
+        "a register changes at the end of the last cycle, the timer counts from the next",
+        "4316E sections 2.4 and 2.9",
+    ),
+    Disagreement(
+        "timer-1-beside-mode-3",
+        "timer 1 obeys TR1 while timer 0 is in mode 3",
+        "it runs whenever it is not in mode 3 itself",
+        "4316E section 2.10",
+    ),
+    Disagreement(
+        "t2ex-edge",
+        "a fall of P1.1 by an instruction captures or reloads within that instruction",
+        "the pin follows the latch at S1P1 of the next cycle and is sampled at its S5P2",
+        "4316E sections 2.5.2 and 2.12",
+    ),
+    Disagreement(
+        "absent-bits",
+        "register addresses and bits that an AT89C52 lacks hold what is written; so does all of T2MOD",
+        "undefined; T2MOD has two bits, and DCEN counts down",
+        "1919D table 5-1",
+    ),
+    Disagreement(
+        "serial-port",
+        "sends and receives whole bytes, with other timing; one SBUF",
+        "bit by bit with a 16x clock; SBUF is two registers",
+        "4316E section 2.13",
+    ),
+    Disagreement(
+        "interrupt-timing",
+        "takes an interrupt at once, by polling order alone",
+        "3 to 8 cycles after the flag, high level first",
+        "4316E section 2.16, 1919D section 13",
+    ),
+    Disagreement(
+        "idle",
+        "idle and power-down end a single step in their own way",
+        "the clock of the core stands",
+        "4316E section 2.17",
+    ),
+)

@@ -1,0 +1,168 @@
+"""What a random walk must not do, because ucsim is known to do it wrong.
+
+What belongs here: which instruction may be executed in which state. The names in the comments are those of
+`disagreements.py`.
+"""
+
+from __future__ import annotations
+
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.opcodes import ROW, TABLE
+
+# Registers of an AT89C52 that both machines have and that hold what is written.
+P0, SP, DPL, DPH, PCON, TCON, TMOD = 0x80, 0x81, 0x82, 0x83, 0x87, 0x88, 0x89
+TL0, TL1, TH0, TH1, P1, SCON, SBUF, P2, IE, P3, IP = (
+    0x8A,
+    0x8B,
+    0x8C,
+    0x8D,
+    0x90,
+    0x98,
+    0x99,
+    0xA0,
+    0xA8,
+    0xB0,
+    0xB8,
+)
+T2CON, T2MOD, RCAP2L, RCAP2H, TL2, TH2, PSW, ACC, B = 0xC8, 0xC9, 0xCA, 0xCB, 0xCC, 0xCD, 0xD0, 0xE0, 0xF0
+COMPARED = (
+    *(P0, SP, DPL, DPH, PCON, TCON, TMOD, TL0, TL1, TH0, TH1, P1, SCON, P2, IE, P3, IP),
+    *(T2CON, RCAP2L, RCAP2H, TL2, TH2, PSW, ACC, B),
+)  # fmt: skip
+
+_FORBIDDEN = {
+    PCON: 0x73,  # idle, absent-bits
+    IE: 0x40,  # absent-bits
+    IP: 0xC0,  # absent-bits
+    TCON: 0x50,  # timer-start
+    T2CON: 0x0C,  # timer-start, t2ex-edge
+}
+_OPERANDS = {row[0]: row[4] for row in TABLE}
+OPERANDS = tuple(_OPERANDS[ROW[opcode]] for opcode in range(256))
+_FIRST_DIRECT = tuple(
+    any(part in ("dir", "dst") for part in text.split(",")) for text in OPERANDS
+)  # the second byte is a direct address
+_FIRST_BIT = tuple(any(part in ("bit", "/bit") for part in text.split(",")) for text in OPERANDS)
+_PUSH, _POP = 0xC0, 0xD0
+MOVX = (0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3)
+_CALLS = (0x12, *range(0x11, 0x100, 0x20))
+_RETURNS = (0x22, 0x32)
+
+
+def has_direct(opcode: int) -> bool:
+    """Whether the byte after the opcode is a direct address."""
+    return _FIRST_DIRECT[opcode]
+
+
+def has_bit(opcode: int) -> bool:
+    """Whether the byte after the opcode is a bit address."""
+    return _FIRST_BIT[opcode]
+
+
+def parity(value: int) -> int:
+    return value.bit_count() & 1
+
+
+def peek(cpu: Cpu, address: int) -> int:
+    """A direct address: internal RAM or a register, ports at their latch."""
+    return cpu.peek_iram(address) if address < 0x80 else cpu.sfr(address)
+
+
+def written(cpu: Cpu, opcode: int, first: int, second: int) -> tuple[int, int, int] | None:
+    """The direct address an instruction is about to write: (address, value, ACC afterwards), or None."""
+    a = cpu.a
+    row = ROW[opcode]
+    if has_bit(opcode) and row in (0x10, 0x92, 0xB2, 0xC2, 0xD2):
+        address = first & 0xF8 if first >= 0x80 else 0x20 + (first >> 3)
+        mask = 1 << (first & 7)
+        old = peek(cpu, address)
+        level = {0x10: 0, 0x92: cpu.cy, 0xB2: old & mask == 0, 0xC2: 0, 0xD2: 1}[row]
+        value = old | mask if level else old & ~mask
+        return address, value, value if address == ACC else a
+    if not has_direct(opcode):
+        return None
+    old = peek(cpu, first)
+    if row == 0x85:
+        return second, old, old if second == ACC else a
+    if row == 0xC5:
+        return first, a, old
+    values = {
+        0x05: old + 1,
+        0x15: old - 1,
+        0x42: old | a,
+        0x43: old | second,
+        0x52: old & a,
+        0x53: old & second,
+        0x62: old ^ a,
+        0x63: old ^ second,
+        0x75: second,
+        0x86: cpu.peek_iram(cpu.peek_iram(cpu.bank + (opcode & 1))),
+        0x88: cpu.peek_iram(cpu.bank + (opcode & 7)),
+        0xD0: cpu.peek_iram(cpu.sp),
+        0xD5: old - 1,
+        0xF5: a,
+    }
+    if row not in values:
+        return None
+    value = values[row] & 0xFF
+    return first, value, value if first == ACC else a
+
+
+def allowed(cpu: Cpu, opcode: int, first: int, second: int) -> bool:
+    """Whether both machines must do the same with this instruction in this state."""
+    for address in direct_addresses(opcode, first, second):
+        if address >= 0x80 and address not in COMPARED:
+            return False
+    if opcode in MOVX and not cpu.sfr(P3) & (0x80 if opcode < 0xF0 else 0x40):  # movx-strobe
+        return False
+    if (opcode == _PUSH and cpu.sp == 0xFF) or (opcode in _CALLS and cpu.sp >= 0xFE):
+        return False
+    if (opcode == _POP and cpu.sp == 0x00) or (opcode in _RETURNS and cpu.sp <= 0x01):
+        return False
+    if (opcode == 0x83 and cpu.pc + 1 + cpu.a > 0xFFFF) or (opcode == 0x93 and cpu.dptr + cpu.a > 0xFFFF):
+        return False
+    target = written(cpu, opcode, first, second)
+    return target is None or _may_write(cpu, opcode, *target)
+
+
+def direct_addresses(opcode: int, first: int, second: int) -> tuple[int, ...]:
+    """The direct addresses that an instruction names, by byte or by bit."""
+    if opcode == 0x85:
+        return first, second
+    if has_direct(opcode):
+        return (first,)
+    if has_bit(opcode) and first >= 0x80:
+        return (first & 0xF8,)
+    return ()
+
+
+def _may_write(cpu: Cpu, opcode: int, address: int, value: int, a: int) -> bool:
+    """Whether a register may be written, given ACC after the instruction."""
+    if address == PSW:
+        by_bit = has_bit(opcode) and (value ^ cpu.psw()) & 0x18  # bank-by-bit
+        return not by_bit and value & 1 == parity(a)  # parity-write
+    if address == P3:
+        listening = cpu.sfr(SCON) & 0x10  # serial-port
+        return value & 0x0C == 0x0C and bool(value & 1 or not listening)  # level-interrupt
+    if value & _FORBIDDEN.get(address, 0):
+        return False
+    if address == TCON and (value >> 1) & ~value & 0x05:  # level-interrupt: IEx without ITx
+        return False
+    if address == TMOD and value & 0x03 == 0x03:  # timer-1-beside-mode-3
+        return False
+    if address == SCON and value & 0x10:  # serial-port
+        return value & 0xC0 != 0 and bool(cpu.sfr(P3) & 1)
+    return not _interrupts(cpu, address, value)
+
+
+def _interrupts(cpu: Cpu, address: int, value: int) -> bool:
+    """interrupt-timing: whether an enabled interrupt would be pending after a write."""
+    ie, tcon, scon, t2con = (
+        value if address == register else cpu.sfr(register) for register in (IE, TCON, SCON, T2CON)
+    )
+    pending = (tcon >> 1) & 0x01 | (tcon >> 4) & 0x02 | (tcon >> 1) & 0x04 | (tcon >> 4) & 0x08
+    if scon & 0x03:
+        pending |= 0x10
+    if t2con & 0xC0:
+        pending |= 0x20
+    return bool(ie & 0x80 and ie & pending)

@@ -1,0 +1,116 @@
+"""Random single steps in lockstep with ucsim: `python -m tests.robot.ucsim.lockstep --steps 2000000`.
+
+What belongs here: running walks on the simulator, comparing after each instruction, reporting. Each step is
+compared in PC, cycles, all of internal RAM and every register that both machines have; external RAM at the
+end of a walk. Walk number i of seed s is the same wherever it runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from typing import NamedTuple
+
+from miro_robot.mcs51.opcodes import disassemble
+
+from tests.robot.ucsim import s51
+from tests.robot.ucsim.exclusions import COMPARED, P0
+from tests.robot.ucsim.walk import PROLOGUE, Step, Walk, Walker
+
+_ALIGN_P0 = "set mem sfr 0x80 0xff"
+_XRAM = "dump /b xram 0 65535"
+_P0_AT = COMPARED.index(P0)
+
+
+class Outcome(NamedTuple):
+    """Of one walk: how often each opcode was executed, and the first difference ("" if none)."""
+
+    seed: int
+    opcodes: tuple[int, ...]
+    difference: str
+
+
+def compare(seed: int, steps: int) -> Outcome:
+    """One walk on both machines."""
+    walk = Walker(seed).walk(steps)
+    output = s51.run(walk.code, _commands(walk))
+    counts = Counter(step.opcode for step in walk.steps)
+    difference = next(_differences(walk, s51.Reader(output)), "")
+    return Outcome(seed, tuple(counts[opcode] for opcode in range(256)), difference)
+
+
+def _commands(walk: Walk) -> Iterator[str]:
+    yield f"run 0 {len(PROLOGUE):#x}"
+    for step in walk.steps:
+        if step.moved:
+            yield f"pc {step.pc_before:#x}"
+        yield from s51.OBSERVE
+        if step.movx_changed_p0:
+            yield _ALIGN_P0
+    yield _XRAM
+
+
+def _differences(walk: Walk, reader: s51.Reader) -> Iterator[str]:
+    for number, step in enumerate(walk.steps):
+        seen = reader.observed()
+        found = list(_step_differences(step, seen))
+        if found:
+            shown = disassemble(walk.code, step.pc_before)
+            yield f"step {number}, {step.pc_before:04X}h {step.opcode:02X}h {shown}: " + ", ".join(found)
+    xram = reader.raw(_XRAM, 0x10000)
+    for address in range(0x10000):
+        if xram[address] != walk.xram[address]:
+            yield f"external RAM {address:04X}h ours {walk.xram[address]:02X}h ucsim {xram[address]:02X}h"
+
+
+def _step_differences(step: Step, seen: s51.Observed) -> Iterator[str]:
+    if step.pc != seen.pc:
+        yield f"PC ours {step.pc:04X}h ucsim {seen.pc:04X}h"
+    if 12 * step.cycles != seen.ticks:
+        yield f"ticks ours {12 * step.cycles} ucsim {seen.ticks}"
+    registers = bytes([seen.sfr[address - 0x80] for address in COMPARED])
+    for place, address in enumerate(COMPARED):
+        ours, theirs = step.sfr[place], registers[place]
+        if ours != theirs and not (step.movx_changed_p0 and place == _P0_AT):
+            yield f"{address:02X}h ours {ours:02X}h ucsim {theirs:02X}h"
+    if step.iram != seen.iram:
+        for address in range(256):
+            ours, theirs = step.iram[address], seen.iram[address]
+            if ours != theirs:
+                yield f"internal RAM {address:02X}h ours {ours:02X}h ucsim {theirs:02X}h"
+
+
+def main() -> int:
+    """Prints figures; exit code 1 if anything differed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=2_000_000, help="instructions in all")
+    parser.add_argument("--walk", type=int, default=10_000, help="instructions per walk")
+    parser.add_argument("--seed", type=int, default=0, help="of the first walk; the others count up")
+    parser.add_argument("--jobs", type=int, default=2, help="walks at a time")
+    options = parser.parse_args()
+    walks = -(-options.steps // options.walk)
+    seeds = range(options.seed, options.seed + walks)
+    begin = time.monotonic()
+    totals = [0] * 256
+    differing = 0
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for outcome in pool.map(compare, seeds, [options.walk] * walks):
+            totals = [total + count for total, count in zip(totals, outcome.opcodes, strict=True)]
+            if outcome.difference:
+                differing += 1
+                print(f"walk {outcome.seed}: {outcome.difference}")
+    rarest = min(range(256), key=lambda opcode: totals[opcode])
+    print(
+        f"{s51.version()}: {sum(totals)} single steps in {walks} walks, "
+        f"{sum(1 for total in totals if total)} opcodes, the rarest ({rarest:02X}h) {totals[rarest]} times, "
+        f"{differing} walks with a difference, {time.monotonic() - begin:.0f} s"
+    )
+    return 1 if differing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,104 @@
+"""Driving ucsim's `s51 -t C52`: images in, commands in, the state after each command out.
+
+What belongs here: the process, its command file, and reading its output. What to run and what to compare is
+in `walk.py` and `lockstep.py`. The simulator is started once for thousands of commands: `exec FILE` echoes
+each command before its output, and `dump /b` prints raw bytes, so the output can be cut without guessing.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+OBSERVE = ("step", "dump /b iram 0 255", "dump /b sfr 128 255")
+_STOPPED = re.compile(rb"Stop at 0x([0-9a-f]+): \(\d+\) stepped (\d+) ticks\n")
+
+
+class Observed(NamedTuple):
+    """The simulator after one or more instructions."""
+
+    pc: int
+    ticks: int  # of the 24 MHz crystal, spent in this step
+    iram: bytes
+    sfr: bytes  # 80h..FFh
+
+
+class OutputError(Exception):
+    """The simulator's output is not what its commands should print."""
+
+
+def installed() -> bool:
+    return shutil.which("s51") is not None
+
+
+def version() -> str:
+    """The first line of its version, with name and number."""
+    return subprocess.run(["s51", "-V"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
+
+
+def run(code: bytes, commands: Iterable[str]) -> bytes:
+    """Starts the simulator on a code image at address 0, executes `commands`, returns all it printed."""
+    with tempfile.TemporaryDirectory() as folder:
+        image = Path(folder, "image.ihx")
+        image.write_text(intel_hex(code))
+        script = Path(folder, "commands")
+        script.write_text("\n".join(commands) + "\n")
+        printed = Path(folder, "printed")
+        with printed.open("wb") as sink:  # it writes byte by byte: a pipe would wake its reader each time
+            subprocess.run(
+                ["s51", "-t", "C52", "-b", "-q", "-P", str(image)],
+                input=f'exec "{script}"\nquit\n'.encode(),
+                stdout=sink,
+                stderr=subprocess.STDOUT,
+                check=True,
+            )
+        return printed.read_bytes()
+
+
+def intel_hex(code: bytes) -> str:
+    """An image from address 0 as Intel HEX, 32 bytes a record."""
+    lines = []
+    for address in range(0, len(code), 32):
+        part = code[address : address + 32]
+        record = bytes((len(part), address >> 8, address & 0xFF, 0)) + part
+        lines.append(f":{record.hex().upper()}{-sum(record) & 0xFF:02X}")
+    lines.append(":00000001FF\n")
+    return "\n".join(lines)
+
+
+class Reader:
+    """Cuts an output at the echoes of its commands, in order."""
+
+    def __init__(self, output: bytes) -> None:
+        self.output = output
+        self.at = 0
+
+    def after(self, echo: str) -> int:
+        """Moves behind the next echo of a command."""
+        text = echo.encode() + b"\n"
+        found = self.output.find(text, self.at)
+        if found < 0:
+            raise OutputError(f"no `{echo}` in {self.output[self.at : self.at + 400]!r}")
+        self.at = found + len(text)
+        return self.at
+
+    def raw(self, echo: str, size: int) -> bytes:
+        """The `size` bytes that a `dump /b` command printed."""
+        first = self.after(echo)
+        self.at = first + size
+        return self.output[first : self.at]
+
+    def observed(self, step: str = OBSERVE[0]) -> Observed:
+        """The outputs of the commands OBSERVE; `step` where the first was another one."""
+        first = self.after(step)
+        stopped = _STOPPED.search(self.output, first, first + 2000)
+        if stopped is None:
+            raise OutputError(f"`{step}` printed {self.output[first : first + 400]!r}")
+        iram = self.raw(OBSERVE[1], 256)
+        sfr = self.raw(OBSERVE[2], 128)
+        return Observed(int(stopped[1], 16), int(stopped[2]), iram, sfr)
