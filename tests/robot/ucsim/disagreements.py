@@ -51,6 +51,12 @@ DISAGREEMENTS: tuple[Disagreement, ...] = (
         "4316E, stack pointer",
     ),
     Disagreement(
+        "pc-wrap",
+        "code beyond FFFFh is not that at 0000h",
+        "PC is a 16-bit register",
+        "4316E, program counter",
+    ),
+    Disagreement(
         "movc-wrap",
         "MOVC beyond FFFFh reads 0",
         "16-bit addition, so that it goes on at 0000h",

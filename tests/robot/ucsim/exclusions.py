@@ -7,7 +7,7 @@ What belongs here: which instruction may be executed in which state. The names i
 from __future__ import annotations
 
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.opcodes import ROW, TABLE
+from miro_robot.mcs51.opcodes import LENGTH, ROW, TABLE
 
 # Registers of an AT89C52 that both machines have and that hold what is written.
 P0, SP, DPL, DPH, PCON, TCON, TMOD = 0x80, 0x81, 0x82, 0x83, 0x87, 0x88, 0x89
@@ -113,6 +113,10 @@ def allowed(cpu: Cpu, opcode: int, first: int, second: int) -> bool:
     for address in direct_addresses(opcode, first, second):
         if address >= 0x80 and address not in COMPARED:
             return False
+    after = cpu.pc + LENGTH[opcode]
+    offset = (first if LENGTH[opcode] == 2 else second) if OPERANDS[opcode].endswith("rel") else 0
+    if after > 0xFFFF or not 0 <= after + (offset ^ 0x80) - 0x80 <= 0xFFFF:  # pc-wrap
+        return False
     if opcode in MOVX and not cpu.sfr(P3) & (0x80 if opcode < 0xF0 else 0x40):  # movx-strobe
         return False
     if (opcode == _PUSH and cpu.sp == 0xFF) or (opcode in _CALLS and cpu.sp >= 0xFE):
@@ -150,8 +154,8 @@ def _may_write(cpu: Cpu, opcode: int, address: int, value: int, a: int) -> bool:
         return False
     if address == TMOD and value & 0x03 == 0x03:  # timer-1-beside-mode-3
         return False
-    if address == SCON and value & 0x10:  # serial-port
-        return value & 0xC0 != 0 and bool(cpu.sfr(P3) & 1)
+    if address == SCON and value & 0x10 and not (value & 0xC0 and cpu.sfr(P3) & 1):  # serial-port
+        return False
     return not _interrupts(cpu, address, value)
 
 
