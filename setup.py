@@ -65,6 +65,7 @@ class BuildHot(build_ext):
     def initialize_options(self):
         super().initialize_options()
         self.only = ""
+        self.parallel = True  # compile on all cores
 
     def build_extensions(self):
         from Cython.Build import cythonize
