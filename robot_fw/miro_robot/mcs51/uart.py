@@ -242,6 +242,7 @@ class Uart:
                     idle = within
                 self.rx_count += idle
                 self.rx_next += idle * self.rx_period
+                self.rx_last = self.level(self.rx_next - self.rx_period)
                 continue
             now = self.rx_next
             self.rx_next = now + self.rx_period
