@@ -89,6 +89,37 @@ def test_an_enumeration_member_counts_as_its_number():
     assert encode(IntEnum("Kind", ["A", "B"]).B) == encode(2)
 
 
+class Text(str): ...
+
+
+class Octets(bytes): ...
+
+
+class Entries(dict): ...
+
+
+class Items(list): ...
+
+
+class Number(float): ...
+
+
+def test_a_value_of_a_derived_class_counts_as_one_of_its_base(plain):
+    derived = Entries(a=Text("\u00e9"), b=Octets(b"x"), c=Items([1, Number(-0.0)]))
+    state = {"a": "\u00e9", "b": b"x", "c": [1, 0.0]}
+    assert encode(derived) == plain.encode(derived) == naive.encode(state)
+
+
+@pytest.mark.parametrize("size", range(200, 300, 7))
+@pytest.mark.parametrize("kind", ["text", "ascii", "bytes", "number"])
+def test_values_that_cross_the_end_of_the_encoders_room_come_out_whole(plain, size, kind):
+    one = {"text": "\u00e9" * size, "ascii": "e" * size, "bytes": b"\x80" * size, "number": 7 ** (3 * size)}[
+        kind
+    ]
+    state = [None] * (size // 3) + [one] * 9 + [-1, 1.5, one, True]
+    assert encode(state) == plain.encode(state) == naive.encode(state)
+
+
 @pytest.mark.parametrize(
     ("state", "message"),
     [
