@@ -13,6 +13,7 @@ from miro_sim.cli.program import Program
 from miro_sim.cli.replay import replay
 from miro_sim.cli.run import run
 from miro_sim.cli.scenarios import scenarios
+from miro_sim.cli.vectors import vectors
 
 
 @click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]})
@@ -25,5 +26,5 @@ def main() -> None:
     """
 
 
-for command in (run, replay, scenarios, info, fw):
+for command in (run, replay, scenarios, info, fw, vectors):
     main.add_command(command)

@@ -1,0 +1,103 @@
+"""Single-step vectors on ucsim: `python -m tests.robot.ucsim.vector_check DIR`, for what `mirotwin vectors` wrote.
+
+What belongs here: putting the simulator into a vector's initial state by hand, one step, comparing with its
+final state. Vectors that `exclusions.py` rules out, or that hold pins low from outside, are not run.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from miro_robot.mcs51.vectors import RESET, Bench, Vector, decode
+
+from tests.robot.ucsim import s51
+from tests.robot.ucsim.exclusions import COMPARED, MOVX, P0, PSW, allowed
+
+_BATCH = 2000  # vectors per start of the simulator
+
+
+def comparable(vector: Vector, bench: Bench) -> bool:
+    """Whether ucsim is expected to agree."""
+    state = vector.initial
+    bench.prepare(state)
+    code = dict(state.code)
+    opcode, first, second = (code.get((state.pc + offset) & 0xFFFF, 0) for offset in range(3))
+    return not state.pins and allowed(bench.cpu, opcode, first, second)
+
+
+def differences(vectors: list[Vector]) -> Iterator[str]:
+    """What ucsim makes of vectors in another way, a line for each vector."""
+    for begin in range(0, len(vectors), _BATCH):
+        batch = vectors[begin : begin + _BATCH]
+        reader = s51.Reader(s51.run(b"\x00", _commands(batch)))
+        for vector in batch:
+            found = list(_step_differences(vector, reader.observed(), _xram(vector, reader)))
+            if found:
+                yield f"{vector.name}: " + ", ".join(found)
+
+
+def _commands(vectors: list[Vector]) -> Iterator[str]:
+    yield "fill iram 0 255 0"
+    for vector in vectors:
+        state = vector.initial
+        yield from _set("rom", state.code)
+        yield from _set("xram", state.xram)
+        yield from _set("iram", state.iram)
+        yield from _set("sfr", sorted(state.sfr, key=lambda cell: cell[0] != PSW))  # parity follows ACC
+        yield f"pc {state.pc:#x}"
+        yield from s51.OBSERVE
+        for address, _ in vector.final.xram:
+            yield f"dump /b xram {address} {address}"
+        yield from _set("iram", [(address, 0) for address, _ in state.iram])
+        yield from _set("sfr", [(address, RESET.get(address, 0)) for address, _ in state.sfr])
+
+
+def _set(memory: str, cells: Iterable[tuple[int, int]]) -> Iterator[str]:
+    for address, value in cells:
+        yield f"set mem {memory} {address:#x} {value:#x}"
+
+
+def _xram(vector: Vector, reader: s51.Reader) -> list[tuple[int, int]]:
+    cells = [address for address, _ in vector.final.xram]
+    return [(address, reader.raw(f"dump /b xram {address} {address}", 1)[0]) for address in cells]
+
+
+def _step_differences(vector: Vector, seen: s51.Observed, xram: list[tuple[int, int]]) -> Iterator[str]:
+    final = vector.final
+    opcode = dict(vector.initial.code)[vector.initial.pc]
+    if seen.pc != final.pc:
+        yield f"PC vector {final.pc:04X}h ucsim {seen.pc:04X}h"
+    if seen.ticks != 12 * len(vector.cycles):
+        yield f"cycles vector {len(vector.cycles)} ucsim {seen.ticks / 12:g}"
+    if xram != final.xram:
+        yield f"external RAM vector {final.xram} ucsim {xram}"
+    iram, registers = dict(final.iram), {**RESET, **dict(final.sfr)}
+    for address in range(256):
+        if seen.iram[address] != iram.get(address, 0):
+            yield f"internal RAM {address:02X}h vector {iram.get(address, 0):02X}h ucsim {seen.iram[address]:02X}h"
+    for address in COMPARED:
+        expected, found = registers.get(address, 0), seen.sfr[address - 0x80]
+        if expected != found and not (address == P0 and opcode in MOVX):
+            yield f"{address:02X}h vector {expected:02X}h ucsim {found:02X}h"
+
+
+def load(folder: Path) -> list[Vector]:
+    return [vector for path in sorted(folder.glob("*.json")) for vector in decode(path.read_bytes())]
+
+
+def main(folder: str) -> int:
+    """Prints differences and figures; exit code 1 if there are any."""
+    vectors = load(Path(folder))
+    bench = Bench()
+    run = [vector for vector in vectors if comparable(vector, bench)]
+    found = list(differences(run))
+    for line in found:
+        print(line)
+    print(f"{s51.version()}: {len(run)} of {len(vectors)} vectors run, {len(found)} differ")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))
