@@ -22,6 +22,7 @@ cdef class Board(Bus):
     cdef unsigned char external[4]
     cdef unsigned char bridge_enable[2]
     cdef unsigned char bridge_sign[2]
+    cdef unsigned char hi_seen[2]
     cdef int data_bank
     cdef int pin_bank[10]
     cdef int pin_bit[10]

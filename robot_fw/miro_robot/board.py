@@ -37,7 +37,7 @@ class Board(Bus):
     NOT_STATE = (
         "wiring", "plant", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_bank", "pin_bit", "pin_inverted", "hi_port", "hi_bit", "hi_inverted",
-        "hi_count", "hi_side", "stop_on_fault", "faults",
+        "hi_count", "hi_side", "hi_seen", "stop_on_fault", "faults",
     )  # fmt: skip
 
     def __init__(
@@ -64,6 +64,7 @@ class Board(Bus):
         self.external = bytearray([0xFF] * PORTS)
         self.bridge_enable = bytearray(2)
         self.bridge_sign = bytearray(2)
+        self.hi_seen = bytearray(2)
         self._resolve_outputs(wiring)
         self._resolve_inputs(wiring, slot, robots)
         plant.attach(self.left, self.right)
@@ -141,7 +142,8 @@ class Board(Bus):
             if self.right.next_tick <= now:
                 self.right.advance(now)
             self._drive_bridge(now)
-            self._drive_interrupts(now)
+            if self.left.hi != self.hi_seen[0] or self.right.hi != self.hi_seen[1]:
+                self._drive_interrupts(now)
 
     # ---- from chip to bridge and CPU ----------------------------------------------------------------------
 
@@ -158,6 +160,8 @@ class Board(Bus):
 
     def _drive_interrupts(self, tick: int) -> None:
         """HI of each LM629 to the CPU pins that it is wired to."""
+        self.hi_seen[0] = self.left.hi
+        self.hi_seen[1] = self.right.hi
         index = 0
         while index < self.hi_count:
             hi = self.right.hi if self.hi_side[index] else self.left.hi
@@ -278,6 +282,7 @@ class Board(Bus):
         self.bus_levels = state["bus_levels"]
         self.bridge_enable = bytearray(state["bridge_enable"])
         self.bridge_sign = bytearray(state["bridge_sign"])
+        self.hi_seen = bytearray([self.left.hi, self.right.hi])
         self.fault_count = state["fault_count"]
         self.busy_writes = state["busy_writes"]
         self.contention = state["contention"]

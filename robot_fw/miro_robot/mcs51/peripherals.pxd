@@ -35,6 +35,7 @@ cdef class Peripherals:
     cdef public int frozen
     cdef int pulsed
     cdef readonly long long now
+    cdef long long timer_wait
     cdef long long serial_wait
     cdef readonly long long p3_reads
 

@@ -4,8 +4,8 @@ What belongs here: which register address is whose, which pin goes where, which 
 port, and the event horizon: `sync(cycle)` does all below a cycle that the core can notice, `next_event`
 says when it has to ask again. Registers of the core itself (ACC, PSW, PCON ...) are `Cpu`'s.
 
-The serial port and a timer 2 that only clocks it are left behind until one of them could raise a flag
-(`serial_wait`) or somebody looks at them (`settle`): between two characters nothing of theirs is stepped.
+Timers and serial port are left behind until one of them could raise a flag (`timer_wait`, `serial_wait`)
+or somebody looks at them (`settle`): in between nothing of theirs is stepped.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _NO_PERIOD = 1 << 40  # of a clock that stands
 class Peripherals:
     """All special function registers but the core's; time in machine cycles."""
 
-    NOT_STATE = ("bus", "pulsed", "now", "serial_wait")  # all but the first follow from the registers
+    NOT_STATE = ("bus", "pulsed", "now", "timer_wait", "serial_wait")  # all but the first follow from the registers
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
@@ -53,6 +53,7 @@ class Peripherals:
         self.frozen = 0  # power-down: the oscillator stands
         self.pulsed = 0  # a timer that counts a pin clocks the serial port
         self.now = 0  # cycle below which everything has been done that can be noticed
+        self.timer_wait = -1  # cycle up to which timers 0 and 1 raise no flag; -1: to be worked out
         self.serial_wait = -1  # tick before which the serial port raises no flag; -1: to be worked out
         self.p3_reads = 0  # how often the pins of P3 were read: whether software listens on RXD itself
 
@@ -83,15 +84,19 @@ class Peripherals:
             if self.pulsed:
                 self._sync_pulsed(cycle)
             else:
-                self.timers.sync(cycle)
+                if cycle > self.timer_wait:
+                    self.timers.sync(cycle)
+                    self.timer_wait = self.timers.quiet_until()
                 if not self.timer2.silent():
                     self.timer2.sync(cycle)
                 if 12 * cycle > self.serial_wait:
                     self.settle()
 
     def settle(self) -> None:
-        """Brings the serial port and timer 2 up to where the rest is."""
+        """Brings timers and serial port up to where the rest is."""
         if not self.frozen and not self.pulsed:
+            self.timers.sync(self.now)
+            self.timer_wait = -1
             self.timer2.sync(self.now)
             self.uart.sync(12 * self.now)
             if self.shift.flag:
@@ -111,6 +116,7 @@ class Peripherals:
         if second < cycle and second != first:
             self._pulse(second == pulse1, second == pulse2, second)
         self.uart.sync(12 * cycle)
+        self.timer_wait = -1
         self.serial_wait = -1
 
     def _pulse(self, timer1: int, timer2: int, cycle: int) -> None:
@@ -162,6 +168,7 @@ class Peripherals:
 
     def _set_serial_clock(self) -> None:
         """With all parts at the same cycle."""
+        self.timer_wait = -1
         self.serial_wait = -1
         mode = self.uart.mode()
         self.pulsed = 0
@@ -238,6 +245,7 @@ class Peripherals:
         """INT0, INT1: the interrupt sees the sample itself, a gate acts on the cycle after it."""
         self.external.sample(number, level, cycle)
         self.sync(cycle + 1)
+        self.settle()
         self.timers.gates = (self.timers.gates & (3 ^ (1 << number))) | (level << number)
 
     def pin_levels(self, port: int, cycle: int) -> int:
@@ -276,6 +284,8 @@ class Peripherals:
             return self.uart.received
         if address == _TMOD:
             return self.timers.tmod
+        if address in (_TL0, _TL1, _TH0, _TH1):
+            self.timers.sync(cycle)
         if address in (_TL0, _TL1):
             return self.timers.tl[address - _TL0]
         if address in (_TH0, _TH1):
@@ -313,6 +323,8 @@ class Peripherals:
 
     def write_timer(self, address: int, value: int, cycle: int) -> int:
         """A register of timers 0 and 1; 0 if the address is none of them."""
+        self.timers.sync(cycle)
+        self.timer_wait = -1
         if address == _TCON:
             self.timers.write_control(value, cycle)
             self.external.write(value, cycle)
@@ -379,7 +391,9 @@ class Peripherals:
         if source == 0 or source == 2:
             self.external.taken(source >> 1, cycle)
         elif source == 1 or source == 3:
+            self.timers.sync(cycle)
             self.timers.taken(source >> 1, cycle)
+            self.timer_wait = -1
 
     def snapshot(self) -> dict[str, object]:
         return {
@@ -411,6 +425,7 @@ class Peripherals:
         self.frozen = state["frozen"]
         self.p3_reads = state["p3_reads"]
         self.now = self.timers.synced
+        self.timer_wait = -1
         self.serial_wait = -1
         self.pulsed = 0
         if self.uart.mode() & 1:

@@ -31,6 +31,8 @@ cdef class Timers:
     cdef int reload(self, int part) noexcept
     @cython.locals(left=int)
     cpdef long long next_overflow(self, int part) noexcept
+    @cython.locals(first='long long', second='long long')
+    cdef long long quiet_until(self) noexcept
     cpdef long long next_flag(self, int timer) noexcept
     cpdef void fall(self, int timer, long long cycle) noexcept
     @cython.locals(timer=int)

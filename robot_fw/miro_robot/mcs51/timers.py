@@ -107,6 +107,12 @@ class Timers:
             return self.edge_cycle[part] if left == 1 and self.edge_cycle[part] >= self.synced else _FAR
         return self.synced + left - 1
 
+    def quiet_until(self) -> int:
+        """The next cycle in which TF0 or TF1 goes up if nothing changes, or FAR."""
+        first = self.next_flag(0)
+        second = self.next_flag(1)
+        return first if first < second else second
+
     def next_flag(self, timer: int) -> int:
         """Cycle in which TF0, TF1 will be seen set, or FAR if it is up already or not in sight."""
         if self.control & (0x20 << (2 * timer)):
