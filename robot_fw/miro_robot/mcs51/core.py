@@ -101,7 +101,7 @@ class Core:
 
     def snapshot(self) -> dict[str, object]:
         return {
-            "iram": bytes([self.iram[address] for address in range(256)]),
+            "iram": bytes(self.iram[:256]),
             "pc": self.pc,
             "a": self.a,
             "b": self.b,

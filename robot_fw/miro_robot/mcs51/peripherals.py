@@ -73,6 +73,7 @@ class Peripherals:
         self.external.levels = (self.p3 >> 2) & 3  # pins moved on while the oscillator stood
         self.timers.gates = self.external.levels
         self.timer2.up = (self.p1 >> 1) & 1
+        self.timer_wait = -1
         self._set_serial_clock()
 
     # Time
@@ -96,7 +97,6 @@ class Peripherals:
         """Brings timers and serial port up to where the rest is."""
         if not self.frozen and not self.pulsed:
             self.timers.sync(self.now)
-            self.timer_wait = -1
             self.timer2.sync(self.now)
             self.uart.sync(12 * self.now)
             if self.shift.flag:
@@ -168,7 +168,6 @@ class Peripherals:
 
     def _set_serial_clock(self) -> None:
         """With all parts at the same cycle."""
-        self.timer_wait = -1
         self.serial_wait = -1
         mode = self.uart.mode()
         self.pulsed = 0
@@ -239,6 +238,7 @@ class Peripherals:
             self.sync(cycle + 1)
             self.settle()
             self.timer2.external((p1 >> 1) & 1, cycle + 1)
+        self.timer_wait = -1
         self.clock_serial()
 
     def _external_pin(self, number: int, level: int, cycle: int) -> None:
