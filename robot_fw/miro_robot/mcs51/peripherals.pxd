@@ -71,6 +71,7 @@ cdef class Peripherals:
     cdef int timer1_is_idle_clock(self) noexcept
     cdef int write_timer(self, int address, int value, long long cycle) except -1
     cdef int write_serial(self, int address, int value, long long cycle) except -1
+    @cython.locals(period='long long')
     cpdef long long bit_ticks(self) noexcept
     cdef int write_smod(self, int smod, long long cycle) except -1
     cdef int write_port(self, int port, int value, long long cycle) except -1

@@ -365,10 +365,11 @@ class Peripherals:
             self.timer2.count = (self.timer2.count & 0x00FF) | (value << 8)
 
     def bit_ticks(self) -> int:
-        """Length of a bit that the receiver expects, 0 while it is off or has no regular clock."""
-        if not self.uart.scon & _REN or self.uart.mode() == 0 or self.uart.rx_period >= _NO_PERIOD:
+        """Length of a bit that the receiver expects, 0 while it is off or its clock does not run regularly yet."""
+        period = self.uart.rx_period
+        if not self.uart.scon & _REN or self.uart.mode() == 0 or period >= _NO_PERIOD:
             return 0
-        return 16 * self.uart.rx_period
+        return 16 * period if self.uart.rx_next <= 12 * self.now + period else 0
 
     def write_smod(self, smod: int, cycle: int) -> None:
         self.sync(cycle)

@@ -1,0 +1,145 @@
+"""The bare board of `fw run`: RAM, terminal, ends of a run, dumps."""
+
+from pathlib import Path
+
+import pytest
+from miro_robot.bare import BareMachine, Ended
+from miro_robot.faults import FaultKind
+from miro_robot.image import Image, Symbols
+
+from tests.robot.mcs51.asm import assemble
+
+SERIAL = "MOV RCAP2H,#0FFh\nMOV RCAP2L,#0B2h\nMOV T2CON,#34h\nMOV SCON,#50h\n"
+ECHO = SERIAL + "loop:\nJNB RI,$\nMOV A,SBUF\nCLR RI\nMOV SBUF,A\nJNB TI,$\nCLR TI\nSJMP loop"
+AUTOBAUD = """
+MOV R2,#00h
+MOV R3,#00h
+CLR A
+JB RXD,$
+measure:
+INC A
+NOP
+NOP
+NOP
+NOP
+NOP
+NOP
+JNB RXD,measure
+MOV 30h,A
+SJMP $
+"""
+
+
+def image(text):
+    code = assemble(text)
+    return Image(
+        path=Path("test.ihx"),
+        code=code + b"\xff" * (0x10000 - len(code)),
+        used=((0, len(code)),),
+        size=len(code),
+        sha256="",
+        symbols=Symbols({}),
+    )
+
+
+def test_stdin_is_echoed_byte_by_byte():
+    out = bytearray()
+    machine = BareMachine(image(ECHO), stdin=b"hello, world\n", output=out.extend)
+    assert machine.run(max_cycles=100_000) == Ended.CYCLES
+    assert bytes(out) == b"hello, world\n"
+
+
+def test_the_next_byte_waits_until_ri_was_cleared():
+    slow = SERIAL + "loop:\nJNB RI,$\nMOV @R0,SBUF\nINC R0\nMOV R7,#00h\nw:\nMOV R6,#20\nDJNZ R6,$\n"
+    slow += "DJNZ R7,w\nCLR RI\nSJMP loop"
+    machine = BareMachine(image("MOV R0,#30h\n" + slow), stdin=b"abcdef")
+    machine.run(max_cycles=200_000)
+    assert bytes(machine.cpu.peek_iram(0x30 + n) for n in range(6)) == b"abcdef"
+
+
+def test_a_program_may_measure_the_bit_rate_of_its_first_character():
+    machine = BareMachine(image(AUTOBAUD), stdin=b" ", baud=9600)
+    assert machine.run(max_cycles=100_000) == Ended.HALTED
+    low_cycles = machine.cpu.peek_iram(0x30) * 9
+    assert low_cycles == pytest.approx(6 * 2_000_000 / 9600, abs=12)  # start bit and five zeros of a space
+
+
+def test_without_a_baud_rate_nothing_is_sent_to_a_receiver_that_is_off():
+    machine = BareMachine(image(AUTOBAUD), stdin=b" ")
+    assert machine.run(max_cycles=50_000) == Ended.CYCLES
+    assert machine.cpu.peek_iram(0x30) == 0
+
+
+def test_external_ram_is_64_kb_apart_from_code():
+    machine = BareMachine(
+        image("MOV DPTR,#0000h\nMOV A,#5Ah\nMOVX @DPTR,A\nMOV A,#00h\nMOVC A,@A+DPTR\nSJMP $")
+    )
+    assert machine.run(max_cycles=1000) == Ended.HALTED
+    assert machine.cpu.a == 0x90
+    assert machine.dump()["xram_hex"].startswith("5a00")
+
+
+def test_code_in_xram_runs_what_it_writes():
+    store = "MOV A,#{}\nMOVX @DPTR,A\nINC DPTR\n"
+    text = "MOV DPTR,#0100h\n" + "".join(store.format(byte) for byte in ("74h", "33h", "22h"))
+    text += "LCALL 0100h\nSJMP $"
+    machine = BareMachine(image(text), code_in_xram=True)
+    assert machine.run(max_cycles=1000) == Ended.HALTED
+    assert machine.cpu.a == 0x33
+    assert machine.faults == []
+    other = BareMachine(image(text))
+    assert other.run(max_cycles=1000) == Ended.FAULT
+
+
+def test_a_run_stops_at_an_address_and_goes_on():
+    machine = BareMachine(image("NOP\nNOP\nMOV A,#01h\nSJMP $"))
+    assert machine.run(until=2, max_cycles=1000) == Ended.UNTIL
+    assert machine.cpu.a == 0
+    assert machine.run() == Ended.HALTED
+
+
+def test_a_fault_names_kind_place_and_tick():
+    machine = BareMachine(image("NOP\nDB 0A5h\nSJMP $"))
+    assert machine.run(max_cycles=1000) == Ended.FAULT
+    fault = machine.faults[0]
+    assert (fault.kind, fault.pc, fault.tick) == (FaultKind.UNDEFINED_OPCODE, 1, 24)
+    assert str(fault) == "firmware executed the undefined opcode A5 at 0x0001, tick 24"
+    forgiving = BareMachine(image("NOP\nDB 0A5h\nSJMP $"), stop_on_fault=False)
+    assert forgiving.run(max_cycles=1000) == Ended.HALTED
+
+
+def test_the_last_character_is_sent_before_a_run_halts():
+    out = bytearray()
+    machine = BareMachine(image(SERIAL + "MOV SBUF,#41h\nSJMP $"), output=out.extend)
+    assert machine.run() == Ended.HALTED
+    assert bytes(out) == b"A"
+
+
+def test_progress_is_told_and_the_dump_has_the_registers():
+    told = []
+    machine = BareMachine(image("SETB EA\nMOV B,#12h\nloop:\nSJMP loop"))
+    assert machine.run(max_cycles=500_000, progress=told.append) == Ended.CYCLES
+    assert told[-1] == machine.cpu.cycles
+    dump = machine.dump()
+    assert (dump["pc"], dump["sfr"]["f0"], len(dump["iram_hex"]), len(dump["xram_hex"])) == (
+        5,
+        0x12,
+        512,
+        0x20000,
+    )
+
+
+def test_a_saved_machine_goes_on_with_the_same_bits():
+    machine = BareMachine(image(ECHO), stdin=b"some words to echo")
+    machine.run(max_cycles=11_111)
+    other = BareMachine(image(ECHO))
+    other.restore(machine.snapshot())
+    assert other.snapshot() == machine.snapshot()
+    machine.run(max_cycles=60_000)
+    other.run(max_cycles=60_000)
+    assert other.snapshot() == machine.snapshot()
+
+
+def test_a_senseless_baud_rate_is_refused():
+    with pytest.raises(ValueError, match="baud 5 is outside"):
+        BareMachine(image("NOP"), baud=5)
