@@ -25,6 +25,7 @@ cdef class Cpu(Executor):
     cdef long long next_event
     cdef long long blocked
     cdef readonly int code_limit
+    cdef public object inspector
 
     @cython.locals(address=int)
     cpdef load(self, bytes image, used=*)
@@ -33,6 +34,7 @@ cdef class Cpu(Executor):
     cpdef int code_at(self, int address) noexcept
     @cython.locals(now='long long', port=int)
     cpdef reset(self)
+    cpdef int run(self, long long until_cycle) except -1
     cpdef int step(self) except -1
     @cython.locals(row=int)
     cpdef int run_until_pc(self, int address, long long until_cycle) except -1

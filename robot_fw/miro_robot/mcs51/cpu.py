@@ -7,7 +7,7 @@ and power-down, MOVX, and the public face. Instructions are in `execute.py`, the
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.execute import BREAKPOINT, REACHED, STOPPED, Executor
@@ -27,6 +27,12 @@ _READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its s
 _FLOATING = 0xFF  # what an undriven external bus reads as
 
 
+class Inspector(Protocol):
+    """What looks into a running CPU (`miro_robot.inspect`)."""
+
+    def run(self, until_cycle: int) -> int: ...
+
+
 class Cpu(Executor):
     """An AT89C52 at 24 MHz. `bus` is what it is soldered to; input is pushed through `set_external` and
     `rxd`.
@@ -35,6 +41,7 @@ class Cpu(Executor):
     NOT_STATE: tuple[str, ...] = (
         *Executor.NOT_STATE,
         "code_limit",
+        "inspector",
         "limit",
         "next_event",
         "rxd",
@@ -53,6 +60,7 @@ class Cpu(Executor):
         self.next_event = 0
         self.blocked = -1  # boundary at which no interrupt is taken: after RETI and writes to IE, IP
         self.code_limit = 0x10000
+        self.inspector: Inspector | None = None
         for address in range(0x10000):
             self.write_code(address, 0xFF)
             self.rows[address] = _OUTSIDE
@@ -92,6 +100,12 @@ class Cpu(Executor):
         return bytes([self.rom[address] for address in range(0x10000)])
 
     # Control
+
+    def run(self, until_cycle: int) -> int:
+        """As `Executor.run`; an inspector that is attached runs it in its own way, with the same result."""
+        if self.inspector is None:
+            return Executor.run(self, until_cycle)
+        return self.inspector.run(until_cycle)
 
     def reset(self) -> None:
         """RST: registers and PC as after power-on, ports FF; RAM and time stay."""

@@ -1,0 +1,25 @@
+cimport cython
+
+from miro_robot.mcs51.cpu cimport Cpu
+from miro_robot.mcs51.execute cimport Executor
+
+cdef int _VECTOR, _VECTOR_STEP
+
+cdef class Watcher:
+    cpdef executed(self, Cpu cpu, int pc, long long start)
+    cpdef interrupted(self, Cpu cpu, int source, int pc, long long start)
+    cpdef slept(self, Cpu cpu, long long start)
+    cpdef ran(self, Cpu cpu, long long start)
+
+cdef class Inspector:
+    cdef readonly Cpu cpu
+    cdef public list watchers
+
+    @cython.locals(cpu=Cpu, began='long long', reason=int, watcher=Watcher)
+    cpdef int run(self, long long until_cycle) except -1
+    @cython.locals(cpu=Cpu, pc=int, start='long long', executed='long long', reason=int, watcher=Watcher)
+    cdef int _step(self) except -1
+    @cython.locals(cpu=Cpu, pc=int, start='long long', ended=int, woken=bint, watcher=Watcher)
+    cdef int _sleep(self, long long until_cycle) except -1
+    @cython.locals(source=int, watcher=Watcher)
+    cdef int _tell_interrupted(self, int pc, long long start) except -1

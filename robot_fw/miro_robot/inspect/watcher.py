@@ -1,0 +1,116 @@
+"""Runs a CPU step by step and tells watchers what it did.
+
+What belongs here: the second run loop, one instruction at a time, and what a watcher is told. What watchers make of it
+is in their own files. The CPU's hot loop stays free of all this: without an inspector it costs one test per run.
+"""
+
+from __future__ import annotations
+
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.execute import Executor
+
+_VECTOR, _VECTOR_STEP = 3, 8  # interrupt vectors are at 8 * source + 3
+
+
+class Watcher:
+    """Is told what a CPU did, after it did it; the default is to ignore it.
+
+    Cycles are machine cycles; the step began in cycle `start` and ended with `cpu.cycles`.
+    """
+
+    def executed(self, cpu: Cpu, pc: int, start: int) -> None:
+        """The instruction at `pc` was executed."""
+
+    def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
+        """The hardware called the routine of `source` (0..5: INT0, timer 0, INT1, timer 1, serial, timer 2).
+
+        `pc`: where it came in between.
+        """
+
+    def slept(self, cpu: Cpu, start: int) -> None:
+        """The CPU was idle or powered down."""
+
+    def ran(self, cpu: Cpu, start: int) -> None:
+        """A run that began in cycle `start` is over; others may now look at what the CPU did to its lines."""
+
+
+class Inspector:
+    """Runs `cpu` for its watchers. `Cpu.run` hands over to the inspector in `Cpu.inspector`."""
+
+    def __init__(self, cpu: Cpu) -> None:
+        self.cpu = cpu
+        self.watchers: list[Watcher] = []
+
+    def run(self, until_cycle: int) -> int:
+        """What `Executor.run` does, in steps; the same state comes out, and the same reason for stopping."""
+        cpu = self.cpu
+        began = cpu.cycles
+        reason = 0
+        if began >= until_cycle:
+            return Executor.run(cpu, until_cycle)
+        while reason == 0 and cpu.cycles < until_cycle:
+            if cpu.idle or cpu.powered_down:
+                reason = self._sleep(until_cycle)
+            else:
+                reason = self._step()
+        for watcher in self.watchers:
+            watcher.ran(cpu, began)
+        return reason
+
+    def _step(self) -> int:
+        """One instruction or interrupt entry."""
+        cpu = self.cpu
+        pc = cpu.pc
+        start = cpu.cycles
+        executed = cpu.instructions
+        reason = Executor.run(cpu, start + 1)
+        if cpu.instructions != executed:
+            for watcher in self.watchers:
+                watcher.executed(cpu, pc, start)
+        elif cpu.cycles != start:
+            self._tell_interrupted(pc, start)
+        return reason
+
+    def _sleep(self, until_cycle: int) -> int:
+        """To the interrupt that ends idle mode, or to the end of the run."""
+        cpu = self.cpu
+        pc = cpu.pc
+        start = cpu.cycles
+        ended = 0
+        cpu.until = until_cycle
+        cpu.stop = 0
+        cpu.begin_run()
+        while ended == 0 and (cpu.idle or cpu.powered_down):
+            ended = cpu.boundary()
+        cpu.end_run()
+        woken = cpu.idle == 0 and cpu.powered_down == 0
+        if cpu.cycles - (2 if woken else 0) > start:
+            for watcher in self.watchers:
+                watcher.slept(cpu, start)
+        if woken:
+            self._tell_interrupted(pc, cpu.cycles - 2)
+        return cpu.stop
+
+    def _tell_interrupted(self, pc: int, start: int) -> None:
+        source = (self.cpu.pc - _VECTOR) // _VECTOR_STEP
+        for watcher in self.watchers:
+            watcher.interrupted(self.cpu, source, pc, start)
+
+
+def attach(cpu: Cpu, *watchers: Watcher) -> Inspector:
+    """From now on `watchers` are told what `cpu` does, beside those that are told already."""
+    inspector = cpu.inspector
+    if not isinstance(inspector, Inspector):
+        inspector = Inspector(cpu)
+        cpu.inspector = inspector
+    inspector.watchers.extend(watchers)
+    return inspector
+
+
+def detach(cpu: Cpu, *watchers: Watcher) -> None:
+    """They are told no more; the last one to go gives the CPU its hot loop back."""
+    inspector = cpu.inspector
+    if isinstance(inspector, Inspector):
+        inspector.watchers = [watcher for watcher in inspector.watchers if watcher not in watchers]
+        if not inspector.watchers:
+            cpu.inspector = None
