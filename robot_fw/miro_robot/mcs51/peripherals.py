@@ -36,7 +36,13 @@ _NO_PERIOD = 1 << 40  # of a clock that stands
 class Peripherals:
     """All special function registers but the core's; time in machine cycles."""
 
-    NOT_STATE = ("bus", "pulsed", "now", "timer_wait", "serial_wait")  # all but the first follow from the registers
+    NOT_STATE = (
+        "bus",
+        "pulsed",
+        "now",
+        "timer_wait",
+        "serial_wait",
+    )  # all but the first follow from the registers
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
@@ -284,7 +290,7 @@ class Peripherals:
             return self.uart.received
         if address == _TMOD:
             return self.timers.tmod
-        if address in (_TL0, _TL1, _TH0, _TH1):
+        if address in (_TL0, _TL1, _TH0, _TH1) and not self.frozen:
             self.timers.sync(cycle)
         if address in (_TL0, _TL1):
             return self.timers.tl[address - _TL0]
@@ -297,7 +303,8 @@ class Peripherals:
         if address in (_RCAP2L, _RCAP2H):
             return (self.timer2.capture >> (8 * (address - _RCAP2L))) & 0xFF
         if address in (_TL2, _TH2):
-            self.timer2.sync(cycle)
+            if not self.frozen:
+                self.timer2.sync(cycle)
             return (self.timer2.count >> (8 * (address - _TL2))) & 0xFF
         return _UNIMPLEMENTED
 
