@@ -2,6 +2,7 @@ cimport cython
 
 cdef long long _FAR
 
+@cython.final
 cdef class Interrupts:
     cdef public int ie
     cdef public int ip
@@ -20,6 +21,7 @@ cdef class Interrupts:
     cpdef void enter(self, int source) noexcept
     cpdef void leave(self) noexcept
 
+@cython.final
 cdef class ExternalInterrupts:
     cdef Interrupts interrupts
     cdef readonly int control

@@ -4,6 +4,7 @@ cdef long long _FAR
 cdef long long _MASK
 cdef long long _SIZE
 
+@cython.final
 cdef class Line:
     cdef public long long settled_tick
     cdef long long _ticks[4096]

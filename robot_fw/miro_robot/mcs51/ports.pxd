@@ -2,6 +2,7 @@ cimport cython
 
 cdef long long _FAR
 
+@cython.final
 cdef class Ports:
     cdef int latches[4]
     cdef int outside[4]

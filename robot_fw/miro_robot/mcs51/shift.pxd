@@ -8,6 +8,7 @@ cdef long long _FAR
 cdef int _SAMPLE
 cdef int _CLOCK_FALLS, _CLOCK_RISES
 
+@cython.final
 cdef class Shift:
     cdef Uart uart
     cdef readonly Line data

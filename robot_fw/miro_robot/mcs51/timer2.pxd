@@ -9,6 +9,7 @@ cdef int _TF2, _EXF2, _RCLK, _TCLK, _EXEN2, _TR2, _C_T2, _CP_RL2
 cdef int _T2OE, _DCEN
 cdef int _STATES
 
+@cython.final
 cdef class Timer2:
     cdef Interrupts interrupts
     cdef readonly int control

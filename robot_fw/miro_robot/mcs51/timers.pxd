@@ -5,6 +5,7 @@ from miro_robot.mcs51.interrupts cimport Interrupts
 cdef long long _FAR
 cdef long long _NONE
 
+@cython.final
 cdef class Timers:
     cdef Interrupts interrupts
     cdef public int tmod

@@ -12,6 +12,7 @@ cdef int _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI
 cdef int _ROLLOVERS
 cdef int _VOTE_FIRST, _VOTE_LAST, _ACTION
 
+@cython.final
 cdef class Uart:
     cdef Bus bus
     cdef Interrupts interrupts
