@@ -95,7 +95,7 @@ class BareMachine:
                 return Ended.UNTIL
             if self.stop_on_fault and len(self.faults) > faults:
                 return Ended.FAULT
-            if self._halted():
+            if self.cpu.cycles < limit and self._halted():
                 return Ended.HALTED
             if progress is not None:
                 progress(self.cpu.cycles)

@@ -41,6 +41,15 @@ def test_a_program_that_ends_is_done_unless_it_should_have_got_somewhere(
     assert mirotwin("fw", "run", image, "--until", "0x10")[0] == 1
 
 
+def test_the_cycle_limit_wins_over_an_endless_loop(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    image = hex_file(tmp_path / "a.ihx", b"\x00" + LOOP)
+    for limit in (1, 2, 3, 1000, 1001):
+        code, _, err = mirotwin("fw", "run", image, "--max-cycles", limit)
+        assert code == 42
+        assert err.startswith("mirotwin: gave up at 0x0001")
+    assert mirotwin("fw", "run", image, "--max-cycles", 10_000_000)[0] == 0
+
+
 def test_a_fault_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
     code, out, err = mirotwin("fw", "run", hex_file(tmp_path / "a.ihx", b"\xa5"), "--max-cycles", 100)
     assert (code, out) == (3, "")
