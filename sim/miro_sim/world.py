@@ -49,7 +49,7 @@ class World:
         self.scenario = scenario
         self.seed = seed
         self.image = image
-        self.periods = -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)
+        self.periods = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS))
         self.networks = [
             Network(
                 network,

@@ -142,3 +142,12 @@ def test_when_the_simulation_breaks_the_recording_up_to_then_is_kept(
         assert f"error: {short}: angle; parameters far from" in err
     assert len(recording_reader.read(tmp_path / "out" / "run.mcap").periods) == 2
     assert msgspec.json.decode((tmp_path / "out" / "summary.json").read_bytes())["digest"]
+
+
+def test_the_shortest_duration_is_one_control_period(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    scenario = tmp_path / "shortest.toml"
+    scenario.write_text(SHORT.replace("duration_s = 0.2", "duration_s = 1e-9"))
+    assert mirotwin("run", scenario, "--out", tmp_path / "out", "-q") == (0, "", "")
+    assert len(recording_reader.read(tmp_path / "out" / "run.mcap").periods) == 1
