@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from miro_sim.clock import seconds
 from miro_sim.records import Period
-from miro_sim.summary import SETTLED_CM, SETTLED_RAD, ErrorSample, errors_by_robot, tracking_of
+from miro_sim.summary import SETTLED_CM, SETTLED_RAD, ErrorSample, errors_by_robot, settling_text, tracking_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,10 +59,9 @@ def draw(periods: Sequence[Period], path: Path, *, scenario: str, seed: int, tit
 
 def _heading(scenario: str, seed: int, title: str, errors: Sequence[ErrorSample]) -> str:
     tracking = tracking_of(errors)
-    settled = "not settled" if tracking.settling_s is None else f"settled at {tracking.settling_s:.2f} s"
     rms = f"rms of the last second {tracking.rms_position_cm:.2f} cm, {tracking.rms_theta_deg:.2f} degrees"
     first = f"{scenario}, seed {seed}" + (f": {_plain(title)}" if title else "")
-    return f"{first}\n{rms}; {settled}"
+    return f"{first}\n{rms}; {settling_text(errors)}"
 
 
 def _plain(text: str) -> str:

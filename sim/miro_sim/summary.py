@@ -160,6 +160,14 @@ def _settling_s(samples: Sequence[ErrorSample]) -> float | None:
     return seconds(outside[-1]) if outside else 0.0
 
 
+def settling_text(samples: Sequence[ErrorSample]) -> str:
+    """When the robot settled, for people; one that is outside at the end has not, whatever `settling_s` is."""
+    settling_s = _settling_s(samples)
+    if settling_s is None or not samples[-1].settled:
+        return "not settled"
+    return f"settled at {settling_s:.2f} s"
+
+
 def summarise(
     *,
     scenario: str,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from miro_sim.clock import CONTROL_PERIOD_TICKS
 from miro_sim.figure import draw
 from miro_sim.records import Period
-from miro_sim.summary import ErrorSample, Summary, summarise, to_json, tracking_of, wrapped
+from miro_sim.summary import ErrorSample, Summary, settling_text, summarise, to_json, tracking_of, wrapped
 
 from tests.sim.synthetic import periods
 
@@ -93,6 +93,20 @@ def test_settling_is_the_last_time_outside_three_centimetres_or_0_15_radian(
     errors: list[tuple[float, float, float]], settling: float | None
 ) -> None:
     assert tracking_of(samples(*errors)).settling_s == settling
+
+
+@pytest.mark.parametrize(
+    ("errors", "text"),
+    [
+        ([(5.0, 0.0, 0.0), (0.0, 0.0, 0.2), (1.0, 0.0, 0.0)], "settled at 0.03 s"),
+        ([(0.0, 0.0, 0.0), (2.9, 2.9, 0.0)], "not settled"),
+        ([(5.0, 0.0, 0.0), (0.0, 0.0, 0.2)], "not settled"),
+    ],
+)
+def test_a_robot_that_ends_outside_is_not_called_settled(
+    errors: list[tuple[float, float, float]], text: str
+) -> None:
+    assert settling_text(samples(*errors)) == text
 
 
 def test_a_run_without_a_period_has_no_tracking() -> None:

@@ -19,7 +19,7 @@ from miro_sim.outdir import OutputFolder
 from miro_sim.recording import Recorder, Source
 from miro_sim.records import Period
 from miro_sim.scenario_file import ScenarioText, load
-from miro_sim.summary import Summary, summarise, to_json
+from miro_sim.summary import Summary, errors_by_robot, settling_text, summarise, to_json
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
@@ -96,7 +96,7 @@ def run(
         complain(f"error: {text.origin}: {failure}; parameters far from any robot's can do this")
         return FIRMWARE_FAULT
     if not quiet:
-        _print(summary, folder.path)
+        _print(summary, periods, folder.path)
     return report_faults(world)
 
 
@@ -135,7 +135,7 @@ def report_faults(world: World) -> int:
     return FIRMWARE_FAULT if found else DONE
 
 
-def _print(summary: Summary, folder: Path) -> None:
+def _print(summary: Summary, periods: list[Period], folder: Path) -> None:
     tracking, link, firmware = summary.tracking, summary.link, summary.firmware
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="bold")
@@ -147,7 +147,7 @@ def _print(summary: Summary, folder: Path) -> None:
         f"engine {summary.engine})",
     )
     if tracking.rms_position_cm is not None:
-        settled = "not settled" if tracking.settling_s is None else f"settled at {tracking.settling_s:.2f} s"
+        settled = settling_text(next(iter(errors_by_robot(periods).values())))
         table.add_row(
             "tracking",
             f"rms of the last second {tracking.rms_position_cm:.2f} cm "
