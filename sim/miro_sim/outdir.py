@@ -69,6 +69,9 @@ def _check(path: Path, force: bool) -> None:
     try:
         present = sorted(os.listdir(path))
     except FileNotFoundError:
+        if path.is_symlink():
+            what = f"is a symbolic link to {os.readlink(path)}, which does not exist"
+            raise OutputError(path, what, "make that folder, or remove the link") from None
         return
     except OSError as error:
         what = "exists and is not a folder" if isinstance(error, NotADirectoryError) else _reason(error)
@@ -77,9 +80,29 @@ def _check(path: Path, force: bool) -> None:
         shown = ", ".join(present[:3]) + (", .." if len(present) > 3 else "")
         remedy = f"choose another with --out, or replace {', '.join(FILES)} with --force"
         raise OutputError(path, f"the folder is not empty ({shown})", remedy)
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise OutputError(path, "the folder cannot be written to", "choose another folder with --out")
     for name in FILES:
         if (path / name).is_dir():
             raise OutputError(path / name, "is a folder where a run writes a file", "remove it")
+
+
+def check_file(path: Path, option: str) -> None:
+    """Whether a single file could be written there, asked before the work that fills it. Raises OutputError."""
+    folder = path.parent
+    remedy = f"choose another file with {option}"
+    if path.is_dir():
+        raise OutputError(path, "is a folder", remedy)
+    if path.exists():
+        if not os.access(path, os.W_OK):
+            raise OutputError(path, "the file cannot be written to", remedy)
+    elif path.is_symlink():
+        what = f"is a symbolic link to {os.readlink(path)}, which does not exist"
+        raise OutputError(path, what, remedy)
+    elif not folder.is_dir():
+        raise OutputError(path, f"there is no folder {folder}", remedy)
+    elif not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(path, f"the folder {folder} cannot be written to", remedy)
 
 
 def _reason(error: OSError) -> str:

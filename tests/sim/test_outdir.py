@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from miro_sim.outdir import OutputError, OutputFolder
+from miro_sim.outdir import OutputError, OutputFolder, check_file
 
 
 def write_run(folder: Path, text: str = "new") -> None:
@@ -71,3 +71,24 @@ def test_a_file_where_the_folder_should_be_is_refused(tmp_path: Path) -> None:
     (tmp_path / "made" / "run.mcap").mkdir(parents=True)
     with pytest.raises(OutputError, match=r"run\.mcap: is a folder"):
         OutputFolder(tmp_path / "made", force=True)
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.access", lambda path, mode: False)  # root may write everywhere
+    with pytest.raises(OutputError, match="the folder cannot be written to; choose another"):
+        OutputFolder(tmp_path)
+    with pytest.raises(OutputError, match="cannot be written to; choose another file with --dump"):
+        check_file(tmp_path / "new.json", "--dump")
+    (tmp_path / "old.json").touch()
+    with pytest.raises(OutputError, match="the file cannot be written to"):
+        check_file(tmp_path / "old.json", "--dump")
+
+
+def test_a_link_to_nothing_is_called_that(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("nowhere")
+    with pytest.raises(OutputError, match="is a symbolic link to nowhere, which does not exist"):
+        OutputFolder(tmp_path / "link")
+    with pytest.raises(OutputError, match="is a symbolic link to nowhere, which does not exist"):
+        check_file(tmp_path / "link", "--dump")

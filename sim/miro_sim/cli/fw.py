@@ -13,6 +13,7 @@ import msgspec
 from miro_sim.cli.options import choose_engine, engine_option, load_image
 from miro_sim.cli.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, UserError, complain
 from miro_sim.cli.progress import ProgressBar
+from miro_sim.outdir import check_file
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
@@ -60,6 +61,8 @@ def run_bare(
     Exit codes: 0 --until was reached (or, without it, the firmware ended), 1 the firmware ended before it,
     3 firmware fault, 42 --max-cycles was reached.
     """
+    if dump is not None:
+        check_file(Path(dump), "--dump")
     choose_engine(engine)
     loaded = load_image(image, SPACE_BYTES if code_in_xram else FLASH_BYTES)
     target = None if until is None else address_of(until, loaded, image)

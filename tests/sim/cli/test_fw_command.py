@@ -87,6 +87,16 @@ def test_the_dump_holds_registers_and_memories(mirotwin: Callable[..., Result], 
     assert dump["sfr"]["81"] == 7
 
 
+def test_a_dump_that_cannot_be_written_is_refused_before_the_firmware_runs(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image = hex_file(tmp_path / "a.ihx", HELLO)
+    for place, what in ((tmp_path, "is a folder"), (tmp_path / "no" / "dump.json", "there is no folder")):
+        code, out, err = mirotwin("fw", "run", image, "--dump", place)
+        assert (code, out) == (2, "")
+        assert err.startswith(f"mirotwin: error: {place}: {what}")
+
+
 def test_the_8_kb_limit_is_lifted_when_code_is_in_ram(
     mirotwin: Callable[..., Result], tmp_path: Path
 ) -> None:
