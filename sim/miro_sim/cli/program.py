@@ -6,8 +6,12 @@ What belongs here: exit codes, the translation of errors, and the two consoles. 
 
 import errno
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
 from typing import Any, NoReturn
 
 import click
@@ -27,6 +31,8 @@ FIRMWARE_FAULT = 3
 DIVERGENCE = 4
 LIMIT_REACHED = 42
 INTERRUPTED = 130
+SIGNALLED = 128
+"""Plus the number of the signal: what a shell reports for a program that a signal ended."""
 
 PIPE_COLUMNS = 200
 
@@ -35,6 +41,14 @@ MAX_SEED = (1 << 63) - 1
 
 class UserError(Exception):
     """What a command found wrong with its input, ready to print: `FILE: PLACE: what; remedy`."""
+
+
+class Terminated(BaseException):
+    """SIGTERM or SIGHUP: raised where the program stands, so that it cleans up as after Ctrl-C."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        super().__init__(signal.Signals(number).name)
 
 
 BAD_INPUTS = (
@@ -58,6 +72,34 @@ def output() -> Console:
     return Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else PIPE_COLUMNS)
 
 
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Within it, SIGTERM and SIGHUP raise Terminated; a signal that is ignored (nohup) stays ignored."""
+
+    def terminate(number: int, frame: FrameType | None) -> NoReturn:
+        raise Terminated(number)
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for name in ("SIGTERM", "SIGHUP"):
+            number = getattr(signal, name, None)  # not every system has both
+            if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+                before[number] = signal.signal(number, terminate)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _give_up_stdout() -> None:
+    """What is still buffered has nowhere to go; without this the interpreter tries again when it ends."""
+    try:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (OSError, ValueError):  # not a real file: nothing will be tried
+        return
+
+
 class Program(click.Group):
     """The group behind `mirotwin`: runs a command and turns what went wrong into a line and an exit code."""
 
@@ -69,7 +111,9 @@ class Program(click.Group):
 
     def _run(self, args: Sequence[str] | None, prog_name: str, extra: dict[str, Any]) -> int:
         try:
-            code = super().main(args, prog_name, **extra)
+            with terminable():
+                code = super().main(args, prog_name, **extra)
+                sys.stdout.flush()
         except click.exceptions.NoArgsIsHelpError as error:
             error.show()
             return BAD_INPUT
@@ -85,13 +129,19 @@ class Program(click.Group):
             return BAD_INPUT
         except OSError as error:
             if error.errno == errno.EPIPE:  # the reader of our output has gone
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-                return 1
-            if error.filename is None:
-                raise
-            complain(f"error: {os.fsdecode(error.filename)}: {error.strerror}")
+                _give_up_stdout()
+                return EXPECTATION_FAILED
+            reason = error.strerror or str(error) or type(error).__name__
+            if error.filename is None:  # no file was being opened: stdout is full, or a disk
+                complain(f"error: reading or writing failed: {reason}")
+                _give_up_stdout()
+            else:
+                complain(f"error: {os.fsdecode(error.filename)}: {reason}")
             return BAD_INPUT
         except (click.Abort, KeyboardInterrupt):
             complain("interrupted")
             return INTERRUPTED
+        except Terminated as error:
+            complain(f"ended by {error}")
+            return SIGNALLED + error.number
         return code if isinstance(code, int) else DONE

@@ -1,6 +1,9 @@
 """`mirotwin run`: the files it writes, and that nothing is half-written whatever happens."""
 
 import json
+import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
@@ -117,6 +120,33 @@ def test_an_interrupted_run_leaves_nothing_behind(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(("number", "expected"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_a_terminated_run_leaves_nothing_behind(
+    mirotwin: Callable[..., Result],
+    short: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    number: signal.Signals,
+    expected: int,
+) -> None:
+    monkeypatch.setattr(runner, "run", lambda *arguments: signal.raise_signal(number))
+    before = signal.getsignal(number)
+    code, out, err = mirotwin("run", short, "--out", tmp_path / "out")
+    assert (code, out, err) == (expected, "", f"mirotwin: ended by {number.name}\n")
+    assert list(tmp_path.iterdir()) == []
+    assert signal.getsignal(number) is before
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("arguments", [["scenarios"], ["scenarios", "show", "fig6"], ["--help"], ["info"]])
+def test_output_that_cannot_be_written_is_one_line_on_stderr(arguments: list[str]) -> None:
+    program = [sys.executable, "-c", "from miro_sim.cli import main; main()", *arguments]
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr == "mirotwin: error: reading or writing failed: No space left on device\n"
+
+
 @pytest.mark.parametrize("error", [OverflowError("angle"), AssertionError("angle")])
 def test_when_the_simulation_breaks_the_recording_up_to_then_is_kept(
     mirotwin: Callable[..., Result],
@@ -144,9 +174,7 @@ def test_when_the_simulation_breaks_the_recording_up_to_then_is_kept(
     assert msgspec.json.decode((tmp_path / "out" / "summary.json").read_bytes())["digest"]
 
 
-def test_the_shortest_duration_is_one_control_period(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_the_shortest_duration_is_one_control_period(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
     scenario = tmp_path / "shortest.toml"
     scenario.write_text(SHORT.replace("duration_s = 0.2", "duration_s = 1e-9"))
     assert mirotwin("run", scenario, "--out", tmp_path / "out", "-q") == (0, "", "")
