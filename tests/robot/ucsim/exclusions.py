@@ -7,7 +7,7 @@ What belongs here: which instruction may be executed in which state. The names i
 from __future__ import annotations
 
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.opcodes import LENGTH, ROW, TABLE
+from miro_robot.mcs51.opcodes import CYCLES, LENGTH, ROW, TABLE
 
 # Registers of an AT89C52 that both machines have and that hold what is written.
 P0, SP, DPL, DPH, PCON, TCON, TMOD = 0x80, 0x81, 0x82, 0x83, 0x87, 0x88, 0x89
@@ -31,12 +31,12 @@ COMPARED = (
 )  # fmt: skip
 
 _FORBIDDEN = {
-    PCON: 0x73,  # idle, absent-bits
+    T2CON: 0x08,  # t2ex-memory
+    PCON: 0x73,  # absent-bits; and idle or powered down there is no next step
     IE: 0x40,  # absent-bits
     IP: 0xC0,  # absent-bits
-    TCON: 0x50,  # timer-start
-    T2CON: 0x0C,  # timer-start, t2ex-edge
 }
+_TIMER = (TCON, TMOD, TL0, TL1, TH0, TH1, T2CON, RCAP2L, RCAP2H, TL2, TH2)
 _OPERANDS = {row[0]: row[4] for row in TABLE}
 OPERANDS = tuple(_OPERANDS[ROW[opcode]] for opcode in range(256))
 _FIRST_DIRECT = tuple(
@@ -156,7 +156,21 @@ def _may_write(cpu: Cpu, opcode: int, address: int, value: int, a: int) -> bool:
         return False
     if address == SCON and value & 0x10 and not (value & 0xC0 and cpu.sfr(P3) & 1):  # serial-port
         return False
-    return not _interrupts(cpu, address, value)
+    return _timers_agree(cpu, opcode, address, value) and not _interrupts(cpu, address, value)
+
+
+def _timers_agree(cpu: Cpu, opcode: int, address: int, value: int) -> bool:
+    """Whether timers that run after a write, or ran before, do the same on both machines."""
+    tcon, tmod, t2con, tl0, tl1 = (
+        value if address == register else cpu.sfr(register) for register in (TCON, TMOD, T2CON, TL0, TL1)
+    )
+    running = (tcon | cpu.sfr(TCON)) & 0x50 or (t2con | cpu.sfr(T2CON)) & 0x04
+    if running and address in _TIMER and CYCLES[opcode] == 2:
+        return False  # early-write
+    for started, mode, low in ((tcon & 0x10, tmod, tl0), (tcon & 0x40, tmod >> 4, tl1)):
+        if started and (mode & 0x04 or (mode & 0x03 == 0 and low > 0x1F)):  # counted-edges, mode-0-low
+            return False
+    return t2con & 0x06 != 0x06  # counted-edges
 
 
 def _interrupts(cpu: Cpu, address: int, value: int) -> bool:
@@ -169,4 +183,6 @@ def _interrupts(cpu: Cpu, address: int, value: int) -> bool:
         pending |= 0x10
     if t2con & 0xC0:
         pending |= 0x20
+    if tcon & 0x50 or t2con & 0x04:
+        pending |= 0x2A  # sooner or later
     return bool(ie & 0x80 and ie & pending)
