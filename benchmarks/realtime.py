@@ -1,0 +1,44 @@
+"""How much faster than real time the built-in scenarios run, with and without recording: ratios, best of N.
+
+    python benchmarks/realtime.py [RUNS]
+
+One process, one core. The clock covers the loop over control periods, as `wall_s` in summary.json does.
+"""
+
+import io
+import sys
+import time
+
+from miro_protocol import engine
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim import runner, scenario_file
+from miro_sim.clock import seconds
+from miro_sim.recording import Recorder, Source
+from miro_sim.world import World
+
+
+def ratio(name: str, recorded: bool) -> float:
+    """Simulated seconds per second of one run."""
+    image = load_hex(image_path())
+    text = scenario_file.load(name)
+    world = World(text.scenario, 0, image)
+    source = Source(name, text.text, 0, image.path.read_bytes(), image.sha256)
+    with Recorder(io.BytesIO(), source) as recorder:
+        start = time.perf_counter()
+        runner.run(world, recorder if recorded else None)
+        elapsed = time.perf_counter() - start
+    return seconds(world.tick) / elapsed
+
+
+def main() -> None:
+    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 5
+    print(f"engine {engine.active()}, best of {runs}")
+    for name in ("fig6", "fig8"):
+        for recorded in (True, False):
+            best = max(ratio(name, recorded) for _ in range(runs))
+            print(f"{name} {'recorded' if recorded else 'bare    '} {best:6.1f} x real time")
+
+
+if __name__ == "__main__":
+    main()
