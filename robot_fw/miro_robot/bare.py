@@ -80,7 +80,9 @@ class BareMachine:
         max_cycles: int | None = None,
         progress: Callable[[int], object] | None = None,
     ) -> Ended:
-        """Until the instruction at `until` is next, or `cycles` >= `max_cycles`, or a fault, or a dead end.
+        """Until the instruction at `until` is next, or `cycles` >= `max_cycles`, or a fault.
+
+        Without `max_cycles` a dead end (a jump to itself or idle mode that nothing can leave) ends it as well.
 
         `progress` is called with the cycle count every now and then.
         """
@@ -95,7 +97,7 @@ class BareMachine:
                 return Ended.UNTIL
             if self.stop_on_fault and len(self.faults) > faults:
                 return Ended.FAULT
-            if self.cpu.cycles < limit and self._halted():
+            if max_cycles is None and self._halted():
                 return Ended.HALTED
             if progress is not None:
                 progress(self.cpu.cycles)

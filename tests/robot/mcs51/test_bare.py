@@ -59,7 +59,7 @@ def test_the_next_byte_waits_until_ri_was_cleared():
 
 def test_a_program_may_measure_the_bit_rate_of_its_first_character():
     machine = BareMachine(image(AUTOBAUD), stdin=b" ", baud=9600)
-    assert machine.run(max_cycles=100_000) == Ended.HALTED
+    assert machine.run() == Ended.HALTED
     low_cycles = machine.cpu.peek_iram(0x30) * 9
     assert low_cycles == pytest.approx(6 * 2_000_000 / 9600, abs=12)  # start bit and five zeros of a space
 
@@ -74,7 +74,7 @@ def test_external_ram_is_64_kb_apart_from_code():
     machine = BareMachine(
         image("MOV DPTR,#0000h\nMOV A,#5Ah\nMOVX @DPTR,A\nMOV A,#00h\nMOVC A,@A+DPTR\nSJMP $")
     )
-    assert machine.run(max_cycles=1000) == Ended.HALTED
+    assert machine.run() == Ended.HALTED
     assert machine.cpu.a == 0x90
     assert machine.dump()["xram_hex"].startswith("5a00")
 
@@ -84,7 +84,7 @@ def test_code_in_xram_runs_what_it_writes():
     text = "MOV DPTR,#0100h\n" + "".join(store.format(byte) for byte in ("74h", "33h", "22h"))
     text += "LCALL 0100h\nSJMP $"
     machine = BareMachine(image(text), code_in_xram=True)
-    assert machine.run(max_cycles=1000) == Ended.HALTED
+    assert machine.run() == Ended.HALTED
     assert machine.cpu.a == 0x33
     assert machine.faults == []
     other = BareMachine(image(text))
@@ -105,7 +105,7 @@ def test_a_fault_names_kind_place_and_tick():
     assert (fault.kind, fault.pc, fault.tick) == (FaultKind.UNDEFINED_OPCODE, 1, 24)
     assert str(fault) == "firmware executed the undefined opcode A5 at 0x0001, tick 24"
     forgiving = BareMachine(image("NOP\nDB 0A5h\nSJMP $"), stop_on_fault=False)
-    assert forgiving.run(max_cycles=1000) == Ended.HALTED
+    assert forgiving.run() == Ended.HALTED
 
 
 def test_the_last_character_is_sent_before_a_run_halts():
@@ -143,3 +143,9 @@ def test_a_saved_machine_goes_on_with_the_same_bits():
 def test_a_senseless_baud_rate_is_refused():
     with pytest.raises(ValueError, match="baud 5 is outside"):
         BareMachine(image("NOP"), baud=5)
+
+
+def test_a_dead_end_runs_on_to_the_cycle_limit_if_there_is_one() -> None:
+    machine = BareMachine(image("SJMP $"))
+    assert machine.run(max_cycles=1000) == Ended.CYCLES
+    assert 1000 <= machine.cpu.cycles <= 1001

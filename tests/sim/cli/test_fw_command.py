@@ -43,11 +43,10 @@ def test_a_program_that_ends_is_done_unless_it_should_have_got_somewhere(
 
 def test_the_cycle_limit_wins_over_an_endless_loop(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
     image = hex_file(tmp_path / "a.ihx", b"\x00" + LOOP)
-    for limit in (1, 2, 3, 1000, 1001):
+    for limit in (1, 2, 3, 1000, 1001, 100_000):
         code, _, err = mirotwin("fw", "run", image, "--max-cycles", limit)
         assert code == 42
         assert err.startswith("mirotwin: gave up at 0x0001")
-    assert mirotwin("fw", "run", image, "--max-cycles", 10_000_000)[0] == 0
 
 
 def test_a_fault_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
