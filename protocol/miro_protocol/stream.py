@@ -101,15 +101,19 @@ def parse(text: str, source: str = "<stream>") -> list[Transmission]:
 
 def read(path: str | os.PathLike[str]) -> list[Transmission]:
     """Reads a stream file; StreamError, or OSError when it cannot be opened."""
-    data = Path(path).read_bytes()
+    return decode(Path(path).read_bytes(), os.fspath(path))
+
+
+def decode(data: bytes, source: str = "<stream>") -> list[Transmission]:
+    """A stream file from its bytes; `source` names it in a StreamError."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = data[: error.start]
         line, column = before.count(b"\n") + 1, error.start - (before.rfind(b"\n") + 1) + 1
         reason, remedy = f"byte {data[error.start]:02x}h is not UTF-8", "save the file as UTF-8 text"
-        raise StreamError(os.fspath(path), line, column, reason, remedy) from None
-    return parse(text, os.fspath(path))
+        raise StreamError(source, line, column, reason, remedy) from None
+    return parse(text, source)
 
 
 def write(path: str | os.PathLike[str], sent: Iterable[Transmission]) -> None:

@@ -69,6 +69,9 @@ def parse(data: bytes, path: str) -> Recording:
 
 def records(data: bytes, path: str) -> Iterator[tuple[int, McapRecord]]:
     """(offset, record) of everything in an MCAP file; RecordingError at the first place that is damaged."""
+    if data and len(data) < len(MAGIC) and MAGIC.startswith(data):
+        what, remedy = "the file ends in its first bytes", "record the run again"
+        raise RecordingError(path, f"offset {len(data)}", what, remedy)
     if not data.startswith(MAGIC):
         what = "empty file" if not data else "not an MCAP file"
         raise RecordingError(

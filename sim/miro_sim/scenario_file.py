@@ -9,11 +9,11 @@ import math
 import tomllib
 from difflib import get_close_matches
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from miro_sim.inputs import InputError, read_input
 from miro_sim.scenario import Scenario
 from miro_sim.scenario_errors import ScenarioError, value_error
 
@@ -51,11 +51,13 @@ def load(source: str) -> ScenarioText:
         text = builtin_text(source)
         return ScenarioText(source, text, parse(text, source))
     try:
-        raw = Path(source).read_bytes()
+        raw = read_input(source)
     except FileNotFoundError:
         raise ScenarioError(
             source, "", "no such file", "`mirotwin scenarios` lists the built-in ones"
         ) from None
+    except InputError as error:
+        raise ScenarioError(source, "", error.what, error.remedy) from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise ScenarioError(source, "", f"cannot be read: {reason}") from None

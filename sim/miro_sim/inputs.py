@@ -1,0 +1,54 @@
+"""Reading what a user names: whole, but never a device or more than any honest file holds.
+
+What belongs here: the checks before and while a file is read. What does not: what is in it.
+"""
+
+import os
+import stat
+from pathlib import Path
+
+TEXT_BYTES = 64 << 20
+"""For what is written by hand or by a tool chain: scenarios, images, streams, serial input."""
+RECORDING_BYTES = 16 << 30
+CHUNK_BYTES = 1 << 20
+
+
+class InputError(ValueError):
+    """A file that is not read: `path`, what, remedy."""
+
+    def __init__(self, path: str, what: str, remedy: str) -> None:
+        self.path = path
+        self.what = what
+        self.remedy = remedy
+        super().__init__(f"{path}: {what}; {remedy}")
+
+
+def check_regular(path: str | Path) -> None:
+    """Refuses what is there and is no regular file: what is read twice cannot come through a pipe."""
+    if os.path.exists(path) and not os.path.isdir(path) and not os.path.isfile(path):
+        raise InputError(str(path), "is not a regular file", "copy the content to a file first")
+
+
+def read_input(
+    path: str | Path, limit: int = TEXT_BYTES, prefix: bytes = b"", prefix_limit: int = 0
+) -> bytes:
+    """The content of a file or pipe of at most `limit` bytes, or `prefix_limit` if it begins with `prefix`.
+
+    Raises InputError for devices (but the null device, which is empty) and longer ones, OSError as `open` does.
+    """
+    with open(path, "rb") as file:
+        mode = os.fstat(file.fileno()).st_mode
+        if (stat.S_ISCHR(mode) or stat.S_ISBLK(mode)) and not _is_null(path):
+            raise InputError(str(path), "is a device", "name a file or a pipe")
+        data = bytearray(file.read(CHUNK_BYTES))
+        if prefix and data.startswith(prefix):
+            limit = prefix_limit
+        while len(data) <= limit and (more := file.read(CHUNK_BYTES)):
+            data += more
+    if len(data) > limit:
+        raise InputError(str(path), f"holds more than {limit >> 20} MiB", "name the file that was meant")
+    return bytes(data)
+
+
+def _is_null(path: str | Path) -> bool:
+    return os.path.samefile(path, os.devnull)
