@@ -125,7 +125,10 @@ def test_a_bad_key_is_named_with_its_place_and_its_remedy(old: str, new: str, ex
 @pytest.mark.parametrize(
     ("lines", "expected"),
     [
-        ("motor.resistance_ohm = -2.0", "drive.motor.resistance_ohm: -2.0 is out of range; must be above 0"),
+        (
+            "motor.resistance_ohm = -2.0",
+            "motor.resistance_ohm: -2.0 is out of range; must be above 0 and below 1e12",
+        ),
         ("chassis.mass_g = 500", "drive.chassis.mass_g: unknown key; use mass_kg, in kilograms"),
         ("encoder.lines = 1000000", "drive: 7.2 V, 0.00692 Nm/A and 1000000 lines make 6.62e+08 counts/s"),
         ("motor.torque_constant_nm_a = 11", "torque_constant_nm_a: 11.0 is out of range; must be <= 10"),

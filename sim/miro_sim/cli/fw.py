@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from miro_sim.cli.options import choose_engine, engine_option, load_image
+from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, load_image
 from miro_sim.cli.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, UserError, complain
 from miro_sim.cli.progress import ProgressBar
+from miro_sim.inputs import read_input
 from miro_sim.outdir import check_file
 
 if TYPE_CHECKING:
@@ -28,22 +29,20 @@ def fw() -> None:
 
 
 @fw.command("run")
-@click.argument("image", metavar="IMAGE.ihx", type=click.Path())
+@click.argument("image", metavar="IMAGE.ihx", type=Place())
 @click.option(
     "--until", metavar="SYMBOL|ADDRESS", help="Stop before the instruction there (0x.. or a symbol's name)."
 )
 @click.option(
-    "--max-cycles", type=click.IntRange(1), metavar="N", help="Give up after N machine cycles, exit code 42."
+    "--max-cycles", type=Whole(1), metavar="N", help="Give up after N machine cycles, exit code 42."
 )
-@click.option("--stdin", "stdin", type=click.Path(), metavar="FILE", help="Bytes for the serial port.")
-@click.option(
-    "--baud", type=click.IntRange(50, 750_000), help="Bit rate of --stdin. Default: what the firmware sets."
-)
+@click.option("--stdin", "stdin", type=Place(), metavar="FILE", help="Bytes for the serial port.")
+@click.option("--baud", type=Whole(50, 750_000), help="Bit rate of --stdin. Default: what the firmware sets.")
 @click.option(
     "--code-in-xram", is_flag=True, help="EA low: program and data share 64 KB; lifts the 8 KB limit."
 )
 @click.option(
-    "--dump", type=click.Path(), metavar="FILE.json", help="Write registers and memories there at the end."
+    "--dump", type=Place(), metavar="FILE.json", help="Write registers and memories there at the end."
 )
 @engine_option
 def run_bare(
@@ -59,14 +58,15 @@ def run_bare(
     """Runs IMAGE.ihx on a bare AT89C52; what it sends goes to stdout as it is.
 
     Exit codes: 0 --until was reached (or, without it, the firmware ended), 1 the firmware ended before it,
-    3 firmware fault, 42 --max-cycles was reached.
+    3 firmware fault, 42 --max-cycles was reached. Ctrl-C (130) leaves on stdout what was sent until then, and
+    writes no dump.
     """
     if dump is not None:
         check_file(Path(dump), "--dump")
     choose_engine(engine)
     loaded = load_image(image, SPACE_BYTES if code_in_xram else FLASH_BYTES)
     target = None if until is None else address_of(until, loaded, image)
-    given = b"" if stdin is None else Path(stdin).read_bytes()
+    given = b"" if stdin is None else read_input(stdin)
     from miro_robot.bare import BareMachine, Ended
 
     out = sys.stdout.buffer
@@ -101,6 +101,10 @@ def address_of(text: str, image: Image, path: str) -> int:
         if address >= SPACE_BYTES:
             raise UserError(f"--until: {text} is beyond the last code address; use 0x0000 to 0xffff")
         return address
+    if not text:
+        raise UserError("--until: the empty string is no place; give a symbol or an address as 0x..")
+    if text.isascii() and text.isdecimal() and len(text) <= 6:
+        raise UserError(f"--until: {text} is no symbol; write {int(text):#x} for an address")
     for name in (text, text.removeprefix("_")):
         found = image.symbols.find(name)
         if found is not None and found.space == "code":

@@ -9,7 +9,7 @@ from miro_protocol import engine as engines
 from rich.table import Table
 
 from miro_sim.cli.options import choose_engine, engine_option, firmware_option, load_image
-from miro_sim.cli.program import BAD_INPUT, DONE, complain, output
+from miro_sim.cli.program import BAD_INPUT, DONE, complain, show
 
 PACKAGES = ("numpy", "msgspec", "click", "rich", "mcap", "matplotlib", "pyserial", "crcmod-plus", "intelhex")
 
@@ -42,7 +42,7 @@ def info(engine: str | None, firmware: str | None) -> int:
     table.add_row("firmware", str(image.path))
     table.add_row("", f"sha256 {image.sha256}")
     table.add_row("", f"{image.size} bytes of 8192")
-    output().print(table)
+    show(table)
     for message in broken:
         complain(f"error: {message}")
     return BAD_INPUT if broken else DONE

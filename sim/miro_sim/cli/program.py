@@ -17,8 +17,9 @@ from typing import Any, NoReturn
 import click
 from miro_protocol.engine import EngineError
 from miro_protocol.stream import StreamError
-from rich.console import Console
+from rich.console import Console, RenderableType
 
+from miro_sim.inputs import InputError
 from miro_sim.outdir import OutputError
 from miro_sim.recording_reader import RecordingError
 from miro_sim.replay import StreamContentError
@@ -54,6 +55,7 @@ class Terminated(BaseException):
 BAD_INPUTS = (
     UserError,
     ScenarioError,
+    InputError,
     OutputError,
     RecordingError,
     StreamError,
@@ -67,9 +69,15 @@ def complain(message: str) -> None:
     click.echo(f"mirotwin: {one_line(message)}", err=True)
 
 
-def output() -> Console:
-    """The console for results, on stdout; what goes to a file or a pipe is not folded at 80 columns."""
-    return Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else PIPE_COLUMNS)
+def show(result: RenderableType) -> None:
+    """Prints a result on stdout; what goes to a file or a pipe is not folded at 80 columns nor padded."""
+    if sys.stdout.isatty():
+        Console(highlight=False, markup=False).print(result)
+        return
+    console = Console(highlight=False, markup=False, width=PIPE_COLUMNS)
+    with console.capture() as capture:
+        console.print(result)
+    click.echo("\n".join(line.rstrip(" ") for line in capture.get().split("\n")), nl=False)
 
 
 @contextmanager

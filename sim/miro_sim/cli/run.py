@@ -11,8 +11,8 @@ import click
 from rich.table import Table
 
 from miro_sim import runner
-from miro_sim.cli.options import choose_engine, engine_option, firmware_option, load_image
-from miro_sim.cli.program import DONE, FIRMWARE_FAULT, MAX_SEED, UserError, complain, output
+from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, firmware_option, load_image
+from miro_sim.cli.program import DONE, FIRMWARE_FAULT, MAX_SEED, UserError, complain, show
 from miro_sim.cli.progress import ProgressBar
 from miro_sim.figure import draw
 from miro_sim.outdir import OutputFolder
@@ -29,11 +29,9 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Runs a scenario and writes its files.")
 @click.argument("scenario")
+@click.option("--out", type=Place(path_type=Path), help="Folder for the files. Default: runs/SCENARIO-SEED.")
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder for the files. Default: runs/SCENARIO-SEED."
-)
-@click.option(
-    "--seed", type=click.IntRange(0, MAX_SEED), default=0, show_default=True, help="Master seed of all noise."
+    "--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Master seed of all noise."
 )
 @firmware_option("Image to run instead of the robot's own.")
 @engine_option
@@ -166,7 +164,7 @@ def _print(summary: Summary, periods: list[Period], folder: Path) -> None:
     )
     table.add_row("digest", summary.digest)
     table.add_row("files", str(folder))
-    output().print(table)
+    show(table)
 
 
 def _known(count: int | None) -> str:

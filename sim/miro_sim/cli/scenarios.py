@@ -4,7 +4,7 @@ import click
 from rich.table import Table
 
 from miro_sim import scenario_file
-from miro_sim.cli.program import output
+from miro_sim.cli.program import show as print_result
 
 
 @click.group(invoke_without_command=True)
@@ -22,7 +22,7 @@ def scenarios(context: click.Context) -> None:
         scenario = scenario_file.load(name).scenario
         robots = len([robot for network in scenario.networks for robot in network.robot])
         table.add_row(name, f"{scenario.duration_s:g} s", str(robots), scenario.title)
-    output().print(table)
+    print_result(table)
 
 
 @scenarios.command()

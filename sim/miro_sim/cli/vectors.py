@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from miro_sim.cli.options import choose_engine, engine_option
+from miro_sim.cli.options import Place, Whole, choose_engine, engine_option
 from miro_sim.cli.program import MAX_SEED, UserError
 from miro_sim.cli.progress import ProgressBar
 
@@ -21,15 +21,15 @@ NAMES = tuple(f"{opcode:02x}.json" for opcode in range(OPCODES))
 
 
 @click.command(short_help="Writes single-step test vectors of the processor.")
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder for the 256 files.")
+@click.option("--out", type=Place(path_type=Path), required=True, help="Folder for the 256 files.")
 @click.option(
     "--per-opcode",
-    type=click.IntRange(1, 1_000_000),
+    type=Whole(1, 1_000_000),
     default=8,
     show_default=True,
     help="Vectors per opcode.",
 )
-@click.option("--seed", type=click.IntRange(0, MAX_SEED), default=1, show_default=True, help="Of the states.")
+@click.option("--seed", type=Whole(0, MAX_SEED), default=1, show_default=True, help="Of the states.")
 @click.option("--force", is_flag=True, help="Replace files of these names in the folder.")
 @engine_option
 def vectors(out: Path, per_opcode: int, seed: int, force: bool, engine: str | None) -> None:

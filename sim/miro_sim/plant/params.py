@@ -27,7 +27,7 @@ class _Positive(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
             if isinstance(value, msgspec.Struct):
                 continue
             zero_is_fine = name in MAY_BE_ZERO
-            limit = "0 or above" if zero_is_fine else "above 0"
+            limit = ("0 or above" if zero_is_fine else "above 0") + " and below 1e12"
             if not (0.0 <= value < 1e12) or (value == 0 and not zero_is_fine):
                 raise ValueError(f"{name} must be {limit}, got {value!r}")
 

@@ -59,6 +59,8 @@ def test_a_fault_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result], tm
     ("until", "expected"),
     [
         ("maim", "no symbol maim in the code; did you mean _main?"),
+        ("100", "100 is no symbol; write 0x64 for an address"),
+        ("", "the empty string is no place; give a symbol"),
         ("0x10000", "beyond the last code address"),
         ("0xyz", "not a hexadecimal number"),
     ],

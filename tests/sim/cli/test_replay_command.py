@@ -139,3 +139,13 @@ def test_a_recording_without_a_control_period_is_refused(
     code, _, err = mirotwin("replay", path)
     assert code == 2
     assert "holds no control period" in err
+
+
+@pytest.mark.parametrize("length", range(1, 8))
+def test_a_recording_cut_short_in_its_first_bytes_is_called_truncated(
+    mirotwin: Callable[..., Result], tmp_path: Path, length: int
+) -> None:
+    (tmp_path / "run.mcap").write_bytes(b"\x89MCAP0\r\n"[:length])
+    code, out, err = mirotwin("replay", tmp_path / "run.mcap")
+    assert (code, out) == (2, "")
+    assert "the file ends in its first bytes; record the run again" in err

@@ -179,3 +179,30 @@ def test_the_shortest_duration_is_one_control_period(mirotwin: Callable[..., Res
     scenario.write_text(SHORT.replace("duration_s = 0.2", "duration_s = 1e-9"))
     assert mirotwin("run", scenario, "--out", tmp_path / "out", "-q") == (0, "", "")
     assert len(recording_reader.read(tmp_path / "out" / "run.mcap").periods) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--seed", "abc"], "Invalid value for '--seed': 'abc' is not a whole number."),
+        (["--out", ""], "Invalid value for '--out': the empty string names no place."),
+        (["--firmware", ""], "Invalid value for '--firmware': the empty string names no place."),
+        (["--firmware", "no.ihx"], "no.ihx: there is no such file; give the path of an .ihx or .hex file"),
+        (["--firmware", "/dev/null"], "/dev/null: is not a regular file; copy the content to a file first"),
+    ],
+)
+def test_an_option_that_means_nothing_is_refused_in_plain_words(
+    mirotwin: Callable[..., Result], short: Path, arguments: list[str], expected: str
+) -> None:
+    code, out, err = mirotwin("run", short, *arguments)
+    assert (code, out) == (2, "")
+    assert expected in err
+
+
+@pytest.mark.parametrize("arguments", [["info"], ["scenarios"]])
+def test_a_table_in_a_pipe_has_no_trailing_blanks(
+    mirotwin: Callable[..., Result], arguments: list[str]
+) -> None:
+    lines = mirotwin(*arguments)[1].splitlines()
+    assert lines
+    assert [line for line in lines if line != line.rstrip()] == []

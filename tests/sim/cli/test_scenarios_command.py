@@ -37,7 +37,7 @@ def test_show_prints_the_file_as_it_stands(name: str) -> None:
         (["run", "absent.toml"], "error: absent.toml: no such file"),
         (["run", "fig6", "--seed", "-1"], "error: Invalid value for '--seed': -1 is not in the range"),
         (["run", "fig6", "--seed", str(1 << 63)], "error: Invalid value for '--seed': 9223372036854775808"),
-        (["run", "fig6", "--seed", "one"], "error: Invalid value for '--seed': 'one' is not a valid integer"),
+        (["run", "fig6", "--seed", "one"], "error: Invalid value for '--seed': 'one' is not a whole number"),
         (["run", "fig6", "--engine", "numba"], "error: Invalid value for '--engine': 'numba' is not one of"),
         (["run"], "error: Missing argument 'SCENARIO'"),
         (["rnu"], "error: No such command 'rnu'"),
