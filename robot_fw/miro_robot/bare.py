@@ -33,6 +33,7 @@ class Ended(StrEnum):
     UNTIL = "until"  # the address asked for is next
     CYCLES = "cycles"  # the limit is reached
     FAULT = "fault"
+    PAUSED = "paused"  # where the caller wanted to look; it can go on
     HALTED = "halted"  # nothing can ever make it go on: SJMP to itself or asleep, with no interrupt to come
 
 
@@ -79,19 +80,22 @@ class BareMachine:
         until: int | None = None,
         max_cycles: int | None = None,
         progress: Callable[[int], object] | None = None,
+        pause: int | None = None,
     ) -> Ended:
         """Until the instruction at `until` is next, or `cycles` >= `max_cycles`, or a fault.
 
         Without `max_cycles` a dead end (a jump to itself or idle mode that nothing can leave) ends it as well.
+        `pause`: cycle at which to come back for the time being.
 
         `progress` is called with the cycle count every now and then.
         """
         limit = FAR if max_cycles is None else max_cycles
+        stop = limit if pause is None else min(limit, pause)
         faults = len(self.faults)
         while True:
-            if self.cpu.cycles >= limit:
-                return Ended.CYCLES
-            end = min(self._feed(), limit)
+            if self.cpu.cycles >= stop:
+                return Ended.CYCLES if self.cpu.cycles >= limit else Ended.PAUSED
+            end = min(self._feed(), stop)
             reason = self.cpu.run(end) if until is None else self.cpu.run_until_pc(until, end)
             if reason == BREAKPOINT:
                 return Ended.UNTIL

@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import sys
-from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 import msgspec
 
+from miro_sim.cli.code_place import FLASH_BYTES, SPACE_BYTES, address_of, place_of
 from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, load_image
-from miro_sim.cli.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, UserError, complain
+from miro_sim.cli.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, complain
 from miro_sim.cli.progress import ProgressBar
 from miro_sim.inputs import read_input
 from miro_sim.outdir import check_file
-
-if TYPE_CHECKING:
-    from miro_robot.image import Image
-
-FLASH_BYTES = 8192
-SPACE_BYTES = 65536
 
 
 @click.group()
@@ -65,7 +58,7 @@ def run_bare(
         check_file(Path(dump), "--dump")
     choose_engine(engine)
     loaded = load_image(image, SPACE_BYTES if code_in_xram else FLASH_BYTES)
-    target = None if until is None else address_of(until, loaded, image)
+    target = None if until is None else address_of(until, loaded, image, "--until")
     given = b"" if stdin is None else read_input(stdin)
     from miro_robot.bare import BareMachine, Ended
 
@@ -87,40 +80,3 @@ def run_bare(
         complain(f"the firmware ended at {place}; no interrupt can wake it")
         return DONE if target is None else EXPECTATION_FAILED
     return DONE
-
-
-def address_of(text: str, image: Image, path: str) -> int:
-    """A code address from 0x.. or from a symbol's name, with or without the underscore that C puts before
-    it.
-    """
-    if text[:2].lower() == "0x":
-        try:
-            address = int(text, 16)
-        except ValueError:
-            raise UserError(f"--until: {text} is not a hexadecimal number") from None
-        if address >= SPACE_BYTES:
-            raise UserError(f"--until: {text} is beyond the last code address; use 0x0000 to 0xffff")
-        return address
-    if not text:
-        raise UserError("--until: the empty string is no place; give a symbol or an address as 0x..")
-    if text.isascii() and text.isdecimal() and len(text) <= 6:
-        raise UserError(f"--until: {text} is no symbol; write {int(text):#x} for an address")
-    for name in (text, text.removeprefix("_")):
-        found = image.symbols.find(name)
-        if found is not None and found.space == "code":
-            return found.address
-    names = [name for name, symbol in image.symbols.names.items() if symbol.space == "code"]
-    close = get_close_matches(text, names, n=1) or get_close_matches(f"_{text}", names, n=1)
-    if close:
-        remedy = f"did you mean {close[0]}?"
-    elif names:
-        remedy = "see the map beside the image"
-    else:
-        remedy = "put its .map or .cdb beside it, or give an address as 0x.."
-    raise UserError(f"{path}: --until: no symbol {text} in the code; {remedy}")
-
-
-def place_of(address: int, image: Image) -> str:
-    """An address for people."""
-    name = image.symbols.name_at(address)
-    return f"{address:#06x} in {name}" if name else f"{address:#06x}"

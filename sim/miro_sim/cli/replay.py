@@ -3,48 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
-import msgspec
 from miro_protocol import stream
 from rich.table import Table
 
 from miro_sim import runner
-from miro_sim.cli.options import Place, choose_engine, engine_option, firmware_option, load_image
+from miro_sim.cli.options import Place, engine_option, firmware_option
 from miro_sim.cli.program import DIVERGENCE, DONE, UserError, complain, show
 from miro_sim.cli.progress import ProgressBar
+from miro_sim.cli.replay_job import Job, load_job
 from miro_sim.cli.run import report_faults
 from miro_sim.clock import seconds
 from miro_sim.frame_list import FrameLine, frame_lines
-from miro_sim.inputs import RECORDING_BYTES, read_input
-from miro_sim.recording_reader import MAGIC, Recording, parse
 from miro_sim.records import Period, WireRun
-from miro_sim.replay import (
-    Difference,
-    ScriptRun,
-    compare,
-    scenario_of_stream,
-    script_of,
-    script_of_stream,
-)
-from miro_sim.scenario import Scenario
-from miro_sim.scenario_file import parse as parse_scenario
-
-if TYPE_CHECKING:
-    from miro_robot.image import Image
+from miro_sim.replay import Difference, compare
 
 SHOWN = 20
-
-
-class Job(msgspec.Struct, frozen=True):
-    """What is to be replayed: a recording, or a text stream (then `recorded` is empty)."""
-
-    scenario: Scenario
-    seed: int
-    script: list[ScriptRun]
-    recorded: Sequence[Period]
 
 
 @click.command(short_help="Sends recorded bytes again and compares.")
@@ -60,15 +35,7 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
     A text stream runs over an ideal link in the default
     scenario, and there is nothing to compare.
     """
-    data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
-    choose_engine(engine)
-    if data.startswith(MAGIC) or MAGIC.startswith(data) or b"\0" in data[:4096]:
-        recording = parse(data, file)
-        job = _job_of_recording(recording, file)
-        image = _recorded_image(recording, file) if firmware is None else load_image(firmware)
-    else:
-        job = _job_of_stream(data, file)
-        image = load_image(firmware)
+    job, image = load_job(file, firmware, engine)
     from miro_sim.world import World
 
     try:
@@ -95,32 +62,6 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
         _print_frames(job, replayed, everything)
     faults = report_faults(world)
     return _verdict(job, replayed, difference) or faults
-
-
-def _job_of_recording(recording: Recording, path: str) -> Job:
-    source = recording.source
-    if not recording.periods:
-        raise UserError(f"{path}: the recording holds no control period; nothing can be replayed")
-    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml")
-    return Job(scenario, source.seed, script_of(recording.periods), recording.periods)
-
-
-def _job_of_stream(data: bytes, path: str) -> Job:
-    sent = stream.decode(data, path)
-    return Job(scenario_of_stream(sent, path), 0, script_of_stream(sent), ())
-
-
-def _recorded_image(recording: Recording, path: str) -> Image:
-    """The image in the recording, with the symbols it had when it was recorded."""
-    from miro_robot.image import ImageError, Symbol, Symbols, parse_hex
-
-    source = recording.source
-    try:
-        image = parse_hex(source.firmware, Path(path) / "firmware.ihx")
-    except ImageError as error:
-        raise UserError(str(error)) from None
-    symbols = Symbols({name: Symbol(address, space) for name, (address, space) in source.symbols.items()})
-    return msgspec.structs.replace(image, symbols=symbols)
 
 
 def _print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> None:

@@ -1,0 +1,238 @@
+"""SUBJECT, what the `mirotwin fw` commands look into: an image, a scenario, a recording or a stream file.
+
+What belongs here: the argument and the options that say what runs, for how long, and which of its robots is looked
+at. What does not: looking (one file a command), and the run itself (`miro_sim.watched`).
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import msgspec
+
+from miro_sim import clock
+from miro_sim.cli.code_place import FLASH_BYTES, SPACE_BYTES, address_of, place_of
+from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, firmware_option, load_image
+from miro_sim.cli.program import (
+    DONE,
+    EXPECTATION_FAILED,
+    FIRMWARE_FAULT,
+    LIMIT_REACHED,
+    MAX_SEED,
+    UserError,
+    complain,
+)
+from miro_sim.cli.progress import ProgressBar
+from miro_sim.cli.replay_job import load_job
+from miro_sim.inputs import read_input
+from miro_sim.scenario_file import builtin_names, load
+
+if TYPE_CHECKING:
+    from miro_robot.inspect.watcher import Watcher
+
+    from miro_sim.watched import BareRun, RobotRun, Run
+    from miro_sim.world import World
+
+IMAGE_SUFFIXES = (".ihx", ".hex", ".ihex")
+UNITS = {"": Fraction(1), "s": Fraction(24_000_000), "ms": Fraction(24_000), "us": Fraction(24)}
+
+
+class Moment(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """A tick of 24 MHz, or a time with its unit (1.5s, 20ms, 100us), as a tick."""
+
+    name = "TIME"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        match = re.fullmatch(r"(\d{1,18}(?:\.\d{1,18})?)(s|ms|us|)", str(value))
+        if match is None or (not match[2] and "." in match[1]):
+            self.fail(f"{value!r} is no time; give ticks, or a number with s, ms or us.", param, ctx)
+        return int(Fraction(match[1]) * UNITS[match[2]])
+
+
+class Request(msgspec.Struct, frozen=True):
+    """What the command line says about the run; names as the options'."""
+
+    subject: str
+    seed: int | None
+    firmware: str | None
+    network: int | None
+    robot: int | None
+    until: str | None
+    max_cycles: int | None
+    stdin: str | None
+    baud: int | None
+    code_in_xram: bool
+    from_tick: int
+    to_tick: int | None
+    engine: str | None
+
+
+_OPTIONS: tuple[Callable[[Any], Any], ...] = (
+    click.argument("subject", metavar="SUBJECT", type=Place()),
+    click.option("--from", "from_tick", type=Moment(), default="0", help="Look from then on: ticks, or 1.5s, 20ms."),
+    click.option("--to", "to_tick", type=Moment(), help="End there. Default: the end of the run."),
+    click.option("--seed", type=Whole(0, MAX_SEED), help="Scenario: master seed of all noise. Default 0."),
+    firmware_option("Scenario, recording, stream: image to run instead of its own."),
+    click.option("--network", type=Whole(0), help="Which network's robot. Default 0."),
+    click.option("--robot", type=Whole(0, 4), help="Slot of the robot. Default: the first there is."),
+    click.option("--until", metavar="SYMBOL|ADDRESS", help="Image: stop before the instruction there."),
+    click.option("--max-cycles", type=Whole(1), metavar="N", help="Image: give up after N cycles, exit code 42."),
+    click.option("--stdin", "stdin", type=Place(), metavar="FILE", help="Image: bytes for the serial port."),
+    click.option("--baud", type=Whole(50, 750_000), help="Image: bit rate of --stdin; default as fw run."),
+    click.option("--code-in-xram", is_flag=True, help="Image: EA low, program and data share 64 KB."),
+    engine_option,
+)  # fmt: skip
+
+
+def subject_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Gives a command SUBJECT and these options, as one `request`."""
+
+    @functools.wraps(command)
+    def gathered(**given: Any) -> Any:
+        request = Request(**{name: given.pop(name) for name in Request.__struct_fields__})
+        return command(request=request, **given)
+
+    with_options: Callable[..., Any] = gathered
+    for option in reversed(_OPTIONS):
+        with_options = option(with_options)
+    return with_options
+
+
+def open_run(request: Request) -> Run:
+    """The run that was asked for, at its first tick. Fixes the engine. Raises UserError."""
+    if request.to_tick is not None and request.to_tick <= request.from_tick:
+        raise UserError(
+            f"--from {request.from_tick} --to {request.to_tick}: the window is empty; --to must be later"
+        )
+    if request.subject.lower().endswith(IMAGE_SUFFIXES):
+        run: Run = _bare_run(request)
+    else:
+        run = _robot_run(request)
+    if run.end_tick is not None and request.from_tick >= run.end_tick:
+        raise UserError(
+            f"{request.subject}: --from {request.from_tick}: the run ends at tick {run.end_tick}; look earlier"
+        )
+    return run
+
+
+def look(run: Run, request: Request, *watchers: Watcher) -> int:
+    """Runs it under the eyes of `watchers` and says how it ended; returns the exit code.
+
+    Raises UserError when the run was over before there was anything to look at.
+    """
+    from miro_sim.watched import watch
+
+    end_tick = _earlier(run.end_tick, request.to_tick)
+    with ProgressBar(f"running {request.subject}", end_tick) as bar:
+        reached = watch(run, watchers, request.from_tick, request.to_tick, bar.to)
+    if not reached:
+        end = run.cpu.cycles * clock.CYCLE_TICKS
+        raise UserError(
+            f"{request.subject}: --from {request.from_tick}: the run ended at tick {end}; look earlier"
+        )
+    return _verdict(run, request)
+
+
+def _earlier(one: int | None, other: int | None) -> int | None:
+    return min((tick for tick in (one, other) if tick is not None), default=None)
+
+
+def _refuse(request: Request, kind: str, *options: str) -> None:
+    for option in options:
+        value = getattr(request, option)
+        if value is not None and value is not False:
+            name = option.replace("_", "-")
+            raise UserError(f"{request.subject}: is {kind}, --{name} does not apply to it; leave it out")
+
+
+def _bare_run(request: Request) -> BareRun:
+    _refuse(request, "an image on the bare processor", "seed", "firmware", "network", "robot")
+    choose_engine(request.engine)
+    image = load_image(request.subject, SPACE_BYTES if request.code_in_xram else FLASH_BYTES)
+    until = None if request.until is None else address_of(request.until, image, request.subject, "--until")
+    stdin = b"" if request.stdin is None else read_input(request.stdin)
+    from miro_robot.bare import BareMachine
+
+    from miro_sim.watched import BareRun
+
+    machine = BareMachine(image, code_in_xram=request.code_in_xram, stdin=stdin, baud=request.baud)
+    return BareRun(machine, until, request.max_cycles)
+
+
+def _robot_run(request: Request) -> RobotRun:
+    _refuse(request, "no image", "until", "max_cycles", "stdin", "baud", "code_in_xram")
+    subject = request.subject
+    is_path = os.path.exists(subject) or "/" in subject or "\\" in subject
+    periods = None
+    if subject in builtin_names() or subject.endswith(".toml") or not is_path:
+        text = load(subject)
+        choose_engine(request.engine)
+        image = load_image(request.firmware)
+        scenario, seed, script = text.scenario, request.seed or 0, None
+    else:
+        _refuse(request, "a recording or stream, which has its seed", "seed")
+        job, image = load_job(subject, request.firmware, request.engine)
+        scenario, seed, script = job.scenario, job.seed, job.script
+        periods = len(job.recorded) or None
+    from miro_sim.watched import RobotRun
+    from miro_sim.world import World
+
+    try:
+        world = World(scenario, seed, image, script=script)
+    except (ValueError, ArithmeticError) as error:
+        raise UserError(f"{subject}: cannot be run: {error}") from None
+    network, index = _which_robot(world, request)
+    return RobotRun(world, network, index, periods)
+
+
+def _which_robot(world: World, request: Request) -> tuple[int, int]:
+    """(network, place among its robots) of the robot that was asked for."""
+    network = request.network or 0
+    if network >= len(world.networks):
+        raise UserError(
+            f"{request.subject}: --network {network}: there are {len(world.networks)}, numbered from 0"
+        )
+    slots = [robot.spec.slot for robot in world.networks[network].robots]
+    if request.robot is None:
+        return network, 0
+    if request.robot not in slots:
+        there = ", ".join(map(str, slots))
+        raise UserError(
+            f"{request.subject}: --robot {request.robot}: no robot in that slot; there is {there}"
+        )
+    return network, slots.index(request.robot)
+
+
+def _verdict(run: Run, request: Request) -> int:
+    """Says on stderr why a run ended that did not end as planned."""
+    from miro_robot.bare import Ended
+
+    from miro_sim.cli.run import report_faults
+    from miro_sim.watched import BareRun, RobotRun
+
+    if isinstance(run, RobotRun):
+        return report_faults(run.world)
+    assert isinstance(run, BareRun)
+    place = f"{place_of(run.cpu.pc, run.image)} after {run.cpu.cycles} machine cycles"
+    if run.machine.faults:
+        complain(f"firmware fault: {run.machine.faults[0]}")
+        return FIRMWARE_FAULT
+    if run.ended is Ended.CYCLES:
+        complain(f"gave up at {place}")
+        return LIMIT_REACHED
+    if run.ended is Ended.HALTED and request.until is not None:
+        complain(f"the firmware ended at {place}; no interrupt can wake it")
+        return EXPECTATION_FAILED
+    return DONE
+
+
+def image_name(run: Run) -> str:
+    """What to call the image in output: its file's name."""
+    return Path(run.image.path).name
