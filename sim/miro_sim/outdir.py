@@ -8,6 +8,8 @@ goes wrong leaves either the files from before or the new ones, never half of on
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
@@ -103,6 +105,33 @@ def check_file(path: Path, option: str) -> None:
         raise OutputError(path, f"there is no folder {folder}", remedy)
     elif not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(path, f"the folder {folder} cannot be written to", remedy)
+
+
+@contextmanager
+def whole_file(path: Path, option: str) -> Iterator[Path]:
+    """A name beside `path` to write to; what was written takes its place at the end, or is gone if anything raised.
+
+    Raises OutputError, before anything is done, where `check_file` does.
+    """
+    check_file(path, option)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    except OSError as error:
+        raise OutputError(path, _reason(error), f"choose another file with {option}") from None
+    os.close(handle)
+    staging = Path(name)
+    try:
+        yield staging
+        staging.chmod(0o666 & ~_umask())
+        os.replace(staging, path)
+    finally:
+        staging.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 def _reason(error: OSError) -> str:

@@ -3,12 +3,13 @@ cimport cython
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.execute cimport Executor
 
-cdef int _VECTOR, _VECTOR_STEP
+cdef int _VECTOR, _VECTOR_STEP, _CALL_CYCLES
 
 cdef class Watcher:
+    cpdef attached(self, Cpu cpu)
     cpdef executed(self, Cpu cpu, int pc, long long start)
     cpdef interrupted(self, Cpu cpu, int source, int pc, long long start)
-    cpdef slept(self, Cpu cpu, long long start)
+    cpdef slept(self, Cpu cpu, long long start, long long end)
     cpdef ran(self, Cpu cpu, long long start)
 
 cdef class Inspector:
@@ -19,7 +20,7 @@ cdef class Inspector:
     cpdef int run(self, long long until_cycle) except -1
     @cython.locals(cpu=Cpu, pc=int, start='long long', executed='long long', reason=int, watcher=Watcher)
     cdef int _step(self) except -1
-    @cython.locals(cpu=Cpu, pc=int, start='long long', ended=int, woken=bint, watcher=Watcher)
+    @cython.locals(cpu=Cpu, pc=int, start='long long', end='long long', ended=int, woken=bint, watcher=Watcher)
     cdef int _sleep(self, long long until_cycle) except -1
     @cython.locals(source=int, watcher=Watcher)
     cdef int _tell_interrupted(self, int pc, long long start) except -1

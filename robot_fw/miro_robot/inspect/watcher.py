@@ -10,6 +10,7 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.execute import Executor
 
 _VECTOR, _VECTOR_STEP = 3, 8  # interrupt vectors are at 8 * source + 3
+_CALL_CYCLES = 2  # of the hardware's LCALL
 
 
 class Watcher:
@@ -17,6 +18,9 @@ class Watcher:
 
     Cycles are machine cycles; the step began in cycle `start` and ended with `cpu.cycles`.
     """
+
+    def attached(self, cpu: Cpu) -> None:
+        """It looks on from now."""
 
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
         """The instruction at `pc` was executed."""
@@ -27,8 +31,8 @@ class Watcher:
         `pc`: where it came in between.
         """
 
-    def slept(self, cpu: Cpu, start: int) -> None:
-        """The CPU was idle or powered down."""
+    def slept(self, cpu: Cpu, start: int, end: int) -> None:
+        """The CPU was idle or powered down from cycle `start` to before `end`."""
 
     def ran(self, cpu: Cpu, start: int) -> None:
         """A run that began in cycle `start` is over; others may now look at what the CPU did to its lines."""
@@ -84,11 +88,12 @@ class Inspector:
             ended = cpu.boundary()
         cpu.end_run()
         woken = cpu.idle == 0 and cpu.powered_down == 0
-        if cpu.cycles - (2 if woken else 0) > start:
+        end = cpu.cycles - (_CALL_CYCLES if woken else 0)
+        if end > start:
             for watcher in self.watchers:
-                watcher.slept(cpu, start)
+                watcher.slept(cpu, start, end)
         if woken:
-            self._tell_interrupted(pc, cpu.cycles - 2)
+            self._tell_interrupted(pc, end)
         return cpu.stop
 
     def _tell_interrupted(self, pc: int, start: int) -> None:
@@ -104,6 +109,8 @@ def attach(cpu: Cpu, *watchers: Watcher) -> Inspector:
         inspector = Inspector(cpu)
         cpu.inspector = inspector
     inspector.watchers.extend(watchers)
+    for watcher in watchers:
+        watcher.attached(cpu)
     return inspector
 
 

@@ -7,6 +7,8 @@ and power-down, MOVX, and the public face. Instructions are in `execute.py`, the
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextvars import ContextVar
 from typing import Any, Protocol
 
 from miro_robot.mcs51.bus import Bus
@@ -25,6 +27,10 @@ _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
 _PCON_BITS = 0x8F  # the others are not implemented and read as 0
 _READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end
 _FLOATING = 0xFF  # what an undriven external bus reads as
+
+
+on_load: ContextVar[Callable[[Cpu], object] | None] = ContextVar("on_load", default=None)
+"""Called with every CPU that gets an image: how coverage of a test session comes to CPUs that tests make."""
 
 
 class Inspector(Protocol):
@@ -79,6 +85,9 @@ class Cpu(Executor):
             for address in range(first, end):
                 self.rows[address] = self.row_of[self.rom[address]]
             self.code_limit = max(self.code_limit, end)
+        loaded = on_load.get()
+        if loaded is not None:
+            loaded(self)
 
     def write_code(self, address: int, value: int) -> None:
         """One byte of code memory, which from now on counts as loaded."""

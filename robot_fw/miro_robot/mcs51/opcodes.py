@@ -6,6 +6,8 @@ instruction does is in `execute.py`. Source: Atmel 8051 Hardware Manual, instruc
 
 from __future__ import annotations
 
+from miro_robot.mcs51.names import NUMBERS, Names
+
 # first opcode, how many, opcode step, mnemonic, operands, bytes, machine cycles.
 # Operands: dir direct byte, bit bit address, imm/imm16 constants, rel branch offset, addr11/addr16 targets,
 # src/dst the direct bytes of opcode 85, whose source comes first in code.
@@ -140,33 +142,50 @@ def _by_opcode(column: int) -> bytes:
 ROW = _by_opcode(0)  # opcode -> first opcode of its line in TABLE
 LENGTH = _by_opcode(5)
 CYCLES = _by_opcode(6)
+_AJMP, _LJMP, _ACALL, _LCALL = 0x01, 0x02, 0x11, 0x12
 _TEXT = {row[0]: (row[3], row[4]) for row in TABLE}
 
 
-def disassemble(code: bytes, address: int) -> str:
+def disassemble(code: bytes, address: int, names: Names = NUMBERS) -> str:
     """The instruction at `address` of a 64 KB image in the notation of the data sheet, targets absolute."""
     opcode, first, second = (code[(address + offset) & 0xFFFF] for offset in range(3))
     mnemonic, operands = _TEXT[ROW[opcode]]
     after = (address + LENGTH[opcode]) & 0xFFFF
     last = second if LENGTH[opcode] == 3 else first
-    fields = {
-        "addr16": f"{first << 8 | second:04X}h",
-        "addr11": f"{after & 0xF800 | (opcode & 0xE0) << 3 | first:04X}h",
-        "imm16": f"{first << 8 | second:04X}h",
-        "imm": f"{second if 'dir,#' in operands else first:02X}h",
-        "rel": f"{(after + (last ^ 0x80) - 0x80) & 0xFFFF:04X}h",
-        "src": f"{first:02X}h",
-        "dst": f"{second:02X}h",
-        "dir": f"{first:02X}h",
-        "bit": _bit_name(first),
-        "Rn": f"R{opcode & 7}",
-        "Ri": f"R{opcode & 1}",
+    constant = second if "dir,#" in operands else first
+    words = {
+        "addr16": lambda: names.code(first << 8 | second),
+        "addr11": lambda: names.code(after & 0xF800 | (opcode & 0xE0) << 3 | first),
+        "#imm16": lambda: f"#{first << 8 | second:04X}h",
+        "#imm": lambda: f"#{constant:02X}h",
+        "rel": lambda: names.code((after + (last ^ 0x80) - 0x80) & 0xFFFF),
+        "src": lambda: names.direct(first),
+        "dst": lambda: names.direct(second),
+        "dir": lambda: names.direct(first),
+        "bit": lambda: names.bit(first),
+        "/bit": lambda: f"/{names.bit(first)}",
+        "Rn": lambda: f"R{opcode & 7}",
+        "@Ri": lambda: f"@R{opcode & 1}",
     }
-    for name, text in fields.items():
-        operands = operands.replace(name, text)
-    return f"{mnemonic} {operands}".rstrip()
+    text = ",".join(words[word]() if word in words else word for word in operands.split(","))
+    return f"{mnemonic} {text}".rstrip()
 
 
-def _bit_name(bit: int) -> str:
-    byte = bit & 0xF8 if bit & 0x80 else 0x20 + (bit >> 3)
-    return f"{byte:02X}h.{bit & 7}"
+def is_conditional(opcode: int) -> bool:
+    """Whether the instruction goes one of two ways: JB, JC, JZ, CJNE, DJNZ and their like."""
+    mnemonic, operands = _TEXT[ROW[opcode]]
+    return operands.endswith("rel") and mnemonic != "SJMP"
+
+
+def target(code: bytes, address: int) -> int | None:
+    """Where the LCALL, ACALL, LJMP or AJMP at `address` goes; None if that is another instruction."""
+    opcode, first, second = (code[(address + offset) & 0xFFFF] for offset in range(3))
+    if opcode in (_LCALL, _LJMP):
+        return first << 8 | second
+    if ROW[opcode] in (_ACALL, _AJMP):
+        return (address + 2) & 0xF800 | (opcode & 0xE0) << 3 | first
+    return None
+
+
+def is_call(opcode: int) -> bool:
+    return ROW[opcode] in (_ACALL, _LCALL)

@@ -1,4 +1,4 @@
-"""`mirotwin fw run`: an image on the bare processor, with nothing but its serial port connected."""
+"""`mirotwin fw` and `fw run`: an image on the bare processor, with nothing but its serial port connected."""
 
 from __future__ import annotations
 
@@ -9,6 +9,10 @@ import click
 import msgspec
 
 from miro_sim.cli.code_place import FLASH_BYTES, SPACE_BYTES, address_of, place_of
+from miro_sim.cli.fw_coverage import coverage
+from miro_sim.cli.fw_disasm import disasm
+from miro_sim.cli.fw_profile import profile
+from miro_sim.cli.fw_trace import trace
 from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, load_image
 from miro_sim.cli.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, complain
 from miro_sim.cli.progress import ProgressBar
@@ -18,7 +22,15 @@ from miro_sim.outdir import check_file
 
 @click.group()
 def fw() -> None:
-    """Firmware on the bare processor, without the robot."""
+    """Firmware: run it on the bare processor, or look into it at work.
+
+    SUBJECT is what runs: an IMAGE.ihx on the bare processor, or the robot in a scenario (a built-in name or a .toml),
+    in a recording (run.mcap) or on a stream file.
+    """
+
+
+for command in (disasm, trace, profile, coverage):
+    fw.add_command(command)
 
 
 @fw.command("run")

@@ -131,7 +131,11 @@ def look(run: Run, request: Request, *watchers: Watcher) -> int:
 
     end_tick = _earlier(run.end_tick, request.to_tick)
     with ProgressBar(f"running {request.subject}", end_tick) as bar:
-        reached = watch(run, watchers, request.from_tick, request.to_tick, bar.to)
+        try:
+            reached = watch(run, watchers, request.from_tick, request.to_tick, bar.to)
+        except (ValueError, ArithmeticError) as error:
+            now = run.cpu.cycles * clock.CYCLE_TICKS
+            raise UserError(f"{request.subject}: cannot be run beyond tick {now}: {error}") from None
     if not reached:
         end = run.cpu.cycles * clock.CYCLE_TICKS
         raise UserError(

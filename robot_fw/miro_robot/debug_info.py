@@ -1,0 +1,157 @@
+"""What the compiler said about an image: which C line an instruction belongs to, and where functions are.
+
+What belongs here: reading lines from the `.rst` listings beside an image or else from its `.cdb`, functions from the
+`.cdb`, and finding source files. (SDCC 4.2 leaves the lines of inlined functions out of the `.cdb`.) What does not:
+names of addresses (`image.Symbols`), and everything one does with lines (`inspect/`). An image without these files has
+an empty DebugInfo: all still works, by address.
+"""
+
+from __future__ import annotations
+
+import bisect
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import msgspec
+
+from miro_robot.image import Image
+from miro_robot.mcs51.opcodes import LENGTH
+
+_CDB_LINE = re.compile(r"^L:C\$([^$]+)\$(\d+)\$\w+\$\w+:([0-9A-F]+)$", re.MULTILINE)
+_CDB_BEGIN = re.compile(r"^L:(G|F\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]+)$", re.MULTILINE)
+_CDB_END = re.compile(r"^L:X(G|F\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]+)$", re.MULTILINE)
+_MAP_MODULE = re.compile(r"^(\S+)\.rel\s+\[", re.MULTILINE)
+_MAP_CONSTANTS = re.compile(r"^(?:CONST|XINIT)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) =", re.MULTILINE)
+_RST_LINE = re.compile(r"^\s*\d+ ;\t([^\s:]+\.\w+):(\d+): ")
+_RST_CODE = re.compile(r"^ {6}([0-9A-F]{6}) [0-9A-F]{2}[ \n]")
+
+
+class SourceLine(msgspec.Struct, frozen=True, order=True):
+    """A line of a source file, by the name the compiler was given; lines count from 1."""
+
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}"
+
+
+class Function(msgspec.Struct, frozen=True):
+    """A C function: its symbol, `first` to before `end`, and its first line (None if it has none)."""
+
+    name: str
+    first: int
+    end: int
+    line: SourceLine | None
+
+
+class DebugInfo:
+    """Lines and functions of one image. `lines`: (address, line) of each place where a line's code begins, by address.
+    `constants`: (first, end) of code memory that holds tables instead of instructions.
+    """
+
+    def __init__(
+        self,
+        lines: Iterable[tuple[int, SourceLine]] = (),
+        functions: Iterable[Function] = (),
+        constants: Iterable[tuple[int, int]] = (),
+    ) -> None:
+        last_of_place = dict(lines)  # two lines at one place: the later one owns the code
+        self.lines = sorted(last_of_place.items())
+        self.functions = sorted(functions, key=lambda function: function.first)
+        self.constants = tuple(constants)
+        self._starts = [address for address, _ in self.lines]
+        self._function_starts = [function.first for function in self.functions]
+
+    @classmethod
+    def of(cls, image: Image) -> DebugInfo:
+        """From the files beside the image; what is missing contributes nothing."""
+        cdb = _text(image.path.with_suffix(".cdb"))
+        link_map = _text(image.path.with_suffix(".map"))
+        constants = [
+            (int(first, 16), int(first, 16) + int(size, 16))
+            for first, size in dict.fromkeys(_MAP_CONSTANTS.findall(link_map))
+            if int(size, 16)
+        ]
+        lines = list(_listing_lines(image.path, link_map)) or list(_cdb_lines(cdb))
+        return cls(lines, _cdb_functions(cdb, image.code), constants)
+
+    def line_at(self, address: int) -> SourceLine | None:
+        """The source line of the instruction there; None outside C functions."""
+        index = bisect.bisect_right(self._starts, address) - 1
+        if index < 0:
+            return None
+        place, line = self.lines[index]
+        if self.functions:
+            function = self.function_at(address)
+            if function is None or place < function.first:
+                return None
+        return line
+
+    def function_at(self, address: int) -> Function | None:
+        index = bisect.bisect_right(self._function_starts, address) - 1
+        if index < 0 or address >= self.functions[index].end:
+            return None
+        return self.functions[index]
+
+    def is_constant(self, address: int) -> bool:
+        return any(first <= address < end for first, end in self.constants)
+
+    def __repr__(self) -> str:
+        return f"DebugInfo({len(self.lines)} places of lines, {len(self.functions)} functions)"
+
+
+class Sources:
+    """Where the compiler's file names are found: in `folders`, in this order."""
+
+    def __init__(self, folders: Iterable[Path]) -> None:
+        self.folders = tuple(folders)
+        self._found: dict[str, Path | None] = {}
+
+    def path(self, file: str) -> Path | None:
+        """The file, or None where no folder has it."""
+        if file not in self._found:
+            places = (folder / file for folder in self.folders)
+            self._found[file] = next((place for place in places if place.is_file()), None)
+        return self._found[file]
+
+    def text(self, line: SourceLine) -> str:
+        """What stands in that line, "" if the file is not there or is shorter."""
+        path = self.path(line.file)
+        lines = [] if path is None else _text(path).splitlines()
+        return lines[line.line - 1].strip() if line.line <= len(lines) else ""
+
+
+def _text(path: Path) -> str:
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+
+
+def _cdb_lines(cdb: str) -> Iterator[tuple[int, SourceLine]]:
+    for file, line, address in _CDB_LINE.findall(cdb):
+        yield int(address, 16), SourceLine(file, int(line))
+
+
+def _cdb_functions(cdb: str, code: bytes) -> Iterator[Function]:
+    """From begin and end records; the end record stands at the returning instruction."""
+    declared: dict[int, SourceLine] = {}
+    for address, line in _cdb_lines(cdb):  # the first line at a function's first place is its head
+        declared.setdefault(address, line)
+    begins = {(scope, name): int(address, 16) for scope, name, address in _CDB_BEGIN.findall(cdb)}
+    for scope, name, address in _CDB_END.findall(cdb):
+        first, last = begins.get((scope, name)), int(address, 16)
+        if first is not None and first <= last < len(code):
+            end = last + LENGTH[code[last]]
+            yield Function("_" + name, first, end, declared.get(first))
+
+
+def _listing_lines(image: Path, link_map: str) -> Iterator[tuple[int, SourceLine]]:
+    """From the relinked listings: a comment names the line, the next code is its first."""
+    for module in dict.fromkeys([*_MAP_MODULE.findall(link_map), image.stem]):
+        line = None
+        for text in _text(image.parent / f"{Path(module).name}.rst").splitlines():
+            if named := _RST_LINE.match(text):
+                line = SourceLine(named[1], int(named[2]))
+            elif line is not None and (code := _RST_CODE.match(text)):
+                yield int(code[1], 16), line
+                line = None

@@ -1,0 +1,88 @@
+"""Where the time went: a profile of one CPU, as data.
+
+What belongs here: putting counters and activity together by function. What does not: counting, and tables for people.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from miro_robot.image import Image
+from miro_robot.inspect.activity import Activity
+from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.symbol_names import SymbolNames
+from miro_robot.mcs51.names import INTERRUPTS
+
+_IRAM_TOP = 0xFF
+
+
+class FunctionProfile(msgspec.Struct, frozen=True):
+    """Machine cycles spent in the function itself; `calls`: how often its first instruction ran."""
+
+    name: str
+    address: int
+    calls: int
+    instructions: int
+    cycles: int
+
+
+class InterruptProfile(msgspec.Struct, frozen=True):
+    """Latency, duration and total in machine cycles; ticks of 24 MHz at which the worst ones began."""
+
+    source: str
+    count: int
+    worst_latency: int
+    worst_latency_tick: int
+    worst_duration: int
+    worst_duration_tick: int
+    total_cycles: int
+
+
+class StackProfile(msgspec.Struct, frozen=True):
+    """`first`: where the linker begins the stack (None: not known); `highest`: the last byte it reached."""
+
+    first: int | None
+    highest: int
+    highest_tick: int
+    free: int
+
+
+class Profile(msgspec.Struct, frozen=True):
+    """`asleep_cycles` of `cycles` were spent in idle mode or power-down. Functions by cycles, most first."""
+
+    cycles: int
+    asleep_cycles: int
+    instructions: int
+    functions: list[FunctionProfile]
+    interrupts: list[InterruptProfile]
+    stack: StackProfile
+
+
+def profile(image: Image, counters: Counters, activity: Activity) -> Profile:
+    """Of a CPU that ran `image` under both watchers."""
+    names = SymbolNames(image)
+    by_function: dict[int, list[int]] = {}
+    for address in counters.addresses():
+        found = by_function.setdefault(names.function(address)[0], [0, 0])
+        found[0] += counters.executed_at(address)
+        found[1] += counters.cycles_at(address)
+    functions = [
+        FunctionProfile(names.place(first), first, counters.executed_at(first), executed, spent)
+        for first, (executed, spent) in by_function.items()
+    ]
+    start = image.symbols.find("__start__stack")
+    return Profile(
+        cycles=activity.cycles,
+        asleep_cycles=activity.asleep_cycles,
+        instructions=sum(function.instructions for function in functions),
+        functions=sorted(functions, key=lambda function: (-function.cycles, function.address)),
+        interrupts=[
+            InterruptProfile(name, *activity.of_source(source)) for source, name in enumerate(INTERRUPTS)
+        ],
+        stack=StackProfile(
+            first=start.address if start is not None and start.space == "iram" else None,
+            highest=activity.highest_sp,
+            highest_tick=activity.highest_sp_tick,
+            free=_IRAM_TOP - activity.highest_sp,
+        ),
+    )

@@ -1,0 +1,84 @@
+"""Every step of a CPU as a line: tick, address, place, instruction, and the registers that it changed.
+
+What belongs here: the watcher and the form of a line. What does not: the window of time (who attaches it), and files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+from miro_robot.inspect.symbol_names import SymbolNames
+from miro_robot.inspect.watcher import Watcher
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.names import INTERRUPTS
+from miro_robot.mcs51.opcodes import disassemble
+
+HEADING = f"{'tick':>12}  addr  {'place':<28}  {'instruction':<30}  changed registers"
+REGISTERS = ("A", "B", "SP", "PSW", "DPTR", *(f"R{number}" for number in range(8)))
+
+
+class Trace(Watcher):
+    """Hands one line a step to `write`. `only`: first addresses of functions; others' steps are left out.
+
+    A register that an instruction left as it was is not named; R0 to R7 are those of the bank selected after it.
+    """
+
+    def __init__(
+        self, names: SymbolNames, write: Callable[[str], object], only: Collection[int] | None = None
+    ) -> None:
+        self.names = names
+        self.write = write
+        self.only = only
+        self.code = b""
+        self.before: tuple[int, ...] = ()
+        self.last = 0  # address of the last instruction: which went to sleep
+        self.static: dict[int, str | None] = {}  # by address: the part of the line that is always the same
+
+    def attached(self, cpu: Cpu) -> None:
+        self.code = cpu.code
+        self.before = registers(cpu)
+        self.last = cpu.pc
+
+    def executed(self, cpu: Cpu, pc: int, start: int) -> None:
+        after = registers(cpu)
+        self.last = pc
+        if pc not in self.static or cpu.code_at(pc) != self.code[pc]:
+            self.static[pc] = self._static(cpu, pc)
+        text = self.static[pc]
+        if text is not None:
+            if after == self.before:
+                self.write(f"{12 * start:>12}  {text}")
+            else:
+                self.write(f"{12 * start:>12}  {text:<66}  {_changed(self.before, after)}")
+        self.before = after
+
+    def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
+        self.before = registers(cpu)
+        if self.only is None or self.names.function(pc)[0] in self.only:
+            what = f"-- interrupt: {INTERRUPTS[source]}, to {self.names.place(cpu.pc)}"
+            self.write(f"{12 * start:>12}  {pc:04X}  {self.names.place(pc):<28}  {what}")
+
+    def slept(self, cpu: Cpu, start: int, end: int) -> None:
+        if self.only is None or self.names.function(self.last)[0] in self.only:
+            self.write(f"{12 * start:>12}  {'':36}-- asleep for {end - start} cycles")
+
+    def _static(self, cpu: Cpu, pc: int) -> str | None:
+        if self.only is not None and self.names.function(pc)[0] not in self.only:
+            return None
+        if cpu.code_at(pc) != self.code[pc]:  # a program in RAM that changes itself
+            self.code = cpu.code
+        return f"{pc:04X}  {self.names.place(pc):<28}  {disassemble(self.code, pc, self.names)}"
+
+
+def registers(cpu: Cpu) -> tuple[int, ...]:
+    """In the order of REGISTERS."""
+    bank = cpu.bank
+    return (cpu.a, cpu.b, cpu.sp, cpu.psw(), cpu.dptr, *(cpu.peek_iram(bank + number) for number in range(8)))
+
+
+def _changed(before: tuple[int, ...], after: tuple[int, ...]) -> str:
+    return " ".join(
+        f"{name}={value:04X}" if name == "DPTR" else f"{name}={value:02X}"
+        for name, old, value in zip(REGISTERS, before, after, strict=True)
+        if old != value
+    )

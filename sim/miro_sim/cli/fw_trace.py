@@ -1,0 +1,47 @@
+"""`mirotwin fw trace`: every step of the processor as a line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from miro_sim.cli.code_place import address_of
+from miro_sim.cli.debug import with_debug_files
+from miro_sim.cli.options import Place
+from miro_sim.cli.subject import Request, look, open_run, subject_options
+from miro_sim.outdir import check_file, whole_file
+
+
+@click.command(short_help="Writes each instruction with what it changed.")
+@subject_options
+@click.option(
+    "--symbol",
+    "symbols",
+    multiple=True,
+    metavar="SYMBOL|ADDRESS",
+    help="Only the function there; several may be.",
+)
+@click.option("--out", type=Place(), metavar="FILE", help="Write there instead of to stdout.")
+def trace(request: Request, symbols: tuple[str, ...], out: str | None) -> int:
+    """Writes what the processor did in SUBJECT: tick, address, symbol, instruction, changed registers.
+
+    A line stands for one instruction, one call of an interrupt routine, or one stretch of sleep.
+    """
+    if out is not None:
+        check_file(Path(out), "--out")
+    run = open_run(request)
+    from miro_robot.inspect.symbol_names import SymbolNames
+    from miro_robot.inspect.trace import HEADING, Trace
+
+    image = with_debug_files(run.image)
+    names = SymbolNames(image)
+    only = {
+        names.function(address_of(symbol, image, request.subject, "--symbol"))[0] for symbol in symbols
+    } or None
+    if out is None:
+        click.echo(HEADING)
+        return look(run, request, Trace(names, click.echo, only))
+    with whole_file(Path(out), "--out") as staging, staging.open("w", encoding="utf-8") as stream:
+        stream.write(HEADING + "\n")
+        return look(run, request, Trace(names, lambda line: stream.write(line + "\n"), only))

@@ -1,0 +1,74 @@
+"""Firmware coverage as a report: what the command line and the pytest plugin make of counts.
+
+What belongs here: paths, the table for people, reading a tracefile to add to. What does not: the mapping to lines
+(`miro_robot.inspect.coverage`).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+from rich.table import Table
+
+from miro_sim.inputs import InputError, read_input
+
+if TYPE_CHECKING:
+    from miro_robot.debug_info import Sources
+    from miro_robot.image import Image
+    from miro_robot.inspect.coverage import Counts, Share
+    from miro_robot.inspect.lcov import Tracefile
+
+
+class Report(msgspec.Struct, frozen=True):
+    """`listing`: text of the listing whose lines were counted, None when C lines were; it belongs at `listing_path`."""
+
+    tracefile: Tracefile
+    instructions: Share
+    listing: str | None
+    listing_path: Path
+
+
+def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) -> Report:
+    """Coverage of `image` with paths as seen from the current folder."""
+    from miro_robot.debug_info import DebugInfo
+    from miro_robot.inspect.coverage import at_paths, by_line, by_listing, instruction_share
+
+    debug = DebugInfo.of(image)
+    share = instruction_share(image, debug, counts)
+    listing_path = (out or image.path).with_suffix(".lst")
+    if debug.lines:
+        tracefile = at_paths(by_line(image, debug, counts), sources, Path.cwd())
+        return Report(tracefile, share, None, listing_path)
+    listing, record = by_listing(image, counts)
+    return Report({str(listing_path): record}, share, listing, listing_path)
+
+
+def read_tracefile(path: Path) -> Tracefile:
+    """What a tracefile holds, nothing if there is none yet. Raises InputError."""
+    from miro_robot.inspect.lcov import TracefileError, decode
+
+    if not path.exists():
+        return {}
+    try:
+        return decode(read_input(path).decode("utf-8"), str(path))
+    except UnicodeDecodeError:
+        raise InputError(str(path), "is not text", "name an lcov tracefile") from None
+    except TracefileError as error:
+        what, _, remedy = str(error).removeprefix(f"{path}:").partition("; ")
+        raise InputError(str(path), f"line {what}", remedy) from None
+
+
+def table(tracefile: Tracefile) -> Table:
+    """A row a file and a total: lines, branches, and the lines that never ran."""
+    from miro_robot.inspect.coverage import branch_share, line_share, missed
+
+    result = Table(box=None, pad_edge=False)
+    for column in ("file", "lines", "branches", "never ran"):
+        result.add_column(column, overflow="fold")
+    for path in sorted(tracefile):
+        one = {path: tracefile[path]}
+        result.add_row(path, str(line_share(one)), str(branch_share(one)), missed(tracefile[path]))
+    result.add_row("all", str(line_share(tracefile)), str(branch_share(tracefile)), "")
+    return result

@@ -1,0 +1,147 @@
+"""pytest plugin: which lines of the firmware a test session ran.
+
+    pytest --firmware-coverage=firmware.info [--firmware-image=mine.ihx] [--firmware-sources=DIR]
+
+What belongs here: watching every CPU that tests load the image into (in this process and in those of pytest-xdist),
+and the report at the end. What does not: the mapping to lines (`miro_robot.inspect.coverage`). Without the option
+nothing of the project is imported, and nothing is watched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+    from miro_robot.inspect.coverage import Counts
+    from miro_robot.mcs51.cpu import Cpu
+
+OUTPUT = "firmware_coverage"
+"""Under this name a pytest-xdist worker hands over its counts."""
+TABLE_COLUMNS = 160
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("mirotwin", "firmware coverage (mirotwin)")
+    group.addoption(
+        "--firmware-coverage",
+        metavar="FILE.info",
+        help="write which lines of the firmware the tests ran, as an lcov tracefile",
+    )
+    group.addoption(
+        "--firmware-image", metavar="IMAGE.ihx", help="the image to watch (default: the robot's own)"
+    )
+    group.addoption(
+        "--firmware-sources", metavar="DIR", action="append", default=[], help="where its C files are"
+    )
+    group.addoption(
+        "--firmware-coverage-fail-under",
+        metavar="PERCENT",
+        type=float,
+        default=0.0,
+        help="fail when fewer of the lines ran",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--firmware-coverage"):
+        config.pluginmanager.register(FirmwareCoverage(config), "mirotwin-firmware-coverage")
+
+
+class FirmwareCoverage:
+    """Of one session. On the controller of pytest-xdist it adds up what its workers counted."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        from miro_robot.inspect.counters import Counters
+        from miro_robot.mcs51.cpu import on_load
+
+        from miro_sim.inputs import InputError
+        from miro_sim.outdir import OutputError, check_file
+
+        self.config = config
+        self.out = Path(config.getoption("--firmware-coverage"))
+        self.from_workers: list[Counts] = []
+        self.counters = Counters()
+        try:
+            self.image = _image(config.getoption("--firmware-image"))
+            check_file(self.out, "--firmware-coverage")
+        except (InputError, OutputError, ValueError) as error:
+            raise pytest.UsageError(str(error)) from None
+        on_load.set(self.watch)
+
+    def watch(self, cpu: Cpu) -> None:
+        """Counts what `cpu` does from now on, if it was the image that it got."""
+        from miro_robot.inspect.watcher import Inspector, attach
+
+        inspector = cpu.inspector
+        watched = isinstance(inspector, Inspector) and self.counters in inspector.watchers
+        if not watched and cpu.code == self.image.code:
+            attach(cpu, self.counters)
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        from miro_robot.inspect.coverage import counts_of
+
+        if hasattr(session.config, "workeroutput"):  # a worker of pytest-xdist: JSON has no numbers as keys
+            counts = counts_of(self.counters)
+            session.config.workeroutput[OUTPUT] = [[address, *both] for address, both in counts.items()]
+        elif self._share() < self.config.getoption("--firmware-coverage-fail-under"):
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any) -> None:
+        handed: Iterable[tuple[int, int, int]] = getattr(node, "workeroutput", {}).get(OUTPUT, ())
+        self.from_workers.append({address: (executed, jumped) for address, executed, jumped in handed})
+
+    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+        from miro_robot.inspect.lcov import encode
+        from rich.console import Console
+
+        from miro_sim.firmware_coverage import table
+        from miro_sim.outdir import whole_file
+
+        report = self._report()
+        for path, text in ((report.listing_path, report.listing), (self.out, encode(report.tracefile))):
+            if text is not None:
+                with whole_file(path, "--firmware-coverage") as staging:
+                    staging.write_text(text, encoding="utf-8")
+        terminalreporter.section(f"coverage of {self.image.path.name}, written to {self.out}")
+        console = Console(highlight=False, markup=False, width=TABLE_COLUMNS)
+        with console.capture() as capture:
+            console.print(table(report.tracefile))
+            console.print(f"instructions: {report.instructions}")
+        for line in capture.get().splitlines():
+            terminalreporter.write_line(line.rstrip())
+
+    def _report(self) -> Any:
+        from miro_robot.debug_info import Sources
+        from miro_robot.firmware import source_folder
+        from miro_robot.inspect.coverage import counts_of, merged
+
+        from miro_sim.firmware_coverage import collect
+
+        own = source_folder()
+        folders = [
+            *map(Path, self.config.getoption("--firmware-sources")),
+            self.image.path.parent,
+            *([own] if own else []),
+        ]
+        counts = merged([counts_of(self.counters), *self.from_workers])
+        return collect(self.image, counts, Sources(folders), self.out)
+
+    def _share(self) -> float:
+        """Percent of the lines."""
+        from miro_robot.inspect.coverage import line_share
+
+        share = line_share(self._report().tracefile)
+        return 100.0 * share.hit / share.total if share.total else 100.0
+
+
+def _image(path: str | None) -> Image:
+    from miro_robot.firmware import image_path
+    from miro_robot.image import load_hex
+
+    return load_hex(path or image_path())

@@ -1,0 +1,196 @@
+"""Watchers see what a CPU does, and change nothing of it."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_robot.inspect.activity import Activity
+from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.watcher import Watcher, attach, detach
+from miro_robot.mcs51.cpu import Cpu
+
+from tests.naive import watching
+from tests.robot.mcs51.asm import assemble
+from tests.robot.mcs51.rig import RecordingBus
+
+# Two timers at two priorities, a serial port, sleep, and a busy main loop with branches.
+BUSY = """
+    LJMP start
+    ORG 0Bh
+    LJMP timer0
+    ORG 1Bh
+    LJMP timer1
+    ORG 23h
+    LJMP serial
+timer0:
+    PUSH ACC
+    MOV A,30h
+    MUL AB
+    INC 30h
+    POP ACC
+    RETI
+timer1:
+    INC 31h
+    NOP
+    RETI
+serial:
+    CLR TI
+    INC 32h
+    RETI
+start:
+    MOV SP,#40h
+    MOV TMOD,#22h
+    MOV TH0,#{th0:03X}h
+    MOV TH1,#{th1:03X}h
+    MOV SCON,#50h
+    MOV IP,#{ip:03X}h
+    MOV IE,#{ie:03X}h
+    SETB TR0
+    SETB TR1
+    MOV SBUF,#55h
+again:
+    MOV R7,#{loops:03X}h
+inner:
+    DIV AB
+    DJNZ R7,inner
+    JB 31h.0,again
+    ORL PCON,#01h
+    SJMP again
+""".replace("31h.0", "10h")
+
+
+class Log(Watcher):
+    """Notes everything it is told in the words of the naive twin."""
+
+    def __init__(self) -> None:
+        self.steps: list[watching.Step] = []
+
+    def executed(self, cpu, pc, start):
+        self.steps.append(watching.Step("run", pc, start, cpu.cycles, cpu.pc, cpu.sp))
+
+    def interrupted(self, cpu, source, pc, start):
+        self.steps.append(watching.Step("call", pc, start, start + 2, 8 * source + 3, cpu.sp))
+
+    def slept(self, cpu, start, end):
+        self.steps.append(watching.Step("sleep", cpu.pc, start, end, cpu.pc, cpu.sp))
+
+
+def program(th0: int, th1: int, ip: int, ie: int, loops: int) -> bytes:
+    return assemble(BUSY.format(th0=th0, th1=th1, ip=ip, ie=ie | 0x80, loops=loops))
+
+
+PROGRAMS = st.builds(
+    program,
+    th0=st.integers(0, 0xE0),
+    th1=st.integers(0, 0xC0),
+    ip=st.sampled_from([0, 0x02, 0x08, 0x10, 0x1A]),
+    ie=st.sampled_from([0x02, 0x08, 0x10, 0x0A, 0x1A]),
+    loops=st.integers(1, 20),
+)
+CUTS = st.lists(st.integers(1, 700), min_size=1, max_size=12)
+
+
+def cpu_of(code: bytes) -> Cpu:
+    cpu = Cpu(RecordingBus())
+    cpu.load(code)
+    return cpu
+
+
+def run(cpu: Cpu, cuts: list[int]) -> None:
+    for cut in cuts:
+        cpu.run(cpu.cycles + cut)
+
+
+def shown(steps: list[watching.Step]) -> list[tuple[str, int]]:
+    """Instructions and calls in their order; where sleep is cut depends on who looks."""
+    return [(step.kind, step.start) for step in steps if step.kind != "sleep"]
+
+
+@given(PROGRAMS, CUTS)
+@settings(deadline=None, max_examples=25)
+def test_a_watched_run_ends_in_the_same_state_and_tells_each_step(code, cuts):
+    plain, watched, naive = cpu_of(code), cpu_of(code), cpu_of(code)
+    log = Log()
+    attach(watched, log)
+    run(plain, cuts)
+    run(watched, cuts)
+    assert watched.snapshot() == plain.snapshot()
+    taken = watching.steps(naive, plain.cycles)
+    assert naive.snapshot() == plain.snapshot()
+    assert shown(log.steps) == shown(taken)
+
+
+@given(PROGRAMS, CUTS)
+@settings(deadline=None, max_examples=25)
+def test_counters_and_activity_equal_the_naive_twin(code, cuts):
+    cpu, naive = cpu_of(code), cpu_of(code)
+    counters, activity = Counters(), Activity()
+    attach(cpu, counters, activity)
+    run(cpu, cuts)
+    taken = watching.steps(naive, cpu.cycles)
+    ran, spent = watching.executions(taken), watching.cycles(taken)
+    assert {at: counters.executed_at(at) for at in counters.addresses()} == ran
+    assert {at: counters.cycles_at(at) for at in counters.addresses()} == spent
+    assert activity.cycles == cpu.cycles
+    asleep = [step.end - step.start for step in taken if step.kind == "sleep"]
+    assert activity.asleep_cycles == sum(asleep)
+    assert activity.highest_sp == max(7, *(step.sp for step in taken))
+    durations = watching.routines(cpu, taken)
+    for source in range(6):
+        count, _, _, worst, _, total = activity.of_source(source)
+        assert count == len(
+            [step for step in taken if step.kind == "call" and step.pc_after == 8 * source + 3]
+        )
+        assert (worst, total) == (max(durations.get(source, [0])), sum(durations.get(source, [])))
+
+
+def test_a_jump_is_counted_as_taken_only_when_it_leaves():
+    cpu = cpu_of(assemble("MOV R0,#3\nagain:\nDJNZ R0,again\nend:\nSJMP end"))
+    counters = Counters()
+    attach(cpu, counters)
+    cpu.run(20)
+    assert (counters.executed_at(2), counters.jumped_at(2)) == (3, 2)
+
+
+def timer_latencies(text: str) -> tuple[int, int]:
+    """(worst latency, how often) of timer 0 in a program that gets to its main loop at `main`."""
+    cpu = cpu_of(assemble("LJMP main\nORG 0Bh\nRETI\nmain:\n" + text))
+    activity = Activity()
+    attach(cpu, activity)
+    cpu.run(3000)
+    count, latency = activity.of_source(1)[:2]
+    return latency, count
+
+
+START = "MOV TMOD,#02h\nMOV TH0,#9Ch\nMOV IE,#82h\nSETB TR0\n"
+
+
+def test_an_interrupt_out_of_sleep_has_the_least_latency_of_the_data_sheet():
+    """At89c52 sheet, section 6: flag latched in cycle n, first cycle of the routine n + 4: three full cycles."""
+    latency, count = timer_latencies(START + "again:\nORL PCON,#01h\nSJMP again")
+    assert (latency, count > 10) == (3, True)
+
+
+def test_a_division_adds_its_remaining_cycles():
+    """Section 6: polling waits for the last cycle of the instruction; DIV has four."""
+    latency, _ = timer_latencies(START + "again:\nDIV AB\nDIV AB\nDIV AB\nDIV AB\nSJMP again")
+    assert latency == 6
+
+
+def test_an_access_to_ie_before_a_division_makes_the_longest_latency():
+    """Section 6: one more instruction runs after an access to IE; at worst a DIV: 8 cycles."""
+    latency, _ = timer_latencies(START + "again:\nSETB EA\nDIV AB\nSJMP again")
+    assert 6 < latency <= 8
+
+
+def test_a_detached_watcher_is_told_no_more_and_the_others_go_on():
+    cpu = cpu_of(assemble("again:\nSJMP again"))
+    first, second = Counters(), Counters()
+    attach(cpu, first)
+    attach(cpu, second)
+    cpu.run(10)
+    detach(cpu, first)
+    cpu.run(20)
+    assert (first.executed_at(0), second.executed_at(0)) == (5, 10)
+    detach(cpu, second)
+    assert cpu.inspector is None
