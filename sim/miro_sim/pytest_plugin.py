@@ -115,6 +115,9 @@ class FirmwareCoverage:
             console.print(f"instructions: {report.instructions}")
         for line in capture.get().splitlines():
             terminalreporter.write_line(line.rstrip())
+        wanted = self.config.getoption("--firmware-coverage-fail-under")
+        if self._share() < wanted:
+            terminalreporter.write_line(f"fewer lines ran than the {wanted} % that were asked for", red=True)
 
     def _report(self) -> Any:
         from miro_robot.debug_info import Sources

@@ -1,0 +1,94 @@
+"""C lines and functions of an image: from the listing, from the .cdb, and without either."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+
+from miro_robot.debug_info import DebugInfo, SourceLine, Sources
+from miro_robot.firmware import image_path, source_folder
+from miro_robot.image import load_hex
+
+from tests.robot.inspect.programs import PROGRAM, line_of
+
+
+def copied(program, folder, *suffixes):
+    """The image in a folder of its own, with only these files beside it."""
+    for suffix in (".ihx", *suffixes):
+        shutil.copy(program.with_suffix(suffix), folder)
+    return load_hex(folder / program.name)
+
+
+def test_every_line_with_code_is_found_in_the_listing_and_in_the_cdb_alike(program, tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    listing = DebugInfo.of(copied(program, tmp_path / "a", ".rst", ".map"))
+    cdb = DebugInfo.of(copied(program, tmp_path / "b", ".cdb", ".map"))
+    expected = {
+        line_of(text) for text in ("if (value > 2)", "total += value", "total++", "total = 0", "add(")
+    }
+    for debug in (listing, cdb):
+        lines = {line for _, line in debug.lines}
+        assert {SourceLine("program.c", number) for number in expected} <= lines
+        assert {line.file for line in lines} == {"program.c"}
+
+
+def test_functions_span_from_their_first_instruction_to_behind_their_return(program):
+    debug = DebugInfo.of(load_hex(program))
+    image = load_hex(program)
+    names = [function.name for function in debug.functions]
+    assert names == ["_add", "_never", "_main"]
+    heads = ("static void add", "void never")
+    for function, head in zip(debug.functions[:2], heads, strict=True):
+        assert image.code[function.end - 1] == 0x22  # RET
+        assert function.line == SourceLine("program.c", line_of(head))
+        assert debug.function_at(function.first) is function
+        assert debug.function_at(function.end) is not function
+
+
+def test_code_of_the_library_belongs_to_no_line(program):
+    debug = DebugInfo.of(load_hex(program))
+    assert debug.line_at(0) is None
+    assert debug.line_at(debug.functions[0].first - 1) is None
+    assert debug.line_at(debug.functions[-1].end) is None
+
+
+def test_tables_are_told_from_instructions(program):
+    image = load_hex(program)
+    table = image.symbols.find("table")
+    debug = DebugInfo.of(image)
+    assert all(debug.is_constant(table.address + number) for number in range(5))
+    assert not debug.is_constant(debug.functions[0].first)
+
+
+def test_an_image_alone_has_no_lines_and_no_functions(program, tmp_path):
+    debug = DebugInfo.of(copied(program, tmp_path))
+    assert (debug.lines, debug.functions, debug.constants) == ([], [], ())
+    assert debug.line_at(0) is None
+    assert debug.function_at(0) is None
+
+
+def test_the_robots_image_has_the_lines_of_inlined_functions_too():
+    """SDCC 4.2.0 leaves them out of the .cdb: the image comes with its listing for that."""
+    debug = DebugInfo.of(load_hex(image_path()))
+    byte = next(function for function in debug.functions if function.name == "_crc_byte")
+    nibble = next(function for function in debug.functions if function.name == "_crc_nibble")
+    inlined = {debug.line_at(address) for address in range(byte.first, byte.end)}
+    assert inlined & {debug.line_at(address) for address in range(nibble.first, nibble.end)}
+
+
+def test_the_listing_beside_the_robots_image_is_what_its_makefile_writes(tmp_path, program):
+    folder = source_folder()
+    command = ["make", "-s", "-C", folder, f"OUT={tmp_path}", f"BUILD={tmp_path / 'build'}"]
+    subprocess.run(command, check=True, capture_output=True)
+    assert (tmp_path / "miro.rst").read_text() == image_path().with_suffix(".rst").read_text()
+
+
+def test_sources_are_taken_from_the_first_folder_that_has_them(program, tmp_path):
+    sources = Sources([tmp_path, program.parent])
+    first_line = SourceLine("program.c", 1)
+    assert sources.text(first_line) == PROGRAM.splitlines()[0]
+    (tmp_path / "program.c").write_text("other\n")
+    assert Sources([tmp_path, program.parent]).text(first_line) == "other"
+    assert Sources([tmp_path]).text(SourceLine("program.c", 7)) == ""
+    assert Sources([]).path("program.c") is None

@@ -1,0 +1,84 @@
+"""lcov tracefiles: written, read back, added up, and read by lcov itself."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from contextlib import suppress
+from copy import deepcopy
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from miro_robot.inspect.lcov import FileRecord, TracefileError, add, decode, encode
+
+COUNTS = st.integers(0, 10**12)
+LINES = st.integers(1, 9999)
+RECORDS = st.builds(
+    FileRecord,
+    lines=st.dictionaries(LINES, COUNTS, max_size=8),
+    functions=st.dictionaries(
+        st.from_regex(r"_[a-z]{1,9}", fullmatch=True), st.tuples(LINES, COUNTS), max_size=4
+    ),
+    branches=st.dictionaries(
+        st.tuples(LINES, st.integers(0, 5), st.integers(0, 1)), st.none() | COUNTS, max_size=8
+    ),
+)
+TRACEFILES = st.dictionaries(st.from_regex(r"[a-z][a-z/]{0,9}\.c", fullmatch=True), RECORDS, max_size=4)
+
+
+@given(TRACEFILES)
+def test_what_is_written_is_read_back(tracefile):
+    assert decode(encode(tracefile), "x.info") == tracefile
+
+
+@given(TRACEFILES, TRACEFILES)
+def test_adding_up_does_not_depend_on_the_order(one, other):
+    forth, back = deepcopy(one), deepcopy(other)
+    add(forth, other)
+    add(back, one)
+    for tracefile in (forth, back):  # a function keeps the line of the file that came first
+        for record in tracefile.values():
+            record.functions = {name: (0, count) for name, (_, count) in record.functions.items()}
+    assert forth == back
+
+
+@given(TRACEFILES)
+def test_a_run_added_to_itself_has_every_count_twice_and_no_line_more(tracefile):
+    total = deepcopy(tracefile)
+    add(total, tracefile)
+    for path, record in tracefile.items():
+        assert total[path].lines == {line: 2 * count for line, count in record.lines.items()}
+        assert total[path].branches == {
+            branch: None if times is None else 2 * times for branch, times in record.branches.items()
+        }
+
+
+@given(st.text(max_size=200))
+def test_any_text_is_a_tracefile_or_is_refused(text):
+    with suppress(TracefileError):
+        assert isinstance(decode(text, "x.info"), dict)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [("DA:1,2\n", 1), ("SF:a.c\nDA:1\n", 2), ("SF:a.c\nend_of_record\nDA:1,2\n", 3), ("TN:\nhello\n", 2)],
+)
+def test_a_record_out_of_place_is_named(text, line):
+    with pytest.raises(TracefileError, match=rf"^x\.info:{line}: .*; give a file"):
+        decode(text, "x.info")
+
+
+@pytest.mark.skipif(shutil.which("lcov") is None, reason="needs lcov")
+def test_lcov_counts_what_is_written(tmp_path):
+    record = FileRecord(
+        lines={3: 0, 5: 7}, functions={"_f": (3, 0), "_g": (5, 7)}, branches={(5, 0, 0): 7, (5, 0, 1): 0}
+    )
+    (tmp_path / "a.c").write_text("\n" * 9)
+    (tmp_path / "a.info").write_text(encode({str(tmp_path / "a.c"): record}))
+    command = ["lcov", "--summary", "a.info", "--rc", "lcov_branch_coverage=1"]
+    shown = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    text = shown.stdout + shown.stderr
+    assert "50.0% (1 of 2 lines)" in text
+    assert "50.0% (1 of 2 functions)" in text
+    assert "50.0% (1 of 2 branches)" in text

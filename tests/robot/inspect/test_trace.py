@@ -1,0 +1,92 @@
+"""A trace has a line for each step, with what it changed."""
+
+from __future__ import annotations
+
+from miro_robot.inspect.symbol_names import SymbolNames
+from miro_robot.inspect.trace import REGISTERS, Trace, registers
+from miro_robot.inspect.watcher import attach
+from miro_robot.mcs51.cpu import Cpu
+
+from tests.robot.inspect.test_listing import image_of
+from tests.robot.mcs51.asm import assemble
+from tests.robot.mcs51.rig import RecordingBus
+
+PROGRAM = """
+    LJMP main
+    ORG 0Bh
+    INC R7
+    RETI
+main:
+    MOV A,#12h
+    MOV DPTR,#1234h
+    MOV R3,A
+    LCALL sub
+    MOV TMOD,#02h
+    MOV TH0,#F0h
+    MOV TL0,#F0h
+    MOV IE,#82h
+    SETB TR0
+    ORL PCON,#01h
+    SJMP $
+sub:
+    MOV R3,A
+    RET
+"""
+
+
+def traced(cycles: int, only: set[int] | None = None) -> list[str]:
+    code = assemble(PROGRAM)
+    cpu = Cpu(RecordingBus())
+    cpu.load(code)
+    lines: list[str] = []
+    attach(cpu, Trace(SymbolNames(image_of(code)), lines.append, only))
+    cpu.run(cycles)
+    return lines
+
+
+def test_a_line_has_tick_address_place_instruction_and_changed_registers():
+    assert traced(10)[:4] == [
+        f"{0:>12}  0000  {'reset':<28}  LJMP 000Dh",
+        f"{24:>12}  000D  {'000Dh':<28}  {'MOV A,#12h':<30}  A=12",
+        f"{36:>12}  000F  {'000Dh+2':<28}  {'MOV DPTR,#1234h':<30}  DPTR=1234",
+        f"{60:>12}  0012  {'000Dh+5':<28}  {'MOV R3,A':<30}  R3=12",
+    ]
+
+
+def test_a_register_written_with_what_it_held_has_not_changed():
+    first, again = (line for line in traced(12) if "MOV R3,A" in line)
+    assert first.endswith("R3=12")
+    assert again.endswith("MOV R3,A")
+
+
+def test_sleep_and_the_interrupt_that_ends_it_have_lines_of_their_own():
+    lines = traced(60)
+    asleep = next(index for index, line in enumerate(lines) if "-- asleep for" in line)
+    assert "-- interrupt: timer 0, to vector timer 0" in lines[asleep + 1]
+    assert "INC R7" in lines[asleep + 2]
+    assert lines[asleep + 2].endswith("R7=01")
+
+
+def test_only_the_functions_asked_for_are_written():
+    whole = traced(60)
+    main = next(int(line.split()[1], 16) for line in whole if "MOV A,#12h" in line)
+    only = traced(60, {main})
+    assert only
+    assert [line for line in whole if f"  {main:04X}h" in line and "--" not in line] == [
+        line for line in only if "--" not in line
+    ]
+
+
+def test_the_changed_registers_lead_from_the_first_state_to_the_last():
+    code = assemble(PROGRAM)
+    cpu = Cpu(RecordingBus())
+    cpu.load(code)
+    state = dict(zip(REGISTERS, registers(cpu), strict=True))
+    lines: list[str] = []
+    attach(cpu, Trace(SymbolNames(image_of(code)), lines.append))
+    cpu.run(24)  # before the first interrupt, which pushes
+    for line in lines:
+        for change in line[78:].split():
+            name, _, value = change.partition("=")
+            state[name] = int(value, 16)
+    assert state == dict(zip(REGISTERS, registers(cpu), strict=True))

@@ -1,0 +1,248 @@
+"""`mirotwin fw disasm|trace|profile|coverage`: looking into an image, a scenario, a recording, a stream."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim import scenario_file
+from miro_sim.watched import RobotRun, watch
+from miro_sim.world import World
+
+from tests.sim.cli.conftest import Result, hex_file
+
+MIROTWIN = Path(sys.executable).with_name("mirotwin")
+LOOP = b"\x80\xfe"
+
+
+@pytest.fixture(scope="session")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The robot's image without any debug file."""
+    return Path(shutil.copy(image_path(), tmp_path_factory.mktemp("bare") / "bare.ihx"))
+
+
+def test_the_robots_own_firmware_is_listed_with_symbols_and_c_lines(mirotwin: Callable[..., Result]) -> None:
+    code, out, _ = mirotwin("fw", "disasm")
+    assert code == 0
+    assert "\n_decode_character:\n" in out
+    assert "; main.c:54: PCON = sleep;\n" in out
+    assert "  MOV PCON,_sleep\n" in out
+
+
+def test_one_function_can_be_listed_alone(mirotwin: Callable[..., Result]) -> None:
+    code, out, _ = mirotwin("fw", "disasm", image_path(), "--symbol", "uart_send")
+    assert code == 0
+    assert out.startswith("_uart_send:\n")
+    assert out.count(":\n") == 1
+    assert "RET" in out
+
+
+def test_a_bare_image_is_listed_with_addresses(mirotwin: Callable[..., Result], bare: Path) -> None:
+    code, out, _ = mirotwin("fw", "disasm", bare)
+    assert code == 0
+    assert "LJMP 0029h" in out
+
+
+def test_a_trace_begins_and_ends_with_its_window(mirotwin: Callable[..., Result], short: Path) -> None:
+    code, out, _ = mirotwin("fw", "trace", short, "--from", "40ms", "--to", "40.5ms")
+    ticks = [int(line[:12]) for line in out.splitlines()[1:]]
+    assert code == 0
+    assert 960_000 <= ticks[0] < 960_000 + 48
+    assert 972_000 - 24_000 < ticks[-1] < 972_000
+    assert ticks == sorted(ticks)
+
+
+def test_a_window_shows_what_the_whole_trace_shows_there(
+    mirotwin: Callable[..., Result], short: Path
+) -> None:
+    whole = mirotwin("fw", "trace", short, "--to", "9ms")[1].splitlines()[1:]
+    window = mirotwin("fw", "trace", short, "--from", "5ms", "--to", "8ms")[1].splitlines()[1:]
+    first, last = int(window[1][:12]), int(window[-1][:12])
+    inside = [line for line in whole if first <= int(line[:12]) <= last and "asleep" not in line]
+    assert len(inside) > 50
+    assert [line for line in window[1:] if "asleep" not in line] == inside
+
+
+def test_both_engines_trace_and_profile_alike(short: Path) -> None:
+    def shown(*arguments: str) -> str:
+        command = [MIROTWIN, "fw", arguments[0], short, "--to", "12ms", *arguments[1:]]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+    for arguments in (("trace",), ("profile", "--json")):
+        python = shown(*arguments, "--engine", "python")
+        assert python.count("\n") > 20
+        assert python == shown(*arguments, "--engine", "compiled")
+
+
+def test_a_profile_adds_up(mirotwin: Callable[..., Result], short: Path) -> None:
+    code, out, _ = mirotwin("fw", "profile", short, "--json", "--robot", 2)
+    found = json.loads(out)
+    assert code == 0
+    entries = 2 * sum(interrupt["count"] for interrupt in found["interrupts"])
+    spent = sum(function["cycles"] for function in found["functions"])
+    assert spent + entries + found["asleep_cycles"] == found["cycles"]
+    by_name = {function["name"]: function for function in found["functions"]}
+    assert by_name["_uart_interrupt"]["calls"] == found["interrupts"][4]["count"]
+    assert found["interrupts"][4]["worst_latency"] >= 3
+    assert found["stack"]["highest"] >= found["stack"]["first"] > 0x80
+
+
+def test_a_profile_for_people_names_functions_interrupts_and_stack(
+    mirotwin: Callable[..., Result], short: Path
+) -> None:
+    _, out, _ = mirotwin("fw", "profile", short, "--to", "50ms")
+    assert "_uart_interrupt" in out
+    assert "serial" in out
+    assert "stack: from " in out
+
+
+def test_coverage_of_several_runs_adds_up_in_one_file(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    info = tmp_path / "fw.info"
+    code, _, _ = mirotwin("fw", "coverage", short, "--to", "30ms", "--out", info)
+    first = info.read_text()
+    assert code == 0
+    assert "SF:" in first
+    assert "robot_fw/firmware/main.c\n" in first
+    assert mirotwin("fw", "coverage", short, "--from", "30ms", "--out", info, "--append")[0] == 0
+    whole = tmp_path / "whole.info"
+    mirotwin("fw", "coverage", short, "--out", whole)
+    assert _hits(info.read_text()) == _hits(whole.read_text())
+    assert len(_hits(first)) < len(_hits(whole.read_text()))
+
+
+def _hits(info: str) -> list[str]:
+    """The lines that ran. (How often is the largest count of a line's instructions, which does not add up.)"""
+    return [
+        line.partition(",")[0] for line in info.splitlines() if line.startswith("DA:") and line[-2:] != ",0"
+    ]
+
+
+def test_coverage_of_a_bare_image_comes_with_its_listing(
+    mirotwin: Callable[..., Result], bare: Path, tmp_path: Path
+) -> None:
+    info = tmp_path / "bare.info"
+    code, _, _ = mirotwin("fw", "coverage", bare, "--to", "1ms", "--out", info)
+    assert code == 0
+    assert f"SF:{info.with_suffix('.lst')}\n" in info.read_text()
+    assert "LJMP 0029h" in info.with_suffix(".lst").read_text()
+
+
+def test_a_recording_is_looked_into_with_its_own_scenario_seed_and_firmware(
+    mirotwin: Callable[..., Result], finished: Path, short: Path
+) -> None:
+    window = ("--from", "100ms", "--to", "101ms")
+    recorded = mirotwin("fw", "trace", finished / "run.mcap", *window)
+    assert recorded[0] == 0
+    assert recorded == mirotwin("fw", "trace", short, "--seed", 5, *window)
+
+
+def test_a_stream_file_is_looked_into_as_replay_runs_it(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    stream = tmp_path / "a.stream"
+    stream.write_text("# mirotwin stream 1\n240000 > 55 55 55\n")
+    code, out, _ = mirotwin("fw", "profile", stream, "--to", "20ms", "--json")
+    assert code == 0
+    assert json.loads(out)["interrupts"][4]["count"] == 3
+
+
+def test_looking_changes_no_bit_of_the_world(short: Path) -> None:
+    from miro_robot.inspect.activity import Activity
+    from miro_robot.inspect.counters import Counters
+
+    def world() -> World:
+        return World(scenario_file.load(str(short)).scenario, 3, load_hex(image_path()))
+
+    plain, watched = world(), world()
+    while not plain.finished:
+        plain.step()
+    assert watch(RobotRun(watched, 0, 1), [Counters(), Activity()], 1_000_001, 2_345_678)
+    while not watched.finished:
+        watched.step()
+    assert watched.digest == plain.digest
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("fig6", "--from", "2s", "--to", "1s"), "the window is empty; --to must be later"),
+        (("fig6", "--from", "7s"), "the run ends at tick"),
+        (("fig6", "--from", "7 s"), "is no time; give ticks"),
+        (("fig6", "--robot", "1"), "no robot in that slot; there is 0"),
+        (("fig6", "--network", "1"), "there are 1, numbered from 0"),
+        (("fig6", "--until", "main"), "--until does not apply to it"),
+        (("fig7",), "no such scenario"),
+        (("gone.ihx",), "there is no such file"),
+        (("gone.mcap",), "no such scenario"),
+    ],
+)
+def test_what_cannot_be_looked_at_is_one_line(
+    mirotwin: Callable[..., Result], arguments: tuple[str, ...], said: str
+) -> None:
+    for command in ("trace", "profile", "coverage"):
+        code, out, err = mirotwin("fw", command, *arguments)
+        assert (code, out) == (2, "")
+        assert said in err
+        assert err.count("\n") == 1
+
+
+def test_a_window_after_the_end_of_an_image_is_empty(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    image = hex_file(tmp_path / "a.ihx", LOOP)
+    out = tmp_path / "a.trace"
+    code, _, err = mirotwin("fw", "trace", image, "--from", "1s", "--out", out)
+    assert code == 2
+    assert "the run ended at tick" in err
+    assert not out.exists()
+
+
+def test_the_options_of_a_scenario_do_not_apply_to_an_image(
+    mirotwin: Callable[..., Result], bare: Path
+) -> None:
+    code, _, err = mirotwin("fw", "profile", bare, "--seed", 1)
+    assert code == 2
+    assert "--seed does not apply" in err
+
+
+def test_an_unknown_symbol_is_named_with_its_nearest(mirotwin: Callable[..., Result]) -> None:
+    code, _, err = mirotwin("fw", "trace", "fig6", "--symbol", "uart_sent", "--to", "1ms")
+    assert code == 2
+    assert "did you mean _uart_send?" in err
+
+
+def test_output_that_cannot_be_written_is_refused_before_the_run(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    for command in ("trace", "coverage"):
+        code, _, err = mirotwin("fw", command, "fig6", "--out", tmp_path / "gone" / "x")
+        assert code == 2
+        assert "there is no folder" in err
+    (tmp_path / "x.info").write_text("hello\n")
+    code, _, err = mirotwin("fw", "coverage", "fig6", "--out", tmp_path / "x.info", "--append")
+    assert code == 2
+    assert "x.info: line 1: is no record of a tracefile" in err
+
+
+def test_a_fault_is_reported_after_what_was_seen(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    image = hex_file(tmp_path / "a.ihx", b"\x00\xa5")
+    code, out, err = mirotwin("fw", "trace", image)
+    assert code == 3
+    assert "NOP" in out
+    assert "undefined opcode A5" in err
+
+
+def test_the_cycle_limit_of_an_image_has_its_exit_code(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image = hex_file(tmp_path / "a.ihx", LOOP)
+    assert mirotwin("fw", "profile", image, "--max-cycles", 10)[0] == 42
+    assert mirotwin("fw", "profile", image, "--to", 100)[0] == 0
+    assert mirotwin("fw", "profile", image)[0] == 0

@@ -1,0 +1,73 @@
+"""The pytest plugin: firmware coverage of other people's test sessions."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TESTS = """
+from miro_robot.bare import BareMachine
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.cpu import Cpu
+
+def test_reset():
+    BareMachine(load_hex(image_path())).run(max_cycles=2000)
+
+def test_longer():
+    BareMachine(load_hex(image_path())).run(max_cycles=20000)
+
+def test_other_firmware_does_not_count():
+    cpu = Cpu(Bus())
+    cpu.load(bytes(64))
+    cpu.run(10)
+    assert cpu.inspector is None
+"""
+
+
+def session(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    (folder / "test_mine.py").write_text(TESTS)
+    (folder / "pytest.ini").write_text("[pytest]\n")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+
+
+def counted(folder: Path, *arguments: str) -> str:
+    done = session(folder, "--firmware-coverage=fw.info", *arguments)
+    assert done.returncode == 0, done.stdout
+    assert "coverage of miro.ihx, written to fw.info" in done.stdout
+    return (folder / "fw.info").read_text()
+
+
+def test_a_session_counts_what_all_its_tests_ran_also_in_several_processes(tmp_path: Path) -> None:
+    alone = counted(tmp_path)
+    assert "FNDA:2,_main" in alone
+    assert alone == counted(tmp_path, "-n", "2")
+    assert alone != counted(tmp_path, "-k", "reset")
+
+
+def test_a_session_fails_under_the_share_that_was_asked_for(tmp_path: Path) -> None:
+    wanted = ("--firmware-coverage=fw.info", "--firmware-coverage-fail-under")
+    assert session(tmp_path, *wanted, "5").returncode == 0
+    failed = session(tmp_path, *wanted, "99")
+    assert failed.returncode == 1
+    assert "3 passed" in failed.stdout
+    assert "99.0 % that were asked for" in failed.stdout
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ("--firmware-image=gone.ihx", "gone.ihx: there is no such file"),
+        ("--firmware-coverage=gone/fw.info", "there is no folder gone"),
+    ],
+)
+def test_bad_input_is_a_usage_error(tmp_path: Path, option: str, said: str) -> None:
+    done = session(tmp_path, "--firmware-coverage=fw.info", option)
+    assert done.returncode == 4
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
