@@ -1,6 +1,7 @@
 cimport cython
 
 from miro_robot.mcs51.line cimport Line
+from miro_sim.radio.chain cimport Chain
 from miro_sim.rng cimport Stream
 
 cdef long long _FAR, _BIT, _HOLD
@@ -8,19 +9,26 @@ cdef long long _FAR, _BIT, _HOLD
 
 cdef class Transmitter:
     cdef readonly Line line
+    cdef Chain bursts, dropouts
     cdef long long last_edge
 
 
 cdef class Band:
+    cdef readonly object params, seed
+    cdef readonly str name
     cdef Stream errors
     cdef long long latency
-    cdef unsigned long long threshold
+    cdef unsigned long long threshold, burst_threshold
+    cdef bint slotted
     cdef list transmitters
 
-    cpdef add(self, Line line)
+    cpdef add(self, long long robot, Line line)
     @cython.locals(transmitter=Transmitter, limit='long long')
     cpdef long long limit(self) except? -1
-    @cython.locals(transmitter=Transmitter, sent='long long', edge='long long', level=int, carrier=int)
+    @cython.locals(
+        transmitter=Transmitter, sent='long long', slot='long long', edge='long long', level=int, carrier=int,
+        threshold='unsigned long long',
+    )
     cpdef int level(self, long long tick) except -1
     @cython.locals(transmitter=Transmitter, sent='long long', change='long long')
     cpdef long long next_change(self, long long tick) except? -1

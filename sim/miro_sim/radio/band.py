@@ -2,11 +2,11 @@
 
 What belongs here: the level as a function of time. At tick t, with u = t - latency,
 
-* a robot's carrier is up while its TXD had an edge in (u - 50000, u]: from its first start bit until two
-characters
-  after its last edge;
+* a robot's carrier is up while its TXD had an edge in (u - 50000, u], from its first start bit until two
+  characters after its last edge, unless its `dropouts` chain is bad in slot u // 2500;
 * the level is the AND of the TXD levels of the robots whose carrier is up (two at once: space wins);
-* with any carrier up it is inverted if the `errors` stream is below the threshold at index u // 2500;
+* with any carrier up it is inverted if the `errors` stream is below the threshold at index u // 2500; the
+  threshold is that of a burst if the `bursts` chain of one of them is bad in slot u // 2500;
 * with none it is mark: this band's receiver is always squelched.
 
 Sampling it as a UART is the business of `uplink`.
@@ -18,6 +18,7 @@ from miro_robot.mcs51.line import Line
 from msgspec import convert
 
 from miro_sim.clock import FAR, HOST_BIT_TICKS, HOST_CHARACTER_TICKS
+from miro_sim.radio.chain import Chain
 from miro_sim.radio.params import RadioParams
 from miro_sim.rng import Stream
 
@@ -28,12 +29,17 @@ assert (FAR, HOST_BIT_TICKS, 2 * HOST_CHARACTER_TICKS) == (_FAR, _BIT, _HOLD)
 
 
 class Transmitter:
-    """One robot's TXD wire and the tick of the last edge that the receiver has come past (-1: none yet)."""
+    """One robot's TXD wire and the tick of the last edge that the receiver has come past (-1: none yet).
 
-    NOT_STATE = ("line",)
+    Its chains are called NAME/bursts and NAME/dropouts.
+    """
 
-    def __init__(self, line: Line) -> None:
+    NOT_STATE = ("bursts", "dropouts", "line")
+
+    def __init__(self, line: Line, params: RadioParams, seed: int, name: str) -> None:
         self.line = line
+        self.bursts = None if params.bursts is None else Chain(params.bursts, seed, f"{name}/bursts")
+        self.dropouts = None if params.dropouts is None else Chain(params.dropouts, seed, f"{name}/dropouts")
         self.last_edge = -1
 
     def snapshot(self) -> dict[str, object]:
@@ -46,16 +52,22 @@ class Transmitter:
 class Band:
     """The mixed level. Ticks are the receiver's; queries come in ascending order, below `limit`."""
 
-    NOT_STATE = ("errors", "latency", "threshold")
+    NOT_STATE = ("burst_threshold", "errors", "latency", "name", "params", "seed", "slotted", "threshold")
 
     def __init__(self, params: RadioParams, seed: int, name: str) -> None:
+        self.params = params
+        self.seed = seed
+        self.name = name
         self.errors = Stream(seed, f"{name}/errors")
         self.latency = params.latency_ticks
         self.threshold = params.error_threshold
+        self.burst_threshold = params.burst_threshold
+        chains = (params.bursts, params.dropouts)
+        self.slotted = self.threshold > 0 or any(chain is not None for chain in chains)
         self.transmitters: list[Transmitter] = []
 
-    def add(self, line: Line) -> None:
-        self.transmitters.append(Transmitter(line))
+    def add(self, robot: int, line: Line) -> None:
+        self.transmitters.append(Transmitter(line, self.params, self.seed, f"{self.name}/robot{robot}"))
 
     def limit(self) -> int:
         """The tick up to which the robots' wires, and so the level, are final."""
@@ -67,17 +79,24 @@ class Band:
     def level(self, tick: int) -> int:
         """The level at `tick` in bit 0; bit 1 is set if it is inverted by an error."""
         sent = tick - self.latency
+        slot = sent // _BIT
         level = 1
         carrier = 0
+        threshold = self.threshold
         for transmitter in self.transmitters:
             edge = transmitter.line.next_edge(transmitter.last_edge)
             while edge <= sent:
                 transmitter.last_edge = edge
                 edge = transmitter.line.next_edge(edge)
-            if transmitter.last_edge >= 0 and sent < transmitter.last_edge + _HOLD:
-                carrier = 1
-                level &= transmitter.line.level_at(sent)
-        if carrier and self.errors.below(sent // _BIT, self.threshold):
+            if transmitter.last_edge < 0 or sent >= transmitter.last_edge + _HOLD:
+                continue
+            if transmitter.dropouts is not None and transmitter.dropouts.bad(slot):
+                continue
+            if transmitter.bursts is not None and transmitter.bursts.bad(slot):
+                threshold = self.burst_threshold
+            carrier = 1
+            level &= transmitter.line.level_at(sent)
+        if carrier and self.errors.below(slot, threshold):
             return (level ^ 1) | 2
         return level
 
@@ -89,7 +108,7 @@ class Band:
             change = min(change, transmitter.line.next_edge(sent))
             if transmitter.last_edge >= 0 and sent < transmitter.last_edge + _HOLD:
                 change = min(change, transmitter.last_edge + _HOLD)
-                if self.threshold:
+                if self.slotted:
                     change = min(change, (sent // _BIT + 1) * _BIT)
         if change == _FAR:
             return _FAR

@@ -2,13 +2,14 @@ cimport cython
 
 from miro_sim.radio.band cimport Band
 
-cdef long long _BIT, _HALF_BIT, _STOP
+cdef long long _STOP
 
 
 cdef class Uplink:
     cdef readonly str name
     cdef readonly Band band
     cdef readonly long long now, start_tick, bit_errors
+    cdef long long numerator, denominator
     cdef int before, bit, shift
 
     @cython.locals(until='long long')

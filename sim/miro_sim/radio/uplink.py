@@ -3,6 +3,7 @@
 What belongs here: the receiver of a 9600-baud 8N1 UART. It waits for a falling edge, samples the start bit
 in its middle (1250 ticks on; mark there is a false start), then eight data bits and the stop bit 2500 ticks
 apart, and waits for the next falling edge after the stop bit's sample. A symbol is known at that sample.
+With an offset of the PC's baud rate or the robots' crystals the bit is another fraction of ticks (`params`).
 How the level comes about is the business of `band`, what the symbols mean that of `miro_protocol`.
 """
 
@@ -11,14 +12,12 @@ from __future__ import annotations
 from miro_robot.mcs51.line import Line
 from msgspec import convert
 
-from miro_sim.clock import CHARACTER_BITS, HOST_BIT_TICKS
+from miro_sim.clock import CHARACTER_BITS
 from miro_sim.radio.band import Band
 from miro_sim.radio.params import RadioParams
 
-_BIT = 2500
-_HALF_BIT = 1250
 _STOP = 9  # number of the stop bit, the start bit being 0
-assert (HOST_BIT_TICKS, CHARACTER_BITS) == (_BIT, _STOP + 1)
+assert CHARACTER_BITS == _STOP + 1
 
 
 class Uplink:
@@ -28,11 +27,13 @@ class Uplink:
     The robots' wires are this object's to forget: edges that it has come past are dropped from them.
     """
 
-    NOT_STATE = ("name",)
+    NOT_STATE = ("denominator", "name", "numerator")
 
     def __init__(self, params: RadioParams, seed: int, name: str) -> None:
         self.name = name
         self.band = Band(params, seed, name)
+        self.numerator = params.bit_ticks.numerator
+        self.denominator = 2 * params.bit_ticks.denominator  # of half a bit
         self.now = 0
         self.before = 1  # level just before `now`, while waiting for a start bit
         self.start_tick = -1  # falling edge of the character being received, -1 while waiting for one
@@ -43,11 +44,11 @@ class Uplink:
     def __repr__(self) -> str:
         return f"Uplink({self.name!r}, now={self.now}, start_tick={self.start_tick}, bit={self.bit})"
 
-    def listen(self, line: Line) -> None:
+    def listen(self, robot: int, line: Line) -> None:
         """Adds a robot's TXD wire, before anything is received. Raises ValueError later."""
         if self.now:
-            raise ValueError(f"{self.name}: a robot joins after tick 0")
-        self.band.add(line)
+            raise ValueError(f"{self.name}: robot {robot} joins after tick 0")
+        self.band.add(robot, line)
 
     def receive(self, until_tick: int) -> list[tuple[int, bool, int]]:
         """Symbols (byte, stop bit good, tick of the start bit's edge) known before `until_tick`.
@@ -78,7 +79,7 @@ class Uplink:
 
     def sample(self, until: int, symbols: list[tuple[int, bool, int]]) -> None:
         """Goes on to the middle of the next bit and takes it."""
-        middle = self.start_tick + _HALF_BIT + self.bit * _BIT
+        middle = self.start_tick + (2 * self.bit + 1) * self.numerator // self.denominator
         if middle >= until:
             self.now = until
             return

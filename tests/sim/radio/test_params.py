@@ -3,7 +3,8 @@
 from fractions import Fraction
 
 import pytest
-from miro_sim.radio import RadioParams, error_threshold
+from miro_sim.radio import RadioParams
+from miro_sim.radio.probability import error_threshold
 
 
 def test_units_become_ticks_and_a_threshold():

@@ -1,0 +1,15 @@
+cimport cython
+
+from miro_sim.rng cimport Stream
+
+cdef unsigned long long _ONE
+
+
+cdef class Chain:
+    cdef readonly Stream stream
+    cdef unsigned long long enter, stay
+    cdef long long slot
+    cdef int answer
+
+    @cython.locals(known='long long', index='long long', draw='unsigned long long', answer=int)
+    cpdef int bad(self, long long slot) except -1

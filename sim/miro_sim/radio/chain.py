@@ -1,0 +1,60 @@
+"""A two-state Markov chain over bit times that can be asked about any of them, in any order.
+
+What belongs here: is the chain in its bad state in slot i? What that does to a bit belongs to who asks.
+
+A chain's state depends on its whole past, unless the draws are coupled. Here one draw u of slot i decides
+for both states at once:
+
+    u below `enter`           the state is bad from here on, whatever it was
+    u at or above 1 - `leave` the state is good from here on, whatever it was
+    otherwise                 the state stays
+
+From good to bad with probability `enter`, from bad to good with `leave`: the Gilbert-Elliott chain. And the
+state in slot i is settled by the last slot up to i whose draw fell into one of the two ranges, so that it is
+a pure function of (seed, stream, i): one walks back until there is one, 1 / (enter + leave) steps on average.
+Before slot 0 the state is good.
+"""
+
+from __future__ import annotations
+
+from miro_sim.radio.params import ChainParams
+from miro_sim.rng import Stream
+
+_ONE = 1 << 32
+
+
+class Chain:
+    """The chain of one stream. It has no state: slot and answer of the last call are a cache."""
+
+    def __init__(self, params: ChainParams, seed: int, name: str) -> None:
+        self.stream = Stream(seed, name)
+        self.enter = params.enter
+        self.stay = _ONE - params.leave  # draws from here on end the bad state
+        self.slot = -1
+        self.answer = 0
+
+    def __repr__(self) -> str:
+        return f"Chain({self.stream.name!r}, enter={self.enter}, leave={_ONE - self.stay})"
+
+    def bad(self, slot: int) -> int:
+        """1 if the state in a slot (0 or greater) is bad."""
+        if slot == self.slot:
+            return self.answer
+        known = self.slot
+        answer = self.answer
+        if slot < known:
+            known = -1
+            answer = 0
+        index = slot
+        while index > known:
+            draw = self.stream.u32(index)
+            if draw < self.enter:
+                answer = 1
+                break
+            if draw >= self.stay:
+                answer = 0
+                break
+            index -= 1
+        self.slot = slot
+        self.answer = answer
+        return answer

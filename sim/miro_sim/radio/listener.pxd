@@ -1,0 +1,42 @@
+cimport cython
+
+from miro_robot.mcs51.line cimport Line
+from miro_sim.radio.chain cimport Chain
+from miro_sim.radio.sender cimport Sender
+from miro_sim.radio.slicer cimport Slicer
+from miro_sim.rng cimport Stream
+
+cdef long long _BIT, _CHARACTER
+cdef unsigned long long _ONE
+
+
+cdef class Listener:
+    cdef readonly Line line
+    cdef readonly long long bit_errors
+    cdef readonly Slicer slicer
+    cdef Stream errors, noise, idle, lost, collision
+    cdef Chain bursts, dropouts
+    cdef unsigned long long threshold, burst_threshold, false_start, lost_threshold
+    cdef bint squelch, perfect_idle
+
+    @cython.locals(sender=Sender, index=Py_ssize_t, start='long long', data=bytes, stop='long long')
+    cpdef fill(self, long long tick, long long until, list senders, Py_ssize_t rank)
+    @cython.locals(sender=Sender)
+    cdef long long pause(self, long long tick, long long until, list senders, Py_ssize_t rank) except? -1
+    @cython.locals(slot='long long')
+    cdef void hear_nothing(self, long long tick, long long until) except *
+    cdef int silence(self, long long tick, long long slot) except -1
+    @cython.locals(slot='long long')
+    cdef void hear_idle(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
+    @cython.locals(level=int, chance='unsigned long long')
+    cdef int idle_level(self, long long tick, long long slot, list senders, Py_ssize_t rank) except -1
+    @cython.locals(sender=Sender, first='long long', number='long long', begin='long long', level=int)
+    cdef void hear_data(
+        self, long long tick, long long until, long long start, bytes data, list senders, Py_ssize_t rank
+    ) except *
+    @cython.locals(level=int, chance='unsigned long long')
+    cdef int bit(
+        self, long long begin, int sent, long long draw, bint fresh, list senders, Py_ssize_t rank
+    ) except -1
+    @cython.locals(sender=Sender, index=Py_ssize_t)
+    cdef int mixed(self, int level, long long begin, list senders, Py_ssize_t rank) except -1

@@ -1,0 +1,219 @@
+"""One robot's receiver: from what is on the air to the level on its RXD wire.
+
+What belongs here: the chain that a bit goes through, in this order, and its draws:
+
+    collision   another carrier on the frequency has another level: a fair coin           `NAME/collision`
+    carrier     lost in a drop-out: noise, or mark if squelched          `NAME/dropouts`, `NAME/noise`
+    slicer      its threshold gives the chance of an error
+    channel     a burst, or else the Gaussian errors, turn the bit over    `NAME/bursts`, `NAME/errors`
+    module      a character is lost and its bits are mark                                 `NAME/lost`
+
+Idle carrier goes through the same chain, in slots of 2500 ticks of absolute time, with `NAME/idle` for its
+errors: a false start bit, a burst, a slicer that has drifted off. What does not belong here: what is on the
+air (`sender`), the UART behind the wire.
+
+Error draws of a bit are numbered by the time at its transmitter, so that no two bits share one; all others by
+the slot (tick // 2500) in which the bit begins here. So everything depends on what was sent and on the tick
+alone, not on how often or up to where one asked.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_robot.mcs51.line import Line
+
+from miro_sim.clock import CHARACTER_BITS, HOST_BIT_TICKS
+from miro_sim.radio.chain import Chain
+from miro_sim.radio.params import RadioParams
+from miro_sim.radio.sender import Sender
+from miro_sim.radio.slicer import Slicer
+from miro_sim.rng import Stream
+
+_BIT = 2500
+_CHARACTER = 10
+_ONE = 1 << 32
+assert (HOST_BIT_TICKS, CHARACTER_BITS) == (_BIT, _CHARACTER)
+
+
+class Listener:
+    """One robot's receiver. `bit_errors` counts the bits of its own network that it got wrong so far.
+
+    Characters that its module lost are not counted, nor what it heard of other networks.
+    """
+
+    NOT_STATE = (
+        "burst_threshold",
+        "bursts",
+        "collision",
+        "dropouts",
+        "errors",
+        "false_start",
+        "idle",
+        "line",
+        "lost",
+        "lost_threshold",
+        "noise",
+        "perfect_idle",
+        "squelch",
+        "threshold",
+    )
+
+    def __init__(self, line: Line, params: RadioParams, seed: int, name: str) -> None:
+        self.line = line
+        self.errors = Stream(seed, f"{name}/errors")
+        self.noise = Stream(seed, f"{name}/noise")
+        self.idle = Stream(seed, f"{name}/idle")
+        self.lost = Stream(seed, f"{name}/lost")
+        self.collision = Stream(seed, f"{name}/collision")
+        self.squelch = params.squelch
+        self.threshold = params.error_threshold
+        self.burst_threshold = params.burst_threshold
+        self.false_start = params.false_start_threshold
+        self.lost_threshold = params.lost_threshold
+        self.bursts = None if params.bursts is None else Chain(params.bursts, seed, f"{name}/bursts")
+        self.dropouts = None if params.dropouts is None else Chain(params.dropouts, seed, f"{name}/dropouts")
+        self.slicer = None if params.slicer is None else Slicer(params.slicer)
+        parts = (self.bursts, self.dropouts, self.slicer)
+        self.perfect_idle = not self.false_start and all(part is None for part in parts)
+        self.bit_errors = 0
+
+    def __repr__(self) -> str:
+        return f"Listener({self.errors.name!r}, bit_errors={self.bit_errors}, slicer={self.slicer!r})"
+
+    def fill(self, tick: int, until: int, senders: list[Sender], rank: int) -> None:
+        """The wire's edges from `tick` up to `until`, as `senders[rank:]` have it: the first one on the air wins.
+
+        The others are heard in its pauses, and spoil its bits (`mixed`).
+        """
+        if rank == len(senders):
+            self.hear_nothing(tick, until)
+            return
+        sender = senders[rank]
+        for index in range(len(sender.transmissions)):
+            start, data = sender.transmissions[index]
+            tick = self.pause(tick, min(until, start - sender.keyup), senders, rank)
+            stop = min(until, start)
+            if tick < stop:
+                self.hear_idle(tick, stop, senders, rank)
+                tick = stop
+            stop = min(until, sender.end(index))
+            if tick < stop:
+                self.hear_data(tick, stop, start, data, senders, rank)
+                tick = stop
+        self.pause(tick, until, senders, rank)
+
+    def pause(self, tick: int, until: int, senders: list[Sender], rank: int) -> int:
+        """What is heard between the transmissions of `senders[rank]`; returns the tick reached."""
+        if tick >= until:
+            return tick
+        sender = senders[rank]
+        if sender.always_on:
+            self.hear_idle(tick, until, senders, rank)
+        else:
+            self.fill(tick, until, senders, rank + 1)
+        return until
+
+    def hear_nothing(self, tick: int, until: int) -> None:
+        """No carrier from `tick` to `until`."""
+        slot = tick // _BIT
+        while tick < until:
+            self.line.append(tick, self.silence(tick, slot))
+            if self.squelch:
+                break
+            slot += 1
+            tick = slot * _BIT
+
+    def silence(self, tick: int, slot: int) -> int:
+        """The level without a carrier."""
+        if self.slicer is not None and self.slicer.signal:
+            self.slicer.hear(tick, 0)
+        if self.squelch:
+            return 1
+        return self.noise.bit(slot)
+
+    def hear_idle(self, tick: int, until: int, senders: list[Sender], rank: int) -> None:
+        """A carrier without data from `tick` to `until`."""
+        slot = tick // _BIT
+        if self.perfect_idle and rank + 1 == len(senders):
+            self.line.append(tick, 1)
+            return
+        while tick < until:
+            self.line.append(tick, self.idle_level(tick, slot, senders, rank))
+            slot += 1
+            tick = slot * _BIT
+
+    def idle_level(self, tick: int, slot: int, senders: list[Sender], rank: int) -> int:
+        """The level in a slot of idle carrier, or in what is left of it at `tick`."""
+        if self.dropouts is not None and self.dropouts.bad(slot):
+            return self.silence(tick, slot)
+        level = 1
+        if rank + 1 < len(senders):
+            level = self.mixed(1, slot * _BIT, senders, rank)
+        chance = self.false_start
+        if self.slicer is not None:
+            if tick == slot * _BIT or self.slicer.signal != 2 * level - 1:  # else asked before in this slot
+                self.slicer.hear(tick, 2 * level - 1)
+            chance += self.slicer.threshold(level)
+        if self.bursts is not None and self.bursts.bad(slot):
+            chance = self.burst_threshold
+        if chance and self.idle.below(slot, min(chance, _ONE)):
+            level ^= 1
+        return level
+
+    def hear_data(
+        self, tick: int, until: int, start: int, data: bytes, senders: list[Sender], rank: int
+    ) -> None:
+        """Part of a transmission whose first start bit arrives at `start`."""
+        sender = senders[rank]
+        first = (start - sender.latency) // _BIT  # number of the first error draw
+        number = sender.number(tick - start)
+        begin = sender.begin(start, number)
+        while begin < until:
+            level = self.bit(begin, sender.bit(data, number), first + number, begin >= tick, senders, rank)
+            if self.lost_threshold:
+                if self.lost.below(first + number - number % _CHARACTER, self.lost_threshold):
+                    level = 1
+            self.line.append(max(begin, tick), level)
+            number += 1
+            begin = sender.begin(start, number)
+
+    def bit(self, begin: int, sent: int, draw: int, fresh: bool, senders: list[Sender], rank: int) -> int:
+        """The level in a bit that begins at `begin`; not `fresh`: it was asked for before, or is cut."""
+        level = sent
+        if self.dropouts is not None and self.dropouts.bad(begin // _BIT):
+            level = self.silence(begin, begin // _BIT)
+        else:
+            if rank + 1 < len(senders):
+                level = self.mixed(level, begin, senders, rank)
+            chance = self.threshold
+            if self.slicer is not None:
+                if fresh:
+                    self.slicer.hear(begin, 2 * level - 1)
+                chance = self.slicer.threshold(level)
+            if self.bursts is not None and self.bursts.bad(begin // _BIT):
+                chance = self.burst_threshold
+            if self.errors.below(draw, chance):
+                level ^= 1
+        if level != sent and fresh and rank == 0:
+            self.bit_errors += 1
+        return level
+
+    def mixed(self, level: int, begin: int, senders: list[Sender], rank: int) -> int:
+        """The level of `senders[rank]` at `begin`, or a fair coin if another one on the air has the other."""
+        for index in range(rank + 1, len(senders)):
+            sender = senders[index]
+            if sender.level(begin) == 1 - level:
+                return self.collision.bit(begin // _BIT)
+        return level
+
+    def snapshot(self) -> dict[str, object]:
+        state: dict[str, object] = {"bit_errors": self.bit_errors}
+        if self.slicer is not None:
+            state["slicer"] = self.slicer.snapshot()
+        return state
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.bit_errors = state["bit_errors"]
+        if self.slicer is not None:
+            self.slicer.restore(state["slicer"])

@@ -1,0 +1,77 @@
+"""Probabilities as thresholds of a 32-bit draw, and the bit errors of non-coherent FSK.
+
+What belongs here: conversions that run once, when a band is built; what comes out are integers. What does
+not: the draws (`miro_sim.rng`) and who makes them.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from miro_host import dmath
+
+from miro_sim import clock
+
+ONE = 1 << 32
+"""The threshold that every draw is below."""
+
+BIT_S = Fraction(clock.HOST_BIT_TICKS, clock.TICKS_PER_SECOND)
+LN10_TENTH = 0.23025850929940458
+MARGIN_STEPS = 128
+"""Entries of `margin_table` in a margin of 1."""
+
+
+def threshold(probability: float | Fraction, name: str = "probability") -> int:
+    """A probability as the number of the 2^32 values of a draw that mean "yes", rounded half up.
+
+    The float stands for the decimal number that it prints as, as in `clock.ticks`. Raises ValueError
+    outside 0 .. 1, naming it `name`.
+    """
+    exact = Fraction(repr(probability)) if isinstance(probability, float) else Fraction(probability)
+    if not 0 <= exact <= 1:
+        raise ValueError(f"{name} {probability} is outside 0 .. 1")
+    return (2 * exact * ONE + 1) // 2
+
+
+def error_threshold(bit_error_rate: float | Fraction) -> int:
+    """`threshold` of a bit-error rate."""
+    return threshold(bit_error_rate, "bit_error_rate")
+
+
+def rate_threshold(per_s: float) -> int:
+    """`threshold` of an event in one bit time (1/9600 s) that comes `per_s` times a second."""
+    return threshold(Fraction(repr(float(per_s))) * BIT_S, f"{per_s}/s in a bit time: the probability")
+
+
+def mean_threshold(mean_s: float) -> int:
+    """`threshold` of an end in one bit time of something that lasts `mean_s` seconds on average."""
+    exact = Fraction(repr(float(mean_s)))
+    if exact < BIT_S:
+        raise ValueError(f"a mean of {mean_s} s is shorter than a bit (1/9600 s)")
+    return threshold(BIT_S / exact)
+
+
+def fsk_exponent(eb_n0_db: float) -> float:
+    """Eb / 2N0 as a plain number from Eb/N0 in decibels."""
+    return 0.5 * dmath.exp(eb_n0_db * LN10_TENTH)
+
+
+def fsk_threshold(eb_n0_db: float) -> int:
+    """Bit errors of non-coherent FSK in white Gaussian noise, 0.5 exp(-Eb/2N0) (link.md section 2)."""
+    return int(2147483648.0 * dmath.exp(-fsk_exponent(eb_n0_db)) + 0.5)
+
+
+def margin_table(eb_n0_db: float) -> tuple[int, ...]:
+    """Thresholds of a wrong decision at margins -1, -1 + 1/128, .. 3.
+
+    The margin is the distance of the signal from the slicer's threshold, 1 when that is in the middle. A
+    margin m has the errors of a signal of m times the amplitude, 0.5 exp(-m^2 Eb/2N0). A negative one means
+    that the decision is wrong unless noise turns it over: 1 - that.
+    """
+    exponent = fsk_exponent(eb_n0_db)
+    table = []
+    for step in range(-MARGIN_STEPS, 3 * MARGIN_STEPS + 1):
+        margin = float(step) / float(MARGIN_STEPS)
+        wrong = int(2147483648.0 * dmath.exp(-(exponent * (margin * margin))) + 0.5)
+        table.append(ONE - wrong if step < 0 else wrong)
+    return tuple(table)

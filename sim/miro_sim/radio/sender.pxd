@@ -1,0 +1,19 @@
+cimport cython
+
+cdef long long _CHARACTER
+
+
+cdef class Sender:
+    cdef readonly list transmissions
+    cdef readonly long long numerator, denominator, latency, keyup
+    cdef readonly bint always_on
+
+    cdef long long begin(self, long long start, long long number) except? -1
+    cdef long long number(self, long long since) except? -1
+    @cython.locals(start='long long', data=bytes)
+    cpdef long long end(self, Py_ssize_t index) except? -1
+    @cython.locals(place='long long')
+    cdef int bit(self, bytes data, long long number) except -1
+    @cython.locals(index=Py_ssize_t, start='long long', data=bytes)
+    cdef int level(self, long long tick) except? -2
+    cpdef forget(self, long long until)

@@ -1,0 +1,79 @@
+"""A transmitter as the robots hear it: what it has on the air, and when each bit of it begins.
+
+What belongs here: transmissions under way and their bit times on the robots' clock. A robot's clock is the
+tick, so the PC's baud rate and the robot's crystal show as one ratio; a bit begins at a whole tick, rounded
+down from the exact fraction, so that nothing adds up. What does not: what receivers make of it (`listener`).
+"""
+
+from __future__ import annotations
+
+from miro_sim.clock import CHARACTER_BITS
+from miro_sim.radio.params import RadioParams, bit_ticks
+
+_CHARACTER = 10
+assert CHARACTER_BITS == _CHARACTER
+
+
+class Sender:
+    """One transmitter, on the clock of robots whose crystals are off by `crystal_offset_ppm`.
+
+    `transmissions`: (tick at which the first start bit arrives, bytes), in order.
+    """
+
+    NOT_STATE = ("always_on", "denominator", "keyup", "latency", "numerator")
+
+    def __init__(self, params: RadioParams, crystal_offset_ppm: int) -> None:
+        bit = bit_ticks(params.baud_offset_ppm, crystal_offset_ppm)
+        self.numerator = bit.numerator
+        self.denominator = bit.denominator
+        self.latency = params.latency_ticks
+        self.keyup = params.keyup_ticks
+        self.always_on = params.carrier == "on"
+        self.transmissions: list[tuple[int, bytes]] = []
+
+    def __repr__(self) -> str:
+        waiting = [(start, data.hex(" ")) for start, data in self.transmissions]
+        return f"Sender({self.numerator}/{self.denominator} ticks a bit, {waiting})"
+
+    def begin(self, start: int, number: int) -> int:
+        """Tick at which bit `number` of a transmission begins."""
+        return start + number * self.numerator // self.denominator
+
+    def number(self, since: int) -> int:
+        """Number of the bit that is on the air `since` ticks after the start."""
+        return ((since + 1) * self.denominator - 1) // self.numerator
+
+    def end(self, index: int) -> int:
+        """Tick at which the last stop bit of a waiting transmission is over."""
+        start, data = self.transmissions[index]
+        return self.begin(start, _CHARACTER * len(data))
+
+    def bit(self, data: bytes, number: int) -> int:
+        """The level of bit `number` of these characters."""
+        place = number % _CHARACTER
+        if place == 0:
+            return 0
+        if place == _CHARACTER - 1:
+            return 1
+        return (data[number // _CHARACTER] >> (place - 1)) & 1
+
+    def level(self, tick: int) -> int:
+        """What is on the air at `tick`: 0 space, 1 mark, -1 no carrier."""
+        for index in range(len(self.transmissions)):
+            start, data = self.transmissions[index]
+            if start <= tick < self.end(index):
+                return self.bit(data, self.number(tick - start))
+            if start - self.keyup <= tick < start:
+                return 1
+        return 1 if self.always_on else -1
+
+    def forget(self, until: int) -> None:
+        """Drops the transmissions that are over by then."""
+        while self.transmissions and self.end(0) <= until:
+            del self.transmissions[0]
+
+    def snapshot(self) -> list[list[object]]:
+        return [[start, data] for start, data in self.transmissions]
+
+    def restore(self, state: list[tuple[int, bytes]]) -> None:
+        self.transmissions = state
