@@ -17,6 +17,7 @@ from miro_robot.image import Image
 from miro_sim import scenario as sc
 from miro_sim.build import radio_for
 from miro_sim.clock import HOST_CHARACTER_TICKS, ticks
+from miro_sim.control_noise import NoisyCommands
 from miro_sim.radio import Downlink, Uplink
 from miro_sim.records import RobotPeriod, WireRun
 from miro_sim.robot import Robot
@@ -33,6 +34,7 @@ class Network:
         "index",
         "compute_ticks",
         "keyup_ticks",
+        "noisy_commands",
         "script",
         "sent",
         "seen",
@@ -55,6 +57,12 @@ class Network:
             Robot(robot, scenario, index, spec.robots, seed, image)
             for robot in sorted(spec.robot, key=lambda robot: robot.slot)
         ]
+        self.noisy_commands = [
+            NoisyCommands(
+                spec.control_noise, robot.pilot.wheels, seed, f"net{index}/robot{robot.spec.slot}/control"
+            )
+            for robot in self.robots
+        ]
         self.station = Station(spec.robots, telemetry=spec.radio.telemetry)
         radio = radio_for(spec.radio)
         self.downlink = Downlink(radio, seed, f"net{index}/down")
@@ -70,7 +78,7 @@ class Network:
         self.seen: list[RobotPeriod] = []
 
     def begin_period(self, tick: int, end_tick: int) -> None:
-        """Camera, PC and station, in this order; then the line is known up to the end of the period."""
+        """Camera, PC and station, in this order."""
         measured = [robot.expose(tick) for robot in self.robots]
         self.sent = []
         if self.script is None:
@@ -85,13 +93,20 @@ class Network:
             robot.record(tick, posture, command)
             for robot, posture, command in zip(self.robots, measured, commands, strict=True)
         ]
+
+    def share_frequency(self, other: Network) -> None:
+        """Lets the robots of this network hear the other one's transmitter too."""
+        self.downlink.overhear(other.downlink)
+
+    def settle(self, end_tick: int) -> None:
+        """All networks have sent: the line is known up to the end of the period."""
         self.downlink.settle(end_tick + SETTLE_TICKS)
 
     def _transmit(self, start_tick: int, commands: Sequence[Command | None]) -> None:
         wheels = [(0, 0)] * self.spec.robots
-        for robot, command in zip(self.robots, commands, strict=True):
+        for robot, noise, command in zip(self.robots, self.noisy_commands, commands, strict=True):
             if command is not None:
-                wheels[robot.spec.slot] = (command.left, command.right)
+                wheels[robot.spec.slot] = noise.wheels_of(command, robot.frame)
         self._send(start_tick, self.station.frame(wheels))
 
     def _transmit_script(self, end_tick: int) -> None:

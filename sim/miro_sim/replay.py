@@ -18,8 +18,9 @@ from miro_protocol.stream import DOWN, Transmission
 
 from miro_sim.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND, seconds
 from miro_sim.records import Axis, Period, RobotPeriod, WireRun
-from miro_sim.scenario import Network, Radio, Scenario
+from miro_sim.scenario import Network, Scenario
 from miro_sim.scenario_file import load
+from miro_sim.scenario_radio import Radio
 
 ScriptRun = tuple[int, int, bytes]
 DEFAULT_SCENARIO = "fig6"

@@ -1,8 +1,8 @@
 """The scenario: everything about a run that is chosen rather than drawn, as frozen structs.
 
 What belongs here: the keys a scenario file may have, with unit, default and range, and the rules between
-them. What does not: reading files and reporting what is wrong in them (`scenario_file`), and what the keys
-do (`miro_host`, `radio`, `plant`, `world`).
+them; those of the radio are in `scenario_radio`. What does not: reading files and reporting what is wrong in
+them (`scenario_file`), and what the keys do (`miro_host`, `radio`, `plant`, `world`).
 
 Every key carries its unit. Defaults are the "realistic" set: the paper's measurement error (2.40 cm and
 4.83 degrees as 3 sigma), one camera frame of vision delay, 3 ms of computing, a keyed carrier and a
@@ -15,6 +15,7 @@ import msgspec
 from msgspec import Meta
 
 from miro_sim.plant.params import DriveParams
+from miro_sim.scenario_radio import ControlNoise, Radio
 
 PERIOD_TICKS = 800_800
 CHARACTER_TICKS = 25_000  # 10 bits at 9600 baud
@@ -51,21 +52,6 @@ class HostTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """How long the PC computes between the camera frame and the key-up of the transmitter."""
 
     compute_s: Annotated[float, Meta(ge=0.00001, le=0.030)] = 0.003
-
-
-class Radio(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One radio network: 9600 baud down to the robots and, with `telemetry`, a second band up.
-
-    `carrier` keyed is a transmitter that is on per frame only, `keyup_s` before its first start bit;
-    between frames the receiver's slicer makes noise, unless `squelch` holds it at mark.
-    """
-
-    latency_s: Annotated[float, Meta(ge=0.0, le=0.030)] = 0.0
-    bit_error_rate: Annotated[float, Meta(ge=0.0, le=0.5)] = 1e-4
-    carrier: Literal["keyed", "on"] = "keyed"
-    keyup_s: Annotated[float, Meta(ge=0.0, le=0.030)] = 0.001
-    squelch: bool = False
-    telemetry: bool = True
 
 
 class LineRef(
@@ -156,6 +142,7 @@ class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     robots: Literal[3, 5] = 3
     radio: Radio = Radio()
+    control_noise: ControlNoise = ControlNoise()
     robot: Annotated[tuple[Robot, ...], Meta(min_length=1)]
 
     def __post_init__(self) -> None:
@@ -171,12 +158,21 @@ class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
                     f"robot[{index}]: slot {slot} is taken by robot[{slots.index(slot)}];"
                     " give each robot its own slot"
                 )
-        characters = FRAME_CHARACTERS[self.robots]
-        needed = characters * CHARACTER_TICKS + round(self.radio.keyup_s * 24e6)
-        if self.radio.carrier == "keyed" and needed > PERIOD_TICKS:
-            longest_s = (PERIOD_TICKS - characters * CHARACTER_TICKS) / 24e6
+        self._check_air_time()
+
+    def _check_air_time(self) -> None:
+        """A frame, with the transmitter's key-up, has to fit the camera period."""
+        radio, characters = self.radio, FRAME_CHARACTERS[self.robots]
+        air_ticks = characters * CHARACTER_TICKS * 1_000_000 / (1_000_000 + radio.baud_offset_ppm)
+        if air_ticks > PERIOD_TICKS:
             raise ValueError(
-                f"radio.keyup_s: {self.radio.keyup_s} s and a frame of {characters} characters do"
+                f"radio.baud_offset_ppm: {radio.baud_offset_ppm} makes a frame of {characters} characters longer"
+                " than the camera period; use a smaller one"
+            )
+        longest_s = (PERIOD_TICKS - air_ticks) / 24e6
+        if radio.carrier == "keyed" and round(radio.keyup_s * 24e6) > PERIOD_TICKS - air_ticks:
+            raise ValueError(
+                f"radio.keyup_s: {radio.keyup_s} s and a frame of {characters} characters do"
                 f" not fit the camera period; at most {longest_s:.6f} s"
             )
 

@@ -20,6 +20,7 @@ UNITS = {
     "deg": "degrees",
     "hz": "hertz",
     "db": "decibels",
+    "ppm": "parts per million",
     "m_s": "metres per second",
     "rad_s": "radians per second",
     "m_s2": "metres per second squared",
@@ -95,7 +96,7 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
     if missing:
         place = f"{path}.{missing[1]}" if path else missing[1]
         return ScenarioError(origin, place, "this key is missing", _choices_of(missing[1]))
-    inner = re.fullmatch(r"(?s)([a-z_.]+(?:\[\d+\])?(?:\.[a-z_]+)*): (.*)", what)
+    inner = re.fullmatch(r"(?s)([a-z0-9_.]+(?:\[\d+\])?(?:\.[a-z0-9_]+)*): (.*)", what)
     if inner:  # a rule between keys (`Network.__post_init__`) names the place below its own table
         path = f"{path}.{inner[1]}" if path else inner[1]
         what = inner[2]

@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 
 from miro_sim.inputs import InputError, read_input
+from miro_sim.profiles import UnknownProfileError, with_profiles
 from miro_sim.scenario import Scenario
 from miro_sim.scenario_errors import ScenarioError, value_error
 
@@ -85,10 +86,23 @@ def parse(text: str, origin: str) -> Scenario:
     except ValueError:  # an integer with more digits than Python converts
         raise ScenarioError(origin, "", "an integer of thousands of digits") from None
     _check_finite(raw, "", origin)
+    _fill_in_profiles(raw, origin)
     try:
         return msgspec.convert(raw, Scenario)
     except msgspec.ValidationError as error:
         raise value_error(origin, raw, str(error)) from None
+
+
+def _fill_in_profiles(raw: dict[str, Any], origin: str) -> None:
+    """Replaces the radio tables by themselves with their profiles; what has another shape is left alone."""
+    networks = raw.get("network")
+    for index, network in enumerate(networks if isinstance(networks, list) else []):
+        if isinstance(network, dict) and isinstance(network.get("radio"), dict):
+            try:
+                network["radio"] = with_profiles(network["radio"])
+            except UnknownProfileError as error:
+                place = f"network[{index}].radio.profile"
+                raise ScenarioError(origin, place, str(error), error.remedy) from None
 
 
 def _syntax_error(origin: str, text: str, message: str) -> ScenarioError:

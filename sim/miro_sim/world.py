@@ -4,15 +4,16 @@ What belongs here: the order in which the parties act, the digest chain, and sav
 party does (`network.py`, `robot.py`, `miro_host`, `miro_robot`), files, and the wall clock.
 
 Order on the tick of a camera frame: networks by index; within one, all robots are exposed (slot order), all pilots
-compute, the station composes its frame, the air is settled up to the next camera frame. Then each robot runs alone
-to that tick (networks by index, slot order), the PC's receivers hear what came back, and the state is hashed.
-`run_to` may stop anywhere in between; it gives the same bits however it is cut.
+compute, the station composes its frame. The air of all networks is settled up to the next camera frame. Then each
+robot runs alone to that tick (networks by index, slot order), the PC's receivers hear what came back, and the state is
+hashed. `run_to` may stop anywhere in between; it gives the same bits however it is cut.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from itertools import permutations
 from typing import Any
 
 import msgspec
@@ -61,6 +62,9 @@ class World:
             )
             for index, network in enumerate(scenario.networks)
         ]
+        for one, other in permutations(self.networks, 2):
+            if one.spec.radio.channel is not None and one.spec.radio.channel == other.spec.radio.channel:
+                one.share_frequency(other)
         self.tick = 0
         self.index = 0
         self.in_period = False
@@ -98,6 +102,8 @@ class World:
             if not self.in_period:
                 for network in self.networks:
                     network.begin_period(self.tick, end_tick)
+                for network in self.networks:
+                    network.settle(end_tick)
                 self.in_period = True
             self.tick = min(tick, end_tick)
             for network in self.networks:

@@ -44,16 +44,16 @@ def test_the_built_in_scenarios_are_the_two_figures_of_the_paper() -> None:
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig8"])
-def test_a_built_in_scenario_names_itself_and_spells_out_every_key(name: str) -> None:
+def test_a_built_in_scenario_names_itself_and_names_every_key(name: str) -> None:
     loaded = load(name)
     assert loaded.scenario.name == name
     raw = msgspec.to_builtins(loaded.scenario)
-    keys = {line.partition("=")[0].strip() for line in loaded.text.splitlines() if "=" in line}
+    keys = {line.partition("=")[0].strip("# ") for line in loaded.text.splitlines() if "=" in line}
     robot = raw["network"][0]["robot"][0]
     tables = [raw, raw["camera"], raw["host"], raw["network"][0]["radio"], robot]
-    tables += [robot["reference"], robot["controller"]]
+    tables += [robot["reference"], robot["controller"], raw["network"][0]["control_noise"]]
     for table in tables:
-        leaves = {key for key, value in table.items() if not isinstance(value, (dict, list, tuple))}
+        leaves = {key for key, value in table.items() if isinstance(value, (bool, int, float, str))}
         assert leaves <= keys
 
 

@@ -1,8 +1,12 @@
 """`mirotwin scenarios`: the built-in ones, and their files to copy from."""
 
+import json
+from typing import Any
+
 import click
 from rich.table import Table
 
+from miro_sim import profiles as radio_profiles
 from miro_sim import scenario_file
 from miro_sim.cli.program import show as print_result
 
@@ -30,3 +34,23 @@ def scenarios(context: click.Context) -> None:
 def show(name: str) -> None:
     """Prints the file of the built-in scenario NAME, to read or to start one's own from."""
     click.echo(scenario_file.builtin_text(name), nl=False)
+
+
+@scenarios.command()
+def profiles() -> None:
+    """Lists the radio profiles and the keys that each sets, for `profile = ".."` in [network.radio]."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("profile", style="bold")
+    table.add_column("what it does")
+    table.add_column("keys")
+    for name, profile in radio_profiles.profiles().items():
+        table.add_row(name, profile["about"], _keys(radio_profiles.keys_of(name)))
+    print_result(table)
+
+
+def _keys(table: dict[str, Any]) -> str:
+    """A table as TOML in one line."""
+    return ", ".join(
+        f"{key} = {{ {_keys(value)} }}" if isinstance(value, dict) else f"{key} = {json.dumps(value)}"
+        for key, value in table.items()
+    )

@@ -1,0 +1,69 @@
+"""Radio profiles: named sets of `[network.radio]` keys, and how a scenario's table is made of them.
+
+What belongs here: the names, and which key wins. What does not: what the keys mean (`scenario_radio`) and
+whether their values are good (`scenario_file`).
+"""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from functools import cache
+from importlib import resources
+from typing import Any
+
+ERROR_KEYS = ("bit_error_rate", "eb_n0_db")
+"""Two ways to say one thing: a table that has one of them takes the other one away."""
+
+Table = dict[str, Any]
+
+
+class UnknownProfileError(ValueError):
+    """A name that is no profile; `remedy` is what to write instead."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"{name!r} is no profile")
+        close = get_close_matches(name, profiles(), n=1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        self.remedy = f"{hint}profiles: {', '.join(profiles())}"
+
+
+@cache
+def profiles() -> Mapping[str, Mapping[str, Any]]:
+    """Name -> `about` and keys of the profiles that come with the package, in the order of their file."""
+    text = (resources.files("miro_sim") / "profiles.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def keys_of(name: str) -> Table:
+    """The keys that a profile sets. Raises UnknownProfileError."""
+    if name not in profiles():
+        raise UnknownProfileError(name)
+    return {key: value for key, value in profiles()[name].items() if key != "about"}
+
+
+def with_profiles(radio: Table) -> Table:
+    """A radio table with the keys of its profiles filled in; its own keys win. Raises UnknownProfileError.
+
+    A `profile` that is no name and no list of names is left for others to complain about.
+    """
+    named = radio.get("profile", ())
+    names = [named] if isinstance(named, str) else named
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        return radio
+    merged: Table = {}
+    for name in names:
+        merged = overridden(merged, keys_of(name))
+    return overridden(merged, radio)
+
+
+def overridden(table: Table, winner: Table) -> Table:
+    """Both tables as one; where both have a key the second one's holds, and tables are merged likewise."""
+    merged = dict(table)
+    if any(key in winner for key in ERROR_KEYS):
+        for key in ERROR_KEYS:
+            merged.pop(key, None)
+    for key, value in winner.items():
+        below = merged.get(key)
+        both = isinstance(below, dict) and isinstance(value, dict)
+        merged[key] = {**below, **value} if both else value  # type: ignore[dict-item]
+    return merged
