@@ -1,20 +1,25 @@
-"""The radio's two bands as functions of time, one tick at a time, and a UART that reads such a function.
+"""The radio's two bands as functions of time, one segment after the other, and a UART that reads such a function.
 
-Written from the definitions in `miro_sim.radio`; draws come from the naive streams. Everything is evaluated
-from the beginning at every call.
+Written from the definitions in `miro_sim.radio` and its README; draws come from the naive streams. Everything is
+evaluated from the beginning at every call.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterable
+from fractions import Fraction
+from functools import cache
+from typing import NamedTuple
 
-from miro_sim.radio import RadioParams
+from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 
 from tests.naive import rng
 
 Sent = list[tuple[int, bytes]]  # (tick of the first start bit at the transmitter, bytes)
 Edges = list[tuple[int, int]]  # (tick, level)
 Symbol = tuple[int, bool, int]
+NOBODY: list[tuple[RadioParams, str, Sent]] = []
 
 
 def wire_bits(data: bytes) -> list[int]:
@@ -22,51 +27,176 @@ def wire_bits(data: bytes) -> list[int]:
     return [bit for byte in data for bit in (0, *(byte >> i & 1 for i in range(8)), 1)]
 
 
-def downlink_bit(tick: int, params: RadioParams, sent: Sent) -> tuple[int, int] | None:
-    """(level as sent, tick at the transmitter at which the bit began), or None between transmissions."""
-    for start, data in sent:
-        number = (tick - params.latency_ticks - start) // 2500
-        if 0 <= number < 10 * len(data):
-            return wire_bits(data)[number], start + 2500 * number
-    return None
+@cache
+def chain_states(params: ChainParams, seed: int, name: str, slots: int) -> list[bool]:
+    """Bad or good in slots 0 .. slots-1, by the book: step by step from a good start."""
+    bad, states = False, []
+    for slot in range(slots):
+        draw = rng.u32(seed, name, slot)
+        bad = draw < 2**32 - params.leave if bad else draw < params.enter
+        states.append(bad)
+    return states
 
 
-def downlink_level(tick: int, params: RadioParams, seed: int, name: str, sent: Sent) -> int:
-    """The level on the RXD wire of the robot called `name`."""
-    bit = downlink_bit(tick, params, sent)
-    if bit is not None:
-        level, began = bit
-        wrong = rng.u32(seed, f"{name}/errors", began // 2500) < params.error_threshold
-        return level ^ wrong
-    u = tick - params.latency_ticks
-    keyed = any(start - params.keyup_ticks <= u < start for start, _ in sent)
-    if keyed or params.carrier == "on" or params.squelch:
-        return 1
-    return rng.bit(seed, f"{name}/noise", tick // 2500)
+def chain_bad(params: ChainParams | None, seed: int, name: str, slot: int) -> bool:
+    return params is not None and chain_states(params, seed, name, slot - slot % 256 + 256)[slot]
 
 
-def downlink_edges(until: int, params: RadioParams, seed: int, name: str, sent: Sent) -> Edges:
-    """Every change of the level before `until`, the wire being at mark before tick 0."""
-    ticks = set(range(0, until, 2500))
-    for start, data in sent:
-        begin = start + params.latency_ticks
-        ticks |= {begin - params.keyup_ticks} | {begin + 2500 * i for i in range(10 * len(data) + 1)}
-    return changes(
-        lambda tick: downlink_level(tick, params, seed, name, sent), (t for t in ticks if 0 <= t < until)
-    )
+class OnAir(NamedTuple):
+    """What a sender has on the air: `bit` is the number of a data bit, or None for the idle carrier."""
+
+    level: int
+    begin: int
+    bit: int | None = None
+    arrival: int = 0
+
+
+class Sender:
+    """Everything that a transmitter ever sends, as it arrives at robots with the crystal of `listener`."""
+
+    def __init__(self, params: RadioParams, listener: RadioParams, seed: int, name: str, sent: Sent) -> None:
+        self.params = params
+        own = Fraction(2500 * (10**6 + params.crystal_offset_ppm), 10**6 + params.baud_offset_ppm)
+        self.bit_ticks = Fraction(
+            2500 * (10**6 + listener.crystal_offset_ppm), 10**6 + params.baud_offset_ppm
+        )
+        self.arrivals: list[tuple[int, list[int], list[int]]] = []  # arrival, bits, ticks at which they begin
+        over = 0
+        for start, data in sent:
+            late = rng.u32(seed, f"{name}/jitter", start // 2500) * (params.jitter_ticks + 1) // 2**32
+            arrival = max(start + params.latency_ticks + late, over)
+            bits = wire_bits(data)
+            begins = [arrival + int(number * self.bit_ticks) for number in range(len(bits) + 1)]
+            self.arrivals.append((arrival, bits, begins))
+            over = arrival + max(25_000 * len(data), int(10 * len(data) * own))
+
+    def on_air(self, tick: int) -> OnAir | None:
+        for arrival, bits, begins in self.arrivals:
+            if begins[0] <= tick < begins[-1]:
+                number = bisect_right(begins, tick) - 1
+                return OnAir(bits[number], begins[number], number, arrival)
+        keyed = any(0 < arrival - tick <= self.params.keyup_ticks for arrival, _, _ in self.arrivals)
+        return OnAir(1, tick - tick % 2500) if keyed or self.params.carrier == "on" else None
+
+    def event_ticks(self) -> set[int]:
+        ticks = set()
+        for arrival, _, begins in self.arrivals:
+            ticks |= {arrival - self.params.keyup_ticks, *begins}
+        return ticks
+
+
+class Slicer:
+    """Its threshold as the mean of what came in, in steps of at most a bit time."""
+
+    def __init__(self, params: SlicerParams | None) -> None:
+        self.params = params
+        self.mean = self.signal = self.tick = 0
+
+    def hear(self, tick: int, signal: int) -> None:
+        if self.params is None:
+            return
+        target = self.signal * 65536 + self.params.offset if self.signal else 0
+        for step in [2500] * ((tick - self.tick) // 2500) + [(tick - self.tick) % 2500]:
+            self.mean += ((target - self.mean) * (self.params.gain * step // 2500)) // 65536
+        self.tick, self.signal = tick, signal
+
+    def chance(self, level: int) -> int:
+        assert self.params is not None
+        margin = 65536 - (2 * level - 1) * (self.mean - self.params.offset)
+        return self.params.thresholds[min(max((margin + 65536) // 512, 0), 512)]
+
+
+def downlink_edges(
+    until: int,
+    params: RadioParams,
+    seed: int,
+    name: str,
+    robot: str,
+    sent: Sent,
+    others: list[tuple[RadioParams, str, Sent]] = NOBODY,
+) -> Edges:
+    """Every change of the level on a robot's RXD wire before `until`, the wire being at mark before tick 0."""
+    senders = [Sender(params, params, seed, name, sent)]
+    senders += [Sender(its, params, seed, its_name, its_sent) for its, its_name, its_sent in others]
+    ticks = set(range(0, until, 2500)).union(*(sender.event_ticks() for sender in senders))
+    slicer = Slicer(params.slicer)
+    decided: dict[object, int] = {}
+    levels = {}
+    for tick in sorted(tick for tick in ticks if 0 <= tick < until):
+        rank, on_air = next(
+            ((rank, found) for rank, sender in enumerate(senders) if (found := sender.on_air(tick))),
+            (-1, None),
+        )
+        key = (
+            rank,
+            None if on_air is None else on_air._replace(level=0),
+            tick // 2500 if on_air is None else 0,
+        )
+        if key not in decided:
+            decided[key] = decide(tick, rank, on_air, senders, params, slicer, seed, robot)
+        levels[tick] = decided[key]
+    return changes(levels.__getitem__, levels)
+
+
+def decide(
+    tick: int,
+    rank: int,
+    on_air: OnAir | None,
+    senders: list[Sender],
+    params: RadioParams,
+    slicer: Slicer,
+    seed: int,
+    robot: str,
+) -> int:
+    """What a receiver puts out from `tick` on for a bit, or for a slot of idle carrier or of none."""
+
+    def silence(tick: int, slot: int) -> int:
+        if slicer.signal:
+            slicer.hear(tick, 0)
+        return 1 if params.squelch else rng.bit(seed, f"{robot}/noise", slot)
+
+    if on_air is None:
+        return silence(tick, tick // 2500)
+    slot, level = on_air.begin // 2500, on_air.level
+    lost = False
+    if on_air.bit is not None:
+        number = (on_air.arrival - senders[rank].params.latency_ticks) // 2500 + on_air.bit
+        character = number - on_air.bit % 10
+        lost = rng.u32(seed, f"{robot}/lost", character) < params.lost_threshold
+    if chain_bad(params.dropouts, seed, f"{robot}/dropouts", slot):
+        level = silence(tick if on_air.bit is None else on_air.begin, slot)
+        return 1 if lost else level
+    rivals = [found for sender in senders[rank + 1 :] if (found := sender.on_air(on_air.begin))]
+    if any(rival.level != level for rival in rivals):
+        level = rng.bit(seed, f"{robot}/collision", slot)
+    if tick == on_air.begin or (on_air.bit is None and slicer.signal != 2 * level - 1):
+        slicer.hear(tick, 2 * level - 1)
+    bad = chain_bad(params.bursts, seed, f"{robot}/bursts", slot)
+    if on_air.bit is None:
+        chance = params.false_start_threshold + (slicer.chance(level) if params.slicer else 0)
+        chance = params.burst_threshold if bad else chance
+        return level ^ (rng.u32(seed, f"{robot}/idle", slot) < chance)
+    chance = slicer.chance(level) if params.slicer else params.error_threshold
+    chance = params.burst_threshold if bad else chance
+    level ^= rng.u32(seed, f"{robot}/errors", number) < chance
+    return 1 if lost else level
 
 
 def uplink_level(tick: int, params: RadioParams, seed: int, name: str, wires: list[Edges]) -> int:
-    """The level at the PC's receiver; `wires` are the TXD edges of each robot."""
+    """The level at the PC's receiver; `wires` are the TXD edges of robots 0, 1, .."""
     u = tick - params.latency_ticks
     levels = []
-    for edges in wires:
+    threshold = params.error_threshold
+    for robot, edges in enumerate(wires):
         past = [edge for edge in edges if edge[0] <= u]
-        if past and u < past[-1][0] + 50_000:
+        on_air = past and u < past[-1][0] + 50_000
+        if on_air and not chain_bad(params.dropouts, seed, f"{name}/robot{robot}/dropouts", u // 2500):
             levels.append(past[-1][1])
+            if chain_bad(params.bursts, seed, f"{name}/robot{robot}/bursts", u // 2500):
+                threshold = params.burst_threshold
     if not levels:
         return 1
-    wrong = rng.u32(seed, f"{name}/errors", u // 2500) < params.error_threshold
+    wrong = rng.u32(seed, f"{name}/errors", u // 2500) < threshold
     return min(levels) ^ wrong
 
 
@@ -93,14 +223,14 @@ def level_at(edges: Edges, tick: int) -> int:
     return ([1] + [level for edge, level in edges if edge <= tick])[-1]
 
 
-def receive(edges: Edges, until: int, bit_ticks: int = 2500) -> list[Symbol]:
+def receive(edges: Edges, until: int, bit_ticks: Fraction = Fraction(2500)) -> list[Symbol]:
     """What a UART makes of a level: every symbol whose stop bit is sampled before `until`."""
     symbols = []
     free = 0
     for start, level in edges:
         if level == 1 or start < free:
             continue
-        samples = [start + bit_ticks // 2 + bit_ticks * i for i in range(10)]
+        samples = [start + int((i + Fraction(1, 2)) * bit_ticks) for i in range(10)]
         if samples[0] < until and level_at(edges, samples[0]) == 1:
             free = samples[0] + 1
             continue

@@ -7,7 +7,7 @@ from miro_robot.mcs51.line import Line
 from miro_sim.radio import Downlink, RadioParams
 
 from tests.naive import radio as naive
-from tests.sim.radio.strategies import cuts, params, seeds, transmissions
+from tests.sim.radio.strategies import cuts, neighbours, params, seeds, transmissions
 
 UNTIL = 1_500_000
 
@@ -20,46 +20,71 @@ def band(radio, seed=0, robots=(0,)):
     return downlink, lines
 
 
+def shared(radio, seed, others, robots=(0,)):
+    """A network with others on its frequency; returns all downlinks, its own first, and its wires."""
+    downlink, lines = band(radio, seed, robots)
+    links = [downlink]
+    for number, (its, _) in enumerate(others):
+        links.append(Downlink(its, seed, f"other{number}"))
+        downlink.overhear(links[-1])
+    return links, lines
+
+
+def announcements(radio, sent, others):
+    """(tick at which the carrier comes up here, link number, start, bytes) of all networks, in order."""
+    waiting = []
+    for number, (its, its_sent) in enumerate([(radio, sent), *others]):
+        lead = 0 if its.carrier == "on" else its.keyup_ticks
+        waiting += [(start - lead + its.latency_ticks, number, start, data) for start, data in its_sent]
+    return sorted(waiting)
+
+
 @settings(deadline=None, max_examples=60)
-@given(params, seeds, transmissions())
-def test_every_robot_hears_what_the_naive_twin_evaluates_tick_by_tick(radio, seed, sent):
-    downlink, lines = band(radio, seed, (0, 2))
-    for start, data in sent:
-        downlink.send(start, data)
-    downlink.settle(UNTIL)
+@given(params, seeds, transmissions(), neighbours)
+def test_every_robot_hears_what_the_naive_twin_evaluates_from_the_definitions(radio, seed, sent, others):
+    links, lines = shared(radio, seed, others, (0, 2))
+    for _, link, start, data in announcements(radio, sent, others):
+        links[link].send(start, data)
+    links[0].settle(UNTIL)
+    heard = [(its, f"other{number}", its_sent) for number, (its, its_sent) in enumerate(others)]
     for robot, line in lines.items():
-        assert line.edges() == naive.downlink_edges(UNTIL, radio, seed, f"net/robot{robot}", sent)
+        assert line.edges() == naive.downlink_edges(
+            UNTIL, radio, seed, "net", f"net/robot{robot}", sent, heard
+        )
         assert line.settled_tick == UNTIL
 
 
-@settings(deadline=None)
-@given(params, seeds, transmissions(), cuts(UNTIL), st.data())
-def test_edges_errors_and_snapshots_do_not_depend_on_how_settling_is_cut(radio, seed, sent, ticks, data):
-    whole, whole_lines = band(radio, seed)
-    cut, cut_lines = band(radio, seed)
-    for start, text in sent:
-        whole.send(start, text)
+@settings(deadline=None, max_examples=200)
+@given(params, seeds, transmissions(), neighbours, cuts(UNTIL), st.data())
+def test_edges_errors_and_snapshots_do_not_depend_on_how_settling_is_cut(
+    radio, seed, sent, others, ticks, data
+):
+    (whole, *whole_others), whole_lines = shared(radio, seed, others)
+    (cut, *cut_others), cut_lines = shared(radio, seed, others)
+    for _, link, start, text in announcements(radio, sent, others):
+        [whole, *whole_others][link].send(start, text)
     whole.settle(UNTIL)
-    waiting = list(sent)
+    waiting = announcements(radio, sent, others)
     for tick in ticks:
-        lead = 0 if radio.carrier == "on" else radio.keyup_ticks
-        while waiting and (waiting[0][0] - lead + radio.latency_ticks < tick or data.draw(st.booleans())):
-            cut.send(*waiting.pop(0))
+        while waiting and (waiting[0][0] < tick or data.draw(st.booleans())):
+            _, link, start, text = waiting.pop(0)
+            [cut, *cut_others][link].send(start, text)
         cut.settle(tick)
-    for start, text in waiting:
-        cut.send(start, text)
+    for _, link, start, text in waiting:
+        [cut, *cut_others][link].send(start, text)
     assert cut_lines[0].edges() == whole_lines[0].edges()
     assert cut.snapshot() == whole.snapshot()
 
 
 @settings(deadline=None)
-@given(params, seeds, transmissions(), st.integers(1, UNTIL))
-def test_a_snapshot_at_any_tick_carries_the_bytes_in_the_air(radio, seed, sent, tick):
-    first, first_lines = band(radio, seed)
-    for start, data in sent:
-        first.send(start, data)
+@given(params, seeds, transmissions(), neighbours, st.integers(1, UNTIL))
+def test_a_snapshot_at_any_tick_carries_the_bytes_in_the_air(radio, seed, sent, others, tick):
+    links, first_lines = shared(radio, seed, others)
+    for _, link, start, data in announcements(radio, sent, others):
+        links[link].send(start, data)
+    first = links[0]
     first.settle(tick)
-    second, second_lines = band(radio, seed)
+    (second, *_), second_lines = shared(radio, seed, others)
     second.restore(first.snapshot())
     second_lines[0].restore(first_lines[0].snapshot())
     for downlink in (first, second):

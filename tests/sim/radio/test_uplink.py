@@ -42,7 +42,7 @@ networks = st.lists(transmissions(), min_size=1, max_size=3)
 @given(params, seeds, networks)
 def test_symbols_are_those_of_a_naive_uart_on_a_naively_mixed_level(radio, seed, wires):
     edges = naive.uplink_edges(UNTIL, radio, seed, "net", [txd(sent)[1] for sent in wires])
-    assert band(radio, seed, wires).receive(UNTIL) == naive.receive(edges, UNTIL)
+    assert band(radio, seed, wires).receive(UNTIL) == naive.receive(edges, UNTIL, radio.bit_ticks)
 
 
 @settings(deadline=None)
@@ -60,13 +60,13 @@ def test_a_snapshot_at_any_tick_carries_the_half_received_character(radio, seed,
     first = Uplink(radio, seed, "net")
     second = Uplink(radio, seed, "net")
     lines = [txd(sent)[0] for sent in wires]
-    for line in lines:
-        first.listen(0, line)
+    for robot, line in enumerate(lines):
+        first.listen(robot, line)
     first.receive(tick)
-    for line in lines:
+    for robot, line in enumerate(lines):
         copy = Line()
         copy.restore(line.snapshot())
-        second.listen(0, copy)
+        second.listen(robot, copy)
     second.restore(first.snapshot())
     assert second.receive(UNTIL) == first.receive(UNTIL)
     assert second.snapshot() == first.snapshot()
