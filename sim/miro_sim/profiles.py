@@ -5,7 +5,7 @@ whether their values are good (`scenario_file`).
 """
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from difflib import get_close_matches
 from functools import cache
 from importlib import resources
@@ -17,14 +17,12 @@ ERROR_KEYS = ("bit_error_rate", "eb_n0_db")
 Table = dict[str, Any]
 
 
-class UnknownProfileError(ValueError):
-    """A name that is no profile; `remedy` is what to write instead."""
+class ProfileError(ValueError):
+    """A `profile` that names none; `remedy` is what to write instead."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(f"{name!r} is no profile")
-        close = get_close_matches(name, profiles(), n=1)
-        hint = f"did you mean {close[0]}? " if close else ""
-        self.remedy = f"{hint}profiles: {', '.join(profiles())}"
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__(what)
+        self.remedy = remedy
 
 
 @cache
@@ -35,21 +33,22 @@ def profiles() -> Mapping[str, Mapping[str, Any]]:
 
 
 def keys_of(name: str) -> Table:
-    """The keys that a profile sets. Raises UnknownProfileError."""
+    """The keys that a profile sets. Raises ProfileError."""
     if name not in profiles():
-        raise UnknownProfileError(name)
+        close = get_close_matches(name, profiles(), n=1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        raise ProfileError(f"{name!r} is no profile", f"{hint}profiles: {', '.join(profiles())}")
     return {key: value for key, value in profiles()[name].items() if key != "about"}
 
 
 def with_profiles(radio: Table) -> Table:
-    """A radio table with the keys of its profiles filled in; its own keys win. Raises UnknownProfileError.
-
-    A `profile` that is no name and no list of names is left for others to complain about.
-    """
-    named = radio.get("profile", ())
+    """A radio table with the keys of its profiles filled in; its own keys win. Raises ProfileError."""
+    named = radio.get("profile", [])
     names = [named] if isinstance(named, str) else named
-    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
-        return radio
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ProfileError(
+            f"expected a name or a list of names, got {named!r}", "see `mirotwin scenarios profiles`"
+        )
     merged: Table = {}
     for name in names:
         merged = overridden(merged, keys_of(name))

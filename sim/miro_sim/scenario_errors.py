@@ -113,7 +113,9 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
 def _explain(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
     wrong_type = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", what)
     if wrong_type:
-        want = " or ".join(TYPE_NAMES.get(name, name) for name in wrong_type[1].split(" | "))
+        want = " or ".join(
+            TYPE_NAMES.get(name, name) for name in wrong_type[1].split(" | ") if name != "null"
+        )
         got = TYPE_NAMES.get(wrong_type[2], f"a {wrong_type[2]}")
         what = f"expected {want}{_unit_of(path)}, got {got}{_shown(value)}"
         if wrong_type[1] == "array" and isinstance(value, dict):

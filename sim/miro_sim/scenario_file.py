@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 
 from miro_sim.inputs import InputError, read_input
-from miro_sim.profiles import UnknownProfileError, with_profiles
+from miro_sim.profiles import ProfileError, with_profiles
 from miro_sim.scenario import Scenario
 from miro_sim.scenario_errors import ScenarioError, value_error
 
@@ -100,7 +100,7 @@ def _fill_in_profiles(raw: dict[str, Any], origin: str) -> None:
         if isinstance(network, dict) and isinstance(network.get("radio"), dict):
             try:
                 network["radio"] = with_profiles(network["radio"])
-            except UnknownProfileError as error:
+            except ProfileError as error:
                 place = f"network[{index}].radio.profile"
                 raise ScenarioError(origin, place, str(error), error.remedy) from None
 

@@ -1,0 +1,69 @@
+"""The two-state chain: the textbook's one, whatever one asks it first; and the fading that it stands for."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_sim import profiles
+from miro_sim.radio import ChainParams
+from miro_sim.radio.chain import Chain
+
+from tests.naive import radio as naive
+from tests.sim.radio.strategies import chains, seeds
+
+SECONDS = 100
+SLOTS = 9600 * SECONDS
+
+# link.md section 2: margin in dB, time below, fades a second, mean fade in ms, frames hit (31 characters)
+RAYLEIGH = [
+    ("fade5", 0.27, 2.17, 125, 0.34),
+    ("fade10", 0.095, 1.52, 63, 0.14),
+    ("fade15", 0.031, 0.91, 34, 0.061),
+    ("fade20", 0.010, 0.52, 19, 0.027),
+    ("fade30", 0.001, 0.17, 6, 0.007),
+]
+
+
+@settings(deadline=None)
+@given(chains(), seeds, st.lists(st.integers(0, 1023), min_size=1, max_size=60))
+def test_any_slot_in_any_order_is_as_the_naive_chain_has_it_step_by_step(params, seed, slots):
+    states = naive.chain_states(params, seed, "fade", 1024)
+    chain = Chain(params, seed, "fade")
+    assert [chain.bad(slot) for slot in slots] == [states[slot] for slot in slots]
+    assert [Chain(params, seed, "fade").bad(slot) for slot in slots[:3]] == [
+        states[slot] for slot in slots[:3]
+    ]
+
+
+def runs_of(states):
+    """Lengths of the runs of 1 that are over."""
+    return [len(run) for run in "".join(map(str, states)).split("0")[:-1] if run]
+
+
+@pytest.mark.parametrize(("name", "below", "per_s", "mean_ms", "hit"), RAYLEIGH)
+def test_a_fading_profile_is_as_often_and_as_long_below_as_rayleighs_crossings(
+    name, below, per_s, mean_ms, hit
+):
+    """Within four standard deviations of the chain's figures, which are the table's but for its rounding."""
+    bursts = profiles.keys_of(name)["bursts"]
+    enter, leave = bursts["good_to_bad"], bursts["bad_to_good"]
+    chain = Chain(ChainParams.of(enter, leave), 3, name)
+    states = [chain.bad(slot) for slot in range(SLOTS)]
+    fades = runs_of(states)
+    share = enter / (enter + leave)
+    expected = SLOTS * share * leave  # number of fades
+    assert abs(len(fades) - expected) < 4 * expected**0.5
+    assert abs(sum(fades) / len(fades) - 1 / leave) < 4 / leave / len(fades) ** 0.5
+    assert abs(sum(states) / SLOTS - share) < 4 * (2 * share / leave / SLOTS) ** 0.5
+    assert share == pytest.approx(below, rel=0.05)
+    assert share * leave * 9600 == pytest.approx(per_s, rel=0.05)
+    assert 1000 / leave / 9600 == pytest.approx(mean_ms, rel=0.05)
+    frames = [max(states[start : start + 310]) for start in range(0, SLOTS - 320, 320)]
+    chance = 1 - (1 - share) * (1 - enter) ** 309
+    assert (
+        abs(sum(frames) / len(frames) - chance) < 4 * (2 * chance / leave / 320 / len(frames)) ** 0.5 + 0.002
+    )
+    assert chance == pytest.approx(hit, rel=0.1, abs=0.001)
+
+
+def test_a_chain_shows_what_it_is():
+    assert repr(Chain(ChainParams(enter=5, leave=7), 0, "a")) == "Chain('a', enter=5, leave=7)"

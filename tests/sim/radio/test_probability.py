@@ -1,0 +1,64 @@
+"""Thresholds: the formula of non-coherent FSK against mpmath and the link's own table, and what is refused."""
+
+import mpmath
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from miro_sim.radio import ChainParams, RadioParams, SlicerParams
+from miro_sim.radio.probability import ONE, fsk_threshold, margin_table, mean_threshold, rate_threshold
+
+
+def ber(eb_n0_db, margin=1):
+    with mpmath.workprec(120):
+        return mpmath.exp(-(mpmath.mpf(10) ** (mpmath.mpf(eb_n0_db) / 10)) * mpmath.mpf(margin) ** 2 / 2) / 2
+
+
+@given(st.floats(-20, 60))
+def test_a_signal_to_noise_ratio_becomes_the_nearest_threshold(eb_n0_db):
+    assert abs(fsk_threshold(eb_n0_db) - ber(eb_n0_db) * ONE) <= mpmath.mpf("0.50001")
+
+
+@pytest.mark.parametrize(("eb_n0_db", "rate"), [(8.93, 1e-2), (10.94, 1e-3), (12.31, 1e-4), (13.35, 1e-5)])
+def test_the_figures_of_the_radio_literature_come_out(eb_n0_db, rate):
+    assert fsk_threshold(eb_n0_db) / ONE == pytest.approx(rate, rel=0.02)
+
+
+def test_without_a_signal_half_of_the_bits_are_wrong():
+    assert fsk_threshold(-300.0) == ONE // 2
+
+
+@given(st.floats(-20, 60), st.integers(0, 512))
+def test_a_margin_has_the_errors_of_a_signal_of_that_amplitude(eb_n0_db, index):
+    margin = (index - 128) / 128
+    wrong = ber(eb_n0_db, margin)
+    expected = wrong if margin >= 0 else 1 - wrong
+    assert abs(margin_table(eb_n0_db)[index] - expected * ONE) <= mpmath.mpf("0.50001")
+
+
+def test_a_margin_of_one_is_no_penalty():
+    assert margin_table(11.0)[256] == fsk_threshold(11.0)
+
+
+def test_times_become_chances_a_bit():
+    assert rate_threshold(9600.0) == ONE
+    assert rate_threshold(0.0) == 0
+    assert mean_threshold(1.0) == round(ONE / 9600)
+    assert ChainParams.lasting(2.0, 0.02) == ChainParams(enter=round(ONE / 19_200), leave=round(ONE / 192))
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: rate_threshold(9601.0), "9601.0/s in a bit time"),
+        (lambda: mean_threshold(0.0001), "shorter than a bit"),
+        (lambda: ChainParams(enter=ONE, leave=1), "not within"),
+        (lambda: ChainParams(enter=-1, leave=1), "not within"),
+        (lambda: SlicerParams.of(settle_s=0.0001, offset=0.0, eb_n0_db=10.0), "settle_s 0.0001 is shorter"),
+        (lambda: SlicerParams.of(settle_s=0.004, offset=1.1, eb_n0_db=10.0), "slicer offset"),
+        (lambda: RadioParams.of(bit_error_rate=0.0, eb_n0_db=10.0), "the same thing twice"),
+        (lambda: RadioParams.of(lost_character_rate=1.5), "lost_character_rate 1.5"),
+    ],
+)
+def test_what_cannot_be_is_refused(make, text):
+    with pytest.raises(ValueError, match=text):
+        make()

@@ -1,0 +1,151 @@
+"""Disturbances on the wire, as the robot's own UART and firmware take them."""
+
+import pytest
+from miro_protocol.frames import TeamFrame, encode
+from miro_sim.radio import ChainParams, RadioParams
+
+from tests.sim.radio.on_board import RadioRig, hears, receiver, seed_where, slow_receiver, stored
+
+START = 100_000
+QUIET = RadioParams(squelch=True)
+NOISY = RadioParams.of(bit_error_rate=0.01, squelch=True)
+PERIOD = 800_800
+LEAD = 6  # characters before the sync
+
+
+def pairs(cpu):
+    found = stored(cpu)
+    return list(zip(found[::2], found[1::2], strict=True))
+
+
+def hears_text(text, *errors, seed_of=NOISY):
+    """(SBUF, RB8) of a transmission whose wrong bits are exactly these."""
+    seed = seed_where(seed_of, START, 10 * len(text), lambda found: found == [*errors])
+    return pairs(hears(receiver(), seed_of, seed, [(START, text)], START + 25_000 * (len(text) + 3)))
+
+
+def test_a_wrong_stop_bit_shows_in_rb8():
+    assert hears_text(b"UVW", 29) == [(0x55, 1), (0x56, 1), (0x57, 0)]
+
+
+def test_a_wrong_stop_bit_hides_the_fall_of_the_next_start_bit_and_that_byte_slips():
+    """57h comes low bit first as 1 1 1 0 1 0 1 0: its fourth bit is the first fall, and 0101 and mark follow."""
+    assert hears_text(b"UVW", 19) == [(0x55, 1), (0x56, 0), (0xF5, 1)]
+
+
+def test_a_wrong_data_bit_is_another_character():
+    assert hears_text(b"UVW", 13) == [(0x55, 1), (0x56 ^ 4, 1), (0x57, 1)]
+
+
+def test_a_wrong_start_bit_slips_to_the_next_fall_and_the_characters_come_out_of_step():
+    """Without its start bit A9h begins at its first space: 0101 and its stop bit are taken for another byte."""
+    heard = hears_text(b"\xa9\xa9\xff\x55", 0)
+    assert heard[0][0] not in (0xA9, 0x55)
+    assert heard[-1] == (0x55, 1)  # FFh has brought it into step again
+
+
+def test_a_false_start_bit_on_an_idle_carrier_is_a_character_and_can_swallow_a_real_start():
+    """A space of one bit time: the UART takes it for a start bit and reads FFh out of the idle line behind."""
+    always_idle = RadioParams(carrier="on", false_start_threshold=2**32 // 12)
+    heard = pairs(hears(receiver(), always_idle, 3, [], 30 * 25_000))
+    assert len(heard) > 5
+    assert all(good for _, good in heard[:1])
+    quiet = RadioParams(carrier="on")
+    assert pairs(hears(receiver(), quiet, 3, [], 30 * 25_000)) == []
+    text = b"\x55" * 10
+    whole = pairs(hears(receiver(), quiet, 3, [(START, text)], 20 * 25_000))
+    late = pairs(hears(receiver(), always_idle, 3, [(START, text)], 20 * 25_000))
+    assert whole == [(0x55, 1)] * 10
+    assert late != whole
+
+
+def test_a_lost_character_leaves_a_gap_and_the_others_whole():
+    losing = RadioParams.of(lost_character_rate=0.3, squelch=True)
+    heard = pairs(hears(receiver(), losing, 1, [(START, bytes(range(65, 85)))], 30 * 25_000))
+    letters = [byte for byte, good in heard if good]
+    assert len(letters) == len(heard) < 20
+    assert letters == sorted(set(letters))
+    assert set(letters) < set(range(65, 85))
+
+
+@pytest.mark.parametrize(("tens", "whole"), [(1, True), (3, True), (6, False)])
+def test_a_uart_that_is_not_read_in_time_loses_characters(tens, whole):
+    """1500 cycles after RI are in time; after 3000 the next character has come, and RI still stands."""
+    text = bytes(range(65, 85))
+    heard = stored(hears(slow_receiver(tens), QUIET, 0, [(START, text)], 40 * 25_000))
+    assert (heard == text) == whole
+    assert set(heard) <= set(text)
+
+
+@pytest.mark.parametrize(("baud", "whole"), [(0, True), (20_000, True), (-20_000, True), (50_000, False)])
+def test_a_uart_follows_an_offset_of_two_percent_but_not_of_five(baud, whole):
+    text = bytes([0x00, 0xFF, 0x55, 0x80, 0x01, 0x7F] * 3)
+    radio = RadioParams(baud_offset_ppm=baud, squelch=True)
+    heard = pairs(hears(receiver(), radio, 0, [(START, text)], 25 * 25_000))
+    assert (heard == [(byte, 1) for byte in text]) == whole
+
+
+def frames(count, n=3):
+    return [encode(TeamFrame(0, seq % 64, ((100 + seq, -100),) * n), n) for seq in range(count)]
+
+
+def robot_after(radio, seed, count=1, n=3):
+    """The counters of a robot that was sent so many frames, one a camera period, from 200 000 ticks on."""
+    rig = RadioRig(radio, seed, n)
+    for number, data in enumerate(frames(count, n)):
+        start = 200_000 + number * PERIOD
+        rig.downlink.send(start, data)
+        rig.run_to(start + PERIOD - 100_000)
+    return rig
+
+
+def damaged_robot(wanted):
+    """A robot that got one frame whose wrong bits (numbered from the preamble on) are as wanted."""
+    seed = seed_where(NOISY, 200_000, 230, wanted)
+    return robot_after(NOISY, seed)
+
+
+def test_a_frame_with_a_wrong_stop_bit_is_no_frame_and_not_a_bad_crc_either():
+    rig = damaged_robot(lambda found: len(found) == 1 and found[0] >= 10 * LEAD and found[0] % 10 == 9)
+    assert rig.counters == (0, 0, 0)
+    assert rig.downlink.listeners[0].bit_errors == 1
+
+
+def test_a_frame_with_a_wrong_data_bit_is_counted_as_a_bad_crc():
+    rig = damaged_robot(lambda found: len(found) == 1 and found[0] > 80 and found[0] % 10 not in (0, 9))
+    assert rig.counters == (0, 1, 0)
+
+
+def test_a_frame_with_a_wrong_bit_in_the_preamble_is_taken():
+    rig = damaged_robot(lambda found: len(found) == 1 and found[0] < 50)
+    assert rig.counters == (1, 0, 0)
+
+
+def test_a_wrong_start_bit_slips_a_byte_and_costs_the_frame():
+    rig = damaged_robot(lambda found: len(found) == 1 and found[0] > 80 and found[0] % 10 == 0)
+    assert rig.counters[0] == 0
+
+
+def test_lost_characters_cost_frames_and_the_numbers_step_over_them():
+    rig = robot_after(RadioParams.of(lost_character_rate=0.03, squelch=True), 2, 12)
+    accepted, rejected, stale = rig.counters
+    assert 2 < accepted < 12
+    assert (rejected, stale) == (0, 0)
+    assert rig.u8("_last_hdr") & 63 >= accepted
+
+
+def test_a_robot_out_of_reach_for_a_while_comes_back_by_itself():
+    """Dropped for good: nothing comes through, noise or not; never dropped: everything does."""
+    gone = ChainParams(enter=2**32, leave=0)
+    assert robot_after(RadioParams(dropouts=gone), 4, 5).counters == (0, 0, 0)
+    back = robot_after(RadioParams(dropouts=ChainParams.lasting(0.15, 0.05)), 4, 20)
+    accepted, _, stale = back.counters
+    assert 5 < accepted < 20
+    assert stale == 0
+
+
+def test_the_firmware_takes_frames_from_a_pc_whose_clock_is_one_percent_off():
+    """The spacing rule allows 4.8 %."""
+    for ppm in (10_000, -10_000):
+        radio = RadioParams(baud_offset_ppm=ppm, crystal_offset_ppm=-ppm // 100)
+        assert robot_after(radio, 5, 6).counters == (6, 0, 0)

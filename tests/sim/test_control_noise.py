@@ -1,0 +1,114 @@
+"""Noise in the control signal: bounded, in what is sent and nowhere else, past the CRC."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from miro_host.pilot import STANDSTILL, Command
+from miro_host.wheels import Wheels
+from miro_protocol.decoder import Decoder, Received
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.control_noise import NoisyCommands
+from miro_sim.scenario_file import ScenarioError, parse
+from miro_sim.scenario_radio import ControlNoise
+from miro_sim.world import World
+
+IMAGE = load_hex(image_path())
+WHEELS = Wheels()
+TEXT = """
+name = "noisy"
+duration_s = 0.5
+[camera]
+noise = "none"
+[[network]]
+radio.profile = "wire"
+{}
+[[network.robot]]
+slot = 1
+reference.kind = "line"
+wheel_radius_mismatch = 0.0
+"""
+
+
+def command(v_m_s, w_rad_s):
+    return Command(*WHEELS.command(v_m_s, w_rad_s), v_m_s, w_rad_s, 0.0, 0.0, 0.0, 0.0)
+
+
+@given(st.integers(0, 2**63 - 1), st.integers(0, 10**6), st.floats(0, 1), st.floats(0, 40))
+def test_what_is_sent_is_a_command_within_the_bounds(seed, period, v_bound, w_bound):
+    """At 0.2 m/s no wheel limit is met below 0.2 + 0.4 m/s; beyond it the limit holds."""
+    noise = NoisyCommands(ControlNoise(v_m_s=v_bound, w_rad_s=w_bound), WHEELS, seed, "net0/robot0/control")
+    left, right = noise.wheels_of(command(0.2, 1.0), period)
+    assert max(abs(left), abs(right)) <= 16_633
+    v_m_s = (left + right) / 2 / WHEELS.units_per_m_s
+    w_rad_s = (right - left) / WHEELS.units_per_m_s / WHEELS.track_m
+    if v_bound + 0.034 * w_bound < 1.2:
+        assert abs(v_m_s - 0.2) <= v_bound + 1e-4
+        assert abs(w_rad_s - 1.0) <= w_bound + 2e-3
+
+
+def test_no_bounds_are_no_noise_and_no_rounding():
+    noise = NoisyCommands(ControlNoise(), WHEELS, 1, "a")
+    odd = Command(123, -456, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # not what v and w would give
+    assert noise.wheels_of(odd, 3) == (123, -456)
+
+
+def test_draws_are_even_over_the_bounds_and_new_in_each_period():
+    noise = NoisyCommands(ControlNoise(v_m_s=0.1), WHEELS, 5, "a")
+    speeds = [sum(noise.wheels_of(STANDSTILL, period)) / 2 / WHEELS.units_per_m_s for period in range(4000)]
+    assert len(set(speeds)) > 1500
+    assert abs(sum(speeds) / 4000) < 4 * 0.1 / (3 * 4000) ** 0.5
+    assert sum(abs(speed) < 0.05 for speed in speeds) == pytest.approx(2000, abs=4 * 32)
+    assert noise.wheels_of(STANDSTILL, 17) == noise.wheels_of(STANDSTILL, 17)
+
+
+def run(lines, seed=2, periods=12):
+    world = World(parse(TEXT.format(lines), "noisy.toml"), seed, IMAGE)
+    return world, [world.step() for _ in range(periods)]
+
+
+def sent(periods):
+    decoder = Decoder(3)
+    data = b"".join(run.data for period in periods for run in period.wire if run.direction == ">")
+    return [event.message(3).velocities[1] for event in decoder.feed(data) if isinstance(event, Received)]
+
+
+def test_frames_carry_noise_that_the_controller_does_not_know_of_and_pass_the_crc():
+    world, periods = run("control_noise = { v_m_s = 0.05, w_rad_s = 0.5 }")
+    meant = [(p.robots[0].control.left, p.robots[0].control.right) for p in periods]
+    got = sent(periods)
+    assert len(got) == 12
+    assert all(one != other for one, other in zip(got, meant, strict=True))
+    robot = world.networks[0].robots[0]
+    assert (robot.counter(0), robot.counter(1)) == (12, 0)
+
+
+def test_without_bounds_the_frames_carry_what_the_controller_said():
+    for lines in ("", "control_noise = { v_m_s = 0.0, w_rad_s = 0.0 }"):
+        _, periods = run(lines)
+        assert sent(periods) == [(p.robots[0].control.left, p.robots[0].control.right) for p in periods]
+
+
+def test_the_robot_drives_what_it_was_sent():
+    quiet, noisy = run("")[1], run("control_noise = { w_rad_s = 4.0 }")[1]
+    assert quiet[-1].robots[0].truth.theta_rad == pytest.approx(0.0, abs=1e-3)
+    assert abs(noisy[-1].robots[0].truth.theta_rad) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        (
+            "control_noise.v_cm_s = 5",
+            "network[0].control_noise.v_cm_s: unknown key; use v_m_s, in metres per second",
+        ),
+        (
+            "control_noise.w_rad_s = -1",
+            "network[0].control_noise.w_rad_s: -1 is out of range; must be >= 0.0 in rad",
+        ),
+    ],
+)
+def test_a_bad_bound_is_named_with_its_place_and_its_remedy(lines, expected):
+    with pytest.raises(ScenarioError) as caught:
+        parse(TEXT.format(lines), "noisy.toml")
+    assert str(caught.value).startswith(f"noisy.toml: {expected}")

@@ -1,0 +1,207 @@
+"""Radio profiles in scenarios: which key wins, what is refused and how, and what a run makes of them."""
+
+import re
+from pathlib import Path
+
+import msgspec
+import pytest
+from click.testing import CliRunner
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim import profiles
+from miro_sim.build import radio_for
+from miro_sim.canonical import encode
+from miro_sim.cli import main
+from miro_sim.clock import CONTROL_PERIOD_TICKS
+from miro_sim.radio import ChainParams
+from miro_sim.scenario_file import ScenarioError, parse
+from miro_sim.scenario_radio import Bursts, Radio
+from miro_sim.world import World
+
+README = Path(__file__).parents[2] / "sim/miro_sim/radio/README.md"
+IMAGE = load_hex(image_path())
+NETWORK = """
+[[network]]
+[network.radio]
+{}
+[[network.robot]]
+slot = 0
+reference.kind = "line"
+"""
+
+
+def text(*radios: str) -> str:
+    return 'name = "air"\nduration_s = 0.5\n' + "".join(NETWORK.format(radio) for radio in radios)
+
+
+def radio(lines: str) -> Radio:
+    return parse(text(lines), "air.toml").networks[0].radio
+
+
+def refusal(lines: str) -> str:
+    with pytest.raises(ScenarioError) as caught:
+        radio(lines)
+    assert "\n" not in str(caught.value)
+    return str(caught.value).removeprefix("air.toml: network[0].radio")
+
+
+def test_everything_is_off_unless_asked_for() -> None:
+    """Only what every scenario has had: errors of 1e-4, a key-up, noise between frames."""
+    params = msgspec.structs.asdict(radio_for(radio("")))
+    names = (
+        "jitter_ticks",
+        "baud_offset_ppm",
+        "crystal_offset_ppm",
+        "false_start_threshold",
+        "lost_threshold",
+    )
+    assert [params[name] for name in names] == [0] * len(names)
+    assert (params["bursts"], params["dropouts"], params["slicer"]) == (None, None, None)
+
+
+def test_a_profile_sets_its_keys() -> None:
+    found = radio('profile = "fade15"')
+    assert found.bursts == Bursts(good_to_bad=9.8e-5, bad_to_good=3.1e-3, bit_error_rate=0.5)
+    assert found.bit_error_rate == 1e-5
+    assert radio_for(found).bursts == ChainParams.of(9.8e-5, 3.1e-3)
+
+
+def test_a_key_of_the_scenario_wins_over_the_profiles_also_inside_a_table() -> None:
+    found = radio('profile = "fade15"\nbit_error_rate = 0.0\nbursts.bad_to_good = 0.5')
+    assert found.bit_error_rate == 0.0
+    assert found.bursts == Bursts(good_to_bad=9.8e-5, bad_to_good=0.5, bit_error_rate=0.5)
+
+
+def test_of_several_profiles_the_later_one_wins() -> None:
+    found = radio('profile = ["fade15", "late", "weak"]')
+    assert (found.jitter_s, found.eb_n0_db, found.bit_error_rate) == (0.003, 10.94, None)
+    assert found.bursts is not None
+    assert radio('profile = ["weak", "fade15"]').eb_n0_db is None
+
+
+def test_a_bit_error_rate_takes_the_place_of_a_profiles_signal_to_noise_ratio() -> None:
+    assert radio('profile = "weak"\nbit_error_rate = 0.01').eb_n0_db is None
+
+
+@pytest.mark.parametrize("name", profiles.profiles())
+def test_every_profile_is_a_good_radio_that_says_what_it_does(name: str) -> None:
+    radio_for(radio(f'profile = "{name}"'))
+    assert profiles.profiles()[name]["about"]
+    assert f"`{name}`" in README.read_text()
+
+
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        ('profile = "fade16"', ".profile: 'fade16' is no profile; did you mean fade15?"),
+        ('profile = ["late", "nothing"]', ".profile: 'nothing' is no profile; profiles: wire, late,"),
+        (
+            "profile = 3",
+            ".profile: expected a name or a list of names, got 3; see `mirotwin scenarios profiles`",
+        ),
+        ("eb_n0_db = 11.0\nbit_error_rate = 0.0", ".eb_n0_db: says the same as bit_error_rate; give one of"),
+        ("eb_n0 = 11.0", ".eb_n0: unknown key; use eb_n0_db, in decibels"),
+        ("jitter_ms = 1", ".jitter_ms: unknown key; use jitter_s, in seconds"),
+        ("baud_offset_hz = 3", ".baud_offset_hz: unknown key; use baud_offset_ppm, in parts per million"),
+        (
+            "crystal_offset_ppm = 60000",
+            ".crystal_offset_ppm: 60000 is out of range; must be <= 50000 in parts",
+        ),
+        (
+            "crystal_offset_ppm = 0.5",
+            ".crystal_offset_ppm: expected a whole number in parts per million, got",
+        ),
+        ("eb_n0_db = '11 dB'", ".eb_n0_db: expected a number in decibels, got a string ('11 dB')"),
+        ("false_starts_hz = -1.0", ".false_starts_hz: -1.0 is out of range; must be >= 0.0 in hertz"),
+        ("slicer.offset = 0.5", ".slicer: its errors follow from Eb/N0; give eb_n0_db, not bit_error_rate"),
+        ("slicer.settle_ms = 4", ".slicer.settle_ms: unknown key; use settle_s, in seconds"),
+        ("bursts.good_to_bad = 0.1", ".bursts.bad_to_good: this key is missing; add it"),
+        (
+            "bursts = { good_to_bad = 0.7, bad_to_good = 0.7 }",
+            ".bursts.bad_to_good: 0.7 and good_to_bad 0.7 make more than 1; a state must last",
+        ),
+        (
+            "dropouts = { every_s = 1, length_s = 0 }",
+            ".dropouts.length_s: 0 is out of range; must be >= 0.000105",
+        ),
+        ("channel = -1", ".channel: -1 is out of range; must be >= 0"),
+    ],
+)
+def test_a_bad_radio_is_named_with_its_place_and_its_remedy(lines: str, expected: str) -> None:
+    assert refusal(lines).startswith(expected)
+
+
+def test_a_pc_so_slow_that_its_frame_outlasts_the_period_is_refused() -> None:
+    slow = text("baud_offset_ppm = -40000").replace("[[network]]", "[[network]]\nrobots = 5", 1)
+    with pytest.raises(
+        ScenarioError, match=r"network\[0\]\.radio\.baud_offset_ppm: -40000 makes a frame of 31"
+    ):
+        parse(slow, "air.toml")
+    late = text("baud_offset_ppm = -3000").replace("[[network]]", "[[network]]\nrobots = 5", 1)
+    with pytest.raises(
+        ScenarioError, match=r"network\[0\]\.radio\.keyup_s: 0\.001 s and a frame of 31 .* do not"
+    ):
+        parse(late, "air.toml")
+
+
+def test_the_command_line_lists_the_profiles_with_their_keys() -> None:
+    result = CliRunner().invoke(main, ["scenarios", "profiles"])
+    assert result.exit_code == 0
+    listed = re.sub(r"\s+", " ", result.stdout)
+    assert "fade15 fading with 15 dB" in listed
+    for name in profiles.profiles():
+        assert name in result.stdout
+
+
+def world(*radios: str, seed: int = 7) -> World:
+    return World(parse(text(*radios), "air.toml"), seed, IMAGE)
+
+
+def ran(world: World, periods: int = 6) -> World:
+    for _ in range(periods):
+        world.step()
+    return world
+
+
+ALL = 'profile = ["late", "slicer", "dropouts", "offset", "clicks", "lossy"]\neb_n0_db = 12.0'
+BURSTS = "bursts = { good_to_bad = 0.002, bad_to_good = 0.01 }"
+
+
+def test_a_run_with_everything_on_is_the_same_however_it_is_cut_saved_and_loaded() -> None:
+    whole = ran(world(ALL, ALL + "\nchannel = 1\n" + BURSTS, "channel = 1\nlatency_s = 0.01"))
+    cut = world(ALL, ALL + "\nchannel = 1\n" + BURSTS, "channel = 1\nlatency_s = 0.01")
+    for tick in range(0, 6 * CONTROL_PERIOD_TICKS, 333_333):
+        cut.run_to(tick)
+        again = world(ALL, ALL + "\nchannel = 1\n" + BURSTS, "channel = 1\nlatency_s = 0.01")
+        again.load(cut.save())
+        cut = again
+    cut.run_to(6 * CONTROL_PERIOD_TICKS)
+    assert cut.digest == whole.digest
+    assert encode(cut.snapshot()) == encode(whole.snapshot())
+
+
+def accepted(world: World) -> list[int | None]:
+    return [network.robots[0].counter(0) for network in world.networks]
+
+
+def test_networks_side_by_side_do_not_know_of_each_other() -> None:
+    """A network's robots have the same bits whether there is another one or not."""
+    alone, beside = ran(world(BURSTS)), ran(world(BURSTS, ALL))
+    assert encode(beside.networks[0].snapshot()) == encode(alone.networks[0].snapshot())
+
+
+def test_networks_on_one_channel_spoil_each_others_frames() -> None:
+    wire = 'profile = "wire"\nkeyup_s = 0.001'
+    assert accepted(ran(world(wire, wire))) == [6, 6]
+    assert accepted(ran(world(wire + "\nchannel = 1", wire + "\nchannel = 2"))) == [6, 6]
+    shared = ran(world(wire + "\nchannel = 1", wire + "\nchannel = 1\nlatency_s = 0.007"))
+    assert accepted(shared) == [0, 0]
+
+
+def test_what_is_off_is_not_in_the_state() -> None:
+    """Snapshots of scenarios without a disturbance are those of before there was one."""
+    downlink = world("").networks[0].downlink.snapshot()
+    assert sorted(downlink) == ["free_tick", "listeners", "settled_tick", "transmissions"]
+    assert downlink["listeners"] == [{"bit_errors": 0}]
+    everything = world(ALL + "\nchannel = 1", "channel = 1").networks[0].downlink.snapshot()
+    assert {"busy_tick", "overheard"} < set(everything)
