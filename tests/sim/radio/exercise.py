@@ -1,9 +1,9 @@
-"""One busy network, run for half a second, as a digest of everything heard: the same for both engines."""
+"""Busy networks, run for half a second, as a digest of everything heard: the same for both engines."""
 
 import hashlib
 
 from miro_robot.mcs51.line import Line
-from miro_sim.radio import Downlink, RadioParams, Uplink
+from miro_sim.radio import ChainParams, Downlink, RadioParams, SlicerParams, Uplink
 from miro_sim.rng import Stream
 
 from tests.naive.radio import wire_bits
@@ -12,9 +12,27 @@ ROBOTS = 3
 PERIOD = 800_800
 
 
-def exercise(seed: int) -> str:
-    radio = RadioParams.of(latency_s=0.0001, bit_error_rate=1e-2)
+PLAIN = RadioParams.of(latency_s=0.0001, bit_error_rate=1e-2)
+EVERYTHING = RadioParams.of(
+    latency_s=0.0001,
+    jitter_s=0.001,
+    eb_n0_db=9.0,
+    baud_offset_ppm=777,
+    crystal_offset_ppm=-51,
+    bursts=ChainParams.of(1e-3, 1e-2),
+    dropouts=ChainParams.lasting(0.3, 0.02),
+    slicer=SlicerParams.of(settle_s=0.004, offset=-0.5, eb_n0_db=9.0),
+    false_starts_hz=100.0,
+    lost_character_rate=0.02,
+)
+
+
+def exercise(seed: int, radio: RadioParams) -> str:
+    """Everything that three robots and their PC hear, with a neighbour on the frequency."""
     down, up = Downlink(radio, seed, "down"), Uplink(radio, seed, "up")
+    neighbour = Downlink(EVERYTHING, seed, "neighbour")
+    if radio is not PLAIN:
+        down.overhear(neighbour)
     rxd, txd = [Line() for _ in range(ROBOTS)], [Line() for _ in range(ROBOTS)]
     for robot in range(ROBOTS):
         down.listen(robot, rxd[robot])
@@ -25,6 +43,7 @@ def exercise(seed: int) -> str:
         begin = period * PERIOD
         data = bytes(payload.u32(period * 23 + i) & 255 for i in range(23))
         down.send(begin + 96_000, data)
+        neighbour.send(begin + 350_000, data[::-1])
         for i, level in enumerate(wire_bits(data[:19])):
             txd[period % ROBOTS].append(begin + 1000 + 2496 * i, level)
         for until in (begin + 123_456, begin + PERIOD):

@@ -4,13 +4,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import Downlink, RadioParams, Uplink
 
 from tests.naive import radio as naive
-from tests.sim.radio.exercise import exercise
+from tests.sim.radio import exercise
 from tests.sim.radio.strategies import seeds, transmissions
 
 
@@ -64,12 +65,13 @@ def test_the_measured_bit_error_rate_is_the_one_asked_for():
     assert abs(wrong - total * 1e-2) < 4 * (total * 1e-2) ** 0.5
 
 
-def test_both_engines_hear_the_same_network():
+@pytest.mark.parametrize("radio", ["PLAIN", "EVERYTHING"])
+def test_both_engines_hear_the_same_network(radio):
     script = (
         "from miro_protocol import engine; engine.select('python');"
-        "from tests.sim.radio.exercise import exercise; print(exercise(77))"
+        f"from tests.sim.radio import exercise; print(exercise.exercise(77, exercise.{radio}))"
     )
     root = Path(__file__).parents[3]
     done = subprocess.run([sys.executable, "-c", script], cwd=root, capture_output=True, text=True)
     assert done.stderr == ""
-    assert done.stdout.strip() == exercise(77)
+    assert done.stdout.strip() == exercise.exercise(77, getattr(exercise, radio))
