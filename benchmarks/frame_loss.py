@@ -1,10 +1,11 @@
 """Frames lost against Eb/N0, beside the formula: `python -m benchmarks.frame_loss [--picture FILE.png]`.
 
-Every frame goes over the simulation's own radio: keyed carrier, slicer noise in between, non-coherent FSK. Two
+Every frame goes over the simulation's own radio: keyed carrier, slicer noise in between, non-coherent FSK. Three
 receivers listen:
 
-fast      a UART that samples the middle of each bit, and the decoder of `miro_protocol`
+decoder   a UART that samples the middle of each bit, and the decoder of `miro_protocol`
 firmware  the robot: its chip's UART, bit by bit, and its C; fewer frames, because it is slower
+slicer    as decoder, behind a slicer of 4 ms with carriers half a deviation apart (profile `slicer`)
 
 A frame counts as lost unless it comes out valid and as it was sent (firmware: valid). Bars are 95 % intervals
 (Wilson). The formula: the F characters from sync to CRC must be right to the last of their 10 F bits, and so must
@@ -31,7 +32,7 @@ from miro_robot.mcs51.line import Line
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
 from miro_sim.clock import CONTROL_PERIOD_TICKS
-from miro_sim.radio import Downlink, RadioParams, Uplink
+from miro_sim.radio import Downlink, RadioParams, SlicerParams, Uplink
 from miro_sim.rng import Stream
 
 from benchmarks.interval import wilson
@@ -43,6 +44,7 @@ MARGIN_TICKS = 120  # an instruction may overrun
 DECODING_TICKS = 240_000
 COUNTERS = ("_frames_accepted", "_frames_stale")
 COLOURS = {3: "tab:blue", 5: "tab:orange"}
+MARKERS = (("decoder", "o", 0.0), ("firmware", "x", 0.06), ("slicer", "^", 0.0))  # name, sign, dB to the side
 
 
 class Point(NamedTuple):
@@ -77,23 +79,36 @@ def frame(robots: int, number: int, draws: Stream) -> bytes:
     return encode(TeamFrame(0, number % 64, tuple(zip(values[::2], values[1::2], strict=True))), robots)
 
 
-def fast(robots: int, eb_n0_db: float, frames: int, seed: int) -> Point:
+def decoder(robots: int, eb_n0_db: float, frames: int, seed: int) -> Point:
     """The decoder in Python, behind a UART with the PC's bit time."""
+    params = RadioParams.of(eb_n0_db=eb_n0_db)
+    return Point(robots, "decoder", eb_n0_db, frames, lost(robots, params, frames, seed, eb_n0_db))
+
+
+def slicer(robots: int, eb_n0_db: float, frames: int, seed: int) -> Point:
+    """The same with the threshold of an AC-coupled slicer."""
+    part = SlicerParams.of(settle_s=0.004, offset=-0.5, eb_n0_db=eb_n0_db)
+    params = RadioParams.of(eb_n0_db=eb_n0_db, slicer=part)
+    return Point(robots, "slicer", eb_n0_db, frames, lost(robots, params, frames, seed, eb_n0_db))
+
+
+def lost(robots: int, params: RadioParams, frames: int, seed: int, eb_n0_db: float) -> int:
+    """How many of so many frames do not come out of the decoder as they were sent."""
     line, draws = Line(), Stream(seed, "velocities")
-    downlink = Downlink(RadioParams.of(eb_n0_db=eb_n0_db), seed, f"fast{robots}/{eb_n0_db}")
+    downlink = Downlink(params, seed, f"decoder{robots}/{eb_n0_db}")
     uart = Uplink(RadioParams.ideal(), seed, "uart")
     downlink.listen(0, line)
     uart.listen(0, line)
-    decoder = Decoder(robots)
+    scanner = Decoder(robots)
     right = 0
     for number in range(frames):
         start = FIRST_TICK + number * CONTROL_PERIOD_TICKS
         data = frame(robots, number, draws)
         downlink.send(start, data)
         downlink.settle(start + CONTROL_PERIOD_TICKS - AHEAD_TICKS)
-        for event in decoder.feed_symbols(uart.receive(start + CONTROL_PERIOD_TICKS - AHEAD_TICKS)):
+        for event in scanner.feed_symbols(uart.receive(start + CONTROL_PERIOD_TICKS - AHEAD_TICKS)):
             right += isinstance(event, Received) and encode(event.message(robots), robots) == data
-    return Point(robots, "fast", eb_n0_db, frames, frames - right)
+    return frames - right
 
 
 def firmware(robots: int, eb_n0_db: float, frames: int, seed: int) -> Point:
@@ -140,7 +155,7 @@ def draw(points: Sequence[Point], path: Path) -> None:
         bits = critical_bits(robots)
         label = f"N = {robots}: 1 - (1 - p)$^{{{bits}}}$"
         axes.plot(levels, [formula(robots, level) for level in levels], color=colour, lw=1, label=label)
-        for receiver, marker, shift in (("fast", "o", 0.0), ("firmware", "x", 0.06)):
+        for receiver, marker, shift in MARKERS:
             found = [one for one in points if (one.robots, one.receiver) == (robots, receiver) and one.lost]
             if found:
                 spans = [wilson(one.lost, one.sent) for one in found]
@@ -172,7 +187,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--frames", type=int, default=100_000, help="for the decoder, a point [%(default)s]")
+    parser.add_argument("--frames", type=int, default=50_000, help="for the decoder, a point [%(default)s]")
     parser.add_argument("--robot-frames", type=int, default=5000, help="for the firmware [%(default)s]")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--picture", type=Path, help="where to write the picture (PNG); none, if not given")
@@ -180,7 +195,11 @@ def main() -> None:
     points = []
     begin = time.perf_counter()
     for robots in DOWNLINK:
-        for measure, frames in ((fast, options.frames), (firmware, options.robot_frames)):
+        for measure, frames in (
+            (decoder, options.frames),
+            (firmware, options.robot_frames),
+            (slicer, options.frames),
+        ):
             for level in LEVELS_DB:
                 points.append(measure(robots, level, frames, options.seed))
                 print(row(points[-1]), flush=True)

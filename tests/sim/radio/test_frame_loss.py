@@ -12,12 +12,16 @@ def deviations(point):
 
 
 @pytest.mark.parametrize("robots", [3, 5])
-@pytest.mark.parametrize(("receiver", "frames"), [(frame_loss.fast, 1500), (frame_loss.firmware, 150)])
+@pytest.mark.parametrize(("receiver", "frames"), [(frame_loss.decoder, 1500), (frame_loss.firmware, 150)])
 def test_as_many_frames_are_lost_as_have_a_wrong_bit_where_it_counts(receiver, frames, robots):
     assert abs(deviations(receiver(robots, 10.0, frames, 4))) < 4
 
 
-@pytest.mark.parametrize("receiver", [frame_loss.fast, frame_loss.firmware])
+def test_a_slicer_that_has_not_settled_costs_frames():
+    assert deviations(frame_loss.slicer(3, 10.0, 1500, 4)) > 4
+
+
+@pytest.mark.parametrize("receiver", [frame_loss.decoder, frame_loss.firmware])
 def test_without_errors_no_frame_is_lost_in_the_noise_between_frames(receiver):
     assert receiver(3, 40.0, 100, 4).lost == 0
 
@@ -28,7 +32,7 @@ def test_the_bits_that_count_are_those_from_sync_to_crc_and_one_stop_bit():
 
 
 def test_the_same_figures_make_the_same_picture(tmp_path):
-    points = [frame_loss.Point(3, "fast", 10.0, 1000, 440), frame_loss.Point(5, "firmware", 14.0, 100, 0)]
+    points = [frame_loss.Point(3, "decoder", 10.0, 1000, 440), frame_loss.Point(5, "firmware", 14.0, 100, 0)]
     for name in ("a.png", "b.png"):
         frame_loss.draw(points, tmp_path / name)
     picture = (tmp_path / "a.png").read_bytes()
