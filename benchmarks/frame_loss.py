@@ -98,7 +98,7 @@ def lost(robots: int, params: RadioParams, frames: int, seed: int, eb_n0_db: flo
     downlink = Downlink(params, seed, f"decoder{robots}/{eb_n0_db}")
     uart = Uplink(RadioParams.ideal(), seed, "uart")
     downlink.listen(0, line)
-    uart.listen(0, line)
+    uart.listen(line)
     scanner = Decoder(robots)
     right = 0
     for number in range(frames):

@@ -69,7 +69,7 @@ class Network:
         self.uplink = Uplink(radio, seed, f"net{index}/up")
         for robot in self.robots:
             self.downlink.listen(robot.spec.slot, robot.board.cpu.rxd)
-            self.uplink.listen(robot.spec.slot, robot.board.cpu.txd)
+            self.uplink.listen(robot.board.cpu.txd, robot.spec.slot)
         self.telemetry = TelemetryDecoder()
         self.script = list(script) if script is not None else None
         self.script_next = 0

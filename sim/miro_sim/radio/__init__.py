@@ -8,6 +8,15 @@ firmware.
 from miro_sim.radio.downlink import Downlink
 from miro_sim.radio.listener import Listener
 from miro_sim.radio.params import ChainParams, RadioParams, SlicerParams
+from miro_sim.radio.probability import error_threshold
 from miro_sim.radio.uplink import Uplink
 
-__all__ = ["ChainParams", "Downlink", "Listener", "RadioParams", "SlicerParams", "Uplink"]
+__all__ = [
+    "ChainParams",
+    "Downlink",
+    "Listener",
+    "RadioParams",
+    "SlicerParams",
+    "Uplink",
+    "error_threshold",
+]

@@ -36,7 +36,7 @@ def exercise(seed: int, radio: RadioParams) -> str:
     rxd, txd = [Line() for _ in range(ROBOTS)], [Line() for _ in range(ROBOTS)]
     for robot in range(ROBOTS):
         down.listen(robot, rxd[robot])
-        up.listen(robot, txd[robot])
+        up.listen(txd[robot])
     payload = Stream(seed, "payload")
     heard = hashlib.sha256()
     for period in range(15):

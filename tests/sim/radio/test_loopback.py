@@ -20,7 +20,7 @@ def echo(params, seed, sent, until):
     line = Line()
     down, up = Downlink(params, seed, "down"), Uplink(RadioParams.ideal(), seed, "up")
     down.listen(0, line)
-    up.listen(0, line)
+    up.listen(line)
     for start, data in sent:
         down.send(start, data)
     down.settle(until)

@@ -25,8 +25,8 @@ def txd(sent, bit_ticks=2496):
 
 def band(radio, seed, wires):
     uplink = Uplink(radio, seed, "net")
-    for robot, sent in enumerate(wires):
-        uplink.listen(robot, txd(sent)[0])
+    for sent in wires:
+        uplink.listen(txd(sent)[0])
     return uplink
 
 
@@ -60,13 +60,13 @@ def test_a_snapshot_at_any_tick_carries_the_half_received_character(radio, seed,
     first = Uplink(radio, seed, "net")
     second = Uplink(radio, seed, "net")
     lines = [txd(sent)[0] for sent in wires]
-    for robot, line in enumerate(lines):
-        first.listen(robot, line)
+    for line in lines:
+        first.listen(line)
     first.receive(tick)
-    for robot, line in enumerate(lines):
+    for line in lines:
         copy = Line()
         copy.restore(line.snapshot())
-        second.listen(robot, copy)
+        second.listen(copy)
     second.restore(first.snapshot())
     assert second.receive(UNTIL) == first.receive(UNTIL)
     assert second.snapshot() == first.snapshot()
@@ -82,7 +82,7 @@ def test_a_snapshot_does_not_fit_a_network_of_another_size():
 def test_without_errors_every_byte_arrives_at_any_clock_within_two_percent(sent, bit_ticks):
     spaced = [(start + index * 20_000, data) for index, (start, data) in enumerate(sent)]
     uplink = Uplink(CLEAN, 0, "net")
-    uplink.listen(0, txd(spaced, bit_ticks)[0])
+    uplink.listen(txd(spaced, bit_ticks)[0])
     assert bytes_of(uplink.receive(2 * UNTIL)) == b"".join(data for _, data in sent)
 
 
@@ -101,7 +101,7 @@ def test_nothing_is_received_from_a_wire_that_is_not_settled_yet():
     line, _ = txd([(10_000, b"A")])
     line.settled_tick = 30_000
     uplink = Uplink(CLEAN, 0, "net")
-    uplink.listen(0, line)
+    uplink.listen(line)
     assert uplink.receive(UNTIL) == []
     assert uplink.now == 30_000
     line.settled_tick = UNTIL
@@ -114,7 +114,7 @@ def test_a_missing_stop_bit_is_reported_and_the_next_falling_edge_starts_anew():
         line.append(tick, level)
     line.settled_tick = UNTIL
     uplink = Uplink(CLEAN, 0, "net")
-    uplink.listen(0, line)
+    uplink.listen(line)
     assert uplink.receive(UNTIL) == [(0, False, 10_000), (0xFF, True, 50_000)]
 
 
@@ -124,7 +124,7 @@ def test_a_pulse_shorter_than_half_a_bit_is_no_start_bit():
     line.append(11_249, 1)
     line.settled_tick = UNTIL
     uplink = Uplink(CLEAN, 0, "net")
-    uplink.listen(0, line)
+    uplink.listen(line)
     assert uplink.receive(UNTIL) == []
 
 
@@ -133,7 +133,7 @@ def test_a_wire_stuck_at_space_loses_its_carrier_after_two_characters():
     line.append(10_000, 0)
     line.settled_tick = UNTIL
     uplink = Uplink(CLEAN, 0, "net")
-    uplink.listen(0, line)
+    uplink.listen(line)
     assert uplink.receive(UNTIL) == [(0, False, 10_000)]
     assert naive.uplink_edges(UNTIL, CLEAN, 0, "net", [[(10_000, 0)]]) == [(10_000, 0), (60_000, 1)]
 
@@ -146,7 +146,7 @@ def test_two_robots_at_once_are_mixed_and_space_wins():
 def test_the_bit_error_rate_of_the_samples_is_the_one_asked_for():
     uplink = Uplink(RadioParams.of(bit_error_rate=1e-2), 3, "net")
     line = Line()
-    uplink.listen(0, line)
+    uplink.listen(line)
     received = 0
     for start in range(0, 400 * 700_000, 700_000):
         for number, level in enumerate(naive.wire_bits(bytes(range(25)))):
@@ -161,7 +161,7 @@ def test_a_robot_joins_before_the_start():
     uplink = band(CLEAN, 0, [[]])
     uplink.receive(1)
     with pytest.raises(ValueError, match="after tick 0"):
-        uplink.listen(0, Line())
+        uplink.listen(Line())
 
 
 def test_an_uplink_shows_where_it_is():
