@@ -57,6 +57,16 @@ def hot_extensions():
     ]
 
 
+def remove_orphans():
+    """Compiled twins in the tree of modules that are hot no more: Python would take them for the module itself."""
+    hot = engine().hot_sources(package_dirs())
+    for package, folder in package_dirs().items():
+        for built in [*folder.rglob("*.so"), *folder.rglob("*.pyd")]:
+            relative = Path(package) / built.relative_to(folder).with_name(built.name.split(".")[0])
+            if ".".join(relative.parts) not in hot:
+                built.unlink()
+
+
 class BuildHot(build_ext):
     """Translates stamped copies, so that the hash stands in the module and not in the source."""
 
@@ -66,6 +76,11 @@ class BuildHot(build_ext):
         super().initialize_options()
         self.only = ""
         self.parallel = True  # compile on all cores
+
+    def run(self):
+        super().run()
+        if self.inplace or self.editable_mode:
+            remove_orphans()
 
     def build_extensions(self):
         from Cython.Build import cythonize

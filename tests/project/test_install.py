@@ -93,3 +93,15 @@ def test_a_compiled_module_whose_source_has_changed_is_refused(tree):
     assert "stale" in done.stderr
     assert "Traceback" not in done.stderr
     assert run_short(tree, "--engine", "python", "--force").returncode == 0
+
+
+@pytest.mark.skipif(engine.active() != "compiled", reason="no compiled modules here")
+def test_building_again_removes_the_compiled_twin_of_a_module_that_is_hot_no_more(tree):
+    with_compiled_modules(tree)
+    orphan = engine.compiled_file(ROOT / "sim/miro_sim/rng.py")
+    left_over = tree / "sim/miro_sim" / orphan.name.replace("rng", "clock")
+    shutil.copy(orphan, left_over)
+    built = python(tree, "setup.py", "-q", "build_ext", "--inplace", CC="no-such-compiler")
+    assert built.returncode == 0, built.stderr
+    assert not left_over.exists()
+    assert engine.compiled_file(tree / "sim/miro_sim/rng.py").exists()
