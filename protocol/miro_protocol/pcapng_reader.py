@@ -8,6 +8,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from io import BytesIO
+from typing import Protocol
 
 from miro_protocol.pcapng import (
     BYTE_ORDER,
@@ -25,9 +27,19 @@ from miro_protocol.pcapng import (
 from miro_protocol.stream import DOWN, UP
 
 MAGIC = b"\x0a\x0d\x0d\x0a"
+MAX_BLOCK = 64 << 20  # a longer block is no packet of a serial line: its length is damaged
+CLASSIC_PCAP = (b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1", b"\xa1\xb2\x3c\x4d")
+_HEAD = 12  # kind, length, and what may be a section's byte order mark
 _OLD_PACKETS = {2: "obsolete packet", 3: "simple packet"}
-_CLASSIC_PCAP = (b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1", b"\xa1\xb2\x3c\x4d")
 _DIRECTIONS = {1: DOWN, 2: UP, 3: DOWN, 4: UP}  # DATA_TX_START, _RX_START, _TX_END, _RX_END
+
+
+class Readable(Protocol):
+    """An open file or pipe."""
+
+    def read(self, size: int, /) -> bytes:
+        """`size` bytes, fewer only at the end."""
+        ...
 
 
 class CaptureError(Exception):
@@ -41,13 +53,14 @@ class CaptureError(Exception):
         self.remedy = remedy
 
 
-def iterate(data: bytes, source: str = "<capture>") -> Iterator[Packet]:
+def iterate(data: bytes | Readable, source: str = "<capture>") -> Iterator[Packet]:
     """Reads packet by packet; CaptureError at the first place that makes no sense, after all before it.
 
-    Captures by others are read too: both byte orders, any time resolution, several sections. `network` is
-    the interface's number in its section. Events that carry no characters are passed over.
+    From bytes, or from an open binary file or pipe, of which one block at a time is kept. Captures by others are
+    read too: both byte orders, any time resolution, several sections. `network` is the interface's number in its
+    section. Events that carry no characters are passed over.
     """
-    return _Reader(data, source).packets()
+    return _Reader(BytesIO(data) if isinstance(data, bytes) else data, source).packets()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,19 +71,18 @@ class _Interface:
 
 
 class _Reader:
-    def __init__(self, data: bytes, source: str) -> None:
-        self.data = data
+    def __init__(self, stream: Readable, source: str) -> None:
+        self.stream = stream
         self.source = source
         self.place = 0  # of the block under way
         self.order = "<"
         self.interfaces: list[_Interface] = []
 
     def packets(self) -> Iterator[Packet]:
-        if not self.data.startswith(MAGIC):
-            raise self.error(*self._foreign())
-        while self.place < len(self.data):
-            kind, body = self._block()
+        while (head := self.stream.read(_HEAD)) or self.place == 0:
+            kind, body = self._block(head)
             if kind == SECTION:
+                self._section(body)
                 self.interfaces = []
             elif kind == INTERFACE:
                 self.interfaces.append(self._interface(body))
@@ -94,42 +106,36 @@ class _Reader:
     def malformed(self, what: str) -> CaptureError:
         return self.error(f"damaged block: {what}", "copy the file again")
 
-    def _foreign(self) -> tuple[str, str]:
-        if not self.data:
-            return "empty file", "give a pcapng capture"
-        if self.data[:4] in _CLASSIC_PCAP:
-            return "a capture in the old pcap format", "convert it with `editcap -F pcapng OLD NEW`"
-        return "not a pcapng file", "give a capture that was saved as pcapng"
-
-    def _block(self) -> tuple[int, bytes]:
-        """Kind and body of the block at `place`, its lengths checked."""
-        if len(self.data) - self.place < 12:
+    def _block(self, head: bytes) -> tuple[int, bytes]:
+        """Kind and body of the block at `place` which begins with `head`, its lengths checked."""
+        if self.place == 0 and not head.startswith(MAGIC):
+            raise self.error(*_foreign(head))
+        if len(head) < _HEAD:
             raise self.cut()
-        if self.data.startswith(MAGIC, self.place):
-            self._section()
-        kind, size = struct.unpack_from(self.order + "II", self.data, self.place)
-        if size < 12 or size % 4:
+        if head.startswith(MAGIC):
+            self._byte_order(head[8:])
+        kind, size = struct.unpack_from(self.order + "II", head)
+        if size < 12 or size % 4 or size > MAX_BLOCK:
             raise self.malformed(f"length {size}")
-        end = self.place + size
-        if end > len(self.data):
+        block = head + self.stream.read(size - _HEAD)
+        if len(block) < size:
             raise self.cut()
-        (again,) = struct.unpack_from(self.order + "I", self.data, end - 4)
+        (again,) = struct.unpack_from(self.order + "I", block, size - 4)
         if again != size:
             raise self.malformed(f"lengths {size} and {again} differ")
-        return kind, self.data[self.place + 8 : end - 4]
+        return kind, block[8:-4]
 
-    def _section(self) -> None:
-        """Byte order and version of the section that begins here."""
-        head = self.data[self.place + 8 : self.place + 16]
-        if len(head) < 8:
-            raise self.cut()
+    def _byte_order(self, mark: bytes) -> None:
         for order in "<>":
-            magic, major = struct.unpack(order + "IH", head[:6])
-            if magic == BYTE_ORDER:
+            if struct.unpack(order + "I", mark) == (BYTE_ORDER,):
                 self.order = order
-                break
-        else:
-            raise self.malformed(f"byte order mark {head[:4].hex()}")
+                return
+        raise self.malformed(f"byte order mark {mark.hex()}")
+
+    def _section(self, body: bytes) -> None:
+        if len(body) < 8:
+            raise self.malformed("section header too short")
+        (major,) = struct.unpack_from(self.order + "H", body, 4)
         if major != 1:
             raise self.error(f"pcapng version {major}", "this program reads version 1")
 
@@ -186,3 +192,12 @@ class _Reader:
         if not 0 <= tick <= MAX_TICK:
             raise self.malformed(f"tick {tick} is not in 0..{MAX_TICK}")
         return Packet(tick, _DIRECTIONS[event], data, number)
+
+
+def _foreign(head: bytes) -> tuple[str, str]:
+    """What a file that begins so is, and what to do about it."""
+    if not head:
+        return "empty file", "give a pcapng capture"
+    if head[:4] in CLASSIC_PCAP:
+        return "a capture in the old pcap format", "convert it with `editcap -F pcapng OLD NEW`"
+    return "not a pcapng file", "give a capture that was saved as pcapng"

@@ -23,7 +23,7 @@ FIRST_LINE = "# mirotwin stream 1"
 DOWN = ">"
 UP = "<"
 DIRECTIONS = (DOWN, UP)
-MAX_TICK = (1 << 63) - 1
+MAX_TICK = (1 << 61) - 1  # decoders count ticks in 64 bits
 
 _VERSION = re.compile(r"#\s*mirotwin stream\b\s*(.*?)\s*$")
 _TOKEN = re.compile(r"\S+")

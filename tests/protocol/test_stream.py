@@ -35,7 +35,7 @@ def test_blank_lines_comments_capitals_and_windows_line_ends_are_read():
 
 
 REFUSED = [
-    ("x > 55", 1, 1, "'x' is not a tick", "0..9223372036854775807"),
+    ("x > 55", 1, 1, "'x' is not a tick", "0..2305843009213693951"),
     ("-1 > 55", 1, 1, "'-1' is not a tick", ""),
     ("9223372036854775808 > 55", 1, 1, "is not a tick", ""),
     ("5", 1, 2, "no direction", "write > for host to robot"),

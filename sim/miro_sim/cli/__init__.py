@@ -7,6 +7,7 @@ inside the commands, because the engine has to be chosen first.
 
 import click
 
+from miro_sim.cli.decode import decode
 from miro_sim.cli.fw import fw
 from miro_sim.cli.info import info, version_of
 from miro_sim.cli.program import Program
@@ -26,5 +27,5 @@ def main() -> None:
     """
 
 
-for command in (run, replay, scenarios, info, fw, vectors):
+for command in (run, replay, decode, scenarios, info, fw, vectors):
     main.add_command(command)

@@ -16,9 +16,11 @@ from typing import Any, NoReturn
 
 import click
 from miro_protocol.engine import EngineError
+from miro_protocol.pcapng_reader import CaptureError
 from miro_protocol.stream import StreamError
 from rich.console import Console, RenderableType
 
+from miro_sim.capture.hextext import HexError
 from miro_sim.inputs import InputError
 from miro_sim.outdir import OutputError
 from miro_sim.recording_reader import RecordingError
@@ -60,6 +62,8 @@ BAD_INPUTS = (
     RecordingError,
     StreamError,
     StreamContentError,
+    CaptureError,
+    HexError,
     EngineError,
 )
 

@@ -1,0 +1,101 @@
+"""Opens a file of any format as runs of characters.
+
+What belongs here: which reader a format has. What does not: telling formats apart (`detect`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import msgspec
+from miro_protocol import pcapng_reader, stream
+from miro_protocol.pcapng_reader import CaptureError
+from miro_protocol.stream import DOWN, UP, StreamError
+from miro_protocol.table import HOST_BIT_TICKS, TELEMETRY
+
+from miro_sim.capture import Run, recorded
+from miro_sim.capture.hextext import HexError, HexText
+from miro_sim.capture.input import Input
+from miro_sim.recording_reader import RecordingError
+
+READ_ERRORS = (CaptureError, HexError, RecordingError, StreamError)
+"""What reading runs may raise: all that could be read has come before it."""
+LINE_BYTES = 16 << 20
+UNTIMED = ("raw", "hex")
+_ESCAPED = re.compile(r"[\udc80-\udcff]")
+
+
+class Source(msgspec.Struct):
+    """`runs` in the order of the file; `robots` (network -> 3 or 5) is what the file itself says about layouts."""
+
+    format: str
+    runs: Iterator[Run]
+    robots: dict[int, int]
+
+    @property
+    def timed(self) -> bool:
+        """Whether ticks are times; without them they only count characters."""
+        return self.format not in UNTIMED
+
+
+def open_source(given: Input, format: str, direction: str = DOWN) -> Source:
+    """`direction` is that of raw bytes and hex text, which do not say. Reading may raise one of `READ_ERRORS`."""
+    robots: dict[int, int] = {}
+    if format == "pcapng":
+        return Source(format, _pcapng(given), robots)
+    if format == "recording":
+        return Source(format, recorded.runs(given, robots), robots)
+    if format == "stream":
+        return Source(format, _stream(given), robots)
+    pieces = _raw(given) if format == "raw" else _hex(given)
+    return Source(format, _contiguous(pieces, direction), robots)
+
+
+def character_ticks(direction: str) -> int:
+    """Length of a character as whoever speaks in that direction sends it."""
+    return TELEMETRY.character_ticks if direction == UP else 10 * HOST_BIT_TICKS
+
+
+def _raw(given: Input) -> Iterator[bytes]:
+    while data := given.read_some():
+        yield data
+
+
+def _hex(given: Input) -> Iterator[bytes]:
+    text = HexText(given.label)
+    while not text.failed and (piece := given.read_some()):
+        yield text.feed(piece)
+    text.finish()
+
+
+def _contiguous(pieces: Iterator[bytes], direction: str) -> Iterator[Run]:
+    step, count = character_ticks(direction), 0
+    for data in pieces:
+        if data:
+            yield Run(count * step, data, direction)
+            count += len(data)
+
+
+def _pcapng(given: Input) -> Iterator[Run]:
+    for packet in pcapng_reader.iterate(given, given.label):
+        yield Run(packet.tick, packet.data, packet.direction, packet.network)
+
+
+def _stream(given: Input) -> Iterator[Run]:
+    for sent in stream.iterate(_lines(given), given.label):
+        yield Run(sent.tick, sent.data, sent.direction)
+
+
+def _lines(given: Input) -> Iterator[str]:
+    number = 0
+    while line := given.readline(LINE_BYTES):
+        number += 1
+        if len(line) == LINE_BYTES and not line.endswith(b"\n"):
+            remedy = "is this a stream file?"
+            raise StreamError(given.label, number, 1, f"a line of more than {LINE_BYTES >> 20} MiB", remedy)
+        text = line.decode("utf-8-sig" if number == 1 else "utf-8", "surrogateescape")
+        if wrong := _ESCAPED.search(text):
+            reason = f"byte {ord(wrong[0]) - 0xDC00:02x}h is not UTF-8"
+            raise StreamError(given.label, number, wrong.start() + 1, reason, "save the file as UTF-8 text")
+        yield text

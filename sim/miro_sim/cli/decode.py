@@ -1,0 +1,128 @@
+"""`mirotwin decode`: what the bytes in a file say, frame by frame, and where they are damaged."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+
+import click
+import msgspec
+from miro_protocol.stream import DOWN, UP
+from miro_protocol.table import ROBOT_COUNTS
+
+from miro_sim.capture import Run, render
+from miro_sim.capture.detect import FORMATS, NAMES, detect
+from miro_sim.capture.input import Input
+from miro_sim.capture.layout import Layouts, head_of, is_telemetry
+from miro_sim.capture.rows import Row, rows
+from miro_sim.capture.source import READ_ERRORS, Source, open_source
+from miro_sim.cli.options import Place, choose_engine, engine_option
+from miro_sim.cli.program import DONE, complain
+from miro_sim.cli.progress import ProgressBar
+
+DIRECTIONS = {"down": DOWN, "up": UP}
+PROGRESS_BYTES = 1 << 16
+
+
+@click.command(short_help="Decodes captured bytes to frames and damage.")
+@click.argument("file", metavar="FILE|-", type=Place())
+@click.option(
+    "--format", "format", type=click.Choice(FORMATS), help="What FILE is. Default: its beginning tells."
+)
+@click.option(
+    "--robots",
+    type=click.Choice([str(count) for count in ROBOT_COUNTS]),
+    help="Robots in the network. Default: what FILE says, else what makes more frames readable.",
+)
+@click.option(
+    "--direction",
+    type=click.Choice([*DIRECTIONS]),
+    help="Which way raw bytes and hex text went: down to the robots (default, unless they read as telemetry) or up.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line, for programs.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar.")
+@engine_option
+def decode(
+    file: str,
+    format: str | None,
+    robots: str | None,
+    direction: str | None,
+    as_json: bool,
+    quiet: bool,
+    engine: str | None,
+) -> int:
+    """Decodes FILE (standard input for -) and prints one line a frame or damaged run of bytes.
+
+    FILE may be hex text, raw bytes, a pcapng capture of a serial line, a recording (run.mcap) or a stream file; its
+    first bytes tell which, and the first line printed says so. Any bytes can be decoded. A capture that is cut
+    short or damaged is reported with the offset, after everything before it, and the exit code is 2.
+    """
+    choose_engine(engine)
+    with Input(file) as given:
+        if format is None:
+            format, note = detect(given.peek())
+            if note:
+                complain(f"{given.label}: {note} (--format says otherwise)")
+        source = open_source(given, format, DIRECTIONS[direction or "down"])
+        layouts = layouts_for(source, None if robots is None else int(robots), direction is None)
+        with ProgressBar("decoding", given.size, quiet or sys.stdout.isatty()) as bar:
+            found = rows(_counted(source.runs, given, bar), layouts.of)
+            return (
+                _print_json(given, source, found) if as_json else _print_table(given, source, layouts, found)
+            )
+
+
+def layouts_for(source: Source, said: int | None, guess_direction: bool) -> Layouts:
+    """Looks at the beginning of `source` for what it does not say: layout, and the direction of raw bytes."""
+    head: list[Run] = []
+    guess_direction = guess_direction and not source.timed
+    if said is None or guess_direction:
+        head, source.runs = head_of(source.runs)
+    if guess_direction and is_telemetry(head):
+        head = [msgspec.structs.replace(run, direction=UP) for run in head]
+        source.runs = (msgspec.structs.replace(run, direction=UP) for run in source.runs)
+    return Layouts(said, source, head, complain)
+
+
+def _counted(runs: Iterable[Run], given: Input, bar: ProgressBar) -> Iterator[Run]:
+    """Moves the bar; where somebody waits for the other end of a pipe, lets them see what there is."""
+    shown = 0
+    for run in runs:
+        yield run
+        if given.size is None:
+            sys.stdout.flush()
+        elif given.tell() >= shown + PROGRESS_BYTES:
+            shown = given.tell()
+            bar.to(shown)
+
+
+def _print_table(given: Input, source: Source, layouts: Layouts, found: Iterable[Row]) -> int:
+    out = sys.stdout
+    totals = render.Totals()
+    out.write(f"{given.label}: {NAMES[source.format]}{layouts}\n{render.units_line()}\n")
+    out.write(f"{render.head_line(source.timed)}\n")
+    try:
+        for row in found:
+            totals.add(row)
+            out.write(f"{render.table_line(row, source.timed)}\n")
+    finally:
+        out.write(f"{totals}\n")
+    return DONE
+
+
+def _print_json(given: Input, source: Source, found: Iterable[Row]) -> int:
+    def put(line: bytes) -> None:
+        sys.stdout.write(line.decode() + "\n")
+
+    totals = render.Totals()
+    put(render.json_input(given.label, source.format, source.timed))
+    try:
+        for row in found:
+            totals.add(row)
+            put(render.json_line(row, source.timed))
+    except READ_ERRORS as error:
+        put(render.json_error(str(error)))
+        raise
+    finally:
+        put(render.json_end(totals))
+    return DONE
