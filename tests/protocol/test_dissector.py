@@ -42,19 +42,24 @@ def test_the_committed_dissector_is_the_generated_one():
 
 
 def tshark(packets, folder, *options):
-    """tshark's fields of each packet; a missing tshark is an error where tests must not be skipped."""
+    """tshark's fields of each packet."""
+    write(folder / "run.pcapng", packets)
+    return dissected(folder / "run.pcapng", *options)
+
+
+def dissected(capture, *options):
+    """tshark's fields of each packet in a file; a missing tshark is an error where tests must not be skipped."""
     if shutil.which("tshark") is None:
         if "CI" not in os.environ:
             pytest.skip("tshark is not installed (Debian package tshark)")
         pytest.fail("tshark is missing: install the Debian package tshark")
-    write(folder / "run.pcapng", packets)
-    command = ["tshark", "-X", f"lua_script:{SCRIPT}", "-d", "rtacser.data,miro", "-r", folder / "run.pcapng"]
+    command = ["tshark", "-X", f"lua_script:{SCRIPT}", "-d", "rtacser.data,miro", "-r", capture]
     done = subprocess.run(
         [*command, *options, "-T", "json", "--no-duplicate-keys"],
         capture_output=True,
         text=True,
         check=True,
-        env={**os.environ, "TZ": "UTC", "HOME": str(folder)},
+        env={**os.environ, "TZ": "UTC", "HOME": str(capture.parent)},
     )
     assert "Lua" not in done.stderr, done.stderr
     return [packet["_source"]["layers"] for packet in json.loads(done.stdout)]

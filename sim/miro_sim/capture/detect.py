@@ -26,7 +26,8 @@ from miro_sim.capture.hextext import HexText
 from miro_sim.capture.input import HEAD_BYTES
 from miro_sim.recording_reader import MAGIC as MCAP
 
-FORMATS = ("hex", "raw", "pcapng", "recording", "stream")
+TIMED = ("pcapng", "recording", "stream")
+FORMATS = ("hex", "raw", *TIMED)
 NAMES = {
     "hex": "hex text",
     "raw": "raw bytes",

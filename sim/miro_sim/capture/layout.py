@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-from miro_protocol.stream import DOWN
+import msgspec
+from miro_protocol.stream import DOWN, UP
 from miro_protocol.table import ROBOT_COUNTS
 
 from miro_sim.capture import Run
@@ -113,3 +114,17 @@ class Layouts:
         """`, network 0 of 3 robots` of all networks in the head."""
         networks = sorted({run.network for run in self.head})
         return "".join(f", network {network} of {self.of(network)} robots" for network in networks)
+
+
+def look(
+    source: Source, said: int | None, tell: Callable[[str], None], guess_direction: bool = False
+) -> Layouts:
+    """Looks at the beginning of `source` for what it does not say: layout, and the direction of raw bytes."""
+    head: list[Run] = []
+    guess_direction = guess_direction and not source.timed
+    if said is None or guess_direction:
+        head, source.runs = head_of(source.runs)
+    if guess_direction and is_telemetry(head):
+        head = [msgspec.structs.replace(run, direction=UP) for run in head]
+        source.runs = (msgspec.structs.replace(run, direction=UP) for run in source.runs)
+    return Layouts(said, source, head, tell)

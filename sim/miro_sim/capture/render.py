@@ -19,7 +19,7 @@ from typing import Any
 
 import msgspec
 from miro_protocol.events import Damaged, Received
-from miro_protocol.frames import Message, ServiceFrame, TeamFrame
+from miro_protocol.frames import Message, ServiceFrame, TeamFrame, describe
 from miro_protocol.table import (
     FLAG_MEANINGS,
     SERVICE_DATA,
@@ -77,6 +77,14 @@ def kind(event: Received, message: Message | None) -> str:
     if isinstance(message, ServiceFrame):
         return Opcode(message.opcode).name.lower()
     return FrameType(event.type).name.lower()
+
+
+def described(row: Row) -> str:
+    """A few words: what a frame is, or what is wrong with these bytes. The comment in a stream file."""
+    event = row.event
+    if isinstance(event, Damaged):
+        return f"{len(event.data)} bytes, {reason(event)}"
+    return describe(row.message) if row.message is not None else f"says nothing known: {row.unknown}"
 
 
 def contents(row: Row) -> str:

@@ -15,6 +15,7 @@ from miro_protocol.stream import DOWN, UP, StreamError
 from miro_protocol.table import HOST_BIT_TICKS, TELEMETRY
 
 from miro_sim.capture import Run, recorded
+from miro_sim.capture.detect import TIMED
 from miro_sim.capture.hextext import HexError, HexText
 from miro_sim.capture.input import Input
 from miro_sim.recording_reader import RecordingError
@@ -22,7 +23,6 @@ from miro_sim.recording_reader import RecordingError
 READ_ERRORS = (CaptureError, HexError, RecordingError, StreamError)
 """What reading runs may raise: all that could be read has come before it."""
 LINE_BYTES = 16 << 20
-UNTIMED = ("raw", "hex")
 _ESCAPED = re.compile(r"[\udc80-\udcff]")
 
 
@@ -36,7 +36,7 @@ class Source(msgspec.Struct):
     @property
     def timed(self) -> bool:
         """Whether ticks are times; without them they only count characters."""
-        return self.format not in UNTIMED
+        return self.format in TIMED
 
 
 def open_source(given: Input, format: str, direction: str = DOWN) -> Source:

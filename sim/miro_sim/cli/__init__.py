@@ -8,6 +8,7 @@ inside the commands, because the engine has to be chosen first.
 import click
 
 from miro_sim.cli.decode import decode
+from miro_sim.cli.export import export
 from miro_sim.cli.fw import fw
 from miro_sim.cli.info import info, version_of
 from miro_sim.cli.program import Program
@@ -27,5 +28,5 @@ def main() -> None:
     """
 
 
-for command in (run, replay, decode, scenarios, info, fw, vectors):
+for command in (run, replay, decode, export, scenarios, info, fw, vectors):
     main.add_command(command)

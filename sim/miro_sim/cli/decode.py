@@ -6,14 +6,13 @@ import sys
 from collections.abc import Iterable, Iterator
 
 import click
-import msgspec
 from miro_protocol.stream import DOWN, UP
 from miro_protocol.table import ROBOT_COUNTS
 
 from miro_sim.capture import Run, render
 from miro_sim.capture.detect import FORMATS, NAMES, detect
 from miro_sim.capture.input import Input
-from miro_sim.capture.layout import Layouts, head_of, is_telemetry
+from miro_sim.capture.layout import Layouts, look
 from miro_sim.capture.rows import Row, rows
 from miro_sim.capture.source import READ_ERRORS, Source, open_source
 from miro_sim.cli.options import Place, choose_engine, engine_option
@@ -64,24 +63,12 @@ def decode(
             if note:
                 complain(f"{given.label}: {note} (--format says otherwise)")
         source = open_source(given, format, DIRECTIONS[direction or "down"])
-        layouts = layouts_for(source, None if robots is None else int(robots), direction is None)
+        layouts = look(source, None if robots is None else int(robots), complain, direction is None)
         with ProgressBar("decoding", given.size, quiet or sys.stdout.isatty()) as bar:
             found = rows(_counted(source.runs, given, bar), layouts.of)
             return (
                 _print_json(given, source, found) if as_json else _print_table(given, source, layouts, found)
             )
-
-
-def layouts_for(source: Source, said: int | None, guess_direction: bool) -> Layouts:
-    """Looks at the beginning of `source` for what it does not say: layout, and the direction of raw bytes."""
-    head: list[Run] = []
-    guess_direction = guess_direction and not source.timed
-    if said is None or guess_direction:
-        head, source.runs = head_of(source.runs)
-    if guess_direction and is_telemetry(head):
-        head = [msgspec.structs.replace(run, direction=UP) for run in head]
-        source.runs = (msgspec.structs.replace(run, direction=UP) for run in source.runs)
-    return Layouts(said, source, head, complain)
 
 
 def _counted(runs: Iterable[Run], given: Input, bar: ProgressBar) -> Iterator[Run]:
