@@ -1,7 +1,13 @@
 """Hypothesis strategies for frames and for what a receiver hears, drawn from the same table as the codec.
 
 Needs the extra `strategies` (`pip install mirotwin[strategies]`). What belongs here: inputs that anybody
-testing a sender or a receiver of this wire wants. What does not: assertions.
+testing a sender or a receiver of this wire wants. What does not: assertions, the radio and the robot
+(`miro_sim.testing`).
+
+* `host_frames`, `telemetry_frames`: messages
+* `valid_streams`, `damaged_streams`: characters as a receiver hears them, damaged by wrong bits, lost and added
+  characters, wrong stop bits, pauses, slips (wrong start and stop bits) and noise
+* `transmissions`: what a host sends at which tick, as a stream file holds it
 """
 
 from __future__ import annotations
@@ -12,13 +18,18 @@ from hypothesis import strategies as st
 
 from miro_protocol.decoder import Symbol
 from miro_protocol.frames import Message, ServiceFrame, TeamFrame, TelemetryFrame, encode
+from miro_protocol.line import LineReceiver, bits_of, edges_of
+from miro_protocol.stream import DOWN, Transmission
 from miro_protocol.table import (
+    BITS_PER_CHARACTER,
     FLAG_MEANINGS,
+    HOST_BIT_TICKS,
     ROBOT_COUNTS,
     SEQ,
     SERVICE_DATA,
     TELEMETRY,
     TELEMETRY_FIELDS,
+    TICKS_PER_MS,
     TICKS_PER_US,
     VELOCITY,
     Field,
@@ -116,6 +127,24 @@ def _damaged(draw: st.DrawFn, wire: bytes) -> _Piece:
 
 
 @st.composite
+def _slipped(draw: st.DrawFn, wire: bytes) -> _Piece:
+    """The frame with bits of the line turned over, start and stop bits among them, as a UART hears it.
+
+    Pauses are counted in characters of the host, as those of the other pieces are.
+    """
+    bits = bits_of(wire)
+    for place in draw(st.lists(st.integers(0, len(bits) - 1), min_size=1, max_size=4, unique=True)):
+        bits[place] ^= 1
+    symbols = LineReceiver().feed(edges_of(bits, 0), (len(bits) + 20) * HOST_BIT_TICKS)
+    data, stop_bits = bytes(byte for byte, _, _ in symbols), tuple(good for _, good, _ in symbols)
+    free, pauses = 0, []
+    for _, _, tick in symbols:
+        pauses.append(tick - free)
+        free = tick + BITS_PER_CHARACTER * HOST_BIT_TICKS
+    return _Piece(data, stop_bits, tuple(pauses))
+
+
+@st.composite
 def _noise(draw: st.DrawFn) -> _Piece:
     """Random characters, with more than a fair share of those that frames begin with."""
     lookalike = st.sampled_from([b"\x55", b"\xff", b"\x2d", b"\xd4", b"\x2d\xd4"])
@@ -132,7 +161,8 @@ def _heard(draw: st.DrawFn, damaged: bool, telemetry: bool) -> Heard:
     step = (TELEMETRY if telemetry else downlink(n)).character_ticks
     whole = message.flatmap(lambda sent: _whole(encode(sent, n), sent))
     broken = message.flatmap(lambda sent: _damaged(encode(sent, n)))
-    piece = st.one_of(whole, broken, _noise()) if damaged else whole
+    slipped = message.flatmap(lambda sent: _slipped(encode(sent, n)))
+    piece = st.one_of(whole, broken, slipped, _noise()) if damaged else whole
     tick, symbols, sent = 0, [], []
     for part in draw(st.lists(piece, max_size=6)):
         tick += draw(_pauses())
@@ -151,5 +181,21 @@ def valid_streams(telemetry: bool = False) -> st.SearchStrategy[Heard]:
 
 
 def damaged_streams(telemetry: bool = False) -> st.SearchStrategy[Heard]:
-    """Whole frames, damaged frames and noise in any order. Pauses are at most 20 us or at least 80 us."""
+    """Whole, damaged and slipped frames and noise in any order. Pauses are at most 20 us or at least 80 us."""
     return _heard(damaged=True, telemetry=telemetry)
+
+
+@st.composite
+def transmissions(draw: st.DrawFn, n: int, most: int = 10) -> list[Transmission]:
+    """Frames, damaged frames and garbage that a host sends to `n` robots: `stream.write` makes a file of them.
+
+    They do not overlap and are up to 200 ms apart.
+    """
+    frame = host_frames(n).map(lambda message: encode(message, n))
+    piece = st.one_of(frame, frame.flatmap(_damaged).map(lambda broken: broken.data), st.binary(max_size=20))
+    tick, sent = 0, []
+    for data in draw(st.lists(piece.filter(len), max_size=most)):
+        tick += draw(st.integers(0, 200)) * TICKS_PER_MS
+        sent.append(Transmission(tick, DOWN, data))
+        tick += len(data) * BITS_PER_CHARACTER * HOST_BIT_TICKS
+    return sent
