@@ -9,8 +9,9 @@ from miro_protocol import stream
 from miro_protocol.decoder import Damaged, Decoder, Reason, Received
 from miro_protocol.strategies import FAR_TICKS, NEAR_TICKS, damaged_streams, robot_counts, transmissions
 
-
-ANY = settings(phases=[Phase.generate], max_examples=2000, deadline=None, database=None)  # the first one will do
+ANY = settings(
+    phases=[Phase.generate], max_examples=2000, deadline=None, database=None
+)  # the first one will do
 
 
 def events(heard):
