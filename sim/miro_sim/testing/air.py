@@ -55,7 +55,9 @@ class Air:
             if trouble.kind == "burst":
                 ticks.update(range(first, trouble.end_tick, HOST_BIT_TICKS))
         edges = []
-        for tick in sorted(tick for tick in ticks if self.settled_tick <= tick < until):
+        for tick in sorted(ticks):
+            if not self.settled_tick <= tick < until:
+                continue
             level = self._level(tick)
             if level != self.level:
                 self.rxd.append(tick, level)

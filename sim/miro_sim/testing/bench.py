@@ -43,7 +43,6 @@ EDGE_TICKS = MS // 5  # firmware tells "150 ms or more" to within 0.1 ms
 COUNTERS = ("_frames_accepted", "_frames_rejected", "_frames_stale")
 
 ANSWER_FRAMES = 4  # that may be counted while an answer is on its way
-PARTS = ("board", "downlink", "air", "uplink", "receiver", "decoder", "freshness", "telemetry")
 
 Counters = tuple[int, int, int]
 
@@ -250,15 +249,28 @@ class Bench:
             "now": self.now,
             "booted_tick": self.booted_tick,
             "possible": [[tick, list(counters)] for tick, counters in self.possible],
-            **{name: getattr(self, name).snapshot() for name in PARTS},
+            "board": self.board.snapshot(),
+            "downlink": self.downlink.snapshot(),
+            "air": self.air.snapshot(),
+            "uplink": self.uplink.snapshot(),
+            "receiver": self.receiver.snapshot(),
+            "decoder": self.decoder.snapshot(),
+            "freshness": self.freshness.snapshot(),
+            "telemetry": self.telemetry.snapshot(),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         self.now = state["now"]
         self.booted_tick = state["booted_tick"]
         self.possible = msgspec.convert(state["possible"], list[tuple[int, Counters]])
-        for name in PARTS:
-            getattr(self, name).restore(state[name])
+        self.board.restore(state["board"])
+        self.downlink.restore(state["downlink"])
+        self.air.restore(state["air"])
+        self.uplink.restore(state["uplink"])
+        self.receiver.restore(state["receiver"])
+        self.decoder.restore(state["decoder"])
+        self.freshness.restore(state["freshness"])
+        self.telemetry.restore(state["telemetry"])
 
     def __repr__(self) -> str:
         return f"Bench(n={self.n}, slot={self.slot}, now={self.now}, counters={self.counters}, {self.radio})"

@@ -15,6 +15,7 @@ from miro_sim.testing.air import Air, Trouble
 from miro_sim.testing.bench import MS, Bench, LinkFailure
 
 from tests.sim.cli.conftest import Result, mirotwin
+from tests.sim.testing.noise import listen
 
 __all__ = ["mirotwin"]
 NOISY = RadioParams.of(bit_error_rate=3e-3)
@@ -67,6 +68,14 @@ def test_a_dropped_link_is_silence() -> None:
     assert (bench.counters, bench.heard) == ((0, 0, 0), [])
     bench.send(team(1))
     assert bench.counters == (1, 0, 0)
+
+
+@pytest.mark.parametrize("n", [3, 5])
+def test_slicer_noise_alone_is_never_taken_for_a_frame_by_the_firmware(n: int) -> None:
+    """`python -m tests.sim.testing.noise` listens for minutes."""
+    bench = listen(10, n)
+    assert len(bench.heard) > 7000
+    assert bench.counters == (0, 0, 0)
 
 
 def test_trouble_that_comes_too_late_is_refused() -> None:

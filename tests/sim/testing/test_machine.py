@@ -82,7 +82,7 @@ def test_a_planted_fault_is_found_and_shrunk_to_a_stream_file_that_shows_it_agai
     with pytest.raises(LinkFailure, match=r"undefined opcode A5 .* in _telemetry_answer") as caught:
         run_state_machine_as_test(  # type: ignore[no-untyped-call]
             Planted,
-            settings=settings(max_examples=100, stateful_step_count=5, deadline=None, database=None),
+            settings=settings(max_examples=60, stateful_step_count=3, deadline=None, database=None),
         )
     assert any("mirotwin replay" in note for note in caught.value.__notes__)
     sent = stream.read(tmp_path / "failure.stream")
