@@ -3,9 +3,13 @@
 import re
 from pathlib import Path
 
+import pytest
+from hypothesis import Phase, settings
 from miro_protocol import document
+from miro_protocol.decoder import Decoder, Received
 
-README = (Path(__file__).parents[2] / "protocol/README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "protocol/README.md").read_text(encoding="utf-8")
 
 
 def test_the_tables_in_the_readme_are_those_of_the_code():
@@ -16,10 +20,37 @@ def test_the_tables_in_the_readme_are_those_of_the_code():
     assert README.partition(begin)[2].partition(end)[0] == document.render()
 
 
+EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+
+
 def test_the_example_in_the_readme_runs(capsys):
-    (example,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    exec(example, {})
+    exec(EXAMPLES[0], {})
     assert capsys.readouterr().out.splitlines() == [
         "Damaged(data=b'noise', reason=<Reason.NO_SYNC: 0>, start_tick=0)",
         "TeamFrame(type=0, seq=3, velocities=((100, -100), (0, 0), (0, 0)))",
     ]
+
+
+def test_the_example_of_a_users_own_test_runs_and_can_fail():
+    def receive(n, symbols):
+        events = Decoder(n).feed_symbols(symbols)
+        return [event.body for event in events if isinstance(event, Received)]
+
+    for mine, fails in ((receive, False), (lambda n, symbols: receive(n, symbols)[1:], True)):
+        names = {"my_receiver": mine}
+        exec(EXAMPLES[1], names)
+        test = settings(max_examples=50, deadline=None, database=None, phases=[Phase.generate])(
+            names["test_my_receiver_finds_what_the_decoder_finds"]
+        )
+        if fails:
+            with pytest.raises(AssertionError):
+                test()
+        else:
+            test()
+
+
+def test_the_page_names_every_module_for_users():
+    folder = ROOT / "protocol/miro_protocol"
+    modules = {path.stem for path in folder.glob("*.py")} - {"__init__", "engine", "files", "events", "scan"}
+    named = set(re.findall(r"`(\w+)`", README.partition("## Frame")[0]))
+    assert modules - {"dissector_code"} <= named
