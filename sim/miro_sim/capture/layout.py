@@ -13,9 +13,11 @@ from miro_protocol.table import ROBOT_COUNTS
 
 from miro_sim.capture import Run
 from miro_sim.capture.source import READ_ERRORS, Source
+from miro_sim.inputs import InputError
 
 HEAD_CHARACTERS = 1 << 16
-DEFAULT = ROBOT_COUNTS[0]
+MOST_NETWORKS = 64
+SHOWN_NETWORKS = 8
 
 
 def head_of(runs: Iterator[Run]) -> tuple[list[Run], Iterator[Run]]:
@@ -98,8 +100,14 @@ class Layouts:
         self.head = head
         self.tell = tell
         self.found: dict[int, int] = {}
+        self.asked: set[int] = set()
 
     def of(self, network: int) -> int:
+        """InputError for more networks than decoders are kept for."""
+        self.asked.add(network)
+        if len(self.asked) > MOST_NETWORKS:
+            what = f"characters of more than {MOST_NETWORKS} networks"
+            raise InputError(self.source.label, what, "take one out with `mirotwin export --network`")
         if self.said is not None:
             return self.said
         if network in self.source.robots:
@@ -111,8 +119,10 @@ class Layouts:
         return self.found[network]
 
     def __str__(self) -> str:
-        """`, network 0 of 3 robots` of all networks in the head."""
+        """`, network 0 of 3 robots` of all networks in the head, if they are few."""
         networks = sorted({run.network for run in self.head})
+        if len(networks) > SHOWN_NETWORKS:
+            return f", {len(networks)} networks"
         return "".join(f", network {network} of {self.of(network)} robots" for network in networks)
 
 

@@ -18,9 +18,10 @@ from miro_sim.capture import Run, recorded
 from miro_sim.capture.detect import TIMED
 from miro_sim.capture.hextext import HexError, HexText
 from miro_sim.capture.input import Input
+from miro_sim.inputs import InputError
 from miro_sim.recording_reader import RecordingError
 
-READ_ERRORS = (CaptureError, HexError, RecordingError, StreamError)
+READ_ERRORS = (CaptureError, HexError, InputError, RecordingError, StreamError)
 """What reading runs may raise: all that could be read has come before it."""
 LINE_BYTES = 16 << 20
 _ESCAPED = re.compile(r"[\udc80-\udcff]")
@@ -29,6 +30,7 @@ _ESCAPED = re.compile(r"[\udc80-\udcff]")
 class Source(msgspec.Struct):
     """`runs` in the order of the file; `robots` (network -> 3 or 5) is what the file itself says about layouts."""
 
+    label: str
     format: str
     runs: Iterator[Run]
     robots: dict[int, int]
@@ -43,13 +45,13 @@ def open_source(given: Input, format: str, direction: str = DOWN) -> Source:
     """`direction` is that of raw bytes and hex text, which do not say. Reading may raise one of `READ_ERRORS`."""
     robots: dict[int, int] = {}
     if format == "pcapng":
-        return Source(format, _pcapng(given), robots)
+        return Source(given.label, format, _pcapng(given), robots)
     if format == "recording":
-        return Source(format, recorded.runs(given, robots), robots)
+        return Source(given.label, format, recorded.runs(given, robots), robots)
     if format == "stream":
-        return Source(format, _stream(given), robots)
+        return Source(given.label, format, _stream(given), robots)
     pieces = _raw(given) if format == "raw" else _hex(given)
-    return Source(format, _contiguous(pieces, direction), robots)
+    return Source(given.label, format, _contiguous(pieces, direction), robots)
 
 
 def character_ticks(direction: str) -> int:

@@ -174,6 +174,15 @@ def test_what_cannot_be_read_is_named_after_all_that_could(
     assert message in found[-2]["text"]
 
 
+def test_a_capture_of_very_many_networks_does_not_fill_the_memory() -> None:
+    crowd = render([Packet(at, ">", TEAM, at) for at in range(200)])
+    code, lines, err = decode(crowd)
+    assert code == 2
+    assert lines[0] == "standard input: pcapng capture, 200 networks"
+    assert "characters of more than 64 networks; take one out with `mirotwin export --network`" in err
+    assert len(lines) == 3 + 64 + 1
+
+
 def test_a_damaged_recording_gives_what_came_before(
     mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
 ) -> None:
