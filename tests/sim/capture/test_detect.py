@@ -1,5 +1,7 @@
 """Formats are told from the first bytes; a guess that could be wrong about plain text is said aloud."""
 
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -56,3 +58,11 @@ def test_what_the_library_writes_as_a_stream_is_a_stream(sent: list[stream.Trans
     text = stream.format_stream(sent)
     assert detect(text.encode())[0] == "stream"
     assert detect(text.partition("\n")[2].encode())[0] == "stream"
+
+
+def test_the_specification_names_the_formats_in_the_order_in_which_they_are_tried() -> None:
+    page = (Path(__file__).parents[3] / "protocol/README.md").read_text(encoding="utf-8")
+    table = page.partition("| it begins with | taken for |")[2].partition("\n\n")[0]
+    named = [row.split("|")[-2].strip() for row in table.splitlines()[2:]]
+    assert named == ["pcapng", "recording", "stream", "hex", "raw"]
+    assert sorted(named) == sorted(FORMATS)
