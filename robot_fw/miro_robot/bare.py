@@ -70,6 +70,7 @@ class BareMachine:
         self.polls = 0  # reads of P3 seen so far
         self.bus = XramBus(self._sent, self._faulted)
         self.cpu = Cpu(self.bus)
+        self.cpu.txd.unread = True  # the terminal takes characters, not edges
         self.cpu.load(image.code, image.used)
         if code_in_xram:
             self.bus.fill(image.code)

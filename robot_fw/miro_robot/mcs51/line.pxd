@@ -7,6 +7,7 @@ cdef long long _SIZE
 @cython.final
 cdef class Line:
     cdef public long long settled_tick
+    cdef public bint unread
     cdef long long _ticks[4096]
     cdef int _before
     cdef long long _first

@@ -4,7 +4,8 @@ What belongs here: edges with their ticks, and the queries a sampling receiver n
 UART bit, a strobe) belongs to the chips at both ends.
 
 A Line has one producer, which appends edges in order and says up to where its content is final, and consumers
-that never look beyond that tick. Edges live in a ring; the consumer forgets what is no longer needed.
+that never look beyond that tick. Edges live in a ring; the consumer forgets what is no longer needed. A line
+without a consumer (`unread`) drops its oldest edges when the ring is full.
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ _SIZE = 4096
 class Line:
     """Levels (0, 1) over ticks. `settled_tick`: content is final for every tick below it."""
 
-    NOT_STATE = ("_cursor",)  # where the last query ended: a cache
+    NOT_STATE = ("_cursor", "unread")  # where the last query ended: a cache; who listens: wiring
 
     def __init__(self, initial: int = 1) -> None:
         self.settled_tick = 0
+        self.unread = False
         self._ticks = [0] * 4096
         self._before = initial  # level before the oldest edge kept; each edge toggles
         self._first = 0  # serial numbers of the oldest edge kept and of the next one
@@ -34,7 +36,7 @@ class Line:
         """The wire has `level` from `tick` on.
 
         No edge if that is no change; replaces an edge on the same tick. Raises ValueError on a tick before
-        the last edge, OverflowError when 4096 edges are waiting to be forgotten.
+        the last edge, OverflowError when 4096 edges are waiting to be forgotten by somebody.
         """
         if self._end > self._first:
             last = self._ticks[(self._end - 1) & _MASK]
@@ -47,6 +49,9 @@ class Line:
                 return
         if level == self._last_level():
             return
+        if self._end - self._first == _SIZE and self.unread:
+            self._first += _SIZE // 2  # an even number: the level before the oldest edge stays
+            self._cursor = max(self._cursor, self._first)
         if self._end - self._first == _SIZE:
             raise OverflowError(f"line holds {_SIZE} edges already at tick {tick}: nobody forgets them")
         self._ticks[self._end & _MASK] = tick

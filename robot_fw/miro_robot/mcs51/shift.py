@@ -29,6 +29,7 @@ class Shift:
     def __init__(self, uart: Uart) -> None:
         self.uart = uart
         self.data = Line()
+        self.data.unread = True  # only ever asked for its level of now
         self.flag = 0  # what its end sets: TI sending, RI receiving, 0 idle
         self.value = 0
         self.number = 0  # bits done

@@ -115,6 +115,23 @@ def test_the_last_character_is_sent_before_a_run_halts():
     assert bytes(out) == b"A"
 
 
+@pytest.mark.parametrize(
+    ("mode", "lasts"), [("#00h", 30), ("#80h", 1_000), ("#0D8h", 1_000)], ids=["mode 0", "mode 2", "mode 3"]
+)
+def test_a_program_may_send_as_much_as_it_likes(mode, lasts):
+    out = bytearray()
+    text = f"MOV TMOD,#20h\nMOV TH1,#0FFh\nMOV TCON,#40h\nMOV SCON,{mode}\nloop:\nMOV SBUF,#55h\nJNB TI,$\n"
+    machine = BareMachine(image(text + "CLR TI\nSJMP loop"), output=out.extend)
+    assert machine.run(max_cycles=1_000 * lasts) == Ended.CYCLES
+    assert bytes(out) == b"U" * len(out)
+    assert len(out) > 1_000
+
+
+def test_a_program_may_wave_with_p3_1_as_long_as_it_likes():
+    machine = BareMachine(image("loop:\nCPL TXD\nSJMP loop"))
+    assert machine.run(max_cycles=300_000) == Ended.CYCLES
+
+
 def test_progress_is_told_and_the_dump_has_the_registers():
     told = []
     machine = BareMachine(image("SETB EA\nMOV B,#12h\nloop:\nSJMP loop"))

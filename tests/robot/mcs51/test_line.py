@@ -76,6 +76,17 @@ def test_the_ring_wraps_and_says_when_it_is_full():
         line.append(20_000, 1 - line.level_at(20_000))
 
 
+def test_a_line_that_nobody_reads_drops_its_oldest_edges():
+    line = Line()
+    line.unread = True
+    for tick in range(10_000):
+        line.append(tick, tick & 1)
+        assert line.level_at(tick) == tick & 1
+    kept = line.edges()
+    assert 2048 <= len(kept) <= 4096
+    assert kept == [(tick, tick & 1) for tick in range(10_000 - len(kept), 10_000)]
+
+
 def test_the_repr_shows_the_last_edges():
     line = Line()
     line.append(5, 0)
