@@ -3,11 +3,13 @@ from miro_robot.lm629.chip cimport Lm629
 from miro_robot.mcs51.bus cimport Bus
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.plant cimport Plant
+from miro_robot.probe cimport Probe
 
 
 cdef class Board(Bus):
     cdef public object wiring
     cdef public object faults
+    cdef public Probe probe
     cdef readonly Cpu cpu
     cdef readonly Lm629 left
     cdef readonly Lm629 right

@@ -19,6 +19,7 @@ from miro_robot.lm629.options import Lm629Options
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
+from miro_robot.probe import Probe
 from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
 
 CYCLE_TICKS = 12
@@ -37,7 +38,7 @@ class Board(Bus):
     NOT_STATE = (
         "wiring", "plant", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_bank", "pin_bit", "pin_inverted", "hi_port", "hi_bit", "hi_inverted",
-        "hi_count", "hi_side", "hi_seen", "stop_on_fault", "faults",
+        "hi_count", "hi_side", "hi_seen", "stop_on_fault", "faults", "probe",
     )  # fmt: skip
 
     def __init__(
@@ -57,6 +58,7 @@ class Board(Bus):
         self.stop_on_fault = stop_on_fault
         self.faults: list[FirmwareFault] = []
         self.fault_count = 0
+        self.probe: Probe | None = None
         self.busy_writes = 0
         self.contention = 0
         self.bus_levels = 0xFF
@@ -144,6 +146,8 @@ class Board(Bus):
             self._drive_bridge(now)
             if self.left.hi != self.hi_seen[0] or self.right.hi != self.hi_seen[1]:
                 self._drive_interrupts(now)
+            if self.probe is not None:
+                self.probe.passed(now)
 
     # ---- from chip to bridge and CPU ----------------------------------------------------------------------
 
@@ -233,6 +237,8 @@ class Board(Bus):
                 self.cpu.set_external(self.data_bank, levels, tick)
         self._drive_bridge(tick)
         self._drive_interrupts(tick)
+        if self.probe is not None:
+            self.probe.moved(tick)
 
     def _watch_bus(self, both_drive: bool, tick: int) -> None:
         """What the firmware must not do to the LM629: write while busy, read two chips at once."""

@@ -22,6 +22,9 @@ class Watcher:
     def attached(self, cpu: Cpu) -> None:
         """It looks on from now."""
 
+    def starting(self, cpu: Cpu) -> None:
+        """A run begins; what it will find on its lines is there, and not forgotten yet."""
+
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
         """The instruction at `pc` was executed."""
 
@@ -52,6 +55,8 @@ class Inspector:
         reason = 0
         if began >= until_cycle:
             return Executor.run(cpu, until_cycle)
+        for watcher in self.watchers:
+            watcher.starting(cpu)
         while reason == 0 and cpu.cycles < until_cycle:
             if cpu.idle or cpu.powered_down:
                 reason = self._sleep(until_cycle)

@@ -27,7 +27,7 @@ cdef class Lm629:
     cdef readonly Pid pid
     cdef readonly Signals signals
     cdef readonly object trajectory_buffer, filter_buffer
-    cdef public list commands
+    cdef public list commands, encoder_edges
     cdef public long long writes_while_busy
     cdef public long long next_tick, sample_tick, period_tick, reset_tick
     cdef public int mode, reset_level, start_taken

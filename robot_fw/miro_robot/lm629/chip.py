@@ -57,12 +57,14 @@ class Lm629:
     For observers: `real_position`, `real_velocity`, `index_position` (counts, as of the last sample),
     `desired_position`, `desired_velocity`, `status`, `pwm_magnitude` (0..127), `writes_while_busy` (writes
     lost because the chip was busy or in reset), and `commands`, which collects (tick, opcode, data bytes)
-    of every command whose words are complete; it is no state, drain it as you like.
+    of every command whose words are complete; it is no state, drain it as you like. `encoder_edges` is None, or
+    a list of yours that gets (tick, a, b) of every call of `set_encoder`.
     """
 
     NOT_STATE = (
         *("options", "reset_ticks", "reset_pulse_ticks"),
-        *("commands", "hi", "writes_while_busy"),  # the last two are copies of what the parts hold
+        *("commands", "encoder_edges"),
+        *("hi", "writes_while_busy"),  # copies of what the parts hold
     )
 
     def __init__(self, options: Lm629Options = DEFAULT_OPTIONS) -> None:
@@ -77,6 +79,7 @@ class Lm629:
         self.trajectory_buffer = TrajectoryBuffer()
         self.filter_buffer = FilterBuffer()
         self.commands: list[tuple[int, int, bytes]] = []
+        self.encoder_edges: list[tuple[int, int, int]] | None = None
         self.writes_while_busy = 0
         self.reset_level = 1
         self.reset_tick = 0
@@ -281,6 +284,8 @@ class Lm629:
     def set_encoder(self, tick: int, a: int, b: int) -> None:
         """Levels of A and B from `tick` on; the first call tells where the wheel stands."""
         self.encoder.set_phases(tick, a, b)
+        if self.encoder_edges is not None:
+            self.encoder_edges.append((tick, a, b))
 
     def set_index(self, tick: int, level: int) -> None:
         """Level of /IN from `tick` on."""

@@ -11,7 +11,18 @@ from rich.table import Table
 from miro_sim.cli.options import choose_engine, engine_option, firmware_option, load_image
 from miro_sim.cli.program import BAD_INPUT, DONE, complain, show
 
-PACKAGES = ("numpy", "msgspec", "click", "rich", "mcap", "matplotlib", "pyserial", "crcmod-plus", "intelhex")
+PACKAGES = (
+    "numpy",
+    "msgspec",
+    "click",
+    "rich",
+    "mcap",
+    "matplotlib",
+    "pyserial",
+    "crcmod-plus",
+    "intelhex",
+    "pyvcd",
+)
 
 
 def version_of(package: str) -> str:

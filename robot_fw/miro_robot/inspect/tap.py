@@ -1,0 +1,278 @@
+"""Where the wires of a robot are picked up: levels with the exact ticks at which they change.
+
+What belongs here: looking at CPU, board and chips at the moments at which a level may change, and noting each change
+as (tick, place, level). What does not: putting parts together to pins, and files (`waveform.py`).
+
+Lines, CPU, chips and plant run ahead of each other, so changes are not noted in the order of their ticks;
+`CpuTap.known` says below which tick nothing can be missing any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from miro_robot.board import Board
+from miro_robot.inspect.watcher import Watcher
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.line import Line
+from miro_robot.probe import Probe
+
+_FAR = 1 << 62
+_TICKS = 12  # per machine cycle
+
+_RXD, _TXD, _SHIFT, _LATCH, _OUTSIDE, _ASLEEP, _IN_SERVICE, _ROUTINE, _DATA, _SIDE = (
+    0,
+    1,
+    2,
+    3,
+    7,
+    11,
+    12,
+    14,
+    20,
+    21,
+)
+_CS, _BUSY, _HI, _PWM, _SIGN, _MAGNITUDE, _A, _B, _PER_SIDE = 0, 5, 6, 7, 8, 9, 10, 11, 12
+_CHIP_PINS = 5  # /CS, /RD, /WR, PS, /RST, as the board has them
+_PLACES = 45
+PLACES = (
+    *("rxd", "txd", "shift"),
+    *(f"latch{port}" for port in range(4)),
+    *(f"outside{port}" for port in range(4)),
+    *("asleep", "low", "high"),
+    *("int0", "timer0", "int1", "timer1", "serial", "timer2"),
+    "data",
+    *(
+        f"{side}.{pin}"
+        for side in ("left", "right")
+        for pin in ("cs", "rd", "wr", "ps", "rst", "busy", "hi", "pwm", "sign", "magnitude", "a", "b")
+    ),
+)
+"""What the places are. `shift`: what the serial port in mode 0 puts on RXD; `outside`: what is wired to a port puts
+on its pins; `low` and `high`: a routine of that priority is in service."""
+
+UNKNOWN = 2
+"""Level of a routine's place while one is in service that nobody saw begin."""
+
+
+class BoardTap(Probe):
+    """Notes what happens on a board into `events`; `levels` are those noted last."""
+
+    def __init__(self, board: Board, events: list[tuple[int, int, int]]) -> None:
+        self.board = board
+        self.events = events
+        self.levels = [0] * 45
+        self.busy_end = [0] * 2
+        self.passed_tick = 0
+        self.left_edges: list[tuple[int, int, int]] = []
+        self.right_edges: list[tuple[int, int, int]] = []
+
+    def attach(self, tick: int) -> None:
+        """Looks on from `tick`, where `levels` begin."""
+        board = self.board
+        board.probe = self
+        board.left.encoder_edges = self.left_edges
+        board.right.encoder_edges = self.right_edges
+        self._look_at_pins(tick)
+        self._look(tick)
+        self._start_edges(_SIDE, board.left.encoder.quadrature.pin)
+        self._start_edges(_SIDE + _PER_SIDE, board.right.encoder.quadrature.pin)
+        self.events.clear()
+
+    def detach(self) -> None:
+        self.board.probe = None
+        self.board.left.encoder_edges = None
+        self.board.right.encoder_edges = None
+
+    def known(self) -> int:
+        """The tick below which the board's changes are all noted, whatever the CPU does from there on."""
+        board = self.board
+        tick = min(board.left.next_tick, board.right.next_tick)
+        if board.plant.next_tick == _FAR:  # it stands still: no encoder edge is on its way
+            return tick
+        return min(tick, self.passed_tick)
+
+    def moved(self, tick: int) -> None:
+        self._look_at_pins(tick)
+        self._look(tick)
+
+    def passed(self, tick: int) -> None:
+        self.passed_tick = tick
+        self._take_edges(_SIDE, self.left_edges)
+        self._take_edges(_SIDE + _PER_SIDE, self.right_edges)
+        self._look(tick)
+
+    def _look_at_pins(self, tick: int) -> None:
+        """What only the CPU can move: the inputs of the chips, and the bus, which they answer on at once."""
+        board = self.board
+        self._see(tick, _DATA, board.bank[board.data_bank] & board.bus_levels)
+        pin = 0
+        while pin < _CHIP_PINS:
+            self._see(tick, _SIDE + _CS + pin, board._level(pin))
+            self._see(tick, _SIDE + _PER_SIDE + _CS + pin, board._level(_CHIP_PINS + pin))
+            pin += 1
+
+    def _look(self, tick: int) -> None:
+        """What chips put out by themselves, and the CPU's pins that follow."""
+        board = self.board
+        port = 0
+        while port < 4:
+            self._see(tick, _OUTSIDE + port, board.external[port])
+            port += 1
+        self._look_at_chip(tick, 0)
+        self._look_at_chip(tick, 1)
+
+    def _look_at_chip(self, tick: int, side: int) -> None:
+        board = self.board
+        chip = board.right if side else board.left
+        place = _SIDE + side * _PER_SIDE
+        busy_end = self.busy_end[side]
+        if busy_end and busy_end <= tick:
+            self._see(busy_end, place + _BUSY, 0)
+        self._see(tick, place + _BUSY, 1 if chip.port.is_busy(tick) else 0)
+        self.busy_end[side] = chip.port.busy_until if chip.port.busy_until > tick else 0
+        self._see(tick, place + _HI, chip.hi)
+        self._see(tick, place + _PWM, chip.pwm)
+        self._see(tick, place + _SIGN, chip.sign)
+        self._see(tick, place + _MAGNITUDE, chip.pwm_magnitude)
+
+    def _start_edges(self, place: int, state: int) -> None:
+        """The levels of A and B as reported last; `state` is their place in the order 00, 10, 11, 01."""
+        self.levels[place + _A] = ((state + 1) >> 1) & 1
+        self.levels[place + _B] = state >> 1
+
+    def _take_edges(self, place: int, edges: list[tuple[int, int, int]]) -> None:
+        for tick, a, b in edges:
+            self._see(tick, place + _A, a)
+            self._see(tick, place + _B, b)
+        edges.clear()
+
+    def _see(self, tick: int, place: int, level: int) -> None:
+        if level != self.levels[place]:
+            self.levels[place] = level
+            self.events.append((tick, place, level))
+
+
+class CpuTap(Watcher):
+    """Notes what happens on a CPU, and on the board around it if there is one, into `events`.
+
+    Begins where it is attached, at `begin_tick`, with `start` as the levels there. After every run it calls `told`.
+    """
+
+    def __init__(self, board: Board | None, told: Callable[[], object]) -> None:
+        self.told = told
+        self.events: list[tuple[int, int, int]] = []
+        self.board_tap = None if board is None else BoardTap(board, self.events)
+        self.begin_tick = -1
+        self.start: list[int] = []
+        self.levels = [0] * 20
+        self.line_ticks = [0] * 3  # of the last edge taken from RXD, TXD, shift
+        self.cycles = 0  # the CPU has got so far
+        self.routine = [-1] * 2  # whose routine of low, high priority is in service
+
+    def known(self) -> int:
+        """The tick below which all changes are noted."""
+        tick = _TICKS * self.cycles
+        return tick if self.board_tap is None else min(tick, self.board_tap.known())
+
+    def detach(self) -> None:
+        if self.board_tap is not None:
+            self.board_tap.detach()
+
+    def attached(self, cpu: Cpu) -> None:
+        self._begin(cpu)
+
+    def starting(self, cpu: Cpu) -> None:
+        self._take_line(_RXD, cpu.rxd, cpu.rxd.settled_tick)
+        self._look(cpu)
+
+    def executed(self, cpu: Cpu, pc: int, start: int) -> None:
+        self._take_outputs(cpu)
+        self._look(cpu)
+
+    def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
+        tick = _TICKS * start
+        self._see(tick, _ASLEEP, 0)
+        high = 1 if cpu.chip.interrupts.in_service & 2 and not self.levels[_IN_SERVICE + 1] else 0
+        self._see(tick, _IN_SERVICE + high, 1)
+        self._see(tick, _ROUTINE + source, 1)
+        self.routine[high] = source
+        self._take_outputs(cpu)
+
+    def slept(self, cpu: Cpu, start: int, end: int) -> None:
+        self._take_outputs(cpu)
+
+    def ran(self, cpu: Cpu, start: int) -> None:
+        self.cycles = cpu.cycles
+        self.told()
+
+    def _begin(self, cpu: Cpu) -> None:
+        """Takes the levels of now."""
+        self.begin_tick = _TICKS * cpu.cycles
+        self.cycles = cpu.cycles
+        if self.board_tap is not None:
+            self.board_tap.attach(self.begin_tick)
+        for place, line in ((_RXD, cpu.rxd), (_TXD, cpu.txd), (_SHIFT, cpu.chip.shift.data)):
+            self.levels[place] = line.level_at(self.begin_tick)
+            self.line_ticks[place] = self.begin_tick
+        for port in range(4):
+            self.levels[_LATCH + port] = cpu.chip.ports.latches[port]
+            self.levels[_OUTSIDE + port] = 0xFF
+        in_service = cpu.chip.interrupts.in_service
+        for source in range(6):
+            self.levels[_ROUTINE + source] = UNKNOWN if in_service else 0
+        self.levels[_IN_SERVICE] = in_service & 1
+        self.levels[_IN_SERVICE + 1] = in_service >> 1
+        self.levels[_ASLEEP] = 1 if cpu.idle or cpu.powered_down else 0
+        self.start = [self.levels[place] for place in range(_DATA)]
+        if self.board_tap is None:
+            self.start += [0] * (_PLACES - _DATA)
+        else:
+            own = [self.board_tap.levels[place] for place in range(_PLACES)]
+            self.start[_OUTSIDE:_ASLEEP] = own[_OUTSIDE:_ASLEEP]
+            self.start += own[_DATA:]
+
+    def _look(self, cpu: Cpu) -> None:
+        """What an instruction may have changed: with effect from the next cycle."""
+        tick = _TICKS * cpu.cycles
+        port = 0
+        while port < 4:
+            self._see(tick, _LATCH + port, cpu.chip.ports.latches[port])
+            port += 1
+        self._see(tick, _ASLEEP, 1 if cpu.idle or cpu.powered_down else 0)
+        in_service = cpu.chip.interrupts.in_service
+        if in_service & 1 != self.levels[_IN_SERVICE] or in_service >> 1 != self.levels[_IN_SERVICE + 1]:
+            self._leave(tick, 0, in_service & 1)
+            self._leave(tick, 1, in_service >> 1)
+            if not in_service:
+                self._leave_unseen(tick)
+
+    def _leave(self, tick: int, high: int, level: int) -> None:
+        self._see(tick, _IN_SERVICE + high, level)
+        if not level and self.routine[high] >= 0:
+            self._see(tick, _ROUTINE + self.routine[high], 0)
+            self.routine[high] = -1
+
+    def _leave_unseen(self, tick: int) -> None:
+        """None is in service any more, seen to begin or not."""
+        source = 0
+        while source < 6:
+            self._see(tick, _ROUTINE + source, 0)
+            source += 1
+
+    def _take_outputs(self, cpu: Cpu) -> None:
+        self._take_line(_TXD, cpu.txd, cpu.txd.settled_tick)
+        self._take_line(_SHIFT, cpu.chip.shift.data, cpu.txd.settled_tick)
+
+    def _take_line(self, place: int, line: Line, settled_tick: int) -> None:
+        """The edges below `settled_tick` that are new."""
+        tick = line.next_edge(self.line_ticks[place])
+        while tick < settled_tick and tick < _FAR:
+            self._see(tick, place, line.level_at(tick))
+            self.line_ticks[place] = tick
+            tick = line.next_edge(tick)
+
+    def _see(self, tick: int, place: int, level: int) -> None:
+        if level != self.levels[place]:
+            self.levels[place] = level
+            self.events.append((tick, place, level))

@@ -1,0 +1,180 @@
+"""What happened on a robot's wires, as a VCD file.
+
+What belongs here: bringing what the tap noted into the order of time, putting port pins together from their sources,
+cutting the window out, and the VCD's header. What does not: when to look (`tap.py`), which signals there are
+(`signals.py`), and where files go (`miro_sim.cli`).
+
+Time stamps are nanoseconds, tick * 125 // 3 as in recordings: 24 MHz fits no decimal timescale, and this one loses
+nothing, since the tick is -(-3 * ns // 125) again.
+"""
+
+from __future__ import annotations
+
+from operator import itemgetter
+from typing import IO, Any
+
+from vcd.writer import VCDWriter
+
+from miro_robot.board import Board
+from miro_robot.inspect.signals import PLACE_OF, SIGNALS, TOP, Signal
+from miro_robot.inspect.tap import UNKNOWN, CpuTap
+from miro_robot.inspect.watcher import attach, detach
+from miro_robot.mcs51.cpu import Cpu
+
+SETTLING_TICKS = 4096
+"""After it begins to look on in mid-run, so long a level may still be on its way: encoder edges are reported up to a
+step of the plant (2048 ticks) late, and the CPU may be four cycles ahead."""
+
+_RXD, _TXD, _SHIFT = (PLACE_OF[name] for name in ("rxd", "txd", "shift"))
+_LATCH, _OUTSIDE = PLACE_OF["latch0"], PLACE_OF["outside0"]
+
+
+class Waveform:
+    """Writes the wires of `cpu`, and of the `board` around it, to `out` while both run.
+
+    Between `attach` and `close`; or give its `tap` to the CPU's inspector yourself. The file covers the ticks from
+    `first_tick` (but not from where nobody looked yet) to `end_tick`, or as far as all levels are known.
+    """
+
+    def __init__(
+        self, out: IO[str], board: Board | None = None, first_tick: int = 0, end_tick: int | None = None
+    ) -> None:
+        if end_tick is not None and end_tick <= first_tick:
+            raise ValueError(f"ticks {first_tick} to {end_tick}: the window is empty")
+        self.signals = tuple(signal for signal in SIGNALS if board is not None or not signal.on_board)
+        self.tap = CpuTap(board, self._flush)
+        self.end_tick = end_tick
+        self.written_tick = -1
+        self._first_tick = first_tick
+        self._out = out
+        self._cpu: Cpu | None = None
+        self._writer: VCDWriter | None = None
+        self._levels: list[int] = []
+        self._shown: list[int] = []
+        self._variables: list[list[Any]] = []
+        self._affected = [self._signals_of(place) for place in range(len(PLACE_OF))]
+
+    def attach(self, cpu: Cpu) -> Waveform:
+        """Looks on from the next run of `cpu` on, whose board was given."""
+        attach(cpu, self.tap)
+        self._cpu = cpu
+        return self
+
+    @property
+    def first_tick(self) -> int:
+        """Where the file begins."""
+        begin = self.tap.begin_tick
+        return max(self._first_tick, begin + SETTLING_TICKS if begin > 0 else 0)
+
+    @property
+    def begun(self) -> bool:
+        """Whether the window was reached."""
+        return self._writer is not None
+
+    def close(self) -> None:
+        """Looks on no more and writes what is known, up to `written_tick`. Raises ValueError for an empty window."""
+        if self._cpu is not None:
+            detach(self._cpu, self.tap)
+            self._cpu = None
+        if self.tap.begin_tick >= 0:
+            self._flush()
+            self.tap.detach()
+        if self._writer is None:
+            raise ValueError(f"the run ended before tick {self.first_tick}, nothing was written")
+        self._writer.close(nanoseconds(self.written_tick))
+
+    def _flush(self) -> None:
+        """Writes all changes that nothing can come before any more."""
+        known_tick = self.tap.known()
+        if self.end_tick is not None:
+            known_tick = min(known_tick, self.end_tick)
+        if not self._levels:
+            self._levels = list(self.tap.start)
+        events = self.tap.events
+        events.sort(key=itemgetter(0))
+        done = 0
+        while done < len(events) and events[done][0] < known_tick:
+            tick = events[done][0]
+            if self._writer is None and tick > self.first_tick:
+                self._begin()
+            changed: set[int] = set()
+            while done < len(events) and events[done][0] == tick:
+                _, place, level = events[done]
+                self._levels[place] = level
+                changed.update(self._affected[place])
+                done += 1
+            if self._writer is not None:
+                self._show(tick, changed)
+        del events[:done]
+        if self._writer is None and known_tick > self.first_tick:
+            self._begin()
+        self.written_tick = known_tick
+
+    def _begin(self) -> None:
+        """The header, and the levels at the beginning of the window."""
+        self._writer = VCDWriter(
+            self._out,
+            timescale="1 ns",
+            date="1970-01-01",  # of no run: equal runs have equal files
+            version="mirotwin",
+            comment="ticks of 24 MHz as ns = tick * 125 // 3",
+            check_values=False,
+            init_timestamp=nanoseconds(self.first_tick),
+        )
+        self._shown = [self._level_of(signal) for signal in self.signals]
+        for signal, level in zip(self.signals, self._shown, strict=True):
+            scope = (TOP, signal.scope) if signal.scope else (TOP,)
+            self._variables.append(
+                [
+                    self._writer.register_var(scope, wire, "wire", 1, _bit(signal, level, bit))
+                    for bit, wire in enumerate(signal.wires())
+                ]
+            )
+
+    def _show(self, tick: int, changed: set[int]) -> None:
+        assert self._writer is not None
+        stamp = nanoseconds(tick)
+        for index in sorted(changed):
+            signal = self.signals[index]
+            level = self._level_of(signal)
+            if level == self._shown[index]:
+                continue
+            for bit, variable in enumerate(self._variables[index]):
+                self._writer.change(variable, stamp, _bit(signal, level, bit))
+            self._shown[index] = level
+
+    def _level_of(self, signal: Signal) -> int:
+        """What a signal's wires carry now; a pin of a port is the AND of all that drive it."""
+        levels = self._levels
+        if not signal.place.startswith("port"):
+            return levels[PLACE_OF[signal.place]]
+        port = int(signal.place[4:])
+        pins = levels[_LATCH + port] & levels[_OUTSIDE + port]
+        if port == 3:
+            pins &= 0xFC | (levels[_RXD] & levels[_SHIFT]) | levels[_TXD] << 1
+        return pins
+
+    def _signals_of(self, place: int) -> list[int]:
+        """Which signals may change with a place."""
+        names = {name for name, at in PLACE_OF.items() if at == place}
+        if _LATCH <= place < _LATCH + 4:
+            names.add(f"port{place - _LATCH}")
+        if _OUTSIDE <= place < _OUTSIDE + 4:
+            names.add(f"port{place - _OUTSIDE}")
+        if place in (_RXD, _TXD, _SHIFT):
+            names.add("port3")
+        return [index for index, signal in enumerate(self.signals) if signal.place in names]
+
+
+def nanoseconds(tick: int) -> int:
+    """A time stamp."""
+    return tick * 125 // 3
+
+
+def tick_of(nanoseconds: int) -> int:
+    """The tick that a time stamp stands for."""
+    return -(-3 * nanoseconds // 125)
+
+
+def _bit(signal: Signal, level: int, bit: int) -> int | str:
+    return "x" if signal.bits == 1 and level == UNKNOWN else level >> bit & 1

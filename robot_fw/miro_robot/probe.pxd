@@ -1,0 +1,3 @@
+cdef class Probe:
+    cpdef moved(self, long long tick)
+    cpdef passed(self, long long tick)

@@ -1,0 +1,20 @@
+"""What a board tells somebody who watches its wires, with exact ticks.
+
+What belongs here: the base class `Probe`, which ignores it all. What does not: what watchers make of it (`inspect/`).
+A probe reads levels off the board and its chips and changes nothing; a board without one pays a test per event.
+"""
+
+from __future__ import annotations
+
+
+class Probe:
+    """Put into `Board.probe`. The calls come in order of their ticks."""
+
+    def moved(self, tick: int) -> None:
+        """The CPU has changed pins of an LM629 at `tick`; all levels of the board are those of `tick`."""
+
+    def passed(self, tick: int) -> None:
+        """Plant and chips have done all that happens up to `tick`; levels are those of `tick`.
+
+        The plant has reported every encoder edge up to `tick`.
+        """

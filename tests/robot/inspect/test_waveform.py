@@ -1,0 +1,247 @@
+"""Waveforms: every edge of every wire on its tick, against a twin that looks on every tick."""
+
+import io
+import itertools
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_protocol.frames import TeamFrame, encode
+from miro_robot.board import Board
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_robot.inspect.signals import SIGNALS
+from miro_robot.inspect.waveform import SETTLING_TICKS, Waveform, nanoseconds, tick_of
+from miro_robot.lm629.chip import PWM_TICKS
+from miro_robot.mcs51.bus import Bus
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.wiring import load_wiring
+
+from tests.naive.waveform import Sampler, Treadmill
+from tests.robot.inspect.reading import read
+from tests.robot.mcs51.asm import assemble
+
+MS = 24_000
+BIT = 2500
+IMAGE = load_hex(image_path())
+SENT_AT = 5 * MS
+FRAME = encode(TeamFrame(3, 0, ((100, -90), (0, 0), (0, 0))), 3)
+ACTS_AT = SENT_AT + len(FRAME) * 10 * BIT
+"""The end of the frame: after it the chips get their commands, the motors start and an answer is sent."""
+
+
+def board_at(tick):
+    """The robot's board with the firmware, on a treadmill, to which one frame is sent; run up to `tick`."""
+    board = Board(load_wiring(), Treadmill(), slot=0, robots=3)
+    board.cpu.load(IMAGE.code, IMAGE.used)
+    at = SENT_AT
+    for byte in FRAME:
+        for bit in [0] + [byte >> n & 1 for n in range(8)] + [1]:
+            board.cpu.rxd.append(at, bit)
+            at += BIT
+    board.run(tick)
+    return board
+
+
+def waveform_of(board, begin, end, piece=2 * MS, **window):
+    out = io.StringIO()
+    waveform = Waveform(out, board, **window).attach(board.cpu)
+    for tick in [*range(begin + piece, end, piece), end]:
+        board.run(tick)
+    waveform.close()
+    return out.getvalue()
+
+
+def sampled(sampler, first_tick, end_tick):
+    """The changes of the naive twin, per wire, as a file that begins at `first_tick` has them."""
+    wires = {}
+    for signal in SIGNALS:
+        if signal.name not in sampler.changes:
+            continue
+        for bit, wire in enumerate(signal.wires()):
+            changes = []
+            for tick, level in sampler.changes[signal.name]:
+                if tick <= first_tick:
+                    changes = [(first_tick, level >> bit & 1)]
+                elif tick < end_tick and changes[-1][1] != level >> bit & 1:
+                    changes.append((tick, level >> bit & 1))
+            wires[wire] = changes
+    return wires
+
+
+@pytest.mark.parametrize(
+    ("begin", "length", "moving"),
+    [
+        pytest.param(0, 2 * MS, {"left_rst_n", "right_busy", "left_hi", "p3_2", "d0"}, id="start-up"),
+        pytest.param(
+            ACTS_AT,
+            4 * MS,
+            {"left_pwm", "right_sign", "asleep", "isr_timer1", "d7", "txd"},
+            id="a frame",
+        ),
+        pytest.param(ACTS_AT - 2 * MS, MS, {"isr_serial", "rxd", "high_priority"}, id="characters"),
+    ],
+)
+def test_every_edge_of_every_wire_is_where_a_look_on_every_tick_finds_it(begin, length, moving):
+    board = board_at(begin)
+    state = board.snapshot()
+    text = waveform_of(board, begin, begin + length, piece=7_777)
+    vcd = read(text.encode())
+    assert vcd.first_tick == (12 * state["cpu"]["cycles"] + SETTLING_TICKS if begin else 0)
+    assert vcd.last_tick >= begin + length - PWM_TICKS - 60
+    twin = board_at(0)
+    twin.restore(state)
+    sampler = Sampler(twin.cpu, twin)
+    sampler.run(vcd.last_tick)
+    expected = sampled(sampler, vcd.first_tick, vcd.last_tick)
+    assert set(vcd.wires) == set(expected)
+    for wire, changes in vcd.until(vcd.last_tick).items():
+        assert changes == expected[wire], wire
+    assert moving <= {wire for wire, changes in vcd.wires.items() if len(changes) > 1}
+
+
+def test_a_pulse_of_the_bridge_has_the_length_that_its_magnitude_says():
+    vcd = read(waveform_of(board_at(ACTS_AT), ACTS_AT, ACTS_AT + 20 * MS).encode())
+    seen = set()
+    for side in ("left", "right"):
+        edges = vcd.wires[f"{side}_pwm"][1:]
+        for (rise, level), (fall, _) in itertools.pairwise(edges):
+            if level == 1:
+                magnitude = sum(vcd.level_at(f"{side}_magnitude{bit}", rise) << bit for bit in range(7))
+                assert fall - rise == 4 * 4 * magnitude
+                seen.add(magnitude)
+        rises = [tick for tick, level in edges if level == 1]
+        assert {(later - first) % PWM_TICKS for first, later in itertools.pairwise(rises)} == {0}
+    assert len(seen) > 5
+
+
+def test_without_a_board_there_are_the_wires_of_the_cpu_alone():
+    cpu = Cpu(Bus())
+    cpu.load(assemble("loop:\nCPL P1.3\nSJMP loop"))
+    out = io.StringIO()
+    waveform = Waveform(out).attach(cpu)
+    cpu.run(100)
+    waveform.close()
+    vcd = read(out.getvalue().encode())
+    assert vcd.last_tick == 12 * cpu.cycles
+    assert vcd.wires["p1_3"] == [(0, 1)] + [(12 + 36 * n, n & 1) for n in range(33)]
+    assert not {wire for wire in vcd.wires if wire.startswith(("left", "right", "d"))}
+
+
+TWO_PRIORITIES = """
+LJMP main
+ORG 0Bh
+INC 30h
+CPL P1.0
+RETI
+ORG 1Bh
+CPL P1.1
+MOV R2,#9
+DJNZ R2,$
+CPL P1.1
+RETI
+main:
+MOV SP,#40h
+MOV TMOD,#22h
+MOV TH0,#-23
+MOV TH1,#-91
+MOV IE,#8Ah
+MOV IP,#02h
+MOV TCON,#50h
+loop:
+CPL P2.7
+MOV SBUF,30h
+MOV PCON,#01h
+SJMP loop
+"""
+
+
+@pytest.mark.parametrize("mode", ["#00h", "#80h"], ids=["shift register", "mode 2"])
+def test_a_cpu_with_two_priorities_and_sleep_is_as_a_look_on_every_tick_finds_it(mode):
+    code = assemble(TWO_PRIORITIES.replace("MOV SP,#40h", f"MOV SP,#40h\nMOV SCON,{mode}"))
+    cpus = [Cpu(Bus()) for _ in range(2)]
+    out = io.StringIO()
+    for cpu in cpus:
+        cpu.load(code)
+    waveform = Waveform(out).attach(cpus[0])
+    for cycle in (1, 500, 501, 502, 600, 3000):
+        cpus[0].run(cycle)
+    waveform.close()
+    vcd = read(out.getvalue().encode())
+    sampler = Sampler(cpus[1])
+    sampler.run(vcd.last_tick)
+    expected = sampled(sampler, 0, vcd.last_tick)
+    assert vcd.until(vcd.last_tick) == expected
+    assert min(len(vcd.wires[wire]) for wire in ("isr_timer1", "asleep", "txd", "p3_1")) > 20
+    both = [tick for tick, level in vcd.wires["isr_timer0"] if level and vcd.level_at("isr_timer1", tick)]
+    assert both, "no routine was interrupted"
+
+
+def test_a_routine_that_nobody_saw_begin_is_unknown_until_none_is_in_service():
+    cpu = Cpu(Bus())
+    cpu.load(assemble(TWO_PRIORITIES))
+    while cpu.pc != 0x1B:
+        cpu.step()
+    began = 12 * cpu.cycles
+    out = io.StringIO()
+    waveform = Waveform(out).attach(cpu)
+    cpu.run(cpu.cycles + 2000)
+    waveform.close()
+    assert waveform.tap.start[12:20] == [1, 0, 2, 2, 2, 2, 2, 2]
+    assert read(out.getvalue().encode()).first_tick == began + SETTLING_TICKS
+
+
+def test_a_window_has_what_the_whole_has_there():
+    whole = read(waveform_of(board_at(0), 0, 40 * MS).encode())
+    first, end = SENT_AT + 23 * MS + 11, SENT_AT + 29 * MS + 3
+    part = read(waveform_of(board_at(0), 0, 40 * MS, first_tick=first, end_tick=end).encode())
+    late = read(waveform_of(board_at(20 * MS), 20 * MS, 40 * MS, first_tick=first, end_tick=end).encode())
+    assert (part.first_tick, part.last_tick) == (first, end)
+    for wire, changes in part.wires.items():
+        inside = [change for change in whole.wires[wire] if first < change[0] < end]
+        assert changes == [(first, whole.level_at(wire, first)), *inside], wire
+    assert late == part
+
+
+def test_a_window_that_is_empty_or_never_reached_is_refused():
+    with pytest.raises(ValueError, match="ticks 5 to 5: the window is empty"):
+        Waveform(io.StringIO(), first_tick=5, end_tick=5)
+    out = io.StringIO()
+    board = board_at(0)
+    waveform = Waveform(out, board, first_tick=MS).attach(board.cpu)
+    board.run(MS // 2)
+    with pytest.raises(ValueError, match="the run ended before tick 24000, nothing was written"):
+        waveform.close()
+    assert out.getvalue() == ""
+
+
+def test_equal_runs_have_equal_files_however_they_are_cut():
+    texts = {waveform_of(board_at(0), 0, 3 * MS, piece=piece) for piece in (3 * MS, 12, 1_000, 9_999)}
+    assert len({text[: text.rindex("#")] for text in texts}) == 1
+
+
+def test_who_is_watched_does_the_same_and_is_left_alone_after():
+    watched, free = board_at(0), board_at(0)
+    waveform_of(watched, 0, 30 * MS)
+    free.run(30 * MS)
+    assert watched.snapshot() == free.snapshot()
+    assert watched.cpu.inspector is None
+    assert watched.probe is None
+    assert watched.left.encoder_edges is watched.right.encoder_edges is None
+
+
+def test_the_header_has_no_clock_and_every_wire_one_bit():
+    text = waveform_of(board_at(0), 0, MS)
+    vcd = read(text.encode())
+    assert vcd.header["date"] == "1970-01-01"
+    assert str(vcd.header["timescale"]) == "1 ns"
+    assert vcd.sizes == {1}
+    assert text.index(" rxd ") < text.index(" txd ") < text.index("$scope", text.index(" txd "))
+    assert vcd.scopes["left_wr_n"] == "robot.left"
+
+
+@settings(max_examples=300)
+@given(st.integers(0, 1 << 50))
+def test_a_time_stamp_tells_its_tick(tick):
+    assert tick_of(nanoseconds(tick)) == tick
+    assert nanoseconds(tick + 1) > nanoseconds(tick)
