@@ -111,9 +111,11 @@ def check_file(path: Path, option: str) -> None:
 def whole_file(path: Path, option: str) -> Iterator[Path]:
     """A name beside `path` to write to; what was written takes its place at the end, or is gone if anything raised.
 
-    Raises OutputError, before anything is done, where `check_file` does.
+    Raises OutputError, before anything is done, where `check_file` does and for what is there and is no file.
     """
     check_file(path, option)
+    if path.exists() and not path.is_file():
+        raise OutputError(path, "is there and is not a regular file", f"choose another file with {option}")
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     except OSError as error:

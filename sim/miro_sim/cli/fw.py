@@ -13,6 +13,7 @@ from miro_sim.cli.fw_coverage import coverage
 from miro_sim.cli.fw_disasm import disasm
 from miro_sim.cli.fw_profile import profile
 from miro_sim.cli.fw_trace import trace
+from miro_sim.cli.fw_vcd import vcd
 from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, load_image
 from miro_sim.cli.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, complain
 from miro_sim.cli.progress import ProgressBar
@@ -29,7 +30,7 @@ def fw() -> None:
     """
 
 
-for command in (disasm, trace, profile, coverage):
+for command in (disasm, trace, profile, coverage, vcd):
     fw.add_command(command)
 
 

@@ -122,17 +122,20 @@ def open_run(request: Request) -> Run:
     return run
 
 
-def look(run: Run, request: Request, *watchers: Watcher) -> int:
+def look(run: Run, request: Request, *watchers: Watcher, early_ticks: int = 0, late_ticks: int = 0) -> int:
     """Runs it under the eyes of `watchers` and says how it ended; returns the exit code.
 
+    They look on from `early_ticks` before the window to `late_ticks` behind it, as far as the run goes.
     Raises UserError when the run was over before there was anything to look at.
     """
     from miro_sim.watched import watch
 
-    end_tick = _earlier(run.end_tick, request.to_tick)
+    first_tick = max(0, request.from_tick - early_ticks)
+    last_tick = None if request.to_tick is None else request.to_tick + late_ticks
+    end_tick = _earlier(run.end_tick, last_tick)
     with ProgressBar(f"running {request.subject}", end_tick) as bar:
         try:
-            reached = watch(run, watchers, request.from_tick, request.to_tick, bar.to)
+            reached = watch(run, watchers, first_tick, last_tick, bar.to)
         except (ValueError, ArithmeticError) as error:
             now = run.cpu.cycles * clock.CYCLE_TICKS
             raise UserError(f"{request.subject}: cannot be run beyond tick {now}: {error}") from None
