@@ -1,9 +1,10 @@
 """The output folder: what is refused, what is replaced, and that nothing is left half-written."""
 
+import os
 from pathlib import Path
 
 import pytest
-from miro_sim.outdir import OutputError, OutputFolder, check_file
+from miro_sim.outdir import OutputError, OutputFolder, check_file, whole_file
 
 
 def write_run(folder: Path, text: str = "new") -> None:
@@ -92,3 +93,10 @@ def test_a_link_to_nothing_is_called_that(tmp_path: Path) -> None:
         OutputFolder(tmp_path / "link")
     with pytest.raises(OutputError, match="is a symbolic link to nowhere, which does not exist"):
         check_file(tmp_path / "link", "--dump")
+
+
+def test_a_whole_file_does_not_take_the_place_of_a_device() -> None:
+    refusal = "is there and is not a regular file; choose another file with --out"
+    with pytest.raises(OutputError, match=refusal), whole_file(Path(os.devnull), "--out"):
+        pass
+    assert not os.path.isfile(os.devnull)

@@ -6,6 +6,7 @@ What belongs here: from bytes to changes per wire. What does not: expectations.
 from __future__ import annotations
 
 import io
+from bisect import bisect_right
 from dataclasses import dataclass, field
 
 from vcd.reader import TokenKind, tokenize
@@ -32,7 +33,8 @@ class Vcd:
         }
 
     def level_at(self, wire: str, tick: int) -> int | str:
-        return [level for at, level in self.wires[wire] if at <= tick][-1]
+        changes = self.wires[wire]
+        return changes[bisect_right(changes, tick, key=lambda change: change[0]) - 1][1]
 
 
 def read(data: bytes) -> Vcd:

@@ -2,11 +2,15 @@
 
 import io
 import itertools
+import re
+from pathlib import Path
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from miro_protocol.frames import TeamFrame, encode
+from miro_robot import inspect
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
@@ -15,7 +19,7 @@ from miro_robot.inspect.waveform import SETTLING_TICKS, Waveform, nanoseconds, t
 from miro_robot.lm629.chip import PWM_TICKS
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.wiring import load_wiring
+from miro_robot.wiring import Latch, load_wiring
 
 from tests.naive.waveform import Sampler, Treadmill
 from tests.robot.inspect.reading import read
@@ -192,10 +196,10 @@ def test_a_routine_that_nobody_saw_begin_is_unknown_until_none_is_in_service():
 
 
 def test_a_window_has_what_the_whole_has_there():
-    whole = read(waveform_of(board_at(0), 0, 40 * MS).encode())
-    first, end = SENT_AT + 23 * MS + 11, SENT_AT + 29 * MS + 3
-    part = read(waveform_of(board_at(0), 0, 40 * MS, first_tick=first, end_tick=end).encode())
-    late = read(waveform_of(board_at(20 * MS), 20 * MS, 40 * MS, first_tick=first, end_tick=end).encode())
+    whole = read(waveform_of(board_at(0), 0, 31 * MS).encode())
+    first, end = SENT_AT + 22 * MS + 11, SENT_AT + 25 * MS + 3
+    part = read(waveform_of(board_at(0), 0, 31 * MS, first_tick=first, end_tick=end).encode())
+    late = read(waveform_of(board_at(20 * MS), 20 * MS, 31 * MS, first_tick=first, end_tick=end).encode())
     assert (part.first_tick, part.last_tick) == (first, end)
     for wire, changes in part.wires.items():
         inside = [change for change in whole.wires[wire] if first < change[0] < end]
@@ -238,6 +242,77 @@ def test_the_header_has_no_clock_and_every_wire_one_bit():
     assert vcd.sizes == {1}
     assert text.index(" rxd ") < text.index(" txd ") < text.index("$scope", text.index(" txd "))
     assert vcd.scopes["left_wr_n"] == "robot.left"
+
+
+ACTIONS = (
+    *(
+        "CPL P1.3",
+        "CPL P2.0",
+        "MOV P2,#5Ah",
+        "MOV P0,R0",
+        "MOV P3,#0FDh",
+        "MOV P3,#0FEh",
+        "MOV P3,#0FFh",
+        "XRL P1,#18h",
+    ),
+    *(
+        "INC R0",
+        "MUL AB",
+        "MOV SBUF,R0",
+        "MOV SCON,#00h",
+        "MOV SCON,#90h",
+        "MOV IP,#02h",
+        "MOV IP,#08h",
+        "CLR TXD",
+    ),
+    *("MOV PCON,#01h", "MOV IE,#8Ah", "MOV IE,#00h", "MOVX @DPTR,A", "SETB TF1", "NOP"),
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.sampled_from(ACTIONS), min_size=1, max_size=30), st.lists(st.integers(1, 300), max_size=4))
+def test_whatever_a_program_does_is_as_a_look_on_every_tick_finds_it(actions, cuts):
+    head, _, _ = TWO_PRIORITIES.partition("loop:")
+    code = assemble("\n".join([head, "loop:", *actions, "LJMP loop"]))
+    cpus = [Cpu(Bus()) for _ in range(2)]
+    out = io.StringIO()
+    for cpu in cpus:
+        cpu.load(code)
+    waveform = Waveform(out).attach(cpus[0])
+    for cycle in [*sorted(cuts), 400]:
+        cpus[0].run(cycle)
+    waveform.close()
+    vcd = read(out.getvalue().encode())
+    sampler = Sampler(cpus[1])
+    sampler.run(vcd.last_tick)
+    assert vcd.until(vcd.last_tick) == sampled(sampler, 0, vcd.last_tick)
+
+
+def test_a_strobe_on_an_output_latch_moves_when_movx_writes_it():
+    wiring = load_wiring()
+    nets = {net: source.replace("P2.", "CTRL.") for net, source in wiring.nets.items()}
+    latch = Latch("CTRL", address=0x8000, mask=0x8000)
+    board = Board(msgspec.structs.replace(wiring, nets=nets, latch=(latch,)), Treadmill())
+    board.cpu.load(assemble("MOV DPTR,#8000h\nMOV A,#0F7h\nMOVX @DPTR,A\nSJMP $"))
+    out = io.StringIO()
+    waveform = Waveform(out, board).attach(board.cpu)
+    board.run(10_000)
+    waveform.close()
+    vcd = read(out.getvalue().encode())
+    assert vcd.wires["left_cs_n"] == [
+        (0, 1),
+        (12 * 3 + 18, 0),
+    ]  # S3P2 of the second cycle of MOVX, after 2 + 1
+    assert vcd.wires["right_cs_n"] == [(0, 1)]
+
+
+def test_every_wire_is_explained():
+    text = (Path(inspect.__file__).parent / "README.md").read_text()
+    explained = set(re.findall(r"`(\w+)`", text))
+    for signal in SIGNALS:
+        if signal.scope != "right":
+            ends = {signal.wires()[0], signal.wires()[-1]} if signal.scope != "ports" else {"p0_0", "p0_7"}
+            assert ends <= explained, signal.name
 
 
 @settings(max_examples=300)

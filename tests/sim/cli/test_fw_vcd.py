@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,13 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_robot.inspect.waveform import Waveform
 from miro_sim import scenario_file
-from miro_sim.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND, ticks
+from miro_sim.clock import (
+    CONTROL_PERIOD_TICKS,
+    HOST_CHARACTER_TICKS,
+    LM629_SAMPLE_TICKS,
+    TICKS_PER_SECOND,
+    ticks,
+)
 from miro_sim.world import World
 
 from tests.robot.inspect.reading import read
@@ -231,6 +238,32 @@ def test_what_is_there_stays_unless_it_is_to_be_replaced(
 def test_a_device_is_not_replaced(mirotwin: Callable[..., Result], short: Path) -> None:
     refused(mirotwin("fw", "vcd", short, "--force", "--out", os.devnull), "is not a regular file")
     assert not os.path.isfile(os.devnull)
+
+
+def test_the_encoder_wires_count_what_the_chip_counts(tmp_path: Path) -> None:
+    world = World(scenario_file.load("fig8").scenario, 0, load_hex(image_path()))
+    board = world.networks[0].robots[0].board
+    out = io.StringIO()
+    waveform = Waveform(out, board).attach(board.cpu)
+    for _ in range(24):
+        world.step()
+    waveform.close()
+    vcd = read(out.getvalue().encode())
+    for side, chip in (("left", board.left), ("right", board.right)):
+        latched_tick = chip.sample_tick - LM629_SAMPLE_TICKS
+        edges = sorted(
+            (tick, wire)
+            for wire in "ab"
+            for tick, _ in vcd.wires[f"{side}_{wire}"][1:]
+            if tick <= latched_tick
+        )
+        assert len({tick for tick, _ in edges}) == len(edges)
+        order = [(0, 0), (1, 0), (1, 1), (0, 1)]
+        places = [order.index((vcd.level_at(f"{side}_a", t), vcd.level_at(f"{side}_b", t))) for t, _ in edges]
+        steps = [(after - before + 1) % 4 - 1 for before, after in pairwise([0, *places])]
+        assert set(steps) <= {-1, 1}
+        assert abs(chip.real_position) > 1000
+        assert abs(sum(steps) - chip.real_position) <= 1  # the chip's filter may hold back the last one
 
 
 def test_a_watched_world_has_the_digest_of_an_unwatched_one(
