@@ -68,8 +68,10 @@ class BoardTap(Probe):
         self.right_edges: list[tuple[int, int, int]] = []
 
     def attach(self, tick: int) -> None:
-        """Looks on from `tick`, where `levels` begin."""
+        """Looks on from `tick`, where `levels` begin. Raises ValueError when somebody does already."""
         board = self.board
+        if board.probe is not None:
+            raise ValueError("the wires of this board are watched already; close that waveform first")
         board.probe = self
         board.left.encoder_edges = self.left_edges
         board.right.encoder_edges = self.right_edges

@@ -56,7 +56,11 @@ class Waveform:
 
     def attach(self, cpu: Cpu) -> Waveform:
         """Looks on from the next run of `cpu` on, whose board was given."""
-        attach(cpu, self.tap)
+        try:
+            attach(cpu, self.tap)
+        except ValueError:
+            detach(cpu, self.tap)
+            raise
         self._cpu = cpu
         return self
 

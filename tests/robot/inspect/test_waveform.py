@@ -234,6 +234,16 @@ def test_who_is_watched_does_the_same_and_is_left_alone_after():
     assert watched.left.encoder_edges is watched.right.encoder_edges is None
 
 
+def test_two_waveforms_of_one_board_at_a_time_are_refused():
+    board = board_at(0)
+    first = Waveform(io.StringIO(), board).attach(board.cpu)
+    with pytest.raises(ValueError, match="watched already; close that waveform first"):
+        Waveform(io.StringIO(), board).attach(board.cpu)
+    board.run(MS)
+    first.close()
+    assert board.cpu.inspector is None
+
+
 def test_the_header_has_no_clock_and_every_wire_one_bit():
     text = waveform_of(board_at(0), 0, MS)
     vcd = read(text.encode())
