@@ -1,4 +1,5 @@
 cimport cython
+from miro_robot.lm629.bus_timing cimport BusTiming
 from miro_robot.lm629.chip cimport Lm629
 from miro_robot.mcs51.bus cimport Bus
 from miro_robot.mcs51.cpu cimport Cpu
@@ -6,10 +7,17 @@ from miro_robot.plant cimport Plant
 from miro_robot.probe cimport Probe
 
 
+cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS
+cdef int _WR, _RD
+cdef int _RESET_PULSE
+cdef long long RESET_PULSE_TICKS
+
+
 cdef class Board(Bus):
     cdef public object wiring
     cdef public object faults
     cdef public Probe probe
+    cdef readonly object symbols
     cdef readonly Cpu cpu
     cdef readonly Lm629 left
     cdef readonly Lm629 right
@@ -25,6 +33,9 @@ cdef class Board(Bus):
     cdef unsigned char bridge_enable[2]
     cdef unsigned char bridge_sign[2]
     cdef unsigned char hi_seen[2]
+    cdef readonly BusTiming left_timing
+    cdef readonly BusTiming right_timing
+    cdef int on_movx_bus
     cdef int data_bank
     cdef int pin_bank[10]
     cdef int pin_bit[10]
@@ -47,8 +58,12 @@ cdef class Board(Bus):
     @cython.locals(now=cython.longlong)
     cpdef int sync(self, long long tick) except -1
     cpdef port_written(self, int port, int latch, long long tick)
+    cdef int _set_pins(self, int port, int levels, long long tick) except -1
+    @cython.locals(start=cython.longlong, page=cython.int, heard=bint, index=cython.int, value=cython.int)
     cpdef int movx_read(self, int address, long long tick) except -1
+    @cython.locals(start=cython.longlong, page=cython.int, changed=bint, index=cython.int)
     cpdef movx_write(self, int address, int value, long long tick)
+    cdef int _put_address(self, int address, long long start) except -1
     cpdef fault(self, int kind, int pc, long long tick)
     cdef void _drive_bridge(self, long long tick)
     @cython.locals(index=cython.int, hi=cython.int, level=cython.int, port=cython.int, mask=cython.int, levels=cython.int)
@@ -58,3 +73,10 @@ cdef class Board(Bus):
     cdef int _drive_chips(self, long long tick) except -1
     @cython.locals(busy_writes=cython.longlong)
     cdef int _watch_bus(self, bint both_drive, long long tick) except -1
+    @cython.locals(one=BusTiming, other=BusTiming, left=cython.int, right=cython.int)
+    cdef int _watch_timing(self, int data, long long tick) except -1
+    cdef bint _reset_is_short(self, Lm629 chip, int level, long long tick)
+    @cython.locals(left=cython.int, right=cython.int)
+    cdef int _watch_sample(self, long long tick) except -1
+    cdef int _timing_fault(self, int limit, long long ticks, long long tick) except -1
+    cdef int _note(self, int kind, int pc, long long tick, detail) except -1

@@ -14,6 +14,8 @@ from __future__ import annotations
 from typing import Any
 
 from miro_robot.faults import FaultKind, FirmwareFault
+from miro_robot.image import Image, Symbols
+from miro_robot.lm629.bus_timing import LIMITS, RESET_PULSE, BusTiming
 from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.mcs51.bus import Bus
@@ -24,8 +26,26 @@ from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
 
 CYCLE_TICKS = 12
 FAR = 1 << 62
+MAIN_LOOP_LIMIT_CYCLES = 20_000
+"""10 ms: a robot whose main loop gets no time for so long has lost a third of a camera frame."""
 FAULTS_KEPT = 1000
 """A firmware that faults in a loop must not fill the memory: after so many, faults are counted only."""
+
+_ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS = (
+    8,
+    10,
+    11,
+    12,
+    17,
+    18,
+    19,
+    20,
+)
+"""Ticks into a MOVX (AT89C52 sheet, section 5). When P2 goes back to its latch is not in it: CHOSEN, 2 ticks after
+the strobe."""
+_WR, _RD = 0x40, 0x80  # pins of P3
+_RESET_PULSE = RESET_PULSE
+RESET_PULSE_TICKS = LIMITS[RESET_PULSE].ticks
 
 
 class Board(Bus):
@@ -38,7 +58,8 @@ class Board(Bus):
     NOT_STATE = (
         "wiring", "plant", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_bank", "pin_bit", "pin_inverted", "hi_port", "hi_bit", "hi_inverted",
-        "hi_count", "hi_side", "hi_seen", "stop_on_fault", "faults", "probe",
+        "hi_count", "hi_side", "hi_seen", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus",
+        "left_timing", "right_timing",  # see there: no time of theirs outlasts an instruction
     )  # fmt: skip
 
     def __init__(
@@ -53,10 +74,14 @@ class Board(Bus):
         self.wiring = wiring
         self.plant = plant
         self.cpu = Cpu(self)
+        self.cpu.main_loop_limit = MAIN_LOOP_LIMIT_CYCLES
         self.left = Lm629(options or Lm629Options())
         self.right = Lm629(options or Lm629Options())
+        self.left_timing = BusTiming()
+        self.right_timing = BusTiming()
         self.stop_on_fault = stop_on_fault
         self.faults: list[FirmwareFault] = []
+        self.symbols: Symbols | None = None
         self.fault_count = 0
         self.probe: Probe | None = None
         self.busy_writes = 0
@@ -85,6 +110,8 @@ class Board(Bus):
             bank, bit, inverted = wiring.chip_input(side, pin)
             self.pin_bank[index], self.pin_bit[index], self.pin_inverted[index] = bank, bit, inverted
             self.watched[bank] |= 1 << bit
+        on_p3 = self.watched[3] & (_WR | _RD)
+        self.on_movx_bus = 1 if self.watched[0] or self.watched[2] or on_p3 else 0
         self.latches = len(wiring.latch)
         self.latch_address = [latch.address for latch in wiring.latch] + [0] * (8 - len(wiring.latch))
         self.latch_mask = [latch.mask for latch in wiring.latch] + [0] * (8 - len(wiring.latch))
@@ -114,6 +141,11 @@ class Board(Bus):
             self.hi_count += 1
         for port in range(PORTS):
             self.cpu.set_external(port, self.external[port], 0)
+
+    def load(self, image: Image) -> None:
+        """Puts the firmware into the CPU's flash; its symbols name the places of faults."""
+        self.cpu.load(image.code, image.used)
+        self.symbols = image.symbols
 
     # ---- time ----------------------------------------------------------------------------------------------
 
@@ -184,16 +216,27 @@ class Board(Bus):
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
         """The CPU's port pins changed: carry them to the LM629."""
-        changed = self.bank[port] ^ latch
-        self.bank[port] = latch
+        self._set_pins(port, latch, tick)
+
+    def _set_pins(self, port: int, levels: int, tick: int) -> None:
+        changed = self.bank[port] ^ levels
+        self.bank[port] = levels
         if changed & self.watched[port]:
             self.sync(tick)
             self._drive_chips(tick)
 
     def movx_write(self, address: int, value: int, tick: int) -> None:
-        """Stores into every output latch that decodes the address."""
-        index = 0
+        """A bus cycle on P0, P2 and /WR; stores into every output latch that decodes the address."""
+        start = tick - _STROBE_ENDS
+        page = self.bank[2]
         changed = False
+        if self.on_movx_bus:
+            self._put_address(address, start)
+            self._set_pins(0, value, start + _DATA)
+            self._set_pins(3, self.bank[3] & (0xFF ^ _WR), start + _STROBE)
+            self.bank[3] |= _WR
+            changed = True
+        index = 0
         while index < self.latches:
             if address & self.latch_mask[index] == self.latch_address[index]:
                 changed = changed or self.bank[PORTS + index] != value
@@ -202,15 +245,37 @@ class Board(Bus):
         if changed:
             self.sync(tick)
             self._drive_chips(tick)
+        if self.on_movx_bus:
+            self._set_pins(0, 0xFF, start + _DATA_ENDS)
+            self._set_pins(2, page, start + _PAGE_ENDS)
 
     def movx_read(self, address: int, tick: int) -> int:
-        """The LM629 data bus if an input buffer decodes the address, else the pulled-up external bus."""
+        """A bus cycle on P0, P2 and /RD. The LM629 data bus if it is P0 or if an input buffer decodes the address,
+        else the pulled-up external bus.
+        """
+        start = tick - _SAMPLE
+        page = self.bank[2]
+        if self.on_movx_bus:
+            self._put_address(address, start)
+            self._set_pins(3, self.bank[3] & (0xFF ^ _RD), start + _STROBE)
+        heard = self.data_bank == 0
         index = 0
         while index < self.buffers:
-            if address & self.buffer_mask[index] == self.buffer_address[index]:
-                return self.bank[self.data_bank] & self.bus_levels
+            heard = heard or address & self.buffer_mask[index] == self.buffer_address[index]
             index += 1
-        return 0xFF
+        value = self.bank[self.data_bank] & self.bus_levels if heard else 0xFF
+        if self.on_movx_bus:
+            if heard:
+                self._watch_sample(tick)
+            self._set_pins(3, self.bank[3] | _RD, start + _STROBE_ENDS)
+            self._set_pins(2, page, start + _PAGE_ENDS)
+        return value
+
+    def _put_address(self, address: int, start: int) -> None:
+        """The first half of a MOVX: the address, low byte on P0, high byte on P2; then P0 floats."""
+        self._set_pins(2, address >> 8, start + _ADDRESS)
+        self._set_pins(0, address & 0xFF, start + _ADDRESS)
+        self._set_pins(0, 0xFF, start + _RELEASE)
 
     def _level(self, index: int) -> int:
         return (self.bank[self.pin_bank[index]] >> self.pin_bit[index] & 1) ^ self.pin_inverted[index]
@@ -218,6 +283,7 @@ class Board(Bus):
     def _drive_chips(self, tick: int) -> None:
         """Puts the present levels on both chips' pins, then what they answer on the bus."""
         data = self.bank[self.data_bank]
+        self._watch_timing(data, tick)
         self.left.set_reset(tick, self._level(4))
         self.right.set_reset(tick, self._level(9))
         self.left.set_bus(tick, self._level(0), self._level(1), self._level(2), self._level(3), data)
@@ -245,16 +311,49 @@ class Board(Bus):
         busy_writes = self.left.writes_while_busy + self.right.writes_while_busy
         if busy_writes != self.busy_writes:
             self.busy_writes = busy_writes
-            self.fault(FaultKind.LM629_BUSY, self.cpu.pc, tick)
+            self.fault(FaultKind.LM629_BUSY, self.cpu.at, tick)
         if both_drive and not self.contention:
-            self.fault(FaultKind.BUS_CONTENTION, self.cpu.pc, tick)
+            self.fault(FaultKind.BUS_CONTENTION, self.cpu.at, tick)
         self.contention = int(both_drive)
+
+    def _watch_timing(self, data: int, tick: int) -> None:
+        """The same edge at both chips is one fault."""
+        one, other = self.left_timing, self.right_timing
+        left = one.pins(tick, self._level(0), self._level(1), self._level(2), self._level(3), data)
+        right = other.pins(tick, self._level(5), self._level(6), self._level(7), self._level(8), data)
+        if left:
+            self._timing_fault(left, one.ticks, tick)
+        elif right:
+            self._timing_fault(right, other.ticks, tick)
+        if self._reset_is_short(self.left, self._level(4), tick):
+            self._timing_fault(_RESET_PULSE, tick - self.left.reset_tick, tick)
+        elif self._reset_is_short(self.right, self._level(9), tick):
+            self._timing_fault(_RESET_PULSE, tick - self.right.reset_tick, tick)
+
+    def _reset_is_short(self, chip: Lm629, level: int, tick: int) -> bool:
+        """/RST rises, less than 8 LM629 clocks after it fell."""
+        return level != 0 and chip.reset_level == 0 and tick - chip.reset_tick < RESET_PULSE_TICKS
+
+    def _watch_sample(self, tick: int) -> None:
+        """The CPU takes the byte that a chip drives."""
+        left, right = self.left_timing.sampled(tick), self.right_timing.sampled(tick)
+        if left:
+            self._timing_fault(left, self.left_timing.ticks, tick)
+        elif right:
+            self._timing_fault(right, self.right_timing.ticks, tick)
+
+    def _timing_fault(self, limit: int, ticks: int, tick: int) -> None:
+        self._note(FaultKind.LM629_TIMING, self.cpu.at, tick, LIMITS[limit].breach(ticks))
 
     def fault(self, kind: int, pc: int, tick: int) -> None:
         """Notes a firmware fault; the run ends after this instruction when the scenario says so."""
+        self._note(kind, pc, tick, "")
+
+    def _note(self, kind: int, pc: int, tick: int, detail: str) -> None:
         self.fault_count += 1
         if len(self.faults) < FAULTS_KEPT:
-            self.faults.append(FirmwareFault(FaultKind(kind), tick, pc))
+            symbol = self.symbols.name_at(pc) if self.symbols is not None else ""
+            self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol, detail))
         if self.stop_on_fault:
             self.cpu.request_stop()
 
@@ -289,6 +388,8 @@ class Board(Bus):
         self.bridge_enable = bytearray(state["bridge_enable"])
         self.bridge_sign = bytearray(state["bridge_sign"])
         self.hi_seen = bytearray([self.left.hi, self.right.hi])
+        for chip, timing in ((self.left, self.left_timing), (self.right, self.right_timing)):
+            timing.rest(chip.port.writing, chip.port.reading, chip.port.ps, chip.port.data)
         self.fault_count = state["fault_count"]
         self.busy_writes = state["busy_writes"]
         self.contention = state["contention"]

@@ -32,18 +32,23 @@ DESCRIPTIONS = {
     FaultKind.BUS_CONTENTION: "let two chips drive the data bus",
     FaultKind.LM629_BUSY: "wrote to an LM629 while it was busy",
     FaultKind.LM629_TIMING: "broke an LM629 bus timing limit",
-    FaultKind.MAIN_LOOP_STARVED: "left the main loop no time",
+    FaultKind.MAIN_LOOP_STARVED: "left its main loop no time: interrupts took all of 10 ms",
 }
 
 
 class FirmwareFault(msgspec.Struct, frozen=True):
-    """One fault: what, when (tick of 24 MHz), at which instruction, inside which symbol ("" if unknown)."""
+    """One fault: what, when (tick of 24 MHz), at which instruction, inside which symbol ("" if unknown).
+
+    `detail` is for people: by how much, where there is more to say than the kind.
+    """
 
     kind: FaultKind
     tick: int
     pc: int
     symbol: str = ""
+    detail: str = ""
 
     def __str__(self) -> str:
         place = f"{self.pc:#06x}" + (f" in {self.symbol}" if self.symbol else "")
-        return f"firmware {DESCRIPTIONS[self.kind]} at {place}, tick {self.tick}"
+        more = f" ({self.detail})" if self.detail else ""
+        return f"firmware {DESCRIPTIONS[self.kind]}{more} at {place}, tick {self.tick}"

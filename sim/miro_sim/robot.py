@@ -55,7 +55,7 @@ class Robot:
             start.theta_rad + spec.start_error_theta_rad,
         )
         self.board = Board(load_wiring(), self.drive, spec.slot, robots, None, scenario.stop_on_fault)
-        self.board.cpu.load(image.code, image.used)
+        self.board.load(image)
         self.camera_noise = Stream(seed, f"{name}/camera")
         self.vision: Vision = vision_for(scenario.camera)
         self.pilot: Pilot = pilot_for(spec, self.reference)

@@ -20,7 +20,7 @@ cdef class Core:
     cdef public int bank
     cdef readonly long long cycles
     cdef readonly long long start
-    cdef int at
+    cdef readonly int at
     cdef long long limit
     cdef long long until
     cdef int stop

@@ -14,6 +14,7 @@ cdef int _SMOD, _PD, _IDL
 cdef int _PCON_BITS
 cdef int _READ_SAMPLE, _WRITE_RISES
 cdef int _FLOATING
+cdef int _MAIN_LOOP_STARVED, _MARK_CYCLES, _ONE_INSTRUCTION
 
 cdef class Cpu(Executor):
     cdef readonly Peripherals chip
@@ -24,6 +25,9 @@ cdef class Cpu(Executor):
     cdef readonly int powered_down
     cdef long long next_event
     cdef long long blocked
+    cdef public long long main_loop_limit
+    cdef long long next_mark
+    cdef long long marks
     cdef readonly int code_limit
     cdef public object inspector
 
@@ -49,6 +53,8 @@ cdef class Cpu(Executor):
     cdef int boundary(self) except -1
     @cython.locals(chip=Peripherals, earliest='long long', source=int)
     cdef int _attend(self, long long now) except -1
+    cdef int _watch_main_loop(self, long long now) except -1
+    cdef int _taken_over(self)
     cdef int _enter(self, int source) except -1
     cdef int _block(self) except -1
     cdef int register(self, int address, long long cycle) except -1

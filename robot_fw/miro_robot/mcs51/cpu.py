@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextvars import ContextVar
 from typing import Any, Protocol
 
+from miro_robot.faults import FaultKind
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.execute import BREAKPOINT, REACHED, STOPPED, Executor
 from miro_robot.mcs51.peripherals import Peripherals
@@ -27,6 +28,9 @@ _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
 _PCON_BITS = 0x8F  # the others are not implemented and read as 0
 _READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end
 _FLOATING = 0xFF  # what an undriven external bus reads as
+_MAIN_LOOP_STARVED = int(FaultKind.MAIN_LOOP_STARVED)
+_MARK_CYCLES = 2000  # 1 ms: how often a look is taken at whether the main loop gets time
+_ONE_INSTRUCTION = 4  # cycles of the longest: what the hardware lets main level do between two interrupts
 
 
 on_load: ContextVar[Callable[[Cpu], object] | None] = ContextVar("on_load", default=None)
@@ -49,7 +53,9 @@ class Cpu(Executor):
         "code_limit",
         "inspector",
         "limit",
+        "main_loop_limit",
         "next_event",
+        "next_mark",
         "rxd",
         "stop",
         "txd",
@@ -65,6 +71,9 @@ class Cpu(Executor):
         self.powered_down = 0
         self.next_event = 0
         self.blocked = -1  # boundary at which no interrupt is taken: after RETI and writes to IE, IP
+        self.main_loop_limit = 0  # cycles after which interrupts that leave it no time are a fault; 0: never
+        self.next_mark = _FAR
+        self.marks = 0  # marks passed since interrupts took over
         self.code_limit = 0x10000
         self.inspector: Inspector | None = None
         for address in range(0x10000):
@@ -180,6 +189,7 @@ class Cpu(Executor):
     # The run loop's view of time
 
     def begin_run(self) -> None:
+        self.next_mark = (self.cycles // _MARK_CYCLES + 1) * _MARK_CYCLES if self.main_loop_limit else _FAR
         self.next_event = 0
         self.limit = 0
 
@@ -195,11 +205,15 @@ class Cpu(Executor):
     def boundary(self) -> int:
         """Between two instructions with something to look after; 1 ends the run."""
         now = self.cycles
+        if now >= self.next_mark:
+            self._watch_main_loop(now)
         if self.stop or now >= self.until:
             return 1
         if now >= self.next_event and self._attend(now):
             return 0
         event = self.next_event if self.next_event < self.until else self.until
+        if self.next_mark < event:
+            event = self.next_mark
         if (self.idle or self.powered_down) and now < event:
             self.idle_cycles += event - now
             self.cycles = event
@@ -225,8 +239,25 @@ class Cpu(Executor):
         self.next_event = chip.next_event(earliest)
         return 0
 
+    def _watch_main_loop(self, now: int) -> None:
+        """Once a millisecond: have interrupts held the CPU at all marks since the limit?"""
+        self.next_mark = (now // _MARK_CYCLES + 1) * _MARK_CYCLES
+        if self._taken_over():
+            self.marks += 1
+            if (self.marks - 1) * _MARK_CYCLES >= self.main_loop_limit:
+                self.marks = 1
+                self.fault(_MAIN_LOOP_STARVED)
+
+    def _taken_over(self) -> int:
+        """Whether an interrupt is in service, or one just was: silicon grants main level one instruction after RETI,
+        which does not count as time of its own.
+        """
+        return 1 if self.chip.interrupts.in_service or self.cycles - self.blocked <= _ONE_INSTRUCTION else 0
+
     def _enter(self, source: int) -> None:
         """The hardware LCALL: two cycles, and the end of idle mode."""
+        if not self._taken_over():
+            self.marks = 0
         self.idle = 0
         self.pcon &= 0xFF ^ _IDL
         self.chip.taken(source, self.cycles)
@@ -242,7 +273,7 @@ class Cpu(Executor):
         self._block()
 
     def _block(self) -> None:
-        """No interrupt before one more instruction has been executed."""
+        """No interrupt before one more instruction has been executed: after RETI and writes to IE, IP."""
         self.blocked = self.cycles
         self.next_event = 0
         self.limit = 0
@@ -300,6 +331,7 @@ class Cpu(Executor):
         else:
             self.chip.write(address, value, self.cycles)
             if address in (_IE, _IP):
+                self.marks = self.marks if self.chip.interrupts.in_service else 0
                 self._block()
             self.next_event = 0
             self.limit = 0
@@ -365,6 +397,7 @@ class Cpu(Executor):
         """All state, between two runs; the image is not part of it."""
         self.chip.sync(self.cycles)
         self.chip.settle()
+        marks = self.marks if self._taken_over() else 0  # mostly none, and then not worth a word
         return {
             **Executor.snapshot(self),
             "pcon": self.pcon,
@@ -372,6 +405,7 @@ class Cpu(Executor):
             "powered_down": self.powered_down,
             "blocked": self.blocked,
             "chip": self.chip.snapshot(),
+            **({"marks": marks} if marks else {}),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -380,6 +414,7 @@ class Cpu(Executor):
         self.idle = state["idle"]
         self.powered_down = state["powered_down"]
         self.blocked = state["blocked"]
+        self.marks = state.get("marks", 0)
         self.chip.restore(state["chip"])
 
     def __repr__(self) -> str:

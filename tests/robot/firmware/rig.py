@@ -75,7 +75,7 @@ class Rig:
         self.n = n
         self.board = Probe(wiring or load_wiring(), plant or Plant(), slot, n, options)
         self.cpu = self.board.cpu
-        self.cpu.load(IMAGE.code, IMAGE.used)
+        self.board.load(IMAGE)
         self.now = 0
         self.line_free = 0
         self.pending: list[tuple[int, int]] = []

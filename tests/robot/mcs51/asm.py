@@ -16,6 +16,15 @@ KEYWORDS = {"A", "C", "AB", "DPTR", "@DPTR", "@A+DPTR", "@A+PC"}
 
 def assemble(text: str, origin: int = 0) -> bytes:
     """Machine code of the lines, for loading at `origin`."""
+    return _two_passes(text, origin)[0]
+
+
+def labels_of(text: str, origin: int = 0) -> dict[str, int]:
+    """The addresses of the labels."""
+    return _two_passes(text, origin)[1]
+
+
+def _two_passes(text: str, origin: int) -> tuple[bytes, dict[str, int]]:
     lines = [line.split(";")[0].strip() for line in text.splitlines()]
     labels: dict[str, int] = {}
     for _ in range(2):  # the first pass finds the labels
@@ -30,7 +39,7 @@ def assemble(text: str, origin: int = 0) -> bytes:
                 code += bytes(_number(line[4:], labels) - here)
             elif line:
                 code += _instruction(line, here, labels)
-    return bytes(code)
+    return bytes(code), labels
 
 
 def _instruction(line: str, here: int, labels: dict[str, int]) -> bytes:

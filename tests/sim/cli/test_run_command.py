@@ -108,6 +108,37 @@ def test_a_firmware_fault_ends_the_run_with_code_3_and_complete_files(
     assert (tmp_path / "out" / "figure.png").exists()
 
 
+SHORT_RESET = bytes.fromhex("00 C2A5 D2A5 80FE")  # NOP; CLR P2.5; SETB P2.5; SJMP $
+SYMBOLS = """
+CSEG                                00000000    00000007 =           7. bytes (REL,CON,CODE)
+C:   00000000  _main                              a
+C:   00000001  _pulse                             a
+"""
+
+
+def test_a_fault_of_the_board_names_limit_tick_instruction_and_symbol(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    image = hex_file(tmp_path / "bad.ihx", SHORT_RESET)
+    image.with_suffix(".map").write_text(SYMBOLS)
+    code, _, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out", "-q")
+    first = "firmware fault: net0/robot0: firmware broke an LM629 bus timing limit (/RST pulse 500 ns, 1333 ns needed)"
+    assert (code, err.splitlines()[0]) == (3, f"mirotwin: {first} at 0x0003 in _pulse, tick 36")
+
+
+def test_a_scenario_may_count_faults_and_go_on(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    patient = tmp_path / "patient.toml"
+    patient.write_text(short.read_text().replace("duration_s", "stop_on_fault = false\nduration_s"))
+    image = hex_file(tmp_path / "bad.ihx", SHORT_RESET)
+    code, _, err = mirotwin("run", patient, "--firmware", image, "--out", tmp_path / "out", "-q")
+    assert (code, err.count("tick 36")) == (3, 2)  # both robots
+    summary = json.loads((tmp_path / "out" / "summary.json").read_bytes())
+    assert summary["firmware"]["faults"] == 2
+    assert summary["simulated_s"] > 0.2
+
+
 def test_an_interrupted_run_leaves_nothing_behind(
     mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
