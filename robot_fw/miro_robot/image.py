@@ -14,6 +14,8 @@ from pathlib import Path
 
 import msgspec
 
+from miro_robot.symbol_files import check_cdb, check_map
+
 FLASH_BYTES = 8192  # of an AT89C52
 SPACE_BYTES = 0x10000
 _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START_LINEAR = range(6)  # record types
@@ -118,6 +120,7 @@ def parse_hex(content: bytes, path: Path, limit: int = FLASH_BYTES) -> Image:
         loaded[address:end] = b"\x01" * len(data)
     if not any(loaded):
         raise ImageError(path, 0, "holds no bytes", _REBUILD)
+    _check_beside(path, bytes(code), bytes(loaded))
     return Image(
         path=path,
         code=bytes(code),
@@ -126,6 +129,17 @@ def parse_hex(content: bytes, path: Path, limit: int = FLASH_BYTES) -> Image:
         sha256=hashlib.sha256(content).hexdigest(),
         symbols=Symbols.from_beside(path),
     )
+
+
+def _check_beside(path: Path, code: bytes, loaded: bytes) -> None:
+    """Raises ImageError when a symbol file beside the image contradicts it."""
+    for suffix, check in ((".map", check_map), (".cdb", check_cdb)):
+        beside = path.with_suffix(suffix)
+        if beside.is_file():
+            found = check(beside.read_text(encoding="utf-8", errors="replace"), code, loaded)
+            if found is not None:
+                remedy = "it belongs to another image: rebuild both together, or take it away"
+                raise ImageError(beside, found.line, found.reason, remedy)
 
 
 def _too_big(limit: int) -> str:

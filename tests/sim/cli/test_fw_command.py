@@ -27,6 +27,18 @@ def test_a_symbol_is_found_with_or_without_its_underscore(mirotwin: Callable[...
         assert mirotwin("fw", "run", image_path(), "--until", name, "--max-cycles", 100_000) == (0, "", "")
 
 
+def test_the_symbols_of_another_image_are_refused(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    image = hex_file(tmp_path / "a.ihx", LOOP)
+    for suffix in (".map", ".cdb"):
+        beside = image.with_suffix(suffix)
+        beside.write_bytes(image_path().with_suffix(suffix).read_bytes())
+        code, out, err = mirotwin("fw", "run", image)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert err.startswith(f"mirotwin: error: {beside}:")
+        assert err.endswith("it belongs to another image: rebuild both together, or take it away\n")
+        beside.unlink()
+
+
 def test_the_cycle_limit_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result]) -> None:
     code, out, err = mirotwin("fw", "run", image_path(), "--max-cycles", 5000)
     assert (code, out) == (42, "")

@@ -1,0 +1,194 @@
+"""A symbol file of another image is refused by file and line; an unusual one of this image is not."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_robot.firmware import image_path
+from miro_robot.image import ImageError, load_hex
+from miro_robot.symbol_files import check_cdb, check_map
+
+ROBOT = image_path()
+MAP = ROBOT.with_suffix(".map").read_text()
+CDB = ROBOT.with_suffix(".cdb").read_text()
+IMAGE = load_hex(ROBOT)
+LOADED = bytes(any(first <= address < end for first, end in IMAGE.used) for address in range(0x10000))
+needs_sdcc = pytest.mark.skipif(shutil.which("sdcc") is None, reason="sdcc is not installed")
+
+
+def hex_text(code: bytes, at: int = 0) -> str:
+    """Intel HEX records of 16 bytes."""
+    lines = []
+    for offset in range(0, len(code), 16):
+        data = code[offset : offset + 16]
+        body = bytes([len(data)]) + (at + offset).to_bytes(2, "big") + b"\0" + data
+        lines.append(":" + (body + bytes([-sum(body) & 0xFF])).hex().upper())
+    return "\n".join([*lines, ":00000001FF\n"])
+
+
+def refusal(path: Path) -> ImageError:
+    with pytest.raises(ImageError) as caught:
+        load_hex(path)
+    assert caught.value.remedy == "it belongs to another image: rebuild both together, or take it away"
+    assert str(caught.value).startswith(f"{caught.value.path}:{caught.value.line}: ")
+    return caught.value
+
+
+def test_the_map_of_the_robot_beside_a_small_program_is_refused(tmp_path):
+    path = tmp_path / "blink.ihx"
+    path.write_text(hex_text(b"\x80\xfe"))
+    path.with_suffix(".map").write_text(MAP)
+    error = refusal(path)
+    assert error.path.name == "blink.map"
+    assert "C:   00000026  __sdcc_program_startup" in MAP.splitlines()[error.line - 1]
+    assert error.reason == (
+        "the image has no bytes for 33 of 33 code symbols, the first is __sdcc_program_startup (0x0026)"
+    )
+
+
+def test_a_map_in_which_main_moved_is_refused(tmp_path):
+    path = tmp_path / "robot.ihx"
+    shutil.copy(ROBOT, path)
+    path.with_suffix(".map").write_text(MAP.replace("000000E7  _main", "000000E8  _main"))
+    error = refusal(path)
+    assert "000000E8  _main" in MAP.replace("000000E7  _main", "000000E8  _main").splitlines()[error.line - 1]
+    assert error.reason == "_main is at 0x00e8 here, and the image's start-up code jumps to 0x00e7"
+
+
+def test_a_debug_file_whose_instructions_stand_elsewhere_is_refused(tmp_path):
+    path = tmp_path / "robot.ihx"
+    path.write_text(hex_text(IMAGE.code[:0x200] + b"\x00" + IMAGE.code[0x200 : IMAGE.used[-1][1]]))
+    path.with_suffix(".cdb").write_text(CDB)
+    error = refusal(path)
+    assert error.path.name == "robot.cdb"
+    assert CDB.splitlines()[error.line - 1].startswith("L:A$")
+    assert " of its 1165 instructions are not in the image, the first at 0x0" in error.reason
+
+
+def test_the_files_of_the_robot_belong_to_it():
+    assert check_map(MAP, IMAGE.code, LOADED) is None
+    assert check_cdb(CDB, IMAGE.code, LOADED) is None
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    filler=st.none() | st.integers(0, 255),
+    boot_loader=st.binary(max_size=3),
+    cut=st.tuples(st.integers(0x300, 0xA00), st.integers(0, 0x60)),
+)
+def test_an_image_that_was_filled_merged_or_lost_a_little_keeps_its_symbols(filler, boot_loader, cut):
+    code, loaded = bytearray(IMAGE.code), bytearray(LOADED)
+    if filler is not None:
+        for address in range(0x10000):
+            code[address] = code[address] if loaded[address] else filler
+        loaded = bytearray(b"\x01" * 0x10000)
+    code[: len(boot_loader)] = boot_loader  # another reset vector
+    for address in range(cut[0], cut[0] + cut[1]):
+        code[address], loaded[address] = 0xFF, 0
+    assert check_map(MAP, bytes(code), bytes(loaded)) is None
+    assert check_cdb(CDB, bytes(code), bytes(loaded)) is None
+
+
+def map_text(area: str, first: int, size: int, attributes: str, name_at: int) -> str:
+    """A page of a map: one area, five names at one address."""
+    head = f"{area:<36}{first:08X}    {size:08X} = {size:>11}. bytes ({attributes})\n"
+    return head + "".join(f"C:   {name_at:08X}  _name{number}      a\n" for number in range(5))
+
+
+@pytest.mark.parametrize(
+    ("page", "refused"),
+    [
+        (("CSEG", 0x4000, 0x10, "REL,CON,CODE", 0x4000), True),
+        ((".  .ABS.", 0, 0, "ABS,CON", 0x4000), False),
+        (("CABS", 0x4000, 0x100, "ABS,CON,CODE", 0x4000), False),
+        (("CONST", 0x4000, 0, "REL,CON,CODE", 0x4000), False),
+        (("CSEG", 0, 0x10, "REL,CON,CODE", 0x10), False),
+        (("XSEG", 0x4000, 0x10, "REL,CON,XDATA", 0x4000), False),
+        (("BANK1", 0x18000, 0x10, "REL,CON,CODE", 0x18000), False),
+    ],
+)
+def test_absolute_empty_banked_and_data_symbols_prove_nothing(page, refused):
+    found = check_map(map_text(*page), bytes(0x10000), b"\x01" * 16 + bytes(0xFFF0))
+    assert (found is not None) == refused
+
+
+def test_files_of_somebody_elses_linker_prove_nothing():
+    for text in ("", "LINK MAP OF MODULE: demo (DEMO)\n  C:0003H  SYMBOL  TIMER\n"):
+        assert check_map(text, IMAGE.code, LOADED) is None
+        assert check_cdb(text, IMAGE.code, LOADED) is None
+
+
+def test_start_up_code_of_ones_own_is_not_judged():
+    code = bytearray(IMAGE.code)
+    code[0x26:0x29] = b"\x00\x00\x00"  # runs on into main
+    assert check_map(MAP, bytes(code), LOADED) is None
+
+
+def test_a_handful_of_names_or_line_records_proves_nothing():
+    text = "".join(f"L:A$a$1{number}:{number}\n" for number in range(10, 29))
+    assert check_cdb(text, b"\x02" * 0x10000, b"\x01" * 0x10000) is None
+    assert check_cdb(text + "L:A$a$200:99\n", b"\x02" * 0x10000, b"\x01" * 0x10000) is not None
+    area = "CSEG                                00000000    00000100 =         256. bytes (REL,CON,CODE)\n"
+    names = [f"C:   000000{number:02X}  _name{number}   a\n" for number in range(4)]
+    assert check_map(area + "".join(names[:3]), bytes(0x10000), bytes(0x10000)) is None
+    assert check_map(area + "".join(names), bytes(0x10000), bytes(0x10000)) is not None
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.text(alphabet="L:A$CSEG_mainbytes=()RELCODE 0123456789ABCDEF\n.,", max_size=300))
+def test_no_text_whatever_breaks_the_reading(text):
+    check_map(text, IMAGE.code, LOADED)
+    check_cdb(text, IMAGE.code, LOADED)
+
+
+PROGRAM = """
+#include <stdio.h>
+#include <8052.h>
+__code __at(0x1F00) const char serial[] = "00042";
+__code unsigned char eeprom_image[32];
+const unsigned long powers[] = {1, 10, 100, 1000, 10000};
+__xdata char buffer[64];
+volatile unsigned char ticks;
+void tick(void) __interrupt(1) { ticks++; }
+int putchar(int c) { SBUF = c; while (!TI); TI = 0; return c; }
+void table(void) __naked { __asm
+    mov dptr,#0001$
+    ret
+0001$:
+    .db 0x02, 0x02, 0x02, 0x12, 0x75
+    .ds 4
+__endasm; }
+void main(void) { /* MORE */ unsigned char i; for (i = 0; i < 5; i++) printf("%lu %s", powers[i], serial); }
+"""
+
+
+def built(folder: Path, more: str, *options: str) -> Path:
+    folder.mkdir()
+    (folder / "prog.c").write_text(PROGRAM.replace("/* MORE */", more))
+    subprocess.run(["sdcc", "-mmcs51", *options, "prog.c"], cwd=folder, check=True, capture_output=True)
+    return folder / "prog.ihx"
+
+
+@needs_sdcc
+@pytest.mark.parametrize("options", [("--debug",), ("--debug", "--model-large"), ("--opt-code-size",)])
+def test_what_sdcc_builds_belongs_together(tmp_path, options):
+    image = load_hex(built(tmp_path / "a", "", *options))
+    assert image.symbols.find("main") is not None
+
+
+@needs_sdcc
+def test_the_symbols_of_yesterday_are_refused_today(tmp_path):
+    yesterday = built(tmp_path / "a", "", "--debug")
+    today = built(tmp_path / "b", "P1 = 1;", "--debug")
+    for suffix in (".map", ".cdb"):
+        mixed = tmp_path / suffix[1:] / "prog.ihx"
+        mixed.parent.mkdir()
+        shutil.copy(today, mixed)
+        shutil.copy(yesterday.with_suffix(suffix), mixed.with_suffix(suffix))
+        if suffix == ".map":
+            load_hex(mixed)  # main did not move, and everything it names is there: nothing contradicts it
+        else:
+            assert refusal(mixed).path.suffix == ".cdb"
