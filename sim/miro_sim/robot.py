@@ -54,7 +54,9 @@ class Robot:
             start.y_m + spec.start_error_y_cm / 100.0,
             start.theta_rad + spec.start_error_theta_rad,
         )
-        self.board = Board(load_wiring(), self.drive, spec.slot, robots, None, scenario.stop_on_fault)
+        self.board = Board(
+            load_wiring(), self.drive, spec.slot, robots, scenario.lm629, scenario.stop_on_fault
+        )
         self.board.load(image)
         self.camera_noise = Stream(seed, f"{name}/camera")
         self.vision: Vision = vision_for(scenario.camera)

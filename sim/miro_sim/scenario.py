@@ -12,6 +12,7 @@ bit-error rate of 1e-4.
 from typing import Annotated, Literal
 
 import msgspec
+from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from msgspec import Meta
 
 from miro_sim.plant.params import DriveParams
@@ -178,12 +179,16 @@ class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A whole run. `stop_on_fault` ends it at the first firmware fault; otherwise faults are counted."""
+    """A whole run. `stop_on_fault` ends it at the first firmware fault; otherwise faults are counted.
+
+    `lm629` turns readings of the chips' undocumented corners (`robot_fw/miro_robot/lm629/README.md`).
+    """
 
     name: Name
     title: Annotated[str, Meta(max_length=200)] = ""
     duration_s: Duration
     stop_on_fault: bool = True
+    lm629: Lm629Options = DEFAULT_OPTIONS
     camera: Camera = Camera()
     host: HostTimes = HostTimes()
     networks: Annotated[tuple[Network, ...], Meta(min_length=1)] = msgspec.field(name="network")

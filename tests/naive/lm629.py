@@ -1,8 +1,6 @@
-"""A slow, obvious LM629: the same rules as `miro_robot.lm629`, put down a second time in another shape.
+"""A slow, obvious LM629: the rules of `miro_robot.lm629` put down a second time in another shape.
 
-Positions are fractions of a count, the stopping distance is added up term by term, commands are generators
-that wait for their words, the encoder is sampled clock by clock. It shares nothing with the package but its
-options.
+Commands are generators that wait for their words; it shares nothing with the package but its options.
 """
 
 from __future__ import annotations
@@ -14,75 +12,11 @@ from fractions import Fraction
 from miro_robot.lm629.options import Lm629Options
 
 from tests.naive.lm629_encoder import NaiveEncoder
+from tests.naive.lm629_parts import LSB, NaivePid, between, modular, profile_speed
 
 Words = Generator[None, int, None]
-LSB = Fraction(1, 65536)
 HIGH_WORD_READS = {0x07: 2, 0x08: 2, 0x09: 2, 0x0A: 2, 0x0B: 1, 0x0C: 1, 0x0D: 1}
 INTERRUPTS = range(1, 7)
-
-
-def modular(value: int, bits: int) -> int:
-    """Two's complement of `bits` bits."""
-    value %= 1 << bits
-    return value - (1 << bits) if value >= 1 << (bits - 1) else value
-
-
-def between(low: int, value: int, high: int) -> int:
-    return sorted((low, value, high))[1]
-
-
-def stopping_distance(speed: int, acceleration: int) -> int | float:
-    """In LSBs: speed + (speed - a) + (speed - 2a) + ... down to the last that is not negative."""
-    if speed == 0:
-        return 0
-    if acceleration == 0:
-        return math.inf
-    terms = range(speed, -1, -acceleration)
-    if len(terms) > 5000:
-        return len(terms) * (terms[0] + terms[-1]) // 2
-    return sum(terms)
-
-
-def profile_speed(v: int, a: int, limit: int, distance: Fraction) -> int:
-    """The new speed towards the target (steps 4 and 5 of the algorithm), all speeds in LSBs."""
-    if v < 0:
-        return min(v + a, 0)
-    up = min(v + a, limit) if v < limit else max(v - a, limit)
-    if stopping_distance(up, a) * LSB <= distance:
-        return up
-    if up >= v and stopping_distance(v, a) * LSB <= distance:
-        return v
-    return max(v - a, 0)
-
-
-class NaivePid:
-    def __init__(self, saturates: bool) -> None:
-        self.kp = self.ki = self.kd = self.il = self.ds = 0
-        self.saturates = saturates
-        self.forget()
-
-    def forget(self) -> None:
-        self.errors: list[int] = []
-        self.sum = self.last_taken = self.held = self.integral = 0
-        self.until_next = 0
-
-    def load(self, kp: int, ki: int, kd: int, il: int, ds: int) -> None:
-        self.kp, self.ki, self.kd, self.il, self.ds = kp, ki, kd, il, ds
-        self.until_next = 0
-
-    def fit(self, value: int) -> int:
-        return between(-32768, value, 32767) if self.saturates else modular(value, 16)
-
-    def step(self, error: int) -> int:
-        e = between(-32768, error, 32767)
-        self.sum = between(-(2**23), self.sum + e, 2**23 - 1)
-        self.integral = between(-self.il, self.fit(self.ki * math.floor(Fraction(self.sum, 256))), self.il)
-        if self.until_next == 0:
-            self.held = self.fit(self.kd * between(-32768, e - self.last_taken, 32767))
-            self.last_taken = e
-            self.until_next = self.ds + 1
-        self.until_next -= 1
-        return self.fit(self.fit(self.kp * e) + self.integral + self.held)
 
 
 class NaiveLm629:
@@ -90,7 +24,7 @@ class NaiveLm629:
 
     def __init__(self, options: Lm629Options) -> None:
         self.options = options
-        self.encoder = NaiveEncoder(options.filter_clocks, hurry=True)
+        self.encoder = NaiveEncoder(options.filter_clocks, options.double_step, hurry=True)
         self.pins = {"cs": 1, "rd": 1, "wr": 1, "ps": 1, "data": 0xFF}
         self.rst = 1
         self.rst_fell = 0
@@ -99,20 +33,27 @@ class NaiveLm629:
         self.port_byte = 0
         self.driven = 0
         self.alive_at: int | None = None
+        self.signals: set[int] = set()
+        self.index_position = 0
         self.clear("hard")
 
     def clear(self, reset: str) -> None:
         self.reset: str | None = reset
-        self.pid = NaivePid(self.options.pid_saturates)
+        self.pid = NaivePid(self.options.pid_saturates, self.options.sum_rounding == "down")
+        self.excess = False
         self.buffer = {"control": 0, "a": 0, "v": 0, "p": 0}
         self.relative = self.newer_position = False
         self.filter = {"kp": 0, "ki": 0, "kd": 0, "il": 0, "ds": 0}
         self.start: dict[str, int] | None = None
         self.start_relative = False
         self.update: dict[str, int] | None = None
-        self.signals: set[int] = set()
+        kept = set() if self.options.reset_clears_lpes or reset == "hard" else {9}
+        kept |= set() if self.options.reset_clears_index else {0}
+        self.signals &= kept
         self.mask: set[int] = set()
-        self.real = self.velocity_counts = self.index_position = 0
+        self.real = self.velocity_counts = 0
+        if self.options.reset_clears_index:
+            self.index_position = 0
         self.desired = Fraction(0)
         self.speed = self.a = self.limit = self.target = 0
         self.activity = "none"
@@ -122,10 +63,19 @@ class NaiveLm629:
         self.busy_until = 0
         self.words: Words | None = None
         self.answer = b""
-        self.half: int | None = None
+        self.phase, self.high = 0, 0
         self.strobe = ""
         self.strobe_counts = "no"
+        self.drop_counts()
+
+    def drop_counts(self) -> None:
+        """In a reset; whoever waits for an index may go on waiting (R6), but what was caught is lost."""
+        armed = self.encoder.armed
         self.encoder.drop()
+        if not self.options.reset_clears_index:
+            self.encoder.armed = armed
+        if not self.encoder.armed:
+            self.signals.discard(0)
 
     # -------------------------------------------------------------------------------------- time
 
@@ -134,6 +84,8 @@ class NaiveLm629:
             if self.reset and self.alive_at <= tick:
                 self.reset = None
                 self.next_sample = self.alive_at + 8192
+                if not self.options.reset_restarts_samples:
+                    self.next_sample -= self.next_sample % 8192
                 self.encoder.run_to(self.alive_at)
                 self.clear_after_reset()
             elif not self.reset and self.next_sample <= tick:
@@ -143,15 +95,22 @@ class NaiveLm629:
                 return
 
     def clear_after_reset(self) -> None:
-        self.encoder.drop()
-        self.mask = {1, 2, 3, 4, 5}
-        self.signals = {8, 7}
+        self.drop_counts()
+        self.mask = {1, 2, 3, 4, 5} if self.options.reset_interrupts else set()
+        self.signals |= {8, 7}
         self.flag(2)
+        self.mask = {1, 2, 3, 4, 5}
+        if not self.options.reset_disarms_breakpoint:
+            self.breakpoint = (0, 0)
 
     def flag(self, bit: int) -> None:
         if bit not in self.signals and bit in self.mask:
             self.signals.add(15)
         self.signals.add(bit)
+
+    def complain(self, about: bool) -> None:
+        if about:
+            self.flag(1)
 
     def sample(self, tick: int) -> None:
         events: set[int] = set()
@@ -170,14 +129,19 @@ class NaiveLm629:
             self.begin_motion(events)
         if self.update is not None:
             self.pid.load(**self.update)
+            if self.options.update_clears:
+                self.pid.forget()
             self.update = None
             self.signals.discard(13)
         drive = 0
         if 7 not in self.signals:
             self.profile(events)
             error = modular(math.floor(self.desired) - self.real, 31)
-            if abs(error) > self.threshold:
-                events.add(5)
+            judged = error if self.options.error_test == "full" else between(-32768, error, 32767)
+            before, self.excess = self.excess, abs(judged) > self.threshold
+            if self.excess:
+                if self.options.error_flag_repeats or not before:
+                    events.add(5)
                 if 9 in self.signals:
                     self.signals.add(7)
                     events.add(2)
@@ -185,12 +149,20 @@ class NaiveLm629:
                 drive = self.pid.step(error)
         if 7 in self.signals:
             self.stand_at_real()
-            self.pid.forget()
-        top = math.floor(Fraction(drive, 256))
-        self.sign, self.magnitude = int(top < 0), min(127, abs(top))
+            self.excess = False
+            if self.options.open_loop_clears:
+                self.pid.forget()
+        rounded = math.floor if self.options.output_rounding == "down" else math.trunc
+        top = rounded(Fraction(drive, 256))
+        self.magnitude = min(127, abs(top))
+        if 7 not in self.signals:
+            self.sign = self.options.sign_of_negative if top < 0 else int(not self.options.sign_of_negative)
+        elif not self.options.off_keeps_sign:
+            self.sign = 0
         if self.breakpoint is not None:
             place, side = self.breakpoint
-            if self.real == place or (self.real > place) - (self.real < place) != side:
+            passed = (self.real > place) - (self.real < place) != side and not self.options.breakpoint_exact
+            if self.real == place or passed:
                 events.add(6)
                 self.breakpoint = None
         for bit in sorted(events):
@@ -203,6 +175,8 @@ class NaiveLm629:
 
     def begin_motion(self, events: set[int]) -> None:
         assert self.start is not None
+        if self.options.start_takes == "sample":
+            self.take()
         bases = {
             "real": self.real,
             "desired": math.floor(self.desired),
@@ -223,7 +197,7 @@ class NaiveLm629:
             self.signals.add(7)
             events.add(2)
         elif control & 0x0200:
-            self.target = self.real
+            self.target = self.real if self.options.abrupt_stop_at == "real" else math.floor(self.desired)
             self.arrive(events)
         else:
             self.activity = "stop" if control & 0x0400 else "velocity" if control & 0x0800 else "position"
@@ -249,7 +223,9 @@ class NaiveLm629:
             self.move(between(self.speed - self.a, goal, self.speed + self.a), events)
             if self.activity == "stop" and self.speed == 0:
                 self.target = math.floor(self.desired)
+                fraction = self.desired - self.target if self.options.stop_keeps_fraction else Fraction(0)
                 self.arrive(events)
+                self.desired += fraction
         elif self.activity == "position":
             left = self.target - self.desired
             if left == 0 and self.speed == 0:
@@ -297,19 +273,26 @@ class NaiveLm629:
             late()
 
     def strobe_begins(self, tick: int, kind: str, flags: int) -> None:
-        busy = self.status_at(tick) & 1 or self.reset is not None
+        busy = tick < self.busy_until or self.reset is not None
         if kind == "write":
             self.strobe_counts = "no" if busy else "yes"
-            self.lost += bool(busy)
+            if self.options.busy_judged == "end" and self.reset is None:
+                self.strobe_counts = "we will see"
+            self.lost += self.strobe_counts == "no"
         elif self.pins["ps"] == 0:
-            self.strobe_counts = "no"
-            self.driven = int(self.reset == "soft") if self.reset else flags | self.status_at(tick) & 1
+            misuse = self.options.status_read_flags and self.words is not None and not busy
+            self.strobe_counts = "error" if misuse else "no"
+            self.driven = self.status_at(tick) if self.reset else flags | self.status_at(tick) & 1
         else:
-            self.strobe_counts = "no" if busy else "yes" if self.answer else "error"
+            flagged = self.options.undue_data_flags or self.words is not None
+            self.strobe_counts = "no" if busy else "yes" if self.answer else "error" if flagged else "no"
             self.driven = self.answer[0] if self.answer and not busy else self.port_byte
 
     def strobe_ends(self, tick: int, kind: str, pins: dict[str, int]) -> Callable[[], None]:
         """What the end of a strobe does to the port at once; returns what it does to the chip."""
+        if self.strobe_counts == "we will see":
+            self.strobe_counts = "no" if tick < self.busy_until else "yes"
+            self.lost += self.strobe_counts == "no"
         if self.strobe_counts == "no":
             return lambda: None
         if self.strobe_counts == "error":
@@ -317,21 +300,25 @@ class NaiveLm629:
         if kind == "read":
             self.answer = self.answer[1:]
             self.port_byte = self.driven
-            if len(self.answer) % 2 == 0:
+            self.phase = 1 - self.phase
+            if self.phase == 0:
                 self.busy_until = tick + 4 * self.options.busy_clocks
             return lambda: None
         if pins["ps"] == 0:
             unfinished = self.words is not None or bool(self.answer)
-            self.words, self.half, self.answer = None, None, b""
+            self.words, self.answer = None, b""
+            if self.options.command_resets_phase:
+                self.phase = 0
             self.busy_until = tick + 4 * self.options.busy_clocks
             return lambda: self.command(tick, pins["data"], unfinished)
         if self.words is None:
-            return lambda: self.flag(1)
+            return lambda: self.complain(self.options.undue_data_flags or bool(self.answer))
         self.port_byte = pins["data"]
-        if self.half is None:
-            self.half = pins["data"]
+        self.phase = 1 - self.phase
+        if self.phase:
+            self.high = pins["data"]
             return lambda: None
-        word, self.half = self.half << 8 | pins["data"], None
+        word = self.high << 8 | pins["data"]
         self.busy_until = tick + 4 * self.options.busy_clocks
         return lambda: self.give(word)
 
@@ -348,22 +335,27 @@ class NaiveLm629:
 
     def status_at(self, tick: int) -> int:
         if self.reset:
-            return int(self.reset == "soft")
+            return int(self.reset == "soft" and self.options.software_reset_busy)
         return sum(1 << bit for bit in self.signals if 0 < bit < 8) | (tick < self.busy_until)
 
     def signals_word(self) -> int:
-        return sum(1 << bit for bit in self.signals)
+        word = sum(1 << bit for bit in self.signals - {15})
+        if self.options.interrupt == "level":
+            return word | (0x8000 if self.signals & self.mask else 0)
+        return word | (0x8000 if 15 in self.signals else 0)
 
     def pwm_at(self, tick: int) -> int:
         if self.reset or self.alive_at is None:
             return 0
-        return int((tick - self.next_sample) % 2048 < 16 * self.magnitude)
+        place = (tick - self.next_sample) % 2048
+        if self.options.pulse_at == "end":
+            return int(place >= 2048 - 16 * self.magnitude)
+        return int(place < 16 * self.magnitude)
 
     # -------------------------------------------------------------------------------------- commands
 
     def command(self, tick: int, opcode: int, unfinished: bool) -> None:
-        if unfinished:
-            self.flag(1)
+        self.complain(unfinished and self.options.unfinished_flags)
         words: dict[int, Callable[[], Words]] = {
             0x1A: lambda: self.load_threshold(stop=True),
             0x1B: lambda: self.load_threshold(stop=False),
@@ -379,13 +371,16 @@ class NaiveLm629:
             next(self.words)
         elif opcode in HIGH_WORD_READS:
             length = 2 * HIGH_WORD_READS[opcode]
-            self.answer = (self.reading(opcode) % (1 << 8 * length)).to_bytes(length, "big")
+            self.answer = (self.reading(tick, opcode) % (1 << 8 * length)).to_bytes(length, "big")
+            self.answer = self.answer[self.phase :]  # B3: after half a word the other half
         elif opcode == 0x00:
             self.alive_at = math.ceil(Fraction(tick, 4)) * 4 + 4 * self.options.reset_clocks
             self.clear("soft")
         elif opcode == 0x01:
             self.start_motion()
         elif opcode == 0x02:
+            if self.options.home_shifts_buffer and not self.relative:
+                self.buffer["p"] = modular(self.buffer["p"] - self.real, 31)
             self.desired = self.home(self.desired)
             self.target = modular(self.target - self.real, 31)
             self.real = 0
@@ -395,20 +390,28 @@ class NaiveLm629:
         elif opcode == 0x04:
             self.update = dict(self.filter)
             self.signals.add(13)
-        elif opcode not in (0x05, 0x06):
-            self.flag(1)
+        elif opcode == 0x05:
+            self.signals.add(8)
+        elif opcode == 0x06:
+            self.signals -= {8} if self.options.port12_clears else set()
+        else:
+            self.complain(self.options.unknown_opcode_flags)
 
     def home(self, position: Fraction) -> Fraction:
         moved = position - self.real
         return moved + modular(math.floor(moved), 31) - math.floor(moved)
 
-    def reading(self, opcode: int) -> int:
-        limited_sum = between(-self.pid.il, math.floor(Fraction(self.pid.sum, 256)), self.pid.il)
+    def reading(self, tick: int, opcode: int) -> int:
+        limited_sum = between(-self.pid.il, self.pid.top(), self.pid.il)
+        real = self.real
+        if self.options.read_position == "live":
+            self.encoder.run_to(tick)
+            real = modular(real + self.encoder.counts, 31)
         return {
             0x07: self.speed,
             0x08: math.floor(self.desired),
             0x09: self.index_position,
-            0x0A: self.real,
+            0x0A: real,
             0x0B: self.velocity_counts,
             0x0C: self.signals_word(),
             0x0D: self.pid.integral if self.options.sum_reading == "term" else limited_sum,
@@ -416,17 +419,30 @@ class NaiveLm629:
 
     def start_motion(self) -> None:
         in_motion = not self.signals & {7, 10}
-        if 14 in self.signals and in_motion and not self.buffer["control"] & 0x0700:
+        stopping = self.buffer["control"] & 0x0700 and self.options.stop_lifts_refusal
+        if 14 in self.signals and in_motion and not stopping:
             self.flag(1)
             return
-        self.start = dict(self.buffer)
-        self.start_relative = self.relative
-        self.buffer["control"] &= 0x1800
-        self.newer_position = False
+        self.start = {}
+        if self.options.start_takes == "given":
+            self.take()
         self.signals.discard(14)
 
+    def take(self) -> None:
+        self.start = dict(self.buffer)
+        self.start_relative = self.relative
+        self.buffer["control"] &= 0x1F00 if self.options.stop_bits_stay else 0x1800
+        self.newer_position = False
+
+    def fitted(self, value: int, bits: int) -> int:
+        """A parameter without sign."""
+        if value < 1 << bits:
+            return value
+        self.complain(self.options.range_flags)
+        return (1 << bits) - 1 if self.options.out_of_range == "clamped" else value % (1 << bits)
+
     def load_threshold(self, stop: bool) -> Words:
-        self.threshold = (yield) & 0x7FFF
+        self.threshold = self.fitted((yield), 15)
         self.signals.discard(9)
         if stop:
             self.signals.add(9)
@@ -444,23 +460,35 @@ class NaiveLm629:
         self.filter["ds"] = control >> 8
         for bit, name in ((3, "kp"), (2, "ki"), (1, "kd"), (0, "il")):
             if control >> bit & 1:
-                self.filter[name] = (yield) & 0x7FFF
+                self.filter[name] = self.fitted((yield), 15)
 
     def load_trajectory(self) -> Words:
         control = yield
         self.buffer["control"] = control & 0x1F00
-        for bit, name, working in ((5, "a", self.a), (3, "v", self.limit), (1, "p", 0)):
+        if self.options.unsent == "working":
+            in_force = {0x20: ("a", self.a), 0x08: ("v", self.limit), 0x02: ("p", self.target)}
+            self.buffer |= dict(pair for bit, pair in in_force.items() if not control & bit)
+            self.relative = self.relative and bool(control & 0x02)
+        for bit, name in ((5, "a"), (3, "v"), (1, "p")):
             if not control >> bit & 1:
                 continue
             high = yield
             value = high << 16 | (yield)
             relative = bool(control >> bit - 1 & 1)
             if name == "p":
+                value = modular(value, 32)
+                if value != modular(value, 31):
+                    self.complain(self.options.range_flags)
+                    if self.options.out_of_range == "clamped" and not relative:
+                        value = between(-(2**30), value, 2**30 - 1)
                 self.buffer["p"] = modular(value, 31)
                 self.relative, self.newer_position = relative, True
-            else:
+            elif relative:
                 working = self.a if name == "a" else self.limit
-                self.buffer[name] = (value + (working if relative else 0)) % 2**30
+                base = working if self.options.relative_rates == "working" else self.buffer[name]
+                self.buffer[name] = (value + base) % 2**30
+            else:
+                self.buffer[name] = self.fitted(value, 30)
             if name == "a":
                 self.signals.add(14)
 

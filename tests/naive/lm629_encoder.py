@@ -12,7 +12,8 @@ class NaiveEncoder:
     `hurry`, clocks at which all three inputs have rested for long are passed over.
     """
 
-    def __init__(self, filter_clocks: int, hurry: bool = False) -> None:
+    def __init__(self, filter_clocks: int, double_step: int = 0, hurry: bool = False) -> None:
+        self.double_step = double_step
         self.hurry = hurry
         self.filter_clocks = filter_clocks
         self.phases: list[tuple[int, tuple[int, int]]] = []
@@ -47,7 +48,7 @@ class NaiveEncoder:
     def accept(self, phases: tuple[int, int], index: int) -> None:
         before = FORWARD.index(self.accepted or (0, 0))
         step = (FORWARD.index(phases) - before) % 4
-        self.counts += {0: 0, 1: 1, 2: 0, 3: -1}[step]
+        self.counts += {0: 0, 1: 1, 2: self.double_step, 3: -1}[step]
         if self.accepted is not None:
             self.accepted = phases
         self.accepted_index = index

@@ -14,9 +14,26 @@ ACCELERATION, VELOCITY, POSITION = 0x0020, 0x0008, 0x0002
 MASK_30 = 0x3FFFFFFF
 
 
+COMPLETED, OUT_OF_RANGE = 1, 2
+"""What a word led to: an acceleration is complete; its parameter was out of range."""
+
+
+def clamped(value: int, low: int, high: int) -> int:
+    return max(low, min(value, high))
+
+
+def signed_32(value: int) -> int:
+    return ((value + 0x80000000) & 0xFFFFFFFF) - 0x80000000
+
+
 def signed_31(value: int) -> int:
     """Sign-extended from bit 30: the chip's position space."""
     return ((value + 0x40000000) & 0x7FFFFFFF) - 0x40000000
+
+
+def fit_15(word: int, clamp: bool) -> int:
+    """A coefficient or a threshold: 15 bits."""
+    return clamped(word, 0, 0x7FFF) if clamp else word & 0x7FFF
 
 
 class TrajectoryBuffer:
@@ -49,19 +66,33 @@ class TrajectoryBuffer:
         self.half = -1
         return 2 * self.due.bit_count()
 
-    def word(self, word: int, acceleration: int, velocity: int) -> bool:
-        """The next parameter word; the working values are what relative ones add to.
+    def refresh(self, acceleration: int, velocity: int, target: int) -> None:
+        """Parameters that the control word does not announce become these."""
+        if not self.due & ACCELERATION:
+            self.acceleration = acceleration
+        if not self.due & VELOCITY:
+            self.velocity = velocity
+        if not self.due & POSITION:
+            self.position = target
+            self.relative = False
 
-        Returns True when this completed an acceleration.
-        """
+    def word(self, word: int, acceleration: int, velocity: int, clamp: bool = False) -> int:
+        """The next parameter word; relative ones add to the values given. Returns COMPLETED and OUT_OF_RANGE bits."""
         if self.half < 0:
             self.half = word
-            return False
+            return 0
         value = self.half << 16 | word
         self.half = -1
         bit = next(bit for bit in (ACCELERATION, VELOCITY, POSITION) if self.due & bit)
         self.due &= ~bit
         relative = bool(self.relative_bits & bit >> 1)
+        if bit == POSITION:
+            fits = signed_31(value) == signed_32(value)
+            if clamp and not fits and not relative:
+                value = clamped(signed_32(value), -0x40000000, 0x3FFFFFFF)
+        else:
+            fits = relative or value <= MASK_30
+            value = MASK_30 if clamp and not fits else value
         if bit == ACCELERATION:
             self.acceleration = (value + (acceleration if relative else 0)) & MASK_30
         elif bit == VELOCITY:
@@ -70,17 +101,23 @@ class TrajectoryBuffer:
             self.position = signed_31(value)
             self.relative = relative
             self.newer_position = True
-        return bit == ACCELERATION
+        return (COMPLETED if bit == ACCELERATION else 0) | (0 if fits else OUT_OF_RANGE)
 
     def abandon(self) -> None:
         """Another command came first: a parameter that is not complete is dropped."""
         self.due = 0
         self.half = -1
 
-    def take(self) -> None:
+    def shift(self, real_position: int) -> None:
+        """DFH moves the axis under a target that is loaded."""
+        if not self.relative:
+            self.position = signed_31(self.position - real_position)
+
+    def take(self, keep_stops: bool = False) -> None:
         """STT was accepted: it will act on the registers as they are now; stop bits serve once."""
         self.taken = (self.control, self.acceleration, self.velocity, self.position, self.relative)
-        self.control &= ~STOPS
+        if not keep_stops:
+            self.control &= ~STOPS
         self.newer_position = False
 
     def resolve(self, base: int) -> int:
@@ -123,9 +160,9 @@ class FilterBuffer:
         self.due = control & 0x000F
         return self.due.bit_count()
 
-    def word(self, word: int) -> None:
-        """The next coefficient, 15 bits, in the order kp, ki, kd, il."""
-        value = word & 0x7FFF
+    def word(self, word: int, clamp: bool = False) -> int:
+        """The next coefficient, 15 bits, in the order kp, ki, kd, il. Returns 0 or OUT_OF_RANGE."""
+        value = fit_15(word, clamp)
         bit = 1 << self.due.bit_length() - 1
         self.due &= ~bit
         if bit == 8:
@@ -136,6 +173,7 @@ class FilterBuffer:
             self.kd = value
         else:
             self.il = value
+        return OUT_OF_RANGE if word > 0x7FFF else 0
 
     def abandon(self) -> None:
         """Another command came first."""

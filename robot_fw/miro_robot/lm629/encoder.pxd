@@ -20,10 +20,11 @@ cdef class InputFilter:
 @cython.final
 cdef class Encoder:
     cdef readonly InputFilter quadrature, index
+    cdef readonly int double_step
     cdef public int seen, armed, caught
     cdef public long long counts, caught_counts
 
-    cpdef void clear(self) noexcept
+    cpdef void clear(self, int disarm=*) noexcept
     @cython.locals(clock=cython.longlong, place=cython.int)
     cpdef void set_phases(self, long long tick, int a, int b) noexcept
     cpdef void set_index(self, long long tick, int level) noexcept

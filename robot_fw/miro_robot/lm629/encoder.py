@@ -82,16 +82,21 @@ class Encoder:
     Quadrature states are held as their place in the forward order: (A,B) = 00, 10, 11, 01 -> 0, 1, 2, 3.
     """
 
-    def __init__(self, filter_clocks: int) -> None:
+    NOT_STATE = ("double_step",)
+
+    def __init__(self, filter_clocks: int, double_step: int = 0) -> None:
+        self.double_step = double_step
         self.quadrature = InputFilter(filter_clocks, 0)
         self.index = InputFilter(filter_clocks, 1)
         self.seen = 0
+        self.armed = 0
         self.clear()
 
-    def clear(self) -> None:
-        """Forget counts and captures (reset); the inputs go on being watched."""
+    def clear(self, disarm: int = 1) -> None:
+        """Forget counts and captures (reset); the inputs go on being watched, for an index too if not `disarm`."""
         self.counts = 0
-        self.armed = 0
+        if disarm:
+            self.armed = 0
         self.caught = 0
         self.caught_counts = 0
 
@@ -144,6 +149,8 @@ class Encoder:
             self.counts += 1
         elif step == 3:
             self.counts -= 1
+        elif step == 2:
+            self.counts += self.double_step
 
     def _watch(self) -> None:
         if self.quadrature.level == 0 and self.index.level == 0:

@@ -9,6 +9,7 @@ cdef int _IGNORED, _ACCEPTED, _REFUSED
 @cython.final
 cdef class HostPort:
     cdef readonly long long busy_ticks
+    cdef readonly int judged_at_end, reset_status, keeps_phase, undue_flags, status_flags
     cdef public int ps, data, writing, reading, fate, drive
     cdef public long long busy_until
     cdef public long long writes_while_busy

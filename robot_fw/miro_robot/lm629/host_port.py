@@ -8,6 +8,8 @@ wins.
 
 from __future__ import annotations
 
+from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
+
 NOTHING, COMMAND, WORD, ANSWERED, MISUSE = 0, 1, 2, 3, 4
 """What a change of the pins led to: nothing yet; a
 command byte; a data word from the host (`word`); the host has read the last word of an answer; the host
@@ -30,10 +32,15 @@ class HostPort:
     reset.
     """
 
-    NOT_STATE = ("busy_ticks",)
+    NOT_STATE = ("busy_ticks", "judged_at_end", "reset_status", "keeps_phase", "undue_flags", "status_flags")
 
-    def __init__(self, busy_ticks: int) -> None:
+    def __init__(self, busy_ticks: int, options: Lm629Options = DEFAULT_OPTIONS) -> None:
         self.busy_ticks = busy_ticks
+        self.judged_at_end = 1 if options.busy_judged == "end" else 0
+        self.reset_status = 1 if options.software_reset_busy else 0
+        self.keeps_phase = 0 if options.command_resets_phase else 1
+        self.undue_flags = 1 if options.undue_data_flags else 0
+        self.status_flags = 1 if options.status_read_flags else 0
         self.ps = 1
         self.data = 0xFF
         self.writing = 0
@@ -64,7 +71,7 @@ class HostPort:
     def status(self, tick: int, flags: int) -> int:
         """The status byte, given the flags of bits 7..1."""
         if self.lock != _OPEN:
-            return 1 if self.lock == _SOFTWARE_RESET else 0
+            return self.reset_status if self.lock == _SOFTWARE_RESET else 0
         return flags | 1 if tick < self.busy_until else flags
 
     def pins(self, tick: int, cs: int, rd: int, wr: int, ps: int, data: int, flags: int) -> int:
@@ -89,7 +96,7 @@ class HostPort:
 
     def _write_begins(self, tick: int) -> None:
         self.fate = _ACCEPTED
-        if self.is_busy(tick):
+        if self.lock != _OPEN or (self.is_busy(tick) and not self.judged_at_end):
             self.fate = _IGNORED
             self.writes_while_busy += 1
 
@@ -97,35 +104,41 @@ class HostPort:
         self.fate = _IGNORED
         if self.ps == 0:
             self.drive = self.status(tick, flags)
+            if self.status_flags and self.words_left > 0 and self.incoming and not self.is_busy(tick):
+                self.fate = _REFUSED
         elif self.is_busy(tick):
             self.drive = self.buffer
         elif self.words_left > 0 and not self.incoming:
             self.fate = _ACCEPTED
             self.drive = self.answer >> (16 * self.words_left - 8 * self.low_next - 8) & 0xFF
         else:
-            self.fate = _REFUSED
             self.drive = self.buffer
+            if self.undue_flags or self.words_left > 0:
+                self.fate = _REFUSED
 
     def _write_ends(self, tick: int) -> int:
         if self.fate == _IGNORED:
+            return _NOTHING
+        if self.judged_at_end and self.is_busy(tick):
+            self.writes_while_busy += 1
             return _NOTHING
         if self.ps == 0:
             self.abandoned = 1 if self.words_left > 0 else 0
             self.command = self.data
             self.words_left = 0
-            self.low_next = 0
+            self.low_next = self.low_next if self.keeps_phase else 0
             self.record = bytearray()
             self.busy_until = tick + self.busy_ticks
             return _COMMAND
         if self.words_left == 0 or not self.incoming:
-            return _MISUSE
+            return _MISUSE if self.undue_flags or self.words_left > 0 else _NOTHING
         self.buffer = self.data
         self.record.append(self.data)
         if not self.low_next:
             self.word = self.data << 8
             self.low_next = 1
             return _NOTHING
-        self.word |= self.data
+        self.word = self.word & 0xFF00 | self.data
         self._word_is_over(tick)
         return _WORD
 

@@ -7,7 +7,7 @@ cdef long long _bottom(long long value) noexcept
 
 @cython.final
 cdef class Pid:
-    cdef readonly int saturates
+    cdef readonly int saturates, rounds_down
     cdef public long long kp, ki, kd, il, ds
     cdef public long long error_sum, previous, derivative, integral, phase
 
@@ -16,5 +16,6 @@ cdef class Pid:
     @cython.locals(e=cython.longlong)
     cpdef int step(self, long long position_error) noexcept
     cpdef int top_of_sum(self) noexcept
+    cdef long long _top(self) noexcept
     cdef long long _narrow(self, long long value) noexcept
     cdef long long _limited(self, long long value) noexcept

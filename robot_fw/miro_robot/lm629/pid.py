@@ -24,10 +24,11 @@ def _bottom(value: int) -> int:
 class Pid:
     """u(n) = kp*e(n) + ki*sum(e) + kd*(e(n') - e(n'-1)), n' = every (ds+1)-th sample."""
 
-    NOT_STATE = ("saturates",)
+    NOT_STATE = ("saturates", "rounds_down")
 
-    def __init__(self, saturates: bool = True) -> None:
+    def __init__(self, saturates: bool = True, rounds_down: bool = True) -> None:
         self.saturates = 1 if saturates else 0
+        self.rounds_down = 1 if rounds_down else 0
         self.load(0, 0, 0, 0, 0)
         self.open_loop()
 
@@ -52,7 +53,7 @@ class Pid:
         """One sample of the closed loop. `position_error` in counts, any width; returns -32768..32767."""
         e = _saturated(position_error)
         self.error_sum = max(-0x800000, min(self.error_sum + e, 0x7FFFFF))
-        self.integral = self._limited(self._narrow(self.ki * (self.error_sum >> 8)))
+        self.integral = self._limited(self._narrow(self.ki * self._top()))
         if self.phase == 0:
             self.derivative = self._narrow(self.kd * _saturated(e - self.previous))
             self.previous = e
@@ -61,7 +62,12 @@ class Pid:
 
     def top_of_sum(self) -> int:
         """The top 16 bits of the 24-bit error sum, limited like the integral term."""
-        return self._limited(self.error_sum >> 8)
+        return self._limited(self._top())
+
+    def _top(self) -> int:
+        if self.error_sum < 0 and not self.rounds_down:
+            return -(-self.error_sum >> 8)
+        return self.error_sum >> 8
 
     def _narrow(self, value: int) -> int:
         return _saturated(value) if self.saturates else _bottom(value)

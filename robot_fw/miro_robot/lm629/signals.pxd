@@ -6,12 +6,14 @@ cdef int _INTERRUPTS
 
 @cython.final
 cdef class Signals:
+    cdef readonly int level, reset_raises
     cdef public int word, mask
 
-    cpdef void during_reset(self) noexcept
+    cpdef void during_reset(self, int kept) noexcept
     cpdef void after_reset(self) noexcept
     cpdef void raise_flags(self, int flags) noexcept
     cpdef void reset_interrupts(self, int keep) noexcept
     cpdef void mask_interrupts(self, int mask) noexcept
+    cdef void _follow(self) noexcept
     cpdef void set_bits(self, int bits) noexcept
     cpdef void clear_bits(self, int bits) noexcept

@@ -6,6 +6,8 @@ decided in `chip.py`.
 
 from __future__ import annotations
 
+from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
+
 INTERRUPT = 0x8000
 ACCELERATION_LOADED = 0x4000
 UPDATE_PENDING = 0x2000
@@ -29,33 +31,52 @@ _INTERRUPTS = 0x7E
 class Signals:
     """`word`: the 16 bits as RDSIGS answers them. `mask`: 1 = the flag of that bit may raise HI."""
 
-    def __init__(self) -> None:
+    NOT_STATE = ("level", "reset_raises")
+
+    def __init__(self, options: Lm629Options = DEFAULT_OPTIONS) -> None:
+        self.level = 1 if options.interrupt == "level" else 0
+        self.reset_raises = 1 if options.reset_interrupts else 0
         self.word = 0
         self.mask = 0
 
-    def during_reset(self) -> None:
-        self.word = 0
+    def during_reset(self, kept: int) -> None:
+        """Nothing but the bits of `kept` survives."""
+        self.word = kept
         self.mask = 0
 
     def after_reset(self) -> None:
         """All but the breakpoint may interrupt. Motor off counts as a trajectory that is complete."""
         self.mask = 0x3E
-        self.word = 0x0180
-        self.raise_flags(0x04)
+        self.word |= 0x0180
+        if self.reset_raises:
+            self.raise_flags(0x04)
+        else:
+            self.word |= 0x04
+            self._follow()
 
     def raise_flags(self, flags: int) -> None:
         """Set flags of bits 6..1. HI follows where one was 0 and is not masked."""
         if flags & ~self.word & self.mask:
             self.word |= 0x8000
         self.word |= flags
+        self._follow()
 
     def reset_interrupts(self, keep: int) -> None:
         """RSTI: flags whose bit in `keep` is 0 are reset, and so is HI, whatever flags remain."""
         self.word &= keep & _INTERRUPTS | ~(_INTERRUPTS | 0x8000)
+        self._follow()
 
     def mask_interrupts(self, mask: int) -> None:
         """MSKI."""
         self.mask = mask & _INTERRUPTS
+        self._follow()
+
+    def _follow(self) -> None:
+        """HI as a level, where it is one."""
+        if self.level:
+            self.word &= 0x7FFF
+            if self.word & self.mask:
+                self.word |= 0x8000
 
     def set_bits(self, bits: int) -> None:
         self.word |= bits

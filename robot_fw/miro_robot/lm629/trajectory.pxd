@@ -13,13 +13,14 @@ cdef long long _stopping_distance(long long speed, long long acceleration) noexc
 
 @cython.final
 cdef class Trajectory:
+    cdef readonly int keeps_fraction
     cdef public long long position, velocity, acceleration, max_velocity, target
     cdef public int velocity_mode, forward, stopping, moving, crossed
 
     cpdef void reset(self) noexcept
     cpdef void start(self) noexcept
     cpdef void stop_smoothly(self) noexcept
-    cpdef void stop_abruptly(self, long long real_position) noexcept
+    cpdef void stop_abruptly(self, long long place) noexcept
     cpdef void follow(self, long long real_position) noexcept
     cpdef void define_home(self, long long real_position) noexcept
     cpdef int step(self) noexcept

@@ -33,7 +33,10 @@ class Trajectory:
     `moving` is 1 while the profile has not finished. `crossed` is 1 when the last step left the 31-bit space.
     """
 
-    def __init__(self) -> None:
+    NOT_STATE = ("keeps_fraction",)
+
+    def __init__(self, keeps_fraction: bool = False) -> None:
+        self.keeps_fraction = 1 if keeps_fraction else 0
         self.reset()
 
     def reset(self) -> None:
@@ -57,10 +60,10 @@ class Trajectory:
         self.moving = 1
         self.stopping = 1
 
-    def stop_abruptly(self, real_position: int) -> None:
-        """The target becomes the real position, and is reached."""
-        self.follow(real_position)
-        self.target = real_position
+    def stop_abruptly(self, place: int) -> None:
+        """The target becomes `place`, and is reached."""
+        self.follow(place)
+        self.target = place
 
     def follow(self, real_position: int) -> None:
         """Stand at the real position (motor off)."""
@@ -89,7 +92,11 @@ class Trajectory:
         if self.velocity != 0:
             return 0
         self.target = self.position >> 16
-        self._arrive()
+        if self.keeps_fraction:
+            self.moving = 0
+            self.stopping = 0
+        else:
+            self._arrive()
         return 1
 
     def _approach(self, goal: int) -> None:

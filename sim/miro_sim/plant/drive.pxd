@@ -24,3 +24,4 @@ cdef class DifferentialDrive(Plant):
     cdef void _step(self, int ticks)
     @cython.locals(left_tick=cython.longlong, right_tick=cython.longlong)
     cdef void _report(self)
+    cdef void _show_index(self, Lm629 chip, Quadrature encoder, long long tick)

@@ -41,8 +41,9 @@ class DifferentialDrive(Plant):
         self.next_tick = LONGEST_STEP
         self.left_winding = Winding(params)
         self.right_winding = Winding(params)
-        self.left_encoder = Quadrature(params.counts_per_radian())
-        self.right_encoder = Quadrature(params.counts_per_radian())
+        counts = 4 * params.encoder.lines if params.encoder.index_pulse else 0
+        self.left_encoder = Quadrature(params.counts_per_radian(), counts)
+        self.right_encoder = Quadrature(params.counts_per_radian(), counts)
         self.body = Body(params, x_m, y_m, theta_rad)
 
     def attach(self, left: Lm629, right: Lm629) -> None:
@@ -51,6 +52,8 @@ class DifferentialDrive(Plant):
         self.right = right
         left.set_encoder(self.tick, self.left_encoder.a(), self.left_encoder.b())
         right.set_encoder(self.tick, self.right_encoder.a(), self.right_encoder.b())
+        self._show_index(left, self.left_encoder, self.tick)
+        self._show_index(right, self.right_encoder, self.tick)
 
     def advance(self, tick: int) -> None:
         """Integrates to `tick` (a tick that is past already: nothing)."""
@@ -80,10 +83,17 @@ class DifferentialDrive(Plant):
                 self.left_encoder.show()
                 if self.left is not None:
                     self.left.set_encoder(left_tick, self.left_encoder.a(), self.left_encoder.b())
+                    self._show_index(self.left, self.left_encoder, left_tick)
             else:
                 self.right_encoder.show()
                 if self.right is not None:
                     self.right.set_encoder(right_tick, self.right_encoder.a(), self.right_encoder.b())
+                    self._show_index(self.right, self.right_encoder, right_tick)
+
+    def _show_index(self, chip: Lm629, encoder: Quadrature, tick: int) -> None:
+        """The index channel changes with A and B."""
+        if encoder.counts_per_turn:
+            chip.set_index(tick, encoder.index())
 
     def set_bridge(self, tick: int, side: int, enable: int, forward: int) -> None:
         """L298 inputs of one side (0 left, 1 right) from `tick` on: enable pin; 1 forward, 0 backward."""

@@ -6,6 +6,7 @@ cdef long long _FAR
 @cython.final
 cdef class Quadrature:
     cdef readonly double counts_per_radian
+    cdef readonly long long counts_per_turn
     cdef readonly double position
     cdef readonly long long count, edge_tick
     cdef double _start, _ticks_per_count
@@ -18,3 +19,4 @@ cdef class Quadrature:
     cdef void _aim(self) noexcept
     cpdef int a(self) noexcept
     cpdef int b(self) noexcept
+    cpdef int index(self) noexcept

@@ -1,7 +1,7 @@
 """A two-channel incremental encoder on a motor shaft: angle in, edges with their ticks out.
 
 What belongs here: angle -> count -> levels of A and B, and the tick of each edge inside a step. What does
-not: the LM629's filter and counter, the index pulse (the board has none).
+not: the LM629's filter and counter.
 
 Count n stands for positions n <= p < n + 1 (in quarter lines). Forward A leads B: (A, B) goes 00, 10, 11, 01.
 Inside a step the shaft turns evenly; an edge falls on the first integer tick at which p has the new count.
@@ -19,6 +19,7 @@ class Quadrature:
 
     NOT_STATE = (
         "counts_per_radian",
+        "counts_per_turn",
         "edge_tick",
         "_start",
         "_start_tick",
@@ -27,8 +28,9 @@ class Quadrature:
         "_last",
     )
 
-    def __init__(self, counts_per_radian: float) -> None:
+    def __init__(self, counts_per_radian: float, counts_per_turn: int = 0) -> None:
         self.counts_per_radian = counts_per_radian
+        self.counts_per_turn = counts_per_turn  # 0: there is no index channel
         self.position = 0.5  # the rotor stands in the middle of a quarter line
         self.count = 0
         self.edge_tick = _FAR  # of the next edge of the step being reported
@@ -86,6 +88,10 @@ class Quadrature:
     def b(self) -> int:
         """Level of channel B."""
         return (self.count >> 1) & 1
+
+    def index(self) -> int:
+        """Level of the index channel: low for one count a turn; high for good without one."""
+        return 1 if self.counts_per_turn == 0 or self.count % self.counts_per_turn else 0
 
     def snapshot(self) -> dict[str, object]:
         """All mutable state (between steps: no edge is waiting)."""

@@ -24,7 +24,7 @@ class _Positive(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     def __post_init__(self) -> None:
         for name in self.__struct_fields__:
             value = getattr(self, name)
-            if isinstance(value, msgspec.Struct):
+            if isinstance(value, msgspec.Struct | bool):
                 continue
             zero_is_fine = name in MAY_BE_ZERO
             limit = ("0 or above" if zero_is_fine else "above 0") + " and below 1e12"
@@ -72,9 +72,13 @@ class Chassis(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 
 class Encoder(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Optical encoder on the motor shaft; the LM629 counts every state change, 4 per line."""
+    """Optical encoder on the motor shaft; the LM629 counts every state change, 4 per line.
+
+    With `index_pulse` it has a third channel, low for the one count in a turn that begins it (A = B = 0 there).
+    """
 
     lines: int = 512
+    index_pulse: bool = False
 
 
 class DriveParams(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -1,13 +1,17 @@
-"""Random sessions at the pins: the chip and its slow twin agree after every step."""
+"""Random sessions at the pins: the chip and its slow twin agree after every step, however the rules are read.
+
+`python -m tests.robot.lm629.test_against_naive 3000` plays as many sessions.
+"""
 
 from __future__ import annotations
 
+import sys
 from fractions import Fraction
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from miro_robot.lm629.commands import COMMANDS
-from miro_robot.lm629.options import Lm629Options
+from miro_robot.lm629.options import CHOICES, DEFAULT_OPTIONS, Lm629Options
 
 from tests.robot.lm629.bench import Bench
 from tests.robot.lm629.pair import Pair
@@ -51,6 +55,11 @@ HOST_ACTIONS = st.one_of(
     ),
     st.tuples(st.just("write"), st.integers(0, 1), st.integers(0, 0x22) | st.integers(0, 255)),
     st.tuples(st.just("read"), st.integers(0, 1)),
+    st.tuples(st.just("slow_write"), st.integers(0, 1), st.integers(0, 0x22), st.integers(0, 900)),
+    st.tuples(
+        st.just("glitches"), st.lists(st.tuples(*[st.integers(0, 1)] * 4, st.integers(0, 0x22)), max_size=6)
+    ),
+    st.tuples(st.just("hurry"), st.sampled_from(NO_WORDS), st.integers(0, 0x22)),
     st.just(("command", "RESET")),
 )
 WORLD_ACTIONS = st.one_of(
@@ -77,18 +86,22 @@ MOVES = st.one_of(
 )
 ACTIONS = st.one_of(MOVES, MOVES, HOST_ACTIONS, WORLD_ACTIONS)
 POLITE = (
-    *("load", "go", "go_twice", "filter", "retune", "command", "ask"),
+    *("load", "go", "go_twice", "filter", "retune", "command", "ask", "hurry"),
     *("sample", "find_index", "cross", "pass_breakpoint"),
 )
+LENGTHS = {
+    "busy_clocks": [160, 160, 0, 33],
+    "reset_clocks": [6144, 50],
+    "reset_pulse_clocks": [8],
+    "filter_clocks": [8, 8, 1, 0],
+}
 OPTIONS = st.builds(
     Lm629Options,
-    busy_clocks=st.sampled_from([160, 160, 0, 33]),
-    reset_clocks=st.sampled_from([6144, 50]),
-    filter_clocks=st.sampled_from([8, 8, 1, 0]),
-    pid_saturates=st.booleans(),
-    sum_reading=st.sampled_from(["term", "sum"]),
-    relative_base=st.sampled_from(["target", "desired", "real"]),
+    **{name: st.sampled_from(values) for name, values in LENGTHS.items()},
+    **{name: st.sampled_from(values) for name, values in CHOICES.items()},
 )
+SESSIONS = int(sys.argv[1]) if __name__ == "__main__" else 250
+OPTIONS = st.just(DEFAULT_OPTIONS) | OPTIONS
 
 
 class Session(Bench):
@@ -118,6 +131,26 @@ class Session(Bench):
         self.turn(-turns)
         self.sample()
         self.index(1)
+
+    def slow_write(self, ps: int, byte: int, ticks: int) -> None:
+        """A strobe during which the chip may become free."""
+        self.drive(ps=ps, data=byte, cs=0)
+        self.drive(wr=0)
+        self.wait(ticks)
+        self.drive(wr=1)
+        self.drive(cs=1)
+
+    def glitches(self, levels: list[tuple[int, ...]]) -> None:
+        """Pins as they come; then the bus rests."""
+        for cs, rd, wr, ps, data in levels:
+            self.drive(cs=cs, rd=rd, wr=wr, ps=ps, data=data)
+        self.drive(cs=1, rd=1, wr=1)
+
+    def hurry(self, name: str, byte: int) -> None:
+        """A command, and without a look at the busy bit a byte to each port."""
+        self.command(name)
+        self.write(1, byte)
+        self.write(0, byte)
 
     def go(self, load: tuple[int, ...], samples: int) -> None:
         self.load(*load[1:])
@@ -172,7 +205,7 @@ class Session(Bench):
         self.wait(30000)
 
 
-@settings(deadline=None, max_examples=250)
+@settings(deadline=None, max_examples=SESSIONS)
 @given(OPTIONS, st.integers(0, 5000), st.lists(ACTIONS, max_size=40))
 def test_random_sessions_agree_with_the_slow_twin_bit_for_bit(
     options: Lm629Options, start: int, actions: list[tuple[object, ...]]
@@ -186,3 +219,7 @@ def test_random_sessions_agree_with_the_slow_twin_bit_for_bit(
             continue  # these would wait for ever for a chip that is in reset
         getattr(session, str(name))(*arguments)
     pair.compare(session.tick)
+
+
+if __name__ == "__main__":
+    test_random_sessions_agree_with_the_slow_twin_bit_for_bit()

@@ -84,18 +84,17 @@ def test_every_field_is_in_the_snapshot_or_named_as_no_state():
         *(chip.encoder, chip.encoder.quadrature, chip.encoder.index),
     ]
     for part in parts:
-        name = type(part).__name__
-        layout = (FOLDER / f"{type(part).__module__.rpartition('.')[2]}.pxd").read_text()
-        body = re.split(rf"cdef class {name}:\n", layout)[1].split("\n\n\n")[0]
-        fields = {
-            field
-            for line in re.findall(
-                r"^    cdef (?:public|readonly) (?:long long|\w+) ([\w, ]+)$", body, re.MULTILINE
-            )
-            for field in line.split(", ")
-        }
+        fields = set().union(*(fields_of(cls) for cls in type(part).__mro__[:-1]))
         assert fields
-        assert fields == set(part.snapshot()) | set(getattr(part, "NOT_STATE", ())), name
+        assert fields == set(part.snapshot()) | set(getattr(part, "NOT_STATE", ())), type(part).__name__
+
+
+def fields_of(cls: type) -> set[str]:
+    """The data fields that the `.pxd` of a class declares."""
+    layout = (FOLDER / f"{cls.__module__.rpartition('.')[2]}.pxd").read_text()
+    body = re.split(rf"cdef class {cls.__name__}(?:\(\w+\))?:\n", layout)[1].split("\n\n\n")[0]
+    lines = re.findall(r"^    cdef (?:public|readonly) (?:long long|\w+) ([\w, ]+)$", body, re.MULTILINE)
+    return {field for line in lines for field in line.split(", ")}
 
 
 def test_a_repr_tells_where_the_axis_is():

@@ -1,5 +1,6 @@
 """The whole drive: figures of the data sheets, tiny Euler steps, energy, determinism."""
 
+import itertools
 import math
 import subprocess
 import sys
@@ -11,9 +12,10 @@ from hypothesis import strategies as st
 from miro_robot.lm629.chip import Lm629
 from miro_sim.plant.circuit import Winding
 from miro_sim.plant.drive import DifferentialDrive
-from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Motor
+from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Encoder, Motor
 
 from tests.naive.plant import NaiveDrive
+from tests.robot.lm629.bench import Bench
 from tests.sim.plant.runs import pwm, trace
 
 PARAMS = DriveParams()
@@ -165,6 +167,48 @@ def test_both_chips_count_what_the_shafts_have_turned():
     assert drive.velocity_at(drive.tick) == (0.0, 0.0)
     assert left.encoder.counts == drive.left_encoder.count > 10_000
     assert right.encoder.counts == drive.right_encoder.count < -10_000
+
+
+class DrivenBench(Bench):
+    """A bench whose chip sees the left encoder of a drive, edge by edge in tick order."""
+
+    def __init__(self, params):
+        super().__init__()
+        self.plant = DifferentialDrive(params)
+        self.plant.attach(self.chip, Lm629())
+        self.plant.set_bridge(0, 0, 1, 1)
+        self.reset()
+
+    def wait(self, ticks):
+        end = self.tick + ticks
+        while self.chip.next_tick <= end:
+            self.plant.advance(self.chip.next_tick)
+            self.chip.advance(self.chip.next_tick)
+        self.plant.advance(end)
+        self.tick = end
+
+
+def test_two_indices_a_turn_of_the_motor_apart_are_caught_2048_counts_apart():
+    bench = DrivenBench(DriveParams(encoder=Encoder(index_pulse=True)))
+    origin = bench.chip.real_position - bench.plant.left_encoder.count
+    captured = []
+    while len(captured) < 4:
+        bench.command("RSTI", 0)
+        bench.command("SIP")
+        while not bench.chip.status & 0x08:
+            bench.wait(8192)
+        captured.append(bench.ask("RDIP"))
+    steps = [later - before for before, later in itertools.pairwise(captured)]
+    assert all(step > 0 and step % 2048 == 0 for step in steps), steps
+    assert abs((captured[0] - origin) % 2048 - 2048) < 64 or abs((captured[0] - origin) % 2048) < 64
+
+
+def test_without_an_index_channel_nothing_is_ever_caught():
+    bench = DrivenBench(PARAMS)
+    bench.command("SIP")
+    bench.wait(SECOND // 10)
+    assert bench.chip.real_position > 3 * 2048
+    assert bench.signals() & 0x0009 == 0x0001
 
 
 def test_looking_changes_nothing_and_a_past_tick_is_no_step():
