@@ -127,7 +127,7 @@ class HostPort:
             self.command = self.data
             self.words_left = 0
             self.low_next = self.low_next if self.keeps_phase else 0
-            self.record = bytearray()
+            self.record = bytearray([self.word >> 8]) if self.low_next else bytearray()
             self.busy_until = tick + self.busy_ticks
             return _COMMAND
         if self.words_left == 0 or not self.incoming:

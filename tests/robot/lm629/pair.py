@@ -20,6 +20,7 @@ class Pair:
 
     def compare(self, tick: int) -> None:
         chip, naive = self.chip, self.naive
+        loaded, gains = chip.trajectory_buffer, chip.filter_buffer
         ours = {
             "status": chip.status_at(tick),
             "signals": chip.signals.word,
@@ -32,6 +33,10 @@ class Pair:
             "real": (chip.real_position, chip.real_velocity, chip.index_position),
             "desired": (chip.trajectory.position, chip.desired_velocity),
             "integral": chip.pid.integral,
+            "target": chip.trajectory.target,
+            "settings": (chip.threshold, chip.signals.mask),
+            "trajectory": (loaded.acceleration, loaded.velocity, loaded.position, loaded.relative),
+            "filter": (gains.kp, gains.ki, gains.kd, gains.il, gains.ds),
         }
         theirs = {
             "status": naive.status_at(tick),
@@ -45,6 +50,10 @@ class Pair:
             "real": (naive.real, naive.velocity_counts, naive.index_position),
             "desired": (naive.desired * 65536, naive.speed),
             "integral": naive.pid.integral,
+            "target": naive.target,
+            "settings": (naive.threshold, sum(1 << bit for bit in naive.mask)),
+            "trajectory": (naive.buffer["a"], naive.buffer["v"], naive.buffer["p"], naive.relative),
+            "filter": tuple(naive.filter[name] for name in ("kp", "ki", "kd", "il", "ds")),
         }
         assert ours == theirs, f"at tick {tick}"
 

@@ -30,6 +30,7 @@ CONTROLS = st.sampled_from(
     lambda a, b: a & 0xF83F | b, st.integers(0, 0xFFFF), st.sampled_from([0, 0x100, 0x200, 0x400, 0x700])
 )
 COEFFICIENTS = st.integers(0, 300) | st.integers(0, 0xFFFF)
+WORDY = ["LPEI", "MSKI", "RSTI", "LFIL", "SBPA", "LTRJ"]
 FLAGS = st.sampled_from([0, 0x7E, 0x3E, 0xFFFF]) | st.integers(0, 0xFFFF)
 
 
@@ -60,6 +61,14 @@ HOST_ACTIONS = st.one_of(
         st.just("glitches"), st.lists(st.tuples(*[st.integers(0, 1)] * 4, st.integers(0, 0x22)), max_size=6)
     ),
     st.tuples(st.just("hurry"), st.sampled_from(NO_WORDS), st.integers(0, 0x22)),
+    st.builds(
+        lambda first, second, data: ("half_a_word", first, second, *data),
+        st.sampled_from(WORDY),
+        st.sampled_from([*WORDY, "RDRP", "RDSIGS"]),
+        st.tuples(*[st.integers(0, 255)] * 3),
+    ),
+    st.tuples(st.just("excess"), st.integers(0, 20)),
+    st.just(("index_over_reset",)),
     st.just(("command", "RESET")),
 )
 WORLD_ACTIONS = st.one_of(
@@ -71,6 +80,11 @@ WORLD_ACTIONS = st.one_of(
     st.tuples(st.just("jump"), POSITIONS),
     st.tuples(st.just("cross"), st.sampled_from([-(2**30), 2**30 - 1]), st.integers(-30, 30)),
     st.tuples(st.just("pass_breakpoint"), st.integers(-20, 20), st.integers(-30, 30)),
+    st.tuples(st.just("home_loaded"), st.integers(1, 9), POSITIONS),
+    st.tuples(st.just("ask_between_samples"), st.integers(1, 9)),
+    st.tuples(
+        st.just("stress"), st.integers(-200_000, 200_000), COEFFICIENTS, COEFFICIENTS, st.integers(1, 500)
+    ),
     st.tuples(st.just("wind_up"), st.integers(-(2**23), 2**23 - 1)),
     st.tuples(st.just("pulse"), st.sampled_from([28, 32, 50])),
 )
@@ -80,6 +94,8 @@ MOVES = st.one_of(
     trajectories(),
     st.tuples(st.just("filter"), COEFFICIENTS, COEFFICIENTS, COEFFICIENTS, COEFFICIENTS, st.integers(0, 4)),
     st.tuples(st.just("go_twice"), trajectories(), trajectories()),
+    st.tuples(st.just("stops"), st.integers(-200, 200), st.sampled_from([0x100, 0x200, 0x400])),
+    st.tuples(st.just("nudge"), st.integers(-300, 300), st.integers(1, 6)),
     st.tuples(st.just("retune"), COEFFICIENTS, st.integers(1, 4), st.integers(1, 6)),
     st.just(("command", "STT")),
     st.tuples(st.just("sample"), st.integers(1, 12)),
@@ -87,6 +103,16 @@ MOVES = st.one_of(
 ACTIONS = st.one_of(MOVES, MOVES, HOST_ACTIONS, WORLD_ACTIONS)
 POLITE = (
     *("load", "go", "go_twice", "filter", "retune", "command", "ask", "hurry"),
+    *(
+        "home_loaded",
+        "ask_between_samples",
+        "stress",
+        "stops",
+        "half_a_word",
+        "excess",
+        "index_over_reset",
+        "nudge",
+    ),
     *("sample", "find_index", "cross", "pass_breakpoint"),
 )
 LENGTHS = {
@@ -151,6 +177,71 @@ class Session(Bench):
         self.command(name)
         self.write(1, byte)
         self.write(0, byte)
+
+    def half_a_word(self, first: str, second: str, *data: int) -> None:
+        """A command that comes between the two bytes of another one's word."""
+        self.command(first)
+        self.ready()
+        self.write(1, data[0])
+        self.command(second)
+        for byte in data[1:]:
+            self.ready()
+            if second.startswith("RD"):
+                self.read(1)
+            else:
+                self.write(1, byte)
+
+    def excess(self, threshold: int) -> None:
+        """An error that outlasts a reset of its flag."""
+        self.command("LPEI", threshold)
+        self.go(("load", 0x002A, 0x10000, 0x40000, self.pair.chip.real_position + 100), 12)
+        for _ in range(2):
+            self.command("RSTI", 0)
+            self.sample(2)
+
+    def index_over_reset(self) -> None:
+        self.find_index(4)
+        self.command("SIP")
+        self.command("RESET")
+        self.wait(30_000)
+
+    def home_loaded(self, counts: int, position: int) -> None:
+        """DFH while a target is loaded and not started."""
+        self.sample()
+        self.turn(counts)
+        self.sample()
+        self.load(0x0002, position)
+        self.command("DFH")
+
+    def ask_between_samples(self, counts: int) -> None:
+        self.sample()
+        self.turn(counts)
+        self.ask("RDRP")
+
+    def stress(self, error: int, kp: int, ki: int, il: int) -> None:
+        """A large error in a closed loop, and what the integral term makes of it."""
+        self.filter(kp=kp, ki=ki, il=il)
+        self.load(0x0200)
+        self.command("STT")
+        self.sample(2)
+        self.pair.chip.trajectory.position += error * 65536
+        self.pair.naive.desired += error
+        self.sample(3)
+        self.ask("RDSUM")
+
+    def stops(self, error: int, word: int) -> None:
+        """A stop out of motion and drive, and another STT after it."""
+        self.stress(error, 100, 0, 0)
+        self.go(("load", 0x002A, 0x10000, 0x40000, self.pair.chip.real_position + error), 3)
+        self.go(("load", word), 12)
+        self.command("STT")
+        self.sample(2)
+
+    def nudge(self, counts: int, samples: int) -> None:
+        """A relative target in mid-motion."""
+        self.load(0x0003, counts)
+        self.command("STT")
+        self.sample(samples)
 
     def go(self, load: tuple[int, ...], samples: int) -> None:
         self.load(*load[1:])

@@ -142,7 +142,7 @@ CONDITIONS = (
 )
 
 
-@pytest.mark.parametrize(("bit", "provoke"), enumerate(CONDITIONS, start=1))
+@pytest.mark.parametrize(("bit", "provoke"), list(enumerate(CONDITIONS, start=1)))
 def test_each_of_the_six_conditions_interrupts_by_its_own_bit_of_the_mask(bit, provoke):
     for mask, hi in ((1 << bit, 1), (0x7E & ~(1 << bit), 0)):
         bench = Bench.running()

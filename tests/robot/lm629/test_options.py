@@ -48,6 +48,17 @@ def mask_after_one_byte(bench: Bench) -> int:
     return bench.chip.signals.mask
 
 
+def threshold_after_one_byte(bench: Bench) -> int:
+    """The same with LPEI, whose value is the whole word."""
+    bench.command("MSKI")
+    bench.ready()
+    bench.write(1, 0x12)
+    bench.command("LPEI")
+    bench.ready()
+    bench.write(1, 0x34)
+    return bench.chip.threshold
+
+
 def error_after(*steps: tuple[object, ...]) -> Callable[[Bench], int]:
     def run(bench: Bench) -> int:
         bench.ready()
@@ -319,6 +330,7 @@ READINGS: tuple[Reading, ...] = (
     ("busy_clocks", 33, busy_ticks, 640 - 24, 132 - 24),
     ("busy_judged", "end", lost_writes, 1, 0),
     ("command_resets_phase", False, mask_after_one_byte, 0x3E, 0x34),
+    ("command_resets_phase", False, threshold_after_one_byte, 0x7FFF, 0x1234),
     ("unknown_opcode_flags", False, error_after(("write", 0, 0x55)), ERROR, 0),
     ("undue_data_flags", False, error_after(("write", 1, 0x55)), ERROR, 0),
     ("undue_data_flags", False, error_after(("read", 1)), ERROR, 0),

@@ -39,6 +39,19 @@ def test_full_duty_reaches_the_speed_of_the_sheet(volts, sheet_m_s):
     assert speed == pytest.approx(sheet_m_s, rel=0.015)
 
 
+def test_the_first_push_is_that_of_the_stall_torque_less_friction():
+    """Once the current is up (45 uH / 3.44 ohm = 13 us) and before the motor turns to speak of."""
+    drive = DifferentialDrive(PARAMS)
+    pwm(drive, 128, 128, 1)
+    before = drive.velocity_at(drive.tick)[0]
+    pwm(drive, 128, 128, 1)
+    stall_nm = 6.92e-3 * (7.2 - 1.0) / (1.94 + 1.35 + 0.15)
+    roll = 0.020 / 8
+    mass = 0.5 + 2 * 2.7e-7 / roll**2
+    expected = 2 * (stall_nm - PARAMS.friction_nm()) / roll / mass
+    assert (drive.velocity_at(drive.tick)[0] - before) / (2048 / 24e6) == pytest.approx(expected, rel=0.01)
+
+
 def test_the_bare_motor_runs_at_its_catalogue_speed():
     ideal = DriveParams(
         battery=Battery(voltage_v=6.0, resistance_ohm=1e-9),
