@@ -94,7 +94,7 @@ class Peripherals:
                 if cycle > self.timer_wait:
                     self.timers.sync(cycle)
                     self.timer_wait = self.timers.quiet_until()
-                if not self.timer2.silent():
+                if not self.timer2.silent() or self.timer2.falls():
                     self.timer2.sync(cycle)
                 if 12 * cycle > self.serial_wait:
                     self.settle()
@@ -243,7 +243,7 @@ class Peripherals:
         if changed1 & 2:
             self.sync(cycle + 1)
             self.settle()
-            self.timer2.external((p1 >> 1) & 1, cycle + 1)
+            self.timer2.sample_external((p1 >> 1) & 1)
         self.timer_wait = -1
         self.clock_serial()
 

@@ -7,6 +7,7 @@ cdef long long _NONE
 cdef int _TIMER2
 cdef int _TF2, _EXF2, _RCLK, _TCLK, _EXEN2, _TR2, _C_T2, _CP_RL2
 cdef int _T2OE, _DCEN
+cdef int _FELL
 cdef int _STATES
 
 @cython.final
@@ -26,6 +27,7 @@ cdef class Timer2:
     cdef int generates_baud(self) noexcept
     cdef int silent(self) noexcept
     cdef int up_down(self) noexcept
+    cdef int down(self) noexcept
     cdef int rate(self) noexcept
     cdef int left(self) noexcept
     @cython.locals(captures=int)
@@ -42,7 +44,10 @@ cdef class Timer2:
     @cython.locals(waiting=int)
     cdef long long next_pin_overflow(self) noexcept
     cpdef void fall(self, long long cycle) noexcept
-    cpdef void external(self, int level, long long cycle) noexcept
+    cpdef void sample_external(self, int level) noexcept
+    cpdef int falls(self) noexcept
+    @cython.locals(acts=int)
+    cdef void _external(self, long long cycle) noexcept
     cpdef void write_control(self, int value, long long cycle) noexcept
     cpdef void write_mode(self, int value, long long cycle) noexcept
     @cython.locals(flags=int)

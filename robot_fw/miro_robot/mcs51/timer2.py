@@ -6,7 +6,7 @@ does all that happens in the cycles below `cycle`. Dividing its overflows down t
 Timing (AT89C52 sheet section 8): as a timer it counts once per cycle, as a baud rate generator or clock
 output six times (fosc/2). TF2 is set at S2P2 and polled in the same cycle, a cycle sooner than TF0. Pins
 are sampled at S5P2 and act in the next cycle: a count, or a capture or reload that goes before that cycle's
-own count.
+own count. Chosen, as no sheet says when EXF2 is polled: it is latched at S5P2 of that next cycle.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ _NONE = -1
 _TIMER2 = 5  # its place in the polling order
 _TF2, _EXF2, _RCLK, _TCLK, _EXEN2, _TR2, _C_T2, _CP_RL2 = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02, 0x01
 _T2OE, _DCEN = 0x02, 0x01  # T2MOD
+_FELL = 2  # T2EX is low in the last sample and was high in the one before: the cycle that comes acts on it
 _STATES = 6  # per machine cycle
 
 
@@ -34,7 +35,7 @@ class Timer2:
         self.t2mod = 0
         self.count = 0
         self.capture = 0  # RCAP2
-        self.up = 1  # pin T2EX as last sampled
+        self.up = 1  # pin T2EX as last sampled (DCEN: count up), or _FELL
         self.edge_cycle = -1  # cycle in which a fall of T2 counts
         self.clock_out = 0  # level on T2 while T2OE
         self.synced = 0
@@ -64,6 +65,9 @@ class Timer2:
     def up_down(self) -> int:
         return 1 if self.t2mod & _DCEN and not self.silent() and not self.control & _CP_RL2 else 0
 
+    def down(self) -> int:
+        return 1 if self.up_down() and self.up != 1 else 0
+
     def rate(self) -> int:
         """Counts per cycle from the crystal; 0 when stopped or counting a pin."""
         if not self.control & _TR2 or self.control & _C_T2:
@@ -72,7 +76,7 @@ class Timer2:
 
     def left(self) -> int:
         """Counts to the next overflow or underflow."""
-        if self.up_down() and not self.up:
+        if self.down():
             return ((self.count - self.capture) & 0xFFFF) + 1
         return 0x10000 - self.count
 
@@ -85,6 +89,8 @@ class Timer2:
         """Counts through all cycles below `cycle`."""
         if cycle <= self.synced:
             return
+        if self.up == _FELL:
+            self._external(self.synced)
         rate = self.rate()
         if rate:
             self._pass((cycle - self.synced) * rate, rate, self.synced)
@@ -95,7 +101,7 @@ class Timer2:
     def _pass(self, counts: int, rate: int, first: int) -> None:
         """`counts` counts, `rate` of them per cycle, starting with cycle `first`."""
         left = self.left()
-        down = self.up_down() and not self.up
+        down = self.down()
         step = -1 if down else 1
         if counts < left:
             self.count = (self.count + step * counts) & 0xFFFF
@@ -120,7 +126,9 @@ class Timer2:
         self.interrupts.ask(_TIMER2, cycle - 1)
 
     def next_flag(self) -> int:
-        """The `since` with which TF2 will ask if nothing changes, or FAR."""
+        """The `since` with which TF2 or EXF2 will ask if nothing changes, or FAR."""
+        if self.falls():
+            return self.synced
         if self.control & _TF2 or self.silent():
             return _FAR
         if self.rate():
@@ -146,10 +154,19 @@ class Timer2:
         """T2 was high in one sample and low in the next, that of `cycle`."""
         self.edge_cycle = cycle + 1
 
-    def external(self, level: int, cycle: int) -> None:
-        """T2EX changed; called with everything below `cycle`, the one after the sample, done."""
-        self.up = level
-        if level or not self.control & _EXEN2 or self.up_down():
+    def sample_external(self, level: int) -> None:
+        """T2EX changed to `level` in the sample of the cycle before `synced`."""
+        self.up = 1 if level else _FELL
+
+    def falls(self) -> int:
+        """The cycle that comes acts on a fall of T2EX."""
+        return 1 if self.up == _FELL and self.control & _EXEN2 and not self.up_down() else 0
+
+    def _external(self, cycle: int) -> None:
+        """`cycle` begins, the one after the sample in which T2EX fell."""
+        acts = self.falls()
+        self.up = 0
+        if not acts:
             return
         if not self.silent():
             if self.control & _CP_RL2:

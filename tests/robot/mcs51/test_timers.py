@@ -3,7 +3,7 @@
 import itertools
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from miro_robot.mcs51.cpu import Cpu
 
@@ -137,8 +137,13 @@ def push(cpu, pins):
     cpu.set_external(3, p3, 12 * cpu.cycles)
 
 
+ALL_LOW = dict.fromkeys(("int0", "int1", "t0", "t1", "t2", "t2ex"), 0)
+
+
 @settings(deadline=None, max_examples=150)
 @given(st.lists(st.tuples(st.sampled_from(REGISTERS), NEAR_TOP), max_size=12), STEPS)
+@example([], [(4, ("T2CON", 0x08)), (1, ("pins", ALL_LOW)), (1, ("look", None)), (1, ("look", None))])
+@example([("T2CON", 0x24)], [(1, ("pins", ALL_LOW)), (1, ("T2CON", 0x2C)), (1, ("look", None))])
 def test_lazy_timers_equal_those_that_step_every_cycle(setup, steps):
     cpu = Cpu(RecordingBus())
     cpu.load(bytes(0x10000))  # NOPs
