@@ -2,7 +2,9 @@
 
 What belongs here: running walks on the simulator, comparing after each instruction, reporting. Each step is
 compared in PC, cycles, all of internal RAM and every register that both machines have; external RAM at the
-end of a walk. Walk number i of seed s is the same wherever it runs.
+end of a walk. Of two walks one is scattered: each of its steps begins in a random state of all that is compared.
+The other is a program: each step begins in the state that the one before left. Walk number i of seed s is the
+same wherever it runs.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from typing import NamedTuple
 
 from miro_robot.mcs51.opcodes import disassemble
 
-from tests.robot.ucsim import s51
+from tests.robot.ucsim import s51, states
 from tests.robot.ucsim.exclusions import COMPARED, P0
 from tests.robot.ucsim.walk import PROLOGUE, Step, Walk, Walker
 
@@ -35,8 +37,8 @@ class Outcome(NamedTuple):
 
 
 def compare(seed: int, steps: int) -> Outcome:
-    """One walk on both machines."""
-    walk = Walker(seed).walk(steps)
+    """One walk on both machines; those of odd seeds are scattered."""
+    walk = Walker(seed, scattered=bool(seed & 1)).walk(steps)
     output = s51.run(walk.code, _commands(walk))
     counts = Counter(step.opcode for step in walk.steps)
     difference = next(_differences(walk, s51.Reader(output)), "")
@@ -46,6 +48,9 @@ def compare(seed: int, steps: int) -> Outcome:
 def _commands(walk: Walk) -> Iterator[str]:
     yield f"run 0 {len(PROLOGUE):#x}"
     for step in walk.steps:
+        if step.state:
+            yield f"set mem sfr 0x82 {step.state & 0xFF:#x} {step.state >> 8:#x}"  # DPTR
+            yield f"run {states.AT:#x} {states.END:#x}"
         if step.moved:
             yield f"pc {step.pc_before:#x}"
         yield from s51.OBSERVE
@@ -98,11 +103,13 @@ def main() -> int:
     totals = [0] * 256
     differing = 0
     with ProcessPoolExecutor(options.jobs) as pool:
-        for outcome in pool.map(compare, seeds, [options.walk] * walks):
+        for done, outcome in enumerate(pool.map(compare, seeds, [options.walk] * walks), 1):
             totals = [total + count for total, count in zip(totals, outcome.opcodes, strict=True)]
             if outcome.difference:
                 differing += 1
                 print(f"walk {outcome.seed}: {outcome.difference}")
+            print(f"\r{done} of {walks} walks ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
     rarest = min(range(256), key=lambda opcode: totals[opcode])
     print(
         f"{s51.version()}: {sum(totals)} single steps in {walks} walks, "

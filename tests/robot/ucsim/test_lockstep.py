@@ -10,7 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from miro_robot.mcs51.vectors import Bench
 
-from tests.robot.ucsim import s51, timers, vector_check
+from tests.robot.ucsim import s51, states, timers, vector_check
+from tests.robot.ucsim.exclusions import COMPARED
 from tests.robot.ucsim.lockstep import compare
 from tests.robot.ucsim.walk import Walker
 from tests.vectors.paths import MCS51
@@ -31,14 +32,32 @@ def test_random_walks_of_any_seed_agree(seed):
     assert compare(seed, 120).difference == ""
 
 
-def test_the_same_seed_draws_the_same_walk():
-    assert Walker(5).walk(50) == Walker(5).walk(50)
-    assert Walker(5).walk(50) != Walker(6).walk(50)
+@pytest.mark.parametrize("scattered", [False, True])
+def test_the_same_seed_draws_the_same_walk(scattered):
+    assert Walker(5, scattered).walk(50) == Walker(5, scattered).walk(50)
+    assert Walker(5, scattered).walk(50) != Walker(6, scattered).walk(50)
 
 
-def test_a_walk_meets_every_opcode():
-    executed = {step.opcode for seed in range(3) for step in Walker(seed).walk(1500).steps}
+@pytest.mark.parametrize("scattered", [False, True])
+def test_a_walk_meets_every_opcode(scattered):
+    executed = {step.opcode for seed in range(3) for step in Walker(seed, scattered).walk(1500).steps}
     assert len(executed) == 256
+
+
+def test_a_scattered_walk_begins_each_step_in_a_random_state_of_everything():
+    steps = Walker(5, scattered=True).walk(2000).steps
+    assert all(step.state in states.OFFSETS for step in steps)
+    for address in range(256):
+        assert len({step.iram[address] for step in steps}) > 200, f"internal RAM {address:02X}h"
+    for place, address in enumerate(COMPARED):
+        for bit in range(8):
+            if states.RANDOM_BITS.get(address, 0xFF) >> bit & 1:
+                seen = {step.sfr[place] >> bit & 1 for step in steps}
+                assert seen == {0, 1}, f"bit {bit} of register {address:02X}h is always {seen}"
+
+
+def test_a_program_begins_each_step_where_the_one_before_ended():
+    assert {step.state for step in Walker(5).walk(500).steps} == {0}
 
 
 def test_what_programs_read_from_running_timers_agrees():

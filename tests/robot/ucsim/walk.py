@@ -2,7 +2,8 @@
 
 What belongs here: drawing the walk on our CPU and writing down what it should do. Code is invented where the
 walk arrives: a byte of code memory is drawn when it is first fetched (or read by MOVC) and stays. So each
-opcode comes up about equally often, in states that the walk itself keeps random.
+opcode comes up about equally often, in states that the walk itself keeps random. A walk that is `scattered` is a
+row of single steps instead: each begins at a random place in a state of `states.py`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH
 from miro_robot.mcs51.xram import XramBus
 
+from tests.robot.ucsim import states
 from tests.robot.ucsim.exclusions import COMPARED, MOVX, P0, allowed, has_bit, has_direct
 
 VISITS = 4  # of one address, before the walk is moved elsewhere
@@ -35,6 +37,7 @@ class Step(NamedTuple):
     pc_before: int
     opcode: int
     moved: bool  # PC does not follow from the step before
+    state: int  # offset of the random state loaded before it; 0: goes on with what the step before left
     movx_changed_p0: bool
     pc: int
     cycles: int
@@ -53,8 +56,9 @@ class Walk(NamedTuple):
 class Walker:
     """Draws one walk; the same seed draws the same walk."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, scattered: bool = False) -> None:
         self.random = Random(seed)
+        self.scattered = scattered
         self.bus = XramBus(_ignore, _ignore)
         self.cpu = Cpu(self.bus)
         self.known = bytearray(0x10000)  # bytes of code that exist
@@ -63,6 +67,12 @@ class Walker:
             self._define(address, value)
         for address in range(TABLE, TABLE + 256):
             self._define(address, self.random.randrange(256))
+        if scattered:
+            loader = states.PROGRAM + b"\x00"
+            table = self.random.randbytes(states.TABLE_SIZE)
+            for first, content in ((states.AT, loader), (states.TABLE, table)):
+                for address, value in enumerate(content, first):
+                    self._define(address, value)
 
     def walk(self, steps: int) -> Walk:
         cpu = self.cpu
@@ -70,17 +80,30 @@ class Walker:
         cpu.run_until_pc(len(PROLOGUE), 1 << 40)
         done: list[Step] = []
         moved = False
+        state = 0
         while len(done) < steps:
+            if self.scattered and not moved:
+                state = self._scatter()
+                moved = True
             pc = cpu.pc
             if self.visits[pc] == VISITS or not self._settle(pc):
                 cpu.pc = self.random.randrange(0x10000)
                 moved = True
                 continue
-            done.append(self._step(pc, moved))
+            done.append(self._step(pc, moved, state))
             moved = False
         return Walk(cpu.code, done, self.bus.content())
 
-    def _step(self, pc: int, moved: bool) -> Step:
+    def _scatter(self) -> int:
+        """Puts the CPU into a random state at a random place; the state's offset."""
+        offset = self.random.choice(states.OFFSETS)
+        self.cpu.dptr = offset
+        self.cpu.pc = states.AT
+        self.cpu.run_until_pc(states.END, 1 << 40)
+        self.cpu.pc = self.random.randrange(0x10000)
+        return offset
+
+    def _step(self, pc: int, moved: bool, state: int) -> Step:
         cpu = self.cpu
         self.visits[pc] += 1
         opcode = cpu.code_at(pc)
@@ -91,7 +114,7 @@ class Walker:
         assert isinstance(iram, bytes)
         registers = bytes([cpu.sfr(address) for address in COMPARED])
         changed_p0 = opcode in MOVX and p0 != 0xFF
-        return Step(pc, opcode, moved, changed_p0, cpu.pc, cpu.cycles - begin, iram, registers)
+        return Step(pc, opcode, moved, state, changed_p0, cpu.pc, cpu.cycles - begin, iram, registers)
 
     def _settle(self, pc: int) -> bool:
         """Makes sure there is an instruction at `pc` that may be executed now; False if that is impossible."""
