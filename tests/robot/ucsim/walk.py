@@ -109,6 +109,7 @@ class Walker:
         opcode = cpu.code_at(pc)
         begin = cpu.cycles
         p0 = cpu.sfr(P0)
+        cpu.txd.forget(cpu.txd.settled_tick)  # nobody listens
         cpu.step()
         iram = cpu.snapshot()["iram"]
         assert isinstance(iram, bytes)
