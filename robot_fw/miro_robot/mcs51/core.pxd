@@ -3,10 +3,8 @@ from miro_robot.mcs51.bus cimport Bus
 cdef class Core:
     cdef readonly Bus bus
     cdef unsigned char rom[65538]
-    cdef unsigned char rows[65536]
-    cdef unsigned char row_of[256]
-    cdef unsigned char length_of[256]
-    cdef unsigned char cycles_of[256]
+    cdef unsigned short lines[65536]
+    cdef unsigned short line_of[256]
     cdef unsigned char iram[256]
     cdef public int pc
     cdef public int a

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from miro_robot.mcs51.bus import Bus
-from miro_robot.mcs51.opcodes import CYCLES, LENGTH, ROW
+from miro_robot.mcs51.opcodes import LINE
 
 
 class Core:
@@ -17,10 +17,8 @@ class Core:
     NOT_STATE: tuple[str, ...] = (
         "bus",
         "rom",  # the image: constant while it runs, unless code lies in RAM, whose owner then restores it
-        "rows",
-        "row_of",
-        "length_of",
-        "cycles_of",
+        "lines",
+        "line_of",
         "at",
         "start",  # the instruction in progress: snapshots are taken between two
         "limit",
@@ -31,10 +29,8 @@ class Core:
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
         self.rom = bytearray(0x10002)  # 64 KB, and the first two bytes again for operands that wrap
-        self.rows = bytearray(0x10000)  # per address: its opcode's line in the table, or a special row
-        self.row_of = ROW
-        self.length_of = LENGTH
-        self.cycles_of = CYCLES
+        self.lines = [0] * 65536  # per address: `LINE` of its opcode, or a special line
+        self.line_of = list(LINE)
         self.iram = bytearray(256)
         self.pc = 0
         self.a = 0

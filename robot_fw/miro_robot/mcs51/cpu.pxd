@@ -8,8 +8,7 @@ cdef long long _FAR
 cdef int _OUTSIDE
 cdef int _MARK
 cdef int _STOP_REQUESTED
-cdef int _P0, _SP, _DPL, _DPH, _PCON, _P1, _P2, _P3
-cdef int _IE, _IP, _PSW, _ACC, _B
+cdef int _P0, _SP, _PCON, _IE, _IP, _PSW
 cdef int _SMOD, _PD, _IDL
 cdef int _PCON_BITS
 cdef int _READ_SAMPLE, _WRITE_RISES
@@ -40,7 +39,7 @@ cdef class Cpu(Executor):
     cpdef reset(self)
     cpdef int run(self, long long until_cycle) except -1
     cpdef int step(self) except -1
-    @cython.locals(row=int)
+    @cython.locals(line=int)
     cpdef int run_until_pc(self, int address, long long until_cycle) except -1
     cpdef request_stop(self)
     cpdef int set_external(self, int port, int levels, long long tick) except -1
@@ -57,6 +56,7 @@ cdef class Cpu(Executor):
     cdef int _taken_over(self)
     cdef int _enter(self, int source) except -1
     cdef int _block(self) except -1
+    @cython.locals(value=int)
     cdef int register(self, int address, long long cycle) except -1
     @cython.locals(value=int)
     cdef int write_sfr_bit(self, int address, int mask, int level) except -1

@@ -19,11 +19,10 @@ from miro_robot.mcs51.peripherals import Peripherals
 __all__ = ["BREAKPOINT", "REACHED", "STOPPED", "Cpu"]
 
 _FAR = 1 << 62
-_OUTSIDE = 0xFE
-_MARK = 0xFF  # breakpoint
+_OUTSIDE = 0x0800  # lines that are no opcode's, see execute.py
+_MARK = 0x1000
 _STOP_REQUESTED = 1
-_P0, _SP, _DPL, _DPH, _PCON, _P1, _P2, _P3 = 0x80, 0x81, 0x82, 0x83, 0x87, 0x90, 0xA0, 0xB0
-_IE, _IP, _PSW, _ACC, _B = 0xA8, 0xB8, 0xD0, 0xE0, 0xF0
+_P0, _SP, _PCON, _IE, _IP, _PSW = 0x80, 0x81, 0x87, 0xA8, 0xB8, 0xD0
 _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
 _PCON_BITS = 0x8F  # the others are not implemented and read as 0
 _READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end
@@ -78,7 +77,7 @@ class Cpu(Executor):
         self.inspector: Inspector | None = None
         for address in range(0x10000):
             self.write_code(address, 0xFF)
-            self.rows[address] = _OUTSIDE
+            self.lines[address] = _OUTSIDE
 
     # Image
 
@@ -88,11 +87,11 @@ class Cpu(Executor):
         """
         for address in range(0x10000):
             self.write_code(address, image[address] if address < len(image) else 0xFF)
-            self.rows[address] = _OUTSIDE
+            self.lines[address] = _OUTSIDE
         self.code_limit = 0
         for first, end in ((0, len(image)),) if used is None else used:
             for address in range(first, end):
-                self.rows[address] = self.row_of[self.rom[address]]
+                self.lines[address] = self.line_of[self.rom[address]]
             self.code_limit = max(self.code_limit, end)
         loaded = on_load.get()
         if loaded is not None:
@@ -103,11 +102,11 @@ class Cpu(Executor):
         self.rom[address] = value
         if address < 2:
             self.rom[0x10000 + address] = value
-        self.rows[address] = self.row_of[value]
+        self.lines[address] = self.line_of[value]
 
     def is_loaded(self, address: int) -> bool:
         """Whether executing at `address` is legal."""
-        return self.rows[address & 0xFFFF] != _OUTSIDE
+        return self.lines[address & 0xFFFF] != _OUTSIDE
 
     def code_at(self, address: int) -> int:
         return self.rom[address & 0xFFFF]
@@ -149,12 +148,12 @@ class Cpu(Executor):
 
     def run_until_pc(self, address: int, until_cycle: int) -> int:
         """Like `run`, but returns BREAKPOINT before the instruction at `address` is executed."""
-        row = self.rows[address]
-        self.rows[address] = _MARK
+        line = self.lines[address]
+        self.lines[address] = _MARK
         try:
             return self.run(until_cycle)
         finally:
-            self.rows[address] = row
+            self.lines[address] = line
 
     def request_stop(self) -> None:
         """Ends the run after the instruction in progress; for callbacks of the bus."""
@@ -282,18 +281,13 @@ class Cpu(Executor):
 
     def register(self, address: int, cycle: int) -> int:
         """A register, ports at their latches, with everything below `cycle` done."""
-        if address == _ACC:
-            return self.a
-        if address == _B:
-            return self.b
+        value = self.working_register(address)
+        if value >= 0:
+            return value
         if address == _PSW:
             return self.psw()
         if address == _SP:
             return self.sp
-        if address == _DPL:
-            return self.dptr & 0xFF
-        if address == _DPH:
-            return self.dptr >> 8
         if address == _PCON:
             return self.pcon
         return self.chip.read(address, cycle)
@@ -309,21 +303,13 @@ class Cpu(Executor):
     def write_sfr_bit(self, address: int, mask: int, level: int) -> None:
         """Only the one bit changes; the others keep what hardware may have set meanwhile."""
         value = self.register(address, self.cycles)
-        self.write_sfr(address, value | mask if level else value & (0xFF ^ mask))
+        self.write(address, value | mask if level else value & (0xFF ^ mask))
 
     def write_sfr(self, address: int, value: int) -> None:
-        if address == _ACC:
-            self.a = value
-        elif address == _B:
-            self.b = value
-        elif address == _PSW:
+        if address == _PSW:
             self.write_psw(value)
         elif address == _SP:
             self.sp = value
-        elif address == _DPL:
-            self.dptr = (self.dptr & 0xFF00) | value
-        elif address == _DPH:
-            self.dptr = (self.dptr & 0x00FF) | (value << 8)
         elif address == _PCON:
             self.write_pcon(value)
         elif address & 0xCF == 0x80:

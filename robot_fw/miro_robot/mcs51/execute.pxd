@@ -3,19 +3,25 @@ cimport cython
 from miro_robot.mcs51.core cimport Core
 
 cdef int _BREAKPOINT
-cdef int _SPECIAL
 cdef int _UNDEFINED_OPCODE
 cdef int _STACK_OVERFLOW
 cdef int _STACK_UNDERFLOW
 cdef int _OUTSIDE_IMAGE
 
 cdef class Executor(Core):
-    @cython.locals(iram='unsigned char *', rom='unsigned char *', pc=int, row=int, op=int, first=int, second=int,
-                   after=int, length=int, address=int, value=int)
+    @cython.locals(iram='unsigned char *', rom='unsigned char *', now='long long', count='long long', pc=Py_ssize_t, line=int, row=int, op=int,
+                   first=int, second=int, address=int, value=int)
     cpdef int run(self, long long until_cycle) except -1
 
     @cython.final
     cdef inline int read(self, int address) except -1
+    @cython.final
+    @cython.locals(value=int)
+    cdef int read_register(self, int address) except -1
+    @cython.final
+    cdef inline int working_register(self, int address) noexcept
+    @cython.final
+    cdef int write_register(self, int address, int value) except -1
     @cython.final
     cdef inline int read_latched(self, int address) except -1
     @cython.final
@@ -30,7 +36,9 @@ cdef class Executor(Core):
     @cython.locals(address=int, kept=int)
     cdef inline int write_bit(self, int bit, int level) except -1
     @cython.final
-    cdef inline void branch(self, int offset) noexcept
+    cdef inline int jump(self, int target) noexcept
+    @cython.final
+    cdef inline int branch(self, int offset) noexcept
     @cython.final
     cdef inline int call(self, int target) except -1
     @cython.final
@@ -45,7 +53,7 @@ cdef class Executor(Core):
     @cython.locals(a=int, total=int)
     cdef inline void subtract(self, int operand) noexcept
     @cython.final
-    cdef inline void compare(self, int left, int right, int offset) noexcept
+    cdef inline int compare(self, int left, int right, int offset) noexcept
     @cython.final
     @cython.locals(quotient=int)
     cdef inline void divide(self) noexcept

@@ -15,8 +15,9 @@ from __future__ import annotations
 from miro_robot.faults import FaultKind
 from miro_robot.mcs51.core import Core
 
-_BREAKPOINT = 0xFF  # row that ends a run before its instruction
-_SPECIAL = 0xFE  # the lowest of these two
+_BREAKPOINT = (
+    0x1000  # line that ends a run before its instruction; the other that is no opcode's: outside the image
+)
 _UNDEFINED_OPCODE = int(FaultKind.UNDEFINED_OPCODE)
 _STACK_OVERFLOW = int(FaultKind.STACK_OVERFLOW)
 _STACK_UNDERFLOW = int(FaultKind.STACK_UNDERFLOW)
@@ -38,42 +39,41 @@ class Executor(Core):
         self.begin_run()
         iram = self.iram
         rom = self.rom
-        first = 0
-        second = 0
+        now = self.cycles
+        pc = self.pc
+        count = self.instructions
         while True:
-            if self.cycles >= self.limit:
+            if now >= self.limit:
                 if self.boundary():
                     break
+                now = self.cycles
+                pc = self.pc
                 continue
-            pc = self.pc
             self.at = pc
-            row = self.rows[pc]
+            line = self.lines[pc]
             op = rom[pc]
-            if row >= _SPECIAL:
-                if row == _BREAKPOINT:
+            first = rom[pc + 1]
+            second = rom[pc + 2]
+            if line & 0x1800:
+                if line == _BREAKPOINT:
                     self.stop = BREAKPOINT
                     break
                 self.fault(_OUTSIDE_IMAGE)
-                row = self.row_of[op]
-            length = self.length_of[op]
-            after = pc + 1
-            if length != 1:
-                first = rom[after]
-                after = pc + 2
-                if length != 2:
-                    second = rom[after]
-                    after = pc + 3
-            after &= 0xFFFF
-            self.start = self.cycles
-            self.cycles += self.cycles_of[op]
-            self.instructions += 1
-            self.pc = after
+                line = self.line_of[op]
+            pc = (pc + (line >> 13)) & 0xFFFF
+            self.pc = pc
+            self.start = now
+            now += (line >> 8) & 7
+            self.cycles = now
+            count += 1
+            self.instructions = count
+            row = line & 0xFF
             if row == 0x00:  # NOP
                 pass
             elif row == 0x01:  # AJMP addr11
-                self.pc = (after & 0xF800) | ((op & 0xE0) << 3) | first
+                pc = self.jump((pc & 0xF800) | ((op & 0xE0) << 3) | first)
             elif row == 0x02:  # LJMP addr16
-                self.pc = (first << 8) | second
+                pc = self.jump((first << 8) | second)
             elif row == 0x03:  # RR A
                 self.a = (self.a >> 1) | ((self.a & 1) << 7)
             elif row == 0x04:  # INC A
@@ -88,11 +88,11 @@ class Executor(Core):
             elif row == 0x10:  # JBC bit,rel
                 if self.latched_bit(first):
                     self.write_bit(first, 0)
-                    self.branch(second)
+                    pc = self.branch(second)
             elif row == 0x11:  # ACALL addr11
-                self.call((after & 0xF800) | ((op & 0xE0) << 3) | first)
+                pc = self.call((pc & 0xF800) | ((op & 0xE0) << 3) | first)
             elif row == 0x12:  # LCALL addr16
-                self.call((first << 8) | second)
+                pc = self.call((first << 8) | second)
             elif row == 0x13:  # RRC A
                 value = self.a
                 self.a = (value >> 1) | (self.cy << 7)
@@ -108,10 +108,10 @@ class Executor(Core):
                 iram[self.bank + (op & 7)] = (iram[self.bank + (op & 7)] - 1) & 0xFF
             elif row == 0x20:  # JB bit,rel
                 if self.read_bit(first):
-                    self.branch(second)
+                    pc = self.branch(second)
             elif row == 0x22:  # RET
                 value = self.pop() << 8
-                self.pc = value | self.pop()
+                pc = self.jump(value | self.pop())
             elif row == 0x23:  # RL A
                 self.a = ((self.a << 1) & 0xFF) | (self.a >> 7)
             elif row == 0x24:  # ADD A,#imm
@@ -124,10 +124,10 @@ class Executor(Core):
                 self.add(iram[self.bank + (op & 7)], 0)
             elif row == 0x30:  # JNB bit,rel
                 if not self.read_bit(first):
-                    self.branch(second)
+                    pc = self.branch(second)
             elif row == 0x32:  # RETI
                 value = self.pop() << 8
-                self.pc = value | self.pop()
+                pc = self.jump(value | self.pop())
                 self.end_of_interrupt()
             elif row == 0x33:  # RLC A
                 value = self.a
@@ -144,7 +144,7 @@ class Executor(Core):
                 self.add(iram[self.bank + (op & 7)], self.cy)
             elif row == 0x40:  # JC rel
                 if self.cy:
-                    self.branch(first)
+                    pc = self.branch(first)
             elif row == 0x42:  # ORL dir,A
                 self.write(first, self.read_latched(first) | self.a)
             elif row == 0x43:  # ORL dir,#imm
@@ -159,7 +159,7 @@ class Executor(Core):
                 self.a |= iram[self.bank + (op & 7)]
             elif row == 0x50:  # JNC rel
                 if not self.cy:
-                    self.branch(first)
+                    pc = self.branch(first)
             elif row == 0x52:  # ANL dir,A
                 self.write(first, self.read_latched(first) & self.a)
             elif row == 0x53:  # ANL dir,#imm
@@ -174,7 +174,7 @@ class Executor(Core):
                 self.a &= iram[self.bank + (op & 7)]
             elif row == 0x60:  # JZ rel
                 if self.a == 0:
-                    self.branch(first)
+                    pc = self.branch(first)
             elif row == 0x62:  # XRL dir,A
                 self.write(first, self.read_latched(first) ^ self.a)
             elif row == 0x63:  # XRL dir,#imm
@@ -189,11 +189,11 @@ class Executor(Core):
                 self.a ^= iram[self.bank + (op & 7)]
             elif row == 0x70:  # JNZ rel
                 if self.a != 0:
-                    self.branch(first)
+                    pc = self.branch(first)
             elif row == 0x72:  # ORL C,bit
                 self.cy |= self.read_bit(first)
             elif row == 0x73:  # JMP @A+DPTR
-                self.pc = (self.a + self.dptr) & 0xFFFF
+                pc = self.jump((self.a + self.dptr) & 0xFFFF)
             elif row == 0x74:  # MOV A,#imm
                 self.a = first
             elif row == 0x75:  # MOV dir,#imm
@@ -203,11 +203,11 @@ class Executor(Core):
             elif row == 0x78:  # MOV Rn,#imm
                 iram[self.bank + (op & 7)] = first
             elif row == 0x80:  # SJMP rel
-                self.branch(first)
+                pc = self.branch(first)
             elif row == 0x82:  # ANL C,bit
                 self.cy &= self.read_bit(first)
             elif row == 0x83:  # MOVC A,@A+PC
-                self.a = rom[(after + self.a) & 0xFFFF]
+                self.a = rom[(pc + self.a) & 0xFFFF]
             elif row == 0x84:  # DIV AB
                 self.divide()
             elif row == 0x85:  # MOV dst,src
@@ -257,14 +257,14 @@ class Executor(Core):
             elif row == 0xB3:  # CPL C
                 self.cy ^= 1
             elif row == 0xB4:  # CJNE A,#imm,rel
-                self.compare(self.a, first, second)
+                pc = self.compare(self.a, first, second)
             elif row == 0xB5:  # CJNE A,dir,rel
                 value = self.read(first)
-                self.compare(self.a, value, second)
+                pc = self.compare(self.a, value, second)
             elif row == 0xB6:  # CJNE @Ri,#imm,rel
-                self.compare(iram[iram[self.bank + (op & 1)]], first, second)
+                pc = self.compare(iram[iram[self.bank + (op & 1)]], first, second)
             elif row == 0xB8:  # CJNE Rn,#imm,rel
-                self.compare(iram[self.bank + (op & 7)], first, second)
+                pc = self.compare(iram[self.bank + (op & 7)], first, second)
             elif row == 0xC0:  # PUSH dir: SP counts first, so PUSH SP stores the new one
                 self.claim()
                 value = self.read(first)
@@ -302,7 +302,7 @@ class Executor(Core):
                 value = (self.read_latched(first) - 1) & 0xFF
                 self.write(first, value)
                 if value:
-                    self.branch(second)
+                    pc = self.branch(second)
             elif row == 0xD6:  # XCHD A,@Ri
                 address = iram[self.bank + (op & 1)]
                 value = iram[address]
@@ -312,7 +312,7 @@ class Executor(Core):
                 value = (iram[self.bank + (op & 7)] - 1) & 0xFF
                 iram[self.bank + (op & 7)] = value
                 if value:
-                    self.branch(first)
+                    pc = self.branch(first)
             elif row == 0xE0:  # MOVX A,@DPTR
                 self.a = self.movx_read(self.dptr)
             elif row == 0xE2:  # MOVX A,@Ri
@@ -344,9 +344,23 @@ class Executor(Core):
 
     def read(self, address: int) -> int:
         """Direct address, ports at their pins."""
-        if address < 0x80:
-            return self.iram[address]
-        return self.a if address == 0xE0 else self.read_sfr(address)
+        return self.iram[address] if address < 0x80 else self.read_register(address)
+
+    def read_register(self, address: int) -> int:
+        value = self.working_register(address)
+        return value if value >= 0 else self.read_sfr(address)
+
+    def working_register(self, address: int) -> int:
+        """One of the registers that code uses most, -1 if it is another."""
+        if address == 0xE0:
+            return self.a
+        if address == 0xF0:
+            return self.b
+        if address == 0x82:
+            return self.dptr & 0xFF
+        if address == 0x83:
+            return self.dptr >> 8
+        return -1
 
     def read_latched(self, address: int) -> int:
         """Direct address as read-modify-write instructions see it: ports at their latches."""
@@ -355,6 +369,18 @@ class Executor(Core):
     def write(self, address: int, value: int) -> None:
         if address < 0x80:
             self.iram[address] = value
+        else:
+            self.write_register(address, value)
+
+    def write_register(self, address: int, value: int) -> None:
+        if address == 0xE0:
+            self.a = value
+        elif address == 0xF0:
+            self.b = value
+        elif address == 0x82:
+            self.dptr = (self.dptr & 0xFF00) | value
+        elif address == 0x83:
+            self.dptr = (self.dptr & 0x00FF) | (value << 8)
         else:
             self.write_sfr(address, value)
 
@@ -376,16 +402,21 @@ class Executor(Core):
 
     # Flow
 
-    def branch(self, offset: int) -> None:
-        self.pc = (self.pc + (offset ^ 0x80) - 0x80) & 0xFFFF
+    def jump(self, target: int) -> int:
+        """The new PC, which the loop keeps in a variable of its own; so do the others here."""
+        self.pc = target
+        return target
 
-    def call(self, target: int) -> None:
+    def branch(self, offset: int) -> int:
+        return self.jump((self.pc + (offset ^ 0x80) - 0x80) & 0xFFFF)
+
+    def call(self, target: int) -> int:
         """PCL first, then PCH: LCALL, ACALL and interrupts alike."""
         self.claim()
         self.iram[self.sp] = self.pc & 0xFF
         self.claim()
         self.iram[self.sp] = self.pc >> 8
-        self.pc = target
+        return self.jump(target)
 
     def claim(self) -> None:
         """SP counts up; a byte is about to be stored there."""
@@ -418,10 +449,10 @@ class Executor(Core):
         self.cy = total >> 8
         self.a = total & 0xFF
 
-    def compare(self, left: int, right: int, offset: int) -> None:
+    def compare(self, left: int, right: int, offset: int) -> int:
+        """CJNE: the new PC."""
         self.cy = 1 if left < right else 0
-        if left != right:
-            self.branch(offset)
+        return self.pc if left == right else self.branch(offset)
 
     def divide(self) -> None:
         """Dividing by zero leaves A and B as they were (silicon: undefined) and sets OV."""

@@ -1,4 +1,7 @@
-"""What instructions do to flags, memory and stack, with the classic mistakes as cases."""
+"""What instructions do to flags, memory and stack, with the classic mistakes as cases.
+
+4316E is Atmel's 8051 Hardware Manual.
+"""
 
 import pytest
 from miro_robot.faults import FaultKind
@@ -8,6 +11,7 @@ from tests.robot.mcs51.rig import RecordingBus, cpu_with, run_to_loop, sfr, step
 
 
 def test_parity_is_that_of_acc_whatever_is_written_to_psw():
+    """4316E, instruction set: P is combinational."""
     assert sfr(stepped("MOV A,#01h\nMOV PSW,#00h"), "PSW") == 0x01
     assert sfr(stepped("MOV A,#03h\nMOV PSW,#01h"), "PSW") == 0x00
     assert sfr(stepped("MOV A,#03h\nSETB PSW.0"), "PSW") == 0x00
@@ -19,11 +23,13 @@ def test_user_flags_and_bank_bits_of_psw_are_kept():
 
 @pytest.mark.parametrize("switch", ["SETB RS0", "MOV PSW,#08h", "ORL PSW,#08h", "XRL PSW,#08h"])
 def test_every_way_of_writing_rs0_switches_the_bank(switch):
+    """4316E, memory: banks by PSW.4:3, also by bit."""
     cpu = stepped(f"{switch}\nMOV R0,#55h")
     assert (cpu.peek_iram(0x08), cpu.peek_iram(0x00)) == (0x55, 0x00)
 
 
 def test_upper_ram_is_reached_indirectly_and_by_the_stack_only():
+    """4316E, memory: 80 to FF by @Ri and the stack; direct addresses are registers."""
     cpu = stepped("MOV R0,#90h\nMOV @R0,#12h\nMOV A,@R0\nMOV SP,#90h\nMOV B,#77h\nPUSH B")
     assert cpu.a == 0x12
     assert cpu.peek_iram(0x90) == 0x12
@@ -32,6 +38,7 @@ def test_upper_ram_is_reached_indirectly_and_by_the_stack_only():
 
 
 def test_mov_direct_direct_names_its_source_first_in_code():
+    """4316E, instruction set: opcode 85."""
     cpu = stepped("MOV 30h,#11h\nMOV 31h,30h")
     assert cpu.peek_iram(0x31) == 0x11
     assert cpu.code_at(3) == 0x85
@@ -39,12 +46,14 @@ def test_mov_direct_direct_names_its_source_first_in_code():
 
 
 def test_push_sp_stores_the_incremented_pointer_and_pop_sp_ends_with_the_byte():
+    """4316E, instruction set; what PUSH SP stores is chosen, silicon is not pinned down."""
     assert stepped("PUSH SP").peek_iram(0x08) == 0x08
     cpu = stepped("MOV 07h,#42h\nPOP SP")
     assert cpu.sp == 0x42
 
 
 def test_calls_push_the_low_byte_first():
+    """4316E, instruction set."""
     cpu = cpu_with("ORG 0120h\nLCALL 0400h")
     cpu.pc = 0x120
     cpu.step()
@@ -52,6 +61,7 @@ def test_calls_push_the_low_byte_first():
 
 
 def test_ajmp_stays_in_the_page_of_the_following_instruction():
+    """4316E, instruction set."""
     cpu = cpu_with("ORG 07FEh\nAJMP 0800h")
     cpu.pc = 0x7FE
     cpu.step()
@@ -59,15 +69,26 @@ def test_ajmp_stays_in_the_page_of_the_following_instruction():
 
 
 def test_movc_by_pc_counts_from_the_following_instruction():
+    """4316E, instruction set."""
     assert stepped("MOV A,#01h\nMOVC A,@A+PC\nDB 12h,34h", 2).a == 0x34
 
 
+def test_movc_beyond_ffff_goes_on_at_0000():
+    """4316E, memory: addresses are 16 bit and wrap."""
+    cpu = cpu_with("MOV DPTR,#0FFFFh\nMOV A,#02h\nMOVC A,@A+DPTR")
+    for _ in range(3):
+        cpu.step()
+    assert cpu.a == cpu.code_at(1)
+
+
 def test_cjne_compares_unsigned():
+    """4316E, instruction set: CY = first < second."""
     assert stepped("MOV A,#80h\nCJNE A,#7Fh,end\nend:", 2).cy == 0
     assert stepped("MOV A,#7Fh\nCJNE A,#80h,end\nend:", 2).cy == 1
 
 
 def test_inc_and_dec_touch_no_flag():
+    """4316E, instruction set."""
     cpu = stepped("MOV A,#0FFh\nINC A\nDEC A\nINC 30h\nDEC @R0")
     assert (cpu.cy, cpu.ac, cpu.ov) == (0, 0, 0)
 
@@ -78,11 +99,13 @@ def test_xchd_swaps_low_nibbles_only():
 
 
 def test_jbc_clears_the_bit_it_jumps_on():
+    """4316E, instruction set."""
     cpu = stepped("MOV 20h,#81h\nJBC 20h.7,there\nMOV A,#01h\nthere:\nMOV B,#02h", 3)
     assert (cpu.peek_iram(0x20), cpu.a, cpu.b) == (0x01, 0, 2)
 
 
 def test_dptr_wraps_and_movx_by_r_takes_the_page_from_p2():
+    """4316E, memory: the high address of MOVX @Ri is the P2 latch."""
     cpu = stepped(
         "MOV DPTR,#0FFFFh\nINC DPTR\nMOV P2,#12h\nMOV R1,#34h\nMOV A,#56h\nMOVX @R1,A\nMOVX A,@DPTR"
     )
@@ -91,6 +114,7 @@ def test_dptr_wraps_and_movx_by_r_takes_the_page_from_p2():
 
 
 def test_movx_puts_ff_into_the_latch_of_p0_and_tells_when_it_strobes():
+    """4316E section 2.6: the read sample and the rise of WR, in ticks of the MOVX."""
     cpu = stepped("MOV P0,#00h\nMOV DPTR,#1234h\nMOVX @DPTR,A\nMOVX A,@DPTR")
     assert sfr(cpu, "P0") == 0xFF
     assert cpu.bus.ports == [(0, 0x00, 24), (0, 0xFF, 72)]
@@ -99,17 +123,20 @@ def test_movx_puts_ff_into_the_latch_of_p0_and_tells_when_it_strobes():
 
 
 def test_movx_strobes_are_gated_by_the_latch_of_p3():
+    """4316E section 2.5."""
     cpu = stepped("MOV P3,#3Fh\nMOV DPTR,#0001h\nMOVX @DPTR,A\nMOVX A,@DPTR")
     assert cpu.bus.writes == cpu.bus.reads == []
     assert cpu.a == 0xFF
 
 
 def test_registers_that_do_not_exist_read_as_ff():
+    """4316E, memory: undefined on silicon, chosen."""
     assert stepped("MOV A,0A2h").a == 0xFF
     assert stepped("MOV 0A6h,#12h\nMOV A,0A6h").a == 0xFF
 
 
 def test_an_undefined_opcode_is_a_fault_and_runs_as_nop():
+    """4316E, instruction set: A5, one byte, one cycle."""
     cpu = stepped("NOP\nDB 0A5h\nMOV A,#07h")
     assert cpu.a == 7
     assert [(kind, pc) for kind, pc, _ in cpu.bus.faults] == [(FaultKind.UNDEFINED_OPCODE, 1)]
@@ -117,6 +144,7 @@ def test_an_undefined_opcode_is_a_fault_and_runs_as_nop():
 
 
 def test_a_stack_that_wraps_is_a_fault():
+    """4316E, memory: SP wraps FF to 00."""
     cpu = stepped("MOV SP,#0FFh\nPUSH ACC\nMOV SP,#00h\nPOP ACC")
     kinds = [kind for kind, _, _ in cpu.bus.faults]
     assert kinds == [FaultKind.STACK_OVERFLOW, FaultKind.STACK_UNDERFLOW]
@@ -168,6 +196,7 @@ def test_an_exception_in_the_bus_leaves_the_run():
 
 
 def test_reset_puts_registers_back_and_leaves_ram_and_time():
+    """4316E section 2.4 and memory."""
     cpu = run_to_loop("MOV 30h,#12h\nMOV P1,#00h\nMOV SP,#40h\nMOV IE,#85h\nMOV TMOD,#21h\nMOV SCON,#50h")
     cycles = cpu.cycles
     cpu.reset()
