@@ -2,4 +2,5 @@
 
 from pathlib import Path
 
-MCS51 = Path(__file__).with_name("mcs51")
+VECTORS = Path(__file__).parent
+MCS51 = VECTORS / "mcs51"

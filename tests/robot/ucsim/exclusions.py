@@ -37,6 +37,7 @@ _FORBIDDEN = {
     IP: 0xC0,  # absent-bits
 }
 _TIMER = (TCON, TMOD, TL0, TL1, TH0, TH1, T2CON, RCAP2L, RCAP2H, TL2, TH2)
+_TIMERS = tuple((register,) for register in _TIMER)
 _OPERANDS = {row[0]: row[4] for row in TABLE}
 OPERANDS = tuple(_OPERANDS[ROW[opcode]] for opcode in range(256))
 _FIRST_DIRECT = tuple(
@@ -45,6 +46,7 @@ _FIRST_DIRECT = tuple(
 _FIRST_BIT = tuple(any(part in ("bit", "/bit") for part in text.split(",")) for text in OPERANDS)
 _PUSH, _POP = 0xC0, 0xD0
 MOVX = (0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3)
+_LATE = (0x20, 0x30, 0xB5)  # JB, JNB, CJNE A,dir
 _CALLS = (0x12, *range(0x11, 0x100, 0x20))
 _RETURNS = (0x22, 0x32)
 
@@ -111,22 +113,33 @@ def written(cpu: Cpu, opcode: int, first: int, second: int) -> tuple[int, int, i
 def allowed(cpu: Cpu, opcode: int, first: int, second: int) -> bool:
     """Whether both machines must do the same with this instruction in this state."""
     for address in direct_addresses(opcode, first, second):
-        if address >= 0x80 and address not in COMPARED:
+        if address >= 0x80 and address not in COMPARED:  # absent-bits; count-down (T2MOD); serial-port (SBUF)
             return False
-    after = cpu.pc + LENGTH[opcode]
-    offset = (first if LENGTH[opcode] == 2 else second) if OPERANDS[opcode].endswith("rel") else 0
-    if after > 0xFFFF or not 0 <= after + (offset ^ 0x80) - 0x80 <= 0xFFFF:  # pc-wrap
+    if 0x10000 in _targets(cpu, opcode, first if LENGTH[opcode] == 2 else second):  # pc-wrap
         return False
     if opcode in MOVX and not cpu.sfr(P3) & (0x80 if opcode < 0xF0 else 0x40):  # movx-strobe
         return False
+    if opcode in _LATE and _running(cpu) and direct_addresses(opcode, first, second) in _TIMERS:  # late-read
+        return False
+    # stack-wrap
     if (opcode == _PUSH and cpu.sp == 0xFF) or (opcode in _CALLS and cpu.sp >= 0xFE):
         return False
     if (opcode == _POP and cpu.sp == 0x00) or (opcode in _RETURNS and cpu.sp <= 0x01):
         return False
+    # movc-wrap
     if (opcode == 0x83 and cpu.pc + 1 + cpu.a > 0xFFFF) or (opcode == 0x93 and cpu.dptr + cpu.a > 0xFFFF):
         return False
     target = written(cpu, opcode, first, second)
     return target is None or _may_write(cpu, opcode, *target)
+
+
+def _targets(cpu: Cpu, opcode: int, last: int) -> tuple[int, ...]:
+    """Where a relative branch or JMP @A+DPTR may go, before the sum is cut to 16 bits."""
+    if opcode == 0x73:
+        return (cpu.dptr + cpu.a,)
+    if OPERANDS[opcode].endswith("rel"):
+        return (((cpu.pc + LENGTH[opcode]) & 0xFFFF) + (last ^ 0x80) - 0x80,)
+    return ()
 
 
 def direct_addresses(opcode: int, first: int, second: int) -> tuple[int, ...]:
@@ -159,13 +172,16 @@ def _may_write(cpu: Cpu, opcode: int, address: int, value: int, a: int) -> bool:
     return _timers_agree(cpu, opcode, address, value) and not _interrupts(cpu, address, value)
 
 
+def _running(cpu: Cpu) -> bool:
+    return bool(cpu.sfr(TCON) & 0x50 or cpu.sfr(T2CON) & 0x04)
+
+
 def _timers_agree(cpu: Cpu, opcode: int, address: int, value: int) -> bool:
     """Whether timers that run after a write, or ran before, do the same on both machines."""
     tcon, tmod, t2con, tl0, tl1 = (
         value if address == register else cpu.sfr(register) for register in (TCON, TMOD, T2CON, TL0, TL1)
     )
-    running = (tcon | cpu.sfr(TCON)) & 0x50 or (t2con | cpu.sfr(T2CON)) & 0x04
-    if running and address in _TIMER and CYCLES[opcode] == 2:
+    if (_running(cpu) or tcon & 0x50 or t2con & 0x04) and address in _TIMER and CYCLES[opcode] == 2:
         return False  # early-write
     for started, mode, low in ((tcon & 0x10, tmod, tl0), (tcon & 0x40, tmod >> 4, tl1)):
         if started and (mode & 0x04 or (mode & 0x03 == 0 and low > 0x1F)):  # counted-edges, mode-0-low
@@ -174,7 +190,7 @@ def _timers_agree(cpu: Cpu, opcode: int, address: int, value: int) -> bool:
 
 
 def _interrupts(cpu: Cpu, address: int, value: int) -> bool:
-    """interrupt-timing: whether an enabled interrupt would be pending after a write."""
+    """interrupt-latency, -priority, -delay: whether an enabled interrupt would be pending after a write."""
     ie, tcon, scon, t2con = (
         value if address == register else cpu.sfr(register) for register in (IE, TCON, SCON, T2CON)
     )
@@ -185,4 +201,4 @@ def _interrupts(cpu: Cpu, address: int, value: int) -> bool:
         pending |= 0x20
     if tcon & 0x50 or t2con & 0x04:
         pending |= 0x2A  # sooner or later
-    return bool(ie & 0x80 and ie & pending)
+    return bool(ie & 0x80 and ie & pending)  # interrupt-latency, interrupt-priority, interrupt-delay

@@ -23,7 +23,7 @@ from tests.robot.ucsim import s51, states
 from tests.robot.ucsim.exclusions import COMPARED, P0
 from tests.robot.ucsim.walk import PROLOGUE, Step, Walk, Walker
 
-_ALIGN_P0 = "set mem sfr 0x80 0xff"
+_ALIGN_P0 = "set mem sfr 0x80 0xff"  # p0-after-movx
 _XRAM = "dump /b xram 0 65535"
 _P0_AT = COMPARED.index(P0)
 

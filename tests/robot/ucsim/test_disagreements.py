@@ -1,17 +1,21 @@
 """Each entry of `disagreements.py` shown on both machines, so that the list cannot go stale."""
 
 import re
+from pathlib import Path
 
 import pytest
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.xram import XramBus
 
 from tests.robot.mcs51.asm import assemble
-from tests.robot.ucsim import s51
-from tests.robot.ucsim.disagreements import DISAGREEMENTS
+from tests.robot.ucsim import exclusions, lockstep, s51
+from tests.robot.ucsim.disagreements import DISAGREEMENTS, table
+from tests.vectors.paths import VECTORS
 
+CPU_TESTS = Path(__file__).parents[1] / "mcs51"
 pytestmark = pytest.mark.skipif(not s51.installed(), reason="needs ucsim's s51")
 
+ISRS = "LJMP 40h\nORG 0003h\nSJMP 0003h\nORG 000Bh\nSJMP 000Bh\nORG 0040h\n"
 # name, program (a line: an instruction to execute), what is looked at, data sheet, ucsim (None: it stops)
 CASES = [
     ("bank-by-bit", "SETB RS0\nMOV R0,#55h", "iram 08", 0x55, 0x00),
@@ -23,13 +27,18 @@ CASES = [
     ("movc-wrap", "MOV DPTR,#0FFFFh\nMOV A,#1\nMOVC A,@A+DPTR", "sfr E0", 0x90, 0x00),
     ("level-interrupt", "CLR 0B2h\nNOP\nSETB 0B2h\nNOP", "sfr 88", 0x00, 0x02),
     ("early-write", "MOV TMOD,#1\nMOV TCON,#10h", "sfr 8A", 0x00, 0x01),
+    ("late-read", "MOV TMOD,#1\nSETB TR0\nMOV A,#2\nCJNE A,TL0,0Ah\nNOP", "sfr D0", 0x01, 0x81),
     ("counted-edges", "MOV TMOD,#4\nSETB TR0\nCLR 0B4h\nNOP\nNOP", "sfr 8A", 0x01, 0x00),
     ("mode-0-low", "MOV TL0,#0FEh\nSETB TR0\nNOP\nNOP", "sfr 8A", 0xE0, 0x00),
     ("timer-1-beside-mode-3", "MOV TMOD,#13h\nMUL AB", "sfr 8B", 0x04, 0x00),
     ("t2ex-memory", "CLR 91h\nNOP\nSETB 0CBh\nNOP", "sfr C8", 0x08, 0x48),
     ("absent-bits", "MOV IP,#0FFh", "sfr B8", 0x3F, 0xFF),
     ("serial-port", "MOV SCON,#80h\nMOV SBUF,#55h" + "\nMUL AB" * 10, "sfr 98", 0x80, 0x82),
-    ("interrupt-timing", "MOV IE,#82h\nSETB TF0", "pc", 0x0005, 0x000C),
+    ("count-down", "MOV T2MOD,#1\nMOV TL2,#10h\nCLR 91h\nSETB TR2\nNOP\nNOP", "sfr CC", 0x0E, 0x12),
+    ("interrupt-latency", "MOV IE,#82h\nSETB TF0", "pc", 0x0005, 0x000C),
+    # SP: the high one first and alone, or the low one first and the high one within it
+    ("interrupt-priority", ISRS + "MOV IP,#2\nMOV TCON,#23h\nMOV IE,#83h\nNOP\nNOP", "sfr 81", 0x09, 0x0B),
+    ("interrupt-delay", ISRS + "MOV IE,#2\nSETB TF0\nSETB EA\nINC 30h\nNOP\nNOP", "iram 30", 0x01, 0x00),
 ]
 
 
@@ -39,6 +48,24 @@ def steps_of(text: str) -> int:
 
 def test_every_disagreement_is_shown():
     assert [case[0] for case in CASES] == [entry.name for entry in DISAGREEMENTS]
+
+
+def test_the_readme_repeats_the_list():
+    readme = (VECTORS / "README.md").read_text()
+    assert table() in readme, "put there what `python -m tests.robot.ucsim.disagreements` prints"
+
+
+@pytest.mark.parametrize("entry", DISAGREEMENTS, ids=lambda entry: entry.name)
+def test_each_is_held_to_the_data_sheet_by_a_test_of_its_own(entry):
+    file, _, test = entry.held_by.partition("::")
+    assert f"\ndef {test}(" in (CPU_TESTS / file).read_text()
+
+
+def test_each_says_where_it_is_kept_out_of_the_comparison():
+    """The comments of `exclusions.py` and `lockstep.py` name the entry that a rule is there for."""
+    rules = Path(exclusions.__file__).read_text() + Path(lockstep.__file__).read_text()
+    comments = " ".join(re.findall(r"#(.*)", rules))
+    assert [entry.name for entry in DISAGREEMENTS if entry.name not in comments] == []
 
 
 @pytest.mark.parametrize(("name", "text", "place", "sheet", "_"), CASES, ids=[case[0] for case in CASES])

@@ -1,0 +1,92 @@
+"""C programs of SDCC on both machines: `python -m tests.robot.ucsim.compiled --instructions 20000000`.
+
+What belongs here: compiling `programs/`, running the same number of instructions on both, comparing at checkpoints:
+PC, cycles since the last one, all internal RAM, the registers both have, and the external RAM that is used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from miro_robot.image import load_hex
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.xram import XramBus
+
+from tests.robot.ucsim import s51
+from tests.robot.ucsim.exclusions import COMPARED, P0
+
+SOURCE = Path(__file__).with_name("programs") / "mix.c"
+MODELS = ("--model-small", "--model-large")
+STRIDE = 20_000  # instructions between checkpoints
+FAR_BYTES = 512  # of external RAM, all that the program uses
+
+
+def build(model: str, folder: Path) -> bytes:
+    """The program's code."""
+    image = folder / "mix.ihx"
+    subprocess.run(["sdcc", "-mmcs51", model, str(SOURCE), "-o", str(image)], check=True)
+    return load_hex(image, limit=65536).code
+
+
+def differences(code: bytes, checkpoints: int, stride: int = STRIDE) -> Iterator[str]:
+    """What differs at the first checkpoint where something does, a line each."""
+    step, dump = f"step {stride}", f"dump /b xram 0 {FAR_BYTES - 1}"
+    commands = ["fill iram 0 255 0", f"fill xram 0 {FAR_BYTES - 1} 0"]
+    commands += [step, *s51.OBSERVE[1:], dump] * checkpoints
+    reader = s51.Reader(s51.run(code, commands))
+    bus = XramBus(lambda *_: None, lambda *_: None)
+    cpu = Cpu(bus)
+    cpu.load(code)
+    for number in range(checkpoints):
+        begin = cpu.cycles
+        for _ in range(stride):
+            cpu.step()
+        seen = reader.observed(step)
+        found = list(_compared(cpu, cpu.cycles - begin, seen))
+        if bus.content()[:FAR_BYTES] != reader.raw(dump, FAR_BYTES):
+            found.append("external RAM")
+        if found:
+            yield f"checkpoint {number}: " + ", ".join(found)
+            return
+
+
+def _compared(cpu: Cpu, cycles: int, seen: s51.Observed) -> Iterator[str]:
+    if cpu.pc != seen.pc:
+        yield f"PC ours {cpu.pc:04X}h ucsim {seen.pc:04X}h"
+    if 12 * cycles != seen.ticks:
+        yield f"ticks ours {12 * cycles} ucsim {seen.ticks}"
+    for address in range(256):
+        if cpu.peek_iram(address) != seen.iram[address]:
+            yield f"internal RAM {address:02X}h ours {cpu.peek_iram(address):02X}h ucsim {seen.iram[address]:02X}h"
+    for address in COMPARED:
+        ours, theirs = cpu.sfr(address), seen.sfr[address - 0x80]
+        if address != P0 and ours != theirs:  # p0-after-movx
+            yield f"{address:02X}h ours {ours:02X}h ucsim {theirs:02X}h"
+
+
+def main() -> int:
+    """Prints figures; exit code 1 if anything differed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--instructions", type=int, default=20_000_000, help="of each program")
+    checkpoints = -(-parser.parse_args().instructions // STRIDE)
+    differing = 0
+    for model in MODELS:
+        begin = time.monotonic()
+        with tempfile.TemporaryDirectory() as folder:
+            found = list(differences(build(model, Path(folder)), checkpoints))
+        differing += bool(found)
+        print(
+            f"{SOURCE.name} {model}: {checkpoints * STRIDE} instructions, {checkpoints} checkpoints, ", end=""
+        )
+        print("; ".join(found) or f"no difference, {time.monotonic() - begin:.0f} s", flush=True)
+    return 1 if differing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
