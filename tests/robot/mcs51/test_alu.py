@@ -1,4 +1,7 @@
-"""Arithmetic, exhaustively: CRC-32 over every operand pair, as silicon documents and ucsim's s51 agree on them."""
+"""Arithmetic, exhaustively: CRC-32 over every operand pair, as silicon documents and ucsim's s51 agree on them.
+
+4316E is Atmel's 8051 Hardware Manual.
+"""
 
 import zlib
 
@@ -38,20 +41,24 @@ def signatures(opcodes: str, carry: int, registers=("a", "psw"), skip_zero=False
     ],
 )
 def test_sums_and_differences_have_the_reference_signature(text, carry, expected):
+    """4316E, instruction set: CY, AC, OV of ADD, ADDC and SUBB, all operands."""
     assert signatures(text, carry) == expected
 
 
 @PAIRS_ONLY_COMPILED
 def test_products_have_the_reference_signature():
+    """4316E, instruction set: MUL gives B:A, CY = 0, OV for more than 255."""
     assert signatures("MUL AB", 0, ("a", "b", "psw")) == ["06C7FCB6", "978D00AF", "15568B59"]
 
 
 @PAIRS_ONLY_COMPILED
 def test_quotients_have_the_reference_signature():
+    """4316E, instruction set: DIV gives quotient and remainder, CY = OV = 0."""
     assert signatures("DIV AB", 0, ("a", "b", "psw"), skip_zero=True) == ["6D508E27", "7FAEE11D", "94780F82"]
 
 
 def test_decimal_adjust_has_the_reference_signature():
+    """4316E, instruction set: DA in two steps, CY is never cleared, AC and OV stay."""
     cpu = cpu_with("DA A")
     values, flags = bytearray(), bytearray()
     for cy, ac in ((0, 0), (0, 1), (1, 0), (1, 1)):
@@ -65,6 +72,7 @@ def test_decimal_adjust_has_the_reference_signature():
 
 
 def test_division_by_zero_keeps_a_and_b_and_sets_ov():
+    """4316E, instruction set: OV = 1, CY = 0; A and B are undefined on silicon, chosen: unchanged."""
     cpu = cpu_with("DIV AB")
     cpu.a, cpu.b, cpu.cy = 0x55, 0, 1
     cpu.step()
@@ -73,6 +81,7 @@ def test_division_by_zero_keeps_a_and_b_and_sets_ov():
 
 @pytest.mark.parametrize("text", ["MUL AB", "DIV AB"])
 def test_multiplication_and_division_leave_ac_alone(text):
+    """4316E, instruction set: AC untouched by MUL and DIV."""
     cpu = cpu_with(text)
     cpu.ac = 1
     cpu.step()

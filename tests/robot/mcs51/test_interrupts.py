@@ -1,4 +1,7 @@
-"""Interrupts: latency to the cycle, priorities, what blocks them, what clears them."""
+"""Interrupts: latency to the cycle, priorities, what blocks them, what clears them.
+
+4316E is Atmel's 8051 Hardware Manual.
+"""
 
 import pytest
 
@@ -56,6 +59,7 @@ def padded(instruction, event):
 
 
 def test_an_edge_is_answered_three_cycles_after_its_sample():
+    """4316E section 2.16: latched in n, polled in n + 1, LCALL in n + 2 and n + 3, routine in n + 4."""
     cpu = ran(padded("NOP\nNOP\nNOP", 20), [(INT0_LOW, 20)])
     assert entries(cpu) == [(0, 24)]
 
@@ -73,11 +77,15 @@ def test_an_edge_is_answered_three_cycles_after_its_sample():
     ],
 )
 def test_latency_is_three_to_eight_full_cycles(instruction, full_cycles):
+    """4316E section 2.16: + 1 for the rest of an instruction of two cycles, + 3 for MUL and DIV, and one more
+    instruction after a write to IE or IP.
+    """
     cpu = ran(padded(instruction, 20), [(INT0_LOW, 20)])
     assert entries(cpu) == [(0, 20 + full_cycles + 1)]
 
 
 def test_reti_lets_one_more_instruction_run():
+    """4316E section 2.16."""
     cpu = cpu_with(
         """
         LJMP main
@@ -99,18 +107,21 @@ def test_reti_lets_one_more_instruction_run():
 
 
 def test_reading_ie_does_not_block():
+    """4316E section 2.16: the manuals differ; chosen: writes block, reads do not."""
     cpu = ran(padded("MOV A,IE\nNOP\nNOP", 20), [(INT0_LOW, 20)])
     assert entries(cpu) == [(0, 24)]
 
 
 @pytest.mark.parametrize(("ip", "order"), [(0x00, [0, 2]), (0x04, [2, 0]), (0x01, [0, 2]), (0x05, [0, 2])])
 def test_of_two_at_once_the_priority_decides_and_then_the_polling_order(ip, order):
+    """4316E section 2.16."""
     body = f"MOV IP,#{ip:02X}h\nSETB IT0\nSETB IT1\nMOV IE,#85h\n" + "NOP\n" * 60
     cpu = ran(body, [(BOTH_LOW, 30)])
     assert [bit for bit, _ in entries(cpu)] == order
 
 
 def test_a_high_one_interrupts_a_low_one_before_its_first_instruction():
+    """4316E section 2.16."""
     body = "MOV IP,#04h\nSETB IT0\nSETB IT1\nMOV IE,#85h\n" + "NOP\n" * 60
     cpu = ran(
         body, [(INT0_LOW, 30), (BOTH_LOW, 31)]
@@ -120,12 +131,14 @@ def test_a_high_one_interrupts_a_low_one_before_its_first_instruction():
 
 
 def test_a_low_one_does_not_interrupt_a_low_one():
+    """4316E section 2.16: two in-service flip-flops."""
     body = "SETB IT0\nSETB IT1\nMOV IE,#85h\n" + "NOP\n" * 60
     cpu = ran(body, [(INT0_LOW, 30), (BOTH_LOW, 33)])
     assert entries(cpu) == [(0, 34), (2, 40)]  # RETI, one NOP, LCALL
 
 
 def test_an_edge_flag_sticks_and_is_cleared_by_the_vector():
+    """4316E section 2.16."""
     cpu = ran("SETB IT0\n" + "NOP\n" * 60, [(INT0_LOW, 10), (0xFF, 12)], 50)
     assert sfr(cpu, "TCON") == 0x03
     cpu = ran("SETB IT0\nMOV IE,#81h\n" + "NOP\n" * 60, [(INT0_LOW, 10), (0xFF, 12)], 50)
@@ -134,12 +147,14 @@ def test_an_edge_flag_sticks_and_is_cleared_by_the_vector():
 
 
 def test_a_level_flag_follows_the_pin_both_ways():
+    """4316E section 2.16: IEx is the inverted pin at each S5P2."""
     body = "NOP\n" * 60
     assert sfr(ran(body, [(INT0_LOW, 10)], 20), "TCON") == 0x02
     assert sfr(ran(body, [(INT0_LOW, 10), (0xFF, 15)], 20), "TCON") == 0x00
 
 
 def test_a_level_that_went_away_before_it_was_polled_is_forgotten():
+    """4316E section 2.16."""
     body = "MOV IE,#81h\n" + "NOP\n" * 16 + "MUL AB\n" + "NOP\n" * 60  # MUL in cycles 20..23
     assert entries(ran(body, [(INT0_LOW, 19), (0xFF, 22)])) == []
     assert entries(ran(body, [(INT0_LOW, 19), (0xFF, 23)])) == [(0, 26)]
@@ -151,10 +166,13 @@ def test_a_level_still_low_comes_again_after_one_instruction():
     assert sfr(cpu, "TCON") & 0x02
 
 
-def test_a_flag_set_by_software_vectors_after_one_more_instruction():
-    cpu = ran("MOV IE,#82h\nNOP\nSETB TF0\nINC 30h\nINC 30h\nINC 30h\n" + "NOP\n" * 20, [], 12)
-    assert entries(cpu) == [] or entries(cpu)[0][0] == 1
-    assert cpu.peek_iram(0x30) in (1, 2)
+def test_a_flag_set_by_software_is_answered_as_one_that_hardware_sets_in_the_next_cycle():
+    """Chosen, no sheet gives the delay: SETB TF0 ends with cycle 5, so that S5P2 of cycle 6 sees the flag; polled in
+    7, LCALL in 8 and 9. The two instructions of cycles 6 and 7 still run, and CLR P1.1 in 10.
+    """
+    cpu = ran("MOV IE,#82h\nNOP\nSETB TF0\nINC 30h\nINC 30h\nINC 30h\n" + "NOP\n" * 20, [], 11)
+    assert entries(cpu) == [(1, 10)]
+    assert cpu.peek_iram(0x30) == 2
 
 
 @pytest.mark.parametrize(
@@ -171,6 +189,7 @@ def test_a_flag_set_by_software_vectors_after_one_more_instruction():
     ],
 )
 def test_every_source_has_its_vector(name, ie, flag):
+    """4316E section 2.16."""
     cpu = cpu_with(ISRS + f"MOV IE,#{ie:02X}h\n{flag}\n" + "NOP\n" * 20)
     assert cpu.run_until_pc(VECTORS[name], 60) == 2
 
@@ -187,6 +206,7 @@ def test_every_source_has_its_vector(name, ie, flag):
     ],
 )
 def test_hardware_clears_timer_flags_only(ie, flag, name, left):
+    """4316E section 2.16."""
     cpu = cpu_with(ISRS + f"MOV IE,#{ie:02X}h\n{flag}\n" + "NOP\n" * 20)
     cpu.run(9)  # within the routine
     assert cpu.sp == 9
@@ -194,6 +214,7 @@ def test_hardware_clears_timer_flags_only(ie, flag, name, left):
 
 
 def test_exf2_does_not_interrupt_while_timer_2_counts_up_and_down():
+    """4316E section 2.16."""
     cpu = cpu_with(ISRS + "MOV T2MOD,#01h\nMOV IE,#0A0h\nSETB EXF2\n" + "NOP\n" * 20)
     assert cpu.run_until_pc(VECTORS["T2"], 40) == 0
 
@@ -203,6 +224,7 @@ def test_without_ea_nothing_happens():
 
 
 def test_ret_ends_no_interrupt_but_reti_does():
+    """4316E section 2.16."""
     text = "LJMP main\nORG 0003h\nINC 30h\n{}\nORG 0040h\nmain:\nMOV IE,#81h\nloop:\nSJMP loop"
     for ending, runs in (("RET", {1}), ("RETI", set(range(10, 100)))):
         cpu = cpu_with(text.format(ending))

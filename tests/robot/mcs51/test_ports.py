@@ -1,4 +1,7 @@
-"""Ports: latches, pins, and which instruction sees which."""
+"""Ports: latches, pins, and which instruction sees which.
+
+4316E is Atmel's 8051 Hardware Manual.
+"""
 
 import pytest
 
@@ -32,6 +35,7 @@ def with_p1_held(text, steps):
     ],
 )
 def test_read_modify_write_reads_the_latch(text, latch):
+    """4316E, instruction set and section 2.5."""
     assert sfr(with_p1_held(text, 1), "P1") == latch
 
 

@@ -1,5 +1,6 @@
-"""Timer 2: the cycle in which T2EX and T2 act, calculated by hand from the sheet. Sections are of the AT89C52
-fact sheet that the modules cite; section 8 stands for 4316E section 2.12 and 1919D sections 10 to 12."""
+"""Timer 2: the cycle in which T2EX and T2 act, calculated by hand from the sheet. 4316E is Atmel's 8051 Hardware
+Manual, 1919D the AT89S52 data sheet, whose sections 10 to 12 have timer 2 too.
+"""
 
 import pytest
 
@@ -25,41 +26,47 @@ def at(cpu, cycle, *names):
 
 @pytest.mark.parametrize("mode", [CAPTURE, RELOAD, BAUD])
 def test_exf2_is_up_after_the_cycle_that_follows_the_sample(mode):
-    """Sections 1 and 8: T2EX is sampled at S5P2, a fall is between two samples, and the next cycle acts on it."""
+    """4316E sections 2.4 and 2.12: T2EX is sampled at S5P2, a fall is between two samples, and the next cycle
+    acts on it.
+    """
     cpu = falling(20, f"MOV T2CON,#{mode | EXEN2:02X}h\n")
     assert at(cpu, 20, "T2CON") == at(cpu, 21, "T2CON") == (mode | EXEN2,)
     assert at(cpu, 22, "T2CON") == (mode | EXEN2 | 0x40,)
 
 
 def test_a_capture_takes_the_count_of_the_cycle_before():
-    """Section 8: capture copies TH2:TL2 when T2EX falls; TR2 set at the end of cycle 1 counts from 2 on."""
+    """4316E section 2.12: capture copies TH2:TL2 when T2EX falls; TR2 set at the end of cycle 1 counts from 2
+    on.
+    """
     cpu = falling(20, f"MOV T2CON,#{CAPTURE | EXEN2 | TR2:02X}h\n")
     assert at(cpu, 21, "TL2", "RCAP2L") == (19, 0)
     assert at(cpu, 22, "TL2", "RCAP2L") == (20, 19)
 
 
 def test_a_reload_by_t2ex_goes_before_the_count_of_its_cycle():
-    """Section 8: with CP/RL2 = 0 a fall of T2EX loads RCAP2."""
+    """4316E section 2.12: with CP/RL2 = 0 a fall of T2EX loads RCAP2."""
     cpu = falling(20, f"MOV RCAP2L,#80h\nMOV T2CON,#{RELOAD | EXEN2 | TR2:02X}h\n")
     assert at(cpu, 21, "TL2") == (17,)
     assert at(cpu, 22, "TL2") == (0x81,)
 
 
 def test_without_exen2_t2ex_does_nothing():
-    """Section 8: EXEN2 = 0 makes timer 2 ignore T2EX."""
+    """4316E section 2.12: EXEN2 = 0 makes timer 2 ignore T2EX."""
     cpu = falling(20, f"MOV RCAP2L,#80h\nMOV T2CON,#{TR2:02X}h\n")
     assert at(cpu, 30, "TL2", "T2CON") == (26, TR2)
 
 
 @pytest.mark.parametrize(("written_in", "flag"), [(19, 0x40), (20, 0x40), (21, 0x00), (22, 0x00)])
 def test_exen2_counts_as_it_stands_in_the_cycle_that_acts(written_in, flag):
-    """Section 1: a register changes at the end of its instruction, so a write in the sample's own cycle counts."""
+    """4316E section 2.4: a register changes at the end of its instruction, so a write in the sample's own
+    cycle counts.
+    """
     cpu = falling(20, "NOP\n" * written_in + "SETB 0CBh\n")
     assert at(cpu, 40, "T2CON") == (EXEN2 | flag,)
 
 
 def test_a_read_in_the_cycle_of_the_sample_does_not_see_exf2_yet():
-    """Section 8."""
+    """4316E section 2.12."""
     for reader, seen in ((20, EXEN2), (21, EXEN2 | 0x40)):
         cpu = falling(20, "MOV T2CON,#08h\n" + "NOP\n" * (reader - 2) + "MOV A,T2CON\n")
         cpu.run(reader + 1)
@@ -67,22 +74,24 @@ def test_a_read_in_the_cycle_of_the_sample_does_not_see_exf2_yet():
 
 
 def test_exf2_is_answered_a_cycle_later_than_an_external_interrupt():
-    """Section 6: latched in cycle n, first ISR cycle n + 4. The sample of cycle 20 sets EXF2 in cycle 21 (chosen:
-    it is latched at S5P2 of that cycle), so the routine begins in cycle 25 - where INT0 would begin in 24."""
+    """4316E section 2.16: latched in cycle n, first ISR cycle n + 4. The sample of cycle 20 sets EXF2 in
+    cycle 21 (chosen: it is latched at S5P2 of that cycle), so the routine begins in cycle 25 - where INT0
+    would begin in 24.
+    """
     cpu = falling(20, "LJMP main\nORG 002Bh\nSJMP $\nORG 0040h\nmain:\nMOV IE,#0A0h\nMOV T2CON,#08h\n")
     assert cpu.run_until_pc(0x2B, 100) == 2
     assert cpu.cycles == 25
 
 
 def test_counter_mode_counts_in_the_cycle_after_the_sample():
-    """Sections 7 and 8: a fall of T2 between two samples is counted in the following cycle."""
+    """4316E sections 2.9 and 2.12: a fall of T2 between two samples is counted in the following cycle."""
     cpu = falling(20, "MOV T2CON,#06h\n", T2_LOW)
     assert at(cpu, 21, "TL2") == (0,)
     assert at(cpu, 22, "TL2") == (1,)
 
 
 def test_a_counter_that_overflows_reloads_and_flags():
-    """Section 8: overflow loads RCAP2 and sets TF2."""
+    """4316E section 2.12: overflow loads RCAP2 and sets TF2."""
     cpu = falling(
         20, "MOV TL2,#0FFh\nMOV TH2,#0FFh\nMOV RCAP2L,#34h\nMOV RCAP2H,#12h\nMOV T2CON,#06h\n", T2_LOW
     )
@@ -90,7 +99,7 @@ def test_a_counter_that_overflows_reloads_and_flags():
 
 
 def test_capture_mode_overflows_to_zero():
-    """Section 8: in capture mode RCAP2 is not loaded; TF2 is set all the same."""
+    """4316E section 2.12: in capture mode RCAP2 is not loaded; TF2 is set all the same."""
     setup = "MOV TL2,#0F0h\nMOV TH2,#0FFh\nMOV RCAP2L,#34h\nMOV T2CON,#05h\n"  # counts from cycle 8 on
     cpu = cpu_with(setup + "NOP\n" * 40)
     assert at(cpu, 8 + 15, "TH2", "TL2", "T2CON") == (0xFF, 0xFF, 0x05)
@@ -98,7 +107,7 @@ def test_capture_mode_overflows_to_zero():
 
 
 def test_auto_reload_has_the_period_of_its_reload_value():
-    """Section 8: 65536 - RCAP2 cycles from overflow to overflow."""
+    """4316E section 2.12: 65536 - RCAP2 cycles from overflow to overflow."""
     setup = "MOV TL2,#0FFh\nMOV TH2,#0FFh\nMOV RCAP2L,#9Ch\nMOV RCAP2H,#0FFh\nMOV T2CON,#04h\n"  # from 10 on
     cpu = cpu_with("LJMP main\nORG 0040h\nmain:\n" + setup + "loop:\nSJMP loop")
     flags = []
@@ -113,8 +122,9 @@ def test_auto_reload_has_the_period_of_its_reload_value():
 
 
 def test_dcen_counts_down_to_rcap2_and_then_from_ffff():
-    """Section 8: with DCEN and T2EX low it counts down; where TH2:TL2 equals RCAP2 it underflows to FFFF, sets TF2
-    and toggles EXF2."""
+    """4316E section 2.12: with DCEN and T2EX low it counts down; where TH2:TL2 equals RCAP2 it underflows to
+    FFFF, sets TF2 and toggles EXF2.
+    """
     setup = "MOV T2MOD,#01h\nMOV TL2,#05h\nMOV TH2,#10h\nMOV RCAP2L,#03h\nMOV RCAP2H,#10h\nMOV T2CON,#04h\n"
     cpu = cpu_with(setup + "NOP\n" * 40)
     cpu.set_external(1, T2EX_LOW, 0)
@@ -129,7 +139,7 @@ def test_dcen_counts_down_to_rcap2_and_then_from_ffff():
 
 
 def test_dcen_counts_up_while_t2ex_is_high_and_each_overflow_toggles_exf2():
-    """Section 8: up at T2EX = 1, overflow at FFFF loads RCAP2."""
+    """4316E section 2.12: up at T2EX = 1, overflow at FFFF loads RCAP2."""
     setup = (
         "MOV T2MOD,#01h\nMOV TL2,#0FFh\nMOV TH2,#0FFh\nMOV RCAP2L,#0FEh\nMOV RCAP2H,#0FFh\nMOV T2CON,#04h\n"
     )
@@ -139,7 +149,7 @@ def test_dcen_counts_up_while_t2ex_is_high_and_each_overflow_toggles_exf2():
 
 
 def test_dcen_follows_t2ex_from_the_cycle_after_the_sample():
-    """Sections 1 and 8: the direction is that of the last sample."""
+    """4316E sections 2.4 and 2.12: the direction is that of the last sample."""
     cpu = falling(20, "MOV T2MOD,#01h\nMOV TL2,#40h\nMOV T2CON,#04h\n")  # counts from cycle 6 on
     assert at(cpu, 21, "TL2") == (0x40 + 15,)
     assert at(cpu, 22, "TL2") == (0x40 + 14,)
@@ -147,7 +157,7 @@ def test_dcen_follows_t2ex_from_the_cycle_after_the_sample():
 
 @pytest.mark.parametrize("which", [0x20, 0x10])
 def test_as_a_baud_generator_it_counts_six_times_a_cycle_and_sets_no_tf2(which):
-    """Section 8: fosc/2 with RCLK or TCLK, reloading from RCAP2, no TF2."""
+    """4316E section 2.12: fosc/2 with RCLK or TCLK, reloading from RCAP2, no TF2."""
     cpu = cpu_with(f"MOV RCAP2L,#0F0h\nMOV RCAP2H,#0FFh\nMOV T2CON,#{which | 0x04:02X}h\n" + "NOP\n" * 11000)
     assert at(cpu, 6 + 10, "TL2") == (60,)
     cpu.run(6 + 65536 // 6 + 8)  # 65536 counts are 10922 cycles and 4 counts
@@ -158,7 +168,7 @@ def test_as_a_baud_generator_it_counts_six_times_a_cycle_and_sets_no_tf2(which):
 
 @pytest.mark.parametrize("reload", [0xFFF4, 0xFFE8])
 def test_clock_out_toggles_p1_0_every_65536_minus_rcap2_counts(reload):
-    """Section 8: fosc / (4 * (65536 - RCAP2)); counts are two ticks, and a period has two overflows."""
+    """4316E section 2.12: fosc / (4 * (65536 - RCAP2)); counts are two ticks, and a period has two overflows."""
     setup = (
         f"MOV T2MOD,#02h\nMOV RCAP2L,#{reload & 0xFF:02X}h\nMOV RCAP2H,#0FFh\nMOV TL2,#{reload & 0xFF:02X}h\n"
     )

@@ -1,0 +1,152 @@
+"""Compiled and uncompiled in lockstep on the real firmware: `python -m tests.sim.engines --instructions 1000000`.
+
+What belongs here: two processes, one an engine each, that run the same worlds (robot, LM629, drive, radio, pilot) and
+print a hash of the whole state at every checkpoint; and the comparison, line by line, while they run. Only instructions
+that were executed count: the firmware sleeps most of the time. A scenario that ends goes on with the next seed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import itertools
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from miro_protocol import engine
+
+STRIDE_TICKS = 100_003
+"""Between checkpoints, 4 ms: eight a control period, and never at the same place of one."""
+ROOT = Path(__file__).parents[2]
+
+
+class Checkpoint(NamedTuple):
+    """What a world was at a tick; counts are since the first world's begin."""
+
+    seed: int
+    tick: int
+    instructions: int
+    frames: int  # accepted by the firmware
+    commands: int  # completed by both LM629
+    sent: int  # bytes that the robot put on its TXD
+    sha256: str
+
+    def line(self) -> str:
+        return " ".join(str(field) for field in self)
+
+
+def parse(line: str) -> Checkpoint:
+    *numbers, sha256 = line.split()
+    return Checkpoint(*map(int, numbers), sha256)  # type: ignore[arg-type]
+
+
+def run(instructions: int, scenario: str) -> Iterator[Checkpoint]:
+    """Worlds of seed 0, 1, .. in this process's engine, until so many instructions were executed."""
+    from miro_robot.firmware import image_path
+    from miro_robot.image import load_hex
+    from miro_sim import scenario_file
+    from miro_sim.canonical import encode
+    from miro_sim.world import World
+
+    image = load_hex(image_path())
+    read = scenario_file.load(scenario).scenario
+    done, frames, commands, sent = 0, 0, 0, 0
+    for seed in itertools.count():
+        world = World(read, seed, image)
+        robot = world.networks[0].robots[0]
+        tick, executed, accepted = 0, 0, 0
+        period = -1
+        while not world.finished and done + executed < instructions:
+            tick += STRIDE_TICKS
+            world.run_to(tick)
+            if world.index != period and world.last is not None:
+                period = world.index
+                commands += sum(
+                    len(axis.commands) for axis in (world.last.robots[0].left, world.last.robots[0].right)
+                )
+                sent += sum(len(run.data) for run in world.last.wire if run.direction == "<")
+            executed = robot.board.cpu.instructions
+            accepted = robot.counter(0) or 0
+            sha256 = hashlib.sha256(encode(world.snapshot())).hexdigest()
+            yield Checkpoint(seed, tick, done + executed, frames + accepted, commands, sent, sha256)
+        done += executed
+        frames += accepted
+        if done >= instructions:
+            return
+
+
+def processes(instructions: int, scenario: str) -> tuple[subprocess.Popen[str], subprocess.Popen[str]]:
+    """One for each engine; they print checkpoints."""
+    first, second = (
+        subprocess.Popen(
+            [sys.executable, "-m", "tests.sim.engines", "--engine", name, "--scenario", scenario]
+            + ["--instructions", str(instructions)],
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+        )
+        for name in engine.ENGINES
+    )
+    return first, second
+
+
+def compare(compiled: Iterable[str], python: Iterable[str]) -> Iterator[Checkpoint]:
+    """The checkpoints that both print alike. Raises AssertionError at the first that differs."""
+    for ours, theirs in itertools.zip_longest(compiled, python):
+        assert ours == theirs, f"the engines part:\ncompiled {ours}python   {theirs}"
+        yield parse(ours)
+
+
+def lockstep(instructions: int, scenario: str = "fig6") -> Iterator[Checkpoint]:
+    """Both engines over so many instructions. Raises AssertionError where they part, or when one of them fails."""
+    pair = processes(instructions, scenario)
+    try:
+        assert pair[0].stdout is not None
+        assert pair[1].stdout is not None
+        yield from compare(pair[0].stdout, pair[1].stdout)
+        assert [process.wait() for process in pair] == [0, 0]
+    finally:
+        for process in pair:
+            process.kill()
+            process.wait()
+
+
+def main() -> int:
+    """Prints figures; exit code 1 if the engines part."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--instructions", type=int, default=1_000_000, help="to execute, at least")
+    parser.add_argument("--scenario", default="fig6", help="built-in scenario or file")
+    parser.add_argument("--engine", choices=engine.ENGINES, help="print this engine's checkpoints only")
+    options = parser.parse_args()
+    if options.engine:
+        engine.select(options.engine)
+        for checkpoint in run(options.instructions, options.scenario):
+            print(checkpoint.line(), flush=True)
+        return 0
+    begin = time.monotonic()
+    count, last = 0, None
+    try:
+        for last in lockstep(options.instructions, options.scenario):
+            count += 1
+            if count % 20 == 0:
+                shown = f"\r{last.instructions} of {options.instructions} instructions "
+                print(shown, end="", file=sys.stderr, flush=True)
+    except AssertionError as error:
+        print(f"\n{error}")
+        return 1
+    print(file=sys.stderr)
+    assert last is not None
+    print(
+        f"{options.scenario}: equal state hashes at {count} checkpoints over {last.instructions} instructions, "
+        f"{last.frames} frames accepted, {last.commands} LM629 commands, {last.sent} bytes sent, "
+        f"{time.monotonic() - begin:.0f} s"
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
