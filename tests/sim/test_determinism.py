@@ -13,11 +13,34 @@ from miro_robot.image import load_hex
 from miro_sim import scenario_file
 from miro_sim.canonical import encode
 from miro_sim.clock import CONTROL_PERIOD_TICKS
+from miro_sim.profiles import profiles
 from miro_sim.world import World
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 GOLDEN = Path(__file__).parents[1] / "vectors" / "digests.json"
 SEED = 7
+SHORT_RADIO = """
+name = "short"
+duration_s = 0.1
+
+[[network]]
+radio.profile = "{profile}"
+
+[[network.robot]]
+slot = 0
+reference.kind = "line"
+
+[[network.robot]]
+slot = 2
+reference.kind = "arc"
+
+[[network]]
+radio.profile = "{profile}"
+
+[[network.robot]]
+slot = 1
+reference.kind = "line"
+"""
 
 
 def short_scenario(folder, name="fig6", duration_s=0.5):
@@ -120,3 +143,15 @@ def test_a_world_saved_anywhere_and_loaded_elsewhere_goes_on_with_the_same_bits(
         second.run_to(period * CONTROL_PERIOD_TICKS)
         assert encode(second.snapshot()) == encode(first.snapshot())
     assert second.digest == first.digest
+
+
+@pytest.mark.parametrize("profile", sorted(profiles()))
+@pytest.mark.parametrize("seed", [0, 1, 7])
+def test_every_radio_profile_gives_one_digest_however_the_run_is_cut(profile, seed):
+    text = SHORT_RADIO.format(profile=profile)
+    worlds = [World(scenario_file.parse(text, "short"), seed, load_hex(image_path())) for _ in range(2)]
+    worlds[0].step()
+    for tick in range(8192, CONTROL_PERIOD_TICKS, 8192):
+        worlds[1].run_to(tick)
+    worlds[1].step()
+    assert worlds[0].digest == worlds[1].digest

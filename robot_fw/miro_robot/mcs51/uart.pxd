@@ -68,5 +68,5 @@ cdef class Uart:
     cdef void _act(self, long long now) noexcept
     @cython.locals(tick='long long', last=int)
     cdef void _deliver(self) noexcept
-    @cython.locals(fall='long long')
+    @cython.locals(fall='long long', before='long long')
     cpdef long long ri_tick(self) noexcept

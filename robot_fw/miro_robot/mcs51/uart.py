@@ -290,7 +290,12 @@ class Uart:
             return self.rx_next + (9 * _ROLLOVERS + _ACTION - self.rx_count) * self.rx_period
         if not self.scon & _REN or not self.latch & 1:
             return _FAR
-        fall = self.rxd.next_edge(self.rx_next - self.rx_period)
+        before = self.rx_next - self.rx_period
+        fall = self.rxd.next_edge(before)
+        if self.rx_last and not self.rxd.level_at(before):
+            fall = (
+                self.rx_next
+            )  # it fell while another clock was running, or none: the next 16x tick finds it
         if fall > self.rxd.settled_tick:
             fall = self.rxd.settled_tick
         if fall < self.rx_next:

@@ -385,3 +385,27 @@ class _Twin:
             self.uart.clock_rx(now, self.level)
         if tx:
             self.uart.clock_tx(now)
+
+
+def asleep_with_a_start_bit_at(fall: int, cuts: int) -> Cpu:
+    """Starts the baud rate by timer 2 while RXD may fall any moment, sleeps, and counts what it received."""
+    cpu = cpu_with(
+        "LJMP main\nORG 23h\nCLR RI\nINC 30h\nRETI\nmain:\nMOV RCAP2H,#FFh\nMOV RCAP2L,#B2h\nMOV TH2,#FFh\n"
+        "MOV TL2,#B2h\nMOV SCON,#50h\nMOV IE,#90h\nMOV T2CON,#34h\nagain:\nORL PCON,#01h\nSJMP again"
+    )
+    cpu.rxd.append(0, 1)
+    cpu.rxd.append(fall, 0)
+    cpu.rxd.append(fall + 2496, 1)
+    cpu.rxd.settled_tick = 1 << 40
+    while cpu.cycles < 3000:
+        cpu.run(min(cpu.cycles + cuts, 3000))
+    return cpu
+
+
+@pytest.mark.parametrize("fall", range(1, 600, 7))
+def test_a_start_bit_around_a_change_of_clock_wakes_a_sleeper_however_the_run_is_cut(fall):
+    """The bound that lets a sleeping CPU jump must not overlook a fall between the last tick of the old 16x clock and
+    the first one of the new."""
+    whole, cut = asleep_with_a_start_bit_at(fall, 3000), asleep_with_a_start_bit_at(fall, 10)
+    assert whole.peek_iram(0x30) == cut.peek_iram(0x30)
+    assert whole.snapshot() == cut.snapshot()
