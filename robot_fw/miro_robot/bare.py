@@ -133,7 +133,9 @@ class BareMachine:
     def _halted(self) -> bool:
         """Nothing is being sent or waits to be received, and no instruction will ever change a thing."""
         cpu = self.cpu
-        if self.fed < len(self.stdin) or 12 * cpu.cycles < self.char_end or cpu.chip.uart.ti_tick() < FAR:
+        unread = cpu.sfr(0x98) & _RI or not cpu.chip.bit_ticks()  # then no further character will be sent
+        coming = self.fed < len(self.stdin) and not unread
+        if coming or 12 * cpu.cycles < self.char_end or cpu.chip.uart.ti_tick() < FAR:
             return False
         if cpu.asleep():
             return True

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from miro_robot.image import Image
+from miro_robot.image import Image, ImageError
 from miro_robot.mcs51.opcodes import LENGTH
 
 _CDB_LINE = re.compile(r"^L:C\$([^$]+)\$(\d+)\$\w+\$\w+:([0-9A-F]+)$", re.MULTILINE)
@@ -24,7 +24,7 @@ _CDB_END = re.compile(r"^L:X(G|F\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]+)$", re.MULTILIN
 _MAP_MODULE = re.compile(r"^(\S+)\.rel\s+\[", re.MULTILINE)
 _MAP_CONSTANTS = re.compile(r"^(?:CONST|XINIT)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) =", re.MULTILINE)
 _RST_LINE = re.compile(r"^\s*\d+ ;\t([^\s:]+\.\w+):(\d+): ")
-_RST_CODE = re.compile(r"^ {6}([0-9A-F]{6}) [0-9A-F]{2}[ \n]")
+_RST_CODE = re.compile(r"^ {6}([0-9A-F]{6})((?: [0-9A-F]{2})+) +(\[\d+\])?")
 
 
 class SourceLine(msgspec.Struct, frozen=True, order=True):
@@ -48,7 +48,8 @@ class Function(msgspec.Struct, frozen=True):
 
 class DebugInfo:
     """Lines and functions of one image. `lines`: (address, line) of each place where a line's code begins, by address.
-    `constants`: (first, end) of code memory that holds tables instead of instructions.
+    `constants`: (first, end) of code memory that holds tables instead of instructions. `symbols`: places where
+    something with a name begins, and so the line before it ends.
     """
 
     def __init__(
@@ -56,17 +57,22 @@ class DebugInfo:
         lines: Iterable[tuple[int, SourceLine]] = (),
         functions: Iterable[Function] = (),
         constants: Iterable[tuple[int, int]] = (),
+        symbols: Iterable[int] = (),
     ) -> None:
         last_of_place = dict(lines)  # two lines at one place: the later one owns the code
         self.lines = sorted(last_of_place.items())
         self.functions = sorted(functions, key=lambda function: function.first)
         self.constants = tuple(constants)
+        self._symbols = sorted(symbols)
         self._starts = [address for address, _ in self.lines]
         self._function_starts = [function.first for function in self.functions]
 
     @classmethod
     def of(cls, image: Image) -> DebugInfo:
-        """From the files beside the image; what is missing contributes nothing."""
+        """From the files beside the image; what is missing contributes nothing.
+
+        Raises ImageError for a listing whose bytes are not the image's.
+        """
         cdb = _text(image.path.with_suffix(".cdb"))
         link_map = _text(image.path.with_suffix(".map"))
         constants = [
@@ -74,8 +80,16 @@ class DebugInfo:
             for first, size in dict.fromkeys(_MAP_CONSTANTS.findall(link_map))
             if int(size, 16)
         ]
-        lines = list(_listing_lines(image.path, link_map)) or list(_cdb_lines(cdb))
-        return cls(lines, _cdb_functions(cdb, image.code), constants)
+        listed = [
+            found for listing in _listings(image.path, link_map) for found in _read_listing(listing, image)
+        ]
+        lines = [(address, line) for address, _, line in listed if line is not None]
+        tables = [(address, end) for address, end, line in listed if line is None]
+        known = {_name(line.file) for _, line in lines}
+        lines += [(address, line) for address, line in _cdb_lines(cdb) if _name(line.file) not in known]
+        paths = {_name(line.file): line.file for _, line in lines}
+        symbols = [symbol.address for symbol in image.symbols.names.values() if symbol.space == "code"]
+        return cls(lines, _cdb_functions(cdb, image.code, paths), [*constants, *tables], symbols)
 
     def line_at(self, address: int) -> SourceLine | None:
         """The source line of the instruction there; None outside C functions."""
@@ -83,6 +97,8 @@ class DebugInfo:
         if index < 0:
             return None
         place, line = self.lines[index]
+        if bisect.bisect_right(self._symbols, address) > bisect.bisect_right(self._symbols, place):
+            return None
         if self.functions:
             function = self.function_at(address)
             if function is None or place < function.first:
@@ -132,11 +148,13 @@ def _cdb_lines(cdb: str) -> Iterator[tuple[int, SourceLine]]:
         yield int(address, 16), SourceLine(file, int(line))
 
 
-def _cdb_functions(cdb: str, code: bytes) -> Iterator[Function]:
-    """From begin and end records; the end record stands at the returning instruction."""
+def _cdb_functions(cdb: str, code: bytes, paths: dict[str, str]) -> Iterator[Function]:
+    """From begin and end records; the end record stands at the returning instruction. `paths`: files as lines have
+    them, by the names alone that the .cdb has.
+    """
     declared: dict[int, SourceLine] = {}
     for address, line in _cdb_lines(cdb):  # the first line at a function's first place is its head
-        declared.setdefault(address, line)
+        declared.setdefault(address, SourceLine(paths.get(line.file, line.file), line.line))
     begins = {(scope, name): int(address, 16) for scope, name, address in _CDB_BEGIN.findall(cdb)}
     for scope, name, address in _CDB_END.findall(cdb):
         first, last = begins.get((scope, name)), int(address, 16)
@@ -145,13 +163,39 @@ def _cdb_functions(cdb: str, code: bytes) -> Iterator[Function]:
             yield Function("_" + name, first, end, declared.get(first))
 
 
-def _listing_lines(image: Path, link_map: str) -> Iterator[tuple[int, SourceLine]]:
-    """From the relinked listings: a comment names the line, the next code is its first."""
+def _name(path: str) -> str:
+    return path.replace("\\", "/").rpartition("/")[2]
+
+
+def _listings(image: Path, link_map: str) -> Iterator[Path]:
+    """The relinked listings of the image's modules: beside the image, or where the linker found the modules."""
     for module in dict.fromkeys([*_MAP_MODULE.findall(link_map), image.stem]):
-        line = None
-        for text in _text(image.parent / f"{Path(module).name}.rst").splitlines():
-            if named := _RST_LINE.match(text):
-                line = SourceLine(named[1], int(named[2]))
-            elif line is not None and (code := _RST_CODE.match(text)):
-                yield int(code[1], 16), line
+        places = (
+            image.parent / f"{_name(module)}.rst",
+            image.parent / f"{module}.rst",
+            Path(f"{module}.rst"),
+        )
+        found = next((place for place in places if place.is_file()), None)
+        if found is not None:
+            yield found
+
+
+def _read_listing(path: Path, image: Image) -> Iterator[tuple[int, int, SourceLine | None]]:
+    """(address, end, line) of the first code of each line, a comment above it names that; line None for tables.
+
+    Only instructions have a number of clocks. Raises ImageError where a byte is not the image's.
+    """
+    line = None
+    for number, text in enumerate(_text(path).splitlines(), start=1):
+        if named := _RST_LINE.match(text):
+            line = SourceLine(named[1], int(named[2]))
+        elif code := _RST_CODE.match(text):
+            address, data = int(code[1], 16), bytes.fromhex(code[2])
+            if image.code[address : address + len(data)] != data:
+                reason = f"is the listing of another image: {address:#06x} holds something else"
+                raise ImageError(path, number, reason, "build both again, or remove the listing")
+            if not code[3]:
+                yield address, address + len(data), None
+            elif line is not None:
+                yield address, address + len(data), line
                 line = None

@@ -37,7 +37,8 @@ def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) ->
 
     debug = DebugInfo.of(image)
     share = instruction_share(image, debug, counts)
-    listing_path = (out or image.path).with_suffix(".lst")
+    beside = out or image.path
+    listing_path = beside.with_name(f"{beside.name}.lst")
     if debug.lines:
         tracefile = at_paths(by_line(image, debug, counts), sources, Path.cwd())
         return Report(tracefile, share, None, listing_path)

@@ -53,21 +53,21 @@ def merged(many: Iterable[Counts]) -> Counts:
     return total
 
 
-def instructions(image: Image, debug: DebugInfo) -> list[Row]:
+def instructions(image: Image, debug: DebugInfo, counts: Counts) -> list[Row]:
     """The rows of the image's listing that are instructions."""
-    return [row for row in rows(image, debug, SymbolNames(image)) if row.cycles]
+    return [row for row in rows(image, debug, SymbolNames(image), counts) if row.cycles]
 
 
 def instruction_share(image: Image, debug: DebugInfo, counts: Counts) -> Share:
     """Instructions that ran, of all that the listing shows."""
-    listed = instructions(image, debug)
+    listed = instructions(image, debug, counts)
     return Share(len([row for row in listed if row.address in counts]), len(listed))
 
 
 def by_line(image: Image, debug: DebugInfo, counts: Counts) -> Tracefile:
     """Coverage of the C lines, by the file names that the compiler was given."""
     found: Tracefile = {}
-    for row in instructions(image, debug):
+    for row in instructions(image, debug, counts):
         line = debug.line_at(row.address)
         if line is not None:
             _count(found.setdefault(line.file, FileRecord()), line.line, row, counts)
@@ -82,10 +82,10 @@ def by_line(image: Image, debug: DebugInfo, counts: Counts) -> Tracefile:
 def by_listing(image: Image, counts: Counts) -> tuple[str, FileRecord]:
     """The listing as text, and coverage of its lines, for an image without debug files."""
     debug, names = DebugInfo(), SymbolNames(image)
-    listing = list(text_lines(image, debug, names, Sources(())))
+    listing = list(text_lines(image, debug, names, Sources(()), counts))
     number_of = {int(text[:4], 16): number for number, text in enumerate(listing, 1) if text[4:6] == "  "}
     record = FileRecord()
-    for row in instructions(image, debug):
+    for row in instructions(image, debug, counts):
         _count(record, number_of[row.address], row, counts)
     for first, name in names.functions:
         if first in number_of:
@@ -97,7 +97,7 @@ def _count(record: FileRecord, line: int, row: Row, counts: Counts) -> None:
     """One instruction's part in a line."""
     executed, jumped = counts.get(row.address, (0, 0))
     record.lines[line] = max(record.lines.get(line, 0), executed)
-    if is_conditional(row.data[0]):
+    if is_conditional(row.data[0]) and row.data[-1]:  # SDCC compares by a CJNE that jumps nowhere
         block = len([branch for branch in record.branches if branch[0] == line]) // 2
         record.branches[line, block, 0] = jumped if executed else None
         record.branches[line, block, 1] = executed - jumped if executed else None

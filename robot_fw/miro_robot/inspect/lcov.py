@@ -95,11 +95,16 @@ def _encode_file(path: str, record: FileRecord) -> Iterable[str]:
 def decode(text: str, path: str) -> Tracefile:
     """A tracefile, also another program's. Raises TracefileError naming `path` and the line."""
     found: Tracefile = {}
+    parts: list[
+        tuple[str, FileRecord]
+    ] = []  # a file may come several times, as when tracefiles are put together
     record: FileRecord | None = None
     for number, line in enumerate(text.splitlines(), start=1):
         kind, colon, value = line.strip().partition(":")
         if kind == "SF" and value:
-            record = found.setdefault(value, FileRecord())
+            record = FileRecord()
+            add(found, {value: FileRecord()})
+            parts.append((value, record))
         elif kind == "end_of_record":
             record = None
         elif kind in _RECORDS:
@@ -110,6 +115,8 @@ def decode(text: str, path: str) -> Tracefile:
             _take(record, kind, match.groups())
         elif kind and (not colon or not (kind in _DERIVED or kind.isupper())):
             raise TracefileError(path, number, "is no record of a tracefile")
+    for name, part in parts:
+        add(found, {name: part})
     return found
 
 

@@ -6,7 +6,7 @@ of an instruction (`mcs51.opcodes`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import msgspec
 
@@ -29,12 +29,13 @@ class Row(msgspec.Struct, frozen=True):
     line: SourceLine | None = None
 
 
-def rows(image: Image, debug: DebugInfo, names: SymbolNames) -> Iterator[Row]:
+def rows(image: Image, debug: DebugInfo, names: SymbolNames, executed: Collection[int] = ()) -> Iterator[Row]:
     """All of the image in the order of addresses. Instructions are taken one behind the other from each name on; one
-    whose operand would reach into what has a name of its own is data.
+    whose operand would reach into what has a name of its own is data. `executed`: places where instructions begin
+    for sure, which sets right what a table between instructions of a bare image has put out of step.
     """
     begins = dict(debug.lines)
-    marks = {address for address, _ in names.functions}
+    marks = {address for address, _ in names.functions} | set(executed)
     for first, end in image.used:
         address = first
         while address < end:
@@ -55,10 +56,12 @@ def _cut(first: int, end: int, marks: set[int]) -> int:
     return next((address for address in range(first + 1, end) if address in marks), end)
 
 
-def text_lines(image: Image, debug: DebugInfo, names: SymbolNames, sources: Sources) -> Iterator[str]:
+def text_lines(
+    image: Image, debug: DebugInfo, names: SymbolNames, sources: Sources, executed: Collection[int] = ()
+) -> Iterator[str]:
     """The listing as text: names and C lines stand above the code they begin."""
     labels = dict(names.functions)
-    for row in rows(image, debug, names):
+    for row in rows(image, debug, names, executed):
         if row.address in labels:
             yield ""
             yield f"{labels[row.address]}:"

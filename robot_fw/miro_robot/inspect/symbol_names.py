@@ -7,10 +7,14 @@ from __future__ import annotations
 
 import bisect
 
+from miro_robot.debug_info import DebugInfo
 from miro_robot.image import Image
 from miro_robot.mcs51.names import BITS, INTERRUPTS, SFRS, Names
-from miro_robot.mcs51.opcodes import LENGTH, is_call, target
+from miro_robot.mcs51.opcodes import LENGTH, ROW, is_call, target
 
+_NOP = 0x00
+_LEAVING = (_NOP, 0x02, 0x22, 0x32, 0x73, 0x80)  # NOP, LJMP, RET, RETI, JMP @A+DPTR, SJMP
+_AJMP = 0x01
 _VECTORS = (0, *(8 * number + 3 for number in range(len(INTERRUPTS))))
 
 
@@ -59,6 +63,10 @@ def functions(image: Image) -> list[tuple[int, str]]:
     for name, symbol in sorted(image.symbols.names.items(), reverse=True):
         if symbol.space == "code":
             named[symbol.address] = name
+    for function in DebugInfo.of(
+        image
+    ).functions:  # static ones may share a name, of which the symbols have one
+        named.setdefault(function.first, function.name)
     instructions = _sweep(image)
     if not named:
         entries = {
@@ -69,18 +77,21 @@ def functions(image: Image) -> list[tuple[int, str]]:
         named = {address: f"{address:04X}h" for address in instructions if address in entries}
     first = min(named, default=len(image.code))
     for vector, source in zip(_VECTORS[1:], INTERRUPTS, strict=True):
-        if vector < first and vector in instructions:
+        if vector < first and instructions.get(vector) and image.code[vector] != _NOP:
             named[vector] = f"vector {source}"
     named.setdefault(0, "reset")
     return sorted(named.items())
 
 
-def _sweep(image: Image) -> dict[int, None]:
-    """Addresses of instructions, one behind the other."""
-    found: dict[int, None] = {}
+def _sweep(image: Image) -> dict[int, bool]:
+    """Addresses of instructions, one behind the other, and whether the one before goes elsewhere or is padding."""
+    found: dict[int, bool] = {}
     for first, end in image.used:
         address = first
+        entry = True
         while address < end:
-            found[address] = None
-            address += LENGTH[image.code[address]]
+            found[address] = entry
+            opcode = image.code[address]
+            entry = opcode in _LEAVING or ROW[opcode] == _AJMP
+            address += LENGTH[opcode]
     return found

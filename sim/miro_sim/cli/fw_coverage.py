@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 def coverage(request: Request, out: str | None, append: bool, sources: tuple[str, ...]) -> int:
     """Shows which C lines, branches and instructions ran in SUBJECT, and writes them as an lcov tracefile.
 
-    For an image without debug files the lines are those of its listing, written beside FILE.info as FILE.lst.
+    For an image without debug files the lines are those of its listing, written beside FILE.info as FILE.info.lst.
     """
     before: Tracefile = {}
     if out is not None:

@@ -18,6 +18,7 @@ import click
 from miro_protocol.engine import EngineError
 from miro_protocol.pcapng_reader import CaptureError
 from miro_protocol.stream import StreamError
+from miro_robot.image import ImageError
 from rich.console import Console, RenderableType
 
 from miro_sim.capture.hextext import HexError
@@ -34,6 +35,7 @@ FIRMWARE_FAULT = 3
 DIVERGENCE = 4
 LIMIT_REACHED = 42
 INTERRUPTED = 130
+SIGPIPE = 13
 SIGNALLED = 128
 """Plus the number of the signal: what a shell reports for a program that a signal ended."""
 
@@ -65,6 +67,7 @@ BAD_INPUTS = (
     CaptureError,
     HexError,
     EngineError,
+    ImageError,
 )
 
 
@@ -142,7 +145,7 @@ class Program(click.Group):
         except OSError as error:
             if error.errno == errno.EPIPE:  # the reader of our output has gone
                 _give_up_stdout()
-                return EXPECTATION_FAILED
+                return SIGNALLED + SIGPIPE
             reason = error.strerror or str(error) or type(error).__name__
             if error.filename is None:  # no file was being opened: stdout is full, or a disk
                 complain(f"error: reading or writing failed: {reason}")

@@ -45,12 +45,45 @@ def line_of(text: str) -> int:
     )
 
 
-def build(folder: Path) -> Path:
+def build(folder: Path, text: str = PROGRAM, *options: str) -> Path:
     """`program.ihx` with everything that SDCC leaves beside it."""
+    (folder / "program.c").write_text(text)
+    _sdcc(folder, *(options or ("--debug",)), "program.c")
+    return folder / "program.ihx"
+
+
+def build_modules(folder: Path, *modules: str) -> Path:
+    """An image of several C files that are in `folder` already; it has the first one's name."""
+    for module in modules:
+        _sdcc(folder, "--debug", "-c", f"{module}.c")
+    _sdcc(folder, "--debug", *(f"{module}.rel" for module in modules))
+    return folder / f"{modules[0]}.ihx"
+
+
+def _sdcc(folder: Path, *arguments: str) -> None:
     if shutil.which("sdcc") is None:
         assert not os.environ.get("CI"), "CI needs sdcc"
         pytest.skip("needs sdcc")
-    (folder / "program.c").write_text(PROGRAM)
-    command = ["sdcc", "-mmcs51", "--model-small", "--iram-size", "256", "--debug", "program.c"]
+    command = ["sdcc", "-mmcs51", "--model-small", "--iram-size", "256", *arguments]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
-    return folder / "program.ihx"
+
+
+CASES = "\n".join(f"    case {number}: return {(37 * number + 11) % 256};" for number in range(20))
+SWITCH = f"""\
+unsigned char out;
+unsigned char pick(unsigned char which)
+{{
+    switch (which) {{
+{CASES}
+    }}
+    return 0;
+}}
+void main(void)
+{{
+    unsigned char i;
+    for (i = 0; i < 20; i++)
+        out = pick(i);
+    for (;;)
+        ;
+}}
+"""

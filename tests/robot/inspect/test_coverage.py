@@ -14,14 +14,16 @@ from miro_robot.inspect.coverage import (
     by_listing,
     counts_of,
     instruction_share,
+    instructions,
     line_share,
     merged,
     missed,
 )
 from miro_robot.inspect.lcov import FileRecord
 from miro_robot.inspect.watcher import attach
+from miro_robot.mcs51.opcodes import is_conditional
 
-from tests.robot.inspect.programs import line_of
+from tests.robot.inspect.programs import SWITCH, build, line_of
 
 
 def counts_after(image, cycles):
@@ -92,3 +94,34 @@ def test_a_file_below_the_current_folder_is_named_relative_to_it(tmp_path):
 def test_missed_lines_are_shown_as_ranges_that_lines_without_code_do_not_part():
     assert missed(FileRecord(lines={1: 0, 2: 0, 5: 0, 6: 3, 9: 0, 11: 1})) == "1-5, 9"
     assert missed(FileRecord(lines={1: 4})) == ""
+
+
+def test_the_jump_table_of_a_switch_is_no_code(tmp_path):
+    image = load_hex(build(tmp_path, SWITCH))
+    counts = counts_after(image, 20_000)
+    record = by_line(image, DebugInfo.of(image), counts)["program.c"]
+    cases = [number for number, line in enumerate(SWITCH.splitlines(), 1) if "case " in line]
+    assert [record.lines[number] for number in cases] == [1] * 20
+    listed = {row.address for row in instructions(image, DebugInfo.of(image), {})}
+    assert set(counts) <= listed
+
+
+def test_a_table_in_a_bare_image_does_not_hide_what_ran(tmp_path):
+    (tmp_path / "bare").mkdir()
+    image = load_hex(shutil.copy(build(tmp_path, SWITCH), tmp_path / "bare"))
+    counts = counts_after(image, 20_000)
+    assert set(counts) <= {row.address for row in instructions(image, DebugInfo.of(image), counts)}
+
+
+def test_a_comparison_that_jumps_nowhere_is_no_branch(tmp_path):
+    """SDCC compares unsigned numbers by CJNE to the next instruction and JC."""
+    text = "unsigned char a, b;\nvoid main(void)\n{\n    if (a < b)\n        b = 1;\n    for (;;)\n        ;\n}\n"
+    image = load_hex(build(tmp_path, text))
+    debug = DebugInfo.of(image)
+    rows = [row for row in instructions(image, debug, {}) if is_conditional(row.data[0]) and not row.data[-1]]
+    record = by_line(image, debug, counts_after(image, 2000)).get("program.c")
+    assert record is not None
+    assert len([branch for branch in record.branches if branch[0] == 4]) == 2
+    assert all(
+        debug.line_at(row.address) for row in rows if row.address >= image.symbols.find("_main").address
+    )

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 
+import pytest
 from miro_robot.debug_info import DebugInfo, SourceLine, Sources
 from miro_robot.firmware import image_path, source_folder
-from miro_robot.image import load_hex
+from miro_robot.image import ImageError, load_hex
 
-from tests.robot.inspect.programs import PROGRAM, line_of
+from tests.robot.inspect.programs import PROGRAM, build, line_of
 
 
 def copied(program, folder, *suffixes):
@@ -92,3 +94,31 @@ def test_sources_are_taken_from_the_first_folder_that_has_them(program, tmp_path
     assert Sources([tmp_path, program.parent]).text(first_line) == "other"
     assert Sources([tmp_path]).text(SourceLine("program.c", 7)) == ""
     assert Sources([]).path("program.c") is None
+
+
+def test_the_listing_of_another_image_is_refused_with_its_line(program, tmp_path):
+    copied(program, tmp_path, ".rst", ".map", ".cdb")
+    listing = tmp_path / "program.rst"
+    text = re.sub(r"(?m)^( {6}[0-9A-F]{6}) 22 ", r"\1 32 ", listing.read_text(), count=1)
+    listing.write_text(text)
+    with pytest.raises(ImageError, match=r"program\.rst:\d+: is the listing of another image: 0x"):
+        DebugInfo.of(load_hex(tmp_path / program.name))
+
+
+def test_without_functions_a_line_ends_where_the_next_symbol_begins(tmp_path):
+    """Built without --debug: only map and listing tell where library code begins."""
+    image = load_hex(
+        build(tmp_path, "long a, b, c;\nvoid main(void)\n{\n    c = a / b;\n}\n", "--opt-code-size")
+    )
+    debug = DebugInfo.of(image)
+    assert not [function for function in debug.functions if function.name == "_main"]
+    division = image.symbols.find("__divslong").address
+    assert debug.line_at(image.symbols.find("_main").address).file == "program.c"
+    assert debug.line_at(division) is None
+    assert debug.line_at(division + 40) is None
+
+
+def test_modules_without_a_listing_have_the_lines_of_the_cdb(program, tmp_path):
+    image = copied(program, tmp_path, ".map", ".cdb")
+    (tmp_path / "program.rst").write_text("nothing of use\n")
+    assert {line.file for _, line in DebugInfo.of(image).lines} == {"program.c"}

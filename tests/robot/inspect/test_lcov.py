@@ -54,6 +54,13 @@ def test_a_run_added_to_itself_has_every_count_twice_and_no_line_more(tracefile)
         }
 
 
+@given(TRACEFILES, TRACEFILES)
+def test_tracefiles_put_one_behind_the_other_read_as_their_sum(one, other):
+    total = deepcopy(one)
+    add(total, other)
+    assert decode(encode(one) + encode(other), "x.info") == total
+
+
 @given(st.text(max_size=200))
 def test_any_text_is_a_tracefile_or_is_refused(text):
     with suppress(TracefileError):

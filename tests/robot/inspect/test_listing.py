@@ -12,6 +12,7 @@ from miro_robot.inspect.listing import rows, text_lines
 from miro_robot.inspect.symbol_names import SymbolNames, functions
 from miro_robot.mcs51.opcodes import LENGTH
 
+from tests.robot.inspect.programs import build_modules
 from tests.robot.mcs51.asm import assemble
 
 
@@ -90,3 +91,22 @@ def test_a_listing_reads_back_to_the_image(program):
 def test_undefined_opcodes_are_data():
     image = parse_hex(b":02000000A500 59\n:00000001FF\n".replace(b" ", b""), Path("x.ihx"))
     assert [row.text for row in rows(image, DebugInfo(), SymbolNames(image))] == ["DB A5h", "NOP"]
+
+
+def test_code_that_runs_through_the_places_of_vectors_has_no_vectors():
+    image = image_of(b"\0" * 0x40 + assemble("SJMP $"))
+    assert [name for _, name in functions(image)] == ["reset"]
+
+
+def test_static_functions_of_one_name_are_two(tmp_path):
+    for module, other in (("a", "b"), ("b", "c")):
+        main = (
+            "void bstep(void);\nvoid main(void)\n{\n    step();\n    bstep();\n}\n" if module == "a" else ""
+        )
+        own = "" if module == "a" else "void bstep(void)\n{\n    step();\n}\n"
+        text = (
+            f"volatile unsigned char {other}1;\nstatic void step(void)\n{{\n    {other}1++;\n}}\n{own}{main}"
+        )
+        (tmp_path / f"{module}.c").write_text(text)
+    image = load_hex(build_modules(tmp_path, "a", "b"))
+    assert [name for _, name in functions(image)].count("_step") == 2

@@ -132,8 +132,9 @@ def test_coverage_of_a_bare_image_comes_with_its_listing(
     info = tmp_path / "bare.info"
     code, _, _ = mirotwin("fw", "coverage", bare, "--to", "1ms", "--out", info)
     assert code == 0
-    assert f"SF:{info.with_suffix('.lst')}\n" in info.read_text()
-    assert "LJMP 0029h" in info.with_suffix(".lst").read_text()
+    listing = tmp_path / "bare.info.lst"
+    assert f"SF:{listing}\n" in info.read_text()
+    assert "LJMP 0029h" in listing.read_text()
 
 
 def test_a_recording_is_looked_into_with_its_own_scenario_seed_and_firmware(
