@@ -107,6 +107,13 @@ def check_file(path: Path, option: str) -> None:
         raise OutputError(path, f"the folder {folder} cannot be written to", remedy)
 
 
+def check_not_input(path: Path, option: str, *inputs: str | Path | None) -> None:
+    """Refuses to write over what is being read. Raises OutputError."""
+    for given in inputs:
+        if given is not None and path.exists() and os.path.exists(given) and os.path.samefile(path, given):
+            raise OutputError(path, "is the input itself", f"choose another file with {option}")
+
+
 @contextmanager
 def whole_file(path: Path, option: str) -> Iterator[Path]:
     """A name beside `path` to write to; what was written takes its place at the end, or is gone if anything raised.

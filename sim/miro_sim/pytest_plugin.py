@@ -48,7 +48,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    if config.getoption("--firmware-coverage"):
+    share = config.getoption("--firmware-coverage-fail-under")
+    if not 0.0 <= share <= 100.0:
+        raise pytest.UsageError(f"--firmware-coverage-fail-under: {share} is no percentage; give 0 to 100")
+    if share and not config.getoption("--firmware-coverage"):
+        raise pytest.UsageError("--firmware-coverage-fail-under: goes with --firmware-coverage=FILE.info")
+    if config.getoption("--firmware-coverage") and not config.getoption("--collect-only"):
         config.pluginmanager.register(FirmwareCoverage(config), "mirotwin-firmware-coverage")
 
 
@@ -60,7 +65,7 @@ class FirmwareCoverage:
         from miro_robot.mcs51.cpu import on_load
 
         from miro_sim.inputs import InputError
-        from miro_sim.outdir import OutputError, check_file
+        from miro_sim.outdir import OutputError, check_file, check_not_input
 
         self.config = config
         self.out = Path(config.getoption("--firmware-coverage"))
@@ -69,6 +74,8 @@ class FirmwareCoverage:
         try:
             self.image = _image(config.getoption("--firmware-image"))
             check_file(self.out, "--firmware-coverage")
+            check_not_input(self.out, "--firmware-coverage", self.image.path)
+            _check_folders(config.getoption("--firmware-sources"))
         except (InputError, OutputError, ValueError) as error:
             raise pytest.UsageError(str(error)) from None
         on_load.set(self.watch)
@@ -147,4 +154,16 @@ def _image(path: str | None) -> Image:
     from miro_robot.firmware import image_path
     from miro_robot.image import load_hex
 
+    from miro_sim.inputs import check_regular
+
+    if path:
+        check_regular(path)
     return load_hex(path or image_path())
+
+
+def _check_folders(folders: list[str]) -> None:
+    for folder in folders:
+        if not Path(folder).is_dir():
+            raise ValueError(
+                f"{folder}: --firmware-sources: there is no such folder; name the one with the C files"
+            )

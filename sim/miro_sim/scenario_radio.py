@@ -41,6 +41,13 @@ class Dropouts(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     every_s: Mean
     length_s: Mean
 
+    def __post_init__(self) -> None:
+        if BIT_S / self.every_s + BIT_S / self.length_s >= 1.0:
+            raise ValueError(
+                f"every_s: {self.every_s} and length_s {self.length_s} are too short together;"
+                f" one of them must last more than a bit ({BIT_S:.6f} s)"
+            )
+
 
 class Slicer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """An AC-coupled slicer: its time constant, and the offset of the carriers in units of the deviation."""

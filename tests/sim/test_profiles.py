@@ -205,3 +205,12 @@ def test_what_is_off_is_not_in_the_state() -> None:
     assert downlink["listeners"] == [{"bit_errors": 0}]
     everything = world(ALL + "\nchannel = 1", "channel = 1").networks[0].downlink.snapshot()
     assert {"busy_tick", "overheard"} < set(everything)
+
+
+@pytest.mark.parametrize(
+    "pair", ["every_s = 0.000105, length_s = 0.000105", "every_s = 0.0002, length_s = 0.000106"]
+)
+def test_drop_outs_too_short_for_the_bits_are_an_error_with_their_path(pair):
+    text = f'name = "x"\nduration_s = 0.1\n[[network]]\nradio.dropouts = {{ {pair} }}\n'
+    with pytest.raises(ScenarioError, match=r"network\[0\]\.radio\.dropouts"):
+        parse(f'{text}[[network.robot]]\nreference.kind = "line"\n', "x.toml")

@@ -64,6 +64,10 @@ def test_a_session_fails_under_the_share_that_was_asked_for(tmp_path: Path) -> N
     [
         ("--firmware-image=gone.ihx", "gone.ihx: there is no such file"),
         ("--firmware-coverage=gone/fw.info", "there is no folder gone"),
+        ("--firmware-image=/dev/zero", "/dev/zero: is not a regular file"),
+        ("--firmware-sources=gone", "gone: --firmware-sources: there is no such folder"),
+        ("--firmware-coverage-fail-under=nan", "nan is no percentage"),
+        ("--firmware-coverage-fail-under=900", "900.0 is no percentage"),
     ],
 )
 def test_bad_input_is_a_usage_error(tmp_path: Path, option: str, said: str) -> None:
@@ -71,3 +75,15 @@ def test_bad_input_is_a_usage_error(tmp_path: Path, option: str, said: str) -> N
     assert done.returncode == 4
     assert said in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_share_without_a_tracefile_is_a_usage_error(tmp_path: Path) -> None:
+    done = session(tmp_path, "--firmware-coverage-fail-under=90")
+    assert done.returncode == 4
+    assert "goes with --firmware-coverage=FILE.info" in done.stderr
+
+
+def test_collecting_tests_writes_nothing(tmp_path: Path) -> None:
+    done = session(tmp_path, "--firmware-coverage=fw.info", "--collect-only")
+    assert done.returncode == 0
+    assert not (tmp_path / "fw.info").exists()

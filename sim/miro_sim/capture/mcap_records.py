@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from typing import NoReturn
+from zlib import crc32
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -39,6 +40,7 @@ def records(source: Input) -> Iterator[tuple[int, McapRecord]]:
         short = bool(magic) and MAGIC.startswith(magic)
         what = "the file ends in its first bytes" if short else "not an MCAP file"
         raise RecordingError(source.label, "offset 0", what, "give a run.mcap that `mirotwin run` wrote")
+    checksum = crc32(magic)  # of all before the record that ends the data
     while True:
         place = source.tell()
         head = source.read(_HEAD.size)
@@ -56,6 +58,9 @@ def records(source: Input) -> Iterator[tuple[int, McapRecord]]:
             _damaged(source, place, f"{error}".strip().split("\n")[0] or type(error).__name__)
         if not whole:
             _cut(source, place)
+        if opcode == Opcode.DATA_END and int.from_bytes(body[:4], "little") not in (0, checksum):
+            _damaged(source, place, "the checksum of what comes before it is wrong")
+        checksum = crc32(body, crc32(head, checksum))
         if opcode == Opcode.FOOTER:
             break
     place = source.tell()

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import click
-from miro_protocol import files
 from miro_protocol.stream import DOWN
 
 from miro_sim.capture import Run, convert
@@ -18,7 +17,7 @@ from miro_sim.capture.source import READ_ERRORS, open_source
 from miro_sim.cli.options import Place, Whole, choose_engine, engine_option
 from miro_sim.cli.program import BAD_INPUT, DONE, UserError, complain, show
 from miro_sim.cli.progress import ProgressBar
-from miro_sim.outdir import check_file
+from miro_sim.outdir import check_file, whole_file
 
 TARGETS = ("pcapng", "stream")
 
@@ -33,11 +32,13 @@ class Exported:
         self.bar = bar
         self.down = 0
         self.up = 0
+        self.networks: set[int] = set()
         self.failure: Exception | None = None
 
     def __iter__(self) -> Iterator[Run]:
         try:
             for run in self.runs:
+                self.networks.add(run.network)
                 if self.network in (None, run.network):
                     self.down += run.direction == DOWN
                     self.up += run.direction != DOWN
@@ -102,7 +103,7 @@ def export(
         exported = Exported(source.runs, network, given, bar)
         pieces = convert.to_stream(exported, layouts.of) if layouts else convert.to_pcapng(exported)
         try:
-            _write(out, pieces)
+            _write(out, _some(pieces, exported, given.label))
         except convert.ConversionError as error:
             raise UserError(f"{given.label}: {error}") from None
     if not quiet and out != STDIN:
@@ -113,11 +114,19 @@ def export(
     return DONE
 
 
+def _some(pieces: Iterable[bytes], exported: Exported, label: str) -> Iterator[bytes]:
+    """The same; a network that was asked for and is not there is an error, before anything takes its place."""
+    yield from pieces
+    if exported.network is not None and not exported.down + exported.up and exported.failure is None:
+        there = ", ".join(map(str, sorted(exported.networks))) or "none"
+        raise UserError(f"{label}: --network {exported.network}: nothing of it; networks there: {there}")
+
+
 def _write(out: str, pieces: Iterable[bytes]) -> None:
     if out == STDIN:
         for piece in pieces:
             sys.stdout.buffer.write(piece)
         return
-    with files.replacing(out) as file:
+    with whole_file(Path(out), "--out") as staging, staging.open("wb") as file:
         for piece in pieces:
             file.write(piece)

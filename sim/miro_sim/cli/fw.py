@@ -18,7 +18,7 @@ from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, loa
 from miro_sim.cli.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, complain
 from miro_sim.cli.progress import ProgressBar
 from miro_sim.inputs import read_input
-from miro_sim.outdir import check_file
+from miro_sim.outdir import check_file, check_not_input
 
 
 @click.group()
@@ -69,6 +69,7 @@ def run_bare(
     """
     if dump is not None:
         check_file(Path(dump), "--dump")
+        check_not_input(Path(dump), "--dump", image, stdin)
     choose_engine(engine)
     loaded = load_image(image, SPACE_BYTES if code_in_xram else FLASH_BYTES)
     target = None if until is None else address_of(until, loaded, image, "--until")

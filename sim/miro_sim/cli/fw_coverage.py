@@ -12,7 +12,7 @@ from miro_sim.cli.options import Place
 from miro_sim.cli.program import show
 from miro_sim.cli.subject import Request, look, open_run, subject_options
 from miro_sim.firmware_coverage import collect, read_tracefile, table
-from miro_sim.outdir import check_file, whole_file
+from miro_sim.outdir import check_file, check_not_input, whole_file
 
 if TYPE_CHECKING:
     from miro_robot.inspect.lcov import Tracefile
@@ -33,6 +33,7 @@ def coverage(request: Request, out: str | None, append: bool, sources: tuple[str
     before: Tracefile = {}
     if out is not None:
         check_file(Path(out), "--out")
+        check_not_input(Path(out), "--out", request.subject, request.firmware, request.stdin)
         before = read_tracefile(Path(out)) if append else {}
     run = open_run(request)
     from miro_robot.inspect.counters import Counters

@@ -10,7 +10,7 @@ from miro_sim.cli.code_place import address_of
 from miro_sim.cli.debug import with_debug_files
 from miro_sim.cli.options import Place
 from miro_sim.cli.subject import Request, look, open_run, subject_options
-from miro_sim.outdir import check_file, whole_file
+from miro_sim.outdir import check_file, check_not_input, whole_file
 
 
 @click.command(short_help="Writes each instruction with what it changed.")
@@ -30,6 +30,7 @@ def trace(request: Request, symbols: tuple[str, ...], out: str | None) -> int:
     """
     if out is not None:
         check_file(Path(out), "--out")
+        check_not_input(Path(out), "--out", request.subject, request.firmware, request.stdin)
     run = open_run(request)
     from miro_robot.inspect.symbol_names import SymbolNames
     from miro_robot.inspect.trace import HEADING, Trace

@@ -10,7 +10,7 @@ from miro_sim.cli.options import Place
 from miro_sim.cli.program import UserError, show
 from miro_sim.cli.subject import Request, look, open_run, subject_options
 from miro_sim.clock import PWM_PERIOD_TICKS, seconds
-from miro_sim.outdir import check_file, whole_file
+from miro_sim.outdir import check_file, check_not_input, whole_file
 
 SAVE_SUFFIX = ".gtkw"
 LATE_TICKS = 2 * PWM_PERIOD_TICKS
@@ -37,6 +37,7 @@ def vcd(request: Request, out: Path, force: bool) -> int:
     save = out.with_suffix(SAVE_SUFFIX)
     for path in (out, save):
         _check(path, force)
+        check_not_input(path, "--out", request.subject, request.firmware, request.stdin)
     if save == out:
         raise UserError(f"--out {out}: that is the save file's name; give the VCD file another ending, .vcd")
     run = open_run(request)

@@ -4,7 +4,6 @@ mend.
 What belongs here: exit codes, the translation of errors, and the two consoles. What does not: any command.
 """
 
-import errno
 import os
 import signal
 import sys
@@ -54,6 +53,10 @@ class Terminated(BaseException):
     def __init__(self, number: int) -> None:
         self.number = number
         super().__init__(signal.Signals(number).name)
+
+
+class ReaderGone(Exception):
+    """Nobody reads our output any more (`| head`)."""
 
 
 BAD_INPUTS = (
@@ -124,6 +127,13 @@ class Program(click.Group):
         extra["standalone_mode"] = False
         sys.exit(self._run(args, prog_name or "mirotwin", extra))
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """The library would make 1 of a reader that has gone, which here means that an expectation failed."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            raise ReaderGone from None
+
     def _run(self, args: Sequence[str] | None, prog_name: str, extra: dict[str, Any]) -> int:
         try:
             with terminable():
@@ -142,10 +152,10 @@ class Program(click.Group):
         except BAD_INPUTS as error:
             complain(f"error: {error}")
             return BAD_INPUT
+        except (ReaderGone, BrokenPipeError):
+            _give_up_stdout()
+            return SIGNALLED + SIGPIPE
         except OSError as error:
-            if error.errno == errno.EPIPE:  # the reader of our output has gone
-                _give_up_stdout()
-                return SIGNALLED + SIGPIPE
             reason = error.strerror or str(error) or type(error).__name__
             if error.filename is None:  # no file was being opened: stdout is full, or a disk
                 complain(f"error: reading or writing failed: {reason}")

@@ -59,7 +59,8 @@ class LinkFailure(AssertionError):
 class Bench:
     """Robot `slot` of `n` (3 or 5) behind a radio. Time is `now`, in ticks of 24 MHz.
 
-    `image` must export the counters (robot_fw/README.md); ValueError otherwise.
+    `image` must export the counters (robot_fw/README.md), the slot must be there, and `radio` must neither delay by
+    chance nor be off the host's baud rate: frames, noise and trouble change on one grid of bits. ValueError otherwise.
     """
 
     NOT_STATE = ("n", "slot", "radio", "seed", "image", "addresses", "sent", "heard", "answers")
@@ -75,6 +76,12 @@ class Bench:
         self.n = n
         self.slot = slot
         self.radio = radio or RadioParams.ideal()
+        if not 0 <= slot < n:
+            raise ValueError(f"slot {slot} does not exist in a network of {n}; use 0 to {n - 1}")
+        if self.radio.jitter_ticks or self.radio.baud_offset_ppm or self.radio.crystal_offset_ppm:
+            raise ValueError(
+                "radio: jitter and offsets leave the grid of bits that a bench works on; leave them 0"
+            )
         self.seed = seed
         self.image = image or own_image()
         self.addresses = [_address(self.image, name) for name in COUNTERS]
@@ -137,6 +144,8 @@ class Bench:
         self.air.trouble(msgspec.convert((start, start + length_ticks, kind), Trouble))
 
     def wait(self, ticks: int) -> None:
+        if ticks < 0:
+            raise ValueError(f"ticks {ticks}: time only goes forward")
         self.run_to(self.now + ticks)
 
     def reset(self) -> None:

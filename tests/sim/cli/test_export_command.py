@@ -1,6 +1,7 @@
 """`mirotwin export`: a run as a capture that Wireshark opens and as a stream file that `replay` takes."""
 
 import os
+import stat
 import subprocess
 import sys
 from collections.abc import Callable
@@ -144,3 +145,30 @@ def test_a_file_that_exists_is_replaced_only_if_that_was_meant(
     assert "exists; choose another file with --out, or replace it with --force" in err
     assert (tmp_path / "b.pcapng").read_bytes() == b"mine"
     assert mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.pcapng", "--force")[0] == 0
+
+
+def test_what_is_no_regular_file_is_never_replaced(mirotwin, finished, tmp_path):
+    os.mkfifo(tmp_path / "pipe.pcapng")
+    code, _, err = mirotwin("export", finished / "run.mcap", "--out", tmp_path / "pipe.pcapng", "--force")
+    assert code == 2
+    assert "pipe.pcapng" in err
+    assert stat.S_ISFIFO((tmp_path / "pipe.pcapng").stat().st_mode)
+
+
+def test_a_network_that_is_not_there_is_an_error_that_names_those_that_are(mirotwin, finished, tmp_path):
+    out = tmp_path / "x.pcapng"
+    code, _, err = mirotwin("export", finished / "run.mcap", "--network", 9, "--out", out)
+    assert code == 2
+    assert "--network 9: nothing of it; networks there: 0" in err
+    assert not out.exists()
+
+
+def test_a_recording_with_one_wrong_byte_is_reported_after_all_that_could_be_read(
+    mirotwin, finished, tmp_path
+):
+    data = bytearray((finished / "run.mcap").read_bytes())
+    data[200] ^= 0xFF
+    (tmp_path / "bad.mcap").write_bytes(data)
+    code, _, err = mirotwin("decode", tmp_path / "bad.mcap")
+    assert code == 2
+    assert "bad.mcap: offset" in err

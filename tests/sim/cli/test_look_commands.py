@@ -247,3 +247,38 @@ def test_the_cycle_limit_of_an_image_has_its_exit_code(
     assert mirotwin("fw", "profile", image, "--max-cycles", 10)[0] == 42
     assert mirotwin("fw", "profile", image, "--to", 100)[0] == 0
     assert mirotwin("fw", "profile", image)[0] == 0
+
+
+def test_nothing_is_written_over_what_is_read(
+    mirotwin: Callable[..., Result], bare: Path, tmp_path: Path
+) -> None:
+    image = Path(shutil.copy(bare, tmp_path / "mine.ihx"))
+    before = image.read_bytes()
+    for command in (
+        ("fw", "trace", image, "--to", "1ms", "--out", image),
+        ("fw", "coverage", image, "--to", "1ms", "--out", image),
+        ("fw", "vcd", image, "--to", "1ms", "--out", image, "--force"),
+        ("fw", "run", image, "--max-cycles", 10, "--dump", image),
+    ):
+        code, _, err = mirotwin(*command)
+        assert code == 2
+        assert "is the input itself; choose another file" in err
+    assert image.read_bytes() == before
+
+
+def test_a_reader_that_goes_away_ends_it_as_a_shell_reports_that(short: Path) -> None:
+    command = f"{MIROTWIN} fw trace {short} | head -1; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "141"
+    assert done.stderr == ""
+
+
+def test_input_that_nobody_can_take_any_more_does_not_keep_a_dead_program_alive(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    """Receives one character by timer 1, never clears RI, and sleeps with interrupts off."""
+    image = hex_file(tmp_path / "a.ihx", bytes.fromhex("758df3 758920 d28e 759850 438701"))
+    (tmp_path / "in").write_bytes(b"abc")
+    code, _, err = mirotwin("fw", "run", image, "--stdin", tmp_path / "in")
+    assert code == 0
+    assert "no interrupt can wake it" in err

@@ -143,3 +143,16 @@ def test_replay_of_what_the_robot_heard_counts_the_same(
     assert (code, err) == (0, "")
     row = out.splitlines()[-2].split()
     assert tuple(map(int, row[1:4])) == bench.counters
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"n": 3, "slot": 3}, "slot 3 does not exist"),
+        ({"radio": RadioParams(jitter_ticks=2500)}, "jitter and offsets"),
+        ({"radio": RadioParams(baud_offset_ppm=100)}, "jitter and offsets"),
+    ],
+)
+def test_a_bench_that_could_not_keep_its_promises_is_refused(arguments, said):
+    with pytest.raises(ValueError, match=said):
+        Bench(**arguments)
