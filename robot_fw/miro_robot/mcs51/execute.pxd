@@ -9,8 +9,8 @@ cdef int _STACK_UNDERFLOW
 cdef int _OUTSIDE_IMAGE
 
 cdef class Executor(Core):
-    @cython.locals(iram='unsigned char *', rom='unsigned char *', now='long long', count='long long', pc=Py_ssize_t, line=int, row=int, op=int,
-                   first=int, second=int, address=int, value=int)
+    @cython.locals(iram='unsigned char *', rom='unsigned char *', now='long long', count='long long',
+                   pc=Py_ssize_t, line=int, row=int, op=int, first=int, second=int, address=int, value=int)
     cpdef int run(self, long long until_cycle) except -1
 
     @cython.final

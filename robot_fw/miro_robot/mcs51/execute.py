@@ -15,9 +15,7 @@ from __future__ import annotations
 from miro_robot.faults import FaultKind
 from miro_robot.mcs51.core import Core
 
-_BREAKPOINT = (
-    0x1000  # line that ends a run before its instruction; the other that is no opcode's: outside the image
-)
+_BREAKPOINT = 0x1000  # line that ends a run before its instruction
 _UNDEFINED_OPCODE = int(FaultKind.UNDEFINED_OPCODE)
 _STACK_OVERFLOW = int(FaultKind.STACK_OVERFLOW)
 _STACK_UNDERFLOW = int(FaultKind.STACK_UNDERFLOW)
@@ -54,7 +52,7 @@ class Executor(Core):
             op = rom[pc]
             first = rom[pc + 1]
             second = rom[pc + 2]
-            if line & 0x1800:
+            if line & 0x1800:  # no opcode's: a breakpoint, or outside the image
                 if line == _BREAKPOINT:
                     self.stop = BREAKPOINT
                     break
