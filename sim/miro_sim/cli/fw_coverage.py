@@ -54,5 +54,5 @@ def coverage(request: Request, out: str | None, append: bool, sources: tuple[str
         with whole_file(Path(out), "--out") as staging:
             staging.write_text(encode(total), encoding="utf-8")
     show(table(total))
-    show(f"instructions: {report.instructions}")
+    show(f"instructions of this run: {report.instructions}")
     return code
