@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from miro_protocol import engine
+from miro_robot.mcs51 import opcodes
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
@@ -105,3 +106,12 @@ def test_building_again_removes_the_compiled_twin_of_a_module_that_is_hot_no_mor
     assert built.returncode == 0, built.stderr
     assert not left_over.exists()
     assert engine.compiled_file(tree / "sim/miro_sim/rng.py").exists()
+
+
+def test_each_instruction_of_the_compiled_cpu_jumps_to_the_next_by_itself(tree):
+    """If Cython ever writes its C in another way, the loop is merely slower; this test is what notices."""
+    built = python(tree, "setup.py", "-q", "build_ext", "--inplace", "--only", "miro_robot.mcs51", CC="none")
+    assert built.returncode == 0, built.stderr
+    (loop,) = tree.rglob("*.threaded.c")
+    assert loop.name == "execute.threaded.c"
+    assert loop.read_text().count("goto *arm_of[") == len(opcodes.TABLE)

@@ -3,7 +3,7 @@ from miro_robot.mcs51.bus cimport Bus
 cdef class Core:
     cdef readonly Bus bus
     cdef unsigned char rom[65538]
-    cdef unsigned short lines[65536]
+    cdef unsigned int lines[65536]
     cdef unsigned short line_of[256]
     cdef unsigned char iram[256]
     cdef public int pc
@@ -26,6 +26,7 @@ cdef class Core:
     cdef readonly long long idle_cycles
     cdef readonly long long faults
 
+    cdef unsigned int line_at(self, int address) noexcept
     cdef int begin_run(self) except -1
     cdef int end_run(self) except -1
     cdef int boundary(self) except -1

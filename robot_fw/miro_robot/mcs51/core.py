@@ -29,7 +29,7 @@ class Core:
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
         self.rom = bytearray(0x10002)  # 64 KB, and the first two bytes again for operands that wrap
-        self.lines = [0] * 65536  # per address: `LINE` of its opcode, or a special line
+        self.lines = [0] * 65536  # per address: `line_at`, or a special line
         self.line_of = list(LINE)
         self.iram = bytearray(256)
         self.pc = 0
@@ -51,6 +51,11 @@ class Core:
         self.instructions = 0
         self.idle_cycles = 0
         self.faults = 0
+
+    def line_at(self, address: int) -> int:
+        """`LINE` of the opcode at `address` and, in the upper half, the address behind its instruction."""
+        line = self.line_of[self.rom[address]]
+        return line | ((address + (line >> 13)) & 0xFFFF) << 16
 
     # Hooks: what `Cpu` adds to the bare instructions
 

@@ -39,7 +39,7 @@ cdef class Cpu(Executor):
     cpdef reset(self)
     cpdef int run(self, long long until_cycle) except -1
     cpdef int step(self) except -1
-    @cython.locals(line=int)
+    @cython.locals(line='unsigned int')
     cpdef int run_until_pc(self, int address, long long until_cycle) except -1
     cpdef request_stop(self)
     cpdef int set_external(self, int port, int levels, long long tick) except -1

@@ -19,7 +19,7 @@ from miro_robot.mcs51.peripherals import Peripherals
 __all__ = ["BREAKPOINT", "REACHED", "STOPPED", "Cpu"]
 
 _FAR = 1 << 62
-_OUTSIDE = 0x0800  # lines that are no opcode's, see execute.py
+_OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py
 _MARK = 0x1000
 _STOP_REQUESTED = 1
 _P0, _SP, _PCON, _IE, _IP, _PSW = 0x80, 0x81, 0x87, 0xA8, 0xB8, 0xD0
@@ -91,7 +91,7 @@ class Cpu(Executor):
         self.code_limit = 0
         for first, end in ((0, len(image)),) if used is None else used:
             for address in range(first, end):
-                self.lines[address] = self.line_of[self.rom[address]]
+                self.lines[address] = self.line_at(address)
             self.code_limit = max(self.code_limit, end)
         loaded = on_load.get()
         if loaded is not None:
@@ -102,7 +102,7 @@ class Cpu(Executor):
         self.rom[address] = value
         if address < 2:
             self.rom[0x10000 + address] = value
-        self.lines[address] = self.line_of[value]
+        self.lines[address] = self.line_at(address)
 
     def is_loaded(self, address: int) -> bool:
         """Whether executing at `address` is legal."""

@@ -10,7 +10,7 @@ cdef int _OUTSIDE_IMAGE
 
 cdef class Executor(Core):
     @cython.locals(iram='unsigned char *', rom='unsigned char *', now='long long', count='long long',
-                   pc=Py_ssize_t, line=int, row=int, op=int, first=int, second=int, address=int, value=int)
+                   pc=Py_ssize_t, line='unsigned int', row=int, op=int, first=int, second=int, address=int, value=int)
     cpdef int run(self, long long until_cycle) except -1
 
     @cython.final

@@ -8,6 +8,9 @@ Timing inside an instruction (sections 1 and 11 of the AT89C52 sheet; where sili
 is the choice made): operands are read in the instruction's first cycle, `start`; results are written at the
 end of its last, `cycles`. The loop compares `cycles` with `limit` once per instruction and knows nothing
 else about time.
+
+The loop has one shape, a head and one choice among the rows, because the build copies the head to the end of each row
+(`setup.py`, `threaded`); what the head asks has to be rare.
 """
 
 from __future__ import annotations
@@ -57,8 +60,8 @@ class Executor(Core):
                     self.stop = BREAKPOINT
                     break
                 self.fault(_OUTSIDE_IMAGE)
-                line = self.line_of[op]
-            pc = (pc + (line >> 13)) & 0xFFFF
+                line = self.line_at(pc)
+            pc = line >> 16
             self.pc = pc
             self.start = now
             now += (line >> 8) & 7

@@ -1,0 +1,81 @@
+"""The C of an interpreter's loop, reshaped by the build so that each arm jumps to the next by itself.
+
+That the reshaped loop does the same is held by every test of the CPU, whose loop is one; here, what is left alone.
+"""
+
+import importlib.util
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PROGRAM = """
+#include <stdio.h>
+#define unlikely(x) __builtin_expect(!!(x), 0)
+int main(void) {{
+  int at = 0, steps = 0, sum = 0, row, __pyx_t_1;
+  while (1) {{
+
+    /* asked before each instruction */
+    __pyx_t_1 = (steps >= 1000);
+    if (__pyx_t_1) {{
+      goto __pyx_L4_break;
+    }}
+    row = (at * 7 + sum + steps) & 0x7F;
+    steps = steps + 1;
+    switch (row) {{
+{arms}
+      default: break;
+    }}
+    __pyx_L3_continue:;
+  }}
+  __pyx_L4_break:;
+  printf("%d %d\\n", at, sum);
+  return 0;
+}}
+"""
+
+
+@pytest.fixture(scope="module")
+def threaded():
+    spec = importlib.util.spec_from_file_location("mirotwin_setup", ROOT / "setup.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.threaded
+
+
+def program(arms):
+    lines = (
+        f"      case 0x{n:02X}:\n      at = (at + {n}) % 1009;\n      sum = (sum * 5 + at) % 10007;\n      break;"
+        for n in arms
+    )
+    return PROGRAM.format(arms="\n".join(lines))
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_a_loop_over_many_instructions_is_threaded_and_does_the_same(threaded, tmp_path):
+    plain = program(range(100))  # rows 100 to 127 have no arm
+    assert threaded(plain).count("goto *arm_of[") == 100
+    said = []
+    for name, text in (("plain", plain), ("threaded", threaded(plain))):
+        (tmp_path / f"{name}.c").write_text(text)
+        subprocess.run(["cc", "-o", tmp_path / name, tmp_path / f"{name}.c"], check=True)
+        said.append(subprocess.run([tmp_path / name], capture_output=True, text=True, check=True).stdout)
+    assert said[0] == said[1] != "0 0\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        program(range(10)),
+        program(range(250, 350)),
+        program(range(100)).replace("default: break;", "default: at = 1;"),
+        program(range(100)).replace("while (1)", "if (1)"),
+        program(range(100)).replace("__pyx_L3_continue:;", "at = 2;"),
+    ],
+    ids=["few arms", "rows above a byte", "an else", "no loop", "something after the choice"],
+)
+def test_anything_else_stays_as_it_is(threaded, text):
+    assert threaded(text) == text
