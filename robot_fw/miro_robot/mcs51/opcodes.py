@@ -144,7 +144,7 @@ LENGTH = _by_opcode(5)
 CYCLES = _by_opcode(6)
 LINE = tuple(ROW[opcode] | CYCLES[opcode] << 8 | LENGTH[opcode] << 13 for opcode in range(256))
 """The same in one word, for the loop that executes them: bits 7:0 row, 10:8 cycles, 15:13 length. Bits 12:11 mark what
-is no opcode; in bits 31:16 the core puts the address behind the instruction, so that the next fetch waits for no sum."""
+is no opcode; in bits 31:16 the core puts the address behind the instruction, so that the next fetch need not add."""
 _AJMP, _LJMP, _ACALL, _LCALL = 0x01, 0x02, 0x11, 0x12
 _TEXT = {row[0]: (row[3], row[4]) for row in TABLE}
 
