@@ -46,7 +46,7 @@ class BareMachine:
     `output` gets the characters sent. With `code_in_xram`, program and data share one 64 KB space (EA low).
     """
 
-    NOT_STATE = ("image", "output", "stop_on_fault")
+    NOT_STATE = ("image", "jumps_to_itself", "output", "stop_on_fault")
 
     def __init__(
         self,
@@ -62,12 +62,15 @@ class BareMachine:
         self.image = image
         self.output = output
         self.stop_on_fault = stop_on_fault
+        self.jumps_to_itself = _places_of(_SJMP_SELF, image)
         self.faults: list[FirmwareFault] = []
         self.stdin = stdin
         self.baud = baud
         self.fed = 0  # bytes of stdin sent so far
         self.char_end = 0  # tick at which the last of them ends
         self.polls = 0  # reads of P3 seen so far
+        self.next_look = 0  # cycle at which to feed stdin, and to ask whether the program has ended
+        self.ends: tuple[int, ...] = ()  # where the program would end, if it came there before the next look
         self.bus = XramBus(self._sent, self._faulted)
         self.cpu = Cpu(self.bus)
         self.cpu.txd.unread = True  # the terminal takes characters, not edges
@@ -93,19 +96,24 @@ class BareMachine:
         limit = FAR if max_cycles is None else max_cycles
         stop = limit if pause is None else min(limit, pause)
         faults = len(self.faults)
-        while True:
-            if self.cpu.cycles >= stop:
-                return Ended.CYCLES if self.cpu.cycles >= limit else Ended.PAUSED
-            end = min(self._feed(), stop)
-            reason = self.cpu.run(end) if until is None else self.cpu.run_until_pc(until, end)
-            if reason == BREAKPOINT:
+        while self.cpu.cycles < stop:
+            if self.cpu.cycles >= self.next_look:
+                if max_cycles is None and self.cpu.pc != until and self._halted():
+                    return Ended.HALTED
+                self._look()
+            places = () if max_cycles is not None else self.ends
+            places = places if until is None else (*places, until)
+            reason = self.cpu.run_until_any(places, min(self.next_look, stop))
+            if reason == BREAKPOINT and self.cpu.pc == until:
                 return Ended.UNTIL
+            if reason == BREAKPOINT:
+                self.cpu.step()
+                self.next_look = self.cpu.cycles
             if self.stop_on_fault and len(self.faults) > faults:
                 return Ended.FAULT
-            if max_cycles is None and self._halted():
-                return Ended.HALTED
             if progress is not None:
                 progress(self.cpu.cycles)
+        return Ended.CYCLES if self.cpu.cycles >= limit else Ended.PAUSED
 
     def dump(self) -> dict[str, object]:
         """Registers and memories; SFRs by two hex digits, ports at their latches."""
@@ -139,8 +147,21 @@ class BareMachine:
             return False
         if cpu.asleep():
             return True
-        looping = cpu.code_at(cpu.pc) == _SJMP_SELF[0] and cpu.code_at(cpu.pc + 1) == _SJMP_SELF[1]
-        return looping and not cpu.sfr(0xA8) & 0x80
+        return self._jumps_to_itself(cpu.pc) and not cpu.sfr(0xA8) & 0x80
+
+    def _jumps_to_itself(self, address: int) -> bool:
+        cpu = self.cpu
+        return cpu.code_at(address) == _SJMP_SELF[0] and cpu.code_at(address + 1) == _SJMP_SELF[1]
+
+    def _look(self) -> None:
+        """Between two stretches of the run: feeds stdin, and finds out where the program might end."""
+        cpu = self.cpu
+        interruptible = cpu.sfr(0xA8) & 0x80
+        self.ends = () if interruptible else tuple(filter(self._jumps_to_itself, self.jumps_to_itself))
+        self.next_look = self._feed()
+        if cpu.pc in self.ends:  # it is there already; what is being sent may end any time
+            self.ends = ()
+            self.next_look = min(self.next_look, cpu.cycles + _LISTENING_SLICE)
 
     def _feed(self) -> int:
         """Puts the next character on RXD if it is time, and says how far to run now."""
@@ -191,6 +212,8 @@ class BareMachine:
             "fed": self.fed,
             "char_end": self.char_end,
             "polls": self.polls,
+            "next_look": self.next_look,
+            "ends": self.ends,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -210,3 +233,15 @@ class BareMachine:
         self.fed = state["fed"]
         self.char_end = state["char_end"]
         self.polls = state["polls"]
+        self.next_look = state["next_look"]
+        self.ends = tuple(state["ends"])
+
+
+def _places_of(code: bytes, image: Image) -> tuple[int, ...]:
+    """Loaded addresses at which these bytes stand, among them some in the middle of instructions."""
+    return tuple(
+        address
+        for first, end in image.used
+        for address in range(first, end)
+        if image.code[address : address + len(code)] == code
+    )

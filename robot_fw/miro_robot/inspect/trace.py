@@ -29,22 +29,23 @@ class Trace(Watcher):
         self.names = names
         self.write = write
         self.only = only
-        self.code = b""
+        self.code = bytearray()
         self.before: tuple[int, ...] = ()
         self.last = 0  # address of the last instruction: which went to sleep
-        self.static: dict[int, str | None] = {}  # by address: the part of the line that is always the same
+        self.static: dict[bytes, str | None] = {}  # by address and code: the part that is always the same
 
     def attached(self, cpu: Cpu) -> None:
-        self.code = cpu.code
+        self.code = bytearray(cpu.code)
         self.before = registers(cpu)
         self.last = cpu.pc
 
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
         after = registers(cpu)
         self.last = pc
-        if pc not in self.static or cpu.code_at(pc) != self.code[pc]:
-            self.static[pc] = self._static(cpu, pc)
-        text = self.static[pc]
+        code = bytes((pc >> 8, pc & 0xFF, cpu.code_at(pc), cpu.code_at(pc + 1), cpu.code_at(pc + 2)))
+        if code not in self.static:
+            self.static[code] = self._static(cpu, pc)
+        text = self.static[code]
         if text is not None:
             if after == self.before:
                 self.write(f"{12 * start:>12}  {text}")
@@ -65,8 +66,8 @@ class Trace(Watcher):
     def _static(self, cpu: Cpu, pc: int) -> str | None:
         if self.only is not None and self.names.function(pc)[0] not in self.only:
             return None
-        if cpu.code_at(pc) != self.code[pc]:  # a program in RAM that changes itself
-            self.code = cpu.code
+        for address in range(pc, pc + 3):  # a program in RAM may have changed itself
+            self.code[address & 0xFFFF] = cpu.code_at(address)
         return f"{pc:04X}  {self.names.place(pc):<28}  {disassemble(self.code, pc, self.names)}"
 
 

@@ -39,8 +39,9 @@ cdef class Cpu(Executor):
     cpdef reset(self)
     cpdef int run(self, long long until_cycle) except -1
     cpdef int step(self) except -1
-    @cython.locals(line='unsigned int')
     cpdef int run_until_pc(self, int address, long long until_cycle) except -1
+    @cython.locals(address=int)
+    cpdef int run_until_any(self, tuple addresses, long long until_cycle) except -1
     cpdef request_stop(self)
     cpdef int set_external(self, int port, int levels, long long tick) except -1
     cpdef asleep(self)

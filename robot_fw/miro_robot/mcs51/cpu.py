@@ -19,7 +19,7 @@ from miro_robot.mcs51.peripherals import Peripherals
 __all__ = ["BREAKPOINT", "REACHED", "STOPPED", "Cpu"]
 
 _FAR = 1 << 62
-_OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py
+_OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py; both: a mark outside
 _MARK = 0x1000
 _STOP_REQUESTED = 1
 _P0, _SP, _PCON, _IE, _IP, _PSW = 0x80, 0x81, 0x87, 0xA8, 0xB8, 0xD0
@@ -102,11 +102,11 @@ class Cpu(Executor):
         self.rom[address] = value
         if address < 2:
             self.rom[0x10000 + address] = value
-        self.lines[address] = self.line_at(address)
+        self.lines[address] = _MARK if self.lines[address] & _MARK else self.line_at(address)
 
     def is_loaded(self, address: int) -> bool:
         """Whether executing at `address` is legal."""
-        return self.lines[address & 0xFFFF] != _OUTSIDE
+        return not self.lines[address & 0xFFFF] & _OUTSIDE
 
     def code_at(self, address: int) -> int:
         return self.rom[address & 0xFFFF]
@@ -148,12 +148,17 @@ class Cpu(Executor):
 
     def run_until_pc(self, address: int, until_cycle: int) -> int:
         """Like `run`, but returns BREAKPOINT before the instruction at `address` is executed."""
-        line = self.lines[address]
-        self.lines[address] = _MARK
+        return self.run_until_any((address,), until_cycle)
+
+    def run_until_any(self, addresses: tuple[int, ...], until_cycle: int) -> int:
+        """The same for several addresses; `pc` tells which it was."""
+        for address in addresses:
+            self.lines[address] = _MARK | (self.lines[address] & _OUTSIDE)
         try:
             return self.run(until_cycle)
         finally:
-            self.lines[address] = line
+            for address in addresses:
+                self.lines[address] = _OUTSIDE if self.lines[address] & _OUTSIDE else self.line_at(address)
 
     def request_stop(self) -> None:
         """Ends the run after the instruction in progress; for callbacks of the bus."""

@@ -56,7 +56,7 @@ class Executor(Core):
             first = rom[pc + 1]
             second = rom[pc + 2]
             if line & 0x1800:  # no opcode's: a breakpoint, or outside the image
-                if line == _BREAKPOINT:
+                if line & _BREAKPOINT:
                     self.stop = BREAKPOINT
                     break
                 self.fault(_OUTSIDE_IMAGE)

@@ -149,7 +149,7 @@ _AJMP, _LJMP, _ACALL, _LCALL = 0x01, 0x02, 0x11, 0x12
 _TEXT = {row[0]: (row[3], row[4]) for row in TABLE}
 
 
-def disassemble(code: bytes, address: int, names: Names = NUMBERS) -> str:
+def disassemble(code: bytes | bytearray, address: int, names: Names = NUMBERS) -> str:
     """The instruction at `address` of a 64 KB image in the notation of the data sheet, targets absolute."""
     opcode, first, second = (code[(address + offset) & 0xFFFF] for offset in range(3))
     mnemonic, operands = _TEXT[ROW[opcode]]

@@ -73,7 +73,8 @@ def _print(result: Profile, name: str) -> None:
                 str(found.worst_duration_tick),
                 _percent(found.total_cycles, result.cycles),
             )
-    show(interrupts)
+    if interrupts.row_count:
+        show(interrupts)
     stack = result.stack
     begins = "" if stack.first is None else f"from {stack.first:02X}h, "
     used = "" if stack.first is None else f"{stack.highest - stack.first + 1} bytes used, "

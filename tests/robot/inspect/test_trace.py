@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from miro_robot.bare import BareMachine
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.trace import REGISTERS, Trace, registers
 from miro_robot.inspect.watcher import attach
@@ -65,6 +66,16 @@ def test_sleep_and_the_interrupt_that_ends_it_have_lines_of_their_own():
     assert "-- interrupt: timer 0, to vector timer 0" in lines[asleep + 1]
     assert "INC R7" in lines[asleep + 2]
     assert lines[asleep + 2].endswith("R7=01")
+
+
+def test_a_program_that_changes_its_own_operands_is_shown_as_it_was_executed():
+    code = assemble("MOV DPTR,#0005h\nNOP\nMOV A,#00h\nINC A\nMOVX @DPTR,A\nSJMP 0004h")
+    machine = BareMachine(image_of(code), code_in_xram=True)
+    lines: list[str] = []
+    attach(machine.cpu, Trace(SymbolNames(image_of(code)), lines.append))
+    machine.run(max_cycles=30)
+    shown = [line.split("MOV A,")[1].split()[0] for line in lines if "MOV A," in line]
+    assert shown == ["#00h", "#01h", "#02h", "#03h", "#04h"]
 
 
 def test_only_the_functions_asked_for_are_written():

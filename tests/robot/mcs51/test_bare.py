@@ -98,6 +98,38 @@ def test_a_run_stops_at_an_address_and_goes_on():
     assert machine.run() == Ended.HALTED
 
 
+def test_a_program_ends_with_its_first_jump_to_itself():
+    machine = BareMachine(image("MOV A,#01h\nINC A\nSJMP $"))
+    assert machine.run() == Ended.HALTED
+    assert (machine.cpu.pc, machine.cpu.cycles, machine.cpu.instructions) == (3, 4, 3)
+
+
+def test_a_jump_to_itself_that_interrupts_leave_is_no_end():
+    program = "LJMP main\nORG 000Bh\nINC 30h\nRETI\nmain:\nMOV TMOD,#02h\nSETB TR0\nMOV IE,#82h\nSJMP $"
+    machine = BareMachine(image(program))
+    assert machine.run(pause=1_000_000) == Ended.PAUSED
+    assert machine.cpu.peek_iram(0x30) > 0
+
+
+def test_bytes_that_only_look_like_a_jump_to_itself_end_nothing():
+    machine = BareMachine(image("MOV 80h,#0FEh\nMOV DPTR,#80FEh\nSJMP $"))
+    assert machine.run() == Ended.HALTED
+    assert (machine.cpu.pc, machine.cpu.dptr) == (6, 0x80FE)
+
+
+@pytest.mark.parametrize("step", [1, 7, 333, 1_001])
+@pytest.mark.parametrize("text", [ECHO, SERIAL + "MOV SBUF,#41h\nSJMP $", "NOP\nMOV PCON,#01h\nSJMP $"])
+def test_a_run_that_is_paused_is_the_same_run(text, step):
+    whole, cut = (BareMachine(image(text), stdin=b"hi!") for _ in range(2))
+    limit = 12_000 if text == ECHO else None
+    ended = whole.run(max_cycles=limit)
+    pause = step
+    while (cut_ended := cut.run(max_cycles=limit, pause=pause)) == Ended.PAUSED:
+        pause += step if pause < 20_000 else 100_000
+    assert cut_ended == ended
+    assert cut.snapshot() == whole.snapshot()
+
+
 def test_a_fault_names_kind_place_and_tick():
     machine = BareMachine(image("NOP\nDB 0A5h\nSJMP $"))
     assert machine.run(max_cycles=1000) == Ended.FAULT

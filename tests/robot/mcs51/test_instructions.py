@@ -184,6 +184,30 @@ def test_a_run_until_an_address_stops_before_its_instruction():
     assert cpu.a == 2
 
 
+def test_a_run_until_any_of_several_addresses_says_by_pc_which():
+    cpu = cpu_with("MOV A,#01h\nMOV A,#02h\nMOV A,#03h")
+    assert cpu.run_until_any((4, 2), 100) == 2
+    assert cpu.pc == 2
+    assert cpu.run_until_any((4,), 100) == 2
+    assert (cpu.a, cpu.pc) == (2, 4)
+    assert cpu.run_until_any((), 4) == 0
+
+
+def test_code_that_is_written_where_a_run_is_to_stop_does_not_hide_the_place():
+    class CodeInRam(RecordingBus):
+        def movx_write(self, address, value, tick):
+            cpu.write_code(address, value)
+
+    cpu = Cpu(CodeInRam())
+    cpu.load(bytes.fromhex("900006 7404 f0 00 80fe"))  # writes INC A over the NOP behind it
+    assert cpu.run_until_pc(6, 100) == 2
+    cpu.step()
+    assert (cpu.a, cpu.pc) == (5, 7)
+    assert not cpu.is_loaded(0x20)
+    assert cpu.run_until_pc(0x20, 50) == 0
+    assert not cpu.is_loaded(0x20)
+
+
 def test_an_exception_in_the_bus_leaves_the_run():
     class Broken(RecordingBus):
         def port_written(self, port, latch, tick):
