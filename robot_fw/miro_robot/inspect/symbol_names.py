@@ -10,11 +10,9 @@ import bisect
 from miro_robot.debug_info import DebugInfo
 from miro_robot.image import Image
 from miro_robot.mcs51.names import BITS, INTERRUPTS, SFRS, Names
-from miro_robot.mcs51.opcodes import LENGTH, ROW, is_call, target
+from miro_robot.mcs51.opcodes import LENGTH, goes_on, is_call, target
 
 _NOP = 0x00
-_LEAVING = (_NOP, 0x02, 0x22, 0x32, 0x73, 0x80)  # NOP, LJMP, RET, RETI, JMP @A+DPTR, SJMP
-_AJMP = 0x01
 _VECTORS = (0, *(8 * number + 3 for number in range(len(INTERRUPTS))))
 
 
@@ -92,6 +90,6 @@ def _sweep(image: Image) -> dict[int, bool]:
         while address < end:
             found[address] = entry
             opcode = image.code[address]
-            entry = opcode in _LEAVING or ROW[opcode] == _AJMP
+            entry = opcode == _NOP or not goes_on(opcode)
             address += LENGTH[opcode]
     return found

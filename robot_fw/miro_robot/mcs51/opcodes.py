@@ -146,6 +146,7 @@ LINE = tuple(ROW[opcode] | CYCLES[opcode] << 8 | LENGTH[opcode] << 13 for opcode
 """The same in one word, for the loop that executes them: bits 7:0 row, 10:8 cycles, 15:13 length. Bits 12:11 mark what
 is no opcode; in bits 31:16 the core puts the address behind the instruction, so that the next fetch need not add."""
 _AJMP, _LJMP, _ACALL, _LCALL = 0x01, 0x02, 0x11, 0x12
+_LEAVING = (_LJMP, 0x22, 0x32, 0x73, 0x80)  # and RET, RETI, JMP @A+DPTR, SJMP
 _TEXT = {row[0]: (row[3], row[4]) for row in TABLE}
 
 
@@ -188,6 +189,11 @@ def target(code: bytes, address: int) -> int | None:
     if ROW[opcode] in (_ACALL, _AJMP):
         return (address + 2) & 0xF800 | (opcode & 0xE0) << 3 | first
     return None
+
+
+def goes_on(opcode: int) -> bool:
+    """Whether the instruction behind it may be executed next; so it may be after a call."""
+    return opcode not in _LEAVING and ROW[opcode] != _AJMP
 
 
 def is_call(opcode: int) -> bool:

@@ -16,6 +16,7 @@ MAP = ROBOT.with_suffix(".map").read_text()
 CDB = ROBOT.with_suffix(".cdb").read_text()
 IMAGE = load_hex(ROBOT)
 LOADED = bytes(any(first <= address < end for first, end in IMAGE.used) for address in range(0x10000))
+MOVED_FROM = 0x400
 needs_sdcc = pytest.mark.skipif(shutil.which("sdcc") is None, reason="sdcc is not installed")
 
 
@@ -56,6 +57,41 @@ def test_a_map_in_which_main_moved_is_refused(tmp_path):
     error = refusal(path)
     assert "000000E8  _main" in MAP.replace("000000E7  _main", "000000E8  _main").splitlines()[error.line - 1]
     assert error.reason == "_main is at 0x00e8 here, and the image's start-up code jumps to 0x00e7"
+
+
+@pytest.mark.parametrize("by", [-7, -2, -1, 1, 2, 3, 30])
+def test_a_map_in_which_functions_behind_main_moved_is_refused(by):
+    moved = moved_map(by)
+    found = check_map("\n".join(moved), IMAGE.code, LOADED)
+    assert found is not None
+    assert " instructions are not in the image, " in found.reason
+    assert abs(int(moved[found.line - 1][5:13], 16) - MOVED_FROM) < 0x40
+    names_only = [line for line in moved if "$" not in line]  # without --debug
+    found = check_map("\n".join(names_only), IMAGE.code, LOADED)
+    assert found is not None
+    assert found.reason.startswith("no function of the image begins where ")
+    assert int(names_only[found.line - 1][5:13], 16) >= MOVED_FROM + by
+
+
+def moved_map(by: int) -> list[str]:
+    moved = []
+    for line in MAP.splitlines():
+        address = line[5:13] if line.startswith("C:") else ""
+        if address and MOVED_FROM <= int(address, 16) < 0xFFF0:
+            line = line.replace(address, f"{int(address, 16) + by:08X}")
+        moved.append(line)
+    return moved
+
+
+def test_tables_with_names_among_functions_are_not_taken_for_moved_ones():
+    code = bytearray(b"\x22" * 0x10000)
+    code[0x10:0x30] = b"\x05" * 0x20
+    area = "CSEG                                00000000    00000100 =         256. bytes (REL,CON,CODE)\n"
+    names = [f"C:   000000{n:02X}  _name{n}   a\n" for n in (0x14, 0x18, 0x1C, *range(0x40, 0x49))]
+    assert check_map(area + "".join(names), bytes(code), b"\x01" * 0x10000) is None
+    assert check_map(area + "".join(names[:-1]), bytes(code), b"\x01" * 0x10000) is not None
+    code[0x80:0x83] = b"\x12\x00\x14"
+    assert check_map(area + "".join(names[:-1]), bytes(code), b"\x01" * 0x10000) is None
 
 
 def test_a_debug_file_whose_instructions_stand_elsewhere_is_refused(tmp_path):
@@ -188,7 +224,6 @@ def test_the_symbols_of_yesterday_are_refused_today(tmp_path):
         mixed.parent.mkdir()
         shutil.copy(today, mixed)
         shutil.copy(yesterday.with_suffix(suffix), mixed.with_suffix(suffix))
-        if suffix == ".map":
-            load_hex(mixed)  # main did not move, and everything it names is there: nothing contradicts it
-        else:
-            assert refusal(mixed).path.suffix == ".cdb"
+        error = refusal(mixed)
+        assert error.path.suffix == suffix
+        assert " instructions are not in the image, the first at 0x" in error.reason
