@@ -5,6 +5,7 @@ What belongs here: both directions. What does not: symbol files (`miro_robot.ima
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from miro_sim.cli.program import UserError
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
+    from miro_robot.inspect.symbol_names import SymbolNames
 
 FLASH_BYTES = 8192
 SPACE_BYTES = 65536
@@ -46,6 +48,24 @@ def address_of(text: str, image: Image, path: str, option: str) -> int:
     else:
         remedy = "put its .map or .cdb beside it, or give an address as 0x.."
     raise UserError(f"{path}: {option}: no symbol {text} in the code; {remedy}")
+
+
+def functions_at(places: Iterable[str], image: Image, names: SymbolNames, path: str) -> set[tuple[int, str]]:
+    """(first address, name) of the functions that --symbol names; static ones of several files may share a name.
+
+    An address stands for the function around it.
+    """
+    found = set()
+    for place in places:
+        address = address_of(place, image, path, "--symbol")
+        if not any(first <= address < end for first, end in image.used):
+            raise UserError(
+                f"{path}: --symbol: the image has no code at {address:#06x}; see mirotwin fw disasm"
+            )
+        around = names.function(address)
+        by_address = place[:2].lower() == "0x"
+        found |= {around} if by_address else {other for other in names.functions if other[1] == around[1]}
+    return found
 
 
 def place_of(address: int, image: Image) -> str:

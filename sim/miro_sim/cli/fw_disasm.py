@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from miro_sim.cli.code_place import SPACE_BYTES, address_of
+from miro_sim.cli.code_place import SPACE_BYTES, functions_at
 from miro_sim.cli.debug import sources_of, sources_option
 from miro_sim.cli.options import Place, choose_engine, load_image
 
@@ -33,7 +33,7 @@ def disasm(image: str | None, symbols: tuple[str, ...], sources: tuple[str, ...]
 
     names = SymbolNames(loaded)
     path = image or str(loaded.path)
-    wanted = {names.function(address_of(symbol, loaded, path, "--symbol")) for symbol in symbols}
+    wanted = functions_at(symbols, loaded, names, path)
     shown = not wanted
     headings = {f"{name}:" for _, name in wanted}
     for line in text_lines(loaded, DebugInfo.of(loaded), names, sources_of(loaded, sources)):

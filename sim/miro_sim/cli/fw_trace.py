@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from miro_sim.cli.code_place import address_of
+from miro_sim.cli.code_place import functions_at
 from miro_sim.cli.debug import with_debug_files
 from miro_sim.cli.options import Place
 from miro_sim.cli.subject import Request, look, open_run, subject_options
@@ -37,9 +37,7 @@ def trace(request: Request, symbols: tuple[str, ...], out: str | None) -> int:
 
     image = with_debug_files(run.image)
     names = SymbolNames(image)
-    only = {
-        names.function(address_of(symbol, image, request.subject, "--symbol"))[0] for symbol in symbols
-    } or None
+    only = {first for first, _ in functions_at(symbols, image, names, request.subject)} or None
     if out is None:
         click.echo(HEADING)
         return look(run, request, Trace(names, click.echo, only))

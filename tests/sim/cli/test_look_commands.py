@@ -16,6 +16,7 @@ from miro_sim import scenario_file
 from miro_sim.watched import RobotRun, watch
 from miro_sim.world import World
 
+from tests.robot.inspect.programs import build_modules
 from tests.sim.cli.conftest import Result, hex_file
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
@@ -217,6 +218,31 @@ def test_an_unknown_symbol_is_named_with_its_nearest(mirotwin: Callable[..., Res
     code, _, err = mirotwin("fw", "trace", "fig6", "--symbol", "uart_sent", "--to", "1ms")
     assert code == 2
     assert "did you mean _uart_send?" in err
+
+
+@pytest.mark.parametrize("command", [("trace", "--to", "1ms"), ("disasm",)])
+def test_an_address_without_code_is_no_function(
+    mirotwin: Callable[..., Result], bare: Path, command: tuple[str, ...]
+) -> None:
+    code, _, err = mirotwin("fw", command[0], bare, *command[1:], "--symbol", "0x5000")
+    assert code == 2
+    assert "bare.ihx: --symbol: the image has no code at 0x5000; see mirotwin fw disasm" in err
+
+
+def test_static_functions_that_share_a_name_are_all_shown(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    module = "static char step(char c) { return c + %d; }\nvolatile char %s;\nvoid run_%s(void) { %s = step(%s); }\n"
+    main = "void run_b(void);\nvoid main(void) { run_a(); run_b(); while (1); }\n"
+    (tmp_path / "a.c").write_text(module % (1, "a", "a", "a", "a") + main)
+    (tmp_path / "b.c").write_text(module % (2, "b", "b", "b", "b"))
+    image = build_modules(tmp_path, "a", "b")
+    shown = mirotwin("fw", "trace", image, "--symbol", "step")[1].splitlines()[1:]
+    starts = {line.split()[1] for line in shown if line.split()[2] == "_step"}
+    assert len(starts) == 2
+    assert mirotwin("fw", "disasm", image, "--symbol", "step")[1].count("_step:\n") == 2
+    one = mirotwin("fw", "trace", image, "--symbol", f"0x{min(starts)}")[1].splitlines()[1:]
+    assert {line.split()[1] for line in one if line.split()[2] == "_step"} == {min(starts)}
 
 
 def test_output_that_cannot_be_written_is_refused_before_the_run(
