@@ -93,6 +93,14 @@ def test_a_state_that_does_not_list_what_changes_is_refused():
         Bench().run(State(pc=0, sfr=[], iram=[], xram=[], code=[(0, 0x74), (1, 0x55), (2, 0)]))
 
 
+def test_a_bench_carries_out_any_number_of_vectors():
+    """Each of these moves TXD down, and the reset before it up again."""
+    bench = Bench()
+    initial = State(pc=0, sfr=[(0xB0, 0xFD)], iram=[], xram=[], code=[(0, 0), (1, 0)])
+    results = [bench.run(initial) for _ in range(2100)]
+    assert results.count(results[0]) == len(results)
+
+
 def test_files_of_another_form_are_refused():
     with pytest.raises(ValidationError):
         decode(b'[{"name": "00"}]')
