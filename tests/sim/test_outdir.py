@@ -1,10 +1,12 @@
 """The output folder: what is refused, what is replaced, and that nothing is left half-written."""
 
+import errno
 import os
+import stat
 from pathlib import Path
 
 import pytest
-from miro_sim.outdir import OutputError, OutputFolder, check_file, whole_file
+from miro_sim.outdir import OutputError, OutputFolder, check_file, check_new, whole_file
 
 
 def write_run(folder: Path, text: str = "new") -> None:
@@ -95,8 +97,78 @@ def test_a_link_to_nothing_is_called_that(tmp_path: Path) -> None:
         check_file(tmp_path / "link", "--dump")
 
 
+@pytest.fixture(params=["a folder that is there", "a link to one"])
+def made(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    (tmp_path / "target").mkdir()
+    if request.param == "a folder that is there":
+        return tmp_path / "target"
+    (tmp_path / "link").symlink_to("target")
+    return tmp_path / "link"
+
+
+def test_a_folder_that_is_there_is_filled_from_inside_because_it_may_be_another_disk(made: Path) -> None:
+    with OutputFolder(made) as staging:
+        assert staging.parent.samefile(made)
+        write_run(staging)
+    assert sorted(path.name for path in made.iterdir()) == ["run.mcap", "summary.json"]
+
+
+def test_a_full_disk_is_named_with_the_way_out(tmp_path: Path) -> None:
+    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    said = "new: No space left on device; make room, or choose another"
+    with pytest.raises(OutputError, match=f"{said} folder with --out"), OutputFolder(tmp_path / "new"):
+        raise full
+    with pytest.raises(OutputError, match=f"{said} file with --dump"), whole_file(tmp_path / "new", "--dump"):
+        raise full
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_whole_file_is_written_through_a_link(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "real").write_text("old")
+    (tmp_path / "link").symlink_to("data/real")
+    with whole_file(tmp_path / "link", "--out") as staging:
+        staging.write_text("new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "data" / "real").read_text() == "new"
+    assert [path.name for path in (tmp_path / "data").iterdir()] == ["real"]
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o664, 0o755])
+def test_a_whole_file_keeps_the_mode_of_the_one_before(tmp_path: Path, mode: int) -> None:
+    (tmp_path / "mine").touch()
+    (tmp_path / "mine").chmod(mode)
+    with whole_file(tmp_path / "mine", "--out") as staging:
+        staging.write_text("new")
+    assert stat.S_IMODE((tmp_path / "mine").stat().st_mode) == mode
+
+
+@pytest.mark.parametrize("umask", [0o022, 0o077, 0o002])
+def test_a_new_whole_file_has_the_mode_that_any_new_file_has(tmp_path: Path, umask: int) -> None:
+    before = os.umask(umask)
+    try:
+        with whole_file(tmp_path / "whole", "--out") as staging:
+            staging.write_text("new")
+        (tmp_path / "any").write_text("new")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "whole").stat().st_mode == (tmp_path / "any").stat().st_mode
+
+
+def test_a_file_that_is_there_stays_unless_it_is_to_be_replaced(tmp_path: Path) -> None:
+    check_new(tmp_path / "x", "--out", force=False)
+    (tmp_path / "x").touch()
+    check_new(tmp_path / "x", "--out", force=True)
+    with pytest.raises(
+        OutputError, match=r"x: is there already; choose another file with --out, or .* --force"
+    ):
+        check_new(tmp_path / "x", "--out", force=False)
+
+
 def test_a_whole_file_does_not_take_the_place_of_a_device() -> None:
     refusal = "is there and is not a regular file; choose another file with --out"
     with pytest.raises(OutputError, match=refusal), whole_file(Path(os.devnull), "--out"):
         pass
+    with pytest.raises(OutputError, match=refusal):
+        check_file(Path(os.devnull), "--out")
     assert not os.path.isfile(os.devnull)

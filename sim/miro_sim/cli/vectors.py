@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from miro_sim.cli.options import Place, Whole, choose_engine, engine_option
-from miro_sim.cli.program import MAX_SEED, UserError
+from miro_sim.cli.program import MAX_SEED
 from miro_sim.cli.progress import ProgressBar
+from miro_sim.outdir import OutputFolder
 
 if TYPE_CHECKING:
     from miro_sim.rng import Stream
@@ -37,21 +38,17 @@ def vectors(out: Path, per_opcode: int, seed: int, force: bool, engine: str | No
     accesses of each machine cycle. The same seed writes the same bytes; more vectors per opcode only add to
     them. tests/vectors/README.md describes the format.
     """
+    folder = OutputFolder(out, force, NAMES)
     choose_engine(engine)
     from miro_robot.mcs51.vector_draw import draw_vectors
     from miro_robot.mcs51.vectors import encode
 
     from miro_sim.rng import Stream
 
-    out.mkdir(parents=True, exist_ok=True)
-    if not force and (present := sorted(path.name for path in out.iterdir())):
-        shown = ", ".join(present[:3]) + (", .." if len(present) > 3 else "")
-        remedy = "choose another with --out, or replace 00.json to ff.json with --force"
-        raise UserError(f"{out}: the folder is not empty ({shown}); {remedy}")
-    with ProgressBar("drawing", OPCODES) as bar:
+    with folder as staging, ProgressBar("drawing", OPCODES) as bar:
         for opcode, name in enumerate(NAMES):
             draw = drawing(Stream(seed, f"vectors/mcs51/{opcode:02x}"))
-            (out / name).write_bytes(encode(draw_vectors(opcode, per_opcode, draw)))
+            (staging / name).write_bytes(encode(draw_vectors(opcode, per_opcode, draw)))
             bar.to(opcode + 1)
 
 
