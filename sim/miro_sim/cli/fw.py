@@ -18,7 +18,7 @@ from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, loa
 from miro_sim.cli.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, complain
 from miro_sim.cli.progress import ProgressBar
 from miro_sim.inputs import read_input
-from miro_sim.outdir import check_file, check_not_input
+from miro_sim.outdir import check_file, check_not_input, whole_file
 
 
 @click.group()
@@ -82,7 +82,8 @@ def run_bare(
         ended = machine.run(until=target, max_cycles=max_cycles, progress=bar.to)
     out.flush()
     if dump is not None:
-        Path(dump).write_bytes(msgspec.json.format(msgspec.json.encode(machine.dump()), indent=2) + b"\n")
+        with whole_file(Path(dump), "--dump") as staging:
+            staging.write_bytes(msgspec.json.format(msgspec.json.encode(machine.dump()), indent=2) + b"\n")
     place = f"{place_of(machine.cpu.pc, loaded)} after {machine.cpu.cycles} machine cycles"
     if ended is Ended.FAULT:
         complain(f"firmware fault: {machine.faults[0]}")

@@ -2,6 +2,9 @@
 
 import hashlib
 import json
+import resource
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +16,7 @@ from miro_sim.cli import main
 
 from tests.sim.cli.conftest import Result, hex_file
 
+MIROTWIN = Path(sys.executable).with_name("mirotwin")
 LOOP = b"\x80\xfe"
 HELLO = bytes.fromhex("759850 758bff 758920 d28e 7599c3 80fe".replace(" ", ""))
 
@@ -108,6 +112,35 @@ def test_a_dump_that_cannot_be_written_is_refused_before_the_firmware_runs(
         code, out, err = mirotwin("fw", "run", image, "--dump", place)
         assert (code, out) == (2, "")
         assert err.startswith(f"mirotwin: error: {place}: {what}")
+
+
+def test_a_dump_takes_the_place_of_no_device_and_is_refused_before_the_firmware_runs(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image = hex_file(tmp_path / "a.ihx", HELLO)
+    code, out, err = mirotwin("fw", "run", image, "--max-cycles", 100, "--dump", "/dev/full")
+    assert (code, out) == (2, "")
+    assert err == (
+        "mirotwin: error: /dev/full: is there and is not a regular file; choose another file with --dump\n"
+    )
+
+
+def test_a_dump_that_does_not_fit_the_disk_leaves_the_one_before(tmp_path: Path) -> None:
+    """A limit on the length of files stands in for the disk."""
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+
+    image, dump = hex_file(tmp_path / "a.ihx", LOOP), tmp_path / "dump.json"
+    dump.write_text("old")
+    command = [MIROTWIN, "fw", "run", image, "--dump", dump]
+    done = subprocess.run(command, preexec_fn=limit, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.endswith(
+        f"mirotwin: error: {dump}: File too large; make room, or choose another file with --dump\n"
+    )
+    assert dump.read_text() == "old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.ihx", "dump.json"]
 
 
 def test_the_8_kb_limit_is_lifted_when_code_is_in_ram(
