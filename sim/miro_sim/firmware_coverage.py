@@ -1,11 +1,12 @@
 """Firmware coverage as a report: what the command line and the pytest plugin make of counts.
 
-What belongs here: paths, the table for people, reading a tracefile to add to. What does not: the mapping to lines
-(`miro_robot.inspect.coverage`).
+What belongs here: paths, the table for people, the files that are added to and written. What does not: the mapping to
+lines (`miro_robot.inspect.coverage`).
 """
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ import msgspec
 from rich.table import Table
 
 from miro_sim.inputs import InputError, read_input
+from miro_sim.outdir import whole_file
 
 if TYPE_CHECKING:
     from miro_robot.debug_info import Sources
@@ -22,12 +24,23 @@ if TYPE_CHECKING:
 
 
 class Report(msgspec.Struct, frozen=True):
-    """`listing`: text of the listing whose lines were counted, None when C lines were; it belongs at `listing_path`."""
+    """`listing`: text of the listing whose lines were counted, None when C lines were."""
 
     tracefile: Tracefile
     instructions: Share
     listing: str | None
-    listing_path: Path
+
+
+def has_listing(image: Image) -> bool:
+    """Whether the lines that are counted are those of a listing: no debug file names C lines."""
+    from miro_robot.debug_info import DebugInfo
+
+    return not DebugInfo.of(image).lines
+
+
+def listing_path(out: Path) -> Path:
+    """Where the listing belongs that goes with the tracefile at `out`."""
+    return out.with_name(f"{out.name}.lst")
 
 
 def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) -> Report:
@@ -37,13 +50,21 @@ def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) ->
 
     debug = DebugInfo.of(image)
     share = instruction_share(image, debug, counts)
-    beside = out or image.path
-    listing_path = beside.with_name(f"{beside.name}.lst")
     if debug.lines:
         tracefile = at_paths(by_line(image, debug, counts), sources, Path.cwd())
-        return Report(tracefile, share, None, listing_path)
+        return Report(tracefile, share, None)
     listing, record = by_listing(image, counts)
-    return Report({str(listing_path): record}, share, listing, listing_path)
+    return Report({str(listing_path(out or image.path)): record}, share, listing)
+
+
+def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
+    """Writes `total`, and the listing of `report` if it has one. Raises OutputError; then neither is written."""
+    from miro_robot.inspect.lcov import encode
+
+    with ExitStack() as files:
+        for path, text in ((listing_path(out), report.listing), (out, encode(total))):
+            if text is not None:
+                files.enter_context(whole_file(path, option)).write_text(text, encoding="utf-8")
 
 
 def read_tracefile(path: Path) -> Tracefile:

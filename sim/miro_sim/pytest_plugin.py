@@ -104,17 +104,12 @@ class FirmwareCoverage:
         self.from_workers.append({address: (executed, jumped) for address, executed, jumped in handed})
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-        from miro_robot.inspect.lcov import encode
         from rich.console import Console
 
-        from miro_sim.firmware_coverage import table
-        from miro_sim.outdir import whole_file
+        from miro_sim.firmware_coverage import table, write
 
         report = self._report()
-        for path, text in ((report.listing_path, report.listing), (self.out, encode(report.tracefile))):
-            if text is not None:
-                with whole_file(path, "--firmware-coverage") as staging:
-                    staging.write_text(text, encoding="utf-8")
+        write(report.tracefile, report, self.out, "--firmware-coverage")
         terminalreporter.section(f"coverage of {self.image.path.name}, written to {self.out}")
         console = Console(highlight=False, markup=False, width=TABLE_COLUMNS)
         with console.capture() as capture:

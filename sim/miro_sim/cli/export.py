@@ -17,7 +17,7 @@ from miro_sim.capture.source import READ_ERRORS, open_source
 from miro_sim.cli.options import Place, Whole, choose_engine, engine_option
 from miro_sim.cli.program import BAD_INPUT, DONE, UserError, complain, show
 from miro_sim.cli.progress import ProgressBar
-from miro_sim.outdir import check_file, whole_file
+from miro_sim.outdir import check_new, whole_file
 
 TARGETS = ("pcapng", "stream")
 
@@ -87,9 +87,7 @@ def export(
     that is cut short, all that could be read is written, and the exit code is 2.
     """
     if out != STDIN:
-        check_file(Path(out), "--out")
-        if Path(out).exists() and not force:
-            raise UserError(f"{out}: exists; choose another file with --out, or replace it with --force")
+        check_new(Path(out), "--out", force)
     choose_engine(engine)
     to = to or ("stream" if Path(out).suffix in (".stream", ".txt") else "pcapng")
     with Input(file) as given, ProgressBar("exporting", given.size, quiet) as bar:

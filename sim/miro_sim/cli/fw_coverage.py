@@ -9,10 +9,10 @@ import click
 
 from miro_sim.cli.debug import sources_of, sources_option, with_debug_files
 from miro_sim.cli.options import Place
-from miro_sim.cli.program import show
+from miro_sim.cli.program import UserError, show
 from miro_sim.cli.subject import Request, look, open_run, subject_options
-from miro_sim.firmware_coverage import collect, read_tracefile, table
-from miro_sim.outdir import check_file, check_not_input, whole_file
+from miro_sim.firmware_coverage import collect, has_listing, listing_path, read_tracefile, table, write
+from miro_sim.outdir import check_new, check_not_input
 
 if TYPE_CHECKING:
     from miro_robot.inspect.lcov import Tracefile
@@ -21,38 +21,45 @@ if TYPE_CHECKING:
 @click.command(short_help="Shows which lines of the firmware ran.")
 @subject_options
 @click.option(
-    "--out", type=Place(), metavar="FILE.info", help="Write an lcov tracefile (genhtml, CI services)."
+    "--out",
+    type=Place(path_type=Path),
+    metavar="FILE.info",
+    help="Write an lcov tracefile (genhtml, CI services).",
 )
 @click.option("--append", is_flag=True, help="Add to what --out holds already.")
+@click.option("--force", is_flag=True, help="Replace the file at --out, and its listing.")
 @sources_option
-def coverage(request: Request, out: str | None, append: bool, sources: tuple[str, ...]) -> int:
+def coverage(request: Request, out: Path | None, append: bool, force: bool, sources: tuple[str, ...]) -> int:
     """Shows which C lines, branches and instructions ran in SUBJECT, and writes them as an lcov tracefile.
 
     For an image without debug files the lines are those of its listing, written beside FILE.info as FILE.info.lst.
     """
-    before: Tracefile = {}
+    if append and force:
+        raise UserError("--append adds to the file, --force replaces it; give one of the two")
+    total: Tracefile = {}
     if out is not None:
-        check_file(Path(out), "--out")
-        check_not_input(Path(out), "--out", request.subject, request.firmware, request.stdin)
-        before = read_tracefile(Path(out)) if append else {}
+        _check(out, request, append or force)
+        total = read_tracefile(out) if append else {}
     run = open_run(request)
     from miro_robot.inspect.counters import Counters
     from miro_robot.inspect.coverage import counts_of
-    from miro_robot.inspect.lcov import add, encode
+    from miro_robot.inspect.lcov import add
 
     image = with_debug_files(run.image)
+    if out is not None and has_listing(image):
+        _check(listing_path(out), request, append or force)
     counters = Counters()
     folders = sources_of(image, sources)
     code = look(run, request, counters)
-    report = collect(image, counts_of(counters), folders, None if out is None else Path(out))
-    total = before
+    report = collect(image, counts_of(counters), folders, out)
     add(total, report.tracefile)
     if out is not None:
-        if report.listing is not None:
-            with whole_file(report.listing_path, "--out") as staging:
-                staging.write_text(report.listing, encoding="utf-8")
-        with whole_file(Path(out), "--out") as staging:
-            staging.write_text(encode(total), encoding="utf-8")
+        write(total, report, out, "--out")
     show(table(total))
     show(f"instructions of this run: {report.instructions}")
     return code
+
+
+def _check(path: Path, request: Request, may_be_there: bool) -> None:
+    check_not_input(path, "--out", request.subject, request.firmware, request.stdin)
+    check_new(path, "--out", may_be_there, more="add to it with --append, ")

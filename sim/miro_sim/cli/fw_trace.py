@@ -10,7 +10,7 @@ from miro_sim.cli.code_place import functions_at
 from miro_sim.cli.debug import with_debug_files
 from miro_sim.cli.options import Place
 from miro_sim.cli.subject import Request, look, open_run, subject_options
-from miro_sim.outdir import check_file, check_not_input, whole_file
+from miro_sim.outdir import check_new, check_not_input, whole_file
 
 
 @click.command(short_help="Writes each instruction with what it changed.")
@@ -22,15 +22,16 @@ from miro_sim.outdir import check_file, check_not_input, whole_file
     metavar="SYMBOL|ADDRESS",
     help="Only the function there; several may be.",
 )
-@click.option("--out", type=Place(), metavar="FILE", help="Write there instead of to stdout.")
-def trace(request: Request, symbols: tuple[str, ...], out: str | None) -> int:
+@click.option("--out", type=Place(path_type=Path), metavar="FILE", help="Write there instead of to stdout.")
+@click.option("--force", is_flag=True, help="Replace the file at --out.")
+def trace(request: Request, symbols: tuple[str, ...], out: Path | None, force: bool) -> int:
     """Writes what the processor did in SUBJECT: tick, address, symbol, instruction, changed registers.
 
     A line stands for one instruction, one call of an interrupt routine, or one stretch of sleep.
     """
     if out is not None:
-        check_file(Path(out), "--out")
-        check_not_input(Path(out), "--out", request.subject, request.firmware, request.stdin)
+        check_not_input(out, "--out", request.subject, request.firmware, request.stdin)
+        check_new(out, "--out", force)
     run = open_run(request)
     from miro_robot.inspect.symbol_names import SymbolNames
     from miro_robot.inspect.trace import HEADING, Trace
@@ -41,6 +42,6 @@ def trace(request: Request, symbols: tuple[str, ...], out: str | None) -> int:
     if out is None:
         click.echo(HEADING)
         return look(run, request, Trace(names, click.echo, only))
-    with whole_file(Path(out), "--out") as staging, staging.open("w", encoding="utf-8") as stream:
+    with whole_file(out, "--out") as staging, staging.open("w", encoding="utf-8") as stream:
         stream.write(HEADING + "\n")
         return look(run, request, Trace(names, lambda line: stream.write(line + "\n"), only))

@@ -10,7 +10,7 @@ from miro_sim.cli.options import Place
 from miro_sim.cli.program import UserError, show
 from miro_sim.cli.subject import Request, look, open_run, subject_options
 from miro_sim.clock import PWM_PERIOD_TICKS, seconds
-from miro_sim.outdir import check_file, check_not_input, whole_file
+from miro_sim.outdir import check_new, check_not_input, whole_file
 
 SAVE_SUFFIX = ".gtkw"
 LATE_TICKS = 2 * PWM_PERIOD_TICKS
@@ -36,8 +36,8 @@ def vcd(request: Request, out: Path, force: bool) -> int:
     """
     save = out.with_suffix(SAVE_SUFFIX)
     for path in (out, save):
-        _check(path, force)
         check_not_input(path, "--out", request.subject, request.firmware, request.stdin)
+        check_new(path, "--out", force)
     if save == out:
         raise UserError(f"--out {out}: that is the save file's name; give the VCD file another ending, .vcd")
     run = open_run(request)
@@ -61,11 +61,3 @@ def vcd(request: Request, out: Path, force: bool) -> int:
         f"{seconds(waveform.first_tick):.6f} s to {seconds(waveform.written_tick):.6f} s; gtkwave {out} {save}"
     )
     return code
-
-
-def _check(path: Path, force: bool) -> None:
-    check_file(path, "--out")
-    if path.exists() and not force:
-        raise UserError(
-            f"{path}: is there already; choose another file with --out, or replace it with --force"
-        )

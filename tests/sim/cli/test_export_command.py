@@ -142,7 +142,7 @@ def test_a_file_that_exists_is_replaced_only_if_that_was_meant(
     (tmp_path / "b.pcapng").write_bytes(b"mine")
     code, _, err = mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.pcapng")
     assert code == 2
-    assert "exists; choose another file with --out, or replace it with --force" in err
+    assert "is there already; choose another file with --out, or replace it with --force" in err
     assert (tmp_path / "b.pcapng").read_bytes() == b"mine"
     assert mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.pcapng", "--force")[0] == 0
 

@@ -258,6 +258,49 @@ def test_output_that_cannot_be_written_is_refused_before_the_run(
     assert "x.info: line 1: is no record of a tracefile" in err
 
 
+@pytest.mark.parametrize("command", ["trace", "coverage", "vcd"])
+def test_a_file_that_is_there_stays_unless_it_is_to_be_replaced(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, command: str
+) -> None:
+    mine = tmp_path / "mine"
+    mine.write_text("years of work")
+    asked = ("fw", command, short, "--to", "1ms", "--out", mine)
+    code, out, err = mirotwin(*asked)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"mirotwin: error: {mine}: is there already; choose another file with --out, ")
+    assert err.endswith("or replace it with --force\n")
+    assert ("add to it with --append" in err) == (command == "coverage")
+    assert mine.read_text() == "years of work"
+    assert mirotwin(*asked, "--force")[0] == 0
+    assert "years" not in mine.read_text()
+
+
+def test_coverage_either_adds_to_a_file_or_replaces_it(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    code, _, err = mirotwin("fw", "coverage", short, "--out", tmp_path / "x", "--append", "--force")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "--append adds to the file, --force replaces it; give one of the two" in err
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_listing_that_is_there_stays_unless_it_is_to_be_replaced_and_is_not_asked_about_needlessly(
+    mirotwin: Callable[..., Result], bare: Path, tmp_path: Path
+) -> None:
+    listing = tmp_path / "fw.info.lst"
+    listing.write_text("mine")
+    asked = ("--to", "1ms", "--out", tmp_path / "fw.info")
+    code, out, err = mirotwin("fw", "coverage", bare, *asked)
+    assert (code, out) == (2, "")
+    assert f"{listing}: is there already" in err
+    assert list(tmp_path.iterdir()) == [listing]
+    assert mirotwin("fw", "coverage", image_path(), *asked)[0] == 0
+    assert listing.read_text() == "mine"
+    assert mirotwin("fw", "coverage", bare, *asked, "--force")[0] == 0
+    assert "LJMP 0029h" in listing.read_text()
+    assert mirotwin("fw", "coverage", bare, *asked, "--append")[0] == 0
+
+
 def test_a_fault_is_reported_after_what_was_seen(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
     image = hex_file(tmp_path / "a.ihx", b"\x00\xa5")
     code, out, err = mirotwin("fw", "trace", image)
