@@ -23,9 +23,18 @@ class InputError(ValueError):
         super().__init__(f"{path}: {what}; {remedy}")
 
 
+def check_no_folder(path: str | Path, likely: str = "") -> None:
+    """Refuses a folder; if it has a file called `likely`, that is what was probably meant."""
+    if os.path.isdir(path):
+        meant = os.path.join(path, likely)
+        hint = f", such as {meant}" if os.path.isfile(meant) else ""
+        raise InputError(str(path), "is a folder", f"name a file in it{hint}")
+
+
 def check_regular(path: str | Path) -> None:
     """Refuses what is there and is no regular file: what is read twice cannot come through a pipe."""
-    if os.path.exists(path) and not os.path.isdir(path) and not os.path.isfile(path):
+    check_no_folder(path)
+    if os.path.exists(path) and not os.path.isfile(path):
         raise InputError(str(path), "is not a regular file", "copy the content to a file first")
 
 
@@ -34,8 +43,10 @@ def read_input(
 ) -> bytes:
     """The content of a file or pipe of at most `limit` bytes, or `prefix_limit` if it begins with `prefix`.
 
-    Raises InputError for devices (but the null device, which is empty) and longer ones, OSError as `open` does.
+    Raises InputError for folders, devices (but the null device, which is empty) and longer ones, OSError as `open`
+    does.
     """
+    check_no_folder(path)
     with open(path, "rb") as file:
         mode = os.fstat(file.fileno()).st_mode
         if (stat.S_ISCHR(mode) or stat.S_ISBLK(mode)) and not _is_null(path):

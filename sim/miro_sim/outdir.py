@@ -15,7 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
-FILES = ("run.mcap", "figure.png", "summary.json")
+RECORDING = "run.mcap"
+FILES = (RECORDING, "figure.png", "summary.json")
 """What a run writes, and all that `--force` replaces."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """What a disk says that takes no more: only writing can meet it, and the error names no file."""

@@ -168,7 +168,7 @@ def test_a_path_is_a_file_and_its_text_is_kept_as_it_stands(tmp_path: Path) -> N
     assert loaded.scenario == parse(SMALL, "small")
     with pytest.raises(ScenarioError, match="no such file"):
         load(str(tmp_path / "absent.toml"))
-    with pytest.raises(ScenarioError, match="directory"):
+    with pytest.raises(ScenarioError, match="is a folder; name a file in it"):
         load(f"{tmp_path}/")
 
 

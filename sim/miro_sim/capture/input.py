@@ -12,7 +12,8 @@ import sys
 from types import TracebackType
 from typing import BinaryIO
 
-from miro_sim.inputs import InputError
+from miro_sim.inputs import InputError, check_no_folder
+from miro_sim.outdir import RECORDING
 
 STDIN = "-"
 HEAD_BYTES = 1 << 16
@@ -30,6 +31,8 @@ class Input:
         self.label = "standard input" if path == STDIN else path
         self.position = 0
         self._head = b""
+        if path != STDIN:
+            check_no_folder(path, RECORDING)
         self._file: BinaryIO = sys.stdin.buffer if path == STDIN else open(path, "rb")  # noqa: SIM115
         self.size = self._size()
 

@@ -73,7 +73,7 @@ def load_image(path: str | Path | None, limit: int = 8192) -> Image:
         if not os.path.exists(path):
             raise UserError(f"{path}: there is no such file; give the path of an .ihx or .hex file")
         check_regular(path)
-        if os.path.isfile(path) and os.path.getsize(path) > TEXT_BYTES:
+        if os.path.getsize(path) > TEXT_BYTES:
             raise UserError(f"{path}: holds more than {TEXT_BYTES >> 20} MiB; give an .ihx or .hex file")
     try:
         return load_hex(image_path() if path is None else Path(path), limit=limit)

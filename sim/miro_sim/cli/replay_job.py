@@ -15,7 +15,8 @@ from miro_protocol import stream
 
 from miro_sim.cli.options import choose_engine, load_image
 from miro_sim.cli.program import UserError
-from miro_sim.inputs import RECORDING_BYTES, read_input
+from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
+from miro_sim.outdir import RECORDING
 from miro_sim.recording_reader import MAGIC, Recording, parse
 from miro_sim.records import Period
 from miro_sim.replay import ScriptRun, scenario_of_stream, script_of, script_of_stream
@@ -37,6 +38,7 @@ class Job(msgspec.Struct, frozen=True):
 
 def load_job(file: str, firmware: str | None, engine: str | None) -> tuple[Job, Image]:
     """Reads `file`, fixes the engine, and loads the image that was asked for, recorded, or the robot's own."""
+    check_no_folder(file, RECORDING)
     data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
     choose_engine(engine)
     if data.startswith(MAGIC) or MAGIC.startswith(data) or b"\0" in data[:4096]:

@@ -15,7 +15,7 @@ from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, fir
 from miro_sim.cli.program import DONE, FIRMWARE_FAULT, MAX_SEED, UserError, complain, show
 from miro_sim.cli.progress import ProgressBar
 from miro_sim.figure import draw
-from miro_sim.outdir import OutputFolder
+from miro_sim.outdir import RECORDING, OutputFolder
 from miro_sim.recording import Recorder, Source
 from miro_sim.records import Period
 from miro_sim.scenario_file import ScenarioText, load
@@ -66,7 +66,7 @@ def run(
     with folder as staging:
         periods: list[Period] = []
         wall_s = 0.0
-        with (staging / "run.mcap").open("wb") as stream, Recorder(stream, source) as recorder:
+        with (staging / RECORDING).open("wb") as stream, Recorder(stream, source) as recorder:
             began_s = time.perf_counter()
             try:
                 _simulate(world, recorder, record == "full", quiet, periods)

@@ -197,6 +197,45 @@ def test_what_cannot_be_looked_at_is_one_line(
         assert err.count("\n") == 1
 
 
+def one_line(result: Result) -> str:
+    code, out, err = result
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    return err.removeprefix("mirotwin: error: ").rstrip("\n")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("fw", "disasm"),
+        ("fw", "run"),
+        ("fw", "trace"),
+        ("fw", "profile"),
+        ("fw", "coverage"),
+        ("fw", "profile", "fig6", "--firmware"),
+        ("fw", "profile", str(image_path()), "--stdin"),
+        ("replay",),
+        ("decode",),
+        ("run",),
+    ],
+    ids=" ".join,
+)
+def test_a_folder_is_called_one_and_the_way_out_is_to_name_a_file_in_it(
+    mirotwin: Callable[..., Result], tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    assert one_line(mirotwin(*command, tmp_path)) == f"{tmp_path}: is a folder; name a file in it"
+
+
+def test_the_folder_of_a_run_has_its_recording_named(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "x.pcapng"
+    for command in (("fw", "profile"), ("replay",), ("decode",), ("export", "--out", out)):
+        said = f"{finished}: is a folder; name a file in it, such as {finished / 'run.mcap'}"
+        assert one_line(mirotwin(*command, finished)) == said
+    assert not out.exists()
+    assert "run.mcap" not in one_line(mirotwin("fw", "profile", "fig6", "--firmware", finished))
+
+
 def test_a_window_after_the_end_of_an_image_is_empty(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
     image = hex_file(tmp_path / "a.ihx", LOOP)
     out = tmp_path / "a.trace"
