@@ -18,7 +18,7 @@ Table = dict[str, Any]
 
 
 class ProfileError(ValueError):
-    """A `profile` that names none; `remedy` is what to write instead."""
+    """A `profile` that names none, or does not go with the rest; `remedy` is what to write instead."""
 
     def __init__(self, what: str, remedy: str) -> None:
         super().__init__(what)
@@ -52,7 +52,26 @@ def with_profiles(radio: Table) -> Table:
     merged: Table = {}
     for name in names:
         merged = overridden(merged, keys_of(name))
-    return overridden(merged, radio)
+    merged = overridden(merged, radio)
+    _check_slicer(names, radio, merged)
+    return merged
+
+
+def _check_slicer(names: list[str], radio: Table, merged: Table) -> None:
+    """Refuses a profile with a slicer whose Eb/N0 was taken away: no key in the scenario says `slicer`."""
+    slicers = [name for name in names if "slicer" in keys_of(name)]
+    if not slicers or "eb_n0_db" in merged:
+        return
+    what = f"{slicers[-1]} needs eb_n0_db, and"
+    if "bit_error_rate" in radio:
+        raise ProfileError(
+            f"{what} bit_error_rate is given in its place", "leave one of them out, or give eb_n0_db instead"
+        )
+    taker = [name for name in names if "bit_error_rate" in keys_of(name)][-1]
+    raise ProfileError(
+        f"{what} {taker} sets bit_error_rate in its place",
+        f"leave one of them out, name {slicers[-1]} after {taker}, or give eb_n0_db",
+    )
 
 
 def overridden(table: Table, winner: Table) -> Table:

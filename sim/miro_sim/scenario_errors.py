@@ -95,7 +95,7 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
     missing = re.fullmatch(r"Object missing required field `(.*)`", what)
     if missing:
         place = f"{path}.{missing[1]}" if path else missing[1]
-        return ScenarioError(origin, place, "this key is missing", _choices_of(missing[1]))
+        return ScenarioError(origin, place, "this key is missing", _choices_at(place) or "add it")
     inner = re.fullmatch(r"(?s)([a-z0-9_.]+(?:\[\d+\])?(?:\.[a-z0-9_]+)*): (.*)", what)
     if inner:  # a rule between keys (`Network.__post_init__`) names the place below its own table
         path = f"{path}.{inner[1]}" if path else inner[1]
@@ -107,7 +107,7 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
         )
     what, _, remedy = what.partition("; ")
     value = _value_at(raw, path)
-    return ScenarioError(origin, path, *_explain(what, path, value, remedy))
+    return ScenarioError(origin, path, *_explain(what, path, value, remedy or _choices_at(path)))
 
 
 def _explain(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
@@ -120,12 +120,12 @@ def _explain(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
         what = f"expected {want}{_unit_of(path)}, got {got}{_shown(value)}"
         if wrong_type[1] == "array" and isinstance(value, dict):
             return what, "write its header in double brackets"
-        return what, _quoted_number(wrong_type[1], value)
+        return what, _quoted_number(wrong_type[1], value) or remedy
     limit = re.fullmatch(r"Expected `\w+` (>=|>|<=|<) (\S+)", what)
     if limit:
         return f"{value} is out of range", f"must be {limit[1]} {limit[2]}{_unit_of(path)}"
     if what.startswith(("Invalid enum value", "Invalid value")):
-        return f"{value!r} is not one of the choices", _choices_of(path.rpartition(".")[2])
+        return f"{value!r} is not one of the choices", remedy
     if "matching regex" in what:
         return f"{value!r} is not a name", "use a-z, 0-9, - and _, at most 64 characters"
     return what[:1].lower() + what[1:], remedy
@@ -185,8 +185,8 @@ def _value_at(raw: Any, path: str) -> Any:
     return raw
 
 
-def _struct_at(raw: Any, path: str) -> type[msgspec.Struct] | None:
-    """The struct that describes the table at a key path, choosing among tagged ones as the file does."""
+def _type_at(path: str) -> msgspec.inspect.Type | None:
+    """What a scenario may have at a key path; below tagged tables, these tables."""
     found: msgspec.inspect.Type = msgspec.inspect.type_info(Scenario)
     for key, _ in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
         if key and isinstance(found, msgspec.inspect.StructType):
@@ -198,36 +198,35 @@ def _struct_at(raw: Any, path: str) -> type[msgspec.Struct] | None:
             found = found.type
         if not key and isinstance(found, msgspec.inspect.VarTupleType):
             found = found.item_type
-    return _chosen(found, _value_at(raw, path))
+    return found
 
 
-def _chosen(found: msgspec.inspect.Type, value: Any) -> type[msgspec.Struct] | None:
+def _structs_at(path: str) -> list[msgspec.inspect.StructType]:
+    """The kinds of table that there may be at a key path: several where a key says which."""
+    found = _type_at(path)
     options = found.types if isinstance(found, msgspec.inspect.UnionType) else (found,)
-    for option in options:
-        if isinstance(option, msgspec.inspect.StructType):
-            if option.tag_field is None or value.get(option.tag_field) == option.tag:
-                return option.cls
-    return None
+    return [option for option in options if isinstance(option, msgspec.inspect.StructType)]
 
 
 def _keys_at(raw: Any, path: str) -> list[str]:
-    struct = _struct_at(raw, path)
-    if struct is None:
-        return []
-    tag = struct.__struct_config__.tag_field
-    return [*([tag] if tag else []), *struct.__struct_encode_fields__]
+    """The keys of the table at a key path, which has chosen its kind."""
+    value = _value_at(raw, path)
+    for struct in _structs_at(path):
+        tag = struct.tag_field
+        if tag is None or value.get(tag) == struct.tag:
+            return [*([tag] if tag else []), *struct.cls.__struct_encode_fields__]
+    return []
 
 
-CHOICES = {
-    "robots": "3 or 5, the two layouts of a frame",
-    "noise": "gaussian or none",
-    "carrier": "keyed or on",
-    "kind": "line or arc",
-    "law": "yang_kim",
-    "switching": "sign or saturation",
-}
-
-
-def _choices_of(key: str) -> str:
-    choices = CHOICES.get(key)
-    return f"use {choices}" if choices else "add it"
+def _choices_at(path: str) -> str:
+    """What a key may hold, if that is one of a few: words, numbers, or the kinds of its table."""
+    table, _, key = path.rpartition(".")
+    found = _type_at(path)
+    if isinstance(found, msgspec.inspect.LiteralType):
+        choices = [str(value) for value in found.values]
+    else:
+        choices = [str(struct.tag) for struct in _structs_at(table) if struct.tag_field == key]
+    if not choices:
+        return ""
+    *others, last = choices
+    return f"use {', '.join(others)} or {last}" if others else f"use {last}"

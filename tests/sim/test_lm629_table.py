@@ -3,6 +3,7 @@
 import pytest
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
+from miro_robot.lm629.options import CHOICES
 from miro_sim import scenario_file
 from miro_sim.scenario_errors import ScenarioError
 from miro_sim.world import World
@@ -23,6 +24,18 @@ def loaded(tmp_path, options):
     path = tmp_path / "chips.toml"
     path.write_text(SCENARIO.format(options=options))
     return scenario_file.load(str(path)).scenario
+
+
+@pytest.mark.parametrize(
+    "name", [name for name, choices in CHOICES.items() if not isinstance(choices[0], bool)]
+)
+def test_every_choice_is_named_to_who_chooses_another(tmp_path, name):
+    for wrong in ('"so"', "9", "true"):
+        with pytest.raises(ScenarioError) as caught:
+            loaded(tmp_path, f"{name} = {wrong}")
+        named = str(caught.value).partition("; use ")[2].replace(" or ", ", ").split(", ")
+        if "without quotes" not in str(caught.value):
+            assert sorted(named) == sorted(map(str, CHOICES[name]))
 
 
 def test_both_chips_of_a_robot_follow_it(tmp_path):
@@ -49,9 +62,12 @@ def test_another_reading_gives_another_run_and_the_default_one_the_same(tmp_path
     [
         ("busy_clock = 1", "busy_clocks"),
         ("busy_clocks = -1", "busy_clocks must be 0..1048576 clocks, not -1"),
-        ('interrupt = "edge"', "lm629.interrupt"),
-        ("sign_of_negative = 2", "lm629.sign_of_negative"),
-        ("pid_saturates = 1", "lm629.pid_saturates"),
+        ('interrupt = "edge"', "lm629.interrupt: 'edge' is not one of the choices; use event or level"),
+        ("interrupt = 1", "lm629.interrupt: expected a string, got a whole number (1); use event or level"),
+        ('relative_base = "x"', "'x' is not one of the choices; use desired, real or target"),
+        ("sign_of_negative = 2", "lm629.sign_of_negative: 2 is not one of the choices; use 0 or 1"),
+        ("double_step = 1", "lm629.double_step: 1 is not one of the choices; use -2, 0 or 2"),
+        ("pid_saturates = 1", "lm629.pid_saturates: expected true or false, got a whole number (1)"),
     ],
 )
 def test_what_is_no_reading_is_refused_in_one_line(tmp_path, options, said):

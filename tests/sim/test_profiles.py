@@ -131,6 +131,32 @@ def test_a_bad_radio_is_named_with_its_place_and_its_remedy(lines: str, expected
     assert refusal(lines).startswith(expected)
 
 
+def test_profiles_that_contradict_are_named_with_the_key_and_the_ways_out() -> None:
+    assert refusal('profile = ["slicer", "fade15"]') == (
+        ".profile: slicer needs eb_n0_db, and fade15 sets bit_error_rate in its place;"
+        " leave one of them out, name slicer after fade15, or give eb_n0_db"
+    )
+    assert radio('profile = ["fade15", "slicer"]').eb_n0_db == 13.35
+    assert radio('profile = ["slicer", "fade15"]\neb_n0_db = 12.0').eb_n0_db == 12.0
+
+
+def test_a_key_that_contradicts_a_profile_is_named_with_it() -> None:
+    assert refusal('profile = "slicer"\nbit_error_rate = 0.01') == (
+        ".profile: slicer needs eb_n0_db, and bit_error_rate is given in its place;"
+        " leave one of them out, or give eb_n0_db instead"
+    )
+
+
+@pytest.mark.parametrize("first", profiles.profiles())
+def test_two_profiles_go_together_or_are_both_named(first: str) -> None:
+    for second in profiles.profiles():
+        try:
+            radio(f'profile = ["{first}", "{second}"]')
+        except ScenarioError as error:
+            said = str(error).removeprefix("air.toml: network[0].radio.profile: ")
+            assert {first, second} <= set(re.findall(r"\w+", said))
+
+
 def test_a_pc_so_slow_that_its_frame_outlasts_the_period_is_refused() -> None:
     slow = text("baud_offset_ppm = -40000").replace("[[network]]", "[[network]]\nrobots = 5", 1)
     with pytest.raises(

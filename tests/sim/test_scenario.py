@@ -103,6 +103,17 @@ def test_a_whole_number_is_a_number() -> None:
         ("slot = 0", "slot = 5", "network[0].robot[0].slot: 5 is out of range; must be <= 4"),
         ("kind = ", "kid = ", "reference.kind: this key is missing; use line or arc"),
         ('"line"', '"spiral"', "reference.kind: 'spiral' is not one of the choices; use line or arc"),
+        (
+            'switching = "saturation"',
+            'switching = "sing"',
+            "switching: 'sing' is not one of the choices; use saturation or sign",
+        ),
+        ('law = "yang_kim"', 'law = "pid"', "controller.law: 'pid' is not one of the choices; use yang_kim"),
+        (
+            'noise = "gaussian"',
+            "noise = true",
+            "expected a string, got true or false (True); use gaussian or none",
+        ),
         ("squelch = false", "squelch = 0", "radio.squelch: expected true or false, got a whole number (0)"),
         (
             "keyup_s = 0.001",
