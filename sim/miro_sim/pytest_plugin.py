@@ -10,6 +10,7 @@ nothing of the project is imported, and nothing is watched.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from miro_robot.image import Image
     from miro_robot.inspect.coverage import Counts
     from miro_robot.mcs51.cpu import Cpu
+
+    from miro_sim.firmware_coverage import Report
 
 OUTPUT = "firmware_coverage"
 """Under this name a pytest-xdist worker hands over its counts."""
@@ -69,6 +72,7 @@ class FirmwareCoverage:
 
         self.config = config
         self.out = Path(config.getoption("--firmware-coverage"))
+        self.wanted: float = config.getoption("--firmware-coverage-fail-under")
         self.from_workers: list[Counts] = []
         self.counters = Counters()
         try:
@@ -95,7 +99,7 @@ class FirmwareCoverage:
         if hasattr(session.config, "workeroutput"):  # a worker of pytest-xdist: JSON has no numbers as keys
             counts = counts_of(self.counters)
             session.config.workeroutput[OUTPUT] = [[address, *both] for address, both in counts.items()]
-        elif self._share() < self.config.getoption("--firmware-coverage-fail-under"):
+        elif session.exitstatus == pytest.ExitCode.OK and self._too_few():
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
     @pytest.hookimpl(optionalhook=True)
@@ -108,7 +112,9 @@ class FirmwareCoverage:
 
         from miro_sim.firmware_coverage import table, write
 
-        report = self._report()
+        if hasattr(self.config, "workeroutput"):  # the controller's file has the counts of all
+            return
+        report = self._report
         write(report.tracefile, report, self.out, "--firmware-coverage")
         terminalreporter.section(f"coverage of {self.image.path.name}, written to {self.out}")
         console = Console(highlight=False, markup=False, width=TABLE_COLUMNS)
@@ -117,11 +123,14 @@ class FirmwareCoverage:
             console.print(f"instructions: {report.instructions}")
         for line in capture.get().splitlines():
             terminalreporter.write_line(line.rstrip())
-        wanted = self.config.getoption("--firmware-coverage-fail-under")
-        if self._share() < wanted:
-            terminalreporter.write_line(f"fewer lines ran than the {wanted} % that were asked for", red=True)
+        if self._too_few():
+            terminalreporter.write_line(
+                f"fewer lines ran than the {self.wanted} % that were asked for", red=True
+            )
 
-    def _report(self) -> Any:
+    @cached_property
+    def _report(self) -> Report:
+        """Of the whole session: for when its last test has run."""
         from miro_robot.debug_info import Sources
         from miro_robot.firmware import source_folder
         from miro_robot.inspect.coverage import counts_of, merged
@@ -137,12 +146,11 @@ class FirmwareCoverage:
         counts = merged([counts_of(self.counters), *self.from_workers])
         return collect(self.image, counts, Sources(folders), self.out)
 
-    def _share(self) -> float:
-        """Percent of the lines."""
+    def _too_few(self) -> bool:
         from miro_robot.inspect.coverage import line_share
 
-        share = line_share(self._report().tracefile)
-        return 100.0 * share.hit / share.total if share.total else 100.0
+        share = line_share(self._report.tracefile)
+        return bool(share.total) and 100.0 * share.hit / share.total < self.wanted
 
 
 def _image(path: str | None) -> Image:

@@ -59,6 +59,56 @@ def test_a_session_fails_under_the_share_that_was_asked_for(tmp_path: Path) -> N
     assert "99.0 % that were asked for" in failed.stdout
 
 
+BREAKS = """
+import os
+
+def pytest_runtest_setup(item):
+    if os.environ.get("BREAK") == "off":
+        raise KeyboardInterrupt
+
+def pytest_runtestloop(session):
+    if os.environ.get("BREAK") == "down":
+        raise RuntimeError("a plugin's own")
+"""
+COUNTS = """
+from miro_sim import firmware_coverage
+
+collect = firmware_coverage.collect
+
+def counted(*arguments):
+    with open("collected", "a") as file:
+        file.write("once\\n")
+    return collect(*arguments)
+
+firmware_coverage.collect = counted
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "how", "code"),
+    [
+        (["gone.py"], "", 4),
+        (["-k", "gone"], "", 5),
+        ([], "off", 2),
+        ([], "down", 3),
+    ],
+)
+def test_too_few_lines_do_not_hide_what_else_went_wrong(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], how: str, code: int
+) -> None:
+    """pytest: 2 interrupted, 3 an internal error, 4 a usage error, 5 no tests."""
+    (tmp_path / "conftest.py").write_text(BREAKS)
+    monkeypatch.setenv("BREAK", how)
+    done = session(tmp_path, "--firmware-coverage=fw.info", "--firmware-coverage-fail-under=99", *arguments)
+    assert done.returncode == code, done.stdout + done.stderr
+
+
+def test_the_report_is_built_and_written_once_however_many_processes_there_are(tmp_path: Path) -> None:
+    (tmp_path / "conftest.py").write_text(COUNTS)
+    counted(tmp_path, "--firmware-coverage-fail-under=5", "-n", "1")
+    assert (tmp_path / "collected").read_text() == "once\n"
+
+
 @pytest.mark.parametrize(
     ("option", "said"),
     [
