@@ -1,7 +1,8 @@
 """The lcov tracefile: which lines, functions and branches ran, in the form that genhtml and CI services read.
 
 What belongs here: the format, reading and writing, and adding up runs. What does not: where the numbers come from
-(`coverage.py`). Form: geninfo(1), section FILES.
+(`coverage.py`). Form: geninfo(1), section FILES, in lcov 2 TRACEFILE FORMAT. Functions are read in the form of lcov 2.2
+as well (FNL, FNA) and written in the older one (FN, FNDA), which all versions read; their last lines are dropped.
 """
 
 from __future__ import annotations
@@ -18,17 +19,34 @@ _NUMBER = r"\d{1,18}"
 _RECORDS = {
     "FN": re.compile(rf"({_NUMBER})(?:,{_NUMBER})?,(.+)"),
     "FNDA": re.compile(rf"({_NUMBER}),(.+)"),
+    "FNL": re.compile(rf"({_NUMBER}),({_NUMBER})(?:,{_NUMBER})?"),
+    "FNA": re.compile(rf"({_NUMBER}),({_NUMBER}),(.+)"),
     "BRDA": re.compile(rf"({_NUMBER}),({_NUMBER}),({_NUMBER}),({_NUMBER}|-)"),
     "DA": re.compile(rf"({_NUMBER}),({_NUMBER})(?:,.*)?"),
 }
-_DERIVED = ("TN", "FNF", "FNH", "BRF", "BRH", "LF", "LH")  # totals are counted again when it is written
+_OTHER_BRANCH = re.compile(
+    rf"{_NUMBER},[efU]*{_NUMBER},.+,(?:{_NUMBER}|-)"
+)  # lcov 2: marked, or named by a text
+_DERIVED = (
+    "FNF",
+    "FNH",
+    "BRF",
+    "BRH",
+    "LF",
+    "LH",
+    "MCF",
+    "MCH",
+)  # totals are counted again when it is written
+_DROPPED = (*_DERIVED, "TN", "VER")
+_NAME_ANOTHER = "give a file that was written as lcov tracefile"
+_USE_LCOV = "add the files up with `lcov --add-tracefile`"
 
 
 class TracefileError(ValueError):
-    """A text that is no tracefile: file, line, what, remedy."""
+    """A text that is no tracefile, or holds counts that have no place here: file, line, what, remedy."""
 
-    def __init__(self, path: str, line: int, what: str) -> None:
-        super().__init__(f"{path}:{line}: {what}; give a file that was written as lcov tracefile")
+    def __init__(self, path: str, line: int, what: str, remedy: str) -> None:
+        super().__init__(f"{path}:{line}: {what}; {remedy}")
 
 
 class FileRecord(msgspec.Struct):
@@ -94,39 +112,73 @@ def _encode_file(path: str, record: FileRecord) -> Iterable[str]:
 
 def decode(text: str, path: str) -> Tracefile:
     """A tracefile, also another program's. Raises TracefileError naming `path` and the line."""
-    found: Tracefile = {}
-    parts: list[
-        tuple[str, FileRecord]
-    ] = []  # a file may come several times, as when tracefiles are put together
-    record: FileRecord | None = None
+    reader = _Reader()
     for number, line in enumerate(text.splitlines(), start=1):
-        kind, colon, value = line.strip().partition(":")
-        if kind == "SF" and value:
-            record = FileRecord()
-            add(found, {value: FileRecord()})
-            parts.append((value, record))
-        elif kind == "end_of_record":
-            record = None
-        elif kind in _RECORDS:
-            match = _RECORDS[kind].fullmatch(value)
-            if match is None or record is None:
-                what = "belongs to no source file" if match else f"cannot be read as {kind} record"
-                raise TracefileError(path, number, what)
-            _take(record, kind, match.groups())
-        elif kind and (not colon or not (kind in _DERIVED or kind.isupper())):
-            raise TracefileError(path, number, "is no record of a tracefile")
-    for name, part in parts:
+        try:
+            reader.take(line.strip())
+        except _Refused as refused:
+            raise TracefileError(path, number, refused.what, refused.remedy) from None
+    found: Tracefile = {}
+    for name, part in reader.parts:
         add(found, {name: part})
     return found
 
 
-def _take(record: FileRecord, kind: str, values: tuple[str, ...]) -> None:
-    if kind == "FN":
-        record.functions[values[1]] = (int(values[0]), record.functions.get(values[1], (0, 0))[1])
-    elif kind == "FNDA":
-        record.functions[values[1]] = (record.functions.get(values[1], (0, 0))[0], int(values[0]))
-    elif kind == "DA":
-        record.lines[int(values[0])] = int(values[1])
-    else:
-        branch = (int(values[0]), int(values[1]), int(values[2]))
-        record.branches[branch] = None if values[3] == "-" else int(values[3])
+class _Refused(Exception):
+    """A line that cannot be taken."""
+
+    def __init__(self, what: str, remedy: str = _NAME_ANOTHER) -> None:
+        self.what = what
+        self.remedy = remedy
+
+
+class _Reader:
+    """Takes line by line. `parts`: (source file, counts), several of one file when tracefiles are put together."""
+
+    def __init__(self) -> None:
+        self.parts: list[tuple[str, FileRecord]] = []
+        self._record: FileRecord | None = None
+        self._leaders: dict[int, int] = {}  # first line by index: FNL, for the FNA that follow
+
+    def take(self, line: str) -> None:
+        kind, colon, value = line.partition(":")
+        if kind == "SF" and value:
+            self._record, self._leaders = FileRecord(), {}
+            self.parts.append((value, self._record))
+        elif kind == "end_of_record":
+            self._record = None
+        elif kind in _RECORDS:
+            self._count(kind, value)
+        elif (kind in _DROPPED and colon) or not line or line.startswith("#"):
+            pass
+        elif colon and kind.isupper() and kind != "SF":
+            raise _Refused(f"{kind} records are not kept", _USE_LCOV)
+        else:
+            raise _Refused("is no record of a tracefile")
+
+    def _count(self, kind: str, value: str) -> None:
+        match = _RECORDS[kind].fullmatch(value)
+        if match is None and kind == "BRDA" and _OTHER_BRANCH.fullmatch(value):
+            raise _Refused("branches that are marked or named are not kept", _USE_LCOV)
+        if match is None:
+            raise _Refused(f"cannot be read as {kind} record")
+        if self._record is None:
+            raise _Refused("belongs to no source file")
+        self._take(self._record, kind, match.groups())
+
+    def _take(self, record: FileRecord, kind: str, values: tuple[str, ...]) -> None:
+        if kind == "FN":
+            record.functions[values[1]] = (int(values[0]), record.functions.get(values[1], (0, 0))[1])
+        elif kind == "FNDA":
+            record.functions[values[1]] = (record.functions.get(values[1], (0, 0))[0], int(values[0]))
+        elif kind == "FNL":
+            self._leaders[int(values[0])] = int(values[1])
+        elif kind == "FNA":
+            if int(values[0]) not in self._leaders:
+                raise _Refused(f"names function {values[0]}, which no FNL record before it has")
+            record.functions[values[2]] = (self._leaders[int(values[0])], int(values[1]))
+        elif kind == "DA":
+            record.lines[int(values[0])] = int(values[1])
+        else:
+            branch = (int(values[0]), int(values[1]), int(values[2]))
+            record.branches[branch] = None if values[3] == "-" else int(values[3])

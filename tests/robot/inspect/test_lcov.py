@@ -62,6 +62,83 @@ def test_tracefiles_put_one_behind_the_other_read_as_their_sum(one, other):
     assert decode(encode(one) + encode(other), "x.info") == total
 
 
+LCOV_2 = """#written by lcov 2
+TN:first
+SF:a.cpp
+VER:7
+FNL:0,3,9
+FNA:0,2,_Z1fIiE
+FNA:0,0,_Z1fIcE
+FNL:4,12
+FNA:4,5,main
+FNF:2
+FNH:2
+BRF:0
+BRH:0
+DA:3,2
+DA:12,5,d41d8cd98f00b204e9800998ecf8427e
+LF:2
+LH:2
+end_of_record
+"""
+NOT_KEPT = "not kept; add the files up with `lcov --add-tracefile`"
+
+
+def as_lcov_2(text):
+    """The same with functions as lcov writes them since 2.2: a leader for each first line, then its names."""
+    lines, indices, counts = [], {}, {}
+    for line in text.splitlines():
+        kind, _, value = line.partition(":")
+        if kind == "FN":
+            first, name = value.split(",")
+            counts.setdefault(first, []).append(name)
+        elif kind == "FNDA":
+            count, name = value.split(",")
+            first = next(first for first, names in counts.items() if name in names)
+            if first not in indices:
+                indices[first] = len(indices)
+                lines.append(f"FNL:{indices[first]},{first}")
+            lines.append(f"FNA:{indices[first]},{count},{name}")
+        else:
+            if kind == "SF":
+                indices, counts = {}, {}
+            lines.append(line)
+    return "\n".join(lines)
+
+
+def test_functions_are_read_as_lcov_2_writes_them():
+    functions = {"_Z1fIiE": (3, 2), "_Z1fIcE": (3, 0), "main": (12, 5)}
+    assert decode(LCOV_2, "x.info") == {"a.cpp": FileRecord({3: 2, 12: 5}, functions)}
+
+
+@given(TRACEFILES)
+def test_both_forms_of_functions_say_the_same(tracefile):
+    assert decode(as_lcov_2(encode(tracefile)), "x.info") == tracefile
+
+
+@pytest.mark.parametrize(
+    ("record", "said"),
+    [
+        ("FNA:5,1,g", "names function 5, which no FNL record before it has; give a file"),
+        ("FNL:5", "cannot be read as FNL record; give a file"),
+        ("FNA:0,g", "cannot be read as FNA record; give a file"),
+        ("MCDC:10,2,t,1,0,enable", f"MCDC records are {NOT_KEPT}"),
+        ("BRDA:10,e0,1,4", f"branches that are marked or named are {NOT_KEPT}"),
+        ("BRDA:10,0,!enable,0", f"branches that are marked or named are {NOT_KEPT}"),
+        ("NEW:1,2", f"NEW records are {NOT_KEPT}"),
+    ],
+)
+def test_nothing_is_lost_without_a_word(record, said):
+    with pytest.raises(TracefileError) as caught:
+        decode(LCOV_2.replace("LF:2", record), "x.info")
+    assert str(caught.value).startswith(f"x.info:16: {said}")
+
+
+def test_functions_of_one_file_do_not_lend_their_lines_to_the_next():
+    with pytest.raises(TracefileError, match=r"x\.info:21: names function 0, which no FNL record"):
+        decode(LCOV_2 + "TN:\nSF:b.cpp\nFNA:0,1,f\nend_of_record\n", "x.info")
+
+
 @given(st.text(max_size=200))
 def test_any_text_is_a_tracefile_or_is_refused(text):
     with suppress(TracefileError):
