@@ -4,15 +4,17 @@ What belongs here: the message types, `encode`, `decode_fields`. What does not: 
 received bytes (`decoder.py`) and whether it is new (`freshness.py`). Every size, range and offset comes
 from `table.py`.
 
-Who is to blame is a type: a value that may not be sent is a ValueError at the caller; bytes whose CRC is
+Who is to blame is a type: a message that may not be sent is an `EncodeError` at the caller; bytes whose CRC is
 good but which no rightful sender would send are a `ContentError`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping, Set
 from dataclasses import dataclass
 from operator import index
+from reprlib import repr as brief
+from typing import Any
 
 from miro_protocol.crc import crc16
 from miro_protocol.table import (
@@ -32,6 +34,10 @@ from miro_protocol.table import (
     downlink,
 )
 from miro_protocol.whitening import whiten
+
+
+class EncodeError(ValueError):
+    """A message that may not be sent, the caller's mistake: the field, its value, and what is allowed."""
 
 
 class ContentError(Exception):
@@ -93,13 +99,38 @@ Message = TeamFrame | ServiceFrame | TelemetryFrame
 
 
 def checked(field: Field, value: int, where: str = "", high: int | None = None) -> int:
-    """`value` as a plain int; ValueError naming field, value and limits when it may not be sent."""
-    number = index(value)
+    """`value` as a plain int; EncodeError naming field, value and limits when it may not be sent."""
     limit = field.high if high is None else high
+    number = value if type(value) is int else _whole(f"{where}{field.name}", value, f"{field.low}..{limit}")
     if not field.low <= number <= limit:
         unit = f" ({field.unit})" if field.unit else ""
-        raise ValueError(f"{where}{field.name} = {number}: must be {field.low}..{limit}{unit}")
+        raise EncodeError(f"{where}{field.name} = {_shown(value)}: must be {field.low}..{limit}{unit}")
     return number
+
+
+def _whole(name: str, value: Any, allowed: str) -> int:
+    """`value` as a plain int. A truth value is none: it would be sent as 0 or 1."""
+    try:
+        if not isinstance(value, bool):
+            return index(value)
+    except TypeError:
+        pass
+    raise EncodeError(f"{name} = {_shown(value)}: must be a whole number {allowed}")
+
+
+def _items(name: str, value: Any, count: int, what: str) -> tuple[Any, ...]:
+    """The `count` items of `value`, anything of a length and an order."""
+    ordered = type(value) is tuple or (isinstance(value, Collection) and not isinstance(value, Set | Mapping))
+    if not ordered or len(value) != count:
+        raise EncodeError(f"{name.strip()} = {_shown(value)}: must be {count} {what}")
+    return tuple(value)
+
+
+def _shown(value: Any) -> str:
+    """`value` in a few words, however long it is."""
+    if isinstance(value, int) and value.bit_length() > 64:
+        return f"an int of {value.bit_length()} bits"
+    return brief(value)
 
 
 def pack(field: Field, value: int, where: str = "", high: int | None = None) -> bytes:
@@ -118,25 +149,33 @@ def unpack(fields: Iterable[Field], payload: bytes, offset: int = 0) -> list[int
 
 def format_of(message: Message, n: int) -> Format:
     """The wire format `message` travels in on a network of `n` robots."""
-    below = downlink(n)
+    try:
+        below = downlink(n)
+    except ValueError as error:
+        raise EncodeError(str(error)) from None
     return TELEMETRY if isinstance(message, TelemetryFrame) else below
 
 
 def encode(message: Message, n: int) -> bytes:
     """All characters of the frame as they are sent, preamble first, in a network of `n` robots (3 or 5).
 
-    Raises ValueError naming field, value and limits when something may not be sent, TypeError for a
-    number that is not whole.
+    Raises EncodeError naming field, value and what is allowed for whatever may not be sent.
     """
     form = format_of(message, n)
     if isinstance(message, TeamFrame):
         kind, payload = _team_type(message.type), _team_payload(message, n)
     elif isinstance(message, ServiceFrame):
         kind, payload = FrameType.SERVICE, _service_payload(message, n)
-    else:
+    elif isinstance(message, TelemetryFrame):
         kind, payload = FrameType.TELEMETRY, _telemetry_payload(message, n)
+    else:
+        raise _no_message(message)
     header = kind * SEQ_MODULUS + checked(SEQ, message.seq)
     return seal(form, bytes([header]) + payload.ljust(form.payload_size, b"\0"))
+
+
+def _no_message(value: Any) -> EncodeError:
+    return EncodeError(f"message = {_shown(value)}: must be a TeamFrame, ServiceFrame or TelemetryFrame")
 
 
 def seal(form: Format, body: bytes) -> bytes:
@@ -189,38 +228,40 @@ def _require_sendable(message: Message, body: bytes, n: int) -> None:
     try:
         form = format_of(message, n)
         same = encode(message, n) == seal(form, bytes(body))
-    except ValueError as error:
+    except EncodeError as error:
         raise ContentError(str(error)) from None
     if not same:
         raise ContentError(f"{message!r} does not account for all of {bytes(body).hex(' ')}")
 
 
 def _team_type(kind: int) -> int:
-    if kind not in (FrameType.TEAM, FrameType.TEAM_ASK):
-        raise ValueError(
-            f"type = {kind!r}: a team frame has type {FrameType.TEAM:d} or {FrameType.TEAM_ASK:d}"
-        )
-    return kind
+    allowed = (FrameType.TEAM, FrameType.TEAM_ASK)
+    what = f"{allowed[0]:d} or {allowed[1]:d}"
+    number = _whole("type", kind, what)
+    if number not in allowed:
+        raise EncodeError(f"type = {_shown(kind)}: a team frame has type {what}")
+    return number
 
 
 def _team_payload(message: TeamFrame, n: int) -> bytes:
-    if len(message.velocities) != n:
-        raise ValueError(f"velocities for {len(message.velocities)} robots: this network has {n}")
-    return b"".join(
-        pack(field, value, f"slot {slot} ")
-        for slot, pair in enumerate(message.velocities)
-        for field, value in zip(VELOCITY, pair, strict=True)
-    )
+    pairs = _items("velocities", message.velocities, n, "pairs of (left, right), one a robot")
+    return b"".join(map(_pair, range(n), pairs))
+
+
+def _pair(slot: int, pair: Any) -> bytes:
+    where = f"slot {slot} "
+    left, right = _items(where, pair, 2, "numbers (left, right)")
+    return pack(VELOCITY[0], left, where) + pack(VELOCITY[1], right, where)
 
 
 def _service_payload(message: ServiceFrame, n: int) -> bytes:
     slot, opcode = SERVICE
-    head = pack(slot, message.slot, high=n - 1) + pack(opcode, message.opcode)
-    name = Opcode(message.opcode).name.lower()
-    fields = SERVICE_DATA[message.opcode]
-    if len(message.values) != len(fields):
-        raise ValueError(f"{name} with {len(message.values)} values: it takes {len(fields)}")
-    return head + b"".join(pack(*pair) for pair in zip(fields, message.values, strict=True))
+    number = Opcode(checked(opcode, message.opcode))
+    head = pack(slot, message.slot, high=n - 1) + pack(opcode, number)
+    fields = SERVICE_DATA[number]
+    what = f"numbers ({', '.join(field.name for field in fields)})" if fields else "numbers"
+    values = _items(f"{number.name.lower()} values", message.values, len(fields), what)
+    return head + b"".join(pack(*pair) for pair in zip(fields, values, strict=True))
 
 
 def _service_message(seq: int, payload: bytes) -> ServiceFrame:
@@ -234,7 +275,8 @@ def _service_message(seq: int, payload: bytes) -> ServiceFrame:
 def _telemetry_payload(message: TelemetryFrame, n: int) -> bytes:
     slot = checked(SERVICE[0], message.slot, high=n - 1)
     allowed = sum(Flags)
-    if message.flags & ~allowed:
-        raise ValueError(f"flags = {message.flags:#04x}: only bits of {allowed:#04x} are defined")
-    values = (slot | message.flags, *(getattr(message, field.name) for field in TELEMETRY_FIELDS[1:]))
+    flags = _whole("flags", message.flags, f"of bits of {allowed:#04x}")
+    if flags & ~allowed:
+        raise EncodeError(f"flags = {flags:#04x}: only bits of {allowed:#04x} are defined")
+    values = (slot | flags, *(getattr(message, field.name) for field in TELEMETRY_FIELDS[1:]))
     return b"".join(pack(*pair) for pair in zip(TELEMETRY_FIELDS, values, strict=True))

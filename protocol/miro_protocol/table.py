@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
+from operator import index
 
 # -- Time: ticks of the robot's 24 MHz crystal ---------------------------------------------------------------
 
@@ -198,7 +199,7 @@ FRAME_MEANINGS = {
 def downlink(n: int) -> Format:
     """The host-to-robot format of a network of `n` robots; ValueError unless n is 3 or 5."""
     try:
-        return DOWNLINK[n]
+        return DOWNLINK[index(n)]
     except (KeyError, TypeError):
         limits = " or ".join(str(count) for count in ROBOT_COUNTS)
         raise ValueError(f"robot count n = {n!r}: a network has {limits} robots") from None

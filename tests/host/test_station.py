@@ -82,7 +82,7 @@ def test_what_may_not_be_sent_is_refused_and_uses_nothing_up():
     before = station.snapshot()
     with pytest.raises(ValueError, match="slot 1"):
         station.frame([REST, (-32768, 0), REST])
-    with pytest.raises(ValueError, match="2 robots"):
+    with pytest.raises(ValueError, match="must be 3 pairs"):
         station.frame([REST] * 2)
     with pytest.raises(ValueError, match="slot"):
         station.request(3, Opcode.PING)

@@ -1,10 +1,11 @@
 """The codec: what is sent comes back, what may not be sent is refused by name, sizes are the contract's."""
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from miro_protocol import frames, table
-from miro_protocol.frames import ContentError, ServiceFrame, TeamFrame, TelemetryFrame, encode
+from miro_protocol.frames import ContentError, EncodeError, ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.strategies import host_frames, robot_counts, telemetry_frames
 from miro_protocol.whitening import whiten
 
@@ -64,14 +65,14 @@ REFUSED = [
     (TeamFrame(0, 64, STOPPED), 3, r"seq = 64: must be 0\.\.63"),
     (TeamFrame(0, -1, STOPPED), 3, r"seq = -1: must be 0\.\.63"),
     (TeamFrame(1, 0, STOPPED), 3, r"type = 1: a team frame has type 0 or 3"),
-    (TeamFrame(0, 0, STOPPED), 5, r"velocities for 3 robots: this network has 5"),
+    (TeamFrame(0, 0, STOPPED), 5, r"velocities = .*: must be 5 pairs of \(left, right\), one a robot"),
     (TeamFrame(0, 0, STOPPED), 4, r"n = 4: a network has 3 or 5"),
     (TelemetryFrame(0, 0), 11, r"n = 11: a network has 3 or 5"),
     (ServiceFrame.ping(0, 3), 3, r"slot = 3: must be 0\.\.2"),
     (ServiceFrame(0, 0, 3), 3, r"opcode = 3: must be 0\.\.2"),
     (ServiceFrame.filter(0, 0, 0x8000, 0, 0, 0), 3, r"kp = 32768: must be 0\.\.32767"),
     (ServiceFrame.acceleration(0, 0, 0), 3, r"acceleration = 0: must be 1\.\.1073741823"),
-    (ServiceFrame(0, 0, 0, (1,)), 3, r"ping with 1 values: it takes 0"),
+    (ServiceFrame(0, 0, 0, (1,)), 3, r"ping values = \(1,\): must be 0 numbers"),
     (TelemetryFrame(0, 5), 5, r"slot = 5: must be 0\.\.4"),
     (TelemetryFrame(0, 0, flags=0x40), 3, r"flags = 0x40: only bits of 0x38"),
     (TelemetryFrame(0, 0, position_left=65536), 3, r"position_left = 65536: must be 0\.\.65535"),
@@ -80,13 +81,82 @@ REFUSED = [
 
 @pytest.mark.parametrize(("message", "n", "complaint"), REFUSED)
 def test_what_may_not_be_sent_is_refused_by_field_value_and_limits(message, n, complaint):
-    with pytest.raises(ValueError, match=complaint):
+    with pytest.raises(EncodeError, match=complaint):
         encode(message, n)
 
 
-def test_a_number_that_is_not_whole_is_a_type_error():
-    with pytest.raises(TypeError):
-        encode(TeamFrame(0, 0, ((0.5, 0), (0, 0), (0, 0))), 3)
+MISSHAPEN = [
+    (None, 3, "message = None: must be a TeamFrame, ServiceFrame or TelemetryFrame"),
+    (b"\x55", 3, r"message = b'U': must be a TeamFrame"),
+    (TeamFrame(0, 0, STOPPED), None, "n = None: a network has 3 or 5"),
+    (TeamFrame(0, 0, STOPPED), 3.0, r"n = 3\.0: a network has 3 or 5"),
+    (TeamFrame(0, True, STOPPED), 3, r"seq = True: must be a whole number 0\.\.63"),
+    (TeamFrame(0, None, STOPPED), 3, r"seq = None: must be a whole number 0\.\.63"),
+    (TeamFrame(0, 10**5000, STOPPED), 3, r"seq = an int of 16610 bits: must be 0\.\.63"),
+    (TeamFrame(False, 0, STOPPED), 3, "type = False: must be a whole number 0 or 3"),
+    (TeamFrame(np.array([0]), 0, STOPPED), 3, "type = array.*: must be a whole number 0 or 3"),
+    (TeamFrame(0.0, 0, STOPPED), 3, r"type = 0\.0: must be a whole number 0 or 3"),
+    (TeamFrame(0, 0, None), 3, r"velocities = None: must be 3 pairs of \(left, right\)"),
+    (TeamFrame(0, 0, 7), 3, "velocities = 7: must be 3 pairs"),
+    (TeamFrame(0, 0, {0: (0, 0), 1: (0, 0), 2: (0, 0)}), 3, r"velocities = \{.*\}: must be 3 pairs"),
+    (TeamFrame(0, 0, (pair for pair in STOPPED)), 3, "velocities = <.*>: must be 3 pairs"),
+    (TeamFrame(0, 0, ((0, 0), (1, 2, 3), (0, 0))), 3, r"slot 1 = \(1, 2, 3\): must be 2 numbers"),
+    (TeamFrame(0, 0, ((0, 0), (1,), (0, 0))), 3, r"slot 1 = \(1,\): must be 2 numbers"),
+    (TeamFrame(0, 0, (None, (0, 0), (0, 0))), 3, r"slot 0 = None: must be 2 numbers \(left, right\)"),
+    (TeamFrame(0, 0, ((0, 0), (0, 0), {1, 2})), 3, r"slot 2 = \{1, 2\}: must be 2 numbers"),
+    (
+        TeamFrame(0, 0, ((0.5, 0), (0, 0), (0, 0))),
+        3,
+        r"slot 0 left = 0\.5: must be a whole number -32767\.\.",
+    ),
+    (TeamFrame(0, 0, ((0, 0), "ab", (0, 0))), 3, "slot 1 left = 'a': must be a whole number"),
+    (ServiceFrame.ping(0, None), 3, r"slot = None: must be a whole number 0\.\.2"),
+    (ServiceFrame(0, 0, "1"), 3, r"opcode = '1': must be a whole number 0\.\.2"),
+    (ServiceFrame(0, 0, 0, None), 3, "ping values = None: must be 0 numbers"),
+    (ServiceFrame(0, 0, 1, (1, 2)), 3, r"filter values = \(1, 2\): must be 4 numbers \(kp, ki, kd, il\)"),
+    (TelemetryFrame(0, 0, flags=None), 3, "flags = None: must be a whole number"),
+    (TelemetryFrame(0, 0, flags=False), 3, "flags = False: must be a whole number"),
+    (TelemetryFrame(0, 0, flags=-8), 3, "flags = -0x8: only bits of 0x38"),
+    (TelemetryFrame(0, 0, accepted="9"), 3, r"accepted = '9': must be a whole number 0\.\.255"),
+]
+
+
+@pytest.mark.parametrize(("message", "n", "complaint"), MISSHAPEN)
+def test_what_has_the_wrong_shape_is_refused_by_field_value_and_what_is_allowed(message, n, complaint):
+    with pytest.raises(EncodeError, match=complaint):
+        encode(message, n)
+
+
+_anything = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=3) | st.binary(max_size=3),
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.tuples(inner, inner) | st.dictionaries(st.integers(), inner)
+    ),
+    max_leaves=8,
+)
+
+
+@settings(deadline=None)
+@given(
+    st.builds(TeamFrame, _anything, _anything, _anything | st.tuples(_anything, _anything, _anything))
+    | st.builds(ServiceFrame, _anything, _anything, st.integers(0, 2) | _anything, _anything)
+    | st.builds(TelemetryFrame, *[_anything] * 9)
+    | _anything,
+    st.sampled_from([3, 5]) | _anything,
+)
+def test_whatever_a_caller_puts_in_is_encoded_or_refused_as_an_encode_error(message, n):
+    try:
+        wire = encode(message, n)
+    except EncodeError:
+        return
+    assert isinstance(wire, bytes)
+
+
+@pytest.mark.parametrize("rows", [list, tuple, np.array])
+def test_velocities_may_be_any_rows_of_whole_numbers(rows):
+    velocities = ((1, -2), (300, -300), (32767, -32767))
+    wire = encode(TeamFrame(0, 3, velocities), 3)
+    assert encode(TeamFrame(0, 3, rows([rows(pair) for pair in velocities])), 3) == wire
 
 
 @pytest.mark.parametrize(
