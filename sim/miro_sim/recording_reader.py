@@ -1,23 +1,20 @@
 """Reads a recording back: what it was made from, and its control periods as the world left them.
 
-What belongs here: MCAP to records, and telling a truncated or foreign file from a recording. What does not:
-running it again (`replay`). A file is read whole and checked (CRCs, schema, completeness) before anything
-is returned.
+What belongs here: messages to periods, and telling a foreign file from a recording. What does not: the container
+(`mcap_records`), and running it again (`replay`). A file is read whole and checked (CRCs, schema, completeness) before
+anything is returned.
 """
 
 import re
-import struct
-from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import msgspec
-from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata
-from mcap.stream_reader import CRCValidationError, StreamReader
 
 from miro_sim import channels
+from miro_sim.mcap_records import RecordingError, records
 from miro_sim.recording import (
     FIRMWARE_ATTACHMENT,
     FORMAT,
@@ -27,19 +24,6 @@ from miro_sim.recording import (
     Source,
 )
 from miro_sim.records import Period, RobotPeriod, WireRun
-
-MAGIC = b"\x89MCAP0\r\n"
-
-
-class RecordingError(ValueError):
-    """A file that is no whole recording: `path`, `place` (byte offset), what, remedy."""
-
-    def __init__(self, path: str, place: str, what: str, remedy: str) -> None:
-        self.path = path
-        self.place = place
-        self.what = what
-        self.remedy = remedy
-        super().__init__(f"{path}: {place}: {what}; {remedy}")
 
 
 class Recording(msgspec.Struct, frozen=True):
@@ -62,52 +46,15 @@ def read(path: str | Path) -> Recording:
 def parse(data: bytes, path: str) -> Recording:
     """A recording from its bytes; `path` names it in errors."""
     collector = _Collector(path)
-    for place, record in records(data, path):
-        collector.take(record, place)
+    found = records(BytesIO(data), path)
+    try:
+        for place, record in found:
+            collector.take(record, place)
+    except RecordingError:
+        for _ in found:  # a wrong checksum says more than what it made of the contents
+            pass
+        raise
     return collector.finish(len(data))
-
-
-def records(data: bytes, path: str) -> Iterator[tuple[int, McapRecord]]:
-    """(offset, record) of everything in an MCAP file; RecordingError at the first place that is damaged."""
-    if data and len(data) < len(MAGIC) and MAGIC.startswith(data):
-        what, remedy = "the file ends in its first bytes", "record the run again"
-        raise RecordingError(path, f"offset {len(data)}", what, remedy)
-    if not data.startswith(MAGIC):
-        what = "empty file" if not data else "not an MCAP file"
-        raise RecordingError(
-            path, "offset 0", what, "give a run.mcap that `mirotwin run` wrote, or a stream file"
-        )
-    stream = BytesIO(data)
-    start = 0
-    reader = StreamReader(stream, validate_crcs=True, record_size_limit=len(data))
-    found = iter(reader.records)
-    while True:
-        try:
-            record = next(found, None)
-        except (
-            McapError,
-            CRCValidationError,
-            struct.error,
-            ValueError,
-            KeyError,
-            MemoryError,
-            OverflowError,
-        ) as error:
-            truncated = stream.tell() >= len(data)
-            what = (
-                "the file ends in the middle of a record"
-                if truncated
-                else f"damaged record ({_brief(error)})"
-            )
-            remedy = "record the run again; a recording cut short cannot be trusted"
-            raise RecordingError(path, f"offset {start}", what, remedy) from None
-        if record is None:
-            break
-        yield start, record
-        start = stream.tell()
-    if stream.tell() < len(data):
-        what = f"{len(data) - stream.tell()} bytes after the end of the recording"
-        raise RecordingError(path, f"offset {stream.tell()}", what, "remove them")
 
 
 def _brief(error: Exception) -> str:

@@ -21,9 +21,8 @@ from miro_protocol.table import SPACING_TICKS, SPACING_TOLERANCE_TICKS, TELEMETR
 from miro_sim import channels
 from miro_sim.capture import Run
 from miro_sim.capture.input import Input
-from miro_sim.capture.mcap_records import records
+from miro_sim.mcap_records import RecordingError, records
 from miro_sim.recording import FORMAT, METADATA, SCENARIO_ATTACHMENT
-from miro_sim.recording_reader import RecordingError
 from miro_sim.records import WireRun
 from miro_sim.scenario_errors import ScenarioError
 from miro_sim.scenario_file import parse
@@ -63,7 +62,7 @@ class _Reader:
         self.count = 0
 
     def runs(self) -> Iterator[Run]:
-        for place, record in records(self.source):
+        for place, record in records(self.source, self.source.label):
             self.place = place
             if isinstance(record, Message):
                 topic = self.topics.get(record.channel_id)

@@ -19,7 +19,7 @@ from miro_sim.capture.detect import TIMED
 from miro_sim.capture.hextext import HexError, HexText
 from miro_sim.capture.input import Input
 from miro_sim.inputs import InputError
-from miro_sim.recording_reader import RecordingError
+from miro_sim.mcap_records import RecordingError
 
 READ_ERRORS = (CaptureError, HexError, InputError, RecordingError, StreamError)
 """What reading runs may raise: all that could be read has come before it."""

@@ -22,8 +22,8 @@ from rich.console import Console, RenderableType
 
 from miro_sim.capture.hextext import HexError
 from miro_sim.inputs import InputError
+from miro_sim.mcap_records import RecordingError
 from miro_sim.outdir import OutputError
-from miro_sim.recording_reader import RecordingError
 from miro_sim.replay import StreamContentError
 from miro_sim.scenario_errors import ScenarioError, one_line
 

@@ -16,8 +16,9 @@ from miro_protocol import stream
 from miro_sim.cli.options import choose_engine, load_image
 from miro_sim.cli.program import UserError
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
+from miro_sim.mcap_records import MAGIC
 from miro_sim.outdir import RECORDING
-from miro_sim.recording_reader import MAGIC, Recording, parse
+from miro_sim.recording_reader import Recording, parse
 from miro_sim.records import Period
 from miro_sim.replay import ScriptRun, scenario_of_stream, script_of, script_of_stream
 from miro_sim.scenario import Scenario

@@ -3,14 +3,17 @@
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from mcap.writer import Writer
 from miro_protocol.frames import TelemetryFrame, encode
 from miro_sim.capture import Run, recorded
 from miro_sim.capture.input import Input
+from miro_sim.mcap_records import RecordingError
 from miro_sim.recording import Recorder, Source
-from miro_sim.recording_reader import RecordingError
 from miro_sim.records import Period, WireRun
 from miro_sim.scenario_file import load
 
@@ -116,11 +119,28 @@ def test_a_recording_cut_short_anywhere_gives_what_came_before_and_the_offset(tm
     assert set(counts) == set(range(13))  # not all or nothing: a chunk gives what is in it
 
 
+WHOLE = recording([(down(index * PERIOD),) for index in range(3)])
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.integers(0, len(WHOLE) - 1), st.integers(0, 7))
+def test_one_wrong_bit_anywhere_is_reported_after_what_could_be_read(at: int, bit: int) -> None:
+    data = bytearray(WHOLE)
+    data[at] ^= 1 << bit
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "run.mcap"
+        path.write_bytes(data)
+        error = read(path)[2]
+    kinds = ("damaged record", "not an MCAP file", "recording format")
+    assert error is not None
+    assert any(kind in str(error) for kind in kinds)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (lambda data: b"hello world", "offset 0: not an MCAP file"),
-        (lambda data: data[:5], "offset 0: the file ends in its first bytes"),
+        (lambda data: data[:5], "offset 0: the file ends in the middle of a record; it was cut short"),
         (lambda data: data + b"x", "something follows the end"),
         (lambda data: data.replace(b'"direction":">"', b'"direction":"!"'), "damaged record"),
         (lambda data: somebody_elses(), "not a recording of this program"),

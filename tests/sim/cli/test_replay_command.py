@@ -148,4 +148,4 @@ def test_a_recording_cut_short_in_its_first_bytes_is_called_truncated(
     (tmp_path / "run.mcap").write_bytes(b"\x89MCAP0\r\n"[:length])
     code, out, err = mirotwin("replay", tmp_path / "run.mcap")
     assert (code, out) == (2, "")
-    assert "the file ends in its first bytes; record the run again" in err
+    assert "the file ends in the middle of a record; it was cut short; copy it again" in err
