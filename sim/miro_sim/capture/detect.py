@@ -22,7 +22,7 @@ import string
 from miro_protocol.pcapng_reader import CLASSIC_PCAP
 from miro_protocol.pcapng_reader import MAGIC as PCAPNG
 
-from miro_sim.capture.hextext import HexText
+from miro_sim.capture.hextext import BOM, HexText
 from miro_sim.capture.input import HEAD_BYTES
 from miro_sim.mcap_records import MAGIC as MCAP
 
@@ -54,6 +54,6 @@ def detect(head: bytes) -> tuple[str, str]:
         return "stream", ""
     if HexText.begins(head, len(head) < HEAD_BYTES):
         return "hex", ""
-    if head and not head.translate(None, _TEXT):
+    if head.removeprefix(BOM) and not head.removeprefix(BOM).translate(None, _TEXT):
         return "raw", "is text, but neither pairs of hex digits nor a stream file; read as raw bytes"
     return "raw", ""

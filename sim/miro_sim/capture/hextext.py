@@ -1,13 +1,15 @@
 """Characters written as hexadecimal digits: `55 55 ff 2d d4`, `0x55,0xff`, `5555ff2dd4`, comments after `#`.
 
-What belongs here: digits to bytes, piece by piece. What does not: files.
+What belongs here: digits to bytes, piece by piece. What does not: files. UTF-8's byte-order mark, which some editors
+put first (and `cat` into the middle), separates and counts in no column.
 """
 
 from __future__ import annotations
 
 import re
 
-_SEPARATORS = rb"[\s,;:]"
+BOM = b"\xef\xbb\xbf"
+_SEPARATORS = rb"(?:[\s,;:]|\xef\xbb\xbf)"
 _PIECES = re.compile(rb"(?:" + _SEPARATORS + rb"|0[xX]|[0-9a-fA-F]{2}|#[^\n]*+)*+")
 _NOT_DIGITS = re.compile(rb"#[^\n]*|0[xX]|" + _SEPARATORS)
 _DIGIT = re.compile(rb"[0-9a-fA-F]")
@@ -79,9 +81,11 @@ class HexText:
         return bool(self._rest) and not self._pending()
 
     def _pending(self) -> bool:
-        return len(self._rest) == 1 and _DIGIT.match(self._rest) is not None
+        """Whether what is left over is the first half of something."""
+        return BOM.startswith(self._rest) or (len(self._rest) == 1 and _DIGIT.match(self._rest) is not None)
 
     def _advance(self, text: bytes) -> None:
+        text = text.replace(BOM, b"")
         lines = text.count(b"\n")
         self.line += lines
         self.column = len(text) - text.rfind(b"\n") if lines else self.column + len(text)

@@ -18,6 +18,10 @@ from miro_sim.capture.input import HEAD_BYTES
         (b"\x55\x55\xff\x2d\xd4", "raw"),
         (b"55 55 ff 2d d4", "hex"),
         (b"0x55,0x55", "hex"),
+        (b"\xef\xbb\xbf55 55 FF 2D D4\r\n", "hex"),
+        (b"\xef\xbb\xbf# a capture\r\n55 fF\r\n", "hex"),
+        (b"\xef\xbb\xbf792000 > 55 55\r\n", "stream"),
+        (b"\xef\xbb\xbf", "raw"),
         (b"# a capture\n55 ff\n", "hex"),
         (b"792000 > 55 55", "stream"),
         (b"\n  # note\n\n 0 < 55", "stream"),
@@ -37,7 +41,9 @@ def test_the_beginning_tells_the_format(head: bytes, format: str) -> None:
     assert detect(head) == (format, "")
 
 
-@pytest.mark.parametrize("text", [b"hello", b"55 5", b"# only a comment", b"12 | 55", b"   \n"])
+@pytest.mark.parametrize(
+    "text", [b"hello", b"55 5", b"# only a comment", b"12 | 55", b"   \n", b"\xef\xbb\xbfhello"]
+)
 def test_text_that_is_neither_hex_nor_a_stream_is_raw_and_said_to_be(text: bytes) -> None:
     format, note = detect(text)
     assert format == "raw"

@@ -8,9 +8,31 @@ from hypothesis import given
 from hypothesis import strategies as st
 from miro_sim.capture.hextext import HexError, HexText
 
+BOM = "\ufeff"
 TEXTS = st.lists(
     st.sampled_from(
-        ["55", "ff", "2D", "0", "x", "0x", "X", " ", "\n", ",", ":", ";", "#", "# note 5", "g", "\t", "é"]
+        [
+            "55",
+            "ff",
+            "2D",
+            "0",
+            "x",
+            "0x",
+            "X",
+            " ",
+            "\n",
+            ",",
+            ":",
+            ";",
+            "#",
+            "# note 5",
+            "g",
+            "\t",
+            "é",
+            "\r\n",
+            BOM,
+            "\ufefe",
+        ]
     )
 ).map("".join)
 
@@ -20,7 +42,7 @@ def naive(text: str) -> tuple[bytes, tuple[int, int] | None]:
     found = bytearray()
     place = 0
     while place < len(text):
-        if text[place] in " \t\r\n\v\f,;:":
+        if text[place] in " \t\r\n\v\f,;:\ufeff":
             place += 1
         elif text[place] == "#":
             while place < len(text) and text[place] != "\n":
@@ -31,7 +53,7 @@ def naive(text: str) -> tuple[bytes, tuple[int, int] | None]:
             found.append(int(text[place : place + 2], 16))
             place += 2
         else:
-            before = text[:place].encode()
+            before = text[:place].replace(BOM, "").encode()
             return bytes(found), (before.count(b"\n") + 1, len(before) - before.rfind(b"\n"))
     return bytes(found), None
 
@@ -55,10 +77,20 @@ def test_any_text_in_any_pieces_is_read_as_character_by_character(text: str, cut
 
 
 @pytest.mark.parametrize(
-    "text", ["55 ff 2d", "55ff2d", "0x55, 0xFF, 0x2D", "55:ff:2d\n", "55 # five\nff;2d", "# 00\n55ff\t2D"]
+    "text",
+    [
+        "55 ff 2d",
+        "55ff2d",
+        "0x55, 0xFF, 0x2D",
+        "55:ff:2d\n",
+        "55 # five\nff;2d",
+        "# 00\n55ff\t2D",
+        "55\r\nFF\r\n2d\r\n",
+    ],
 )
-def test_usual_ways_to_write_bytes_are_read(text: str) -> None:
-    assert read([text.encode()]) == (b"\x55\xff\x2d", None)
+@pytest.mark.parametrize("before", ["", BOM, BOM + "# note\r\n"])
+def test_usual_ways_to_write_bytes_are_read(text: str, before: str) -> None:
+    assert read([(before + text).encode()]) == (b"\x55\xff\x2d", None)
 
 
 @pytest.mark.parametrize(
@@ -67,6 +99,8 @@ def test_usual_ways_to_write_bytes_are_read(text: str) -> None:
         ("55 f", r"a.hex:1:4: the digit 'f' stands alone; write two hex digits"),
         ("55\n ff zz", r"a.hex:2:5: 'z' is no hex digit"),
         ("5 5", r"a.hex:1:1: the digit '5' stands alone"),
+        (BOM + "55 zz", r"a.hex:1:4: 'z' is no hex digit"),
+        (BOM + "55\r\nff zz", r"a.hex:2:4: 'z' is no hex digit"),
     ],
 )
 def test_what_is_no_pair_is_named_with_line_and_column(text: str, message: str) -> None:

@@ -141,6 +141,17 @@ def test_a_recording_without_a_control_period_is_refused(
     assert "holds no control period" in err
 
 
+def test_half_a_recording_is_said_to_be_cut_short_and_what_to_do(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
+) -> None:
+    data, half = (finished / "run.mcap").read_bytes(), tmp_path / "half.mcap"
+    half.write_bytes(data[: len(data) // 2])
+    code, out, err = mirotwin("replay", half)
+    assert (code, out) == (2, "")
+    assert f"{half}: offset " in err
+    assert "it was cut short; copy it again, or record the run again" in err
+
+
 @pytest.mark.parametrize("length", range(1, 8))
 def test_a_recording_cut_short_in_its_first_bytes_is_called_truncated(
     mirotwin: Callable[..., Result], tmp_path: Path, length: int
