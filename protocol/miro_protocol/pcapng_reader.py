@@ -6,6 +6,7 @@ What belongs here: pcapng to packets. What does not: writing (`pcapng.py`, which
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
@@ -32,6 +33,16 @@ CLASSIC_PCAP = (b"\xd4\xc3\xb2\xa1", b"\xa1\xb2\xc3\xd4", b"\x4d\x3c\xb2\xa1", b
 _HEAD = 12  # kind, length, and what may be a section's byte order mark
 _OLD_PACKETS = {2: "obsolete packet", 3: "simple packet"}
 _DIRECTIONS = {1: DOWN, 2: UP, 3: DOWN, 4: UP}  # DATA_TX_START, _RX_START, _TX_END, _RX_END
+_OTHER_EVENTS = {
+    0: "STATUS_CHANGE",
+    5: "CAPTURE_DATA_LOST",
+    6: "CAPTURE_COMPLETE",
+    7: "FRAMING_ERROR",
+    8: "PARITY_ERROR",
+    9: "SERIAL_BREAK_EVENT",
+    10: "SERIAL_OVERFLOW_EVENT",
+}
+MOST_EVENTS = 4  # that are named
 
 
 class Readable(Protocol):
@@ -53,14 +64,31 @@ class CaptureError(Exception):
         self.remedy = remedy
 
 
-def iterate(data: bytes | Readable, source: str = "<capture>") -> Iterator[Packet]:
+def iterate(
+    data: bytes | Readable, source: str = "<capture>", passed_over: Counter[int] | None = None
+) -> Iterator[Packet]:
     """Reads packet by packet; CaptureError at the first place that makes no sense, after all before it.
 
     From bytes, or from an open binary file or pipe, of which one block at a time is kept. Captures by others are
     read too: both byte orders, any time resolution, several sections. `network` is the interface's number in its
-    section. Events that carry no characters are passed over.
+    section. Packets of other events than characters sent or received are passed over; `passed_over` counts them by
+    event type, see `events_line`.
     """
-    return _Reader(BytesIO(data) if isinstance(data, bytes) else data, source).packets()
+    stream = BytesIO(data) if isinstance(data, bytes) else data
+    return _Reader(stream, source, Counter() if passed_over is None else passed_over).packets()
+
+
+def events_line(passed_over: Counter[int]) -> str:
+    """For people: how many packets were passed over, and what they were."""
+    kinds = [
+        f"{count} {_OTHER_EVENTS.get(event, f'of unknown event type {event:02x}h')}"
+        for event, count in passed_over.most_common(MOST_EVENTS)
+    ]
+    total = passed_over.total()
+    if rest := total - sum(count for _, count in passed_over.most_common(MOST_EVENTS)):
+        kinds.append(f"{rest} more")
+    packets = f"{total} packet{'s' if total > 1 else ''}"
+    return f"passed over {packets} of other events than data sent or received: {', '.join(kinds)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +99,10 @@ class _Interface:
 
 
 class _Reader:
-    def __init__(self, stream: Readable, source: str) -> None:
+    def __init__(self, stream: Readable, source: str, passed_over: Counter[int]) -> None:
         self.stream = stream
         self.source = source
+        self.passed_over = passed_over
         self.place = 0  # of the block under way
         self.order = "<"
         self.interfaces: list[_Interface] = []
@@ -185,7 +214,10 @@ class _Reader:
             raise self.malformed("packet without RTAC header")
         event = RTAC.unpack_from(body, 20)[2]
         data = body[20 + RTAC.size : 20 + size]
-        if event not in _DIRECTIONS or not data:
+        if event not in _DIRECTIONS:
+            self.passed_over[event] += 1
+            return None
+        if not data:
             return None
         tick = -(-(high << 32 | low) * TICKS_PER_SECOND // interface.units)
         tick += interface.offset * TICKS_PER_SECOND

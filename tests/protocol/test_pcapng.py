@@ -1,13 +1,14 @@
 """Captures: what is written comes back to the tick, and what cannot be read is named after all that could."""
 
 import struct
+from collections import Counter
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from miro_protocol import pcapng
 from miro_protocol.pcapng import MAX_DATA, MAX_TICK, Packet, render
-from miro_protocol.pcapng_reader import CaptureError, iterate
+from miro_protocol.pcapng_reader import CaptureError, events_line, iterate
 
 packets = st.builds(
     Packet,
@@ -119,8 +120,22 @@ def test_captures_of_other_programs_are_read(capture, tick, direction):
     assert read(capture) == ([Packet(tick, direction, b"data")], None)
 
 
-def test_events_without_characters_are_passed_over():
-    assert read(big_endian(event=0) + render(SOME)) == (SOME, None)
+def test_events_without_characters_are_passed_over_and_counted():
+    passed_over = Counter()
+    capture = big_endian(event=0) + big_endian(event=0x42) + render(SOME) + big_endian(event=0x42)
+    assert list(iterate(capture, passed_over=passed_over)) == SOME
+    assert passed_over == {0: 1, 0x42: 2}
+
+
+def test_what_was_passed_over_is_told_by_the_events_names():
+    assert events_line(Counter({0x42: 2, 5: 1})) == (
+        "passed over 3 packets of other events than data sent or received: "
+        "2 of unknown event type 42h, 1 CAPTURE_DATA_LOST"
+    )
+    many = events_line(Counter(range(11, 99)))
+    assert many.startswith("passed over 88 packets")
+    assert many.endswith(", 84 more")
+    assert events_line(Counter([0])).startswith("passed over 1 packet of other events")
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ What belongs here: which reader a format has. What does not: telling formats apa
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 
 import msgspec
 from miro_protocol import pcapng_reader, stream
@@ -41,11 +42,14 @@ class Source(msgspec.Struct):
         return self.format in TIMED
 
 
-def open_source(given: Input, format: str, direction: str = DOWN) -> Source:
-    """`direction` is that of raw bytes and hex text, which do not say. Reading may raise one of `READ_ERRORS`."""
+def open_source(given: Input, format: str, tell: Callable[[str], None], direction: str = DOWN) -> Source:
+    """`direction` is that of raw bytes and hex text, which do not say. Reading may raise one of `READ_ERRORS`.
+
+    `tell` gets what the user should hear about what was passed over.
+    """
     robots: dict[int, int] = {}
     if format == "pcapng":
-        return Source(given.label, format, _pcapng(given), robots)
+        return Source(given.label, format, _pcapng(given, tell), robots)
     if format == "recording":
         return Source(given.label, format, recorded.runs(given, robots), robots)
     if format == "stream":
@@ -79,9 +83,18 @@ def _contiguous(pieces: Iterator[bytes], direction: str) -> Iterator[Run]:
             count += len(data)
 
 
-def _pcapng(given: Input) -> Iterator[Run]:
-    for packet in pcapng_reader.iterate(given, given.label):
-        yield Run(packet.tick, packet.data, packet.direction, packet.network)
+def _pcapng(given: Input, tell: Callable[[str], None]) -> Iterator[Run]:
+    passed_over: Counter[int] = Counter()
+    failure: CaptureError | None = None
+    try:
+        for packet in pcapng_reader.iterate(given, given.label, passed_over):
+            yield Run(packet.tick, packet.data, packet.direction, packet.network)
+    except CaptureError as error:
+        failure = error
+    if passed_over:
+        tell(f"{given.label}: {pcapng_reader.events_line(passed_over)}")
+    if failure is not None:
+        raise failure
 
 
 def _stream(given: Input) -> Iterator[Run]:

@@ -62,7 +62,7 @@ def decode(
             format, note = detect(given.peek())
             if note:
                 complain(f"{given.label}: {note} (--format says otherwise)")
-        source = open_source(given, format, DIRECTIONS[direction or "down"])
+        source = open_source(given, format, complain, DIRECTIONS[direction or "down"])
         layouts = look(source, None if robots is None else int(robots), complain, direction is None)
         with ProgressBar("decoding", given.size, quiet or sys.stdout.isatty()) as bar:
             found = rows(_counted(source.runs, given, bar), layouts.of)

@@ -96,7 +96,7 @@ def export(
             raise UserError(
                 f"{given.label}: {NAMES[format]} without times; give a recording, stream or capture"
             )
-        source = open_source(given, format)
+        source = open_source(given, format, complain)
         layouts = look(source, None, complain) if to == "stream" else None
         exported = Exported(source.runs, network, given, bar)
         pieces = convert.to_stream(exported, layouts.of) if layouts else convert.to_pcapng(exported)

@@ -30,7 +30,7 @@ def read(path: Path, format: str) -> tuple[list[Row], Exception | None]:
     found: list[Row] = []
     with Input(str(path)) as given:
         try:
-            for row in rows(open_source(given, format).runs, lambda network: 3):
+            for row in rows(open_source(given, format, print).runs, lambda network: 3):
                 found.append(row)
         except READ_ERRORS as error:
             return found, error
@@ -114,7 +114,7 @@ def test_memory_does_not_grow_with_the_input(tmp_path: Path) -> None:
     path.write_bytes(bytes(range(256)) * (1 << 14))  # 4 MiB
     with Input(str(path)) as given:
         tracemalloc.start()
-        for _ in rows(open_source(given, "raw").runs, lambda network: 3):
+        for _ in rows(open_source(given, "raw", print).runs, lambda network: 3):
             pass
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()

@@ -214,3 +214,24 @@ def test_it_works_in_a_pipe_and_shows_a_frame_before_the_input_ends() -> None:
         process.stdin.close()
         assert json.loads(process.stdout.readline())["accepted"] == 1
     assert process.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments"), [("decode", ()), ("decode", ("--json",)), ("export", ("--out", "-"))]
+)
+@pytest.mark.parametrize("cut", [0, 3])
+def test_packets_of_unknown_events_are_counted_on_stderr(
+    mirotwin: Callable[..., Result], tmp_path: Path, command: str, arguments: tuple[str, ...], cut: int
+) -> None:
+    odd = bytearray(
+        render([Packet(0, ">", DOWN), Packet(800_800, ">", DOWN), Packet(2 * 800_800, ">", DOWN)])
+    )
+    at = odd.index(DOWN, odd.index(DOWN) + 1) - 4
+    odd[at] = 0x42
+    path = tmp_path / "odd.pcapng"
+    path.write_bytes(odd[: len(odd) - cut])
+    code, _, err = mirotwin(command, path, *arguments)
+    assert code == (2 if cut else 0)
+    assert (
+        f"{path}: passed over 1 packet of other events than data sent or received: 1 of unknown event" in err
+    )
