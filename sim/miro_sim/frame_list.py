@@ -1,23 +1,18 @@
 """The bytes on the wire as people read them: one line a frame, or a run of bytes that is none.
 
-What belongs here: runs of bytes to events and lines. What does not: decoding (`miro_protocol`), and printing
-(`cli`). The decoder has a hot module, so it is imported where it is used: the engine is chosen before.
+What belongs here: decoded rows to lines. What does not: decoding (`capture.rows`), and printing (`cli`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import msgspec
-from miro_protocol.events import Damaged, Event, Received
-from miro_protocol.frames import ContentError, TeamFrame, TelemetryFrame, describe
-from miro_protocol.stream import DOWN
+from miro_protocol.events import Damaged
+from miro_protocol.frames import TeamFrame, TelemetryFrame, describe
 
-from miro_sim.records import WireRun
-
-if TYPE_CHECKING:
-    from miro_protocol.decoder import WindowDecoder
+from miro_sim.capture import Run
+from miro_sim.capture.rows import Row, rows
 
 
 class FrameLine(msgspec.Struct, frozen=True):
@@ -33,59 +28,25 @@ class FrameLine(msgspec.Struct, frozen=True):
     text: str
 
 
-def decoded(runs: Iterable[WireRun], robots: Mapping[int, int]) -> Iterator[tuple[WireRun, Event]]:
-    """Decodes runs of bytes; `robots` is the layout (3 or 5) of each network.
+def frame_lines(runs: Iterable[Run], robots: Mapping[int, int]) -> Iterator[FrameLine]:
+    """The lines of everything in `runs`; `robots` is the layout (3 or 5) of each network.
 
-    One decoder a network and direction; a run of the host's bytes is as sent, before the radio. An event
-    comes with the run in which it ended.
+    A run of the host's bytes is as sent, before the radio.
     """
-    from miro_protocol.decoder import Decoder, TelemetryDecoder
-
-    decoders: dict[tuple[int, str], WindowDecoder] = {}
-    pending: dict[tuple[int, str], WireRun] = {}
-    for run in runs:
-        place = (run.network, run.direction)
-        if place not in decoders:
-            decoders[place] = Decoder(robots[run.network]) if run.direction == DOWN else TelemetryDecoder()
-        for event in decoders[place].feed(run.data, run.tick):
-            yield run, event
-        pending[place] = run
-    for place, run in pending.items():
-        for event in decoders[place].flush():
-            yield run, event
+    for row in rows(runs, robots.__getitem__):
+        slot = row.message.slot if isinstance(row.message, TelemetryFrame) else -1
+        yield FrameLine(row.event.start_tick, row.direction, row.network, slot, _text(row))
 
 
-def frame_lines(runs: Iterable[WireRun], robots: Mapping[int, int]) -> Iterator[FrameLine]:
-    """The lines of everything in `runs`, see `decoded`."""
-    for run, event in decoded(runs, robots):
-        yield frame_line(run, event, robots[run.network])
-
-
-def frame_line(run: WireRun, event: Event, layout: int) -> FrameLine:
-    """The line of one event of `run`."""
-    slot = run.slot
+def _text(row: Row) -> str:
+    event, message = row.event, row.message
     if isinstance(event, Damaged):
-        text = _damage(event)
-    else:
-        text, slot = _content(event, slot, layout)
-    return FrameLine(event.start_tick, run.direction, run.network, slot, text)
-
-
-def _damage(event: Damaged) -> str:
-    reason = event.reason.name.lower().replace("_", " ")
-    text = f"{len(event.data)} bytes, {reason}: {event.data[:16].hex(' ')}"
-    return text + " .." if len(event.data) > 16 else text
-
-
-def _content(event: Received, slot: int, layout: int) -> tuple[str, int]:
-    """What a frame says, and whose it is."""
-    try:
-        message = event.message(layout)
-    except ContentError as error:
-        return f"frame that says nothing known: {error}", slot
+        reason = event.reason.name.lower().replace("_", " ")
+        text = f"{len(event.data)} bytes, {reason}: {event.data[:16].hex(' ')}"
+        return text + " .." if len(event.data) > 16 else text
+    if message is None:
+        return f"frame that says nothing known: {row.unknown}"
     text = describe(message)
-    if isinstance(message, TelemetryFrame):
-        slot = message.slot
     if isinstance(message, TeamFrame):
         text += "  " + " ".join(f"{left:+d}/{right:+d}" for left, right in message.velocities)
-    return text, slot
+    return text

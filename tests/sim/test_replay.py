@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from miro_host.posture import Posture
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.stream import Transmission
+from miro_sim.capture import Run
 from miro_sim.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_sim.frame_list import frame_lines
-from miro_sim.records import Axis, Period, WireRun
+from miro_sim.records import Axis, Period
 from miro_sim.replay import (
     StreamContentError,
     compare,
@@ -142,11 +143,7 @@ def test_a_stream_that_cannot_have_been_sent_is_refused(sent: list[Transmission]
 
 def test_frames_are_listed_as_people_read_them_and_no_byte_is_dropped() -> None:
     answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
-    runs = [
-        WireRun(1000, ">", 0, -1, team(3)),
-        WireRun(900_000, "<", 0, 1, answer),
-        WireRun(2_000_000, ">", 0, -1, b"\x00\x01\x02"),
-    ]
+    runs = [Run(1000, team(3)), Run(900_000, answer, "<"), Run(2_000_000, b"\x00\x01\x02")]
     lines = list(frame_lines(runs, {0: 3}))
     texts = [line.text for line in lines]
     assert texts[0] == "team seq=3  +0/+0 +10/-1 +20/-2"
@@ -154,3 +151,10 @@ def test_frames_are_listed_as_people_read_them_and_no_byte_is_dropped() -> None:
     assert texts[2] == "3 bytes, no sync: 00 01 02"
     assert [line.tick for line in lines] == [1000, 900_000, 2_000_000]
     assert [line.slot for line in lines] == [-1, 1, -1]
+
+
+def test_an_answer_whose_run_ends_in_a_bad_stop_bit_is_not_listed_as_valid() -> None:
+    answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
+    (line,) = frame_lines([Run(0, answer, "<", bad_stop=True)], {0: 3})
+    assert (line.tick, line.slot) == (0, -1)
+    assert line.text.startswith("19 bytes, bad stop bit: 55 55")

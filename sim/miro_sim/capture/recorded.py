@@ -1,6 +1,6 @@
 """The characters in a recording (`run.mcap`), in the order of time.
 
-What belongs here: wire messages to runs. What does not: the container (`mcap_records`), all other channels.
+What belongs here: wire messages and periods to runs. What does not: the container (`mcap_records`), all other channels.
 
 A recording holds the characters of each control period. A run that goes on over the end of a period is put
 together again here; where one run of a period goes on right behind another, the first ended in a bad stop bit
@@ -10,7 +10,7 @@ together again here; where one run of a period goes on right behind another, the
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NoReturn
 
 import msgspec
@@ -23,7 +23,7 @@ from miro_sim.capture import Run
 from miro_sim.capture.input import Input
 from miro_sim.mcap_records import RecordingError, records
 from miro_sim.recording import FORMAT, METADATA, SCENARIO_ATTACHMENT
-from miro_sim.records import WireRun
+from miro_sim.records import Period, WireRun
 from miro_sim.scenario_errors import ScenarioError
 from miro_sim.scenario_file import parse
 
@@ -47,6 +47,48 @@ def follows(run: Run, tick: int) -> bool:
     return abs(tick - last - SPACING_TICKS) <= SPACING_TOLERANCE_TICKS
 
 
+def runs_of(periods: Iterable[Period]) -> list[Run]:
+    """The runs in `periods`, all from the first on, in the order of time."""
+    joiner = _Joiner()
+    found = [run for period in periods for run in joiner.take(period.wire)] + joiner.rest()
+    return sorted(found, key=lambda run: (run.tick, run.network, run.direction))
+
+
+class _Joiner:
+    """Puts runs together that go on over the end of a period, and finds out which ended in a bad stop bit."""
+
+    def __init__(self) -> None:
+        self.open: dict[int, Run] = {}  # network -> what its robots sent last, which may go on
+
+    def take(self, period: Sequence[WireRun]) -> list[Run]:
+        """What is complete with the next period."""
+        done: list[Run] = []
+        carried = dict(self.open)
+        for wire in period:
+            run = Run(wire.tick, wire.data, wire.direction, wire.network)
+            if wire.direction != UP:
+                done.append(run)
+                continue
+            before = self.open.get(run.network)
+            if before is not None and follows(before, run.tick):
+                if carried.get(run.network) is before:
+                    run = msgspec.structs.replace(before, data=before.data + run.data)
+                else:
+                    done.append(msgspec.structs.replace(before, bad_stop=True))
+            elif before is not None:
+                done.append(before)
+            self.open[run.network] = run
+        for network, run in carried.items():
+            if self.open.get(network) is run:  # nothing came that could go on with it
+                done.append(self.open.pop(network))
+        return done
+
+    def rest(self) -> list[Run]:
+        """What is left when nothing more comes."""
+        left, self.open = list(self.open.values()), {}
+        return left
+
+
 class _Reader:
     def __init__(self, source: Input, robots: dict[int, int]) -> None:
         self.source = source
@@ -57,7 +99,7 @@ class _Reader:
         self.wire_decoder = msgspec.json.Decoder(channels.WireMessage)
         self.period_decoder = msgspec.json.Decoder(channels.PeriodMessage)
         self.period: list[WireRun] = []
-        self.open: dict[int, Run] = {}  # network -> what its robots sent last, which may go on
+        self.joiner = _Joiner()
         self.heap: list[tuple[int, int, str, int, Run]] = []
         self.count = 0
 
@@ -91,9 +133,8 @@ class _Reader:
     def rest(self) -> Iterator[Run]:
         """What is left when nothing more comes."""
         self._take_period()
-        for run in self.open.values():
+        for run in self.joiner.rest():
             self._push(run)
-        self.open = {}
         yield from self._before(None)
 
     def _fail(self, what: str, remedy: str) -> NoReturn:
@@ -116,27 +157,11 @@ class _Reader:
     def _close(self, tick: int) -> Iterator[Run]:
         """The period that began at `tick` is complete."""
         self._take_period()
-        yield from self._before(min([tick, *(run.tick for run in self.open.values())]))
+        yield from self._before(min([tick, *(run.tick for run in self.joiner.open.values())]))
 
     def _take_period(self) -> None:
-        carried = dict(self.open)
-        for wire in self.period:
-            run = Run(wire.tick, wire.data, wire.direction, wire.network)
-            if wire.direction != UP:
-                self._push(run)
-                continue
-            before = self.open.get(run.network)
-            if before is not None and follows(before, run.tick):
-                if carried.get(run.network) is before:
-                    run = msgspec.structs.replace(before, data=before.data + run.data)
-                else:
-                    self._push(msgspec.structs.replace(before, bad_stop=True))
-            elif before is not None:
-                self._push(before)
-            self.open[run.network] = run
-        for network, run in carried.items():
-            if self.open.get(network) is run:  # nothing came that could go on with it
-                self._push(self.open.pop(network))
+        for run in self.joiner.take(self.period):
+            self._push(run)
         self.period = []
 
     def _push(self, run: Run) -> None:

@@ -9,6 +9,7 @@ from miro_protocol import stream
 from rich.table import Table
 
 from miro_sim import runner
+from miro_sim.capture.recorded import runs_of
 from miro_sim.cli.options import Place, engine_option, firmware_option
 from miro_sim.cli.program import DIVERGENCE, DONE, UserError, complain, show
 from miro_sim.cli.progress import ProgressBar
@@ -16,7 +17,7 @@ from miro_sim.cli.replay_job import Job, load_job
 from miro_sim.cli.run import report_faults
 from miro_sim.clock import seconds
 from miro_sim.frame_list import FrameLine, frame_lines
-from miro_sim.records import Period, WireRun
+from miro_sim.records import Period
 from miro_sim.replay import Difference, compare
 
 SHOWN = 20
@@ -34,6 +35,10 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
     Exit code 4 when it differs from the recording, also where a firmware fault comes of it: 4 goes before 3.
     A text stream runs over an ideal link in the default
     scenario, and there is nothing to compare.
+
+    The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them. No file
+    holds stop bits: an answer that was refused for its very last one is listed as valid (protocol/README.md, "Stop bits
+    in files").
     """
     job, image = load_job(file, firmware, engine)
     from miro_sim.world import World
@@ -66,8 +71,7 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
 
 def _print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> None:
     robots = {index: network.robots for index, network in enumerate(job.scenario.networks)}
-    runs: list[WireRun] = [run for period in job.recorded or replayed for run in period.wire]
-    lines = sorted(frame_lines(runs, robots), key=lambda line: line.tick)
+    lines = sorted(frame_lines(runs_of(job.recorded or replayed), robots), key=lambda line: line.tick)
     shown: Sequence[FrameLine] = lines if everything else lines[:SHOWN]
     table = Table(box=None, pad_edge=False)
     table.add_column("tick", justify="right")

@@ -95,6 +95,17 @@ def test_a_run_right_behind_another_of_its_period_tells_of_a_bad_stop_bit(tmp_pa
     assert found == [(b"abc", True), (b"de", False), (b"f", False)]
 
 
+def test_periods_in_memory_give_the_same_runs_as_their_recording(tmp_path: Path) -> None:
+    first = (down(5), up(7, b"abc"), up(7 + 3 * UP, b"de"), up(7 + 9 * UP, ANSWER[:4], network=1))
+    second = (down(PERIOD + 9), up(7 + 5 * UP, b"f"), up(7 + 13 * UP, ANSWER[4:], network=1))
+    path = tmp_path / "run.mcap"
+    path.write_bytes(recording([first, second, ()]))
+    found = recorded.runs_of([Period(index, 0, (), wire, "") for index, wire in enumerate((first, second))])
+    assert found == read(path)[0]
+    assert [run.data for run in found if run.network] == [ANSWER]
+    assert [run.bad_stop for run in found].count(True) == 1
+
+
 def test_every_recorded_character_of_a_run_is_there(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     wires = [period.wire for period in periods(5)]
