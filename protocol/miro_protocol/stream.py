@@ -16,6 +16,7 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from reprlib import repr as brief
 
 from miro_protocol import files
 
@@ -136,7 +137,7 @@ class _Line:
     def check_version(self) -> None:
         found = _VERSION.match(self.text)
         if found and found[1] != "1":
-            reason = f"stream version {found[1] or 'missing'!r}"
+            reason = f"stream version {brief(found[1] or 'missing')}"
             raise self.error(
                 found.start(1) + 1, reason, "this program reads version 1; use the one that wrote it"
             )
@@ -156,7 +157,7 @@ class _Line:
 
     def _tick(self, token: re.Match[str]) -> int:
         if not _TICK.fullmatch(token[0]) or int(token[0]) > MAX_TICK:
-            reason = f"{token[0]!r} is not a tick"
+            reason = f"{brief(token[0])} is not a tick"
             raise self.error(token.start() + 1, reason, f"a line starts with a whole number 0..{MAX_TICK}")
         return int(token[0])
 
@@ -165,11 +166,11 @@ class _Line:
         if len(tokens) == 1:
             raise self.error(end, "no direction", remedy)
         if tokens[1][0] not in DIRECTIONS:
-            raise self.error(tokens[1].start() + 1, f"{tokens[1][0]!r} is not a direction", remedy)
+            raise self.error(tokens[1].start() + 1, f"{brief(tokens[1][0])} is not a direction", remedy)
         return tokens[1][0]
 
     def _character(self, token: re.Match[str]) -> int:
         if not _HEX.fullmatch(token[0]):
-            reason = f"{token[0]!r} is not a character"
+            reason = f"{brief(token[0])} is not a character"
             raise self.error(token.start() + 1, reason, "write two hex digits each, with blanks between")
         return int(token[0], 16)

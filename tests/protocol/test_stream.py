@@ -110,3 +110,10 @@ def test_a_file_that_is_not_utf_8_is_named_by_place(tmp_path):
     path.write_bytes(b"1 > 55\n2 > 55 # \xff\n")
     with pytest.raises(StreamError, match=r":2:10: byte ffh is not UTF-8"):
         stream.read(path)
+
+
+@pytest.mark.parametrize("before", ["", "1 ", "1 > ", "# mirotwin stream "])
+def test_a_huge_token_is_shown_in_a_few_words(before):
+    with pytest.raises(StreamError) as caught:
+        stream.parse(before + "5" * 10**6)
+    assert len(str(caught.value)) < 300

@@ -37,6 +37,7 @@ NAMES = {
 }
 
 _ENOUGH = 4
+_PACKED = {b"\x1f\x8b\x08": "gzip", b"PK\x03\x04": "zip", b"\xfd7zXZ\0": "xz", b"\x28\xb5\x2f\xfd": "zstd"}
 _STREAM = re.compile(rb"(?:\xef\xbb\xbf)?(?:#\s*mirotwin stream\b|(?:\s|#[^\n]*+\n)*+[0-9]+[ \t]+[<>])")
 _TEXT = bytes(string.printable, "ascii")
 
@@ -54,6 +55,9 @@ def detect(head: bytes) -> tuple[str, str]:
         return "stream", ""
     if HexText.begins(head, len(head) < HEAD_BYTES):
         return "hex", ""
+    for magic, packer in _PACKED.items():
+        if head.startswith(magic):
+            return "raw", f"looks packed by {packer}, unpack it first; read as raw bytes"
     if head.removeprefix(BOM) and not head.removeprefix(BOM).translate(None, _TEXT):
         return "raw", "is text, but neither pairs of hex digits nor a stream file; read as raw bytes"
     return "raw", ""

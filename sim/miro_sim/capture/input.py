@@ -42,13 +42,15 @@ class Input:
         except (OSError, io.UnsupportedOperation):  # no real file: a test's, say
             return None
         if stat.S_ISBLK(status.st_mode) or (stat.S_ISCHR(status.st_mode) and not self._readable(status)):
-            self._file.close()
+            if self.path != STDIN:
+                self._file.close()
             raise InputError(self.label, "is a device", "name a file or a pipe")
         return status.st_size if stat.S_ISREG(status.st_mode) else None
 
     def _readable(self, status: os.stat_result) -> bool:
         """Whether a character device ends some time: the null device, or a terminal that somebody types at."""
-        return self.path == STDIN or os.path.samestat(status, os.stat(os.devnull))
+        terminal = self.path == STDIN and self._file.isatty()
+        return terminal or os.path.samestat(status, os.stat(os.devnull))
 
     def peek(self, size: int = HEAD_BYTES) -> bytes:
         """The next bytes, which stay to be read: `size` of them, fewer only at the end."""

@@ -137,12 +137,17 @@ def _fields(message: Message) -> dict[str, Any]:
 
 def json_input(file: str, format: str, timed: bool) -> bytes:
     return msgspec.json.encode(
-        {"event": "input", "file": file, "format": format, "timed": timed, "units": UNITS}
+        {"event": "input", "file": _utf8(file), "format": format, "timed": timed, "units": UNITS}
     )
 
 
 def json_error(text: str) -> bytes:
-    return msgspec.json.encode({"event": "error", "text": text})
+    return msgspec.json.encode({"event": "error", "text": _utf8(text)})
+
+
+def _utf8(text: str) -> str:
+    """`text` with what is no UTF-8 (a file's name need not be) written out."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def json_end(totals: Totals) -> bytes:

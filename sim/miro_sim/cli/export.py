@@ -88,6 +88,8 @@ def export(
     """
     if out != STDIN:
         check_new(Path(out), "--out", force)
+        if Path(out).exists() and Path(file).exists() and Path(out).samefile(file):
+            raise UserError(f"{out}: is the file to be read; choose another file with --out")
     choose_engine(engine)
     to = to or ("stream" if Path(out).suffix in (".stream", ".txt") else "pcapng")
     with Input(file) as given, ProgressBar("exporting", given.size, quiet) as bar:

@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from io import TextIOWrapper
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -135,6 +136,8 @@ class Program(click.Group):
             raise ReaderGone from None
 
     def _run(self, args: Sequence[str] | None, prog_name: str, extra: dict[str, Any]) -> int:
+        if isinstance(sys.stdout, TextIOWrapper):  # a file's name may hold what stdout cannot
+            sys.stdout.reconfigure(errors="backslashreplace")
         try:
             with terminable():
                 code = super().main(args, prog_name, **extra)

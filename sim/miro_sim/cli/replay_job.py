@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import msgspec
 from miro_protocol import stream
 
+from miro_sim.capture.detect import detect
+from miro_sim.capture.input import HEAD_BYTES
 from miro_sim.cli.options import choose_engine, load_image
 from miro_sim.cli.program import UserError
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
@@ -42,11 +44,24 @@ def load_job(file: str, firmware: str | None, engine: str | None) -> tuple[Job, 
     check_no_folder(file, RECORDING)
     data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
     choose_engine(engine)
-    if data.startswith(MAGIC) or MAGIC.startswith(data) or b"\0" in data[:4096]:
+    if MAGIC.startswith(data[: len(MAGIC)]):
         recording = parse(data, file)
         job = _job_of_recording(recording, file)
         return job, _recorded_image(recording, file) if firmware is None else load_image(firmware)
+    _refuse_other_formats(data, file)
     return _job_of_stream(data, file), load_image(firmware)
+
+
+def _refuse_other_formats(data: bytes, path: str) -> None:
+    format, _ = detect(data[:HEAD_BYTES])
+    if format == "pcapng":
+        remedy = "make a stream file of it with `mirotwin export --out NAME.stream`"
+        raise UserError(f"{path}: offset 0: a capture, which cannot be replayed; {remedy}")
+    if format != "stream" and b"\0" in data[:4096]:
+        what = "neither a recording nor a stream file (UTF-8 text)"
+        raise UserError(
+            f"{path}: offset 0: {what}; give a run.mcap that `mirotwin run` wrote, or a stream file"
+        )
 
 
 def _job_of_recording(recording: Recording, path: str) -> Job:

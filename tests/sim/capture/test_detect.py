@@ -1,5 +1,6 @@
 """Formats are told from the first bytes; a guess that could be wrong about plain text is said aloud."""
 
+import gzip
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,13 @@ def test_text_that_is_neither_hex_nor_a_stream_is_raw_and_said_to_be(text: bytes
     format, note = detect(text)
     assert format == "raw"
     assert "neither pairs of hex digits nor a stream file; read as raw bytes" in note
+
+
+def test_a_packed_file_is_read_as_raw_bytes_and_said_to_be_packed() -> None:
+    assert detect(gzip.compress(b"x")) == (
+        "raw",
+        "looks packed by gzip, unpack it first; read as raw bytes",
+    )
 
 
 @given(st.binary(max_size=300))

@@ -1,6 +1,7 @@
 """`mirotwin decode`: one table from any format, everything that could be read before what could not."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,6 +17,8 @@ from miro_protocol.stream import Transmission, format_stream
 from miro_sim.cli import main
 
 from tests.sim.cli.conftest import Result
+
+PROGRAM = [sys.executable, "-c", "from miro_sim.cli import main; main()"]
 
 TEAM = encode(TeamFrame(3, 1, ((100, -100), (0, 1), (-32767, 32767))), 3)
 SERVICE = encode(ServiceFrame.acceleration(2, 1, 5973), 3)
@@ -202,7 +205,7 @@ def test_no_such_file_and_devices_are_refused(mirotwin: Callable[..., Result], t
 
 
 def test_it_works_in_a_pipe_and_shows_a_frame_before_the_input_ends() -> None:
-    command = [sys.executable, "-c", "from miro_sim.cli import main; main()", "decode", "-", "--json"]
+    command = [*PROGRAM, "decode", "-", "--json"]
     options = ["--format", "raw", "--robots", "3", "--direction", "down"]
     with subprocess.Popen([*command, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdin is not None
@@ -235,3 +238,30 @@ def test_packets_of_unknown_events_are_counted_on_stderr(
     assert (
         f"{path}: passed over 1 packet of other events than data sent or received: 1 of unknown event" in err
     )
+
+
+@pytest.mark.parametrize("arguments", [(), ("--json",)])
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_a_file_whose_name_is_no_utf_8_is_decoded(
+    tmp_path: Path, arguments: tuple[str, ...], encoding: str
+) -> None:
+    name = os.fsencode(tmp_path) + b"/odd\xff.hex"
+    with open(name, "wb") as file:
+        file.write(DOWN.hex().encode())
+    found = subprocess.run(
+        [*PROGRAM, "decode", name, *arguments],
+        env={**os.environ, "PYTHONIOENCODING": f"{encoding}:strict"},
+        capture_output=True,
+        check=False,
+    )
+    assert (found.returncode, found.stderr) == (0, b"")
+    assert b"odd" in found.stdout.splitlines()[0]
+
+
+def test_a_device_that_never_ends_is_refused_as_standard_input_too() -> None:
+    with open("/dev/zero", "rb") as zeros:
+        found = subprocess.run(
+            [*PROGRAM, "decode", "-"], stdin=zeros, capture_output=True, timeout=30, check=False
+        )
+    assert found.returncode == 2
+    assert b"standard input: is a device; name a file or a pipe" in found.stderr

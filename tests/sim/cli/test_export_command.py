@@ -172,3 +172,17 @@ def test_a_recording_with_one_wrong_byte_is_reported_after_all_that_could_be_rea
     code, _, err = mirotwin("decode", tmp_path / "bad.mcap")
     assert code == 2
     assert "bad.mcap: offset" in err
+
+
+def test_the_file_that_is_read_is_never_replaced(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
+) -> None:
+    path, link = tmp_path / "run.mcap", tmp_path / "link"
+    path.write_bytes((finished / "run.mcap").read_bytes())
+    link.symlink_to(path)
+    before = path.read_bytes()
+    for one, other in ((path, path), (path, link), (link, path)):
+        code, _, err = mirotwin("export", one, "--out", other, "--force")
+        assert code == 2
+        assert "is the file to be read; choose another file with --out" in err
+    assert path.read_bytes() == before
