@@ -33,6 +33,8 @@ class Input:
         self._head = b""
         if path != STDIN:
             check_no_folder(path, RECORDING)
+        elif vars(sys)["stdin"] is None:
+            raise InputError(self.label, "is closed", "name a file or a pipe")
         self._file: BinaryIO = sys.stdin.buffer if path == STDIN else open(path, "rb")  # noqa: SIM115
         self.size = self._size()
 

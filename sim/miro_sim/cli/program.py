@@ -136,6 +136,9 @@ class Program(click.Group):
             raise ReaderGone from None
 
     def _run(self, args: Sequence[str] | None, prog_name: str, extra: dict[str, Any]) -> int:
+        if vars(sys)["stdout"] is None:  # `>&-`: the next file to be opened would take its place
+            complain("error: standard output is closed; send it to a file or a pipe")
+            return BAD_INPUT
         if isinstance(sys.stdout, TextIOWrapper):  # a file's name may hold what stdout cannot
             sys.stdout.reconfigure(errors="backslashreplace")
         try:

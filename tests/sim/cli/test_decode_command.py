@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -265,3 +267,11 @@ def test_a_device_that_never_ends_is_refused_as_standard_input_too() -> None:
         )
     assert found.returncode == 2
     assert b"standard input: is a device; name a file or a pipe" in found.stderr
+
+
+@pytest.mark.parametrize(("closed", "name"), [("<&-", b"standard input"), (">&-", b"standard output")])
+def test_a_closed_standard_stream_is_named(closed: str, name: bytes) -> None:
+    line = shlex.join([*PROGRAM, "decode", "-"])
+    found = subprocess.run(f"{line} {closed}", shell=True, capture_output=True, input=b"", check=False)
+    assert found.returncode == 2
+    assert re.fullmatch(rb"mirotwin: error: " + name + rb":? is closed; .*\n", found.stderr)
