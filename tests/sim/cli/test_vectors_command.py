@@ -31,7 +31,7 @@ def test_a_file_where_the_folder_should_be_is_refused_with_the_way_out(
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_set_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
-    command = [MIROTWIN, "vectors", "--out", tmp_path / "set", "--per-opcode", "20000"]
+    command = [MIROTWIN, "vectors", "--out", tmp_path / "set", "--per-opcode", "2000"]
     with subprocess.Popen(command, stderr=subprocess.PIPE) as running:
         while running.poll() is None and not any(tmp_path.rglob("*.json")):
             time.sleep(0.01)
