@@ -241,6 +241,8 @@ class Cpu(Executor):
                 return 1
             earliest = now
         self.next_event = chip.next_event(earliest)
+        if self.next_event <= now:  # all of now is done: nothing that is due may hold time up
+            self.next_event = now + 1
         return 0
 
     def _watch_main_loop(self, now: int) -> None:

@@ -10,7 +10,7 @@ cdef long long _STOPPED_PERIOD
 cdef int _SERIAL
 cdef int _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI
 cdef int _ROLLOVERS
-cdef int _VOTE_FIRST, _VOTE_LAST, _ACTION
+cdef int _VOTE_FIRST, _VOTE_LAST, _ACTION, _LAST_ACTION
 
 @cython.final
 cdef class Uart:

@@ -26,6 +26,7 @@ _SERIAL = 4  # its place in the polling order
 _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02, 0x01
 _ROLLOVERS = 16
 _VOTE_FIRST, _VOTE_LAST, _ACTION = 7, 9, 10  # states of the receiver's counter
+_LAST_ACTION = 9 * _ROLLOVERS + _ACTION  # 16x ticks from the fall to the end of a character
 
 
 class Uart:
@@ -286,8 +287,10 @@ class Uart:
         """A tick before which RI will not go up, FAR if no character can come."""
         if self.rx_done != _FAR:
             return self.rx_done
+        if self.rx_count > _LAST_ACTION:  # a nine-bit frame without its stop bit: no other begins before that
+            return self.rx_next + (_LAST_ACTION + _ROLLOVERS - self.rx_count) * self.rx_period
         if self.rx_count:
-            return self.rx_next + (9 * _ROLLOVERS + _ACTION - self.rx_count) * self.rx_period
+            return self.rx_next + (_LAST_ACTION - self.rx_count) * self.rx_period
         if not self.scon & _REN or not self.latch & 1:
             return _FAR
         before = self.rx_next - self.rx_period
@@ -300,7 +303,7 @@ class Uart:
             fall = self.rxd.settled_tick
         if fall < self.rx_next:
             fall = self.rx_next
-        return fall + (9 * _ROLLOVERS + _ACTION) * self.rx_period if fall < _STOPPED else _FAR
+        return fall + _LAST_ACTION * self.rx_period if fall < _STOPPED else _FAR
 
     def snapshot(self) -> dict[str, object]:
         return {

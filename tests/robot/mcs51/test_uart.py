@@ -264,6 +264,24 @@ def test_mode_0_receives_at_s5p2_of_eight_cycles():
     assert (sfr(cpu, "SCON"), sfr(cpu, "SBUF")) == (0x11, 0xC9)
 
 
+@pytest.mark.parametrize("piece", [7, 100, 3_000])
+@pytest.mark.parametrize("scon", [0x50, 0x90, 0xD0, 0xF0], ids=["mode 1", "mode 2", "mode 3", "mode 3, SM2"])
+def test_characters_that_are_received_by_interrupt_come_one_after_the_other(scon, piece):
+    """Hardware manual, serial modes 1 to 3: a nine-bit frame has its stop bit still to come when RI goes up."""
+    program = "LJMP main\nORG 0023h\nCLR RI\nMOV @R0,SBUF\nINC R0\nRETI\nmain:\nMOV R0,#30h\nMOV TMOD,#20h\n"
+    program += f"MOV TH1,#0FDh\nMOV TCON,#40h\nMOV SCON,#{scon:02X}h\nMOV IE,#90h\nSJMP $"
+    cpu = cpu_with(program)
+    bits = 9 if scon == 0x50 else 10
+    length = 64 if scon == 0x90 else 16 * 12 * 3 * 2
+    for index, value in enumerate((0xA5, 0x3C, 0x01)):
+        frame = (value | 0x100) << 1 | 1 << bits
+        for place in range(bits + 1):
+            cpu.rxd.append(12_000 + (index * (bits + 1) + place) * length, frame >> place & 1)
+    while cpu.cycles < 5_000:
+        cpu.run(cpu.cycles + piece)
+    assert [cpu.peek_iram(0x30 + index) for index in range(3)] == [0xA5, 0x3C, 0x01]
+
+
 CONFIGURATION = st.fixed_dictionaries(
     {
         "scon": st.sampled_from([0x50, 0x70, 0x58, 0xD0, 0xD8, 0xF8, 0x90, 0xB8]),
@@ -272,6 +290,7 @@ CONFIGURATION = st.fixed_dictionaries(
         "th1": st.integers(0xF9, 0xFF),
         "tmod": st.sampled_from([0x20, 0x20, 0x23, 0x60]),
         "rcap2l": st.integers(0xD0, 0xFF),
+        "ie": st.sampled_from([0x00, 0x90]),
     }
 )
 ACTIONS = st.lists(
@@ -324,12 +343,14 @@ def test_the_lazy_port_equals_the_one_that_steps_every_tick(configuration, actio
     cpu.load(bytes([0x75, 0x87, 0x80 * configuration["smod"]]) + bytes(0xFFF0))
     cpu.run(2)
     twin.run(2, pins)
+    cpu.chip.write(SFRS["IE"], configuration["ie"], cpu.cycles)
     cpu.chip.write(SFRS["SCON"], configuration["scon"], cpu.cycles)
     uart.write_scon(configuration["scon"], 12 * cpu.cycles)
     for advance, action, value in actions:
-        cpu.run(cpu.cycles + advance)
-        twin.run(advance, pins)
+        before = cpu.cycles
+        cpu.run(before + advance)
         now = cpu.cycles
+        twin.run(now - before, pins)
         if action == "send":
             cpu.chip.write(SFRS["SBUF"], value, now)
             uart.write_sbuf(value)
