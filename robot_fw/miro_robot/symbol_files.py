@@ -6,8 +6,9 @@ A file that is only unusual must pass: images are filled up, merged with a boot 
 absolute, mark the end of an area, or name data that has no bytes. So a file is refused on contradictions alone:
 * SDCC's start-up code jumps to `_main`, and the file has `_main` elsewhere (one displaced byte is enough for that);
 * the image has no byte at more than half of the places that the file names;
-* more than a quarter of the functions that it names begin nowhere: behind an instruction that runs on, and no call
-  leads there. Where both belong together that happens to tables among hand-written code: to none in the robot's;
+* more than a sixth of the functions that it names begin nowhere: no call leads there, the bytes in front are no
+  instruction that goes elsewhere, and going by those behind the name before, they lie inside an instruction. Where both
+  belong together that happens to tables among hand-written code: to none in the robot's;
 * it lists instructions (`A$`, both files have that after `--debug`), and the image lacks more than a quarter of them,
   or more than one in 64 runs on into something else than the next. Where both belong together that happens to an image
   that was patched: to none of 1165 in the robot's, to none in six other programs.
@@ -109,11 +110,16 @@ def _check_functions(places: list[_Place], code: bytes, loaded: bytes) -> Contra
         if not place.area.startswith(_NO_FUNCTIONS)
         and all(loaded[max(0, place.address - 3) : place.address + 1])
     ]
-    strays = [place for place in functions if _runs_into(code, place.address)]
+    before = [functions[0], *functions[:-1]] if functions else []
+    strays = [
+        place
+        for place, label in zip(functions, before, strict=True)
+        if _runs_into(code, place.address) and not _is_reached(code, label.address, place.address)
+    ]
     if len(strays) >= _FEW_STRAYS:
         called = {target(code, address) for address in range(_SPACE) if loaded[address]}
         strays = [place for place in strays if place.address not in called]
-    if len(strays) < _FEW_STRAYS or 4 * len(strays) <= len(functions):
+    if len(strays) < _FEW_STRAYS or 6 * len(strays) <= len(functions):
         return None
     first = strays[0]
     count = f"{len(strays)} of {len(functions)} functions"
@@ -130,6 +136,13 @@ def _runs_into(code: bytes, address: int) -> bool:
         for size in (1, 2, 3)
         if address >= size
     )
+
+
+def _is_reached(code: bytes, first: int, address: int) -> bool:
+    """Whether an instruction begins at `address`, going by those from `first` on."""
+    while first < address:
+        first += LENGTH[code[first]]
+    return first == address
 
 
 def _check_instructions(text: str, code: bytes, loaded: bytes) -> Contradiction | None:
