@@ -23,7 +23,8 @@ _POLLS = 32  # reads of P3 within such a slice that count as listening on RXD
 _MARGIN_TICKS = 240  # the CPU may look this far beyond the end of a run
 _FAULTS_KEPT = 100
 _RI = 0x01
-_SJMP_SELF = b"\x80\xfe"
+_EA, _SOURCES = 0x80, 0x3F  # of IE
+_SJMP, _LJMP, _AJMP = 0x80, 0x02, 0x01
 _CHARACTER_BITS = 10
 
 
@@ -34,7 +35,7 @@ class Ended(StrEnum):
     CYCLES = "cycles"  # the limit is reached
     FAULT = "fault"
     PAUSED = "paused"  # where the caller wanted to look; it can go on
-    HALTED = "halted"  # nothing can ever make it go on: SJMP to itself or asleep, with no interrupt to come
+    HALTED = "halted"  # nothing can ever make it go on: a jump to itself or asleep, with no interrupt to come
 
 
 class BareMachine:
@@ -46,7 +47,7 @@ class BareMachine:
     `output` gets the characters sent. With `code_in_xram`, program and data share one 64 KB space (EA low).
     """
 
-    NOT_STATE = ("image", "jumps_to_itself", "output", "stop_on_fault")
+    NOT_STATE = ("image", "loops", "output", "stop_on_fault")
 
     def __init__(
         self,
@@ -62,15 +63,16 @@ class BareMachine:
         self.image = image
         self.output = output
         self.stop_on_fault = stop_on_fault
-        self.jumps_to_itself = _places_of(_SJMP_SELF, image)
+        self.loops = _loops(image)
         self.faults: list[FirmwareFault] = []
         self.stdin = stdin
         self.baud = baud
         self.fed = 0  # bytes of stdin sent so far
         self.char_end = 0  # tick at which the last of them ends
         self.polls = 0  # reads of P3 seen so far
-        self.next_look = 0  # cycle at which to feed stdin, and to ask whether the program has ended
-        self.ends: tuple[int, ...] = ()  # where the program would end, if it came there before the next look
+        self.next_feed = 0  # cycle at which to look after stdin
+        self.next_check = 0  # ... and at which to ask whether the program has ended, which changes nothing
+        self.ends: tuple[int, ...] = ()  # where it would end, if it came there before the next check
         self.bus = XramBus(self._sent, self._faulted)
         self.cpu = Cpu(self.bus)
         self.cpu.txd.unread = True  # the terminal takes characters, not edges
@@ -96,19 +98,24 @@ class BareMachine:
         limit = FAR if max_cycles is None else max_cycles
         stop = limit if pause is None else min(limit, pause)
         faults = len(self.faults)
+        places = () if until is None else (until,)
         while self.cpu.cycles < stop:
-            if self.cpu.cycles >= self.next_look:
-                if max_cycles is None and self.cpu.pc != until and self._halted():
-                    return Ended.HALTED
-                self._look()
-            places = () if max_cycles is not None else self.ends
-            places = places if until is None else (*places, until)
-            reason = self.cpu.run_until_any(places, min(self.next_look, stop))
+            if self.cpu.cycles >= self.next_feed:
+                self.next_feed = self._feed()
+            if max_cycles is not None:
+                reason = self.cpu.run_until_any(places, min(self.next_feed, stop))
+            else:
+                if self.cpu.cycles >= self.next_check:
+                    if self.cpu.cycles and self.cpu.pc != until and self._halted():
+                        return Ended.HALTED
+                    self._expect_end()
+                end = min(self.next_feed, self.next_check, stop)
+                reason = self.cpu.run_until_any((*self.ends, *places), end)
             if reason == BREAKPOINT and self.cpu.pc == until:
                 return Ended.UNTIL
             if reason == BREAKPOINT:
                 self.cpu.step()
-                self.next_look = self.cpu.cycles
+                self.next_check = self.cpu.cycles
             if self.stop_on_fault and len(self.faults) > faults:
                 return Ended.FAULT
             if progress is not None:
@@ -147,21 +154,22 @@ class BareMachine:
             return False
         if cpu.asleep():
             return True
-        return self._jumps_to_itself(cpu.pc) and not cpu.sfr(0xA8) & 0x80
+        return not self._interruptible() and _jumps_to_itself(cpu.code_at, cpu.pc)
 
-    def _jumps_to_itself(self, address: int) -> bool:
-        cpu = self.cpu
-        return cpu.code_at(address) == _SJMP_SELF[0] and cpu.code_at(address + 1) == _SJMP_SELF[1]
+    def _interruptible(self) -> bool:
+        enabled = self.cpu.sfr(0xA8)
+        return bool(enabled & _EA and enabled & _SOURCES)
 
-    def _look(self) -> None:
-        """Between two stretches of the run: feeds stdin, and finds out where the program might end."""
+    def _expect_end(self) -> None:
+        """Finds out where the program might end, and when to ask again."""
         cpu = self.cpu
-        interruptible = cpu.sfr(0xA8) & 0x80
-        self.ends = () if interruptible else tuple(filter(self._jumps_to_itself, self.jumps_to_itself))
-        self.next_look = self._feed()
-        if cpu.pc in self.ends:  # it is there already; what is being sent may end any time
+        self.ends = ()
+        self.next_check = cpu.cycles + _SLICE
+        if not self._interruptible():
+            self.ends = tuple(place for place in self.loops if _jumps_to_itself(cpu.code_at, place))
+        if cpu.cycles and cpu.pc in self.ends:  # it is there already; what is being sent may end any time
             self.ends = ()
-            self.next_look = min(self.next_look, cpu.cycles + _LISTENING_SLICE)
+            self.next_check = cpu.cycles + _LISTENING_SLICE
 
     def _feed(self) -> int:
         """Puts the next character on RXD if it is time, and says how far to run now."""
@@ -212,7 +220,8 @@ class BareMachine:
             "fed": self.fed,
             "char_end": self.char_end,
             "polls": self.polls,
-            "next_look": self.next_look,
+            "next_feed": self.next_feed,
+            "next_check": self.next_check,
             "ends": self.ends,
         }
 
@@ -233,15 +242,26 @@ class BareMachine:
         self.fed = state["fed"]
         self.char_end = state["char_end"]
         self.polls = state["polls"]
-        self.next_look = state["next_look"]
+        self.next_feed = state["next_feed"]
+        self.next_check = state["next_check"]
         self.ends = tuple(state["ends"])
 
 
-def _places_of(code: bytes, image: Image) -> tuple[int, ...]:
-    """Loaded addresses at which these bytes stand, among them some in the middle of instructions."""
+def _loops(image: Image) -> tuple[int, ...]:
+    """Loaded addresses at which a jump to itself stands, among them some in the middle of instructions."""
+    code = image.code
     return tuple(
         address
         for first, end in image.used
         for address in range(first, end)
-        if image.code[address : address + len(code)] == code
+        if _jumps_to_itself(lambda place: code[place & 0xFFFF], address)
     )
+
+
+def _jumps_to_itself(code_at: Callable[[int], int], address: int) -> bool:
+    opcode, first, second = (code_at(address + offset) for offset in range(3))
+    if opcode == _LJMP:
+        return first << 8 | second == address
+    if opcode & 0x1F == _AJMP:
+        return (address + 2) & 0xF800 | (opcode >> 5) << 8 | first == address
+    return opcode == _SJMP and first == 0xFE

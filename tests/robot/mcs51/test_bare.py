@@ -104,6 +104,32 @@ def test_a_program_ends_with_its_first_jump_to_itself():
     assert (machine.cpu.pc, machine.cpu.cycles, machine.cpu.instructions) == (3, 4, 3)
 
 
+@pytest.mark.parametrize(
+    ("text", "end"),
+    [
+        ("SJMP $", (0, 2, 1)),
+        ("LJMP 0000h", (0, 2, 1)),
+        ("NOP\nAJMP 0001h", (1, 3, 2)),
+        ("SETB EA\nSJMP $", (2, 3, 2)),
+    ],
+)
+def test_whatever_jump_leads_to_itself_ends_a_program_where_no_interrupt_may_come(text, end):
+    machine = BareMachine(image(text))
+    assert machine.run() == Ended.HALTED
+    assert (machine.cpu.pc, machine.cpu.cycles, machine.cpu.instructions) == end
+
+
+@pytest.mark.parametrize("main", ["SJMP $", "JB F0,done\nSJMP main"])
+def test_a_limit_that_is_not_reached_changes_nothing(main):
+    text = "LJMP start\nORG 0023h\nCLR RI\nMOV A,SBUF\nDJNZ R7,back\nLJMP done\nback:\nRETI\nstart:\n"
+    text += SERIAL + f"MOV R7,#5\nMOV IE,#90h\nmain:\n{main}\ndone:\nNOP\nSJMP $"
+    free, limited = (BareMachine(image(text), stdin=b"hello") for _ in range(2))
+    until = assemble(text).rindex(b"\x00\x80\xfe")
+    assert free.run(until=until) == Ended.UNTIL
+    assert limited.run(until=until, max_cycles=1_000_000) == Ended.UNTIL
+    assert free.dump() == limited.dump()
+
+
 def test_a_jump_to_itself_that_interrupts_leave_is_no_end():
     program = "LJMP main\nORG 000Bh\nINC 30h\nRETI\nmain:\nMOV TMOD,#02h\nSETB TR0\nMOV IE,#82h\nSJMP $"
     machine = BareMachine(image(program))
