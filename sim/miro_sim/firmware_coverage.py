@@ -57,6 +57,14 @@ def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) ->
     return Report({str(listing_path(out or image.path)): record}, share, listing)
 
 
+def is_of_another_image(report: Report, out: Path) -> bool:
+    """Whether the listing beside `out` is not the one whose lines `report` counts: their numbers mean other things."""
+    beside = listing_path(out)
+    if report.listing is None or not beside.exists():
+        return False
+    return read_input(beside) != report.listing.encode("utf-8")
+
+
 def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
     """Writes `total`, and the listing of `report` if it has one. Raises OutputError; then neither is written."""
     from miro_robot.inspect.lcov import encode

@@ -20,26 +20,43 @@ REGISTERS = ("A", "B", "SP", "PSW", "DPTR", *(f"R{number}" for number in range(8
 class Trace(Watcher):
     """Hands one line a step to `write`. `only`: first addresses of functions; others' steps are left out.
 
+    `heading` is the first line, when it begins to look. The last stretch of sleep is written when it looks no longer.
+
     A register that an instruction left as it was is not named; R0 to R7 are those of the bank selected after it.
     """
 
     def __init__(
-        self, names: SymbolNames, write: Callable[[str], object], only: Collection[int] | None = None
+        self,
+        names: SymbolNames,
+        write: Callable[[str], object],
+        only: Collection[int] | None = None,
+        heading: str | None = None,
     ) -> None:
         self.names = names
         self.write = write
         self.only = only
+        self.heading = heading
         self.code = bytearray()
         self.before: tuple[int, ...] = ()
         self.last = 0  # address of the last instruction: which went to sleep
+        self.sleep = (
+            0,
+            0,
+        )  # first cycle of the stretch of sleep that is still to be written, and the one behind it
         self.static: dict[bytes, str | None] = {}  # by address and code: the part that is always the same
 
     def attached(self, cpu: Cpu) -> None:
         self.code = bytearray(cpu.code)
         self.before = registers(cpu)
         self.last = cpu.pc
+        if self.heading is not None:
+            self.write(self.heading)
+
+    def detached(self, cpu: Cpu) -> None:
+        self._write_sleep()
 
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
+        self._write_sleep()
         after = registers(cpu)
         self.last = pc
         code = bytes((pc >> 8, pc & 0xFF, cpu.code_at(pc), cpu.code_at(pc + 1), cpu.code_at(pc + 2)))
@@ -54,13 +71,20 @@ class Trace(Watcher):
         self.before = after
 
     def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
+        self._write_sleep()
         self.before = registers(cpu)
         if self.only is None or self.names.function(pc)[0] in self.only:
             what = f"-- interrupt: {INTERRUPTS[source]}, to {self.names.place(cpu.pc)}"
             self.write(f"{12 * start:>12}  {pc:04X}  {self.names.place(pc):<28}  {what}")
 
     def slept(self, cpu: Cpu, start: int, end: int) -> None:
-        if self.only is None or self.names.function(self.last)[0] in self.only:
+        first, until = self.sleep
+        self.sleep = (first if first < until == start else start, end)
+
+    def _write_sleep(self) -> None:
+        start, end = self.sleep
+        self.sleep = (0, 0)
+        if start < end and (self.only is None or self.names.function(self.last)[0] in self.only):
             self.write(f"{12 * start:>12}  {'':36}-- asleep for {end - start} cycles")
 
     def _static(self, cpu: Cpu, pc: int) -> str | None:

@@ -7,6 +7,7 @@ cdef int _VECTOR, _VECTOR_STEP, _CALL_CYCLES
 
 cdef class Watcher:
     cpdef attached(self, Cpu cpu)
+    cpdef detached(self, Cpu cpu)
     cpdef starting(self, Cpu cpu)
     cpdef executed(self, Cpu cpu, int pc, long long start)
     cpdef interrupted(self, Cpu cpu, int source, int pc, long long start)

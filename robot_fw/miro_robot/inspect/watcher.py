@@ -22,6 +22,9 @@ class Watcher:
     def attached(self, cpu: Cpu) -> None:
         """It looks on from now."""
 
+    def detached(self, cpu: Cpu) -> None:
+        """It looks on no longer."""
+
     def starting(self, cpu: Cpu) -> None:
         """A run begins; what it will find on its lines is there, and not forgotten yet."""
 
@@ -35,7 +38,7 @@ class Watcher:
         """
 
     def slept(self, cpu: Cpu, start: int, end: int) -> None:
-        """The CPU was idle or powered down from cycle `start` to before `end`."""
+        """The CPU was idle or powered down from cycle `start` to before `end`; it may have more sleep behind that."""
 
     def ran(self, cpu: Cpu, start: int) -> None:
         """A run that began in cycle `start` is over; others may now look at what the CPU did to its lines."""
@@ -126,3 +129,5 @@ def detach(cpu: Cpu, *watchers: Watcher) -> None:
         inspector.watchers = [watcher for watcher in inspector.watchers if watcher not in watchers]
         if not inspector.watchers:
             cpu.inspector = None
+        for watcher in watchers:
+            watcher.detached(cpu)

@@ -11,7 +11,15 @@ from miro_sim.cli.debug import sources_of, sources_option, with_debug_files
 from miro_sim.cli.options import Place
 from miro_sim.cli.program import UserError, show
 from miro_sim.cli.subject import Request, look, open_run, subject_options
-from miro_sim.firmware_coverage import collect, has_listing, listing_path, read_tracefile, table, write
+from miro_sim.firmware_coverage import (
+    collect,
+    has_listing,
+    is_of_another_image,
+    listing_path,
+    read_tracefile,
+    table,
+    write,
+)
 from miro_sim.outdir import check_new, check_not_input
 
 if TYPE_CHECKING:
@@ -52,6 +60,10 @@ def coverage(request: Request, out: Path | None, append: bool, force: bool, sour
     folders = sources_of(image, sources)
     code = look(run, request, counters)
     report = collect(image, counts_of(counters), folders, out)
+    if append and out is not None and is_of_another_image(report, out):
+        raise UserError(
+            f"{listing_path(out)}: is the listing of another image; name another file with --out, or use --force"
+        )
     add(total, report.tracefile)
     if out is not None:
         write(total, report, out, "--out")

@@ -40,8 +40,6 @@ def trace(request: Request, symbols: tuple[str, ...], out: Path | None, force: b
     names = SymbolNames(image)
     only = {first for first, _ in functions_at(symbols, image, names, request.subject)} or None
     if out is None:
-        click.echo(HEADING)
-        return look(run, request, Trace(names, click.echo, only))
+        return look(run, request, Trace(names, click.echo, only, HEADING))
     with whole_file(out, "--out") as staging, staging.open("w", encoding="utf-8") as stream:
-        stream.write(HEADING + "\n")
-        return look(run, request, Trace(names, lambda line: stream.write(line + "\n"), only))
+        return look(run, request, Trace(names, lambda line: stream.write(line + "\n"), only, HEADING))

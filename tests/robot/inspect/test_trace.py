@@ -5,7 +5,7 @@ from __future__ import annotations
 from miro_robot.bare import BareMachine
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.trace import REGISTERS, Trace, registers
-from miro_robot.inspect.watcher import attach
+from miro_robot.inspect.watcher import attach, detach
 from miro_robot.mcs51.cpu import Cpu
 
 from tests.robot.inspect.test_listing import image_of
@@ -66,6 +66,20 @@ def test_sleep_and_the_interrupt_that_ends_it_have_lines_of_their_own():
     assert "-- interrupt: timer 0, to vector timer 0" in lines[asleep + 1]
     assert "INC R7" in lines[asleep + 2]
     assert lines[asleep + 2].endswith("R7=01")
+
+
+def test_sleep_is_one_line_however_the_run_is_cut():
+    code = assemble("NOP\nMOV PCON,#01h\nSJMP $")
+    cpu = Cpu(RecordingBus())
+    cpu.load(code)
+    lines: list[str] = []
+    trace = Trace(SymbolNames(image_of(code)), lines.append, heading="heading")
+    attach(cpu, trace)
+    for cycle in (10, 20, 500):
+        cpu.run(cycle)
+    detach(cpu, trace)
+    assert lines[0] == "heading"
+    assert [line.split("-- ")[1] for line in lines if "--" in line] == ["asleep for 497 cycles"]
 
 
 def test_a_program_that_changes_its_own_operands_is_shown_as_it_was_executed():

@@ -253,6 +253,29 @@ def test_the_options_of_a_scenario_do_not_apply_to_an_image(
     assert "--seed does not apply" in err
 
 
+def test_coverage_is_not_added_to_the_listing_of_another_image(
+    mirotwin: Callable[..., Result], bare: Path, tmp_path: Path
+) -> None:
+    other, out = tmp_path / "other.hex", tmp_path / "fw.info"
+    hex_file(other, b"\x00" + LOOP)
+    arguments = ("--max-cycles", 1000, "--out", out)
+    mirotwin("fw", "coverage", bare, *arguments)
+    before = out.read_bytes()
+    code, _, err = mirotwin("fw", "coverage", other, *arguments, "--append")
+    assert code == 2
+    assert f"{out}.lst: is the listing of another image; " in err
+    assert out.read_bytes() == before
+    assert mirotwin("fw", "coverage", bare, *arguments, "--append")[0] == 42
+
+
+def test_a_trace_whose_window_is_never_reached_prints_nothing(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image = tmp_path / "a.hex"
+    hex_file(image, LOOP)
+    assert mirotwin("fw", "trace", image, "--from", "1s")[:2] == (2, "")
+
+
 def test_an_unknown_symbol_is_named_with_its_nearest(mirotwin: Callable[..., Result]) -> None:
     code, _, err = mirotwin("fw", "trace", "fig6", "--symbol", "uart_sent", "--to", "1ms")
     assert code == 2
