@@ -194,6 +194,7 @@ class Cpu(Executor):
 
     def begin_run(self) -> None:
         self.next_mark = (self.cycles // _MARK_CYCLES + 1) * _MARK_CYCLES if self.main_loop_limit else _FAR
+        self.chip.serial_wait = -1  # more may have been put on RXD since the last run
         self.next_event = 0
         self.limit = 0
 

@@ -282,6 +282,19 @@ def test_characters_that_are_received_by_interrupt_come_one_after_the_other(scon
     assert [cpu.peek_iram(0x30 + index) for index in range(3)] == [0xA5, 0x3C, 0x01]
 
 
+@pytest.mark.parametrize("before", [1, 13, 100, 900])
+def test_a_character_that_is_put_on_rxd_between_two_runs_interrupts(before):
+    cpu = cpu_with(
+        "LJMP main\nORG 0023h\nCLR RI\nMOV 30h,SBUF\nRETI\nmain:\nMOV TMOD,#20h\nMOV TH1,#0FDh\n"
+        "MOV TCON,#40h\nMOV SCON,#50h\nMOV IE,#90h\nSJMP $"
+    )
+    cpu.run(before)
+    for place in range(10):
+        cpu.rxd.append(12_000 + place * 1_152, (0xA5 << 1 | 1 << 9) >> place & 1)
+    cpu.run(3_000)
+    assert cpu.peek_iram(0x30) == 0xA5
+
+
 CONFIGURATION = st.fixed_dictionaries(
     {
         "scon": st.sampled_from([0x50, 0x70, 0x58, 0xD0, 0xD8, 0xF8, 0x90, 0xB8]),
