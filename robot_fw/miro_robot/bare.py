@@ -14,6 +14,7 @@ from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
 from miro_robot.mcs51.line import FAR
+from miro_robot.mcs51.opcodes import jumps_to_itself
 from miro_robot.mcs51.xram import XramBus
 
 CRYSTAL_HZ = 24_000_000
@@ -24,7 +25,6 @@ _MARGIN_TICKS = 240  # the CPU may look this far beyond the end of a run
 _FAULTS_KEPT = 100
 _RI = 0x01
 _EA, _SOURCES = 0x80, 0x3F  # of IE
-_SJMP, _LJMP, _AJMP = 0x80, 0x02, 0x01
 _CHARACTER_BITS = 10
 
 
@@ -154,7 +154,7 @@ class BareMachine:
             return False
         if cpu.asleep():
             return True
-        return not self._interruptible() and _jumps_to_itself(cpu.code_at, cpu.pc)
+        return not self._interruptible() and jumps_to_itself(cpu.code_at, cpu.pc)
 
     def _interruptible(self) -> bool:
         enabled = self.cpu.sfr(0xA8)
@@ -166,7 +166,7 @@ class BareMachine:
         self.ends = ()
         self.next_check = cpu.cycles + _SLICE
         if not self._interruptible():
-            self.ends = tuple(place for place in self.loops if _jumps_to_itself(cpu.code_at, place))
+            self.ends = tuple(place for place in self.loops if jumps_to_itself(cpu.code_at, place))
         if cpu.cycles and cpu.pc in self.ends:  # it is there already; what is being sent may end any time
             self.ends = ()
             self.next_check = cpu.cycles + _LISTENING_SLICE
@@ -249,19 +249,9 @@ class BareMachine:
 
 def _loops(image: Image) -> tuple[int, ...]:
     """Loaded addresses at which a jump to itself stands, among them some in the middle of instructions."""
-    code = image.code
     return tuple(
         address
         for first, end in image.used
         for address in range(first, end)
-        if _jumps_to_itself(lambda place: code[place & 0xFFFF], address)
+        if jumps_to_itself(image.code.__getitem__, address)
     )
-
-
-def _jumps_to_itself(code_at: Callable[[int], int], address: int) -> bool:
-    opcode, first, second = (code_at(address + offset) for offset in range(3))
-    if opcode == _LJMP:
-        return first << 8 | second == address
-    if opcode & 0x1F == _AJMP:
-        return (address + 2) & 0xF800 | (opcode >> 5) << 8 | first == address
-    return opcode == _SJMP and first == 0xFE

@@ -6,6 +6,8 @@ instruction does is in `execute.py`. Source: Atmel 8051 Hardware Manual, instruc
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from miro_robot.mcs51.names import NUMBERS, Names
 
 # first opcode, how many, opcode step, mnemonic, operands, bytes, machine cycles.
@@ -146,7 +148,8 @@ LINE = tuple(ROW[opcode] | CYCLES[opcode] << 8 | LENGTH[opcode] << 13 for opcode
 """The same in one word, for the loop that executes them: bits 7:0 row, 10:8 cycles, 15:13 length. Bits 12:11 mark what
 is no opcode; in bits 31:16 the core puts the address behind the instruction, so that the next fetch need not add."""
 _AJMP, _LJMP, _ACALL, _LCALL = 0x01, 0x02, 0x11, 0x12
-_LEAVING = (_LJMP, 0x22, 0x32, 0x73, 0x80)  # and RET, RETI, JMP @A+DPTR, SJMP
+_SJMP = 0x80
+_LEAVING = (_LJMP, 0x22, 0x32, 0x73, _SJMP)  # and RET, RETI, JMP @A+DPTR
 _TEXT = {row[0]: (row[3], row[4]) for row in TABLE}
 
 
@@ -184,6 +187,18 @@ def is_conditional(opcode: int) -> bool:
 def target(code: bytes, address: int) -> int | None:
     """Where the LCALL, ACALL, LJMP or AJMP at `address` goes; None if that is another instruction."""
     opcode, first, second = (code[(address + offset) & 0xFFFF] for offset in range(3))
+    return _absolute(opcode, first, second, address)
+
+
+def jumps_to_itself(code_at: Callable[[int], int], address: int) -> bool:
+    """Whether an SJMP, LJMP or AJMP stands there that goes where it stands. `code_at(a)`: byte of code memory."""
+    opcode, first, second = (code_at((address + offset) & 0xFFFF) for offset in range(3))
+    if opcode == _SJMP:
+        return first == 0xFE
+    return not is_call(opcode) and _absolute(opcode, first, second, address) == address
+
+
+def _absolute(opcode: int, first: int, second: int, address: int) -> int | None:
     if opcode in (_LCALL, _LJMP):
         return first << 8 | second
     if ROW[opcode] in (_ACALL, _AJMP):

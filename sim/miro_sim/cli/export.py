@@ -17,7 +17,7 @@ from miro_sim.capture.source import READ_ERRORS, open_source
 from miro_sim.cli.options import Place, Whole, choose_engine, engine_option
 from miro_sim.cli.program import BAD_INPUT, DONE, UserError, complain, show
 from miro_sim.cli.progress import ProgressBar
-from miro_sim.outdir import check_new, whole_file
+from miro_sim.outdir import check_new, check_not_input, whole_file
 
 TARGETS = ("pcapng", "stream")
 
@@ -88,8 +88,7 @@ def export(
     """
     if out != STDIN:
         check_new(Path(out), "--out", force)
-        if Path(out).exists() and Path(file).exists() and Path(out).samefile(file):
-            raise UserError(f"{out}: is the file to be read; choose another file with --out")
+        check_not_input(Path(out), "--out", file)
     choose_engine(engine)
     to = to or ("stream" if Path(out).suffix in (".stream", ".txt") else "pcapng")
     with Input(file) as given, ProgressBar("exporting", given.size, quiet) as bar:

@@ -184,5 +184,5 @@ def test_the_file_that_is_read_is_never_replaced(
     for one, other in ((path, path), (path, link), (link, path)):
         code, _, err = mirotwin("export", one, "--out", other, "--force")
         assert code == 2
-        assert "is the file to be read; choose another file with --out" in err
+        assert "is the input itself; choose another file with --out" in err
     assert path.read_bytes() == before
