@@ -4,6 +4,8 @@
 """
 
 import itertools
+import subprocess
+import sys
 
 import pytest
 from hypothesis import given, settings
@@ -293,6 +295,24 @@ def test_a_character_that_is_put_on_rxd_between_two_runs_interrupts(before):
         cpu.rxd.append(12_000 + place * 1_152, (0xA5 << 1 | 1 << 9) >> place & 1)
     cpu.run(3_000)
     assert cpu.peek_iram(0x30) == 0xA5
+
+
+HASTY = """
+from miro_protocol import engine
+engine.select("python")
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.uart import Uart
+Uart.ri_tick = lambda uart: 0
+cpu = Cpu()
+cpu.load(bytes.fromhex("759850 75a890 80fe"))
+print(cpu.run(500), cpu.cycles)
+"""
+
+
+def test_an_event_that_is_announced_for_the_past_holds_nothing_up():
+    """A receiver that always says RI may be up already costs speed; once this kept the CPU looking for ever."""
+    done = subprocess.run([sys.executable, "-c", HASTY], capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.stderr) == ("0 500\n", "")
 
 
 CONFIGURATION = st.fixed_dictionaries(
