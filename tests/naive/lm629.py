@@ -246,6 +246,7 @@ class NaiveLm629:
             self.rst_fell = tick
             self.threshold = 0x7FFF
             self.alive_at = None
+            self.encoder.run_to(tick)
             self.clear("hard")
         elif level and not self.rst and tick - self.rst_fell >= 4 * self.options.reset_pulse_clocks:
             self.alive_at = math.ceil(Fraction(tick, 4)) * 4 + 4 * self.options.reset_clocks
@@ -375,6 +376,7 @@ class NaiveLm629:
             self.answer = self.answer[self.phase :]  # B3: after half a word the other half
         elif opcode == 0x00:
             self.alive_at = math.ceil(Fraction(tick, 4)) * 4 + 4 * self.options.reset_clocks
+            self.encoder.run_to(tick)
             self.clear("soft")
         elif opcode == 0x01:
             self.start_motion()

@@ -112,13 +112,17 @@ class MotorAxis:
         if level == 0:
             self.reset_tick = tick
             self.threshold = 0x7FFF
+            self.encoder.settle(tick)
             self._enter_reset(_HELD, host_port.HARDWARE_RESET, _FAR)
         elif tick - self.reset_tick >= self.reset_pulse_ticks:
             self.mode = _RESETTING
             self.next_tick = (tick + 3 & -4) + self.reset_ticks
 
     def _enter_reset(self, mode: int, lock: int, until_tick: int) -> None:
-        """Everything but the error threshold and the encoder's inputs falls back to zero (R5, R6)."""
+        """Everything but the error threshold and the encoder's inputs falls back to zero (R5, R6).
+
+        The encoder has been settled: what it caught before this tick ends the wait for an index.
+        """
         clears_index = self.options.reset_clears_index
         self.mode = mode
         self.next_tick = until_tick

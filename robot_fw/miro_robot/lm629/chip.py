@@ -107,6 +107,7 @@ class Lm629(MotorAxis):
             self.trajectory.define_home(self.real_position)
             self.real_position = 0
         elif name == "RESET":
+            self.encoder.settle(tick)
             self._enter_reset(_RESETTING, host_port.SOFTWARE_RESET, (tick + 3 & -4) + self.reset_ticks)
         elif name == "PORT12" and self.options.port12_clears:
             self.signals.clear_bits(signals.OUTPUT_8_BIT)

@@ -60,7 +60,7 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     reset_clears_lpes: bool = True
     """R5: a RESET command ends "stop on excessive error"."""
     reset_clears_index: bool = True
-    """R6: a reset clears the index register and a SIP that is pending."""
+    """R6: a reset clears the index register and a SIP that is pending; False: both stay."""
     reset_pulse_clocks: int = 8
     """R7: a shorter low on /RST leaves the chip stuck at status 00h."""
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from fractions import Fraction
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from miro_robot.lm629.commands import COMMANDS
 from miro_robot.lm629.options import CHOICES, DEFAULT_OPTIONS, Lm629Options
@@ -298,6 +298,11 @@ class Session(Bench):
 
 @settings(deadline=None, max_examples=SESSIONS)
 @given(OPTIONS, st.integers(0, 5000), st.lists(ACTIONS, max_size=40))
+@example(
+    Lm629Options(reset_clears_index=False),
+    0,
+    [("command", "SIP"), ("turn", 4), ("index", 0), ("turn", 2), ("command", "RESET")],
+)
 def test_random_sessions_agree_with_the_slow_twin_bit_for_bit(
     options: Lm629Options, start: int, actions: list[tuple[object, ...]]
 ):

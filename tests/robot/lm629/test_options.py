@@ -13,6 +13,7 @@ from miro_robot.lm629.options import CHOICES, DEFAULT_OPTIONS, LENGTHS, Lm629Opt
 from tests.robot.lm629.bench import Bench
 
 MOTOR_OFF, BREAKPOINT, EXCESS, COMPLETE, ERROR = 0x80, 0x40, 0x20, 0x04, 0x02
+ACQUIRE_INDEX = 0x0001
 README = Path(__file__).parents[3] / "robot_fw/miro_robot/lm629/README.md"
 
 
@@ -410,6 +411,21 @@ def test_options_come_from_plain_values_and_say_what_they_may_be():
         msgspec.convert({"busy_clock": 1}, Lm629Options)
     with pytest.raises(ValueError, match="sign_of_negative must be one of 1, 0, not 2"):
         Lm629Options(sign_of_negative=2)  # type: ignore[arg-type]
+
+
+def test_an_index_caught_before_a_reset_ends_the_wait_for_it():
+    """SNVS781, RDSIGS: bit 0 stays set until the next index pulse, so no wait is left that R6 could keep."""
+    for reset in ("command", "pin"):
+        bench = Bench.running(reset_clears_index=False)
+        bench.chip.set_encoder(bench.tick, 0, 0)
+        bench.command("SIP")
+        bench.chip.set_index(bench.tick, 0)
+        bench.wait(64)
+        if reset == "command":
+            bench.command("RESET")
+        else:
+            bench.chip.set_reset(bench.tick, 0)
+        assert bench.chip.signals.word & ACQUIRE_INDEX == 0
 
 
 def test_a_chip_with_other_readings_is_saved_with_what_they_need():
