@@ -1,18 +1,15 @@
-"""Random sessions at the pins: the chip and its slow twin agree after every step, however the rules are read.
-
-`python -m tests.robot.lm629.test_against_naive 3000` plays as many sessions.
-"""
+"""Random sessions at the pins: the chip and its slow twin agree after every step, however the rules are read."""
 
 from __future__ import annotations
 
-import sys
 from fractions import Fraction
 
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from miro_robot.lm629.commands import COMMANDS
 from miro_robot.lm629.options import CHOICES, DEFAULT_OPTIONS, Lm629Options
 
+from tests.examples import examples
 from tests.robot.lm629.bench import Bench
 from tests.robot.lm629.pair import Pair
 
@@ -126,7 +123,6 @@ OPTIONS = st.builds(
     **{name: st.sampled_from(values) for name, values in LENGTHS.items()},
     **{name: st.sampled_from(values) for name, values in CHOICES.items()},
 )
-SESSIONS = int(sys.argv[1]) if __name__ == "__main__" else 250
 OPTIONS = st.just(DEFAULT_OPTIONS) | OPTIONS
 
 
@@ -296,7 +292,7 @@ class Session(Bench):
         self.wait(30000)
 
 
-@settings(deadline=None, max_examples=SESSIONS)
+@examples(250)
 @given(OPTIONS, st.integers(0, 5000), st.lists(ACTIONS, max_size=40))
 @example(
     Lm629Options(reset_clears_index=False),
@@ -315,7 +311,3 @@ def test_random_sessions_agree_with_the_slow_twin_bit_for_bit(
             continue  # these would wait for ever for a chip that is in reset
         getattr(session, str(name))(*arguments)
     pair.compare(session.tick)
-
-
-if __name__ == "__main__":
-    test_random_sessions_agree_with_the_slow_twin_bit_for_bit()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from miro_robot.lm629.encoder import Encoder
 
+from tests.examples import examples
 from tests.naive.lm629_encoder import FORWARD, NaiveEncoder
 from tests.robot.lm629.bench import Bench
 
@@ -15,7 +16,7 @@ EVENT = st.tuples(
 )
 
 
-@settings(deadline=None, max_examples=400)
+@examples(400)
 @given(
     filter_clocks=st.sampled_from([8, 8, 8, 3, 1, 0]),
     start=st.integers(0, 40),

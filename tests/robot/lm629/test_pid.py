@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from miro_robot.lm629.pid import Pid
 
+from tests.examples import examples
 from tests.naive.lm629 import NaivePid
 from tests.robot.lm629.bench import Bench
 
@@ -82,7 +83,7 @@ def test_products_may_be_read_as_their_bottom_16_bits():
 COEFFICIENT = st.integers(0, 300) | st.integers(0, 0x7FFF)
 
 
-@settings(deadline=None, max_examples=300)
+@examples(300)
 @given(
     coefficients=st.tuples(COEFFICIENT, COEFFICIENT, COEFFICIENT, COEFFICIENT, st.integers(0, 5)),
     saturates=st.booleans(),

@@ -8,11 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from miro_protocol import engine
 from miro_robot.lm629.chip import Lm629
 
+from tests.examples import examples
 from tests.robot.lm629.bench import Bench
 from tests.robot.lm629.session import play, steps
 
@@ -36,7 +37,7 @@ def test_compiled_and_uncompiled_chips_see_the_same_session(seed: int):
     assert compiled.split()[1] == python.split()[1]
 
 
-@settings(deadline=None, max_examples=60)
+@examples(60)
 @given(seed=st.integers(0, 2**32), before=st.integers(0, 40), extra=st.integers(0, 9000))
 def test_a_chip_restored_at_any_tick_goes_on_with_the_same_bits(seed: int, before: int, extra: int):
     script = list(steps(seed, before + 15))

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from fractions import Fraction
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from miro_robot.lm629.options import DEFAULT_OPTIONS
 from miro_robot.lm629.trajectory import Trajectory
 
+from tests.examples import examples
 from tests.naive.lm629 import NaiveLm629
 
 
@@ -133,7 +134,7 @@ SMALL = st.integers(-400, 400)
 WIDE = st.integers(-(2**30), 2**30 - 1)
 
 
-@settings(deadline=None, max_examples=300)
+@examples(300)
 @given(
     a=st.integers(0, 0x30000) | st.integers(0, 2**30 - 1),
     limit=st.integers(0, 0x80000) | st.integers(0, 2**30 - 1),
@@ -172,7 +173,7 @@ def test_any_state_steps_like_the_slow_twin(
         assert (finished, ours.crossed, ours.target) == (2 in events, 4 in events, theirs.target)
 
 
-@settings(deadline=None, max_examples=200)
+@examples(200)
 @given(a=st.integers(1, 0x20000), limit=st.integers(1, 0x40000), target=st.integers(-300, 300))
 def test_every_move_from_rest_ends_exactly_on_its_target(a: int, limit: int, target: int):
     trajectory = generator(max(a, 0x40), max(limit, 0x200), target)

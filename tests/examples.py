@@ -1,0 +1,17 @@
+"""How many examples a property test draws.
+
+What belongs here: the one decorator by which a test says it, so that a longer run can scale all tests at once.
+What does not: what is drawn; the strategies stand beside the tests.
+"""
+
+from __future__ import annotations
+
+from hypothesis import settings
+
+NORM = 100
+"""`max_examples` of Hypothesis' default profile."""
+
+
+def examples(count: int) -> settings:
+    """Decorator: draw `count` examples; a profile with n times `NORM` as `max_examples` draws n times as many."""
+    return settings(deadline=None, max_examples=max(1, count * settings.default.max_examples // NORM))
