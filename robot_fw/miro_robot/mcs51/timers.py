@@ -159,7 +159,7 @@ class Timers:
         self._overflowed(part, overflows, first + left - 1)
 
     def _store(self, part: int, value: int) -> None:
-        """TL.7:5 of mode 0, undefined on silicon, keeps what was written there."""
+        """TL.7:5 are indeterminate in mode 0 (4316E section 2.9); chosen: they keep what was written there."""
         if part == 2:
             self.th[0] = value
             return

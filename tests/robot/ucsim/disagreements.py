@@ -1,9 +1,10 @@
-"""Where ucsim 0.6.4 does not do what the data sheets say; there the data sheets win.
+"""Where ucsim 0.6.4 does not do what the data sheets say; there the data sheets win. Where they leave open what
+happens, the entry says what was chosen.
 
 What belongs here: the list. How a random walk keeps away from these is in `exclusions.py`; each is shown on both
 machines in `test_disagreements.py`. `tests/vectors/README.md` repeats the list: `python -m
 tests.robot.ucsim.disagreements` prints the table that has to stand there. Sources: Atmel's 8051 Hardware Manual
-(4316E) and the AT89S52 data sheet (1919D).
+(4316E), the AT89S52 data sheet (1919D) and the AT89C51AC2 data sheet (4127H).
 """
 
 from __future__ import annotations
@@ -104,8 +105,9 @@ DISAGREEMENTS: tuple[Disagreement, ...] = (
     Disagreement(
         "mode-0-low",
         "TL.7:5 become 0 when a timer in mode 0 counts",
-        "they are undefined; ours stay",
-        "4316E section 2.9",
+        "indeterminate, to be ignored; chosen: they stay as written (of two emulators named emu8051, that of "
+        "H. Villeneuve clears them, that of J. Komppa keeps them)",
+        "none for the choice; 4316E section 2.9, and 4127H (AT89C51AC2), timer 0, mode 0",
         "test_timers.py::test_modes_0_to_2_overflow_where_they_should",
     ),
     Disagreement(
