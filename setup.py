@@ -81,7 +81,8 @@ def threaded(c):
     Processors predict an indirect jump from where it is and what was jumped before: one jump for the whole loop mixes
     all instructions up. Compilers do not copy it, so the loop's head, from `while` to `switch`, is copied to the end of
     each arm (labels as values: GCC and Clang); what the head asks before each instruction is taken to be rare.
-    Text that is not as Cython 3 writes it stays as it is: slower, the same bits.
+    Text that is not as Cython 3 writes it stays as it is: slower, the same bits. What was reshaped carries a mark, by
+    which `mirotwin info` says so.
     """
     for switch in SWITCH_OF_A_LOOP.finditer(c):
         indent, value, arms, again = switch["indent"], switch["value"], switch["arms"], switch["again"]
@@ -99,7 +100,8 @@ def threaded(c):
         )
         arms = re.sub(rf"^{indent}  break;\n", step.replace("\\", r"\\"), arms, flags=re.M)
         first, last = switch.span("arms")
-        return before + table + loop + head + c[switch.start() : first] + arms + c[last:]
+        mark = f'static const char dispatch[] __attribute__((used)) = "{engine().DISPATCH_MARK.decode()}";\n'
+        return before + table + loop + head + c[switch.start() : first] + arms + c[last:] + mark
     return c
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib.abc import MetaPathFinder
 from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec, SourceFileLoader
@@ -19,6 +19,8 @@ from types import ModuleType
 
 PACKAGES = ("miro_protocol", "miro_robot", "miro_host", "miro_sim")
 ENGINES = ("compiled", "python")
+DISPATCH_MARK = b"mirotwin: dispatch replicated"
+"""Bytes that the build leaves in a compiled module whose interpreter loop it could reshape (`setup.py`, `threaded`)."""
 REMEDY = "reinstall with `pip install -e .` (or `pip install .`), or run with `--engine python`"
 
 
@@ -87,6 +89,11 @@ def compiled_file(source: Path) -> Path | None:
     return None
 
 
+def dispatch_replicated(modules: Iterable[Path]) -> bool:
+    """Whether one of these compiled modules has an interpreter loop with the dispatch at the end of each arm."""
+    return any(DISPATCH_MARK in module.read_bytes() for module in modules)
+
+
 class EngineFinder(MetaPathFinder):
     """First on `sys.meta_path`: sends hot modules to their source when the engine is `python`."""
 
@@ -97,6 +104,10 @@ class EngineFinder(MetaPathFinder):
     def missing(self) -> list[str]:
         """Hot modules that have no compiled twin."""
         return [name for name, source in self.sources.items() if compiled_file(source) is None]
+
+    def compiled(self) -> list[Path]:
+        """The compiled twins that are there."""
+        return [file for file in map(compiled_file, self.sources.values()) if file is not None]
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None

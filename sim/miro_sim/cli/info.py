@@ -24,6 +24,8 @@ PACKAGES = (
     "pyvcd",
 )
 
+PLAIN_REMEDY = "rebuild with GCC or Clang, and with the Cython of .ci/constraints.txt"
+
 
 def version_of(package: str) -> str:
     """The installed version of a distribution, or a word that says it is not there."""
@@ -63,8 +65,15 @@ def _engine_line(active: str) -> str:
     finder = engines.install()
     hot, missing = len(finder.sources), len(finder.missing())
     if active == "compiled":
-        return f"compiled ({hot} modules)"
+        return f"compiled ({hot} modules), {_dispatch()}"
     return f"python ({hot - missing} of {hot} modules have a compiled twin)"
+
+
+def _dispatch() -> str:
+    """Whether the build gave the CPU's loop the shape that processors predict well; the bits do not depend on it."""
+    if engines.dispatch_replicated(engines.install().compiled()):
+        return "dispatch replicated"
+    return f"dispatch plain: slower, the same bits; {PLAIN_REMEDY}"
 
 
 def _broken_modules() -> list[str]:
