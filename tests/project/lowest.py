@@ -1,0 +1,124 @@
+"""The tests at the lower bounds of `pyproject.toml`: `python -m tests.project.lowest`.
+
+What belongs here: reading the bounds, an environment that has just these versions, running tests in it. What does not:
+which versions CI uses otherwise (`.ci/constraints.txt`).
+
+It works in `build/lowest`: a copy of the tree and a `.venv` in it, installed as README says, with every requirement
+held to its bound, those of the build too. What requirements themselves require is not held: pip takes the newest that
+fits. The copy has its own compiled modules, so the lowest Cython is tried as well. That takes minutes; with `--smoke`
+the compiled modules of this tree are copied, and nothing is built. The rest of the command line goes to pytest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import venv
+from collections.abc import Iterable
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PLACE = ROOT / "build" / "lowest"
+ENGINES = ("*.so", "*.pyd")
+REQUIREMENT = re.compile(r"(?P<name>[\w.-]+)>=(?P<bound>[\w.]+)(,<[\w.]+)?")
+SMOKE = (
+    "tests/protocol/test_weights.py",
+    "tests/protocol/test_frames.py",
+    "tests/protocol/test_pcapng.py",
+    "tests/sim/test_scenario.py",
+    "tests/sim/test_recording.py",
+    "tests/sim/test_pytest_plugin.py",
+    "tests/sim/cli/test_scenarios_command.py",
+)
+
+
+def bounds(pyproject: str) -> dict[str, str]:
+    """Package -> lowest version, of all that is required to build, to run and to test.
+
+    Raises ValueError for a requirement that is not written as `name>=version` with at most an upper bound after it,
+    and for one package with two bounds.
+    """
+    data = tomllib.loads(pyproject)
+    project = data["project"]
+    found: dict[str, str] = {}
+    groups = [
+        data["build-system"]["requires"],
+        project["dependencies"],
+        *project["optional-dependencies"].values(),
+    ]
+    for text in (text for group in groups for text in group if not text.startswith(f"{project['name']}[")):
+        match = REQUIREMENT.fullmatch(text)
+        if match is None:
+            raise ValueError(f"{text!r} is not written as name>=version")
+        if found.setdefault(match["name"], match["bound"]) != match["bound"]:
+            raise ValueError(
+                f"{match['name']} has two lower bounds: {found[match['name']]} and {match['bound']}"
+            )
+    return found
+
+
+def constraints(lowest: dict[str, str]) -> str:
+    """A constraints file for pip."""
+    return "".join(f"{name}=={version}\n" for name, version in sorted(lowest.items()))
+
+
+def copy_tree(target: Path, patterns: Iterable[str]) -> None:
+    """Copies what git tracks, and files of this tree's packages that fit `patterns`."""
+    tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
+    names = [Path(name) for name in tracked.stdout.split("\0") if name and (ROOT / name).exists()]
+    for package in ("protocol", "robot_fw", "host", "sim"):
+        names += [path.relative_to(ROOT) for pattern in patterns for path in (ROOT / package).rglob(pattern)]
+    for name in names:
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, target / name)
+
+
+def install(tree: Path, python: Path, smoke: bool) -> None:
+    """Installs the tree at `tree`, editable, at its lower bounds."""
+    held = tree / "lowest.txt"
+    lowest = bounds((tree / "pyproject.toml").read_text(encoding="utf-8"))
+    held.write_text(constraints(lowest), encoding="utf-8")
+    # pip before 25.3 applies the first to what a build needs, later ones the second
+    environment = {**os.environ, "PIP_CONSTRAINT": str(held), "PIP_BUILD_CONSTRAINT": str(held)}
+    pip = [str(python), "-m", "pip", "install", "-q"]
+    if not smoke:
+        subprocess.run([*pip, "-e", ".[test]"], cwd=tree, env=environment, check=True)
+        return
+    # What an editable install consists of, without its build: the metadata and the way to the packages.
+    subprocess.run(
+        [*pip, *(f"{name}=={version}" for name, version in lowest.items())], env=environment, check=True
+    )
+    site = Path(
+        subprocess.run(
+            [str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
+            capture_output=True,
+            check=True,
+            text=True,
+        ).stdout.strip()
+    )
+    subprocess.run([str(python), "setup.py", "-q", "dist_info", "-o", str(site)], cwd=tree, check=True)
+    roots = (str(tree / package) for package in ("protocol", "robot_fw", "host", "sim"))
+    (site / "mirotwin.pth").write_text("\n".join(roots) + "\n", encoding="utf-8")
+
+
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="python -m tests.project.lowest")
+    parser.add_argument("--smoke", action="store_true", help="build nothing and by default run few tests")
+    options, rest = parser.parse_known_args(arguments)
+    shutil.rmtree(PLACE, ignore_errors=True)
+    tree = PLACE / "tree"
+    copy_tree(tree, ENGINES if options.smoke else ())
+    venv.create(tree / ".venv", with_pip=True)
+    python = tree / ".venv" / ("Scripts" if os.name == "nt" else "bin") / "python"
+    install(tree, python, options.smoke)
+    tests = rest or (SMOKE if options.smoke else ())
+    return subprocess.run([str(python), "-m", "pytest", *tests], cwd=tree, check=False).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
