@@ -29,7 +29,8 @@ def test_a_code_small_enough_to_list_has_the_weights_it_has():
 
 
 def ones(numbers):
-    return np.unpackbits(numbers.astype("<u4").view(np.uint8).reshape(-1, 4), axis=1).sum(axis=1)
+    bits = np.unpackbits(numbers.astype("<u4").view(np.uint8).reshape(-1, 4), axis=1)
+    return bits.sum(axis=1, dtype=np.int64)  # NumPy 1.26 counts neither in uint64 nor converts it
 
 
 def solve(basis):
