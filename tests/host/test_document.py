@@ -1,16 +1,17 @@
 """The package's page: its example runs as it stands there."""
 
 import re
-import subprocess
 import sys
 from pathlib import Path
+
+from tests import children
 
 PAGE = Path(__file__).parents[2] / "host" / "README.md"
 
 
 def test_the_example_prints_three_frames():
     (code,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = children.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     lines = done.stdout.splitlines()
     assert [bytes.fromhex(line)[5:8] for line in lines] == [bytes.fromhex("ff 2d d4")] * 3
 

@@ -15,12 +15,13 @@ import argparse
 import os
 import re
 import shutil
-import subprocess
 import sys
 import tomllib
 import venv
 from collections.abc import Iterable
 from pathlib import Path
+
+from tests import children
 
 ROOT = Path(__file__).parents[2]
 PLACE = ROOT / "build" / "lowest"
@@ -69,7 +70,7 @@ def constraints(lowest: dict[str, str]) -> str:
 
 def copy_tree(target: Path, patterns: Iterable[str]) -> None:
     """Copies what git tracks, and files of this tree's packages that fit `patterns`."""
-    tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
+    tracked = children.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
     names = [Path(name) for name in tracked.stdout.split("\0") if name and (ROOT / name).exists()]
     for package in ("protocol", "robot_fw", "host", "sim"):
         names += [path.relative_to(ROOT) for pattern in patterns for path in (ROOT / package).rglob(pattern)]
@@ -87,21 +88,21 @@ def install(tree: Path, python: Path, smoke: bool) -> None:
     environment = {**os.environ, "PIP_CONSTRAINT": str(held), "PIP_BUILD_CONSTRAINT": str(held)}
     pip = [str(python), "-m", "pip", "install", "-q"]
     if not smoke:
-        subprocess.run([*pip, "-e", ".[test]"], cwd=tree, env=environment, check=True)
+        children.run([*pip, "-e", ".[test]"], cwd=tree, env=environment, check=True)
         return
     # What an editable install consists of, without its build: the metadata and the way to the packages.
-    subprocess.run(
+    children.run(
         [*pip, *(f"{name}=={version}" for name, version in lowest.items())], env=environment, check=True
     )
     site = Path(
-        subprocess.run(
+        children.run(
             [str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
             capture_output=True,
             check=True,
             text=True,
         ).stdout.strip()
     )
-    subprocess.run([str(python), "setup.py", "-q", "dist_info", "-o", str(site)], cwd=tree, check=True)
+    children.run([str(python), "setup.py", "-q", "dist_info", "-o", str(site)], cwd=tree, check=True)
     roots = (str(tree / package) for package in ("protocol", "robot_fw", "host", "sim"))
     (site / "mirotwin.pth").write_text("\n".join(roots) + "\n", encoding="utf-8")
 
@@ -117,7 +118,7 @@ def main(arguments: list[str]) -> int:
     python = tree / ".venv" / ("Scripts" if os.name == "nt" else "bin") / "python"
     install(tree, python, options.smoke)
     tests = rest or (SMOKE if options.smoke else ())
-    return subprocess.run([str(python), "-m", "pytest", *tests], cwd=tree, check=False).returncode
+    return children.run([str(python), "-m", "pytest", *tests], cwd=tree, check=False).returncode
 
 
 if __name__ == "__main__":

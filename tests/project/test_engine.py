@@ -1,10 +1,11 @@
 """The engine: compiled and source twins are never mixed, and a stale compiled module is refused."""
 
-import subprocess
 import sys
 
 import pytest
 from miro_protocol import engine
+
+from tests import children
 
 
 def test_a_stamp_that_is_not_the_sources_hash_is_refused_with_a_remedy():
@@ -19,5 +20,5 @@ def test_the_engine_cannot_be_changed_once_it_is_in_use():
         "try:\n    engine.select('compiled')\n"
         "except engine.EngineError as error:\n    print('refused:', error)\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("refused: engine python is already in use")

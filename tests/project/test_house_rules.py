@@ -1,10 +1,11 @@
 """The tools that hold the house rules: ruff, mypy --strict, and the layering contract."""
 
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from tests import children
 
 ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
@@ -21,7 +22,7 @@ BIN = Path(sys.executable).parent
     ids=lambda command: " ".join(command),
 )
 def test_the_tree_passes(command):
-    done = subprocess.run([BIN / command[0], *command[1:]], cwd=ROOT, capture_output=True, text=True)
+    done = children.run([BIN / command[0], *command[1:]], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -7,13 +7,14 @@ package index.
 import json
 import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from miro_protocol import engine
 from miro_robot.mcs51 import opcodes
+
+from tests import children
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
@@ -45,7 +46,7 @@ def with_compiled_modules(tree):
 def python(tree, *arguments, **env):
     """Runs Python on the copy; -S would lose the dependencies, so the copy only comes first on the path."""
     path = os.pathsep.join(str(tree / name) for name in SOURCES)
-    return subprocess.run(
+    return children.run(
         [sys.executable, *arguments],
         cwd=tree,
         env={**os.environ, "PYTHONPATH": path, **env},

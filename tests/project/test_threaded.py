@@ -8,11 +8,12 @@ import importlib
 import importlib.util
 import os
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 from miro_protocol import engine
+
+from tests import children
 
 ROOT = Path(__file__).parents[2]
 info = importlib.import_module("miro_sim.cli.info")  # the package has the command under this name
@@ -66,8 +67,8 @@ def test_a_loop_over_many_instructions_is_threaded_and_does_the_same(threaded, t
     said = []
     for name, text in (("plain", plain), ("threaded", threaded(plain))):
         (tmp_path / f"{name}.c").write_text(text)
-        subprocess.run(["cc", "-o", tmp_path / name, tmp_path / f"{name}.c"], check=True)
-        said.append(subprocess.run([tmp_path / name], capture_output=True, text=True, check=True).stdout)
+        children.run(["cc", "-o", tmp_path / name, tmp_path / f"{name}.c"], check=True)
+        said.append(children.run([tmp_path / name], capture_output=True, text=True, check=True).stdout)
     assert said[0] == said[1] != "0 0\n"
     assert not engine.dispatch_replicated([tmp_path / "plain"])
     assert engine.dispatch_replicated([tmp_path / "plain", tmp_path / "threaded"])

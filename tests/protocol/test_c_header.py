@@ -1,12 +1,13 @@
 """The firmware's header is the table in C: regenerating changes nothing, its values read a real frame."""
 
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 from miro_protocol import c_header, crc, table, whitening
 from miro_protocol.frames import TeamFrame, encode
+
+from tests import children
 
 HEADER = Path(__file__).parents[2] / "robot_fw/firmware/protocol.h"
 
@@ -24,7 +25,7 @@ def arrays() -> dict[str, bytes]:
 
 
 def test_the_committed_header_is_what_the_generator_writes():
-    done = subprocess.run([sys.executable, "-m", "miro_protocol.c_header"], capture_output=True, check=True)
+    done = children.run([sys.executable, "-m", "miro_protocol.c_header"], capture_output=True, check=True)
     assert done.stdout.replace(b"\r\n", b"\n") == HEADER.read_bytes().replace(b"\r\n", b"\n")
 
 

@@ -4,7 +4,6 @@ import json
 import os
 import random
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,8 @@ from miro_protocol import dissector
 from miro_protocol.decoder import Damaged, Decoder, Received
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.pcapng import Packet, write
+
+from tests import children
 
 SCRIPT = Path(__file__).parents[2] / "protocol/miro.lua"
 TEAM = TeamFrame(3, 7, ((100, -100), (0, 1), (-32767, 32767)))
@@ -54,7 +55,7 @@ def dissected(capture, *options):
             pytest.skip("tshark is not installed (Debian package tshark)")
         pytest.fail("tshark is missing: install the Debian package tshark")
     command = ["tshark", "-X", f"lua_script:{SCRIPT}", "-d", "rtacser.data,miro", "-r", capture]
-    done = subprocess.run(
+    done = children.run(
         [*command, *options, "-T", "json", "--no-duplicate-keys"],
         capture_output=True,
         text=True,

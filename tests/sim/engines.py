@@ -19,6 +19,8 @@ from typing import NamedTuple
 
 from miro_protocol import engine
 
+from tests import children
+
 STRIDE_TICKS = 100_003
 """Between checkpoints, 4 ms: eight a control period, and never at the same place of one."""
 ROOT = Path(__file__).parents[2]
@@ -82,7 +84,7 @@ def run(instructions: int, scenario: str) -> Iterator[Checkpoint]:
 def processes(instructions: int, scenario: str) -> tuple[subprocess.Popen[str], subprocess.Popen[str]]:
     """One for each engine; they print checkpoints."""
     first, second = (
-        subprocess.Popen(
+        children.start(
             [sys.executable, "-m", "tests.sim.engines", "--engine", name, "--scenario", scenario]
             + ["--instructions", str(instructions)],
             stdout=subprocess.PIPE,

@@ -2,7 +2,6 @@
 
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -15,6 +14,8 @@ from miro_sim.canonical import encode
 from miro_sim.clock import CONTROL_PERIOD_TICKS
 from miro_sim.profiles import profiles
 from miro_sim.world import World
+
+from tests import children
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 GOLDEN = Path(__file__).parents[1] / "vectors" / "digests.json"
@@ -68,7 +69,7 @@ def digest_of_a_process(folder, *options, env=None, name="fig6"):
         "--quiet",
         *options,
     ]
-    subprocess.run(command, check=True, env={**os.environ, **(env or {})}, capture_output=True, text=True)
+    children.run(command, check=True, env={**os.environ, **(env or {})}, capture_output=True, text=True)
     return json.loads((out / "summary.json").read_text())["digest"]
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import children
+
 TESTS = """
 from miro_robot.bare import BareMachine
 from miro_robot.firmware import image_path
@@ -33,7 +35,7 @@ def session(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     (folder / "test_mine.py").write_text(TESTS)
     (folder / "pytest.ini").write_text("[pytest]\n")
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    return children.run(command, cwd=folder, capture_output=True, text=True)
 
 
 def counted(folder: Path, *arguments: str) -> str:

@@ -6,7 +6,6 @@ Ticks are counted by hand: 12 a machine cycle, LJMP takes 2 cycles, so `main` be
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
 
+from tests import children
 from tests.robot.board.rig import CYCLE, MS, RESET, START, board_with, raw_movx_wiring
 
 COMMAND_LEFT = "MOV P0,#2\nCLR P2.0\nCLR P2.3\nCLR P2.2\nSETB P2.2\n"  # 2 cycles, then 4 of one cycle
@@ -326,7 +326,7 @@ def all_faults():
 
 
 def test_compiled_and_uncompiled_boards_find_the_same_faults():
-    done = subprocess.run(
+    done = children.run(
         [sys.executable, "-c", SCRIPT],
         capture_output=True,
         text=True,

@@ -1,12 +1,12 @@
 """The committed image: it is what the source builds, it fits, and observers find their symbols."""
 
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 from miro_robot.firmware import image_path
 
+from tests import children
 from tests.robot.firmware.rig import IMAGE, iram
 
 SOURCE = Path(__file__).parents[3] / "robot_fw" / "firmware"
@@ -16,13 +16,13 @@ VERSION = (SOURCE / "sdcc.version").read_text("utf-8").strip()
 def sdcc_version() -> str:
     if shutil.which("sdcc") is None or shutil.which("make") is None:
         return ""
-    return subprocess.run(["sdcc", "--version"], capture_output=True, text=True, check=True).stdout
+    return children.run(["sdcc", "--version"], capture_output=True, text=True, check=True).stdout
 
 
 @pytest.mark.skipif(VERSION not in sdcc_version(), reason=f"needs make and SDCC {VERSION}")
 def test_the_source_builds_the_committed_image_byte_for_byte(tmp_path: Path) -> None:
     make = ["make", "-s", "-C", str(SOURCE), f"OUT={tmp_path / 'out'}", f"BUILD={tmp_path / 'build'}"]
-    subprocess.run(make, check=True, capture_output=True)
+    children.run(make, check=True, capture_output=True)
     assert (tmp_path / "out" / "miro.ihx").read_bytes() == image_path().read_bytes()
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
+
+from tests import children
 
 PROGRAM = """\
 #include <8052.h>
@@ -65,7 +66,7 @@ def _sdcc(folder: Path, *arguments: str) -> None:
         assert not os.environ.get("CI"), "CI needs sdcc"
         pytest.skip("needs sdcc")
     command = ["sdcc", "-mmcs51", "--model-small", "--iram-size", "256", *arguments]
-    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    children.run(command, cwd=folder, check=True, capture_output=True)
 
 
 CASES = "\n".join(f"    case {number}: return {(37 * number + 11) % 256};" for number in range(20))

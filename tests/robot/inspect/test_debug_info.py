@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
 
 import pytest
 from miro_robot.debug_info import DebugInfo, SourceLine, Sources
 from miro_robot.firmware import image_path, source_folder
 from miro_robot.image import ImageError, load_hex
 
+from tests import children
 from tests.robot.inspect.programs import PROGRAM, build, line_of
 
 
@@ -82,7 +82,7 @@ def test_the_robots_image_has_the_lines_of_inlined_functions_too():
 def test_the_listing_beside_the_robots_image_is_what_its_makefile_writes(tmp_path, program):
     folder = source_folder()
     command = ["make", "-s", "-C", folder, f"OUT={tmp_path}", f"BUILD={tmp_path / 'build'}"]
-    subprocess.run(command, check=True, capture_output=True)
+    children.run(command, check=True, capture_output=True)
     assert (tmp_path / "miro.rst").read_text() == image_path().with_suffix(".rst").read_text()
 
 

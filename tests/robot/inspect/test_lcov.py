@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 from contextlib import suppress
 from copy import deepcopy
 
@@ -12,6 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from miro_robot.inspect.lcov import FileRecord, TracefileError, add, decode, encode
+
+from tests import children
 
 COUNTS = st.integers(0, 10**12)
 LINES = st.integers(1, 9999)
@@ -162,7 +163,7 @@ def test_lcov_counts_what_is_written(tmp_path):
     (tmp_path / "a.c").write_text("\n" * 9)
     (tmp_path / "a.info").write_text(encode({str(tmp_path / "a.c"): record}))
     command = ["lcov", "--summary", "a.info", "--rc", "lcov_branch_coverage=1"]
-    shown = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    shown = children.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     text = shown.stdout + shown.stderr
     assert "50.0% (1 of 2 lines)" in text
     assert "50.0% (1 of 2 functions)" in text

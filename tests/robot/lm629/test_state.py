@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from hypothesis import strategies as st
 from miro_protocol import engine
 from miro_robot.lm629.chip import Lm629
 
+from tests import children
 from tests.examples import examples
 from tests.robot.lm629.bench import Bench
 from tests.robot.lm629.session import play, steps
@@ -23,7 +23,7 @@ FOLDER = ROOT / "robot_fw/miro_robot/lm629"
 
 def session(name: str, seed: int, count: int) -> str:
     command = [sys.executable, "-m", "tests.robot.lm629.session", name, str(seed), str(count)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    done = children.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     return done.stdout
 
 

@@ -1,7 +1,6 @@
 """A symbol file of another image is refused by file and line; an unusual one of this image is not."""
 
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -10,6 +9,8 @@ from hypothesis import strategies as st
 from miro_robot.firmware import image_path
 from miro_robot.image import ImageError, load_hex
 from miro_robot.symbol_files import check_cdb, check_map
+
+from tests import children
 
 ROBOT = image_path()
 MAP = ROBOT.with_suffix(".map").read_text()
@@ -212,7 +213,7 @@ void main(void) { /* MORE */ unsigned char i; for (i = 0; i < 5; i++) printf("%l
 def built(folder: Path, more: str, *options: str) -> Path:
     folder.mkdir()
     (folder / "prog.c").write_text(PROGRAM.replace("/* MORE */", more))
-    subprocess.run(["sdcc", "-mmcs51", *options, "prog.c"], cwd=folder, check=True, capture_output=True)
+    children.run(["sdcc", "-mmcs51", *options, "prog.c"], cwd=folder, check=True, capture_output=True)
     return folder / "prog.ihx"
 
 

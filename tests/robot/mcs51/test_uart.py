@@ -4,7 +4,6 @@
 """
 
 import itertools
-import subprocess
 import sys
 
 import pytest
@@ -13,6 +12,7 @@ from hypothesis import strategies as st
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.line import FAR
 
+from tests import children
 from tests.naive.mcs51_timers import NaiveTimers
 from tests.naive.mcs51_uart import NaiveUart
 from tests.robot.mcs51.asm import SFRS
@@ -311,7 +311,7 @@ print(cpu.run(500), cpu.cycles)
 
 def test_an_event_that_is_announced_for_the_past_holds_nothing_up():
     """A receiver that always says RI may be up already costs speed; once this kept the CPU looking for ever."""
-    done = subprocess.run([sys.executable, "-c", HASTY], capture_output=True, text=True, timeout=60)
+    done = children.run([sys.executable, "-c", HASTY], capture_output=True, text=True, timeout=60)
     assert (done.stdout, done.stderr) == ("0 500\n", "")
 
 

@@ -7,7 +7,6 @@ PC, cycles since the last one, all internal RAM, the registers both have, and th
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
 import tempfile
 import time
@@ -18,6 +17,7 @@ from miro_robot.image import load_hex
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.xram import XramBus
 
+from tests import children
 from tests.robot.ucsim import s51
 from tests.robot.ucsim.exclusions import COMPARED, P0
 
@@ -30,7 +30,7 @@ FAR_BYTES = 512  # of external RAM, all that the program uses
 def build(model: str, folder: Path) -> bytes:
     """The program's code."""
     image = folder / "mix.ihx"
-    subprocess.run(["sdcc", "-mmcs51", model, str(SOURCE), "-o", str(image)], check=True)
+    children.run(["sdcc", "-mmcs51", model, str(SOURCE), "-o", str(image)], check=True)
     return load_hex(image, limit=65536).code
 
 

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 from miro_robot.mcs51.opcodes import disassemble
 
+from tests import children
 from tests.robot.ucsim import s51, states
 from tests.robot.ucsim.exclusions import COMPARED, P0
 from tests.robot.ucsim.walk import PROLOGUE, Step, Walk, Walker
@@ -102,7 +103,7 @@ def main() -> int:
     begin = time.monotonic()
     totals = [0] * 256
     differing = 0
-    with ProcessPoolExecutor(options.jobs) as pool:
+    with ProcessPoolExecutor(options.jobs, initializer=children.reset_signals) as pool:
         for done, outcome in enumerate(pool.map(compare, seeds, [options.walk] * walks), 1):
             totals = [total + count for total, count in zip(totals, outcome.opcodes, strict=True)]
             if outcome.difference:

@@ -15,6 +15,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+from tests import children
+
 OBSERVE = ("step", "dump /b iram 0 255", "dump /b sfr 128 255")
 _STOPPED = re.compile(rb"Stop at 0x([0-9a-f]+): \(\d+\) stepped (\d+) ticks\n")
 
@@ -38,7 +40,7 @@ def installed() -> bool:
 
 def version() -> str:
     """The first line of its version, with name and number."""
-    return subprocess.run(["s51", "-V"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
+    return children.run(["s51", "-V"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
 
 
 def run(code: bytes, commands: Iterable[str]) -> bytes:
@@ -50,7 +52,7 @@ def run(code: bytes, commands: Iterable[str]) -> bytes:
         script.write_text("\n".join(commands) + "\n")
         printed = Path(folder, "printed")
         with printed.open("wb") as sink:  # it writes byte by byte: a pipe would wake its reader each time
-            subprocess.run(
+            children.run(
                 ["s51", "-t", "C52", "-b", "-q", "-P", str(image)],
                 input=f'exec "{script}"\nquit\n'.encode(),
                 stdout=sink,

@@ -18,6 +18,7 @@ from miro_protocol.pcapng import Packet, render
 from miro_protocol.stream import Transmission, format_stream
 from miro_sim.cli import main
 
+from tests import children
 from tests.sim.cli.conftest import Result
 
 PROGRAM = [sys.executable, "-c", "from miro_sim.cli import main; main()"]
@@ -209,7 +210,7 @@ def test_no_such_file_and_devices_are_refused(mirotwin: Callable[..., Result], t
 def test_it_works_in_a_pipe_and_shows_a_frame_before_the_input_ends() -> None:
     command = [*PROGRAM, "decode", "-", "--json"]
     options = ["--format", "raw", "--robots", "3", "--direction", "down"]
-    with subprocess.Popen([*command, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+    with children.start([*command, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdin is not None
         assert process.stdout is not None
         process.stdin.write(TEAM)
@@ -250,7 +251,7 @@ def test_a_file_whose_name_is_no_utf_8_is_decoded(
     name = os.fsencode(tmp_path) + b"/odd\xff.hex"
     with open(name, "wb") as file:
         file.write(DOWN.hex().encode())
-    found = subprocess.run(
+    found = children.run(
         [*PROGRAM, "decode", name, *arguments],
         env={**os.environ, "PYTHONIOENCODING": f"{encoding}:strict"},
         capture_output=True,
@@ -262,7 +263,7 @@ def test_a_file_whose_name_is_no_utf_8_is_decoded(
 
 def test_a_device_that_never_ends_is_refused_as_standard_input_too() -> None:
     with open("/dev/zero", "rb") as zeros:
-        found = subprocess.run(
+        found = children.run(
             [*PROGRAM, "decode", "-"], stdin=zeros, capture_output=True, timeout=30, check=False
         )
     assert found.returncode == 2
@@ -272,6 +273,6 @@ def test_a_device_that_never_ends_is_refused_as_standard_input_too() -> None:
 @pytest.mark.parametrize(("closed", "name"), [("<&-", b"standard input"), (">&-", b"standard output")])
 def test_a_closed_standard_stream_is_named(closed: str, name: bytes) -> None:
     line = shlex.join([*PROGRAM, "decode", "-"])
-    found = subprocess.run(f"{line} {closed}", shell=True, capture_output=True, input=b"", check=False)
+    found = children.run(f"{line} {closed}", shell=True, capture_output=True, input=b"", check=False)
     assert found.returncode == 2
     assert re.fullmatch(rb"mirotwin: error: " + name + rb":? is closed; .*\n", found.stderr)

@@ -2,7 +2,6 @@
 
 import os
 import stat
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +14,7 @@ from miro_protocol.pcapng_reader import iterate
 from miro_protocol.stream import Transmission, format_stream
 from miro_sim import recording_reader
 
+from tests import children
 from tests.sim.cli.conftest import Result
 
 FRAMES = [encode(TeamFrame(0, seq, ((seq, -seq),) * 3), 3) for seq in range(3)]
@@ -41,7 +41,7 @@ def test_the_same_recording_gives_the_same_bytes_in_any_process(finished: Path, 
     found = []
     for seed in ("1", "2"):
         command = [sys.executable, "-c", "from miro_sim.cli import main; main()", "export"]
-        done = subprocess.run(
+        done = children.run(
             [*command, finished / "run.mcap", "--out", "-"],
             capture_output=True,
             check=True,

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import resource
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +13,7 @@ from click.testing import CliRunner
 from miro_robot.firmware import image_path
 from miro_sim.cli import main
 
+from tests import children
 from tests.sim.cli.conftest import Result, hex_file
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
@@ -134,7 +134,7 @@ def test_a_dump_that_does_not_fit_the_disk_leaves_the_one_before(tmp_path: Path)
     image, dump = hex_file(tmp_path / "a.ihx", LOOP), tmp_path / "dump.json"
     dump.write_text("old")
     command = [MIROTWIN, "fw", "run", image, "--dump", dump]
-    done = subprocess.run(command, preexec_fn=limit, capture_output=True, text=True)
+    done = children.run(command, preexec_fn=limit, capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stderr.endswith(
         f"mirotwin: error: {dump}: File too large; make room, or choose another file with --dump\n"

@@ -6,7 +6,6 @@ import io
 import os
 import re
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable
 from itertools import pairwise
@@ -27,6 +26,7 @@ from miro_sim.clock import (
 )
 from miro_sim.world import World
 
+from tests import children
 from tests.robot.inspect.reading import read
 from tests.robot.mcs51.asm import assemble
 from tests.sim.cli.conftest import Result, hex_file
@@ -78,7 +78,7 @@ def characters(vcd: Path, wire: str, baud: int = 9600) -> list[tuple[int, int]]:
         pytest.fail("sigrok-cli is missing: install the Debian package sigrok-cli")
     command = ["sigrok-cli", "-I", "vcd:downsample=1000", "-i", vcd, "-P", f"uart:baudrate={baud}:rx={wire}"]
     command += ["-A", "uart=rx-data:rx-warnings", "--protocol-decoder-samplenum"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    done = children.run(command, capture_output=True, text=True, check=True)
     assert done.stderr == ""
     lines = [re.fullmatch(r"(\d+)-\d+ uart-1: ([0-9A-F]{2})", line) for line in done.stdout.splitlines()]
     assert all(lines), done.stdout
@@ -160,7 +160,7 @@ def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(
     def written(name: str, *options: str) -> bytes:
         out = tmp_path / f"{name}.vcd"
         command = [MIROTWIN, "fw", "vcd", short, "--robot", "2", "--out", out, *options]
-        subprocess.run(command, check=True, capture_output=True)
+        children.run(command, check=True, capture_output=True)
         return out.read_bytes()
 
     window = ("--from", "100ms", "--to", "106ms")

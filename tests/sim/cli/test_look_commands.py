@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +15,7 @@ from miro_sim import scenario_file
 from miro_sim.watched import RobotRun, watch
 from miro_sim.world import World
 
+from tests import children
 from tests.robot.inspect.programs import build_modules
 from tests.sim.cli.conftest import Result, hex_file
 
@@ -74,7 +74,7 @@ def test_a_window_shows_what_the_whole_trace_shows_there(
 def test_both_engines_trace_and_profile_alike(short: Path) -> None:
     def shown(*arguments: str) -> str:
         command = [MIROTWIN, "fw", arguments[0], short, "--to", "12ms", *arguments[1:]]
-        return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        return children.run(command, check=True, capture_output=True, text=True).stdout
 
     for arguments in (("trace",), ("profile", "--json")):
         python = shown(*arguments, "--engine", "python")
@@ -399,7 +399,7 @@ def test_nothing_is_written_over_what_is_read(
 
 def test_a_reader_that_goes_away_ends_it_as_a_shell_reports_that(short: Path) -> None:
     command = f"{MIROTWIN} fw trace {short} | head -1; echo ${{PIPESTATUS[0]}}"
-    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True)
+    done = children.run(["bash", "-c", command], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "141"
     assert done.stderr == ""
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests import children
 from tests.sim.cli.conftest import Result
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
@@ -32,7 +33,7 @@ def test_a_file_where_the_folder_should_be_is_refused_with_the_way_out(
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_set_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
     command = [MIROTWIN, "vectors", "--out", tmp_path / "set", "--per-opcode", "2000"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE) as running:
+    with children.start(command, stderr=subprocess.PIPE) as running:
         while running.poll() is None and not any(tmp_path.rglob("*.json")):
             time.sleep(0.01)
         running.send_signal(number)
@@ -47,7 +48,7 @@ def test_a_disk_that_is_full_leaves_nothing_and_is_named(tmp_path: Path) -> None
         resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
 
     command = [MIROTWIN, "vectors", "--out", tmp_path / "set", "--per-opcode", "100"]
-    done = subprocess.run(command, preexec_fn=limit, capture_output=True, text=True)
+    done = children.run(command, preexec_fn=limit, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.splitlines()[-1] == (
         f"mirotwin: error: {tmp_path / 'set'}: File too large; make room, or choose another folder with --out"

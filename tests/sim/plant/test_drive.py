@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from miro_sim.plant.circuit import Winding
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Encoder, Motor
 
+from tests import children
 from tests.naive.plant import NaiveDrive
 from tests.robot.lm629.bench import Bench
 from tests.sim.plant.runs import pwm, trace
@@ -272,7 +272,7 @@ print("\\n".join(trace(lambda: DifferentialDrive(DriveParams(), 0.1, 0.2, -1.0),
 
 
 def test_the_drive_in_use_and_its_uncompiled_source_give_the_same_bits():
-    done = subprocess.run(
+    done = children.run(
         [sys.executable, "-c", SCRIPT],
         capture_output=True,
         text=True,

@@ -1,6 +1,5 @@
 """Down and up joined: what is sent is received, whole at no errors, and equally in both engines."""
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from hypothesis import strategies as st
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import Downlink, RadioParams, Uplink
 
+from tests import children
 from tests.naive import radio as naive
 from tests.sim.radio import exercise
 from tests.sim.radio.strategies import seeds, transmissions
@@ -72,6 +72,6 @@ def test_both_engines_hear_the_same_network(radio):
         f"from tests.sim.radio import exercise; print(exercise.exercise(77, exercise.{radio}))"
     )
     root = Path(__file__).parents[3]
-    done = subprocess.run([sys.executable, "-c", script], cwd=root, capture_output=True, text=True)
+    done = children.run([sys.executable, "-c", script], cwd=root, capture_output=True, text=True)
     assert done.stderr == ""
     assert done.stdout.strip() == exercise.exercise(77, getattr(exercise, radio))

@@ -1,0 +1,49 @@
+"""Programs that tests start: each begins with the default action of every signal, whoever started the tests.
+
+What belongs here: the ways in which a test starts another process. What does not: which program, and what it says.
+
+A shell that puts a job in the background without job control leaves SIGINT ignored, and `nohup` does so with SIGHUP.
+Children inherit that, and `restore_signals` of `subprocess` does not undo it. Python installs no handler for a SIGINT
+that is ignored: a child that a test interrupts then runs to its end. So the signals are reset in the child, before its
+program begins. The process that runs the tests keeps what it was given.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+from collections.abc import Callable
+from typing import Any
+
+SIGNALS = ("SIGINT", "SIGHUP", "SIGTERM", "SIGQUIT")
+
+
+def reset_signals() -> None:
+    """Gives this process the default action of the signals that a user or a shell sends."""
+    for name in SIGNALS:
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_DFL)
+
+
+def run(command: Any, **named: Any) -> subprocess.CompletedProcess[Any]:
+    """`subprocess.run`, with default signals."""
+    return subprocess.run(command, **_with_reset(named))
+
+
+def start(command: Any, **named: Any) -> subprocess.Popen[Any]:
+    """`subprocess.Popen`, with default signals."""
+    return subprocess.Popen(command, **_with_reset(named))
+
+
+def _with_reset(named: dict[str, Any]) -> dict[str, Any]:
+    if os.name != "posix":
+        return named  # no preexec_fn there, and none of the shells in question
+    before: Callable[[], None] | None = named.get("preexec_fn")
+
+    def prepare() -> None:
+        reset_signals()
+        if before is not None:
+            before()
+
+    return {**named, "preexec_fn": prepare}
