@@ -67,4 +67,6 @@ class Integrator:
         v, w = state["v_m_s"], state["w_rad_s"]
         assert isinstance(v, float)
         assert isinstance(w, float)
+        if not (abs(v) <= self.limits.max_v_m_s and abs(w) <= self.limits.max_w_rad_s):
+            raise ValueError(f"velocity ({v}, {w}) is beyond the limits")
         self.v_m_s, self.w_rad_s = v, w

@@ -8,6 +8,8 @@ says why). Before the first measurement the command is zero. A lost measurement 
 and repeats the last command.
 """
 
+from typing import Annotated
+
 import msgspec
 
 from miro_host.integrator import Integrator, Limits
@@ -34,6 +36,9 @@ class Command(msgspec.Struct, frozen=True):
     s1: float
     s2: float
 
+
+_Speed = Annotated[int, msgspec.Meta(ge=-0x8000, le=0x7FFF)]  # what a frame holds
+_SavedCommand = tuple[_Speed, _Speed, float, float, float, float, float, float]
 
 STANDSTILL = Command(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -87,8 +92,10 @@ class Pilot:
         return {"integrator": self.integrator.snapshot(), "command": msgspec.structs.astuple(self.command)}
 
     def restore(self, state: dict[str, object]) -> None:
-        integrator, command = state["integrator"], state["command"]
+        integrator = state["integrator"]
         assert isinstance(integrator, dict)
-        assert isinstance(command, tuple | list)
         self.integrator.restore(integrator)
-        self.command = Command(*command)
+        left, right, *rest = msgspec.convert(state["command"], _SavedCommand)
+        if not all(abs(value) < float("inf") for value in rest):
+            raise ValueError("the command holds a value that is not finite")
+        self.command = Command(left, right, *rest)

@@ -70,7 +70,9 @@ class Station:
         assert isinstance(seq, int)
         assert isinstance(since, int)
         assert isinstance(services, list)
+        if not (0 <= seq < SEQ_MODULUS and 0 <= since < SERVICE_EVERY):
+            raise ValueError(f"seq {seq} or team_frames_since_service {since} is out of range")
         self.seq, self.team_frames_since_service = seq, since
-        self.services = deque(
-            ServiceFrame(0, slot, opcode, tuple(values)) for slot, opcode, values in services
-        )
+        self.services.clear()
+        for slot, opcode, values in services:
+            self.request(slot, opcode, values)

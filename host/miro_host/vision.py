@@ -19,6 +19,8 @@ from miro_host.posture import Posture
 
 DEGREE = 0.017453292519943295
 SIGMAS = 3.0
+MOST_MEASURED = 1e6
+"""Metres and radians: far more than a camera sees, and angles that `dmath` takes."""
 
 
 class VisionErrors(msgspec.Struct, frozen=True):
@@ -95,6 +97,9 @@ class Vision:
         return {"under_way": rows}
 
     def restore(self, state: dict[str, object]) -> None:
-        rows = state["under_way"]
-        assert isinstance(rows, list)
+        rows = msgspec.convert(state["under_way"], list[tuple[float, float, float] | None])
+        if len(rows) != self.delay_frames:
+            raise ValueError(f"{len(rows)} frames under way, but the camera's delay is {self.delay_frames}")
+        if not all(abs(value) < MOST_MEASURED for row in rows for value in row or ()):
+            raise ValueError("a measurement under way is no posture")
         self.under_way = deque(None if row is None else Posture(*row) for row in rows)

@@ -181,14 +181,19 @@ class Scanner:
         self.valid = cast(int, state["valid"])
         self.rejected = cast(int, state["rejected"])
         data, flaws = cast(bytes, state["_data"]), cast(bytes, state["_flaws"])
-        ticks = cast("tuple[int, ...]", state["_ticks"])
+        ticks = [checked_tick(tick, 0) for tick in cast("tuple[int, ...]", state["_ticks"])]
+        if not len(data) == len(flaws) == len(ticks) < self._run_limit + self._size - 1:
+            raise ValueError(f"{len(data)}, {len(flaws)} and {len(ticks)} values for the characters kept")
         self._count = 0
         self._last_bad = -1
         self._last_apart = -1
         for place in range(len(data)):
             self._keep(data[place], flaws[place], ticks[place])
-        self._reason = cast(int, state["_reason"])
-        self._next_tick = cast(int, state["_next_tick"])
+        reason = cast(int, state["_reason"])
+        if not 0 <= reason < len(REASONS):
+            raise ValueError(f"_reason is {reason}, not from 0 to {len(REASONS) - 1}")
+        self._reason = reason
+        self._next_tick = checked_tick(cast(int, state["_next_tick"]), 0)
         self._paused = cast(bool, state["_paused"])
 
     def _is_apart(self, tick: int) -> bool:

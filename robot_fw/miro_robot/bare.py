@@ -16,6 +16,7 @@ from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
 from miro_robot.mcs51.line import FAR
 from miro_robot.mcs51.opcodes import jumps_to_itself
 from miro_robot.mcs51.xram import XramBus
+from miro_robot.saved import octets, wholes
 
 CRYSTAL_HZ = 24_000_000
 _SLICE = 200_000  # cycles between two looks at the world when nothing is to be fed
@@ -75,7 +76,6 @@ class BareMachine:
         self.ends: tuple[int, ...] = ()  # where it would end, if it came there before the next check
         self.bus = XramBus(self._sent, self._faulted)
         self.cpu = Cpu(self.bus)
-        self.cpu.txd.unread = True  # the terminal takes characters, not edges
         self.cpu.load(image.code, image.used)
         if code_in_xram:
             self.bus.fill(image.code)
@@ -229,7 +229,7 @@ class BareMachine:
         self.bus.restore(state["bus"])
         self.cpu.load(self.image.code, ())
         code = self.bus.content() if self.bus.code_of is not None else self.image.code
-        for address, loaded in enumerate(state["loaded"]):
+        for address, loaded in enumerate(octets(state, "loaded", 0x10000)):
             if loaded:
                 self.cpu.write_code(address, code[address])
         self.cpu.restore(state["cpu"])
@@ -244,7 +244,7 @@ class BareMachine:
         self.polls = state["polls"]
         self.next_feed = state["next_feed"]
         self.next_check = state["next_check"]
-        self.ends = tuple(state["ends"])
+        self.ends = tuple(wholes(state, "ends", len(state["ends"]), 0, 0xFFFF))
 
 
 def _loops(image: Image) -> tuple[int, ...]:

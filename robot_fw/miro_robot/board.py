@@ -22,6 +22,7 @@ from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
 from miro_robot.probe import Probe
+from miro_robot.saved import octets, whole
 from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
 
 CYCLE_TICKS = 12
@@ -44,6 +45,7 @@ _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_END
 """Ticks into a MOVX (AT89C52 sheet, section 5). When P2 goes back to its latch is not in it: CHOSEN, 2 ticks after
 the strobe."""
 _WR, _RD = 0x40, 0x80  # pins of P3
+_BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
 _RESET_PULSE = RESET_PULSE
 RESET_PULSE_TICKS = LIMITS[RESET_PULSE].ticks
 
@@ -382,17 +384,25 @@ class Board(Bus):
         self.left.restore(state["left"])
         self.right.restore(state["right"])
         self.plant.restore(state["plant"])
-        self.bank = bytearray(state["bank"])
-        self.external = bytearray(state["external"])
-        self.bus_levels = state["bus_levels"]
-        self.bridge_enable = bytearray(state["bridge_enable"])
-        self.bridge_sign = bytearray(state["bridge_sign"])
+        self._check_times(self.cpu.cycles * CYCLE_TICKS)
+        self.bank = bytearray(octets(state, "bank", CONSTANT_BANK + 1))
+        self.external = bytearray(octets(state, "external", PORTS))
+        self.bus_levels = whole(state, "bus_levels", 0, 0xFF)
+        self.bridge_enable = bytearray(octets(state, "bridge_enable", 2))
+        self.bridge_sign = bytearray(octets(state, "bridge_sign", 2))
         self.hi_seen = bytearray([self.left.hi, self.right.hi])
         for chip, timing in ((self.left, self.left_timing), (self.right, self.right_timing)):
             timing.rest(chip.port.writing, chip.port.reading, chip.port.ps, chip.port.data)
-        self.fault_count = state["fault_count"]
-        self.busy_writes = state["busy_writes"]
-        self.contention = state["contention"]
+        self.fault_count = whole(state, "fault_count", 0, FAR)
+        self.busy_writes = whole(state, "busy_writes", 0, FAR)
+        self.contention = whole(state, "contention", 0, 1)
+
+    def _check_times(self, now: int) -> None:
+        """Raises ValueError when a restored part is not where the CPU is: it would take for ever to catch up."""
+        for chip in (self.left, self.right):
+            chip.check_times(now - _BEHIND_TICKS)
+        if self.plant.next_tick < now - _BEHIND_TICKS:
+            raise ValueError(f"the drive's next step is at tick {self.plant.next_tick}, the CPU at {now}")
 
     def __repr__(self) -> str:
         return (

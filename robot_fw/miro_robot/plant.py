@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from miro_robot.lm629.chip import Lm629
+from miro_robot.saved import tick
 
 FAR = 1 << 62  # "never", in ticks
 LEFT = 0
@@ -50,7 +51,7 @@ class Plant:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Takes back what `snapshot` gave."""
-        self.next_tick = state["next_tick"]
+        self.next_tick = tick(state, "next_tick")
 
     def __repr__(self) -> str:
         return "Plant(motors unplugged)"

@@ -11,12 +11,15 @@ from typing import Any
 
 from miro_host.pilot import Command
 from miro_host.station import Station
-from miro_protocol.decoder import TelemetryDecoder
+from miro_protocol.decoder import Symbol, TelemetryDecoder
 from miro_robot.image import Image
+from miro_robot.mcs51.execute import STOPPED
+from miro_robot.saved import LAST_TICK, whole
+from msgspec import convert
 
 from miro_sim import scenario as sc
 from miro_sim.build import radio_for
-from miro_sim.clock import HOST_CHARACTER_TICKS, ticks
+from miro_sim.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, HOST_CHARACTER_TICKS, ticks
 from miro_sim.control_noise import NoisyCommands
 from miro_sim.radio import Downlink, Uplink
 from miro_sim.records import RobotPeriod, WireRun
@@ -74,6 +77,7 @@ class Network:
         self.script = list(script) if script is not None else None
         self.script_next = 0
         self.frames_sent = 0
+        self.heard: list[Symbol] = []  # in this period so far
         self.sent: list[WireRun] = []
         self.seen: list[RobotPeriod] = []
 
@@ -123,15 +127,25 @@ class Network:
         self.sent.append(WireRun(start_tick, ">", self.index, -1, data))
 
     def run(self, tick: int) -> bool:
-        """Runs every robot to `tick`, one after the other; true when a firmware fault stopped one."""
-        stopped = False
-        for robot in self.robots:
-            stopped = robot.board.run(tick) != 0 or stopped
-        return stopped
+        """Runs every robot to `tick`, one after the other; true when a firmware fault stopped one.
+
+        A robot stops where more than 2048 edges of its TXD wait. When all robots are there or at `tick`, the PC hears
+        what came before the first 2048th edge, and those that have stopped go on. That tick depends on the wires'
+        content alone, so the PC hears the same however the run is cut.
+        """
+        while True:
+            reasons = [robot.board.run(tick) for robot in self.robots]
+            if STOPPED in reasons:
+                return True
+            full_tick = self.uplink.full_tick()
+            if full_tick >= tick:
+                return False
+            self.heard += self.uplink.receive(full_tick)
 
     def end_period(self, tick: int) -> list[WireRun]:
         """The PC's receiver hears what the robots sent; returns all runs of bytes of the period."""
-        heard = self.uplink.receive(tick)
+        heard = [*self.heard, *self.uplink.receive(tick)]
+        self.heard = []
         self.telemetry.feed_symbols(heard)
         return [*self.sent, *runs(heard, self.index)]
 
@@ -152,6 +166,7 @@ class Network:
             "telemetry": self.telemetry.snapshot(),
             "script_next": self.script_next,
             "frames_sent": self.frames_sent,
+            **({"heard": list(self.heard)} if self.heard else {}),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -161,8 +176,33 @@ class Network:
         self.downlink.restore(state["downlink"])
         self.uplink.restore(state["uplink"])
         self.telemetry.restore(state["telemetry"])
-        self.script_next = state["script_next"]
-        self.frames_sent = state["frames_sent"]
+        self.heard = convert(state.get("heard", []), list[Symbol])
+        self.script_next = whole(state, "script_next", 0, len(self.script or ()))
+        self.frames_sent = whole(state, "frames_sent", 0, LAST_TICK)
+
+    def check_times(self, begun_tick: int, tick: int, in_period: bool) -> None:
+        """Raises ValueError unless the restored parts are at `tick`, in the period that began at `begun_tick`.
+
+        A part that is far behind would take for ever to catch up.
+        """
+        settled_tick = self.downlink.settled_tick
+        until = begun_tick + (CONTROL_PERIOD_TICKS if in_period else 0)
+        if settled_tick != (until + SETTLE_TICKS if until else 0):
+            raise ValueError(
+                f"the radio is settled up to tick {settled_tick}, in the period from {begun_tick}"
+            )
+        if self.script is None and self.downlink.free_tick > until + CONTROL_PERIOD_TICKS:
+            raise ValueError(f"the station is busy until tick {self.downlink.free_tick}, at tick {tick}")
+        if not begun_tick - CONTROL_PERIOD_TICKS <= self.uplink.now <= tick:
+            raise ValueError(f"the PC has heard everything up to tick {self.uplink.now}, at tick {tick}")
+        for robot in self.robots:
+            cpu = robot.board.cpu
+            if not begun_tick - CONTROL_PERIOD_TICKS <= cpu.cycles * CYCLE_TICKS <= tick + SETTLE_TICKS:
+                raise ValueError(f"a CPU is at cycle {cpu.cycles}, at tick {tick}")
+            if cpu.rxd.settled_tick != settled_tick or cpu.rxd.last_tick() >= max(settled_tick, 1):
+                raise ValueError(
+                    f"RXD is settled up to tick {cpu.rxd.settled_tick}, the radio up to {settled_tick}"
+                )
 
 
 def runs(symbols: Sequence[tuple[int, bool, int]], network: int) -> list[WireRun]:

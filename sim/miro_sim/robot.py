@@ -15,6 +15,7 @@ from miro_host.vision import Vision
 from miro_robot.board import Board
 from miro_robot.image import Image
 from miro_robot.lm629.chip import Lm629
+from miro_robot.saved import whole
 from miro_robot.wiring import load_wiring
 
 from miro_sim import scenario as sc
@@ -24,6 +25,7 @@ from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.records import Axis, Control, RobotPeriod
 from miro_sim.rng import Stream
 
+MOST_FRAMES = 1 << 40
 COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
 
 
@@ -115,7 +117,7 @@ class Robot:
         self.board.restore(state["board"])
         self.vision.restore(state["vision"])
         self.pilot.restore(state["pilot"])
-        self.frame = state["frame"]
+        self.frame = whole(state, "frame", 0, MOST_FRAMES)
 
     def __repr__(self) -> str:
         return f"Robot(net{self.network}/robot{self.spec.slot}, {self.drive!r}, {self.board!r})"

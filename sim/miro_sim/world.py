@@ -19,6 +19,7 @@ from typing import Any
 import msgspec
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
+from miro_robot.saved import whole
 
 from miro_sim.canonical import encode
 from miro_sim.clock import CONTROL_PERIOD_TICKS, ticks
@@ -30,8 +31,15 @@ ScriptRun = tuple[int, int, bytes]
 """(tick of the first start bit, network, bytes) to send in place of what the station would send."""
 
 MAX_SEED = (1 << 63) - 1
-SAVE_FORMAT = 1
+SAVE_FORMAT = 2
 """Raised whenever a saved world of before would no longer mean the same."""
+SAVE_BEGIN = b"mirotwin world\n"
+_SUM_BYTES = hashlib.sha256().digest_size
+_NOT_A_STATE = (
+    *(KeyError, IndexError, TypeError, AttributeError, OverflowError, ZeroDivisionError),
+    *(AssertionError, RecursionError, ValueError),
+)
+"""What reading a state raises when it is not one."""
 
 
 class World:
@@ -153,29 +161,44 @@ class World:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Puts back what `snapshot` gave."""
-        self.tick = state["tick"]
-        self.index = state["index"]
-        self.in_period = state["in_period"]
-        self.stopped = state["stopped"]
-        self.chain = bytes(state["chain"])
+        self.index = whole(state, "index", 0, self.periods)
+        begun = self.index * CONTROL_PERIOD_TICKS
+        self.in_period = bool(whole(state, "in_period", 0, 1))
+        self.stopped = bool(whole(state, "stopped", 0, 1))
+        self.tick = whole(state, "tick", 0 if self.stopped else begun, begun + CONTROL_PERIOD_TICKS - 1)
+        self.chain = msgspec.convert(state["chain"], bytes)
         for network, saved in zip(self.networks, state["networks"], strict=True):
             network.restore(saved)
+            network.check_times(begun, self.tick, self.in_period)
 
     def save(self) -> bytes:
-        """The whole state as bytes, to go on from with `load`: at any tick, also in the middle of a byte."""
-        return msgspec.msgpack.encode({"format": SAVE_FORMAT, **self._identity(), "state": self.snapshot()})
+        """The whole state as bytes, to go on from with `load`: at any tick, also in the middle of a byte.
+
+        `SAVE_BEGIN`, the SHA-256 of the rest, and the rest: a map in msgpack.
+        """
+        return sealed(
+            msgspec.msgpack.encode({"format": SAVE_FORMAT, **self._identity(), "state": self.snapshot()})
+        )
 
     def load(self, saved: bytes) -> None:
-        """Goes on from what `save` gave. Raises ValueError when it is from another scenario, seed or firmware."""
+        """Goes on from what `save` gave.
+
+        Raises ValueError when that was changed, or is from another scenario, seed, firmware or version; after that
+        this world may hold a part of it and is of no use.
+        """
         try:
-            content = msgspec.msgpack.decode(saved)
-        except msgspec.DecodeError as error:
+            content = msgspec.msgpack.decode(_opened(saved))
+        except (msgspec.DecodeError, RecursionError) as error:
             raise ValueError(f"not a saved world: {error}") from error
         for key, own in {"format": SAVE_FORMAT, **self._identity()}.items():
             found = content.get(key) if isinstance(content, dict) else None
             if found != own:
                 raise ValueError(f"saved world has {key} {found!r}, this one has {own!r}")
-        self.restore(content["state"])
+        try:
+            self.restore(content["state"])
+        except _NOT_A_STATE as error:
+            reason = error if isinstance(error, ValueError) else repr(error)
+            raise ValueError(f"not a saved world: {' '.join(str(reason).split())[:200]}") from error
 
     def _identity(self) -> dict[str, object]:
         scenario = hashlib.sha256(msgspec.json.encode(self.scenario, order="sorted")).hexdigest()
@@ -183,6 +206,21 @@ class World:
 
     def __repr__(self) -> str:
         return f"World({self.scenario.name}, seed={self.seed}, tick={self.tick}, digest={self.digest[:12]})"
+
+
+def sealed(content: bytes) -> bytes:
+    """`content` behind its checksum, as `World.load` expects it."""
+    return SAVE_BEGIN + hashlib.sha256(content).digest() + content
+
+
+def _opened(saved: bytes) -> bytes:
+    """What was sealed. Raises ValueError when a byte of it has changed since."""
+    if not saved.startswith(SAVE_BEGIN):
+        raise ValueError("not a saved world: it does not begin like one; save it again with this version")
+    content = saved[len(SAVE_BEGIN) + _SUM_BYTES :]
+    if sealed(content) != saved:
+        raise ValueError("not a saved world: its checksum is wrong, so it was changed or cut off")
+    return content
 
 
 def _total(values: Sequence[int | None]) -> int | None:

@@ -46,6 +46,19 @@ def _side(value: int) -> int:
     return 1 if value > 0 else -1 if value < 0 else 0
 
 
+RANGES = {
+    "mode": (0, 2),
+    **dict.fromkeys(("reset_tick", "next_tick", "sample_tick", "period_tick"), (0, FAR)),
+    "threshold": (0, 0x7FFF),
+    **dict.fromkeys(("real_position", "index_position", "breakpoint"), (-(1 << 30), (1 << 30) - 1)),
+    "real_velocity": (-(1 << 40), 1 << 40),
+    "breakpoint_side": (-1, 1),
+    "pwm_magnitude": (0, 127),
+    **dict.fromkeys(("reset_level", "breakpoint_armed", "start_taken", "pwm", "sign"), (0, 1)),
+}
+"""What the values of `STATE` may be when they come from a saved state."""
+
+
 class MotorAxis:
     """One motor's controller without its host; `Lm629` adds that."""
 

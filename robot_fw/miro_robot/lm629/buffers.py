@@ -7,6 +7,12 @@ the next sample. Called at the host's pace only, so nothing here is hot.
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from msgspec import Meta, Struct, convert
+
+from miro_robot.saved import only
+
 MOTOR_OFF, STOP_ABRUPTLY, STOP_SMOOTHLY = 0x0100, 0x0200, 0x0400
 STOPS = MOTOR_OFF | STOP_ABRUPTLY | STOP_SMOOTHLY
 VELOCITY_MODE, FORWARD = 0x0800, 0x1000
@@ -34,6 +40,39 @@ def signed_31(value: int) -> int:
 def fit_15(word: int, clamp: bool) -> int:
     """A coefficient or a threshold: 15 bits."""
     return clamped(word, 0, 0x7FFF) if clamp else word & 0x7FFF
+
+
+_Word = Annotated[int, Meta(ge=0, le=0xFFFF)]
+_Fit15 = Annotated[int, Meta(ge=0, le=0x7FFF)]
+_Fit30 = Annotated[int, Meta(ge=0, le=MASK_30)]
+_Place = Annotated[int, Meta(ge=-0x40000000, le=0x3FFFFFFF)]
+
+
+class _Trajectory(Struct):
+    """A saved `TrajectoryBuffer`."""
+
+    due: _Word
+    half: Annotated[int, Meta(ge=-1, le=0xFFFF)]
+    control: _Word
+    relative_bits: _Word
+    acceleration: _Fit30
+    velocity: _Fit30
+    position: _Place
+    relative: bool
+    newer_position: bool
+    taken: tuple[_Word, _Fit30, _Fit30, _Place, bool]
+
+
+class _Filter(Struct):
+    """A saved `FilterBuffer`."""
+
+    due: Annotated[int, Meta(ge=0, le=0x000F)]
+    kp: _Fit15
+    ki: _Fit15
+    kd: _Fit15
+    il: _Fit15
+    ds: Annotated[int, Meta(ge=0, le=0xFF)]
+    taken: tuple[_Fit15, _Fit15, _Fit15, _Fit15, Annotated[int, Meta(ge=0, le=0xFF)]]
 
 
 class TrajectoryBuffer:
@@ -133,10 +172,10 @@ class TrajectoryBuffer:
         return dict(vars(self))
 
     def restore(self, state: dict[str, object]) -> None:
-        for name, value in state.items():
-            setattr(self, name, value)
-        control, acceleration, velocity, position, relative = self.taken
-        self.taken = (control, acceleration, velocity, position, relative)
+        only(state, vars(self))
+        values = convert(state, _Trajectory)
+        for name in vars(self):
+            setattr(self, name, getattr(values, name))
 
 
 class FilterBuffer:
@@ -187,7 +226,7 @@ class FilterBuffer:
         return dict(vars(self))
 
     def restore(self, state: dict[str, object]) -> None:
-        for name, value in state.items():
-            setattr(self, name, value)
-        kp, ki, kd, il, ds = self.taken
-        self.taken = (kp, ki, kd, il, ds)
+        only(state, vars(self))
+        values = convert(state, _Filter)
+        for name in vars(self):
+            setattr(self, name, getattr(values, name))

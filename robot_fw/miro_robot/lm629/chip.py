@@ -6,13 +6,16 @@ bytes make words is `host_port.py`'s. Rule names in comments (T1, D1, ...) are t
 
 from __future__ import annotations
 
+from typing import Any
+
 from miro_robot.lm629 import buffers, host_port, signals
-from miro_robot.lm629.axis import FAR, PWM_TICKS, SAMPLE_TICKS, MotorAxis
+from miro_robot.lm629.axis import FAR, PWM_TICKS, RANGES, SAMPLE_TICKS, MotorAxis
 from miro_robot.lm629.commands import BY_OPCODE
+from miro_robot.saved import whole
 
 __all__ = ["FAR", "PWM_TICKS", "SAMPLE_TICKS", "Lm629"]
 
-_RESETTING = 1
+_RESETTING, _RUNNING = 1, 2
 _MOTOR_OFF = signals.MOTOR_OFF
 _ON_TARGET = signals.ON_TARGET
 _STOP_ON_ERROR = signals.STOP_ON_ERROR
@@ -234,11 +237,41 @@ class Lm629(MotorAxis):
         own = {name: getattr(self, name) for name in self.STATE}
         return {**parts, **own, **({} if self.error_repeats else {"excessive": self.excessive})}
 
-    def restore(self, state: dict[str, object]) -> None:
-        for name, value in state.items():
-            if isinstance(value, dict):
-                getattr(self, name).restore(value)
-            else:
-                setattr(self, name, value)
+    def _check_words(self) -> None:
+        """Raises ValueError unless the words that are waited for are those of the command in progress."""
+        waiting = self.port.words_left if self.port.incoming else 0
+        command = BY_OPCODE.get(self.port.command)
+        due = 0 if command is None else command.words_in
+        begun = len(self.port.record) >= 2
+        if command is not None and begun and command.name == "LTRJ":
+            due = 2 * self.trajectory_buffer.due.bit_count() - (1 if self.trajectory_buffer.half >= 0 else 0)
+        elif command is not None and begun and command.name == "LFIL":
+            due = self.filter_buffer.due.bit_count()
+        if waiting > due:
+            raise ValueError(
+                f"{waiting} words are waited for, but command {self.port.command:02X}h has {due}"
+            )
+
+    def check_times(self, earliest_tick: int) -> None:
+        """Raises ValueError unless a restored chip goes on at `earliest_tick` or soon after."""
+        latest_tick = earliest_tick + 2 * SAMPLE_TICKS
+        if self.next_tick < earliest_tick or (self.mode == _RUNNING and self.next_tick > latest_tick):
+            raise ValueError(f"next_tick is {self.next_tick}, not from {earliest_tick} to {latest_tick}")
+        if self.mode == _RUNNING and not earliest_tick <= self.sample_tick <= latest_tick:
+            raise ValueError(f"sample_tick is {self.sample_tick}, not from {earliest_tick} to {latest_tick}")
+        if self.mode != _RUNNING and (self.sample_tick != FAR or self.pwm or self.pwm_magnitude):
+            raise ValueError("a chip in reset takes no samples and drives no motor")
+        late = self.period_tick < earliest_tick - SAMPLE_TICKS or self.period_tick > latest_tick
+        if self.pwm_magnitude and late:
+            raise ValueError(f"period_tick is {self.period_tick}, not about {earliest_tick}")
+
+    def restore(self, state: dict[str, Any]) -> None:
+        for name in self.PARTS:
+            getattr(self, name).restore(state[name])
+        for name in self.STATE:
+            setattr(self, name, whole(state, name, *RANGES[name]))
+        if not self.error_repeats:
+            self.excessive = whole(state, "excessive", 0, 1)
+        self._check_words()
         self.hi = self.signals.word >> 15
         self.writes_while_busy = self.port.writes_while_busy

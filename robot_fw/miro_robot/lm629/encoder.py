@@ -7,7 +7,12 @@ input keeps the tick at which that will be (`due`). What is made of the counts (
 
 from __future__ import annotations
 
+from typing import Any
+
+from miro_robot.saved import whole
+
 _FAR = 1 << 62
+_MOST_COUNTS = 1 << 40  # between two samples: far more than ticks
 
 
 class InputFilter:
@@ -69,9 +74,11 @@ class InputFilter:
             "due": self.due,
         }
 
-    def restore(self, state: dict[str, object]) -> None:
-        for name, value in state.items():
-            setattr(self, name, value)
+    def restore(self, state: dict[str, Any]) -> None:
+        for name in ("level", "run_level", "pin"):
+            setattr(self, name, whole(state, name, 0, 3))
+        for name in ("run_tick", "pin_tick", "due"):
+            setattr(self, name, whole(state, name, 0, _FAR))
 
 
 class Encoder:
@@ -169,9 +176,10 @@ class Encoder:
             "caught_counts": self.caught_counts,
         }
 
-    def restore(self, state: dict[str, object]) -> None:
-        for name, value in state.items():
-            if isinstance(value, dict):
-                getattr(self, name).restore(value)
-            else:
-                setattr(self, name, value)
+    def restore(self, state: dict[str, Any]) -> None:
+        self.quadrature.restore(state["quadrature"])
+        self.index.restore(state["index"])
+        for name in ("seen", "armed", "caught"):
+            setattr(self, name, whole(state, name, 0, 1))
+        for name in ("counts", "caught_counts"):
+            setattr(self, name, whole(state, name, -_MOST_COUNTS, _MOST_COUNTS))

@@ -8,7 +8,10 @@ wins.
 
 from __future__ import annotations
 
+from typing import Any
+
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
+from miro_robot.saved import octets, whole
 
 NOTHING, COMMAND, WORD, ANSWERED, MISUSE = 0, 1, 2, 3, 4
 """What a change of the pins led to: nothing yet; a
@@ -21,6 +24,17 @@ OPEN, HARDWARE_RESET, SOFTWARE_RESET = 0, 1, 2
 _OPEN, _SOFTWARE_RESET = 0, 2
 _NOTHING, _COMMAND, _WORD, _ANSWERED, _MISUSE = 0, 1, 2, 3, 4
 _IGNORED, _ACCEPTED, _REFUSED = 0, 1, 2  # what will become of the strobe that is in progress
+
+RANGES = {
+    **dict.fromkeys(("ps", "writing", "reading", "abandoned", "incoming", "low_next"), (0, 1)),
+    **dict.fromkeys(("data", "drive", "buffer", "command"), (0, 0xFF)),
+    **dict.fromkeys(("fate", "lock"), (0, 2)),
+    **dict.fromkeys(("busy_until", "writes_while_busy"), (0, 1 << 62)),
+    "words_left": (0, 7),
+    "word": (0, 0xFFFF),
+    "answer": (0, 0xFFFFFFFF),
+}
+"""What the values of a saved state may be."""
 
 
 class HostPort:
@@ -193,6 +207,9 @@ class HostPort:
             "record": bytes(self.record),
         }
 
-    def restore(self, state: dict[str, object]) -> None:
-        for name, value in state.items():
-            setattr(self, name, bytearray(value) if isinstance(value, bytes) else value)
+    def restore(self, state: dict[str, Any]) -> None:
+        for name, (low, high) in RANGES.items():
+            setattr(self, name, whole(state, name, low, high))
+        self.record = bytearray(octets(state, "record", min(len(state["record"]), 16)))
+        if not self.incoming and self.words_left > 2:
+            raise ValueError(f"words_left is {self.words_left}, but an answer has at most 2 words")

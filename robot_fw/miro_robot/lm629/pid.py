@@ -6,6 +6,17 @@ force when is in `buffers.py`, the excessive-error test in `chip.py`.
 
 from __future__ import annotations
 
+from miro_robot.saved import whole
+
+RANGES = {
+    **dict.fromkeys(("kp", "ki", "kd", "il"), (0, 0x7FFF)),
+    "ds": (0, 0xFF),
+    "error_sum": (-0x800000, 0x7FFFFF),
+    **dict.fromkeys(("previous", "derivative", "integral"), (-0x8000, 0x7FFF)),
+    "phase": (0, 0xFF),
+}
+"""What the values of a saved state may be."""
+
 
 def _saturated(value: int) -> int:
     """Limited to 16 bits, two's complement."""
@@ -90,5 +101,5 @@ class Pid:
         }
 
     def restore(self, state: dict[str, object]) -> None:
-        for name, value in state.items():
-            setattr(self, name, value)
+        for name, (low, high) in RANGES.items():
+            setattr(self, name, whole(state, name, low, high))

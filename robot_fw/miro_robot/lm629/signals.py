@@ -7,6 +7,7 @@ decided in `chip.py`.
 from __future__ import annotations
 
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
+from miro_robot.saved import whole
 
 INTERRUPT = 0x8000
 ACCELERATION_LOADED = 0x4000
@@ -88,5 +89,5 @@ class Signals:
         return {"word": self.word, "mask": self.mask}
 
     def restore(self, state: dict[str, object]) -> None:
-        for name, value in state.items():
-            setattr(self, name, value)
+        self.word = whole(state, "word", 0, 0xFFFF)
+        self.mask = whole(state, "mask", 0, 0xFF)

@@ -7,9 +7,21 @@ outer properties; the algorithm is the sheet's section 9.3 and always ends exact
 
 from __future__ import annotations
 
+from miro_robot.saved import whole
+
 _NEVER = 1 << 62
 _HALF_SPACE = 1 << 46
 _SPACE_MASK = (1 << 47) - 1
+
+
+RANGES = {
+    "position": (-_HALF_SPACE, _HALF_SPACE - 1),
+    "velocity": (-(1 << 32), 1 << 32),
+    **dict.fromkeys(("acceleration", "max_velocity"), (0, 0x3FFFFFFF)),
+    "target": (-(1 << 30), (1 << 30) - 1),
+    **dict.fromkeys(("velocity_mode", "forward", "stopping", "moving", "crossed"), (0, 1)),
+}
+"""What the values of a saved state may be."""
 
 
 def _wrapped(position: int) -> int:
@@ -169,5 +181,5 @@ class Trajectory:
         }
 
     def restore(self, state: dict[str, object]) -> None:
-        for name, value in state.items():
-            setattr(self, name, value)
+        for name, (low, high) in RANGES.items():
+            setattr(self, name, whole(state, name, low, high))

@@ -9,6 +9,10 @@ from typing import Any
 
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.opcodes import LINE
+from miro_robot.saved import octets, tick, whole
+
+LAST_CYCLE = 1 << 55
+"""Ticks and the counts of a timer up to then fit into 64 bits."""
 
 
 class Core:
@@ -120,19 +124,20 @@ class Core:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
+        iram = octets(state, "iram", 256)
         for address in range(256):
-            self.iram[address] = state["iram"][address]
-        self.pc = state["pc"]
-        self.a = state["a"]
-        self.b = state["b"]
-        self.sp = state["sp"]
-        self.dptr = state["dptr"]
-        self.cy = state["cy"]
-        self.ac = state["ac"]
-        self.ov = state["ov"]
-        self.user_flags = state["user_flags"]
-        self.bank = state["bank"]
-        self.cycles = state["cycles"]
-        self.instructions = state["instructions"]
-        self.idle_cycles = state["idle_cycles"]
-        self.faults = state["faults"]
+            self.iram[address] = iram[address]
+        self.pc = whole(state, "pc", 0, 0xFFFF)
+        self.a = whole(state, "a", 0, 0xFF)
+        self.b = whole(state, "b", 0, 0xFF)
+        self.sp = whole(state, "sp", 0, 0xFF)
+        self.dptr = whole(state, "dptr", 0, 0xFFFF)
+        self.cy = whole(state, "cy", 0, 1)
+        self.ac = whole(state, "ac", 0, 1)
+        self.ov = whole(state, "ov", 0, 1)
+        self.user_flags = whole(state, "user_flags", 0, 0xFF) & 0x22
+        self.bank = whole(state, "bank", 0, 0x18) & 0x18
+        self.cycles = whole(state, "cycles", 0, LAST_CYCLE)
+        self.instructions = tick(state, "instructions")
+        self.idle_cycles = tick(state, "idle_cycles")
+        self.faults = tick(state, "faults")

@@ -8,6 +8,7 @@ cdef long long _FAR
 cdef int _OUTSIDE
 cdef int _MARK
 cdef int _STOP_REQUESTED
+cdef int _WIRE_FULL
 cdef int _P0, _SP, _PCON, _IE, _IP, _PSW
 cdef int _SMOD, _PD, _IDL
 cdef int _PCON_BITS

@@ -13,15 +13,18 @@ from typing import Any, Protocol
 
 from miro_robot.faults import FaultKind
 from miro_robot.mcs51.bus import Bus
-from miro_robot.mcs51.execute import BREAKPOINT, REACHED, STOPPED, Executor
+from miro_robot.mcs51.core import LAST_CYCLE
+from miro_robot.mcs51.execute import BREAKPOINT, REACHED, STOPPED, WIRE_FULL, Executor
 from miro_robot.mcs51.peripherals import Peripherals
+from miro_robot.saved import tick, whole
 
-__all__ = ["BREAKPOINT", "REACHED", "STOPPED", "Cpu"]
+__all__ = ["BREAKPOINT", "REACHED", "STOPPED", "WIRE_FULL", "Cpu"]
 
 _FAR = 1 << 62
 _OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py; both: a mark outside
 _MARK = 0x1000
 _STOP_REQUESTED = 1
+_WIRE_FULL = WIRE_FULL
 _P0, _SP, _PCON, _IE, _IP, _PSW = 0x80, 0x81, 0x87, 0xA8, 0xB8, 0xD0
 _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
 _PCON_BITS = 0x8F  # the others are not implemented and read as 0
@@ -214,6 +217,9 @@ class Cpu(Executor):
             self._watch_main_loop(now)
         if self.stop or now >= self.until:
             return 1
+        if self.txd.full:
+            self.stop = _WIRE_FULL
+            return 1
         if now >= self.next_event and self._attend(now):
             return 0
         event = self.next_event if self.next_event < self.until else self.until
@@ -404,12 +410,12 @@ class Cpu(Executor):
 
     def restore(self, state: dict[str, Any]) -> None:
         Executor.restore(self, state)
-        self.pcon = state["pcon"]
-        self.idle = state["idle"]
-        self.powered_down = state["powered_down"]
-        self.blocked = state["blocked"]
-        self.marks = state.get("marks", 0)
-        self.chip.restore(state["chip"])
+        self.pcon = whole(state, "pcon", 0, 0xFF)
+        self.idle = whole(state, "idle", 0, 1)
+        self.powered_down = whole(state, "powered_down", 0, 1)
+        self.blocked = tick(state, "blocked", -1)
+        self.marks = whole({"marks": state.get("marks", 0)}, "marks", 0, LAST_CYCLE)
+        self.chip.restore(state["chip"], self.cycles)
 
     def __repr__(self) -> str:
         return (

@@ -24,7 +24,7 @@ _STACK_OVERFLOW = int(FaultKind.STACK_OVERFLOW)
 _STACK_UNDERFLOW = int(FaultKind.STACK_UNDERFLOW)
 _OUTSIDE_IMAGE = int(FaultKind.OUTSIDE_IMAGE)
 
-REACHED, STOPPED, BREAKPOINT = 0, 1, 2  # why a run ended
+REACHED, STOPPED, BREAKPOINT, WIRE_FULL = range(4)  # why a run ended
 
 
 class Executor(Core):
@@ -33,7 +33,8 @@ class Executor(Core):
     def run(self, until_cycle: int) -> int:
         """Executes until `cycles` >= `until_cycle`; may end up to 3 cycles late, when an instruction does.
 
-        Returns REACHED, STOPPED (`request_stop`) or BREAKPOINT.
+        Returns REACHED, STOPPED (`request_stop`), BREAKPOINT or WIRE_FULL (more than 2048 edges of TXD wait for
+        the listener that it has; it does not go on before these are heard).
         """
         self.until = until_cycle
         self.stop = REACHED

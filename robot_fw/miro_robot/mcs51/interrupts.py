@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_robot.saved import whole, wholes
+
 _FAR = 1 << 62
 SOURCES = 6  # in polling order: INT0, timer 0, INT1, timer 1, serial, timer 2
 INT0, TIMER0, INT1, TIMER1, SERIAL, TIMER2 = range(SOURCES)
@@ -96,12 +98,14 @@ class Interrupts:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        self.ie = state["ie"]
-        self.ip = state["ip"]
-        self.in_service = state["in_service"]
+        self.ie = whole(state, "ie", 0, 0xFF)
+        self.ip = whole(state, "ip", 0, 0xFF)
+        self.in_service = whole(state, "in_service", 0, 3)
+        since = wholes(state, "since", 6, -2, _FAR)  # a flag of timer 2 is seen a cycle early
+        until = wholes(state, "until", 6, -2, _FAR)
         for source in range(6):
-            self.since[source] = state["since"][source]
-            self.until[source] = state["until"][source]
+            self.since[source] = since[source]
+            self.until[source] = until[source]
 
 
 class ExternalInterrupts:
@@ -158,5 +162,5 @@ class ExternalInterrupts:
         return {"control": self.control, "levels": self.levels}
 
     def restore(self, state: dict[str, Any]) -> None:
-        self.control = state["control"]
-        self.levels = state["levels"]
+        self.control = whole(state, "control", 0, 0x0F)
+        self.levels = whole(state, "levels", 0, 3)

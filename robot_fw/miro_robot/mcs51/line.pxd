@@ -1,24 +1,35 @@
 cimport cython
 
 cdef long long _FAR
-cdef long long _MASK
 cdef long long _SIZE
+cdef long long _WAITING
 
 @cython.final
 cdef class Line:
     cdef public long long settled_tick
     cdef public bint unread
-    cdef long long _ticks[4096]
+    cdef readonly bint full
+    cdef long long[::1] _ticks
+    cdef long long _mask
     cdef int _before
     cdef long long _first
     cdef long long _end
     cdef long long _cursor
+    cdef long long _heard
 
     @cython.locals(last='long long')
     cpdef append(self, long long tick, int level)
+    @cython.final
+    cdef int _make_room(self) except -1
+    @cython.final
+    @cython.locals(old='long long[::1]', old_mask='long long', serial='long long')
+    cdef int _resize(self, long long size) except -1
     cpdef int level_at(self, long long tick) noexcept
     cpdef long long next_edge(self, long long tick) noexcept
     cpdef void forget(self, long long tick) noexcept
+    cpdef void hear(self, long long tick) noexcept
+    cpdef long long full_tick(self) noexcept
+    cpdef long long last_tick(self) noexcept
     @cython.final
     cdef inline int _last_level(self) noexcept
     @cython.final

@@ -5,57 +5,97 @@ UART bit, a strobe) belongs to the chips at both ends.
 
 A Line has one producer, which appends edges in order and says up to where its content is final, and consumers
 that never look beyond that tick. Edges live in a ring; the consumer forgets what is no longer needed. A line
-without a consumer (`unread`) drops its oldest edges when the ring is full.
+without a consumer (`unread`) drops its oldest edges when the ring is full; on any other the ring grows.
+
+What bounds the ring of a line that is listened to (TXD of a robot in a network): a CPU stops when more than
+2048 edges wait to be heard (`full`), and the listener hears them before the CPU goes on. An edge that was heard may
+still be needed for as long as the radio delays it and a bit of the PC lasts. A port pin and the shift clock of the
+serial port make at most three edges a machine cycle, so a ring holds at most (latency + 2500) / 4 + 2048 edges
+and those of one instruction.
 """
 
 from __future__ import annotations
 
+from array import array
 from typing import Any
+
+from miro_robot.saved import ascending, whole
 
 FAR = 1 << 62  # "never", for everybody
 _FAR = 1 << 62  # the same as a C constant
-_MASK = 4095  # ring of 4096 edges
-_SIZE = 4096
+_SIZE = 4096  # places of a new ring; always a power of two
+WAITING = 2048
+"""So many edges may wait to be heard before the line is full."""
+_WAITING = 2048
 
 
 class Line:
-    """Levels (0, 1) over ticks. `settled_tick`: content is final for every tick below it."""
+    """Levels (0, 1) over ticks. `settled_tick`: content is final for every tick below it.
 
-    NOT_STATE = ("_cursor", "unread")  # where the last query ended: a cache; who listens: wiring
+    `full`: more than 2048 edges have come since `hear`. The tick of the 2048th is `full_tick`.
+    """
+
+    NOT_STATE = (
+        *("_cursor", "unread"),  # where the last query ended: a cache; who listens: wiring
+        *("_mask", "_heard", "full"),  # size of the ring; what was heard: the listener's restore says it
+    )
 
     def __init__(self, initial: int = 1) -> None:
         self.settled_tick = 0
         self.unread = False
-        self._ticks = [0] * 4096
+        self.full = False
+        self._ticks = array("q", bytes(8 * _SIZE))
+        self._mask = _SIZE - 1
         self._before = initial  # level before the oldest edge kept; each edge toggles
         self._first = 0  # serial numbers of the oldest edge kept and of the next one
         self._end = 0
         self._cursor = 0  # serial number of the first edge after the tick last asked for
+        self._heard = 0  # ... of the first edge that was not heard yet
 
     def append(self, tick: int, level: int) -> None:
         """The wire has `level` from `tick` on.
 
         No edge if that is no change; replaces an edge on the same tick. Raises ValueError on a tick before
-        the last edge, OverflowError when 4096 edges are waiting to be forgotten by somebody.
+        the last edge.
         """
         if self._end > self._first:
-            last = self._ticks[(self._end - 1) & _MASK]
+            last = self._ticks[(self._end - 1) & self._mask]
             if tick < last:
                 raise ValueError(f"edge at tick {tick} comes after one at tick {last}")
             if tick == last and level != self._last_level():
                 self._end -= 1  # edges alternate, so replacing the last one takes it back
                 if self._cursor > self._end:
                     self._cursor = self._end
+                if self._heard > self._end:
+                    self._heard = self._end
                 return
         if level == self._last_level():
             return
-        if self._end - self._first == _SIZE and self.unread:
-            self._first += _SIZE // 2  # an even number: the level before the oldest edge stays
-            self._cursor = max(self._cursor, self._first)
-        if self._end - self._first == _SIZE:
-            raise OverflowError(f"line holds {_SIZE} edges already at tick {tick}: nobody forgets them")
-        self._ticks[self._end & _MASK] = tick
+        if self._end - self._first > self._mask:
+            self._make_room()
+        self._ticks[self._end & self._mask] = tick
         self._end += 1
+        if self._end - self._heard > _WAITING:
+            self.full = not self.unread
+
+    def _make_room(self) -> None:
+        """The ring is full: drops the older half if nobody reads it, else doubles it."""
+        if self.unread:
+            self._first += (self._mask + 1) // 2  # an even number: the level before the oldest edge stays
+            self._cursor = max(self._cursor, self._first)
+            self._heard = max(self._heard, self._first)
+        else:
+            self._resize(2 * (self._mask + 1))
+
+    def _resize(self, size: int) -> None:
+        """A ring of `size` places with the same edges in it."""
+        old, old_mask = self._ticks, self._mask
+        self._ticks = array("q", bytes(8 * size))
+        self._mask = size - 1
+        serial = self._first
+        while serial < self._end:
+            self._ticks[serial & self._mask] = old[serial & old_mask]
+            serial += 1
 
     def level_at(self, tick: int) -> int:
         """Level after all edges with edge tick <= `tick`."""
@@ -67,13 +107,27 @@ class Line:
         self._seek(tick)
         if self._cursor == self._end:
             return _FAR
-        return self._ticks[self._cursor & _MASK]
+        return self._ticks[self._cursor & self._mask]
 
     def forget(self, tick: int) -> None:
         """Drops the edges that no query at `tick` or later needs."""
         self._seek(tick)
         self._before ^= (self._cursor - self._first) & 1
         self._first = self._cursor
+        if self._heard < self._first:
+            self._heard = self._first
+
+    def hear(self, tick: int) -> None:
+        """A listener has heard all edges below `tick`: those from there on wait."""
+        while self._heard < self._end and self._ticks[self._heard & self._mask] < tick:
+            self._heard += 1
+        self.full = self._end - self._heard > _WAITING and not self.unread
+
+    def full_tick(self) -> int:
+        """Tick of the 2048th edge that waits to be heard, FAR if there are not so many."""
+        if self._end - self._heard < _WAITING:
+            return _FAR
+        return self._ticks[(self._heard + _WAITING - 1) & self._mask]
 
     def edges(self) -> list[tuple[int, int]]:
         """The edges kept, oldest first, as (tick, level)."""
@@ -81,8 +135,12 @@ class Line:
         kept = []
         for serial in range(self._first, self._end):
             level ^= 1
-            kept.append((self._ticks[serial & _MASK], level))
+            kept.append((self._ticks[serial & self._mask], level))
         return kept
+
+    def last_tick(self) -> int:
+        """Tick of the last edge kept, -1 without one."""
+        return self._ticks[(self._end - 1) & self._mask] if self._end > self._first else -1
 
     def _last_level(self) -> int:
         return self._before ^ ((self._end - self._first) & 1)
@@ -90,9 +148,9 @@ class Line:
     def _seek(self, tick: int) -> None:
         """Queries mostly walk forward, so the cursor walks with them."""
         cursor = self._cursor
-        while cursor < self._end and self._ticks[cursor & _MASK] <= tick:
+        while cursor < self._end and self._ticks[cursor & self._mask] <= tick:
             cursor += 1
-        while cursor > self._first and self._ticks[(cursor - 1) & _MASK] > tick:
+        while cursor > self._first and self._ticks[(cursor - 1) & self._mask] > tick:
             cursor -= 1
         self._cursor = cursor
 
@@ -104,14 +162,22 @@ class Line:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        ticks = state["ticks"]
-        self.settled_tick = state["settled_tick"]
-        self._before = state["before"]
+        """The edges count as heard below tick 0 only, until the listener says otherwise."""
+        ticks = ascending(state, "ticks")
+        self.settled_tick = whole(state, "settled_tick", 0, _FAR)
+        self._before = whole(state, "before", 0, 1)
         self._first = 0
         self._cursor = 0
-        self._end = len(ticks)
+        self._heard = 0
+        self._end = 0
+        size = _SIZE
+        while size < len(ticks):
+            size *= 2
+        self._resize(size)
         for serial, tick in enumerate(ticks):
             self._ticks[serial] = tick
+        self._end = len(ticks)
+        self.hear(0)
 
     def __repr__(self) -> str:
         kept = self.edges()

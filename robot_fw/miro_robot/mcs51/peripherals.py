@@ -19,6 +19,7 @@ from miro_robot.mcs51.shift import Shift
 from miro_robot.mcs51.timer2 import Timer2
 from miro_robot.mcs51.timers import Timers
 from miro_robot.mcs51.uart import Uart
+from miro_robot.saved import tick, whole
 
 _FAR = 1 << 62
 _UNIMPLEMENTED = 0xFF  # what a register address without a register reads as; undefined on silicon
@@ -419,7 +420,8 @@ class Peripherals:
             "p3_reads": self.p3_reads,
         }
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: dict[str, Any], cycle: int) -> None:
+        """`cycle`: where the core is."""
         self.interrupts.restore(state["interrupts"])
         self.external.restore(state["external"])
         self.timers.restore(state["timers"])
@@ -427,11 +429,16 @@ class Peripherals:
         self.uart.restore(state["uart"])
         self.shift.restore(state["shift"])
         self.ports.restore(state["ports"])
-        self.smod = state["smod"]
-        self.p1 = state["p1"]
-        self.p3 = state["p3"]
-        self.frozen = state["frozen"]
-        self.p3_reads = state["p3_reads"]
+        self.smod = whole(state, "smod", 0, 1)
+        self.p1 = whole(state, "p1", 0, 0xFF)
+        self.p3 = whole(state, "p3", 0, 0xFF)
+        self.frozen = whole(state, "frozen", 0, 1)
+        self.p3_reads = tick(state, "p3_reads")
+        if self.timers.synced > cycle or self.timer2.synced > cycle:
+            raise ValueError(f"timers are ahead of cycle {cycle}")
+        if not self.frozen:
+            self.uart.check_outputs(12 * cycle)
+            self.shift.check_outputs(cycle)
         self.now = self.timers.synced
         self.timer_wait = -1
         self.serial_wait = -1

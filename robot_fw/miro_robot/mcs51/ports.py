@@ -9,9 +9,19 @@ before it. The latch changes at the end of an instruction and the pin with the n
 
 from __future__ import annotations
 
-from typing import Any
+from operator import itemgetter
+from typing import Annotated, Any
+
+from msgspec import Meta, convert
+
+from miro_robot.saved import wholes
 
 _FAR = 1 << 62
+_Push = tuple[
+    Annotated[int, Meta(ge=0, le=1 << 55)],
+    Annotated[int, Meta(ge=0, le=3)],
+    Annotated[int, Meta(ge=0, le=0xFF)],
+]
 
 
 class Ports:
@@ -51,8 +61,12 @@ class Ports:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
+        latches = wholes(state, "latches", 4, 0, 0xFF)
+        outside = wholes(state, "outside", 4, 0, 0xFF)
         for port in range(4):
-            self.latches[port] = state["latches"][port]
-            self.outside[port] = state["outside"][port]
-        self.pending = [(cycle, port, levels) for cycle, port, levels in state["pending"]]
+            self.latches[port] = latches[port]
+            self.outside[port] = outside[port]
+        self.pending = convert(state["pending"], list[_Push])
+        if self.pending != sorted(self.pending, key=itemgetter(0)):
+            raise ValueError("pushes of port pins are not in order")
         self.next_cycle = self.pending[0][0] if self.pending else _FAR

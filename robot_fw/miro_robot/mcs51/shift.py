@@ -14,6 +14,7 @@ from typing import Any
 
 from miro_robot.mcs51.line import Line
 from miro_robot.mcs51.uart import Uart
+from miro_robot.saved import tick, whole
 
 _REN, _TI, _RI = 0x10, 0x02, 0x01
 _FAR = 1 << 62
@@ -100,7 +101,12 @@ class Shift:
 
     def restore(self, state: dict[str, Any]) -> None:
         self.data.restore(state["data"])
-        self.flag = state["flag"]
-        self.value = state["value"]
-        self.number = state["number"]
-        self.cycle = state["cycle"]
+        self.flag = whole(state, "flag", 0, _TI)
+        self.value = whole(state, "value", 0, 0xFF)
+        self.number = whole(state, "number", 0, 8)
+        self.cycle = tick(state, "cycle")
+
+    def check_outputs(self, cycle: int) -> None:
+        """Raises ValueError unless a restored register goes on at `cycle`."""
+        if (self.flag and not cycle <= self.cycle <= cycle + 2) or self.data.last_tick() > 12 * cycle:
+            raise ValueError(f"the shift register is not at cycle {cycle}")

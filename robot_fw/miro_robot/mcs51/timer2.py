@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any
 
 from miro_robot.mcs51.interrupts import Interrupts
+from miro_robot.saved import tick, whole
 
 _FAR = 1 << 62
 _NONE = -1
@@ -206,11 +207,11 @@ class Timer2:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        self.control = state["control"]
-        self.t2mod = state["t2mod"]
-        self.count = state["count"]
-        self.capture = state["capture"]
-        self.up = state["up"]
-        self.edge_cycle = state["edge_cycle"]
-        self.clock_out = state["clock_out"]
-        self.synced = state["synced"]
+        self.control = whole(state, "control", 0, 0xFF)
+        self.t2mod = whole(state, "t2mod", 0, 3)
+        self.count = whole(state, "count", 0, 0xFFFF)
+        self.capture = whole(state, "capture", 0, 0xFFFF)
+        self.up = whole(state, "up", 0, _FELL)
+        self.edge_cycle = tick(state, "edge_cycle", _NONE)
+        self.clock_out = whole(state, "clock_out", 0, 1)
+        self.synced = tick(state, "synced")

@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import Any
 
 from miro_robot.mcs51.interrupts import Interrupts
+from miro_robot.saved import tick, whole, wholes
 
 _FAR = 1 << 62
 _NONE = -1  # no counter edge waiting
@@ -196,12 +197,15 @@ class Timers:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        self.tmod = state["tmod"]
-        self.control = state["control"]
-        self.gates = state["gates"]
-        self.synced = state["synced"]
-        self.overflows1 = state["overflows1"]
+        self.tmod = whole(state, "tmod", 0, 0xFF)
+        self.control = whole(state, "control", 0, 0xFF) & 0xF0
+        self.gates = whole(state, "gates", 0, 3)
+        self.synced = tick(state, "synced")
+        self.overflows1 = tick(state, "overflows1")
+        low = wholes(state, "tl", 2, 0, 0xFF)
+        high = wholes(state, "th", 2, 0, 0xFF)
+        edges = wholes(state, "edge_cycle", 2, _NONE, _FAR)
         for timer in range(2):
-            self.tl[timer] = state["tl"][timer]
-            self.th[timer] = state["th"][timer]
-            self.edge_cycle[timer] = state["edge_cycle"][timer]
+            self.tl[timer] = low[timer]
+            self.th[timer] = high[timer]
+            self.edge_cycle[timer] = edges[timer]

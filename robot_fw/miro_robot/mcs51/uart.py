@@ -18,6 +18,7 @@ from typing import Any
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.interrupts import Interrupts
 from miro_robot.mcs51.line import Line
+from miro_robot.saved import whole
 
 _FAR = 1 << 62
 _STOPPED = 1 << 61  # next tick of a clock that does not run
@@ -40,6 +41,7 @@ class Uart:
         self.rxd = Line()
         self.rxd.settled_tick = _FAR  # nothing connected: mark for ever, until a producer says otherwise
         self.txd = Line()
+        self.txd.unread = True  # until a listener says otherwise
         self.latch = 3
         self.scon = 0
         self.received = 0  # SBUF as read
@@ -335,24 +337,31 @@ class Uart:
     def restore(self, state: dict[str, Any]) -> None:
         self.rxd.restore(state["rxd"])
         self.txd.restore(state["txd"])
-        self.latch = state["latch"]
-        self.scon = state["scon"]
-        self.received = state["received"]
-        self.tx_next = state["tx_next"]
-        self.tx_period = state["tx_period"]
-        self.tx_phase = state["tx_phase"]
-        self.tx_bits = state["tx_bits"]
-        self.tx_left = state["tx_left"]
-        self.tx_value = state["tx_value"]
-        self.tx_delay = state["tx_delay"]
-        self.tx_level = state["tx_level"]
-        self.tx_edge = state["tx_edge"]
-        self.tx_coming = state["tx_coming"]
-        self.rx_next = state["rx_next"]
-        self.rx_period = state["rx_period"]
-        self.rx_count = state["rx_count"]
-        self.rx_last = state["rx_last"]
-        self.rx_votes = state["rx_votes"]
-        self.rx_bits = state["rx_bits"]
-        self.rx_done = state["rx_done"]
-        self.rx_frame = state["rx_frame"]
+        self.latch = whole(state, "latch", 0, 3)
+        self.scon = whole(state, "scon", 0, 0xFF)
+        self.received = whole(state, "received", 0, 0xFF)
+        self.tx_next = whole(state, "tx_next", 0, _STOPPED)
+        self.tx_period = whole(state, "tx_period", 1, _STOPPED_PERIOD)
+        self.tx_phase = whole(state, "tx_phase", 0, _ROLLOVERS - 1)
+        self.tx_bits = whole(state, "tx_bits", 0, 0x7FF)
+        self.tx_left = whole(state, "tx_left", 0, 11)
+        self.tx_value = whole(state, "tx_value", 0, 0xFF)
+        self.tx_delay = whole(state, "tx_delay", 0, 12)
+        self.tx_level = whole(state, "tx_level", 0, 1)
+        self.tx_edge = whole(state, "tx_edge", 0, _FAR)
+        self.tx_coming = whole(state, "tx_coming", 0, 1)
+        self.rx_next = whole(state, "rx_next", 0, _STOPPED)
+        self.rx_period = whole(state, "rx_period", 1, _STOPPED_PERIOD)
+        self.rx_count = whole(state, "rx_count", 0, 0xFF)
+        self.rx_last = whole(state, "rx_last", 0, 1)
+        self.rx_votes = whole(state, "rx_votes", 0, 3)
+        self.rx_bits = whole(state, "rx_bits", 0, 0x1FF)
+        self.rx_done = whole(state, "rx_done", 0, _FAR)
+        self.rx_frame = whole(state, "rx_frame", 0, 0x1FF)
+
+    def check_outputs(self, tick: int) -> None:
+        """Raises ValueError unless a restored port goes on at `tick`: what it sends comes after the edges on TXD."""
+        if self.txd.last_tick() > tick or self.tx_edge < tick or self.tx_next < tick:
+            raise ValueError(f"the serial port has edges of TXD out of order at tick {tick}")
+        if self.rx_next < tick:
+            raise ValueError(f"the serial port is behind tick {tick}")

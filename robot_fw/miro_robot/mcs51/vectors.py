@@ -94,7 +94,6 @@ class Bench:
     def __init__(self) -> None:
         self.bus = _VectorBus()
         self.cpu = Cpu(self.bus)
-        self.cpu.txd.unread = True
 
     def run(self, initial: State) -> tuple[State, list[list[Access]]]:
         """What the instruction at `initial.pc` leaves behind, and its bus cycles.

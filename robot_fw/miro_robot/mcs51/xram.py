@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
+from miro_robot.saved import octets
 
 
 class XramBus(Bus):
@@ -52,4 +53,4 @@ class XramBus(Bus):
         return {"memory": self.content()}
 
     def restore(self, state: dict[str, bytes]) -> None:
-        self.fill(state["memory"])
+        self.fill(octets(state, "memory", 0x10000))

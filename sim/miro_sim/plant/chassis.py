@@ -15,11 +15,16 @@ from __future__ import annotations
 from typing import Any
 
 from miro_host import dmath
+from miro_robot.saved import real
 
 from miro_sim.plant.params import DriveParams
 
 TICK_S = 1.0 / 24e6
 SWEEPS = 8
+# Of a saved state; far more than a robot's.
+MOST_SPEED_RAD_S = 1e6
+MOST_PLACE_M = 1e9
+MOST_HEADING_RAD = 0.5e6  # `dmath` takes a million
 
 
 class Body:
@@ -161,11 +166,11 @@ class Body:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Takes back what `snapshot` gave."""
-        self.left_rad_s = state["left_rad_s"]
-        self.right_rad_s = state["right_rad_s"]
-        self.x_m = state["x_m"]
-        self.y_m = state["y_m"]
-        self.theta_rad = state["theta_rad"]
+        self.left_rad_s = real(state, "left_rad_s", MOST_SPEED_RAD_S)
+        self.right_rad_s = real(state, "right_rad_s", MOST_SPEED_RAD_S)
+        self.x_m = real(state, "x_m", MOST_PLACE_M)
+        self.y_m = real(state, "y_m", MOST_PLACE_M)
+        self.theta_rad = real(state, "theta_rad", MOST_HEADING_RAD)
 
     def __repr__(self) -> str:
         v, w = self.velocity()

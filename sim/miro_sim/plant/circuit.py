@@ -22,11 +22,13 @@ from __future__ import annotations
 from typing import Any
 
 from miro_host import dmath
+from miro_robot.saved import real, whole
 
 from miro_sim.plant.params import DriveParams
 
 MAX_TICKS = 2048  # longest interval: one PWM period
 TICK_S = 1.0 / 24e6
+MOST_CURRENT_A = 1e6  # of a saved state; far more than a motor's
 
 
 class Winding:
@@ -116,8 +118,9 @@ class Winding:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Takes back what `snapshot` gave."""
-        self.current_a = state["current_a"]
-        self.set_bridge(1 if state["drive"] != 0 else 0, 1 if state["drive"] > 0 else 0)
+        self.current_a = real(state, "current_a", MOST_CURRENT_A)
+        drive = whole(state, "drive", -1, 1)
+        self.set_bridge(1 if drive != 0 else 0, 1 if drive > 0 else 0)
 
     def __repr__(self) -> str:
         mode = "forward" if self.drive > 0 else "backward" if self.drive < 0 else "off"

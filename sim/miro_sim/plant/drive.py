@@ -15,6 +15,7 @@ from typing import Any
 
 from miro_robot.lm629.chip import Lm629
 from miro_robot.plant import Plant
+from miro_robot.saved import tick
 
 from miro_sim.plant.chassis import Body
 from miro_sim.plant.circuit import Winding
@@ -124,7 +125,7 @@ class DifferentialDrive(Plant):
 
     def restore(self, state: dict[str, Any]) -> None:
         """Takes back what `snapshot` gave (of a drive with the same parameters)."""
-        self.tick = state["tick"]
+        self.tick = tick(state, "tick")
         self.next_tick = self.tick + LONGEST_STEP
         self.left_winding.restore(state["left_winding"])
         self.right_winding.restore(state["right_winding"])

@@ -11,6 +11,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_robot.saved import real, whole
+
+MOST_COUNTS = 1 << 50  # of a saved state: doubles still hold quarters of it
 _FAR = 1 << 62
 
 
@@ -99,8 +102,10 @@ class Quadrature:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Takes back what `snapshot` gave."""
-        self.position = state["position"]
-        self.count = state["count"]
+        self.position = real(state, "position", MOST_COUNTS)
+        self.count = whole(state, "count", -MOST_COUNTS, MOST_COUNTS)
+        if not self.count <= self.position < self.count + 1:
+            raise ValueError(f"count is {self.count} at position {self.position}")
         self.edge_tick = _FAR
 
     def __repr__(self) -> str:

@@ -33,4 +33,6 @@ cdef class Band:
     @cython.locals(transmitter=Transmitter, sent='long long', change='long long')
     cpdef long long next_change(self, long long tick) except? -1
     @cython.locals(transmitter=Transmitter)
-    cpdef forget(self)
+    cpdef hear(self, long long tick)
+    @cython.locals(transmitter=Transmitter, tick='long long')
+    cpdef long long full_tick(self) except? -1

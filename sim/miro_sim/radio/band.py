@@ -15,6 +15,7 @@ Sampling it as a UART is the business of `uplink`.
 from __future__ import annotations
 
 from miro_robot.mcs51.line import Line
+from miro_robot.saved import tick
 from msgspec import convert
 
 from miro_sim.clock import FAR, HOST_BIT_TICKS, HOST_CHARACTER_TICKS
@@ -46,7 +47,7 @@ class Transmitter:
         return {"last_edge": self.last_edge}
 
     def restore(self, state: dict[str, object]) -> None:
-        self.last_edge = convert(state["last_edge"], int)
+        self.last_edge = tick(state, "last_edge", -1)
 
 
 class Band:
@@ -67,6 +68,7 @@ class Band:
         self.transmitters: list[Transmitter] = []
 
     def add(self, robot: int, line: Line) -> None:
+        line.unread = False
         self.transmitters.append(Transmitter(line, self.params, self.seed, f"{self.name}/robot{robot}"))
 
     def limit(self) -> int:
@@ -114,10 +116,21 @@ class Band:
             return _FAR
         return change + self.latency
 
-    def forget(self) -> None:
-        """Drops edges from the robots' wires that no later query needs."""
+    def hear(self, tick: int) -> None:
+        """The receiver has come to `tick`: drops edges from the robots' wires that no later query needs.
+
+        A later query is about `last_edge` or later, so the edges behind it and the level between are enough.
+        """
         for transmitter in self.transmitters:
             transmitter.line.forget(transmitter.last_edge)
+            transmitter.line.hear(tick)
+
+    def full_tick(self) -> int:
+        """The first tick at which 2048 edges of one robot wait to be heard, FAR if there is none."""
+        tick = _FAR
+        for transmitter in self.transmitters:
+            tick = min(tick, transmitter.line.full_tick())
+        return tick
 
     def snapshot(self) -> dict[str, object]:
         return {"transmitters": [transmitter.snapshot() for transmitter in self.transmitters]}

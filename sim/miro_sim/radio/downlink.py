@@ -12,6 +12,7 @@ Networks on one frequency hear each other (`overhear`); the bands up stay apart.
 from __future__ import annotations
 
 from miro_robot.mcs51.line import Line
+from miro_robot.saved import tick
 from msgspec import convert
 
 from miro_sim.clock import HOST_BIT_TICKS, HOST_CHARACTER_TICKS
@@ -129,9 +130,9 @@ class Downlink:
 
     def restore(self, state: dict[str, object]) -> None:
         """Raises ValueError when the snapshot is of a network with another number of listeners."""
-        self.settled_tick = convert(state["settled_tick"], int)
-        self.free_tick = convert(state["free_tick"], int)
-        self.busy_tick = convert(state.get("busy_tick", self.free_tick + self.sender.latency), int)
+        self.settled_tick = tick(state, "settled_tick")
+        self.free_tick = tick(state, "free_tick")
+        self.busy_tick = tick({"busy_tick": self.free_tick + self.sender.latency, **state}, "busy_tick")
         self.sender.restore(convert(state["transmissions"], list[tuple[int, bytes]]))
         heard = convert(state["listeners"], list[dict[str, object]])
         for listener, its_state in zip(self.listeners.values(), heard, strict=True):

@@ -22,6 +22,7 @@ from __future__ import annotations
 from typing import Any
 
 from miro_robot.mcs51.line import Line
+from miro_robot.saved import tick
 
 from miro_sim.clock import CHARACTER_BITS, HOST_BIT_TICKS
 from miro_sim.radio.chain import Chain
@@ -214,6 +215,6 @@ class Listener:
         return state
 
     def restore(self, state: dict[str, Any]) -> None:
-        self.bit_errors = state["bit_errors"]
+        self.bit_errors = tick(state, "bit_errors")
         if self.slicer is not None:
             self.slicer.restore(state["slicer"])

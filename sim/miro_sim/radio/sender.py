@@ -7,6 +7,8 @@ down from the exact fraction, so that nothing adds up. What does not: what recei
 
 from __future__ import annotations
 
+from miro_robot.saved import LAST_TICK
+
 from miro_sim.clock import CHARACTER_BITS
 from miro_sim.radio.params import RadioParams, bit_ticks
 
@@ -76,4 +78,10 @@ class Sender:
         return [[start, data] for start, data in self.transmissions]
 
     def restore(self, state: list[tuple[int, bytes]]) -> None:
+        """Raises ValueError unless they are in order, from tick 0 on, and hold at least a byte each."""
+        before = 0
+        for start, data in state:
+            if not before <= start <= LAST_TICK // 2 or not data:
+                raise ValueError(f"a transmission of {len(data)} bytes at tick {start}, after tick {before}")
+            before = start + len(data)
         self.transmissions = state

@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_robot.saved import tick, whole
+
 from miro_sim.radio.params import SlicerParams
 
 _BIT = 2500
@@ -75,6 +77,6 @@ class Slicer:
         return {"tick": self.tick, "signal": self.signal, "mean": self.mean}
 
     def restore(self, state: dict[str, Any]) -> None:
-        self.tick = state["tick"]
-        self.signal = state["signal"]
-        self.mean = state["mean"]
+        self.tick = tick(state, "tick")
+        self.signal = whole(state, "signal", -1, 1)
+        self.mean = whole(state, "mean", -4 * _ONE, 4 * _ONE)

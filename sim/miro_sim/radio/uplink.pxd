@@ -14,6 +14,7 @@ cdef class Uplink:
 
     @cython.locals(until='long long')
     cpdef list receive(self, long long until_tick)
+    cpdef long long full_tick(self) except? -1
     @cython.locals(level=int)
     cdef void hunt(self, long long until) except *
     @cython.locals(level=int, middle='long long')

@@ -10,6 +10,7 @@ How the level comes about is the business of `band`, what the symbols mean that 
 from __future__ import annotations
 
 from miro_robot.mcs51.line import Line
+from miro_robot.saved import tick, whole
 from msgspec import convert
 
 from miro_sim.clock import CHARACTER_BITS
@@ -66,8 +67,16 @@ class Uplink:
                 self.hunt(until)
             else:
                 self.sample(until, symbols)
-        self.band.forget()
+        self.band.hear(self.now)
         return symbols
+
+    def full_tick(self) -> int:
+        """The first tick at which 2048 edges of one robot wait to be received, FAR if there is none.
+
+        It depends on the wires' content and on `now` alone. A robot whose wire is full stops; it goes on when this
+        tick was received.
+        """
+        return self.band.full_tick()
 
     def hunt(self, until: int) -> None:
         """Goes on to the next falling edge, or a place without one."""
@@ -112,10 +121,13 @@ class Uplink:
 
     def restore(self, state: dict[str, object]) -> None:
         """Raises ValueError when the snapshot is of a network with another number of robots."""
-        self.now = convert(state["now"], int)
-        self.before = convert(state["before"], int)
-        self.start_tick = convert(state["start_tick"], int)
-        self.bit = convert(state["bit"], int)
-        self.shift = convert(state["shift"], int)
-        self.bit_errors = convert(state["bit_errors"], int)
+        self.now = tick(state, "now")
+        self.before = whole(state, "before", 0, 1)
+        self.start_tick = whole(state, "start_tick", -1, self.now)
+        self.bit = whole(state, "bit", 0, _STOP + 1)
+        self.shift = whole(state, "shift", 0, 0xFF)
+        self.bit_errors = tick(state, "bit_errors")
+        if self.start_tick >= 0 and self.now - self.start_tick > self.numerator * 22 // self.denominator:
+            raise ValueError(f"a character that began at tick {self.start_tick} is over at {self.now}")
         self.band.restore(convert(state["band"], dict[str, object]))
+        self.band.hear(self.now)

@@ -25,6 +25,7 @@ from miro_protocol.table import FRESH_AGAIN_TICKS, SPACING_TOLERANCE_TICKS, down
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
+from miro_robot.mcs51.execute import WIRE_FULL
 from miro_robot.mcs51.line import Line
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
@@ -36,7 +37,7 @@ from miro_sim.testing.air import Air, Trouble
 
 MS = TICKS_PER_SECOND // 1000
 BOOT_TICKS = 4 * MS
-STEP_TICKS = 20 * MS  # the wire's ring holds some 4000 edges
+STEP_TICKS = 20 * MS
 AHEAD_TICKS = 120  # an instruction may overrun a stop by so much
 LOOKING_TICKS = 5 * MS  # after its last character, firmware may still be at a frame
 EDGE_TICKS = MS // 5  # firmware tells "150 ms or more" to within 0.1 ms
@@ -164,12 +165,13 @@ class Bench:
             self.now = min(tick, self.now + STEP_TICKS)
             self.downlink.settle(self.now + AHEAD_TICKS)
             self._hear(self.air.settle())
-            self.board.run(self.now)
+            while self.board.run(self.now) == WIRE_FULL:
+                self._take_answers(self.uplink.full_tick())
             if self.board.faults:
                 fault = self.board.faults[0]
                 where = self.image.symbols.name_at(fault.pc)
                 self.fail(f"{fault}, in {where}" if where else str(fault))
-            self._take_answers()
+            self._take_answers(self.now)
             self.check()
 
     def check(self) -> None:
@@ -205,8 +207,9 @@ class Bench:
             if counters != self.possible[-1][1]:
                 self.possible.append((symbol[2] + HOST_CHARACTER_TICKS, counters))
 
-    def _take_answers(self) -> None:
-        for event in self.telemetry.feed_symbols(self.uplink.receive(self.now)):
+    def _take_answers(self, tick: int) -> None:
+        """What the host has received before `tick`."""
+        for event in self.telemetry.feed_symbols(self.uplink.receive(tick)):
             if not isinstance(event, Received):
                 continue
             answer = event.message(self.n)

@@ -1,0 +1,122 @@
+"""A firmware may toggle TXD at any rate, for any time: the PC hears it piece by piece, however the run is cut."""
+
+import itertools
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from miro_robot.image import Image, Symbols
+from miro_sim import scenario_file
+from miro_sim.canonical import encode
+from miro_sim.clock import CONTROL_PERIOD_TICKS
+from miro_sim.world import World
+
+from tests.robot.mcs51.asm import assemble
+
+SCENARIO = """
+name = "fast"
+duration_s = 10.0
+stop_on_fault = false
+
+[[network]]
+radio = {{ latency_s = {latency_s} }}
+
+[[network.robot]]
+slot = 0
+reference.kind = "line"
+
+[[network.robot]]
+slot = 1
+reference.kind = "line"
+"""
+EVERY_CYCLE = "\n".join(["loop:", *["CPL TXD"] * 60, "SJMP loop"])
+SLOW_AND_FAST = """
+loop:
+MOV R2,#{slow}
+slow:
+CPL TXD
+MOV R3,#{wait}
+wait:
+DJNZ R3,wait
+DJNZ R2,slow
+MOV R2,#{fast}
+fast:
+CPL TXD
+DJNZ R2,fast
+SJMP loop
+"""
+
+
+def world(program, latency_s=0.003, seed=5):
+    code = assemble(program)
+    image = Image(
+        Path("fast.ihx"), code.ljust(0x10000, b"\xff"), ((0, len(code)),), len(code), "", Symbols({})
+    )
+    return World(scenario_file.parse(SCENARIO.format(latency_s=latency_s), "fast"), seed, image)
+
+
+def state(world):
+    return encode(world.snapshot())
+
+
+def edges_kept(world):
+    return max(len(robot.board.cpu.txd.edges()) for robot in world.networks[0].robots)
+
+
+def test_a_firmware_that_toggles_txd_in_every_cycle_runs_on():
+    fast = world(EVERY_CYCLE)
+    for _ in range(3):
+        fast.step()
+    assert fast.tick == 3 * CONTROL_PERIOD_TICKS
+    assert fast.counters()["firmware"]["faults"] == 0
+    assert edges_kept(fast) < 0.003 * 24e6 / 12 + 2500 / 12 + 2100
+
+
+def test_what_the_pc_hears_of_it_is_what_it_would_hear_of_one_endless_line(monkeypatch):
+    """With a line that takes a whole period there is nothing to hear early."""
+    piecewise, whole = world(EVERY_CYCLE), world(EVERY_CYCLE)
+    network = whole.networks[0]
+    monkeypatch.setattr(network, "run", lambda tick: _run_unheard(network, tick))
+    for _ in range(2):
+        assert piecewise.step() == whole.step()
+
+
+def _run_unheard(network, tick):
+    for robot in network.robots:
+        while robot.board.run(tick):
+            robot.board.cpu.txd.hear(tick)  # so many as there are: all stay on the line
+    return False
+
+
+@pytest.mark.parametrize("cut_ticks", [997, 24_583, 100_003, CONTROL_PERIOD_TICKS - 1])
+def test_any_cutting_gives_the_same_state(cut_ticks):
+    program = SLOW_AND_FAST.format(slow=3, wait=200, fast=250)
+    whole, cut = world(program), world(program)
+    end = CONTROL_PERIOD_TICKS + 400_000
+    whole.run_to(end)
+    for tick in itertools.chain(range(cut_ticks, end, cut_ticks), [end]):
+        cut.run_to(tick)
+    assert state(cut) == state(whole)
+    assert whole.networks[0].uplink.now > CONTROL_PERIOD_TICKS  # it has heard something early
+
+
+@settings(deadline=None, max_examples=15)
+@given(
+    slow=st.integers(1, 255),
+    wait=st.integers(1, 255),
+    fast=st.integers(1, 255),
+    latency_s=st.sampled_from([0.0, 0.0005, 0.003, 0.04]),
+    cuts=st.lists(st.integers(1, 2 * CONTROL_PERIOD_TICKS - 1), max_size=6),
+)
+def test_any_rate_saved_and_cut_anywhere_goes_on_with_the_same_bits(slow, wait, fast, latency_s, cuts):
+    program = SLOW_AND_FAST.format(slow=slow, wait=wait, fast=fast)
+    whole, cut = world(program, latency_s), world(program, latency_s)
+    whole.run_to(2 * CONTROL_PERIOD_TICKS - 1)
+    for tick in [*sorted(cuts), 2 * CONTROL_PERIOD_TICKS - 1]:
+        cut.run_to(tick)
+        other = world(program, latency_s)
+        other.load(cut.save())
+        cut = other
+    assert state(cut) == state(whole)
+    assert cut.step().digest == whole.step().digest
