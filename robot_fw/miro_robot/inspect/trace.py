@@ -14,6 +14,7 @@ from miro_robot.mcs51.names import INTERRUPTS
 from miro_robot.mcs51.opcodes import disassemble
 
 HEADING = f"{'tick':>12}  addr  {'place':<28}  {'instruction':<30}  changed registers"
+_STATIC_KEPT = 65536
 REGISTERS = ("A", "B", "SP", "PSW", "DPTR", *(f"R{number}" for number in range(8)))
 
 
@@ -61,6 +62,8 @@ class Trace(Watcher):
         self.last = pc
         code = bytes((pc >> 8, pc & 0xFF, cpu.code_at(pc), cpu.code_at(pc + 1), cpu.code_at(pc + 2)))
         if code not in self.static:
+            if len(self.static) >= _STATIC_KEPT:  # a program that changes itself has no end of them
+                self.static.clear()
             self.static[code] = self._static(cpu, pc)
         text = self.static[code]
         if text is not None:

@@ -115,3 +115,9 @@ def test_the_changed_registers_lead_from_the_first_state_to_the_last():
             name, _, value = change.partition("=")
             state[name] = int(value, 16)
     assert state == dict(zip(REGISTERS, registers(cpu), strict=True))
+
+
+def test_of_a_program_that_changes_itself_only_so_many_instructions_are_remembered(monkeypatch):
+    expected = traced(200)
+    monkeypatch.setattr("miro_robot.inspect.trace._STATIC_KEPT", 2)
+    assert traced(200) == expected

@@ -1,7 +1,9 @@
 """The Line against a plain list of edges."""
 
+from itertools import cycle, islice
+
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from miro_robot.mcs51.line import FAR, Line
 
@@ -64,16 +66,52 @@ def test_going_back_in_time_is_refused():
         line.append(9, 1)
 
 
-def test_the_ring_wraps_and_says_when_it_is_full():
+def test_the_ring_wraps_and_grows_when_nothing_is_forgotten():
     line = Line()
     for tick in range(10_000):
         line.append(tick, tick & 1)
         line.forget(tick - 2000)
     assert line.level_at(9_000) == 0
-    for tick in range(10_000, 10_000 + 4096 - len(line.edges())):
+    for tick in range(10_000, 30_000):
         line.append(tick, tick & 1)
-    with pytest.raises(OverflowError, match="4096 edges"):
-        line.append(20_000, 1 - line.level_at(20_000))
+    assert line.edges()[-20_000:] == [(tick, tick & 1) for tick in range(10_000, 30_000)]
+    assert [line.level_at(tick) for tick in (9_001, 29_998, 29_999)] == [1, 0, 1]
+    assert line.next_edge(15_000) == 15_001
+
+
+def test_a_line_is_full_when_more_than_2048_edges_wait_to_be_heard():
+    line = Line()
+    for number in range(2048):
+        assert not line.full
+        line.append(10 * number, number & 1)
+    assert not line.full
+    assert line.full_tick() == 20_470
+    line.append(20_480, 0)
+    assert line.full
+    assert line.full_tick() == 20_470
+    line.hear(20_470)  # 2047 edges come before it
+    assert not line.full
+    assert line.full_tick() == FAR
+    assert len(line.edges()) == 2049  # heard is not forgotten
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    st.lists(st.integers(1, 40), min_size=1, max_size=20),
+    st.integers(0, 9000),
+    st.lists(st.integers(0, 90_000), max_size=5),
+)
+def test_what_waits_is_what_came_since_the_tick_last_heard(gaps, count, heard):
+    line, ticks, now = Line(), [], 0
+    for gap in islice(cycle(gaps), count):
+        now += gap
+        ticks.append(now)
+        line.append(now, 1 - line.level_at(now))
+    for tick in sorted(heard):
+        line.hear(tick)
+        waiting = [edge for edge in ticks if edge >= tick]
+        assert line.full == (len(waiting) > 2048)
+        assert line.full_tick() == (waiting[2047] if len(waiting) >= 2048 else FAR)
 
 
 def test_a_line_that_nobody_reads_drops_its_oldest_edges():
@@ -82,6 +120,7 @@ def test_a_line_that_nobody_reads_drops_its_oldest_edges():
     for tick in range(10_000):
         line.append(tick, tick & 1)
         assert line.level_at(tick) == tick & 1
+        assert not line.full
     kept = line.edges()
     assert 2048 <= len(kept) <= 4096
     assert kept == [(tick, tick & 1) for tick in range(10_000 - len(kept), 10_000)]
