@@ -16,7 +16,7 @@ from typing import Any
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image, Symbols
 from miro_robot.lm629.bus_timing import LIMITS, RESET_PULSE, BusTiming
-from miro_robot.lm629.chip import Lm629
+from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
@@ -401,7 +401,8 @@ class Board(Bus):
         """Raises ValueError when a restored part is not where the CPU is: it would take for ever to catch up."""
         for chip in (self.left, self.right):
             chip.check_times(now - _BEHIND_TICKS)
-        if self.plant.next_tick < now - _BEHIND_TICKS:
+        latest_tick = now + _BEHIND_TICKS + SAMPLE_TICKS
+        if self.plant.next_tick < now - _BEHIND_TICKS or latest_tick < self.plant.next_tick < FAR:
             raise ValueError(f"the drive's next step is at tick {self.plant.next_tick}, the CPU at {now}")
 
     def __repr__(self) -> str:

@@ -33,6 +33,8 @@ ScriptRun = tuple[int, int, bytes]
 MAX_SEED = (1 << 63) - 1
 SAVE_FORMAT = 2
 """Raised whenever a saved world of before would no longer mean the same."""
+MOST_PERIODS = 1 << 34
+"""Of a saved world: ticks up to then fit into 64 bits, and so do the products that are made of them."""
 SAVE_BEGIN = b"mirotwin world\n"
 _SUM_BYTES = hashlib.sha256().digest_size
 _NOT_A_STATE = (
@@ -161,7 +163,7 @@ class World:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Puts back what `snapshot` gave."""
-        self.index = whole(state, "index", 0, self.periods)
+        self.index = whole(state, "index", 0, MOST_PERIODS)
         begun = self.index * CONTROL_PERIOD_TICKS
         self.in_period = bool(whole(state, "in_period", 0, 1))
         self.stopped = bool(whole(state, "stopped", 0, 1))
