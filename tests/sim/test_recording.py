@@ -4,6 +4,7 @@ import io
 import json
 import struct
 import time
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 from miro_sim import channels
 from miro_sim.mcap_records import MAGIC, RecordingError, records
 from miro_sim.recording import Recorder, Source
@@ -123,6 +124,67 @@ def test_somebody_elses_mcap_file_is_not_taken_for_a_recording() -> None:
     writer.finish()
     with pytest.raises(RecordingError, match="not a recording of this program"):
         parse(stream.getvalue(), "run.mcap")
+
+
+def blown_up(compression: CompressionType) -> bytes:
+    """A file of some KB that unpacks to 64 MB."""
+    stream = io.BytesIO()
+    writer = Writer(stream, compression=compression)
+    writer.start()
+    channel = writer.register_channel("/period", "json", 0)
+    for _ in range(4):
+        writer.add_message(channel, 0, bytes(16 << 20), 0)
+    writer.finish()  # type: ignore[no-untyped-call]
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("compression", "name"), [(CompressionType.ZSTD, "zstd"), (CompressionType.LZ4, "lz4")]
+)
+def test_a_compressed_chunk_is_refused_and_not_unpacked(compression: CompressionType, name: str) -> None:
+    data = blown_up(compression)
+    complaint = (
+        rf"run\.mcap: offset \d+: a chunk is compressed \({name}\), .*; make .* with `mcap decompress`"
+    )
+    tracemalloc.start()
+    try:
+        for size in (len(data), sections(data)["CHUNK"][0] + 60):  # whole, and cut within the chunk
+            with pytest.raises(RecordingError, match=complaint):
+                parse(data[:size], "run.mcap")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def chunk(data: bytes, size: int | None = None, data_size: int | None = None) -> bytes:
+    """An uncompressed chunk of `data` that may say something else about its length."""
+    sizes = (len(data) if size is None else size, len(data) if data_size is None else data_size)
+    body = struct.pack("<QQQIIQ", 0, 0, sizes[0], 0, 0, sizes[1]) + data
+    return struct.pack("<BQ", Opcode.CHUNK, len(body)) + body
+
+
+def nested(depth: int) -> bytes:
+    found = b""
+    for _ in range(depth):
+        found = chunk(found)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("record", "what"),
+    [
+        (chunk(bytes(100), size=3 << 30), "an uncompressed chunk of 100 bytes says that it has 3221225472"),
+        (chunk(bytes(100), data_size=3 << 30), "the lengths of a chunk and of its data do not agree"),
+        (chunk(struct.pack("<BQ", Opcode.MESSAGE, 1 << 40)), "the last record of a chunk ends behind it"),
+        (struct.pack("<BQ", Opcode.CHUNK, 3) + b"abc", "a chunk is too short"),
+        (nested(2), "a chunk within a chunk"),
+        (nested(3000), "a chunk within a chunk"),
+    ],
+    ids=["size", "length of the data", "last record", "too short", "two deep", "3000 deep"],
+)
+def test_a_chunk_that_says_more_than_it_holds_is_damaged(record: bytes, what: str) -> None:
+    with pytest.raises(RecordingError, match=rf"offset 8: damaged record \({what}\)"):
+        parse(MAGIC + record, "run.mcap")
 
 
 @settings(deadline=None, max_examples=150)
