@@ -7,6 +7,9 @@ are given out before the error, and a bit that was turned over anywhere in a rec
 attachments have a CRC each, DataEnd has one of all before it, Footer one of the rest (MCAP specification, "Records").
 A CRC of 0, which other programs write, says nothing.
 
+A file without an end that stops between two records, or in one that belongs into a chunk and stands outside, is what a
+killed process leaves (`mcap_writer`): BrokenOff. One that stops in a chunk or anywhere else is a part of a copy: Cut.
+
 Compressed chunks are refused: `mirotwin run` writes none, and 96 KB of them can hold gigabytes. So nothing that is read
 here grows: what comes out of a record is no longer than the record, and a chunk within a chunk is damage.
 """
@@ -24,7 +27,8 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata
 
-MAGIC = b"\x89MCAP0\r\n"
+from miro_sim.mcap_writer import MAGIC
+
 LONGEST = 256 << 20  # of a record; ours are chunks of 1 MiB and attachments of some KiB
 _HEAD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")  # times, uncompressed size, CRC, length of the compression's name
@@ -35,6 +39,7 @@ _READ: dict[int, Callable[[ReadDataStream], McapRecord]] = {
     Opcode.CHANNEL: Channel.read,
     Opcode.METADATA: Metadata.read,
 }
+_IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 _BAD = (McapError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
 
 
@@ -47,6 +52,14 @@ class RecordingError(ValueError):
         self.what = what
         self.remedy = remedy
         super().__init__(f"{path}: {place}: {what}; {remedy}")
+
+
+class Cut(RecordingError):
+    """A file that ends in the middle of a record; all whole records came before."""
+
+
+class BrokenOff(Cut):
+    """A file whose writer was ended; all that it had written came before, except for a part of a record."""
 
 
 class _Compressed(Exception):
@@ -83,7 +96,7 @@ class _Container:
         while opcode != Opcode.FOOTER:
             head = self._read(_HEAD.size)
             if len(head) < _HEAD.size:
-                self._cut()
+                self._cut(within=None)
             opcode, size = _HEAD.unpack(head)
             if size > LONGEST:
                 self._damaged(f"its length says {size} bytes")
@@ -98,7 +111,7 @@ class _Container:
             except _BAD as error:
                 self._damaged(f"{error}".strip().split("\n")[0] or type(error).__name__)
             if not whole:
-                self._cut()
+                self._cut(opcode)
             self._check(opcode, head, body)
             self.place += len(head) + len(body)
         self._end()
@@ -142,12 +155,15 @@ class _Container:
         self.last = (self.last + data[-len(MAGIC) :])[-len(MAGIC) :]
         return data
 
-    def _cut(self) -> NoReturn:
-        """The file ended before the record did."""
+    def _cut(self, within: int | None = Opcode.HEADER) -> NoReturn:
+        """The file ended before the record did, or (`within` None) before there was one."""
         if self.last == MAGIC:  # as a whole file ends; so what is wrong is a length
             self._damaged("its length is more than the file holds")
-        what = "the file ends in the middle of a record"
-        self._fail(what, "it was cut short; copy it again, or record the run again")
+        if within is None or within in _IN_CHUNKS:
+            what = "the recording has no end: the run that wrote it was broken off"
+            raise BrokenOff(self.path, f"offset {self.place}", what, "record the run again for a whole one")
+        what, remedy = "the file ends in the middle of a record", "copy it again, or record the run again"
+        raise Cut(self.path, f"offset {self.place}", what, f"it was cut short; {remedy}")
 
     def _damaged(self, what: str) -> NoReturn:
         self._fail(f"damaged record ({what})", "copy the file again, or record the run again")

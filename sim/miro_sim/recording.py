@@ -8,14 +8,15 @@ log time is the tick in nanoseconds, rounded down.
 """
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
-from typing import IO, Protocol
+from typing import Protocol
 
 import msgspec
-from mcap.writer import CompressionType, Writer
 
 from miro_sim import channels
 from miro_sim.clock import nanoseconds
+from miro_sim.mcap_writer import McapWriter, Writable
 from miro_sim.records import Period
 
 METADATA = "mirotwin"
@@ -23,6 +24,8 @@ FORMAT = "1"
 SCENARIO_ATTACHMENT = "scenario.toml"
 FIRMWARE_ATTACHMENT = "firmware.ihx"
 SYMBOLS_ATTACHMENT = "symbols.json"
+BROKEN_OFF = "mirotwin.broken_off"
+"""Name of the metadata in a recording whose run did not come to its end."""
 
 
 class Fault(Protocol):
@@ -53,14 +56,23 @@ class Source(msgspec.Struct, frozen=True):
 
 
 class Recorder:
-    """An open recording. Use as a context manager; what was written up to an error is a complete file."""
+    """An open recording. Use as a context manager: an error ends the file too, and marks it as broken off.
 
-    def __init__(self, stream: IO[bytes], source: Source) -> None:
-        self._writer = Writer(stream, compression=CompressionType.NONE, enable_data_crcs=True)
+    `undisturbed` is entered wherever the file would be damaged by an exception out of the blue, such as Ctrl-C raises
+    between any two instructions: it has to put that off.
+    """
+
+    def __init__(
+        self,
+        stream: Writable,
+        source: Source,
+        undisturbed: AbstractContextManager[object] | None = None,
+    ) -> None:
+        self._undisturbed = undisturbed or nullcontext()
         self._encoder = msgspec.json.Encoder()
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
-        self._writer.start(profile=METADATA, library=METADATA)
+        self._writer = McapWriter(stream, profile=METADATA, library=METADATA)
         self._writer.add_metadata(
             METADATA,
             {
@@ -71,10 +83,10 @@ class Recorder:
                 "record": source.record,
             },
         )
-        self._attach(SCENARIO_ATTACHMENT, "application/toml", source.scenario_text.encode())
-        self._attach(FIRMWARE_ATTACHMENT, "text/plain", source.firmware)
+        self._writer.add_attachment(SCENARIO_ATTACHMENT, "application/toml", source.scenario_text.encode())
+        self._writer.add_attachment(FIRMWARE_ATTACHMENT, "text/plain", source.firmware)
         symbols = msgspec.json.encode(source.symbols, order="deterministic")
-        self._attach(SYMBOLS_ATTACHMENT, "application/json", symbols)
+        self._writer.add_attachment(SYMBOLS_ATTACHMENT, "application/json", symbols)
 
     def __enter__(self) -> "Recorder":
         return self
@@ -82,39 +94,48 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        with self._undisturbed:
+            if error is not None:
+                self._writer.add_metadata(BROKEN_OFF, {"by": type(error).__name__})
+            self._writer.finish()
+
+    def flush(self) -> None:
+        """What was added up to now is kept even if this process is killed."""
+        with self._undisturbed:
+            self._writer.flush()
 
     def write(self, period: Period) -> None:
         """Adds everything in a control period."""
-        for topic, tick, message in channels.messages(period):
-            self._add(topic, tick, message)
+        with self._undisturbed:
+            for topic, tick, message in channels.messages(period):
+                self._add(topic, tick, message)
 
     def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
         """Adds one LM629 sample of a robot (full recordings)."""
-        self._add(channels.robot_topic(network, slot, "samples"), sample.tick, sample)
+        with self._undisturbed:
+            self._add(channels.robot_topic(network, slot, "samples"), sample.tick, sample)
 
     def write_faults(self, network: int, slot: int, faults: Sequence[Fault]) -> None:
         """Adds a robot's firmware faults."""
         topic = channels.robot_topic(network, slot, "fault")
-        for fault in faults:
-            message = channels.FaultMessage(fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault))
-            self._add(topic, fault.tick, message)
-
-    def _attach(self, name: str, media_type: str, data: bytes) -> None:
-        self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+        with self._undisturbed:
+            for fault in faults:
+                message = channels.FaultMessage(
+                    fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault)
+                )
+                self._add(topic, fault.tick, message)
 
     def _add(self, topic: str, tick: int, message: msgspec.Struct) -> None:
         channel = self._channels.get(topic)
         if channel is None:
             channel = self._register(topic, type(message))
-        time_ns = nanoseconds(tick)
-        self._writer.add_message(channel, time_ns, self._encoder.encode(message), time_ns)
+        self._writer.add_message(channel, nanoseconds(tick), self._encoder.encode(message))
 
     def _register(self, topic: str, kind: type[msgspec.Struct]) -> int:
         name = f"mirotwin.{kind.__name__.removesuffix('Message')}"
         if name not in self._schemas:
             text = msgspec.json.encode(channels.schema(kind))
-            self._schemas[name] = self._writer.register_schema(name, "jsonschema", text)
-        channel = self._writer.register_channel(topic, "json", self._schemas[name])
+            self._schemas[name] = self._writer.add_schema(name, "jsonschema", text)
+        channel = self._writer.add_channel(topic, "json", self._schemas[name])
         self._channels[topic] = channel
         return channel

@@ -1,8 +1,8 @@
 """Reads a recording back: what it was made from, and its control periods as the world left them.
 
 What belongs here: messages to periods, and telling a foreign file from a recording. What does not: the container
-(`mcap_records`), and running it again (`replay`). A file is read whole and checked (CRCs, schema, completeness) before
-anything is returned.
+(`mcap_records`), and running it again (`replay`). A file is read whole and checked (CRCs, schema) before anything is
+returned. Of one that has no end, the whole control periods are returned.
 """
 
 import re
@@ -14,8 +14,9 @@ import msgspec
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata
 
 from miro_sim import channels
-from miro_sim.mcap_records import RecordingError, records
+from miro_sim.mcap_records import Cut, RecordingError, records
 from miro_sim.recording import (
+    BROKEN_OFF,
     FIRMWARE_ATTACHMENT,
     FORMAT,
     METADATA,
@@ -27,10 +28,11 @@ from miro_sim.records import Period, RobotPeriod, WireRun
 
 
 class Recording(msgspec.Struct, frozen=True):
-    """A run that was recorded."""
+    """A run that was recorded. `broken_off`: what to say of one that does not go to its end, else empty."""
 
     source: Source
     periods: tuple[Period, ...]
+    broken_off: str = ""
 
     @property
     def digest(self) -> str:
@@ -39,7 +41,7 @@ class Recording(msgspec.Struct, frozen=True):
 
 
 def read(path: str | Path) -> Recording:
-    """Reads a recording. Raises RecordingError for any other content, OSError when it cannot be opened."""
+    """Reads a recording, as far as it goes. Raises RecordingError for any other content, OSError as `open` does."""
     return parse(Path(path).read_bytes(), str(path))
 
 
@@ -50,6 +52,8 @@ def parse(data: bytes, path: str) -> Recording:
     try:
         for place, record in found:
             collector.take(record, place)
+    except Cut as cut:
+        return collector.finish(len(data), cut)
     except RecordingError:
         for _ in found:  # a wrong checksum says more than what it made of the contents
             pass
@@ -74,6 +78,7 @@ class _Collector:
         self.robots: dict[tuple[int, int], dict[str, Any]] = {}
         self.wire: list[WireRun] = []
         self.periods: list[Period] = []
+        self.broken_off = ""
 
     def take(self, record: McapRecord, place: int) -> None:
         self.place = place
@@ -83,6 +88,8 @@ class _Collector:
             self._channel(record)
         elif isinstance(record, Attachment):
             self.attachments[record.name] = record.data
+        elif isinstance(record, Metadata) and record.name == BROKEN_OFF:
+            self.broken_off = f"{self.path}: the run that wrote it was broken off"
         elif isinstance(record, Metadata) and record.name == METADATA:
             self.metadata = record.metadata
             if self.metadata.get("format") != FORMAT:
@@ -131,8 +138,11 @@ class _Collector:
         self.robots = {}
         self.wire = []
 
-    def finish(self, size: int) -> Recording:
+    def finish(self, size: int, cut: Cut | None = None) -> Recording:
+        """The recording; `cut` is raised again if it left out what a recording needs."""
         self.place = size
+        if cut is not None and (self.metadata is None or not self.periods):
+            raise cut
         if self.metadata is None:
             raise self.error(
                 "an MCAP file, but not a recording of this program", "give a run.mcap that it wrote"
@@ -159,7 +169,7 @@ class _Collector:
             symbols=symbols,
             record=self.metadata.get("record", "default"),
         )
-        return Recording(source, tuple(self.periods))
+        return Recording(source, tuple(self.periods), str(cut) if cut else self.broken_off)
 
 
 def _place_of(topic: str) -> tuple[int, int, str]:

@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import struct
 import time
 import tracemalloc
@@ -14,7 +15,8 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from miro_sim import channels
-from miro_sim.mcap_records import MAGIC, RecordingError, records
+from miro_sim.mcap_records import RecordingError, records
+from miro_sim.mcap_writer import MAGIC
 from miro_sim.recording import Recorder, Source
 from miro_sim.recording_reader import parse, read
 
@@ -100,11 +102,15 @@ def broken_off(recorder: Recorder) -> None:
     raise ZeroDivisionError
 
 
-def test_what_was_written_up_to_an_error_is_a_whole_recording() -> None:
+def test_what_was_written_up_to_an_error_is_a_recording_that_says_it_was_broken_off() -> None:
     stream = io.BytesIO()
     with pytest.raises(ZeroDivisionError), Recorder(stream, SOURCE) as recorder:
         broken_off(recorder)
-    assert len(parse(stream.getvalue(), "run.mcap").periods) == 1
+    recording = parse(stream.getvalue(), "run.part.mcap")
+    assert len(recording.periods) == 1
+    assert recording.broken_off == "run.part.mcap: the run that wrote it was broken off"
+    assert parse(RECORDED, "run.mcap").broken_off == ""
+    assert make_reader(io.BytesIO(stream.getvalue())).get_summary() is not None
 
 
 def test_a_file_that_is_no_recording_is_named_with_its_place(tmp_path: Path) -> None:
@@ -187,14 +193,29 @@ def test_a_chunk_that_says_more_than_it_holds_is_damaged(record: bytes, what: st
         parse(MAGIC + record, "run.mcap")
 
 
+MESSAGES_OF_PERIODS = [
+    RECORDED.index(f'"digest":"{period.digest}"}}'.encode()) + len(period.digest) + 12
+    for period in periods(3, [(0, 0), (0, 2), (1, 0)])
+]
+"""Where the message ends that closes each period."""
+COMPLAINT = (
+    r"run\.mcap: offset \d+: the (file ends in the middle of a record; it was cut short; copy it again, or"
+    r" record the run again|recording has no end: the run that wrote it was broken off; record .*)"
+)
+
+
 @settings(deadline=None, max_examples=150)
 @given(st.integers(1, len(RECORDED) - 1))
-def test_a_recording_cut_short_anywhere_is_said_to_be_cut_short(size: int) -> None:
-    complaint = (
-        r"run\.mcap: offset \d+: the file ends in the middle of a record; it was cut short; copy it again"
-    )
-    with pytest.raises(RecordingError, match=complaint):
-        parse(RECORDED[:size], "run.mcap")
+def test_a_recording_cut_short_anywhere_gives_its_whole_periods_and_says_so(size: int) -> None:
+    if size < MESSAGES_OF_PERIODS[0]:
+        with pytest.raises(RecordingError, match=COMPLAINT):
+            parse(RECORDED[:size], "run.mcap")
+        return
+    recording = parse(RECORDED[:size], "run.mcap")
+    assert recording.source == SOURCE
+    whole = [end for end in MESSAGES_OF_PERIODS if end <= size]
+    assert recording.periods == tuple(periods(3, [(0, 0), (0, 2), (1, 0)]))[: len(whole)]
+    assert re.fullmatch(COMPLAINT, recording.broken_off)
 
 
 def sections(data: bytes) -> dict[str, tuple[int, int]]:

@@ -24,7 +24,7 @@ from miro_protocol.pcapng_reader import MAGIC as PCAPNG
 
 from miro_sim.capture.hextext import BOM, HexText
 from miro_sim.capture.input import HEAD_BYTES
-from miro_sim.mcap_records import MAGIC as MCAP
+from miro_sim.mcap_writer import MAGIC as MCAP
 
 TIMED = ("pcapng", "recording", "stream")
 FORMATS = ("hex", "raw", *TIMED)

@@ -18,7 +18,7 @@ from miro_sim.capture.input import HEAD_BYTES
 from miro_sim.cli.options import choose_engine, load_image
 from miro_sim.cli.program import UserError
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
-from miro_sim.mcap_records import MAGIC
+from miro_sim.mcap_writer import MAGIC
 from miro_sim.outdir import RECORDING
 from miro_sim.recording_reader import Recording, parse
 from miro_sim.records import Period

@@ -1,5 +1,6 @@
 """The characters in a recording: every one, in the order of time, also when the file was cut short."""
 
+import re
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -122,7 +123,7 @@ def test_a_recording_cut_short_anywhere_gives_what_came_before_and_the_offset(tm
         path.write_bytes(whole[:size])
         found, _, error = read(path)
         assert error is not None
-        assert "the file ends in the middle of a record" in str(error)
+        assert re.search("the file ends in the middle of a record|the recording has no end", str(error))
         assert int(error.place.split()[1]) <= size
         assert [run.tick for run in found] == [index * PERIOD for index in range(len(found))]
         counts.append(len(found))
