@@ -3,7 +3,7 @@
 What belongs here: sin, cos, atan, atan2, exp, log and wrap_pi on finite float64, each within one unit in the
 last place (measured: sin 0.75, cos 0.74, exp 0.81, log 0.76, atan2 0.82, at extreme exponents 0.95 ulp).
 What does not: anything a correctly rounded operation already gives (`math.sqrt`), vectors, extended domains:
-what the twin can only meet by mistake (NaN, infinity, a heading of a million radians) raises ValueError.
+what the twin can only meet by mistake (NaN, infinity, a heading of a million radians) raises DomainError.
 
 The method is that of fdlibm (Sun Microsystems 1993): reduce the argument by a split constant, evaluate a
 polynomial on the small interval, carry the low part of the reduced argument. Coefficients are fdlibm's
@@ -11,6 +11,8 @@ published ones. Bit tricks are replaced by comparisons and by products with powe
 """
 
 import math
+
+from miro_host.domain import DomainError
 
 PI = 3.141592653589793
 ANGLE_LIMIT = 1.6e6  # rad; the split of pi/2 below is exact for fewer than 2**20 quadrants
@@ -91,7 +93,7 @@ def cos(x: float) -> float:
 def sincos(x: float) -> tuple[float, float]:
     """(sin x, cos x) of x rad for the price of one reduction. ValueError unless |x| < ANGLE_LIMIT."""
     if not (-_LIMIT < x < _LIMIT):
-        raise ValueError(f"angle must be within +-{ANGLE_LIMIT} rad, got {x!r}")
+        raise DomainError(f"angle must be within +-{ANGLE_LIMIT} rad, got {x!r}")
     if x < 0.0:
         scaled = x * _INV_PIO2 - 0.5
     else:
@@ -141,7 +143,7 @@ def sincos(x: float) -> tuple[float, float]:
 def atan(x: float) -> float:
     """Arc tangent in rad, -pi/2..pi/2. ValueError for NaN (infinities are fine)."""
     if x != x:
-        raise ValueError("atan of NaN")
+        raise DomainError("atan of NaN")
     if x < 0.0:
         return -_atan(-x, 0.0, False)
     return _atan(x, 0.0, False) if x > 0.0 else x
@@ -201,7 +203,7 @@ def _lost(q: float, y: float, x: float) -> float:
 def atan2(y: float, x: float) -> float:
     """Angle of the point (x, y) in rad, -pi..pi; signed zeros as in IEEE 754. ValueError unless finite."""
     if not (-_LARGEST <= x <= _LARGEST) or not (-_LARGEST <= y <= _LARGEST):
-        raise ValueError(f"atan2 needs finite numbers, got {y!r}, {x!r}")
+        raise DomainError(f"atan2 needs finite numbers, got {y!r}, {x!r}")
     if y == 0.0:
         if x > 0.0 or (x == 0.0 and math.copysign(1.0, x) > 0.0):
             return y
@@ -220,7 +222,7 @@ def atan2(y: float, x: float) -> float:
 def wrap_pi(x: float) -> float:
     """The angle x rad brought into (-pi, pi]; unchanged where it is there already. ValueError as for sin."""
     if not (-_LIMIT < x < _LIMIT):
-        raise ValueError(f"angle must be within +-{ANGLE_LIMIT} rad, got {x!r}")
+        raise DomainError(f"angle must be within +-{ANGLE_LIMIT} rad, got {x!r}")
     if -_PI < x <= _PI:
         return x
     if x == -_PI:
@@ -241,9 +243,9 @@ def wrap_pi(x: float) -> float:
 def exp(x: float) -> float:
     """e to the power x. OverflowError above 709.78, ValueError for NaN, 0.0 below -745.13."""
     if x != x:
-        raise ValueError("exp of NaN")
+        raise DomainError("exp of NaN")
     if x > _EXP_MAX:
-        raise OverflowError(f"exp({x!r}) is beyond float64")
+        raise DomainError(f"exp({x!r}) is beyond float64")
     if x < _EXP_MIN:
         return 0.0
     if -0.34657359027997264 < x < 0.34657359027997264:  # ln 2 / 2
@@ -290,7 +292,7 @@ def _power_of_two(k: int) -> float:
 def log(x: float) -> float:
     """Natural logarithm. ValueError unless x is finite and positive."""
     if not (0.0 < x <= _LARGEST):
-        raise ValueError(f"log needs a finite positive number, got {x!r}")
+        raise DomainError(f"log needs a finite positive number, got {x!r}")
     k = 0
     while x < 2.3283064365386963e-10:  # 2**-32
         x = x * 4294967296.0

@@ -10,6 +10,8 @@ own limit.
 
 import msgspec
 
+from miro_host.domain import DomainError
+
 PI = 3.141592653589793
 TICKS_PER_S = 24_000_000
 TICKS_PER_SAMPLE = 8192  # 2048 clocks of 6 MHz
@@ -18,7 +20,9 @@ UNITS_PER_COUNT = 256
 
 
 def nearest(x: float) -> int:
-    """The integer nearest to x, halves away from zero. Exact: x minus its whole part is."""
+    """The integer nearest to x, halves away from zero. Exact: x minus its whole part is. DomainError unless finite."""
+    if x - x != 0.0:
+        raise DomainError(f"no integer is nearest to {x!r}")
     whole = int(x)
     rest = x - whole
     if rest >= 0.5:

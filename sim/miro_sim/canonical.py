@@ -20,6 +20,8 @@ import hashlib
 import struct
 from collections.abc import Sequence
 
+from miro_host.domain import DomainError
+
 GENESIS = bytes(32)
 """The digest before the first state of a chain."""
 
@@ -40,6 +42,10 @@ class CanonicalError(ValueError):
 
     def __str__(self) -> str:
         return f"state{self.path}: {self.reason}"
+
+
+class NotANumberError(CanonicalError, DomainError):
+    """A state with NaN in it: the computation has left its domain."""
 
 
 def encode(state: object) -> bytes:
@@ -146,7 +152,7 @@ class Encoder:
 
     def put_float(self, value: float) -> None:
         if value != value:
-            raise CanonicalError("NaN has no canonical form")
+            raise NotANumberError("NaN has no canonical form")
         self.put_tag(0x64)  # d
         self.put_bytes(_FLOAT(value + 0.0))  # -0.0 + 0.0 is 0.0; no other float changes
 

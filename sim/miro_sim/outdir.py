@@ -1,23 +1,26 @@
 """The folder or file a command writes to: refused if other things are there, filled in one go at the end.
 
-What belongs here: deciding whether a folder or file may be used, and moving what is finished into it. What does
-not: what is in the files. Everything is written to a temporary place on the same disk first, so that whatever goes
-wrong leaves either the files from before or the new ones, never half of one.
+What belongs here: deciding whether a folder or file may be used, and giving what is finished its name. What does not:
+what is in the files. Everything is written under another name beside its place first (run.part.mcap, FILE.xxxx.part),
+so that whatever goes wrong leaves either the files from before or the new ones, never half of one.
 """
+
+from __future__ import annotations
 
 import errno
 import os
-import shutil
 import stat
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
 RECORDING = "run.mcap"
 FILES = (RECORDING, "figure.png", "summary.json")
-"""What a run writes, and all that `--force` replaces."""
+"""What a run writes; `--force` replaces these, and the parts of them that a run broken off has left."""
+KEPT = (RECORDING, "summary.json")
+"""Of these, a run that is broken off leaves the parts."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """What a disk says that takes no more: only writing can meet it, and the error names no file."""
 
@@ -30,51 +33,110 @@ class OutputError(ValueError):
         super().__init__(f"{path}: {what}; {remedy}")
 
 
+def part_name(name: str) -> str:
+    """What a file is called until it is whole: run.part.mcap for run.mcap."""
+    path = Path(name)
+    return f"{path.stem}.part{path.suffix}"
+
+
 class OutputFolder:
     """`path` as the target of a command that writes files called `names`, by default those of a run.
 
-    Checks at once; as a context manager gives the folder to write into. Leaving the context normally moves the files
-    over; leaving it by an exception removes them. Raises OutputError for a folder with other content (unless
-    `force`), for one that cannot be made, and for a full disk.
+    Checks at once; as a context manager locks the folder, and `part` says where to write each file. Leaving the context
+    normally gives the parts their names, and removes files of these names that were not written again. Leaving it by an
+    exception removes the parts, but for those named in `keep`, and leaves complete files as they were. A process that
+    is killed leaves all its parts. Raises OutputError for a folder with other content (unless `force`), for one that
+    another process writes to, for one that cannot be made, and for a full disk.
     """
 
     def __init__(self, path: Path, force: bool = False, names: Sequence[str] = FILES) -> None:
         self.path = path
         self.names = names
-        self._staging: Path | None = None
+        self.keep: Sequence[str] = ()
+        self._force = force
+        self._made = False
+        self._lock: int | None = None
+        if path.is_dir():
+            _release(_lock(path))
         _check(path, force, names)
 
-    def __enter__(self) -> Path:
+    def part(self, name: str) -> Path:
+        """Where to write the file that is to be called `name`."""
+        return self.path / part_name(name)
+
+    def __enter__(self) -> OutputFolder:
         try:
-            beside = self.path if self.path.is_dir() else self.path.parent
-            beside.mkdir(parents=True, exist_ok=True)
-            name = tempfile.mkdtemp(prefix=f".{self.path.name}.", dir=beside)
+            self._made = not self.path.is_dir()
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._lock = _lock(self.path)
+            _check(self.path, self._force, self.names)  # another run may have filled it since
+            self._remove_parts()
         except OSError as error:
+            _release(self._lock)
             raise OutputError(self.path, _reason(error), "choose another folder with --out") from None
-        self._staging = Path(name)
-        return self._staging
+        except OutputError:
+            _release(self._lock)
+            raise
+        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        assert self._staging is not None
         try:
             if kind is None:
-                self._publish(self._staging)
+                self._publish()
             elif isinstance(error, OSError) and error.errno in FULL:
                 raise OutputError(self.path, _reason(error), _make_room("folder", "--out")) from None
         except OSError as failure:
             raise OutputError(self.path, _reason(failure), "choose another folder with --out") from None
         finally:
-            shutil.rmtree(self._staging, ignore_errors=True)
+            self._leave()
 
-    def _publish(self, staging: Path) -> None:
-        self.path.mkdir(exist_ok=True)
+    def _publish(self) -> None:
         for name in self.names:
-            if (staging / name).exists():
-                os.replace(staging / name, self.path / name)
+            if self.part(name).exists():
+                os.replace(self.part(name), self.path / name)
             else:  # one from before must not stand beside a new run as if it belonged to it
                 (self.path / name).unlink(missing_ok=True)
+
+    def _leave(self) -> None:
+        with suppress(OSError):  # what is being reported says more
+            self._remove_parts(self.keep)
+            if self._made and not os.listdir(self.path):
+                self.path.rmdir()
+        _release(self._lock)
+
+    def _remove_parts(self, keep: Sequence[str] = ()) -> None:
+        for name in self.names:
+            if name not in keep:
+                self.part(name).unlink(missing_ok=True)
+
+
+def _lock(path: Path) -> int | None:
+    """Locks a folder against other processes; it is free again when the descriptor is closed or the process is gone.
+
+    None where there are no such locks (Windows, some network disks). Raises OutputError if another process has it.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return None
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(folder)
+        what = "another process is writing into the folder"
+        raise OutputError(path, what, "wait until it has finished, or choose another with --out") from None
+    except OSError:
+        os.close(folder)
+        return None
+    return folder
+
+
+def _release(lock: int | None) -> None:
+    if lock is not None:
+        os.close(lock)
 
 
 def _check(path: Path, force: bool, names: Sequence[str]) -> None:
@@ -89,15 +151,29 @@ def _check(path: Path, force: bool, names: Sequence[str]) -> None:
         what = "exists and is not a folder" if isinstance(error, NotADirectoryError) else _reason(error)
         raise OutputError(path, what, "choose another folder with --out") from None
     if present and not force:
-        shown = ", ".join(present[:3]) + (", .." if len(present) > 3 else "")
-        ours = ", ".join(names) if len(names) <= len(FILES) else f"{names[0]} to {names[-1]}"
-        remedy = f"choose another with --out, or replace {ours} with --force"
-        raise OutputError(path, f"the folder is not empty ({shown})", remedy)
+        raise OutputError(path, _content(present, names), _ways_out(names))
     if not os.access(path, os.W_OK | os.X_OK):
         raise OutputError(path, "the folder cannot be written to", "choose another folder with --out")
-    for name in names:
+    for name in (*names, *map(part_name, names)):
         if (path / name).is_dir():
             raise OutputError(path / name, "is a folder where a file is to be written", "remove it")
+
+
+def _content(present: Sequence[str], names: Sequence[str]) -> str:
+    """What a folder with the entries `present` holds; what was broken off goes first."""
+    known = {part_name(name) for name in names}
+    if parts := [name for name in present if name in known]:
+        return f"the folder holds what is left of a command that was broken off ({_some(parts)})"
+    return f"the folder is not empty ({_some(present)})"
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:3]) + (", .." if len(names) > 3 else "")
+
+
+def _ways_out(names: Sequence[str]) -> str:
+    ours = ", ".join(names) if len(names) <= len(FILES) else f"{names[0]} to {names[-1]}"
+    return f"choose another with --out, or replace {ours} and parts of them with --force"
 
 
 def check_file(path: Path, option: str) -> None:
@@ -145,7 +221,7 @@ def whole_file(path: Path, option: str) -> Iterator[Path]:
     target = path.resolve()
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666 & ~_umask()
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        handle, name = tempfile.mkstemp(".part", f"{target.name}.", target.parent)
     except OSError as error:
         raise OutputError(path, _reason(error), f"choose another file with {option}") from None
     os.close(handle)

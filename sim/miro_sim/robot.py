@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_host.domain import DomainError
 from miro_host.pilot import Command, Pilot
 from miro_host.posture import Posture
 from miro_host.vision import Vision
@@ -50,12 +51,15 @@ class Robot:
         self.reference = reference_for(spec, scenario.duration_s)
         start = self.reference.at(0.0).posture
         wheels = Stream(seed, f"{name}/wheels")
-        self.drive = DifferentialDrive(
-            drive_for(spec, wheels.uniform(0), wheels.uniform(1)),
-            start.x_m + spec.start_error_x_cm / 100.0,
-            start.y_m + spec.start_error_y_cm / 100.0,
-            start.theta_rad + spec.start_error_theta_rad,
-        )
+        try:
+            self.drive = DifferentialDrive(
+                drive_for(spec, wheels.uniform(0), wheels.uniform(1)),
+                start.x_m + spec.start_error_x_cm / 100.0,
+                start.y_m + spec.start_error_y_cm / 100.0,
+                start.theta_rad + spec.start_error_theta_rad,
+            )
+        except ArithmeticError as error:  # what follows from the parameters divides by zero
+            raise DomainError(f"{name}: its drive cannot be computed ({error})") from error
         self.board = Board(
             load_wiring(), self.drive, spec.slot, robots, scenario.lm629, scenario.stop_on_fault
         )

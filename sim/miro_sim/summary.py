@@ -88,7 +88,8 @@ class Firmware(msgspec.Struct, frozen=True):
 class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """`summary.json`. `tracking` is the first robot's; `robots` lists all when there are several.
 
-    `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded.
+    `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is
+    written only where it is false: the run was broken off, and all figures are of the part before.
     """
 
     scenario: str
@@ -102,6 +103,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     link: Link
     firmware: Firmware
     robots: tuple[RobotTracking, ...] = ()
+    complete: bool = True
 
 
 def wrapped(angle_rad: float) -> float:
@@ -178,6 +180,7 @@ def summarise(
     wall_s: float,
     counters: Mapping[str, Mapping[str, Any]],
     firmware_sha256: str,
+    complete: bool = True,
 ) -> Summary:
     """The summary of a run; `counters` as `World.counters()` gives them."""
     tracked = {place: tracking_of(samples) for place, samples in errors_by_robot(periods).items()}
@@ -194,6 +197,7 @@ def summarise(
         link=Link(**counters["link"]),
         firmware=Firmware(sha256=firmware_sha256, **counters["firmware"]),
         robots=everyone if len(everyone) > 1 else (),
+        complete=complete,
     )
 
 

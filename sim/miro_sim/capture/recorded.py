@@ -10,7 +10,7 @@ together again here; where one run of a period goes on right behind another, the
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NoReturn
 
 import msgspec
@@ -21,24 +21,34 @@ from miro_protocol.table import SPACING_TICKS, SPACING_TOLERANCE_TICKS, TELEMETR
 from miro_sim import channels
 from miro_sim.capture import Run
 from miro_sim.capture.input import Input
-from miro_sim.mcap_records import RecordingError, records
-from miro_sim.recording import FORMAT, METADATA, SCENARIO_ATTACHMENT
+from miro_sim.mcap_records import BrokenOff, RecordingError, records
+from miro_sim.recording import BROKEN_OFF, FORMAT, METADATA, SCENARIO_ATTACHMENT
 from miro_sim.records import Period, WireRun
 from miro_sim.scenario_errors import ScenarioError
 from miro_sim.scenario_file import parse
 
 
-def runs(source: Input, robots: dict[int, int]) -> Iterator[Run]:
+def runs(
+    source: Input, robots: dict[int, int], tell: Callable[[str], None] = lambda text: None
+) -> Iterator[Run]:
     """Runs in the order of time; `robots` is filled with the layout (3 or 5) of each network before the first.
 
-    RecordingError, after all that could be read, for what is no whole recording of this program.
+    RecordingError, after all that could be read, for what is no recording of this program, and for a part of a copy.
+    `tell` is told of a recording whose run was broken off, after all its runs.
     """
     reader = _Reader(source, robots)
     try:
         yield from reader.runs()
+    except BrokenOff as error:
+        yield from reader.rest()
+        if not reader.ours:
+            raise
+        reader.broken_off = str(error)
     except RecordingError:
         yield from reader.rest()
         raise
+    if reader.broken_off:
+        tell(reader.broken_off)
 
 
 def follows(run: Run, tick: int) -> bool:
@@ -95,6 +105,7 @@ class _Reader:
         self.robots = robots
         self.place = 0
         self.ours = False
+        self.broken_off = ""
         self.topics: dict[int, str] = {}
         self.wire_decoder = msgspec.json.Decoder(channels.WireMessage)
         self.period_decoder = msgspec.json.Decoder(channels.PeriodMessage)
@@ -119,6 +130,8 @@ class _Reader:
                 kind = channels.message_type(record.topic)
                 if kind in (channels.WireMessage, channels.PeriodMessage):
                     self.topics[record.id] = record.topic
+            elif isinstance(record, Metadata) and record.name == BROKEN_OFF:
+                self.broken_off = f"{self.source.label}: the run that wrote it was broken off"
             elif isinstance(record, Metadata) and record.name == METADATA:
                 self.ours = True
                 if record.metadata.get("format") != FORMAT:

@@ -51,7 +51,7 @@ def open_source(given: Input, format: str, tell: Callable[[str], None], directio
     if format == "pcapng":
         return Source(given.label, format, _pcapng(given, tell), robots)
     if format == "recording":
-        return Source(given.label, format, recorded.runs(given, robots), robots)
+        return Source(given.label, format, recorded.runs(given, robots, tell), robots)
     if format == "stream":
         return Source(given.label, format, _stream(given), robots)
     pieces = _raw(given) if format == "raw" else _hex(given)

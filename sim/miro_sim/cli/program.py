@@ -1,5 +1,6 @@
 """How the command line fails: one line on stderr and an exit code, never a traceback for what a user can
-mend.
+mend. An error that nobody has foreseen is one line too, which asks for a report; with MIROTWIN_TRACEBACK=1 in the
+environment its traceback goes before it.
 
 What belongs here: exit codes, the translation of errors, and the two consoles. What does not: any command.
 """
@@ -8,6 +9,7 @@ import os
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import TextIOWrapper
@@ -15,6 +17,7 @@ from types import FrameType
 from typing import Any, NoReturn
 
 import click
+from miro_host.domain import DomainError
 from miro_protocol.engine import EngineError
 from miro_protocol.pcapng_reader import CaptureError
 from miro_protocol.stream import StreamError
@@ -34,6 +37,8 @@ BAD_INPUT = 2
 FIRMWARE_FAULT = 3
 DIVERGENCE = 4
 LIMIT_REACHED = 42
+INTERNAL_ERROR = 70
+"""EX_SOFTWARE of sysexits.h."""
 INTERRUPTED = 130
 SIGPIPE = 13
 SIGNALLED = 128
@@ -92,6 +97,25 @@ def show(result: RenderableType) -> None:
 
 
 @contextmanager
+def plain_parameters(label: str, done: str = "run") -> Iterator[None]:
+    """Within it, numbers with which nothing can be computed are the user's: `label` names the file they came from."""
+    try:
+        yield
+    except DomainError as error:
+        what = f"cannot be {done}: {error}; parameters far from any robot's can do this"
+        raise UserError(f"{label}: {what}") from None
+
+
+def _report(error: Exception) -> None:
+    """One line that asks for a report, after the traceback if that is wanted."""
+    if os.environ.get("MIROTWIN_TRACEBACK"):
+        click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+    text = f"{type(error).__name__}: {error}".rstrip(": ")
+    ask = "please report this line with the command (MIROTWIN_TRACEBACK=1 shows the place)"
+    complain(f"internal error: {text}; {ask}")
+
+
+@contextmanager
 def terminable() -> Iterator[None]:
     """Within it, SIGTERM and SIGHUP raise Terminated; a signal that is ignored (nohup) stays ignored."""
 
@@ -136,6 +160,8 @@ class Program(click.Group):
             raise ReaderGone from None
 
     def _run(self, args: Sequence[str] | None, prog_name: str, extra: dict[str, Any]) -> int:
+        if vars(sys)["stderr"] is None:  # `2>&-`: the next file to be opened would take its place
+            sys.stderr = open(os.devnull, "w")  # noqa: SIM115
         if vars(sys)["stdout"] is None:  # `>&-`: the next file to be opened would take its place
             complain("error: standard output is closed; send it to a file or a pipe")
             return BAD_INPUT
@@ -175,4 +201,7 @@ class Program(click.Group):
         except Terminated as error:
             complain(f"ended by {error}")
             return SIGNALLED + error.number
+        except Exception as error:
+            _report(error)
+            return INTERNAL_ERROR
         return code if isinstance(code, int) else DONE

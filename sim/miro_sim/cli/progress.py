@@ -15,12 +15,13 @@ PATIENCE_S = 1.0
 
 
 class ProgressBar:
-    """`bar.to(done)` out of `total`. Draws nothing in the first second, nor when stderr is not a terminal."""
+    """`bar.to(done)` out of `total`. Draws nothing in the first second, nor when stderr is no terminal or closed."""
 
     def __init__(self, what: str, total: float | None, quiet: bool = False) -> None:
         self.what = what
         self.total = total
-        self._shown = not quiet and sys.stderr.isatty()
+        stream = vars(sys)["stderr"]  # None where it is closed
+        self._shown = not quiet and stream is not None and stream.isatty()
         self._began_s = time.monotonic()
         self._progress: Progress | None = None
         self._task: TaskID | None = None

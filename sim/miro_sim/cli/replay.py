@@ -11,7 +11,7 @@ from rich.table import Table
 from miro_sim import runner
 from miro_sim.capture.recorded import runs_of
 from miro_sim.cli.options import Place, engine_option, firmware_option
-from miro_sim.cli.program import DIVERGENCE, DONE, UserError, complain, show
+from miro_sim.cli.program import DIVERGENCE, DONE, UserError, complain, plain_parameters, show
 from miro_sim.cli.progress import ProgressBar
 from miro_sim.cli.replay_job import Job, load_job
 from miro_sim.cli.run import report_faults
@@ -41,12 +41,11 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
     in files").
     """
     job, image = load_job(file, firmware, engine)
+    from miro_sim.radio.downlink import TransmissionError
     from miro_sim.world import World
 
-    try:
+    with plain_parameters(file, "replayed"):
         world = World(job.scenario, job.seed, image, script=job.script)
-    except (ValueError, ArithmeticError) as error:
-        raise UserError(f"{file}: cannot be replayed: {error}") from None
     replayed: list[Period] = []
     difference: Difference | None = None
     with ProgressBar("replaying", world.periods, quiet) as bar:
@@ -60,8 +59,9 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
             return difference is not None or len(replayed) == len(job.recorded)
 
         try:
-            runner.run(world, None, False, check)
-        except (ValueError, ArithmeticError) as error:
+            with plain_parameters(file, "replayed"):
+                runner.run(world, None, False, check)
+        except TransmissionError as error:
             raise UserError(f"{file}: cannot be replayed beyond tick {world.tick}: {error}") from None
     if not quiet:
         _print_frames(job, replayed, everything)

@@ -16,7 +16,7 @@ from miro_protocol import stream
 from miro_sim.capture.detect import detect
 from miro_sim.capture.input import HEAD_BYTES
 from miro_sim.cli.options import choose_engine, load_image
-from miro_sim.cli.program import UserError
+from miro_sim.cli.program import UserError, complain
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.mcap_writer import MAGIC
 from miro_sim.outdir import RECORDING
@@ -46,6 +46,8 @@ def load_job(file: str, firmware: str | None, engine: str | None) -> tuple[Job, 
     choose_engine(engine)
     if MAGIC.startswith(data[: len(MAGIC)]):
         recording = parse(data, file)
+        if recording.broken_off:
+            complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
         job = _job_of_recording(recording, file)
         return job, _recorded_image(recording, file) if firmware is None else load_image(firmware)
     _refuse_other_formats(data, file)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,15 +10,16 @@ import click
 from rich.table import Table
 
 from miro_sim import runner
+from miro_sim.cli.held_signals import held_signals
 from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, firmware_option, load_image
-from miro_sim.cli.program import DONE, FIRMWARE_FAULT, MAX_SEED, UserError, complain, show
+from miro_sim.cli.program import DONE, FIRMWARE_FAULT, MAX_SEED, UserError, complain, plain_parameters, show
 from miro_sim.cli.progress import ProgressBar
-from miro_sim.figure import draw
-from miro_sim.outdir import RECORDING, OutputFolder
-from miro_sim.recording import Recorder, Source
+from miro_sim.cli.run_files import RunFiles
+from miro_sim.outdir import OutputFolder
+from miro_sim.recording import Source
 from miro_sim.records import Period
 from miro_sim.scenario_file import ScenarioText, load
-from miro_sim.summary import Summary, errors_by_robot, settling_text, summarise, to_json
+from miro_sim.summary import Summary, errors_by_robot, settling_text
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
@@ -53,7 +53,12 @@ def run(
     force: bool,
     quiet: bool,
 ) -> int:
-    """Runs SCENARIO (a built-in name, or a .toml file) and writes run.mcap, figure.png and summary.json."""
+    """Runs SCENARIO (a built-in name, or a .toml file) and writes run.mcap, figure.png and summary.json.
+
+    A run that is broken off (Ctrl-C, a full disk, an error) leaves run.part.mcap and summary.part.json instead, with
+    all that was recorded; one that is killed leaves run.part.mcap with all but the last half second. decode, export
+    and replay read it. Files of an earlier run stay as they are until the new ones are complete.
+    """
     text = load(scenario)
     folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force)
     active = choose_engine(engine)
@@ -61,40 +66,14 @@ def run(
     from miro_sim.world import World
 
     source = source_of(text, seed, image, record)
-    world = World(text.scenario, seed, image)
-    failure: Exception | None = None
-    with folder as staging:
-        periods: list[Period] = []
-        wall_s = 0.0
-        with (staging / RECORDING).open("wb") as stream, Recorder(stream, source) as recorder:
-            began_s = time.perf_counter()
-            try:
-                _simulate(world, recorder, record == "full", quiet, periods)
-            except Exception as error:  # the files up to here are kept before it is reported
-                failure = error
-            wall_s = time.perf_counter() - began_s
-        summary = summarise(
-            scenario=text.scenario.name,
-            seed=seed,
-            engine=active,
-            periods=periods,
-            simulated_ticks=world.tick,
-            wall_s=wall_s,
-            counters=world.counters(),
-            firmware_sha256=image.sha256,
-        )
-        (staging / "summary.json").write_bytes(to_json(summary))
-        if periods:
-            title = text.scenario.title
-            draw(periods, staging / "figure.png", scenario=text.scenario.name, seed=seed, title=title)
-    if failure is not None:
-        complain(f"the simulation broke off; the files up to tick {world.tick} are in {folder.path}")
-        if not isinstance(failure, ArithmeticError | ValueError):
-            raise failure
-        complain(f"error: {text.origin}: {failure}; parameters far from any robot's can do this")
-        return FIRMWARE_FAULT
+    with plain_parameters(text.origin):
+        world = World(text.scenario, seed, image)
+    with plain_parameters(text.origin), held_signals() as hold, folder:
+        run_files = RunFiles(folder, source, world, active, hold)
+        bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
+        summary = run_files.fill(bar, text.scenario.title)
     if not quiet:
-        _print(summary, periods, folder.path)
+        _print(summary, run_files.periods, folder.path)
     return report_faults(world)
 
 
@@ -112,16 +91,6 @@ def source_of(text: ScenarioText, seed: int, image: Image, record: str) -> Sourc
         symbols={name: (at.address, at.space) for name, at in image.symbols.names.items()},
         record=record,
     )
-
-
-def _simulate(world: World, recorder: Recorder, full: bool, quiet: bool, periods: list[Period]) -> None:
-    with ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet) as bar:
-
-        def keep(period: Period) -> None:
-            periods.append(period)
-            bar.to(len(periods))
-
-        runner.run(world, recorder, full, keep)
 
 
 def report_faults(world: World) -> int:

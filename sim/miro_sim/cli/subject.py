@@ -28,6 +28,7 @@ from miro_sim.cli.program import (
     MAX_SEED,
     UserError,
     complain,
+    plain_parameters,
 )
 from miro_sim.cli.progress import ProgressBar
 from miro_sim.cli.replay_job import load_job
@@ -128,6 +129,7 @@ def look(run: Run, request: Request, *watchers: Watcher, early_ticks: int = 0, l
     They look on from `early_ticks` before the window to `late_ticks` behind it, as far as the run goes.
     Raises UserError when the run was over before there was anything to look at.
     """
+    from miro_sim.radio.downlink import TransmissionError
     from miro_sim.watched import watch
 
     first_tick = max(0, request.from_tick - early_ticks)
@@ -135,8 +137,9 @@ def look(run: Run, request: Request, *watchers: Watcher, early_ticks: int = 0, l
     end_tick = _earlier(run.end_tick, last_tick)
     with ProgressBar(f"running {request.subject}", end_tick) as bar:
         try:
-            reached = watch(run, watchers, first_tick, last_tick, bar.to)
-        except (ValueError, ArithmeticError) as error:
+            with plain_parameters(request.subject):
+                reached = watch(run, watchers, first_tick, last_tick, bar.to)
+        except TransmissionError as error:
             now = run.cpu.cycles * clock.CYCLE_TICKS
             raise UserError(f"{request.subject}: cannot be run beyond tick {now}: {error}") from None
     if not reached:
@@ -191,10 +194,8 @@ def _robot_run(request: Request) -> RobotRun:
     from miro_sim.watched import RobotRun
     from miro_sim.world import World
 
-    try:
+    with plain_parameters(subject):
         world = World(scenario, seed, image, script=script)
-    except (ValueError, ArithmeticError) as error:
-        raise UserError(f"{subject}: cannot be run: {error}") from None
     network, index = _which_robot(world, request)
     return RobotRun(world, network, index, periods)
 

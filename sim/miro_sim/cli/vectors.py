@@ -45,10 +45,10 @@ def vectors(out: Path, per_opcode: int, seed: int, force: bool, engine: str | No
 
     from miro_sim.rng import Stream
 
-    with folder as staging, ProgressBar("drawing", OPCODES) as bar:
+    with folder, ProgressBar("drawing", OPCODES) as bar:
         for opcode, name in enumerate(NAMES):
             draw = drawing(Stream(seed, f"vectors/mcs51/{opcode:02x}"))
-            (staging / name).write_bytes(encode(draw_vectors(opcode, per_opcode, draw)))
+            folder.part(name).write_bytes(encode(draw_vectors(opcode, per_opcode, draw)))
             bar.to(opcode + 1)
 
 

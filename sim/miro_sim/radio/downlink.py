@@ -25,6 +25,10 @@ MEMORY_TICKS = 2 * HOST_BIT_TICKS
 """How long another network's transmission is kept after its end: a bit that it spoilt may still be going on."""
 
 
+class TransmissionError(ValueError):
+    """What is to be sent does not fit what is on the air already."""
+
+
 class Downlink:
     """A transmitter with its listeners; streams are called NAME/jitter and NAME/robotK/...
 
@@ -78,18 +82,20 @@ class Downlink:
     def send(self, start_tick: int, data: bytes) -> int:
         """Transmits `data` without a gap, the first start bit at `start_tick`; returns `free_tick`.
 
-        Raises ValueError when nothing is to be sent, when the previous transmission is not over by then,
+        Raises TransmissionError when nothing is to be sent, when the previous transmission is not over by then,
         and when a robot that hears it is settled past the tick at which the carrier comes up.
         """
         if not data:
-            raise ValueError(f"{self.name}: a transmission needs at least one byte")
+            raise TransmissionError(f"{self.name}: a transmission needs at least one byte")
         if start_tick < self.free_tick:
-            raise ValueError(f"{self.name}: start at tick {start_tick}, but busy until {self.free_tick}")
+            raise TransmissionError(
+                f"{self.name}: start at tick {start_tick}, but busy until {self.free_tick}"
+            )
         lead = 0 if self.sender.always_on else self.sender.keyup
         key_tick = max(start_tick - lead, 0) + self.sender.latency
         for link in (self, *(link for link, _ in self.audience)):
             if key_tick < link.settled_tick:
-                raise ValueError(
+                raise TransmissionError(
                     f"{self.name}: the carrier for tick {start_tick} reaches the robots at tick {key_tick},"
                     f" but they are settled up to {link.settled_tick}"
                 )
