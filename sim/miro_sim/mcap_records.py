@@ -88,6 +88,7 @@ class _Container:
         self.path = path
         self.place = 0  # of the record under way
         self.checksum = 0  # of what the next section's CRC covers, so far
+        self.data_ended = False
         self.last = b""  # bytes that were read, behind the first magic
 
     def records(self) -> Iterator[tuple[int, McapRecord]]:
@@ -96,7 +97,7 @@ class _Container:
         while opcode != Opcode.FOOTER:
             head = self._read(_HEAD.size)
             if len(head) < _HEAD.size:
-                self._cut(within=None)
+                self._cut(head[0] if head else None)
             opcode, size = _HEAD.unpack(head)
             if size > LONGEST:
                 self._damaged(f"its length says {size} bytes")
@@ -129,6 +130,7 @@ class _Container:
     def _check(self, opcode: int, head: bytes, body: bytes) -> None:
         """Compares the CRC of all before DataEnd, and of all between that and the CRC itself in Footer."""
         if opcode == Opcode.DATA_END:
+            self.data_ended = True
             self._compare(body, self.checksum)
             self.checksum = 0
         elif opcode == Opcode.FOOTER:
@@ -159,7 +161,7 @@ class _Container:
         """The file ended before the record did, or (`within` None) before there was one."""
         if self.last == MAGIC:  # as a whole file ends; so what is wrong is a length
             self._damaged("its length is more than the file holds")
-        if within is None or within in _IN_CHUNKS:
+        if not self.data_ended and (within is None or within in _IN_CHUNKS):
             what = "the recording has no end: the run that wrote it was broken off"
             raise BrokenOff(self.path, f"offset {self.place}", what, "record the run again for a whole one")
         what, remedy = "the file ends in the middle of a record", "copy it again, or record the run again"

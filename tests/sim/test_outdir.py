@@ -9,16 +9,16 @@ import pytest
 from miro_sim.outdir import OutputError, OutputFolder, check_file, check_new, whole_file
 
 
-def write_run(folder: Path, text: str = "new") -> None:
+def write_run(folder: OutputFolder, text: str = "new") -> None:
     for name in ("run.mcap", "summary.json"):
-        (folder / name).write_text(text)
+        folder.part(name).write_text(text)
 
 
 def test_a_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
     target = tmp_path / "runs" / "fig6-1"
     with OutputFolder(target) as staging:
-        assert not target.exists()
         write_run(staging)
+        assert sorted(path.name for path in target.iterdir()) == ["run.part.mcap", "summary.part.json"]
     assert sorted(path.name for path in target.iterdir()) == ["run.mcap", "summary.json"]
     assert [path.name for path in target.parent.iterdir()] == ["fig6-1"]
 
@@ -62,7 +62,35 @@ def test_a_run_that_breaks_off_leaves_things_as_they_were(tmp_path: Path, kind: 
     with pytest.raises(kind):
         broken_off()
     assert (target / "run.mcap").read_text() == "old"
+    assert [path.name for path in target.iterdir()] == ["run.mcap"]
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_folder_takes_one_writer_at_a_time_and_is_free_after_it(tmp_path: Path) -> None:
+    refusal = "another process is writing into the folder; wait until it has finished"
+    early = OutputFolder(tmp_path / "new")
+    with OutputFolder(tmp_path / "new") as folder:
+        write_run(folder)
+        with pytest.raises(OutputError, match=refusal):
+            OutputFolder(tmp_path / "new", force=True)
+        with pytest.raises(OutputError, match=refusal):
+            early.__enter__()
+    with pytest.raises(OutputError, match=r"the folder is not empty \(run\.mcap, summary\.json\)"):
+        early.__enter__()  # it was filled since it was checked
+    with OutputFolder(tmp_path / "new", force=True):
+        pass
+    assert list((tmp_path / "new").iterdir()) == []
+
+
+def test_parts_of_before_are_named_and_never_taken_for_new_ones(tmp_path: Path) -> None:
+    (tmp_path / "figure.part.png").write_text("old")
+    with pytest.raises(
+        OutputError, match=r"holds what is left of a command that was broken off \(figure\.part\.png\)"
+    ):
+        OutputFolder(tmp_path)
+    with OutputFolder(tmp_path, force=True) as folder:
+        write_run(folder)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap", "summary.json"]
 
 
 def test_a_file_where_the_folder_should_be_is_refused(tmp_path: Path) -> None:
@@ -108,7 +136,7 @@ def made(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 
 def test_a_folder_that_is_there_is_filled_from_inside_because_it_may_be_another_disk(made: Path) -> None:
     with OutputFolder(made) as staging:
-        assert staging.parent.samefile(made)
+        assert staging.part("run.mcap").parent.samefile(made)
         write_run(staging)
     assert sorted(path.name for path in made.iterdir()) == ["run.mcap", "summary.json"]
 
