@@ -84,7 +84,8 @@ def export(
         tshark -X lua_script:miro.lua -d rtacser.data,miro -r run.pcapng -V
 
     A stream file is for `mirotwin replay`, for editors and for git. The same input gives the same bytes. Of an input
-    that is cut short, all that could be read is written, and the exit code is 2.
+    that is cut short, all that could be read is written, and the exit code is 2. A run that was broken off
+    (run.part.mcap) is written as far as it goes, with a note.
     """
     if out != STDIN:
         check_new(Path(out), "--out", force)

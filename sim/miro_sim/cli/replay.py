@@ -33,6 +33,7 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
     """Sends the bytes of FILE (run.mcap, or a text stream) again and compares what the robot does.
 
     Exit code 4 when it differs from the recording, also where a firmware fault comes of it: 4 goes before 3.
+    A recording that was broken off, or a part of one, is compared as far as it goes, with a note.
     A text stream runs over an ideal link in the default
     scenario, and there is nothing to compare.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from miro_sim.cli.held_signals import held_signals
 from miro_sim.cli.options import Place, Whole, choose_engine, engine_option
 from miro_sim.cli.program import MAX_SEED
 from miro_sim.cli.progress import ProgressBar
@@ -45,10 +46,12 @@ def vectors(out: Path, per_opcode: int, seed: int, force: bool, engine: str | No
 
     from miro_sim.rng import Stream
 
-    with folder, ProgressBar("drawing", OPCODES) as bar:
+    with held_signals() as hold, folder, ProgressBar("drawing", OPCODES) as bar:
         for opcode, name in enumerate(NAMES):
             draw = drawing(Stream(seed, f"vectors/mcs51/{opcode:02x}"))
-            folder.part(name).write_bytes(encode(draw_vectors(opcode, per_opcode, draw)))
+            with hold.released():
+                drawn = encode(draw_vectors(opcode, per_opcode, draw))
+            folder.part(name).write_bytes(drawn)
             bar.to(opcode + 1)
 
 

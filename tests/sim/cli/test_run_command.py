@@ -181,6 +181,23 @@ def test_output_that_cannot_be_written_is_one_line_on_stderr(arguments: list[str
     assert done.stderr == "mirotwin: error: reading or writing failed: No space left on device\n"
 
 
+@pytest.mark.parametrize("command", [("run", "--out", "out", "-q"), ("fw", "profile")])
+def test_parameters_with_which_nothing_can_be_computed_are_bad_input(
+    mirotwin: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("far.toml").write_text(SHORT + "drive.chassis.track_m = 1e-200\n")
+    words = list(command)
+    words.insert(2 if command[0] == "fw" else 1, "far.toml")
+    code, out, err = mirotwin(*words)
+    assert (code, out) == (2, "")
+    assert err == (
+        "mirotwin: error: far.toml: cannot be run: net0/robot2: what follows from its drive parameters is not"
+        " finite; parameters far from any robot's can do this\n"
+    )
+    assert [path.name for path in tmp_path.iterdir()] == ["far.toml"]
+
+
 def test_the_shortest_duration_is_one_control_period(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
     scenario = tmp_path / "shortest.toml"
     scenario.write_text(SHORT.replace("duration_s = 0.2", "duration_s = 1e-9"))
