@@ -1,7 +1,10 @@
-"""A bare board for `mirotwin fw run`: the CPU, 64 KB of external RAM, a terminal on the serial port.
+"""A bare board for `mirotwin fw run`: the CPU, 64 KB of external RAM, a terminal on the serial port, levels on pins.
 
-What belongs here: running an image to an address, a limit or its end, feeding its serial input, and dumping
-its memory. The robot's board with its motion controllers is `board.py`.
+What belongs here: running an image to an address, a limit or its end, and dumping its memory. What comes in on RXD is
+`bare_input.py`, what comes in on other pins `bare_pins.py`, the robot's board with its motion controllers `board.py`.
+
+A program has ended when no input can make it do anything more: in power-down, asleep with nothing that could wake it,
+or in a jump to itself while no interrupt is enabled. The run goes on until the last character has been sent.
 """
 
 from __future__ import annotations
@@ -10,23 +13,22 @@ from collections.abc import Callable
 from enum import StrEnum
 from typing import Any
 
+from miro_robot.bare_input import Piece, SerialInput
+from miro_robot.bare_pins import PinEvent, PinInput
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
-from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
+from miro_robot.mcs51.cpu import ASLEEP, BREAKPOINT, Cpu
 from miro_robot.mcs51.line import FAR
 from miro_robot.mcs51.opcodes import jumps_to_itself
 from miro_robot.mcs51.xram import XramBus
 from miro_robot.saved import octets, wholes
 
 CRYSTAL_HZ = 24_000_000
-_SLICE = 200_000  # cycles between two looks at the world when nothing is to be fed
-_LISTENING_SLICE = 1_000  # ... while input waits for somebody to listen
-_POLLS = 32  # reads of P3 within such a slice that count as listening on RXD
-_MARGIN_TICKS = 240  # the CPU may look this far beyond the end of a run
+CRYSTAL_RANGE_HZ = (32_768, 100_000_000)
+_SLICE = 200_000  # cycles after which a jump to itself that interrupts left is looked at anew
 _FAULTS_KEPT = 100
-_RI = 0x01
 _EA, _SOURCES = 0x80, 0x3F  # of IE
-_CHARACTER_BITS = 10
+_NEVER = 1 << 61  # tick from which on nothing is being sent: the transmitter is idle, or has no clock
 
 
 class Ended(StrEnum):
@@ -42,10 +44,11 @@ class Ended(StrEnum):
 class BareMachine:
     """One AT89C52 with RAM and a terminal.
 
-    `stdin` is sent to the serial port byte by byte: the first as soon as the receiver is on, or software
-    polls P3 for a start bit; each next one when RI of the one before was cleared. The rate is the one the
-    receiver is programmed for, or `baud`, which also serves a program that measures its first character.
+    `stdin` is sent to the serial port byte by byte, see `SerialInput`: plain bytes as soon as the program listens.
+    The rate is the one the receiver is programmed for, or `baud`, which also serves a program that measures its first
+    character. `live`: `input.add` may add more at any time. `pins` are put on the ports.
     `output` gets the characters sent. With `code_in_xram`, program and data share one 64 KB space (EA low).
+    A machine cycle is 12 periods of the crystal, a tick one. Raises ValueError for parameters out of range.
     """
 
     NOT_STATE = ("image", "loops", "output", "stop_on_fault")
@@ -54,32 +57,41 @@ class BareMachine:
         self,
         image: Image,
         code_in_xram: bool = False,
-        stdin: bytes = b"",
+        stdin: bytes | tuple[Piece, ...] = b"",
         baud: int | None = None,
         output: Callable[[bytes], object] | None = None,
         stop_on_fault: bool = True,
+        crystal_hz: int = CRYSTAL_HZ,
+        gap_ticks: int = 0,
+        live: bool = False,
+        pins: tuple[PinEvent, ...] = (),
     ) -> None:
-        if baud is not None and not 50 <= baud <= 750_000:
-            raise ValueError(f"baud {baud} is outside 50..750000")
+        if not CRYSTAL_RANGE_HZ[0] <= crystal_hz <= CRYSTAL_RANGE_HZ[1]:
+            raise ValueError(
+                f"crystal {crystal_hz} Hz is outside {CRYSTAL_RANGE_HZ[0]}..{CRYSTAL_RANGE_HZ[1]}"
+            )
         self.image = image
         self.output = output
         self.stop_on_fault = stop_on_fault
         self.loops = _loops(image)
-        self.faults: list[FirmwareFault] = []
-        self.stdin = stdin
-        self.baud = baud
-        self.fed = 0  # bytes of stdin sent so far
-        self.char_end = 0  # tick at which the last of them ends
-        self.polls = 0  # reads of P3 seen so far
-        self.next_feed = 0  # cycle at which to look after stdin
-        self.next_check = 0  # ... and at which to ask whether the program has ended, which changes nothing
-        self.ends: tuple[int, ...] = ()  # where it would end, if it came there before the next check
+        self.faults: list[FirmwareFault] = []  # the first hundred
+        self.faults_lost = 0  # how many more there were
+        self.next_feed = 0  # cycle at which to look after the inputs
+        self.next_check = 0  # ... and at which to set `ends` anew
+        self.ends: tuple[int, ...] = ()  # jumps to themselves that may be its end
+        self.dead = False  # it has ended; what it sent may still be on its way
         self.bus = XramBus(self._sent, self._faulted)
         self.cpu = Cpu(self.bus)
+        self.cpu.stop_asleep = 1
         self.cpu.load(image.code, image.used)
         if code_in_xram:
             self.bus.fill(image.code)
             self.bus.code_of = self.cpu
+        pieces = (Piece(stdin),) if isinstance(stdin, bytes) else stdin
+        self.input = SerialInput(self.cpu, pieces, baud, crystal_hz, gap_ticks, live)
+        self.pins = PinInput(self.cpu, pins)
+        if self.pins.uses_rxd and (live or self.input.pieces):
+            raise ValueError("P3.0 is RXD and cannot be a pin while serial input is sent there")
 
     def run(
         self,
@@ -88,39 +100,81 @@ class BareMachine:
         progress: Callable[[int], object] | None = None,
         pause: int | None = None,
     ) -> Ended:
-        """Until the instruction at `until` is next, or `cycles` >= `max_cycles`, or a fault.
+        """Until the instruction at `until` is next, the program has ended, `cycles` >= `max_cycles`, or a fault.
 
-        Without `max_cycles` a dead end (a jump to itself or idle mode that nothing can leave) ends it as well.
         `pause`: cycle at which to come back for the time being.
-
         `progress` is called with the cycle count every now and then.
         """
         limit = FAR if max_cycles is None else max_cycles
         stop = limit if pause is None else min(limit, pause)
-        faults = len(self.faults)
-        places = () if until is None else (until,)
+        faults = len(self.faults) + self.faults_lost
         while self.cpu.cycles < stop:
-            if self.cpu.cycles >= self.next_feed:
-                self.next_feed = self._feed()
-            if max_cycles is not None:
-                reason = self.cpu.run_until_any(places, min(self.next_feed, stop))
-            else:
-                if self.cpu.cycles >= self.next_check:
-                    if self.cpu.cycles and self.cpu.pc != until and self._halted():
-                        return Ended.HALTED
-                    self._expect_end()
-                end = min(self.next_feed, self.next_check, stop)
-                reason = self.cpu.run_until_any((*self.ends, *places), end)
-            if reason == BREAKPOINT and self.cpu.pc == until:
+            if self.dead:
+                if self.cpu.cycles >= self._silent_cycle():
+                    return Ended.HALTED
+                self._sleep_on(min(self._silent_cycle(), stop))
+                continue
+            if self._run_on(until, stop):
                 return Ended.UNTIL
-            if reason == BREAKPOINT:
-                self.cpu.step()
-                self.next_check = self.cpu.cycles
-            if self.stop_on_fault and len(self.faults) > faults:
+            if self.stop_on_fault and len(self.faults) + self.faults_lost > faults:
                 return Ended.FAULT
             if progress is not None:
                 progress(self.cpu.cycles)
         return Ended.CYCLES if self.cpu.cycles >= limit else Ended.PAUSED
+
+    def _run_on(self, until: int | None, stop: int) -> bool:
+        """To the next look at the inputs, or what comes before; whether that is `until`."""
+        cpu = self.cpu
+        if cpu.cycles >= self.next_feed:
+            self.next_feed = min(self.input.feed(), self.pins.feed())
+        if cpu.cycles >= self.next_check:
+            self.ends = tuple(place for place in self.loops if jumps_to_itself(cpu.code_at, place))
+            self.next_check = cpu.cycles + _SLICE
+        end = min(self.next_feed, self.next_check, stop)
+        reason = cpu.run_until_any(self.ends if until is None else (*self.ends, until), end)
+        if reason == BREAKPOINT and cpu.pc == until:
+            return True
+        if reason == BREAKPOINT:
+            self._jump_to_itself()
+        elif reason == ASLEEP and (
+            cpu.powered_down or self.pins.next_tick == FAR or not self._interruptible()
+        ):
+            self.dead = True
+        elif reason == ASLEEP:
+            self._sleep_on(end)
+        return False
+
+    def _jump_to_itself(self) -> None:
+        """Executes it once: the end, or a place where the program waits for interrupts."""
+        place = self.cpu.pc
+        self.cpu.step()
+        if self.cpu.pc == place and not self._interruptible():
+            self.dead = True
+        else:
+            self.ends = tuple(end for end in self.ends if end != place)
+
+    def _sleep_on(self, until_cycle: int) -> None:
+        """Runs without asking what could wake the CPU."""
+        self.cpu.stop_asleep = 0
+        self.cpu.run(until_cycle)
+        self.cpu.stop_asleep = 1
+
+    def _silent_cycle(self) -> int:
+        """The cycle in which the last character has been sent; 0 if nothing is being sent."""
+        chip = self.cpu.chip
+        tick = min(chip.uart.ti_tick(), chip.shift.flag_tick())
+        return 0 if self.cpu.powered_down or tick >= _NEVER else tick // 12 + 1
+
+    def _interruptible(self) -> bool:
+        enabled = self.cpu.sfr(0xA8)
+        return bool(enabled & _EA and enabled & _SOURCES)
+
+    def changed_code(self) -> list[int]:
+        """Addresses of the image whose bytes the program has replaced; only `code_in_xram` lets it."""
+        if self.bus.code_of is None:
+            return []
+        now, image = self.bus.content(), self.image
+        return [at for first, end in image.used for at in range(first, end) if now[at] != image.code[at]]
 
     def dump(self) -> dict[str, object]:
         """Registers and memories; SFRs by two hex digits, ports at their latches."""
@@ -135,6 +189,7 @@ class BareMachine:
         }
 
     def _sent(self, value: int, tick: int) -> None:
+        self.input.heard(value, tick)
         if self.output is not None:
             self.output(bytes([value]))
 
@@ -142,72 +197,10 @@ class BareMachine:
         if len(self.faults) < _FAULTS_KEPT:
             symbol = self.image.symbols.name_at(pc)
             self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol))
+        else:
+            self.faults_lost += 1
         if self.stop_on_fault:
             self.cpu.request_stop()
-
-    def _halted(self) -> bool:
-        """Nothing is being sent or waits to be received, and no instruction will ever change a thing."""
-        cpu = self.cpu
-        unread = cpu.sfr(0x98) & _RI or not cpu.chip.bit_ticks()  # then no further character will be sent
-        coming = self.fed < len(self.stdin) and not unread
-        if coming or 12 * cpu.cycles < self.char_end or cpu.chip.uart.ti_tick() < FAR:
-            return False
-        if cpu.asleep():
-            return True
-        return not self._interruptible() and jumps_to_itself(cpu.code_at, cpu.pc)
-
-    def _interruptible(self) -> bool:
-        enabled = self.cpu.sfr(0xA8)
-        return bool(enabled & _EA and enabled & _SOURCES)
-
-    def _expect_end(self) -> None:
-        """Finds out where the program might end, and when to ask again."""
-        cpu = self.cpu
-        self.ends = ()
-        self.next_check = cpu.cycles + _SLICE
-        if not self._interruptible():
-            self.ends = tuple(place for place in self.loops if jumps_to_itself(cpu.code_at, place))
-        if cpu.cycles and cpu.pc in self.ends:  # it is there already; what is being sent may end any time
-            self.ends = ()
-            self.next_check = cpu.cycles + _LISTENING_SLICE
-
-    def _feed(self) -> int:
-        """Puts the next character on RXD if it is time, and says how far to run now."""
-        now = self.cpu.cycles
-        rxd = self.cpu.rxd
-        if self.fed == len(self.stdin):
-            rxd.settled_tick = FAR
-            return now + _SLICE
-        if 12 * now >= self.char_end and self._listening():
-            self._send(self.stdin[self.fed], 12 * now + _MARGIN_TICKS)
-            self.fed += 1
-        end = now + _LISTENING_SLICE
-        rxd.settled_tick = 12 * end + _MARGIN_TICKS
-        return end
-
-    def _listening(self) -> bool:
-        """Whether a character sent now would be heard: by the receiver with RI down, or by software
-        polling.
-        """
-        reads = self.cpu.chip.p3_reads
-        polling = reads - self.polls >= _POLLS
-        self.polls = reads
-        if self.cpu.chip.bit_ticks():
-            return not self.cpu.sfr(0x98) & _RI
-        return polling and self.baud is not None
-
-    def _send(self, value: int, start: int) -> None:
-        """Start bit, eight data bits, stop bit."""
-        bits = value << 1 | 1 << (_CHARACTER_BITS - 1)
-        for number in range(_CHARACTER_BITS):
-            self.cpu.rxd.append(start + self._bit_offset(number), bits >> number & 1)
-        self.char_end = start + self._bit_offset(_CHARACTER_BITS)
-
-    def _bit_offset(self, number: int) -> int:
-        """Ticks from the start of a character to its bit `number`."""
-        if self.baud is None:
-            return number * self.cpu.chip.bit_ticks()
-        return (2 * number * CRYSTAL_HZ + self.baud) // (2 * self.baud)
 
     def snapshot(self) -> dict[str, object]:
         return {
@@ -215,17 +208,17 @@ class BareMachine:
             "bus": self.bus.snapshot(),
             "loaded": bytes(self.cpu.is_loaded(address) for address in range(0x10000)),
             "faults": [(int(fault.kind), fault.tick, fault.pc) for fault in self.faults],
-            "stdin": self.stdin,
-            "baud": self.baud,
-            "fed": self.fed,
-            "char_end": self.char_end,
-            "polls": self.polls,
+            "faults_lost": self.faults_lost,
+            "input": self.input.snapshot(),
+            "pins": self.pins.snapshot(),
             "next_feed": self.next_feed,
             "next_check": self.next_check,
             "ends": self.ends,
+            "dead": self.dead,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
+        """What `snapshot` gave, of a machine with the same image and pins."""
         self.bus.restore(state["bus"])
         self.cpu.load(self.image.code, ())
         code = self.bus.content() if self.bus.code_of is not None else self.image.code
@@ -237,14 +230,13 @@ class BareMachine:
         self.faults = [
             FirmwareFault(FaultKind(k), tick, pc, names.name_at(pc)) for k, tick, pc in state["faults"]
         ]
-        self.stdin = state["stdin"]
-        self.baud = state["baud"]
-        self.fed = state["fed"]
-        self.char_end = state["char_end"]
-        self.polls = state["polls"]
+        self.faults_lost = state["faults_lost"]
+        self.input.restore(state["input"])
+        self.pins.restore(state["pins"])
         self.next_feed = state["next_feed"]
         self.next_check = state["next_check"]
         self.ends = tuple(wholes(state, "ends", len(state["ends"]), 0, 0xFFFF))
+        self.dead = bool(state["dead"])
 
 
 def _loops(image: Image) -> tuple[int, ...]:

@@ -29,6 +29,7 @@ cdef class Cpu(Executor):
     cdef long long next_mark
     cdef long long marks
     cdef readonly int code_limit
+    cdef public int stop_asleep
     cdef public object inspector
 
     @cython.locals(address=int)

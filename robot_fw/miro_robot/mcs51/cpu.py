@@ -18,7 +18,9 @@ from miro_robot.mcs51.execute import BREAKPOINT, REACHED, STOPPED, WIRE_FULL, Ex
 from miro_robot.mcs51.peripherals import Peripherals
 from miro_robot.saved import tick, whole
 
-__all__ = ["BREAKPOINT", "REACHED", "STOPPED", "WIRE_FULL", "Cpu"]
+__all__ = ["ASLEEP", "BREAKPOINT", "REACHED", "STOPPED", "WIRE_FULL", "Cpu"]
+
+ASLEEP = 4  # why a run ended, beside those of `execute.py`: with `stop_asleep`, nothing known wakes it
 
 _FAR = 1 << 62
 _OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py; both: a mark outside
@@ -60,6 +62,7 @@ class Cpu(Executor):
         "next_mark",
         "rxd",
         "stop",
+        "stop_asleep",
         "txd",
     )
 
@@ -77,6 +80,9 @@ class Cpu(Executor):
         self.next_mark = _FAR
         self.marks = 0  # marks passed since interrupts took over
         self.code_limit = 0x10000
+        self.stop_asleep = (
+            0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes the CPU
+        )
         self.inspector: Inspector | None = None
         for address in range(0x10000):
             self.write_code(address, 0xFF)
@@ -226,6 +232,9 @@ class Cpu(Executor):
         if self.next_mark < event:
             event = self.next_mark
         if (self.idle or self.powered_down) and now < event:
+            if self.stop_asleep and (self.powered_down or self.next_event >= _FAR):
+                self.stop = ASLEEP
+                return 1
             self.idle_cycles += event - now
             self.cycles = event
         self.limit = event

@@ -19,6 +19,7 @@ cdef int _S5P2
 cdef int _SERIAL, _TIMER2
 cdef int _REN
 cdef long long _NO_PERIOD
+cdef long long _STOPPED
 
 cdef class Peripherals:
     cdef Bus bus

@@ -32,6 +32,7 @@ _S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows
 _SERIAL, _TIMER2 = 0x10, 0x20  # in IE
 _REN = 0x10  # in SCON
 _NO_PERIOD = 1 << 40  # of a clock that stands
+_STOPPED = 1 << 61  # ticks from here on never come: the serial port has no clock, or nothing to do
 
 
 class Peripherals:
@@ -154,9 +155,10 @@ class Peripherals:
         if enabled & _SERIAL:
             if self.serial_wait < 0:
                 self.settle()
-            flag = (self.serial_wait + 2) // 12 + 2
-            if flag < event:
-                event = flag
+            if self.serial_wait < _STOPPED:
+                flag = (self.serial_wait + 2) // 12 + 2
+                if flag < event:
+                    event = flag
         return event
 
     def serial_tick(self) -> int:

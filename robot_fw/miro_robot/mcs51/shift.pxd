@@ -26,4 +26,4 @@ cdef class Shift:
     cdef int _bit(self, long long tick) except -1
     @cython.locals(tick='long long', flag=int)
     cdef int _finish(self) except -1
-    cdef long long flag_tick(self) noexcept
+    cpdef long long flag_tick(self) noexcept

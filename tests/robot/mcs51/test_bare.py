@@ -192,7 +192,8 @@ def test_a_program_may_wave_with_p3_1_as_long_as_it_likes():
 
 def test_progress_is_told_and_the_dump_has_the_registers():
     told = []
-    machine = BareMachine(image("SETB EA\nMOV B,#12h\nloop:\nSJMP loop"))
+    machine = BareMachine(image("SETB EA\nMOV B,#12h\nloop:\nNOP\nSJMP loop"))
+    assert machine.run(until=6, max_cycles=500_000, progress=told.append) == Ended.UNTIL
     assert machine.run(max_cycles=500_000, progress=told.append) == Ended.CYCLES
     assert told[-1] == machine.cpu.cycles
     dump = machine.dump()
@@ -215,12 +216,98 @@ def test_a_saved_machine_goes_on_with_the_same_bits():
     assert other.snapshot() == machine.snapshot()
 
 
-def test_a_senseless_baud_rate_is_refused():
-    with pytest.raises(ValueError, match="baud 5 is outside"):
-        BareMachine(image("NOP"), baud=5)
+@pytest.mark.parametrize(
+    ("baud", "crystal_hz", "said"), [(5, 24_000_000, "750000"), (400_000, 11_059_200, "345600")]
+)
+def test_a_baud_rate_that_no_receiver_reaches_is_refused(baud, crystal_hz, said):
+    with pytest.raises(ValueError, match=f"baud {baud} is outside 50..{said} at {crystal_hz} Hz"):
+        BareMachine(image("NOP"), baud=baud, crystal_hz=crystal_hz)
 
 
-def test_a_dead_end_runs_on_to_the_cycle_limit_if_there_is_one() -> None:
-    machine = BareMachine(image("SJMP $"))
-    assert machine.run(max_cycles=1000) == Ended.CYCLES
-    assert 1000 <= machine.cpu.cycles <= 1001
+def test_a_crystal_that_no_8051_has_is_refused():
+    with pytest.raises(ValueError, match="crystal 5 Hz is outside"):
+        BareMachine(image("NOP"), crystal_hz=5)
+
+
+def test_a_limit_does_not_keep_a_program_from_ending() -> None:
+    machine = BareMachine(image("NOP\nSJMP $"))
+    assert machine.run(max_cycles=1000) == Ended.HALTED
+    assert machine.cpu.cycles == 3
+    assert BareMachine(image("NOP\nSJMP $")).run(max_cycles=1) == Ended.CYCLES
+
+
+@pytest.mark.parametrize("limit", [None, 1_000_000])
+@pytest.mark.parametrize(
+    ("text", "cycles"),
+    [
+        ("MOV PCON,#01h", 2),
+        ("MOV PCON,#02h", 2),
+        ("MOV IE,#90h\nMOV PCON,#01h", 4),
+        ("MOV IE,#90h\nMOV SCON,#50h\nMOV PCON,#01h", 6),
+        ("MOV IE,#85h\nMOV PCON,#01h", 4),
+        ("MOV IE,#8Ah\nMOV PCON,#01h", 4),
+        ("SETB TR0\nMOV IE,#82h\nMOV PCON,#02h", 5),
+    ],
+    ids=["idle", "power-down", "serial off", "serial on", "pins", "timers off", "timer that stands"],
+)
+def test_a_program_that_sleeps_for_good_ends_in_that_cycle(text, cycles, limit):
+    machine = BareMachine(image(text + "\nSJMP $"))
+    assert machine.run(max_cycles=limit) == Ended.HALTED
+    assert machine.cpu.cycles == cycles
+
+
+def test_a_sleep_that_a_timer_ends_is_no_end():
+    text = "LJMP main\nORG 000Bh\nINC 30h\nRETI\nmain:\nMOV TMOD,#02h\nSETB TR0\nMOV IE,#82h\n"
+    machine = BareMachine(image(text + "again:\nMOV PCON,#01h\nSJMP again"))
+    assert machine.run(max_cycles=5_000) == Ended.CYCLES
+    assert machine.cpu.peek_iram(0x30) > 10
+
+
+def test_input_that_is_still_to_come_wakes_a_sleeper():
+    text = "LJMP main\nORG 0023h\nMOV A,SBUF\nCLR RI\nMOV 30h,A\nRETI\nmain:\n" + SERIAL
+    machine = BareMachine(image(text + "MOV IE,#90h\nagain:\nMOV PCON,#01h\nSJMP again"), stdin=b"xyz")
+    assert machine.run() == Ended.HALTED
+    assert machine.cpu.peek_iram(0x30) == ord("z")
+    woken = machine.cpu.cycles
+    assert machine.run(pause=woken + 100_000) == Ended.HALTED
+    assert (machine.cpu.cycles, machine.cpu.idle) == (woken, 1)
+
+
+@pytest.mark.parametrize("sleep", ["SJMP $", "MOV PCON,#01h"])
+@pytest.mark.parametrize("mode", ["", "MOV SCON,#00h\n"], ids=["uart", "shift register"])
+def test_a_run_ends_with_the_last_character_that_is_being_sent(sleep, mode):
+    out = bytearray()
+    machine = BareMachine(image(SERIAL + mode + "MOV SBUF,#41h\n" + sleep), output=out.extend)
+    assert machine.run() == Ended.HALTED
+    assert bytes(out) == b"A"
+    assert machine.cpu.sfr(0x98) & 0x02  # TI
+    shorter = BareMachine(image(SERIAL + mode + "MOV SBUF,#41h\n" + sleep))
+    assert shorter.run(pause=machine.cpu.cycles - 2) == Ended.PAUSED
+    assert not shorter.cpu.sfr(0x98) & 0x02
+
+
+def test_power_down_stops_the_transmitter_too():
+    out = bytearray()
+    machine = BareMachine(image(SERIAL + "MOV SBUF,#41h\nMOV PCON,#02h"), output=out.extend)
+    assert machine.run() == Ended.HALTED
+    assert (bytes(out), machine.cpu.cycles) == (b"", 12)
+
+
+def test_interrupts_that_are_switched_off_at_the_end_do_not_hide_it():
+    wait = "MOV R7,#200\nwait:\nDJNZ R7,wait\n"
+    machine = BareMachine(image("SETB ET0\nSETB EA\n" + wait + "CLR EA\nSJMP $"))
+    assert machine.run() == Ended.HALTED
+    assert machine.cpu.cycles == 1 + 1 + 1 + 400 + 1 + 2
+
+
+def test_faults_beyond_a_hundred_are_counted():
+    machine = BareMachine(image("loop:\nDB 0A5h\nSJMP loop"), stop_on_fault=False)
+    assert machine.run(max_cycles=3 * 130) == Ended.CYCLES
+    assert (len(machine.faults), machine.faults_lost) == (100, 30)
+
+
+def test_code_that_data_has_overwritten_is_known():
+    store = "MOV DPTR,#0002h\nMOV A,#77h\nMOVX @DPTR,A\nMOV DPTR,#4000h\nMOVX @DPTR,A\nSJMP $"
+    shared, apart = BareMachine(image(store), code_in_xram=True), BareMachine(image(store))
+    assert shared.run() == apart.run() == Ended.HALTED
+    assert (shared.changed_code(), apart.changed_code()) == ([2], [])
