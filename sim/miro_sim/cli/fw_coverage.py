@@ -73,5 +73,5 @@ def coverage(request: Request, out: Path | None, append: bool, force: bool, sour
 
 
 def _check(path: Path, request: Request, may_be_there: bool) -> None:
-    check_not_input(path, "--out", request.subject, request.firmware, request.stdin)
+    check_not_input(path, "--out", *request.files)
     check_new(path, "--out", may_be_there, more="add to it with --append, ")

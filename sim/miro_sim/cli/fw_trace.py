@@ -30,7 +30,7 @@ def trace(request: Request, symbols: tuple[str, ...], out: Path | None, force: b
     A line stands for one instruction, one call of an interrupt routine, or one stretch of sleep.
     """
     if out is not None:
-        check_not_input(out, "--out", request.subject, request.firmware, request.stdin)
+        check_not_input(out, "--out", *request.files)
         check_new(out, "--out", force)
     run = open_run(request)
     from miro_robot.inspect.symbol_names import SymbolNames

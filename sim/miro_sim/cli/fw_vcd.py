@@ -36,7 +36,7 @@ def vcd(request: Request, out: Path, force: bool) -> int:
     """
     save = out.with_suffix(SAVE_SUFFIX)
     for path in (out, save):
-        check_not_input(path, "--out", request.subject, request.firmware, request.stdin)
+        check_not_input(path, "--out", *request.files)
         check_new(path, "--out", force)
     if save == out:
         raise UserError(f"--out {out}: that is the save file's name; give the VCD file another ending, .vcd")

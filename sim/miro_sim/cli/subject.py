@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import functools
 import os
-import re
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,21 +16,21 @@ import click
 import msgspec
 
 from miro_sim import clock
-from miro_sim.cli.code_place import FLASH_BYTES, SPACE_BYTES, address_of, place_of
-from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, firmware_option, load_image
-from miro_sim.cli.program import (
-    DONE,
-    EXPECTATION_FAILED,
-    FIRMWARE_FAULT,
-    LIMIT_REACHED,
-    MAX_SEED,
-    UserError,
-    complain,
-    plain_parameters,
+from miro_sim.cli.bare_options import (
+    BareRequest,
+    Moment,
+    Time,
+    bare_options,
+    load_bare_image,
+    make_machine,
+    report,
+    take_bare,
+    target_of,
 )
+from miro_sim.cli.options import Place, Whole, choose_engine, engine_option, firmware_option, load_image
+from miro_sim.cli.program import MAX_SEED, UserError, plain_parameters
 from miro_sim.cli.progress import ProgressBar
 from miro_sim.cli.replay_job import load_job
-from miro_sim.inputs import read_input
 from miro_sim.scenario_file import builtin_names, load
 
 if TYPE_CHECKING:
@@ -42,19 +40,6 @@ if TYPE_CHECKING:
     from miro_sim.world import World
 
 IMAGE_SUFFIXES = (".ihx", ".hex", ".ihex")
-UNITS = {"": Fraction(1), "s": Fraction(24_000_000), "ms": Fraction(24_000), "us": Fraction(24)}
-
-
-class Moment(click.ParamType):  # type: ignore[type-arg, unused-ignore]
-    """A tick of 24 MHz, or a time with its unit (1.5s, 20ms, 100us), as a tick."""
-
-    name = "TIME"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        match = re.fullmatch(r"(\d{1,18}(?:\.\d{1,18})?)(s|ms|us|)", str(value))
-        if match is None or (not match[2] and "." in match[1]):
-            self.fail(f"{value!r} is no time; give ticks, or a number with s, ms or us.", param, ctx)
-        return int(Fraction(match[1]) * UNITS[match[2]])
 
 
 class Request(msgspec.Struct, frozen=True):
@@ -65,14 +50,15 @@ class Request(msgspec.Struct, frozen=True):
     firmware: str | None
     network: int | None
     robot: int | None
-    until: str | None
-    max_cycles: int | None
-    stdin: str | None
-    baud: int | None
-    code_in_xram: bool
     from_tick: int
     to_tick: int | None
     engine: str | None
+    bare: BareRequest
+
+    @property
+    def files(self) -> tuple[str | None, ...]:
+        """What is read, and so must not be written."""
+        return (self.subject, self.firmware, *self.bare.files)
 
 
 _OPTIONS: tuple[Callable[[Any], Any], ...] = (
@@ -83,11 +69,7 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     firmware_option("Scenario, recording, stream: image to run instead of its own."),
     click.option("--network", type=Whole(0), help="Which network's robot. Default 0."),
     click.option("--robot", type=Whole(0, 4), help="Slot of the robot. Default: the first there is."),
-    click.option("--until", metavar="SYMBOL|ADDRESS", help="Image: stop before the instruction there."),
-    click.option("--max-cycles", type=Whole(1), metavar="N", help="Image: give up after N cycles, exit code 42."),
-    click.option("--stdin", "stdin", type=Place(), metavar="FILE", help="Image: bytes for the serial port."),
-    click.option("--baud", type=Whole(50, 750_000), help="Image: bit rate of --stdin; default as fw run."),
-    click.option("--code-in-xram", is_flag=True, help="Image: EA low, program and data share 64 KB."),
+    bare_options("Image: "),
     engine_option,
 )  # fmt: skip
 
@@ -97,7 +79,12 @@ def subject_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(command)
     def gathered(**given: Any) -> Any:
-        request = Request(**{name: given.pop(name) for name in Request.__struct_fields__})
+        bare = take_bare(given)
+        for name in ("from_tick", "to_tick"):
+            time: Time | None = given[name]
+            given[name] = None if time is None else time.ticks(bare.crystal_hz)
+        names = [name for name in Request.__struct_fields__ if name != "bare"]
+        request = Request(**{name: given.pop(name) for name in names}, bare=bare)
         return command(request=request, **given)
 
     with_options: Callable[..., Any] = gathered
@@ -165,19 +152,16 @@ def _refuse(request: Request, kind: str, *options: str) -> None:
 def _bare_run(request: Request) -> BareRun:
     _refuse(request, "an image on the bare processor", "seed", "firmware", "network", "robot")
     choose_engine(request.engine)
-    image = load_image(request.subject, SPACE_BYTES if request.code_in_xram else FLASH_BYTES)
-    until = None if request.until is None else address_of(request.until, image, request.subject, "--until")
-    stdin = b"" if request.stdin is None else read_input(request.stdin)
-    from miro_robot.bare import BareMachine
-
+    image = load_bare_image(request.subject, request.bare)
+    until = target_of(request.subject, image, request.bare)
     from miro_sim.watched import BareRun
 
-    machine = BareMachine(image, code_in_xram=request.code_in_xram, stdin=stdin, baud=request.baud)
-    return BareRun(machine, until, request.max_cycles)
+    return BareRun(make_machine(image, request.bare), until, request.bare.max_cycles)
 
 
 def _robot_run(request: Request) -> RobotRun:
-    _refuse(request, "no image", "until", "max_cycles", "stdin", "baud", "code_in_xram")
+    for option in request.bare.given():
+        raise UserError(f"{request.subject}: is no image, {option} does not apply to it; leave it out")
     subject = request.subject
     is_path = os.path.exists(subject) or "/" in subject or "\\" in subject
     periods = None
@@ -220,25 +204,13 @@ def _which_robot(world: World, request: Request) -> tuple[int, int]:
 
 def _verdict(run: Run, request: Request) -> int:
     """Says on stderr why a run ended that did not end as planned."""
-    from miro_robot.bare import Ended
-
     from miro_sim.cli.run import report_faults
     from miro_sim.watched import BareRun, RobotRun
 
     if isinstance(run, RobotRun):
         return report_faults(run.world)
     assert isinstance(run, BareRun)
-    place = f"{place_of(run.cpu.pc, run.image)} after {run.cpu.cycles} machine cycles"
-    if run.machine.faults:
-        complain(f"firmware fault: {run.machine.faults[0]}")
-        return FIRMWARE_FAULT
-    if run.ended is Ended.CYCLES:
-        complain(f"gave up at {place}")
-        return LIMIT_REACHED
-    if run.ended is Ended.HALTED:
-        complain(f"the firmware ended at {place}; no interrupt can wake it")
-        return DONE if request.until is None else EXPECTATION_FAILED
-    return DONE
+    return report(run.machine, run.ended, request.bare)
 
 
 def image_name(run: Run) -> str:

@@ -57,12 +57,16 @@ def test_a_program_that_ends_is_done_unless_it_should_have_got_somewhere(
     assert mirotwin("fw", "run", image, "--until", "0x10")[0] == 1
 
 
-def test_the_cycle_limit_wins_over_an_endless_loop(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_an_endless_loop_ends_a_program_that_has_a_cycle_limit_too(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
     image = hex_file(tmp_path / "a.ihx", b"\x00" + LOOP)
-    for limit in (1, 2, 3, 1000, 1001, 100_000):
+    code, _, err = mirotwin("fw", "run", image, "--max-cycles", 1)
+    assert (code, err) == (42, "mirotwin: gave up at 0x0001 after 1 machine cycles\n")
+    for limit in (4, 1000, 100_000):
         code, _, err = mirotwin("fw", "run", image, "--max-cycles", limit)
-        assert code == 42
-        assert err.startswith("mirotwin: gave up at 0x0001")
+        assert code == 0
+        assert err.startswith("mirotwin: the firmware ended at 0x0001 after 3 machine cycles")
 
 
 def test_a_fault_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
