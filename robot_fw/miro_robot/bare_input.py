@@ -106,7 +106,7 @@ class SerialInput:
         start = max(self.begin_tick, 12 * now + MARGIN_TICKS)
         if self.char_end:
             start = max(start, self.char_end + self.gap_ticks)
-        if self.pieces and 12 * now >= self.char_end and start < 12 * end and listening:
+        if self.pieces and 12 * now >= self.char_end and start < 12 * end + 2 * MARGIN_TICKS and listening:
             self._send(start)
         if self.live or (self.pieces and not self.waiting_for):
             self.cpu.rxd.settled_tick = 12 * end + MARGIN_TICKS

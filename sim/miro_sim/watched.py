@@ -15,14 +15,16 @@ from miro_robot.image import Image
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from miro_robot.mcs51.cpu import Cpu
 
-from miro_sim.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS
+from miro_sim.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, TICKS_PER_SECOND
 from miro_sim.world import World
 
 PIECE_TICKS = CONTROL_PERIOD_TICKS
 
 
 class Run(Protocol):
-    """`board` is None on the bare CPU; `end_tick` is where the run ends by itself, None if nobody knows."""
+    """`board` is None on the bare CPU. `end_tick`: tick at which the run ends by itself, None if unknown. `tick_hz`:
+    the crystal, one tick a period.
+    """
 
     @property
     def cpu(self) -> Cpu: ...
@@ -33,7 +35,12 @@ class Run(Protocol):
     @property
     def end_tick(self) -> int | None: ...
     @property
+    def tick_hz(self) -> int: ...
+    @property
     def over(self) -> bool: ...
+    def tell_pins(self, told: Callable[[int, int, int], object]) -> None:
+        """`told(tick, port, levels)` gets what a file puts on the pins of the bare CPU."""
+
     def to(self, tick: int) -> None:
         """Moves on to `tick`, or to the end of the run."""
 
@@ -50,6 +57,10 @@ class RobotRun:
         self.cpu = world.networks[network].robots[index].board.cpu
         self.image = world.image
         self.end_tick: int | None = (periods or world.periods) * CONTROL_PERIOD_TICKS
+        self.tick_hz = TICKS_PER_SECOND
+
+    def tell_pins(self, told: Callable[[int, int, int], object]) -> None:
+        """A board drives all its pins itself."""
 
     @property
     def over(self) -> bool:
@@ -74,6 +85,10 @@ class BareRun:
         self.image = machine.image
         self.ended = Ended.PAUSED
         self.end_tick = None if max_cycles is None else max_cycles * CYCLE_TICKS
+        self.tick_hz = machine.input.crystal_hz
+
+    def tell_pins(self, told: Callable[[int, int, int], object]) -> None:
+        self.machine.pins.told = told
 
     @property
     def over(self) -> bool:

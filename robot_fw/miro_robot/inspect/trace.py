@@ -1,4 +1,4 @@
-"""Every step of a CPU as a line: tick, address, place, instruction, and the registers that it changed.
+"""Every step of a CPU as a line: tick, address, place, instruction, and the registers and port pins that it changed.
 
 What belongs here: the watcher and the form of a line. What does not: the window of time (who attaches it), and files.
 """
@@ -15,7 +15,8 @@ from miro_robot.mcs51.opcodes import disassemble
 
 HEADING = f"{'tick':>12}  addr  {'place':<28}  {'instruction':<30}  changed registers"
 _STATIC_KEPT = 65536
-REGISTERS = ("A", "B", "SP", "PSW", "DPTR", *(f"R{number}" for number in range(8)))
+PORTS = {"P0": 0x80, "P1": 0x90, "P2": 0xA0, "P3": 0xB0}
+REGISTERS = ("A", "B", "SP", "PSW", "DPTR", *(f"R{number}" for number in range(8)), *PORTS)
 
 
 class Trace(Watcher):
@@ -23,7 +24,8 @@ class Trace(Watcher):
 
     `heading` is the first line, when it begins to look. The last stretch of sleep is written when it looks no longer.
 
-    A register that an instruction left as it was is not named; R0 to R7 are those of the bank selected after it.
+    A register that an instruction left as it was is not named; R0 to R7 are those of the bank selected after it. A
+    port shows what the program puts on its pins: `P1.3=0` for one pin that changed, `P1=5A` for several.
     """
 
     def __init__(
@@ -99,14 +101,26 @@ class Trace(Watcher):
 
 
 def registers(cpu: Cpu) -> tuple[int, ...]:
-    """In the order of REGISTERS."""
+    """In the order of REGISTERS; ports at their latches."""
     bank = cpu.bank
-    return (cpu.a, cpu.b, cpu.sp, cpu.psw(), cpu.dptr, *(cpu.peek_iram(bank + number) for number in range(8)))
+    return (
+        *(cpu.a, cpu.b, cpu.sp, cpu.psw(), cpu.dptr),
+        *(cpu.peek_iram(bank + number) for number in range(8)),
+        *(cpu.sfr(address) for address in PORTS.values()),
+    )
 
 
 def _changed(before: tuple[int, ...], after: tuple[int, ...]) -> str:
     return " ".join(
-        f"{name}={value:04X}" if name == "DPTR" else f"{name}={value:02X}"
+        _change(name, old, value)
         for name, old, value in zip(REGISTERS, before, after, strict=True)
         if old != value
     )
+
+
+def _change(name: str, old: int, value: int) -> str:
+    changed = old ^ value
+    if name in PORTS and changed & (changed - 1) == 0:
+        pin = changed.bit_length() - 1
+        return f"{name}.{pin}={value >> pin & 1}"
+    return f"{name}={value:04X}" if name == "DPTR" else f"{name}={value:02X}"

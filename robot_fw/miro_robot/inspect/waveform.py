@@ -4,8 +4,8 @@ What belongs here: bringing what the tap noted into the order of time, putting p
 cutting the window out, and the VCD's header. What does not: when to look (`tap.py`), which signals there are
 (`signals.py`), and where files go (`miro_sim.cli`).
 
-Time stamps are nanoseconds, tick * 125 // 3 as in recordings: 24 MHz fits no decimal timescale, and this one loses
-nothing, since the tick is -(-3 * ns // 125) again.
+Time stamps are nanoseconds, rounded down (tick * 125 // 3 at 24 MHz, as in recordings): a crystal's period fits no
+decimal timescale, and this one loses nothing, since rounding up gives the tick again.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from miro_robot.inspect.tap import UNKNOWN, CpuTap
 from miro_robot.inspect.watcher import attach, detach
 from miro_robot.mcs51.cpu import Cpu
 
+TICK_HZ = 24_000_000  # of every board, and of the bare CPU by default
+NS_PER_SECOND = 1_000_000_000
 SETTLING_TICKS = 4096
 """After it begins to look on in mid-run, so long a level may still be on its way: encoder edges are reported up to a
 step of the plant (2048 ticks) late, and the CPU may be four cycles ahead."""
@@ -33,17 +35,24 @@ class Waveform:
     """Writes the wires of `cpu`, and of the `board` around it, to `out` while both run.
 
     Between `attach` and `close`; or give its `tap` to the CPU's inspector yourself. The file covers the ticks from
-    `first_tick` (but not from where nobody looked yet) to `end_tick`, or as far as all levels are known.
+    `first_tick` (but not from where nobody looked yet) to `end_tick`, or as far as all levels are known. `tick_hz` is
+    the crystal of a CPU without a board.
     """
 
     def __init__(
-        self, out: IO[str], board: Board | None = None, first_tick: int = 0, end_tick: int | None = None
+        self,
+        out: IO[str],
+        board: Board | None = None,
+        first_tick: int = 0,
+        end_tick: int | None = None,
+        tick_hz: int = TICK_HZ,
     ) -> None:
         if end_tick is not None and end_tick <= first_tick:
             raise ValueError(f"ticks {first_tick} to {end_tick}: the window is empty")
         self.signals = tuple(signal for signal in SIGNALS if board is not None or not signal.on_board)
         self.tap = CpuTap(board, self._flush)
         self.end_tick = end_tick
+        self.tick_hz = tick_hz
         self.written_tick = -1
         self._first_tick = first_tick
         self._out = out
@@ -63,6 +72,10 @@ class Waveform:
             raise
         self._cpu = cpu
         return self
+
+    def pin_moved(self, tick: int, port: int, levels: int) -> None:
+        """The outside puts `levels` on a port of a CPU without a board; told before the CPU runs that far."""
+        self.tap.events.append((tick, _OUTSIDE + port, levels))
 
     @property
     def first_tick(self) -> int:
@@ -85,7 +98,7 @@ class Waveform:
             self.tap.detach()
         if self._writer is None:
             raise ValueError(f"the run ended before tick {self.first_tick}, nothing was written")
-        self._writer.close(nanoseconds(self.written_tick))
+        self._writer.close(nanoseconds(self.written_tick, self.tick_hz))
 
     def _flush(self) -> None:
         """Writes all changes that nothing can come before any more."""
@@ -121,9 +134,9 @@ class Waveform:
             timescale="1 ns",
             date="1970-01-01",  # of no run: equal runs have equal files
             version="mirotwin",
-            comment="ticks of 24 MHz as ns = tick * 125 // 3",
+            comment=_ticks_in_words(self.tick_hz),
             check_values=False,
-            init_timestamp=nanoseconds(self.first_tick),
+            init_timestamp=nanoseconds(self.first_tick, self.tick_hz),
         )
         self._shown = [self._level_of(signal) for signal in self.signals]
         for signal, level in zip(self.signals, self._shown, strict=True):
@@ -137,7 +150,7 @@ class Waveform:
 
     def _show(self, tick: int, changed: set[int]) -> None:
         assert self._writer is not None
-        stamp = nanoseconds(tick)
+        stamp = nanoseconds(tick, self.tick_hz)
         for index in sorted(changed):
             signal = self.signals[index]
             level = self._level_of(signal)
@@ -170,14 +183,20 @@ class Waveform:
         return [index for index, signal in enumerate(self.signals) if signal.place in names]
 
 
-def nanoseconds(tick: int) -> int:
+def nanoseconds(tick: int, tick_hz: int = TICK_HZ) -> int:
     """A time stamp."""
-    return tick * 125 // 3
+    return tick * NS_PER_SECOND // tick_hz
 
 
-def tick_of(nanoseconds: int) -> int:
+def tick_of(nanoseconds: int, tick_hz: int = TICK_HZ) -> int:
     """The tick that a time stamp stands for."""
-    return -(-3 * nanoseconds // 125)
+    return -(-nanoseconds * tick_hz // NS_PER_SECOND)
+
+
+def _ticks_in_words(tick_hz: int) -> str:
+    if tick_hz == TICK_HZ:
+        return "ticks of 24 MHz as ns = tick * 125 // 3"
+    return f"ticks of {tick_hz} Hz as ns = tick * {NS_PER_SECOND} // {tick_hz}"
 
 
 def _bit(signal: Signal, level: int, bit: int) -> int | str:

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 def profile(request: Request, as_json: bool) -> int:
     """Shows cycles by function, interrupts with their worst cases, the share of idling, and the depth of the stack.
 
-    Machine cycles are 0.5 us. A function's cycles are its own, without those of what it calls. The latency of an
-    interrupt is counted from the cycle in which its flag is latched to the first one of its routine: 3 at least.
+    A machine cycle is 12 periods of the crystal: 0.5 us at 24 MHz. A function's cycles are its own, without those of
+    what it calls. The latency of an interrupt is counted from the cycle in which its flag is latched to the first one
+    of its routine: 3 at least.
     """
     run = open_run(request)
     from miro_robot.inspect.activity import Activity

@@ -25,7 +25,7 @@ from miro_sim.outdir import check_new, check_not_input, whole_file
 @click.option("--out", type=Place(path_type=Path), metavar="FILE", help="Write there instead of to stdout.")
 @click.option("--force", is_flag=True, help="Replace the file at --out.")
 def trace(request: Request, symbols: tuple[str, ...], out: Path | None, force: bool) -> int:
-    """Writes what the processor did in SUBJECT: tick, address, symbol, instruction, changed registers.
+    """Writes what the processor did in SUBJECT: tick, address, symbol, instruction, changed registers and port pins.
 
     A line stands for one instruction, one call of an interrupt routine, or one stretch of sleep.
     """

@@ -9,7 +9,7 @@ import click
 from miro_sim.cli.options import Place
 from miro_sim.cli.program import UserError, show
 from miro_sim.cli.subject import Request, look, open_run, subject_options
-from miro_sim.clock import PWM_PERIOD_TICKS, seconds
+from miro_sim.clock import PWM_PERIOD_TICKS
 from miro_sim.outdir import check_new, check_not_input, whole_file
 
 SAVE_SUFFIX = ".gtkw"
@@ -46,7 +46,8 @@ def vcd(request: Request, out: Path, force: bool) -> int:
 
     with whole_file(save, "--out") as save_staging, whole_file(out, "--out") as staging:
         with staging.open("w", encoding="ascii", newline="\n") as stream:
-            waveform = Waveform(stream, run.board, request.from_tick, request.to_tick)
+            waveform = Waveform(stream, run.board, request.from_tick, request.to_tick, run.tick_hz)
+            run.tell_pins(waveform.pin_moved)
             early_ticks = 2 * SETTLING_TICKS
             code = look(run, request, waveform.tap, early_ticks=early_ticks, late_ticks=LATE_TICKS)
             try:
@@ -57,7 +58,6 @@ def vcd(request: Request, out: Path, force: bool) -> int:
                 ) from None
         with save_staging.open("w", encoding="utf-8", newline="\n") as stream:
             write_save_file(stream, out.name, waveform.signals)
-    show(
-        f"{seconds(waveform.first_tick):.6f} s to {seconds(waveform.written_tick):.6f} s; gtkwave {out} {save}"
-    )
+    first_s, last_s = waveform.first_tick / run.tick_hz, waveform.written_tick / run.tick_hz
+    show(f"{first_s:.6f} s to {last_s:.6f} s; gtkwave {out} {save}")
     return code

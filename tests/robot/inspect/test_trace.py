@@ -121,3 +121,13 @@ def test_of_a_program_that_changes_itself_only_so_many_instructions_are_remember
     expected = traced(200)
     monkeypatch.setattr("miro_robot.inspect.trace._STATIC_KEPT", 2)
     assert traced(200) == expected
+
+
+def test_ports_show_the_pins_that_changed():
+    lines: list[str] = []
+    code = assemble("CLR P1.3\nMOV P1,#5Ah\nMOV P1,#5Ah\nSETB P1.0\nMOV P2,#0Fh\nNOP")
+    cpu = Cpu(RecordingBus())
+    cpu.load(code)
+    attach(cpu, Trace(SymbolNames(image_of(code)), lines.append))
+    cpu.run(8)
+    assert [line[82:] for line in lines] == ["P1.3=0", "P1=5A", "", "P1.0=1", "P2=0F"]

@@ -156,6 +156,68 @@ def test_the_8_kb_limit_is_lifted_when_code_is_in_ram(
     assert mirotwin("fw", "run", image, "--code-in-xram", "--until", "0x0000")[0] == 0
 
 
+def test_a_run_goes_on_after_faults_and_counts_those_that_are_not_listed(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image = hex_file(tmp_path / "a.ihx", b"\xa5\x80\xfd")
+    code, _, err = mirotwin("fw", "run", image, "--go-on", "--max-cycles", 330)
+    assert code == 3
+    assert (
+        err.count("mirotwin: firmware fault: firmware executed the undefined opcode A5 at 0x0000, tick ")
+        == 100
+    )
+    assert "mirotwin: firmware faults: 10 more are not listed\n" in err
+    assert err.endswith("mirotwin: gave up at 0x0000 after 330 machine cycles\n")
+
+
+def test_a_time_is_one_of_the_crystal(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    """The program waits for RXD to fall and ends."""
+    image = hex_file(tmp_path / "a.ihx", b"\x20\xb0\xfd" + LOOP)
+    given = tmp_path / "given"
+    given.write_text("x")
+    for crystal, cycles in ((24_000_000, 200_000), (12_000_000, 100_000), (11_059_200, 92_160)):
+        options = ("--stdin", given, "--baud", 9600, "--stdin-after", "100ms", "--crystal", crystal)
+        code, _, err = mirotwin("fw", "run", image, *options)
+        assert code == 0
+        ended = int(err.split(" after ")[1].split()[0])
+        assert cycles <= ended <= cycles + 6
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--stdin-when", "x"), "--stdin-when: there is no --stdin"),
+        (("--stdin-gap", "1ms"), "--stdin-gap: there is no --stdin"),
+        (("--stdin", "F", "--stdin-when", ""), "--stdin-when: the empty string is no text"),
+        (
+            ("--stdin", "F", "--stdin-when", "a", "--stdin-when", "b"),
+            "--stdin-when: 2 for 1 --stdin; give one",
+        ),
+        (
+            ("--stdin", "F", "--stdin", "F", "--stdin", "F", "--stdin-when", "a"),
+            "--stdin-when: 1 for 3 --stdin",
+        ),
+        (("--stdin", "F", "--stdin-by-line"), "--stdin-by-line: says that lines wait"),
+        (("--stdin", "-", "--stdin", "-"), "--stdin: standard input can be read once only"),
+        (("--stdin", "F", "--stdin-after", "soon"), "'soon' is no time"),
+        (
+            ("--stdin", "F", "--baud", "600000", "--crystal", "12000000"),
+            "--baud 600000 is outside 50..375000",
+        ),
+        (("--crystal", "5"), "Invalid value for '--crystal'"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_input_that_cannot_be_meant_is_refused(
+    mirotwin: Callable[..., Result], tmp_path: Path, options: tuple[str, ...], said: str
+) -> None:
+    image, given = hex_file(tmp_path / "a.ihx", LOOP), tmp_path / "given"
+    given.write_text("x")
+    code, out, err = mirotwin("fw", "run", image, *(given if part == "F" else part for part in options))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+
+
 def test_info_names_versions_engine_and_firmware(mirotwin: Callable[..., Result]) -> None:
     code, out, err = mirotwin("info")
     assert (code, err) == (0, "")

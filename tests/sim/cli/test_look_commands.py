@@ -374,10 +374,10 @@ def test_a_fault_is_reported_after_what_was_seen(mirotwin: Callable[..., Result]
 def test_the_cycle_limit_of_an_image_has_its_exit_code(
     mirotwin: Callable[..., Result], tmp_path: Path
 ) -> None:
-    image = hex_file(tmp_path / "a.ihx", LOOP)
+    image = hex_file(tmp_path / "a.ihx", b"\x00\x80\xfd")
     assert mirotwin("fw", "profile", image, "--max-cycles", 10)[0] == 42
     assert mirotwin("fw", "profile", image, "--to", 100)[0] == 0
-    assert mirotwin("fw", "profile", image)[0] == 0
+    assert mirotwin("fw", "profile", hex_file(tmp_path / "b.ihx", LOOP), "--max-cycles", 10)[0] == 0
 
 
 def test_nothing_is_written_over_what_is_read(
@@ -413,3 +413,63 @@ def test_input_that_nobody_can_take_any_more_does_not_keep_a_dead_program_alive(
     code, _, err = mirotwin("fw", "run", image, "--stdin", tmp_path / "in")
     assert code == 0
     assert "no interrupt can wake it" in err
+
+
+def test_a_waveform_of_an_image_has_its_pins_and_its_crystal(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image = hex_file(tmp_path / "a.hex", b"\x80\x00\x80\xfc")
+    pins, out = tmp_path / "a.pins", tmp_path / "a.vcd"
+    pins.write_text("1105920 * P1.2 0  # 100 ms\n1105921 * P1.2 1\n")
+    options = ("--pins", pins, "--crystal", 11_059_200, "--to", "150ms", "--out", out)
+    code, shown, _ = mirotwin("fw", "vcd", image, *options)
+    text = out.read_text()
+    assert code == 0
+    assert shown.startswith("0.000000 s to 0.150000 s; ")
+    assert "ticks of 11059200 Hz as ns = tick * 1000000000 // 11059200" in text
+    wire = next(line.split()[3] for line in text.splitlines() if line.startswith("$var") and " p1_2 " in line)
+    edges = [
+        (int(part.split("\n")[0]), line)
+        for part in text.split("\n#")[1:]
+        for line in part.split("\n")
+        if line[1:] == wire
+    ]
+    assert edges == [(0, f"1{wire}"), (100_000_000, f"0{wire}"), (100_000_090, f"1{wire}")]
+    whole = text.split("$end\n")[-1]
+    assert mirotwin("fw", "vcd", image, *options, "--from", "80ms", "--force")[0] == 0
+    window = out.read_text()
+    assert f"#100000000\n0{wire}\n#100000090\n1{wire}\n" in window
+    assert f"#100000000\n0{wire}\n#100000090\n1{wire}\n" in whole
+
+
+def test_a_bad_line_of_pins_is_named(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    image, pins = hex_file(tmp_path / "a.hex", LOOP), tmp_path / "a.pins"
+    pins.write_text("0 * P1.2 0\n0 * P9.2 1\n")
+    code, out, err = mirotwin("fw", "trace", image, "--pins", pins)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"mirotwin: error: {pins}:2: '0 * P9.2 1' is no pin event; ")
+    pins.write_text("0 * P3.0 0\n")
+    code, _, err = mirotwin("fw", "trace", image, "--pins", pins, "--stdin", pins)
+    assert code == 2
+    assert (
+        err == "mirotwin: error: --pins: P3.0 is RXD and cannot be a pin while serial input is sent there\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "option", [("--crystal", 12_000_000), ("--go-on",), ("--stdin-gap", "1ms"), ("--code-size", "64k")]
+)
+def test_the_options_of_an_image_do_not_apply_to_a_scenario(
+    mirotwin: Callable[..., Result], short: Path, option: tuple[object, ...]
+) -> None:
+    code, _, err = mirotwin("fw", "profile", short, *option)
+    assert code == 2
+    assert err.endswith(f": is no image, {option[0]} does not apply to it; leave it out\n")
+
+
+def test_a_trace_goes_on_after_faults_and_lists_them(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    image = hex_file(tmp_path / "a.hex", b"\xa5\xa5" + LOOP)
+    assert mirotwin("fw", "trace", image)[2].count("undefined opcode") == 1
+    code, out, err = mirotwin("fw", "trace", image, "--go-on")
+    assert (code, err.count("undefined opcode A5 at")) == (3, 2)
+    assert out.count("\n") == 4
