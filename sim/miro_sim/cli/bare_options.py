@@ -228,7 +228,7 @@ def _pieces(request: BareRequest) -> tuple[Piece, ...]:
 
     texts = [text.encode(errors="surrogateescape") for text in request.stdin_when]
     files = len(request.stdin)
-    if not files and len(request.given()) > 0:
+    if not files:
         for name in ("--stdin-when", "--stdin-by-line", "--stdin-after", "--stdin-gap"):
             if name in request.given():
                 raise UserError(f"{name}: there is no --stdin that it could apply to; give both")
@@ -243,7 +243,7 @@ def _pieces(request: BareRequest) -> tuple[Piece, ...]:
     if request.stdin_by_line and not texts:
         raise UserError("--stdin-by-line: says that lines wait for --stdin-when; give that too")
     delay = _ticks(request.stdin_after, request)
-    pieces = []
+    pieces: list[Piece] = []
     for path, when in zip(request.stdin, [b""] * (files - len(texts)) + texts, strict=True):
         data = _stdin_bytes(path)
         parts = data.splitlines(keepends=True) if request.stdin_by_line and when else [data]
