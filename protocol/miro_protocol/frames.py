@@ -198,6 +198,8 @@ def decode_fields(body: bytes, n: int) -> Message:
 
     Raises ContentError when the bytes are not what `encode` would have made of any message.
     """
+    if not body:
+        raise ContentError("the body is empty: it has a header and a payload")
     kind, seq = divmod(body[0], SEQ_MODULUS)
     payload = bytes(body[1:])
     if kind == FrameType.TELEMETRY:

@@ -9,6 +9,7 @@ an empty DebugInfo: all still works, by address.
 from __future__ import annotations
 
 import bisect
+import os
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -18,12 +19,13 @@ import msgspec
 from miro_robot.image import Image, ImageError
 from miro_robot.mcs51.opcodes import LENGTH
 
-_CDB_LINE = re.compile(r"^L:C\$([^$]+)\$(\d+)\$\w+\$\w+:([0-9A-F]+)$", re.MULTILINE)
-_CDB_BEGIN = re.compile(r"^L:(G|F\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]+)$", re.MULTILINE)
-_CDB_END = re.compile(r"^L:X(G|F\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]+)$", re.MULTILINE)
+# Numbers have at most as many digits as SDCC writes, with some to spare: a longer one is damage, and no record.
+_CDB_LINE = re.compile(r"^L:C\$([^$\n]+)\$([0-9]{1,9})\$\w+\$\w+:([0-9A-F]{1,8})$", re.MULTILINE)
+_CDB_BEGIN = re.compile(r"^L:(G|F\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]{1,8})$", re.MULTILINE)
+_CDB_END = re.compile(r"^L:X(G|F\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]{1,8})$", re.MULTILINE)
 _MAP_MODULE = re.compile(r"^(\S+)\.rel\s+\[", re.MULTILINE)
 _MAP_CONSTANTS = re.compile(r"^(?:CONST|XINIT)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) =", re.MULTILINE)
-_RST_LINE = re.compile(r"^\s*\d+ ;\t([^\s:]+\.\w+):(\d+): ")
+_RST_LINE = re.compile(r"^\s*[0-9]+ ;\t([^\s:]+\.\w+):([0-9]{1,9}): ")
 _RST_CODE = re.compile(r"^ {6}([0-9A-F]{6})((?: [0-9A-F]{2})+) +(\[\d+\])?")
 
 
@@ -129,14 +131,14 @@ class Sources:
         """The file, or None where no folder has it."""
         if file not in self._found:
             places = (folder / file for folder in self.folders)
-            self._found[file] = next((place for place in places if place.is_file()), None)
+            self._found[file] = next((place for place in places if os.path.isfile(place)), None)
         return self._found[file]
 
     def text(self, line: SourceLine) -> str:
         """What stands in that line, "" if the file is not there or is shorter."""
         path = self.path(line.file)
         lines = [] if path is None else _text(path).splitlines()
-        return lines[line.line - 1].strip() if line.line <= len(lines) else ""
+        return lines[line.line - 1].strip() if 0 < line.line <= len(lines) else ""
 
 
 def _text(path: Path) -> str:
@@ -175,7 +177,7 @@ def _listings(image: Path, link_map: str) -> Iterator[Path]:
             image.parent / f"{module}.rst",
             Path(f"{module}.rst"),
         )
-        found = next((place for place in places if place.is_file()), None)
+        found = next((place for place in places if os.path.isfile(place)), None)
         if found is not None:
             yield found
 

@@ -233,7 +233,7 @@ _CDB_SPACES = {
     "J": "bit",
 }
 _CDB_SYMBOL = re.compile(r"^S:((?:G|F\w+)\$(\w+)\$\w+\$\w+)\(.*\),([A-Z]),")
-_CDB_ADDRESS = re.compile(r"^L:((?:G|F\w+)\$\w+\$\w+\$\w+):([0-9A-F]+)$")
+_CDB_ADDRESS = re.compile(r"^L:((?:G|F\w+)\$\w+\$\w+\$\w+):([0-9A-F]{1,8})$")
 
 
 def _read_cdb(text: str) -> dict[str, Symbol]:

@@ -25,7 +25,7 @@ from miro_robot.mcs51.opcodes import LENGTH, goes_on, target
 
 _AREA = re.compile(r"^(\S[\S .]*?)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) = .*bytes \(([A-Z,]+)\)")
 _NAME = re.compile(r"^(?:C:)?\s+([0-9A-F]{8})\s+(_\w+)\s")
-_INSTRUCTION = re.compile(r"^(?:L:A\$[^:]*:|C:\s+(?=[0-9A-F]{8}\s+A\$))([0-9A-F]+)\b")
+_INSTRUCTION = re.compile(r"^(?:L:A\$[^:]*:|C:\s+(?=[0-9A-F]{8}\s+A\$))([0-9A-F]{1,8})\b")
 _FEW_RECORDS, _FEW_NAMES, _FEW_STRAYS = 20, 4, 3  # fewer prove nothing
 _NO_FUNCTIONS = ("HOME", "GSINIT", "GSFINAL", "XINIT", "CONST")  # areas: start-up code in pieces, and data
 _JUMPS = (0x02, 0x12)  # LJMP, LCALL

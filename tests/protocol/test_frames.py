@@ -162,6 +162,7 @@ def test_velocities_may_be_any_rows_of_whole_numbers(rows):
 @pytest.mark.parametrize(
     ("body", "complaint"),
     [
+        ("", "the body is empty"),
         ("00" + "0080" + "00" * 10, "left = -32768"),
         ("40" + "0003" + "00" * 10, "opcode 3"),
         ("40" + "0300" + "00" * 10, "slot = 3"),
@@ -178,7 +179,7 @@ def test_a_body_that_no_rightful_host_sends_is_a_content_error(body, complaint):
 @given(robot_counts(), st.data())
 def test_any_body_at_all_is_a_message_or_a_content_error(n, data):
     size = table.DOWNLINK[n].body_size
-    body = data.draw(st.binary(min_size=size, max_size=size))
+    body = data.draw(st.binary(min_size=size, max_size=size) | st.binary(max_size=size + 2))
     try:
         message = frames.decode_fields(body, n)
     except ContentError:

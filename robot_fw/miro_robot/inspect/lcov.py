@@ -15,7 +15,7 @@ import msgspec
 Branch = tuple[int, int, int]
 """(line, block, branch): a block is one conditional jump of the line, branch 0 jumps, branch 1 goes on."""
 
-_NUMBER = r"\d{1,18}"
+_NUMBER = r"[0-9]{1,18}"
 _RECORDS = {
     "FN": re.compile(rf"({_NUMBER})(?:,{_NUMBER})?,(.+)"),
     "FNDA": re.compile(rf"({_NUMBER}),(.+)"),

@@ -122,3 +122,36 @@ def test_modules_without_a_listing_have_the_lines_of_the_cdb(program, tmp_path):
     image = copied(program, tmp_path, ".map", ".cdb")
     (tmp_path / "program.rst").write_text("nothing of use\n")
     assert {line.file for _, line in DebugInfo.of(image).lines} == {"program.c"}
+
+
+DIGITS = "9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("suffix", "line"),
+    [
+        (".rst", f"      1 ;\trobot.c:{DIGITS}: main();"),
+        (".cdb", f"L:C$robot.c${DIGITS}$0$0:0"),
+        (".cdb", f"L:C$robot.c$1$0$0:{DIGITS}"),
+        (".cdb", f"L:G$main$0$0:{DIGITS}\nL:XG$main$0$0:{DIGITS}"),
+        (".cdb", f"S:G$main$0_0$0({{2}}DF,SV:S),C,0,0\nL:G$main$0$0:{DIGITS}"),
+    ],
+)
+def test_a_record_whose_number_has_digits_without_end_is_no_record(tmp_path, suffix, line):
+    """Python converts no more than 4300 digits."""
+    path = tmp_path / "robot.ihx"
+    path.write_text(":0200000080FE80\n:00000001FF\n")
+    path.with_suffix(suffix).write_text(line + "\n")
+    image = load_hex(path)
+    debug = DebugInfo.of(image)
+    assert (debug.lines, debug.functions, image.symbols.names) == ([], [], {})
+
+
+def test_no_file_has_a_line_0(tmp_path):
+    (tmp_path / "program.c").write_text("first\nlast\n")
+    assert Sources([tmp_path]).text(SourceLine("program.c", 0)) == ""
+
+
+@pytest.mark.parametrize("name", ["x" * 5000, "a\0b"])
+def test_a_source_whose_name_no_file_can_have_is_not_found(tmp_path, name):
+    assert Sources([tmp_path]).path(name) is None
