@@ -57,7 +57,8 @@ def read_input(
         while len(data) <= limit and (more := file.read(CHUNK_BYTES)):
             data += more
     if len(data) > limit:
-        raise InputError(str(path), f"holds more than {limit >> 20} MiB", "name the file that was meant")
+        size = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
+        raise InputError(str(path), f"holds more than {size}", "name the file that was meant")
     return bytes(data)
 
 

@@ -22,6 +22,7 @@ PERIOD_TICKS = 800_800
 CHARACTER_TICKS = 25_000  # 10 bits at 9600 baud
 FRAME_CHARACTERS = {3: 23, 5: 31}
 MAX_TORQUE_CONSTANT = 10.0  # Nm/A; beyond it a motor of this size is a mistyped unit
+MAX_NETWORKS = 32  # building and simulating one takes as long as a whole run of fig6
 MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
 
 Positive = Annotated[float, Meta(gt=0.0, le=1e6)]
@@ -192,3 +193,10 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     camera: Camera = Camera()
     host: HostTimes = HostTimes()
     networks: Annotated[tuple[Network, ...], Meta(min_length=1)] = msgspec.field(name="network")
+
+    def __post_init__(self) -> None:
+        if len(self.networks) > MAX_NETWORKS:
+            raise ValueError(
+                f"network: {len(self.networks)} networks, each of which costs as much time as a run of its own;"
+                f" at most {MAX_NETWORKS}, make several scenarios of them"
+            )

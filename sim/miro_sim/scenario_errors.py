@@ -53,6 +53,7 @@ MORE_UNITS = (
     "uh",
     "mnm",
 )
+LONGEST_END = 300  # characters of each end of a long message that are shown
 TYPE_NAMES = {
     "float": "a number",
     "int": "a whole number",
@@ -73,6 +74,7 @@ class ScenarioError(ValueError):
         self.place = place
         self.what = what
         self.remedy = remedy
+        place, what, remedy = (_shortened(part) for part in (place, what, remedy))
         head = f"{origin}: {place}: {what}" if place else f"{origin}: {what}"
         super().__init__(one_line(f"{head}; {remedy}" if remedy else head))
 
@@ -80,6 +82,11 @@ class ScenarioError(ValueError):
 def one_line(text: str) -> str:
     """The text with everything that a terminal would not print as it stands escaped."""
     return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)
+
+
+def _shortened(text: str) -> str:
+    """The text without the middle of what nobody reads to its end: a value or a key of a megabyte."""
+    return text if len(text) <= 2 * LONGEST_END else f"{text[:LONGEST_END]} .. {text[-LONGEST_END:]}"
 
 
 def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError:

@@ -6,6 +6,7 @@ functions, whatever the text.
 """
 
 import math
+import re
 import tomllib
 from difflib import get_close_matches
 from importlib import resources
@@ -17,6 +18,17 @@ from miro_sim.inputs import InputError, read_input
 from miro_sim.profiles import ProfileError, with_profiles
 from miro_sim.scenario import Scenario
 from miro_sim.scenario_errors import ScenarioError, value_error
+
+
+TEXT_KIB = 512
+"""Most KiB of a scenario file: a built-in one has 4."""
+KEY_PARTS = 16
+"""Most parts of a dotted key: the deepest key of a scenario has 6. The time of `tomllib` grows with their square; a
+whole file of such keys takes it 2.5 s.
+"""
+
+_KEY_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{KEY_PARTS}}}")
 
 
 class ScenarioText(msgspec.Struct, frozen=True):
@@ -52,7 +64,7 @@ def load(source: str) -> ScenarioText:
         text = builtin_text(source)
         return ScenarioText(source, text, parse(text, source))
     try:
-        raw = read_input(source)
+        raw = read_input(source, TEXT_KIB << 10)
     except FileNotFoundError:
         raise ScenarioError(
             source, "", "no such file", "`mirotwin scenarios` lists the built-in ones"
@@ -77,12 +89,30 @@ def decode(raw: bytes, origin: str) -> str:
 
 def parse(text: str, origin: str) -> Scenario:
     """TOML text to a Scenario. Raises ScenarioError (and nothing else) naming `origin` and the place."""
+    _check_size(text, origin)
+    try:
+        return _parse(text, origin)
+    except RecursionError:
+        raise ScenarioError(origin, "", "nested too deeply", "a scenario has tables in at most 5 levels") from None
+
+
+def _check_size(text: str, origin: str) -> None:
+    """Refuses what would take `tomllib` minutes."""
+    if len(text) > TEXT_KIB << 10:
+        what = f"holds more than {TEXT_KIB} KiB"
+        raise ScenarioError(origin, "", what, "name the file that was meant")
+    long_key = _LONG_KEY.search(text)
+    if long_key is not None:
+        line = text.count("\n", 0, long_key.start()) + 1
+        what = f"a key of more than {KEY_PARTS} parts"
+        raise ScenarioError(origin, f"line {line}", what, "remove it; no key of a scenario has more than 6")
+
+
+def _parse(text: str, origin: str) -> Scenario:
     try:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(origin, text, str(error)) from None
-    except RecursionError:
-        raise ScenarioError(origin, "", "nested too deeply") from None
     except ValueError:  # an integer with more digits than Python converts
         raise ScenarioError(origin, "", "an integer of thousands of digits") from None
     _check_finite(raw, "", origin)

@@ -1,6 +1,7 @@
 """Scenario files: what is accepted, and the one line that says what is wrong."""
 
 import math
+import time
 from pathlib import Path
 
 import msgspec
@@ -164,6 +165,40 @@ def test_a_frame_of_five_robots_leaves_no_time_for_a_long_key_up() -> None:
 @pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "a = " + "9" * 10_000, "\0", "a = 1\na = 2"])
 def test_text_that_breaks_a_toml_parser_is_refused_in_one_line(text: str) -> None:
     refusal(text)
+
+
+MANY_NETWORKS = "[[network]]\n[[network.robot]]\nreference.kind = 'line'\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a." * 200_000 + "a = 1", "line 1: a key of more than 16 parts; remove it"),
+        ("\n[" + "a." * 200_000 + "a]", "line 2: a key of more than 16 parts; remove it"),
+        ("a = {" + '"a" . ' * 1_000 + "a = 1}", "line 1: a key of more than 16 parts; remove it"),
+        ("# " + "x" * 600_000, "holds more than 512 KiB; name the file that was meant"),
+        ("a = {" + "a = {" * 5_000, "nested too deeply; a scenario has tables in at most 5 levels"),
+        (
+            "name = 'a'\nduration_s = 1\n" + MANY_NETWORKS * 200,
+            "network: 200 networks, each of which costs as much time as a run of its own; at most 32,",
+        ),
+    ],
+)
+def test_a_scenario_that_would_take_minutes_is_refused_at_once(text: str, expected: str) -> None:
+    began_s = time.process_time()
+    assert f"my.toml: {expected}" in refusal(text)
+    assert time.process_time() - began_s < 2.0
+
+
+def test_a_scenario_may_have_32_networks_and_a_comment_any_dots() -> None:
+    text = "# ........................\n# www.a.b.c.example.org\nname = 'a'\nduration_s = 1\n"
+    assert len(parse(text + MANY_NETWORKS * 32, "many").networks) == 32
+
+
+def test_a_long_value_is_shown_by_its_ends() -> None:
+    message = refusal(SMALL.replace("small", "x" * 100_000))
+    assert len(message) < 1000
+    assert message.endswith("is not a name; use a-z, 0-9, - and _, at most 64 characters")
 
 
 def test_a_name_that_is_no_scenario_gets_the_list_and_the_nearest_one() -> None:
