@@ -38,13 +38,15 @@ class Reference(msgspec.Struct, frozen=True):
 class Ramp(msgspec.Struct, frozen=True):
     """Speed profile: from rest to `speed_m_s` in `ramp_s` at constant acceleration, then steady.
 
-    Before 0 s and after `duration_s` the reference stands still; there is no ramp at the end. The instants
-    0 and `duration_s` themselves belong to the drive.
+    Before 0 s and after `duration_s` the reference stands still. With `ramp_down` it comes to rest as it started: at
+    constant deceleration in the last `ramp_s` (in the second half, if `duration_s` is shorter than two ramps).
+    Without, there is no ramp at the end. The instants 0 and `duration_s` themselves belong to the drive.
     """
 
     speed_m_s: float = 0.20
     ramp_s: float = 0.5
     duration_s: float = 6.0
+    ramp_down: bool = False
 
     def __post_init__(self) -> None:
         for name in ("speed_m_s", "ramp_s", "duration_s"):
@@ -56,10 +58,20 @@ class Ramp(msgspec.Struct, frozen=True):
         if t_s < 0.0:
             return 0.0, 0.0, 0.0
         if t_s > self.duration_s:
-            return self._length(self.duration_s), 0.0, 0.0
+            return self._whole_length(), 0.0, 0.0
+        left_s = self.duration_s - t_s
+        if self.ramp_down and left_s < self.ramp_s and left_s < t_s:  # the start, run backwards
+            slowing = self.speed_m_s / self.ramp_s
+            return self._whole_length() - self._length(left_s), slowing * left_s, -slowing
         if t_s < self.ramp_s:
             return self._length(t_s), self.speed_m_s * t_s / self.ramp_s, self.speed_m_s / self.ramp_s
         return self._length(t_s), self.speed_m_s, 0.0
+
+    def _whole_length(self) -> float:
+        if not self.ramp_down:
+            return self._length(self.duration_s)
+        half_s = 0.5 * self.duration_s
+        return 2.0 * self._length(half_s)
 
     def _length(self, t_s: float) -> float:
         if t_s < self.ramp_s:

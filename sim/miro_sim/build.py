@@ -23,9 +23,10 @@ DEGREE = 0.017453292519943295
 
 
 def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
-    """The reference trajectory in the paper's axes, which start at its own start."""
+    """The reference trajectory in the paper's axes, which start at its own start. ValueError: see `Arc`."""
     path = robot.reference
-    ramp = Ramp(speed_m_s=path.speed_m_s, ramp_s=path.ramp_s, duration_s=max(duration_s, path.ramp_s))
+    drive_s = max(duration_s, path.ramp_s) if path.drive_s is None else path.drive_s
+    ramp = Ramp(path.speed_m_s, path.ramp_s, drive_s, ramp_down=path.drive_s is not None)
     if isinstance(path, sc.LineRef):
         return Line(ramp, path.heading_deg * DEGREE)
     return Arc(ramp, path.heading_deg * DEGREE, path.curvature_per_m)

@@ -163,7 +163,7 @@ def _frames(sent: Sequence[Transmission], robots: int) -> int:
 
 
 def scenario_of_stream(sent: Sequence[Transmission], path: str) -> Scenario:
-    """The default scenario with an ideal link, and its robot in every slot of the stream's layout.
+    """The default scenario with an ideal link, and its robot in every slot of the stream's layout, all at one start.
 
     Runs for a second longer than the stream, so that the failsafe is seen. Raises StreamContentError for a
     stream with nothing to send, for transmissions that overlap, and for one that takes more than a day.
@@ -182,7 +182,9 @@ def scenario_of_stream(sent: Sequence[Transmission], path: str) -> Scenario:
             f"{path}: tick {down[-1].tick}: more than a day; let the stream start near tick 0"
         )
     base = load(DEFAULT_SCENARIO).scenario
-    model = msgspec.structs.replace(base.networks[0].robot[0], wheel_radius_mismatch=0.0)
+    first = base.networks[0].robot[0]
+    standing = msgspec.structs.replace(first.reference, drive_s=0.0)  # nothing steers by it
+    model = msgspec.structs.replace(first, wheel_radius_mismatch=0.0, reference=standing)
     robots = robots_of_stream(sent)
     network = Network(
         robots=5 if robots == 5 else 3,

@@ -38,7 +38,7 @@ Name = Annotated[str, Meta(pattern=r"\A[a-z0-9][a-z0-9_-]{0,63}\Z")]
 class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The camera and what the tracker makes of it: noise per axis, pixels, whole frames of delay.
 
-    `position_error_cm` and `heading_error_deg` are three standard deviations (paper section IV: 2.40 cm,
+    `position_error_cm` and `heading_error_deg` are three standard deviations (paper section V-A: 2.40 cm,
     4.83 degrees). `pixel_cm` 0 measures without quantisation; 0.4375 is a pitch of 140 x 105 cm on 320 x
     240 pixels.
     """
@@ -59,22 +59,28 @@ class HostTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 class LineRef(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="line"
 ):
-    """A straight line from the origin, run with a speed ramp: s = v t^2 / (2 t_r), then v (t - t_r / 2)."""
+    """A straight line from the origin, run with a speed ramp: s = v t^2 / (2 t_r), then v (t - t_r / 2).
+
+    With `drive_s` the reference comes to rest by the same ramp, after so many seconds, and stands from then on.
+    Without, it moves for the whole duration.
+    """
 
     heading_deg: TurnDeg = 0.0
     speed_m_s: Annotated[float, Meta(ge=0.0, le=1.46)] = 0.20
     ramp_s: Seconds = 0.5
+    drive_s: Annotated[float, Meta(ge=0.0, le=86_400.0)] | None = None
 
 
 class ArcRef(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="arc"
 ):
-    """A circular arc from the origin: heading theta_0 + kappa s, the same speed ramp as the line."""
+    """A circular arc from the origin: heading theta_0 + kappa s, the same speed ramp and `drive_s` as the line."""
 
     heading_deg: TurnDeg = 60.0
     curvature_per_m: Annotated[float, Meta(ge=-100.0, le=100.0)] = -1.0
     speed_m_s: Annotated[float, Meta(ge=0.0, le=1.46)] = 0.20
     ramp_s: Seconds = 0.5
+    drive_s: Annotated[float, Meta(ge=0.0, le=86_400.0)] | None = None
 
 
 class YangKim(
@@ -108,6 +114,7 @@ class YangKim(
 class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One robot: its slot on the network, where it starts, what it follows and who steers it.
 
+    Start and reference have to lie on the pitch (`scenario_places`).
     The start is the start of the reference plus the errors (captions of the paper's Figs. 6 and 8). Each
     wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `drive` replaces single
     parameters of motors, bridges, battery, chassis and encoders (`plant.params`).

@@ -18,7 +18,7 @@ from miro_sim.inputs import InputError, read_input
 from miro_sim.profiles import ProfileError, with_profiles
 from miro_sim.scenario import Scenario
 from miro_sim.scenario_errors import ScenarioError, value_error
-
+from miro_sim.scenario_places import check_places
 
 TEXT_KIB = 512
 """Most KiB of a scenario file: a built-in one has 4."""
@@ -88,12 +88,17 @@ def decode(raw: bytes, origin: str) -> str:
 
 
 def parse(text: str, origin: str) -> Scenario:
-    """TOML text to a Scenario. Raises ScenarioError (and nothing else) naming `origin` and the place."""
+    """TOML text to a Scenario. Raises ScenarioError (and nothing else) naming `origin` and the place.
+
+    Decides the engine, if nothing has yet: where a reference leads is computed by a hot module.
+    """
     _check_size(text, origin)
     try:
         return _parse(text, origin)
     except RecursionError:
-        raise ScenarioError(origin, "", "nested too deeply", "a scenario has tables in at most 5 levels") from None
+        raise ScenarioError(
+            origin, "", "nested too deeply", "a scenario has tables in at most 5 levels"
+        ) from None
 
 
 def _check_size(text: str, origin: str) -> None:
@@ -118,9 +123,11 @@ def _parse(text: str, origin: str) -> Scenario:
     _check_finite(raw, "", origin)
     _fill_in_profiles(raw, origin)
     try:
-        return msgspec.convert(raw, Scenario)
+        scenario = msgspec.convert(raw, Scenario)
     except msgspec.ValidationError as error:
         raise value_error(origin, raw, str(error)) from None
+    check_places(scenario, origin)
+    return scenario
 
 
 def _fill_in_profiles(raw: dict[str, Any], origin: str) -> None:

@@ -11,7 +11,8 @@ from typing import Any
 
 import msgspec
 
-from miro_sim.clock import TICKS_PER_SECOND, seconds
+from miro_sim import pitch
+from miro_sim.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_sim.records import Period, RobotPeriod
 
 TWO_PI = 6.283185307179586
@@ -20,12 +21,13 @@ SETTLED_RAD = 0.15
 
 
 class ErrorSample(msgspec.Struct, frozen=True):
-    """Tracking error of a robot at one tick."""
+    """Tracking error of a robot at one tick, and whether a corner of it is off the pitch."""
 
     tick: int
     x_cm: float
     y_cm: float
     theta_rad: float
+    off_pitch: bool = False
 
     @property
     def position_cm(self) -> float:
@@ -42,7 +44,8 @@ class Tracking(msgspec.Struct, frozen=True):
 
     `rms_*`: root mean square over the last second of the run (all of it, if shorter), one value a control
     period; position is the distance. `settling_s`: the last time at which the robot was outside 3 cm or
-    0.15 rad; 0 if it never was, None if it never was inside.
+    0.15 rad; 0 if it never was, None if it never was inside. `off_pitch_s`: how long a corner of the robot's square was
+    beyond the edge of the pitch, in whole control periods.
     """
 
     rms_x_cm: float | None
@@ -50,6 +53,7 @@ class Tracking(msgspec.Struct, frozen=True):
     rms_theta_deg: float | None
     rms_position_cm: float | None
     settling_s: float | None
+    off_pitch_s: float | None
 
 
 class RobotTracking(msgspec.Struct, frozen=True):
@@ -122,6 +126,7 @@ def error_of(robot: RobotPeriod, tick: int) -> ErrorSample:
         100.0 * (truth.x_m - at.x_m),
         100.0 * (truth.y_m - at.y_m),
         wrapped(truth.theta_rad - at.theta_rad),
+        not pitch.holds(msgspec.structs.replace(truth, theta_rad=wrapped(truth.theta_rad))),
     )
 
 
@@ -137,7 +142,7 @@ def errors_by_robot(periods: Sequence[Period]) -> dict[tuple[int, int], list[Err
 def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
     """The figures of one robot; None throughout when there is no sample."""
     if not samples:
-        return Tracking(None, None, None, None, None)
+        return Tracking(None, None, None, None, None, None)
     last = [sample for sample in samples if sample.tick > samples[-1].tick - TICKS_PER_SECOND]
     return Tracking(
         rms_x_cm=_rms([sample.x_cm for sample in last]),
@@ -145,6 +150,7 @@ def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
         rms_theta_deg=_rms([math.degrees(sample.theta_rad) for sample in last]),
         rms_position_cm=_rms([sample.position_cm for sample in last]),
         settling_s=_settling_s(samples),
+        off_pitch_s=seconds(CONTROL_PERIOD_TICKS * len([sample for sample in samples if sample.off_pitch])),
     )
 
 
@@ -199,6 +205,18 @@ def summarise(
         robots=everyone if len(everyone) > 1 else (),
         complete=complete,
     )
+
+
+def off_pitch_text(summary: Summary) -> str:
+    """Which robots left the pitch and for how long, for people; empty if none did."""
+    everyone = summary.robots or (RobotTracking(0, -1, summary.tracking),)
+    left = [
+        f"{one.tracking.off_pitch_s:.2f} s"
+        + (f" (net{one.network}/robot{one.slot})" if summary.robots else "")
+        for one in everyone
+        if one.tracking.off_pitch_s
+    ]
+    return f"off it for {', '.join(left)}; there are no walls" if left else ""
 
 
 def to_json(summary: Summary) -> bytes:

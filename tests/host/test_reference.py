@@ -70,6 +70,43 @@ def test_the_speed_is_steady_from_the_end_of_the_ramp_on():
     assert Ramp(ramp_s=0.0).at(0.0) == (0.0, 0.2, 0.0)
 
 
+PROFILES = st.builds(
+    Ramp, st.floats(0.05, 0.4), st.floats(0.1, 1.0), st.floats(0.05, 6.0), ramp_down=st.just(True)
+)
+
+
+@settings(deadline=None)
+@given(PROFILES, st.floats(0.0, 1.0))
+def test_a_ramp_down_is_the_ramp_up_run_backwards(ramp, part):
+    t = part * ramp.duration_s
+    s, v, _ = ramp.at(t)
+    rest, left, _ = ramp.at(ramp.duration_s - t)
+    assert v == pytest.approx(left, abs=1e-12)
+    assert s + rest == pytest.approx(ramp.at(ramp.duration_s)[0], abs=1e-12)
+    assert ramp.at(ramp.duration_s)[1] == pytest.approx(0.0, abs=1e-12)
+
+
+@settings(deadline=None)
+@given(PROFILES, st.floats(0.01, 0.99))
+def test_speed_and_acceleration_of_a_ramp_down_are_the_derivatives_of_its_length(ramp, part):
+    t, h = part * ramp.duration_s, 1e-6
+    corners = (ramp.ramp_s, ramp.duration_s - ramp.ramp_s, 0.5 * ramp.duration_s)
+    assume(all(abs(t - corner) > 2 * h for corner in corners))
+    before, (_, v, a), after = ramp.at(t - h), ramp.at(t), ramp.at(t + h)
+    assert (after[0] - before[0]) / (2 * h) == pytest.approx(v, abs=1e-8)
+    assert (after[1] - before[1]) / (2 * h) == pytest.approx(a, abs=1e-8)
+
+
+def test_a_path_with_a_ramp_down_is_the_same_path_without_until_it_slows_down():
+    for path in (Line, Arc):
+        stopping = path(Ramp(duration_s=4.0, ramp_down=True))
+        assert stopping.at(3.5) == path().at(3.5)
+        end = stopping.at(60.0)
+        assert (end.v_m_s, end.v_dot_m_s2) == (0.0, 0.0)
+        assert stopping.ramp.at(60.0)[0] == pytest.approx(0.2 * 3.5)
+    assert Ramp(duration_s=0.0, ramp_down=True).at(1.0) == (0.0, 0.0, 0.0)
+
+
 def test_an_arc_back_to_the_origin_is_refused():
     with pytest.raises(ValueError, match=r"curvature_per_m = 6\.0"):
         Arc(curvature_per_m=6.0)

@@ -21,6 +21,7 @@ from miro_sim.replay import (
     script_of,
     script_of_stream,
 )
+from miro_sim.scenario_places import check_places
 
 from tests.sim.synthetic import periods
 
@@ -114,6 +115,8 @@ def test_the_layout_of_a_stream_is_the_one_in_which_it_can_be_read(robots: int) 
     scenario = scenario_of_stream(sent, "a.txt")
     assert scenario.networks[0].robots == robots
     assert [robot.slot for robot in scenario.networks[0].robot] == list(range(robots))
+    assert {robot.reference.drive_s for robot in scenario.networks[0].robot} == {0.0}
+    check_places(scenario, "a.txt")
     radio = scenario.networks[0].radio
     assert (radio.bit_error_rate, radio.carrier, radio.squelch) == (0.0, "on", True)
     assert scenario.duration_s * TICKS_PER_SECOND >= 1_800_000 + TICKS_PER_SECOND

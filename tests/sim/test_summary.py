@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 from miro_sim.clock import CONTROL_PERIOD_TICKS
 from miro_sim.figure import draw
 from miro_sim.records import Period
-from miro_sim.summary import ErrorSample, Summary, settling_text, summarise, to_json, tracking_of, wrapped
+from miro_sim.summary import (
+    ErrorSample,
+    Summary,
+    off_pitch_text,
+    settling_text,
+    summarise,
+    to_json,
+    tracking_of,
+    wrapped,
+)
 
 from tests.sim.synthetic import periods
 
@@ -27,7 +36,7 @@ COUNTERS = {
 }
 KEYS = {
     "": "scenario seed engine digest simulated_s wall_s realtime_factor tracking link firmware",
-    "tracking": "rms_x_cm rms_y_cm rms_theta_deg rms_position_cm settling_s",
+    "tracking": "rms_x_cm rms_y_cm rms_theta_deg rms_position_cm settling_s off_pitch_s",
     "link": "frames_sent frames_accepted frames_rejected frames_stale bit_errors",
     "firmware": "sha256 instructions machine_cycles idle_cycles faults",
 }
@@ -107,6 +116,24 @@ def test_a_robot_that_ends_outside_is_not_called_settled(
     errors: list[tuple[float, float, float]], text: str
 ) -> None:
     assert settling_text(samples(*errors)) == text
+
+
+def test_the_time_off_the_pitch_is_counted_by_the_corners_of_the_robot() -> None:
+    run = list(
+        periods(200)
+    )  # along y = 0 at 0.2 m/s: its front edge crosses x = 120 cm at 116.25 cm, after 5.81 s
+    off = [period for period in run if period.robots[0].truth.x_m + 0.0375 > 1.2]
+    assert 20 < len(off) < 30
+    summary = summary_of(run)
+    assert summary.tracking.off_pitch_s == len(off) * 800_800 / 24e6
+    assert off_pitch_text(summary) == f"off it for {summary.tracking.off_pitch_s:.2f} s; there are no walls"
+
+
+def test_each_robot_that_left_the_pitch_is_named_and_no_other() -> None:
+    assert off_pitch_text(summary_of(list(periods(60)))) == ""
+    text = off_pitch_text(summary_of(list(periods(200, [(0, 0), (0, 2)]))))
+    assert "(net0/robot0)" in text
+    assert "(net0/robot2)" in text
 
 
 def test_a_run_without_a_period_has_no_tracking() -> None:

@@ -19,7 +19,7 @@ from miro_sim.outdir import OutputFolder
 from miro_sim.recording import Source
 from miro_sim.records import Period
 from miro_sim.scenario_file import ScenarioText, load
-from miro_sim.summary import Summary, errors_by_robot, settling_text
+from miro_sim.summary import Summary, errors_by_robot, off_pitch_text, settling_text
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
@@ -59,9 +59,9 @@ def run(
     all that was recorded; one that is killed leaves run.part.mcap with all but the last half second. decode, export
     and replay read it. Files of an earlier run stay as they are until the new ones are complete.
     """
+    active = choose_engine(engine)
     text = load(scenario)
     folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force)
-    active = choose_engine(engine)
     image = load_image(firmware)
     from miro_sim.world import World
 
@@ -120,6 +120,9 @@ def _print(summary: Summary, periods: list[Period], folder: Path) -> None:
             f"rms of the last second {tracking.rms_position_cm:.2f} cm "
             f"(x {tracking.rms_x_cm:.2f}, y {tracking.rms_y_cm:.2f}), {tracking.rms_theta_deg:.2f} deg; {settled}",
         )
+    off_pitch = off_pitch_text(summary)
+    if off_pitch:
+        table.add_row("pitch", off_pitch)
     table.add_row(
         "link",
         f"{link.frames_sent} frames sent, {_known(link.frames_accepted)} accepted, "

@@ -166,8 +166,8 @@ def _robot_run(request: Request) -> RobotRun:
     is_path = os.path.exists(subject) or "/" in subject or "\\" in subject
     periods = None
     if subject in builtin_names() or subject.endswith(".toml") or not is_path:
-        text = load(subject)
         choose_engine(request.engine)
+        text = load(subject)
         image = load_image(request.firmware)
         scenario, seed, script = text.scenario, request.seed or 0, None
     else:
