@@ -15,6 +15,7 @@ from rich.table import Table
 
 from miro_sim.inputs import InputError, read_input
 from miro_sim.outdir import whole_file
+from miro_sim.scenario_errors import one_line
 
 if TYPE_CHECKING:
     from miro_robot.debug_info import Sources
@@ -72,7 +73,9 @@ def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
     with ExitStack() as files:
         for path, text in ((listing_path(out), report.listing), (out, encode(total))):
             if text is not None:
-                files.enter_context(whole_file(path, option)).write_text(text, encoding="utf-8")
+                files.enter_context(whole_file(path, option)).write_bytes(
+                    text.encode("utf-8", "surrogateescape")
+                )
 
 
 def read_tracefile(path: Path) -> Tracefile:
@@ -82,9 +85,7 @@ def read_tracefile(path: Path) -> Tracefile:
     if not path.exists():
         return {}
     try:
-        return decode(read_input(path).decode("utf-8"), str(path))
-    except UnicodeDecodeError:
-        raise InputError(str(path), "is not text", "name an lcov tracefile") from None
+        return decode(read_input(path).decode("utf-8", "surrogateescape"), str(path))
     except TracefileError as error:
         what, _, remedy = str(error).removeprefix(f"{path}:").partition("; ")
         raise InputError(str(path), f"line {what}", remedy) from None
@@ -99,6 +100,6 @@ def table(tracefile: Tracefile) -> Table:
         result.add_column(column, overflow="fold")
     for path in sorted(tracefile):
         one = {path: tracefile[path]}
-        result.add_row(path, str(line_share(one)), str(branch_share(one)), missed(tracefile[path]))
+        result.add_row(one_line(path), str(line_share(one)), str(branch_share(one)), missed(tracefile[path]))
     result.add_row("all", str(line_share(tracefile)), str(branch_share(tracefile)), "")
     return result

@@ -38,6 +38,7 @@ _DERIVED = (
     "MCH",
 )  # totals are counted again when it is written
 _DROPPED = (*_DERIVED, "TN", "VER")
+_LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"  # where str.splitlines cuts
 _NAME_ANOTHER = "give a file that was written as lcov tracefile"
 _USE_LCOV = "add the files up with `lcov --add-tracefile`"
 
@@ -95,9 +96,9 @@ def encode(tracefile: Mapping[str, FileRecord]) -> str:
 
 def _encode_file(path: str, record: FileRecord) -> Iterable[str]:
     by_line = sorted(record.functions.items(), key=lambda item: (item[1][0], item[0]))
-    yield f"SF:{path}"
-    yield from (f"FN:{line},{name}" for name, (line, _) in by_line)
-    yield from (f"FNDA:{count},{name}" for name, (_, count) in by_line)
+    yield f"SF:{_in_one_line(path)}"
+    yield from (f"FN:{line},{_in_one_line(name)}" for name, (line, _) in by_line)
+    yield from (f"FNDA:{count},{_in_one_line(name)}" for name, (_, count) in by_line)
     yield f"FNF:{len(by_line)}"
     yield f"FNH:{len([name for name, (_, count) in by_line if count])}"
     for (line, block, branch), times in sorted(record.branches.items()):
@@ -108,6 +109,11 @@ def _encode_file(path: str, record: FileRecord) -> Iterable[str]:
     yield f"LF:{len(record.lines)}"
     yield f"LH:{record.lines_hit}"
     yield "end_of_record"
+
+
+def _in_one_line(name: str) -> str:
+    """A name with its line ends escaped, `\\n`: the format has no way to write them, and they would make records."""
+    return "".join(repr(char)[1:-1] if char in _LINE_ENDS else char for char in name)
 
 
 def decode(text: str, path: str) -> Tracefile:

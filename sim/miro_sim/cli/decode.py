@@ -18,6 +18,7 @@ from miro_sim.capture.source import READ_ERRORS, Source, open_source
 from miro_sim.cli.options import Place, choose_engine, engine_option
 from miro_sim.cli.program import DONE, complain
 from miro_sim.cli.progress import ProgressBar
+from miro_sim.scenario_errors import one_line
 
 DIRECTIONS = {"down": DOWN, "up": UP}
 PROGRESS_BYTES = 1 << 16
@@ -86,7 +87,7 @@ def _counted(runs: Iterable[Run], given: Input, bar: ProgressBar) -> Iterator[Ru
 def _print_table(given: Input, source: Source, layouts: Layouts, found: Iterable[Row]) -> int:
     out = sys.stdout
     totals = render.Totals()
-    out.write(f"{given.label}: {NAMES[source.format]}{layouts}\n{render.units_line()}\n")
+    out.write(f"{one_line(given.label)}: {NAMES[source.format]}{layouts}\n{render.units_line()}\n")
     out.write(f"{render.head_line(source.timed)}\n")
     try:
         for row in found:

@@ -7,6 +7,7 @@ import click
 from miro_sim.cli.code_place import SPACE_BYTES, functions_at
 from miro_sim.cli.debug import sources_of, sources_option
 from miro_sim.cli.options import Place, choose_engine, load_image
+from miro_sim.cli.program import show_line
 
 
 @click.command(short_help="Lists an image's instructions.")
@@ -40,4 +41,4 @@ def disasm(image: str | None, symbols: tuple[str, ...], sources: tuple[str, ...]
         if wanted and line.endswith(":") and not line.startswith(";"):
             shown = line in headings
         if shown:
-            click.echo(line)
+            show_line(line)

@@ -9,6 +9,7 @@ import click
 from miro_sim.cli.code_place import functions_at
 from miro_sim.cli.debug import with_debug_files
 from miro_sim.cli.options import Place
+from miro_sim.cli.program import show_line
 from miro_sim.cli.subject import Request, look, open_run, subject_options
 from miro_sim.outdir import check_new, check_not_input, whole_file
 
@@ -40,6 +41,6 @@ def trace(request: Request, symbols: tuple[str, ...], out: Path | None, force: b
     names = SymbolNames(image)
     only = {first for first, _ in functions_at(symbols, image, names, request.subject)} or None
     if out is None:
-        return look(run, request, Trace(names, click.echo, only, HEADING))
+        return look(run, request, Trace(names, show_line, only, HEADING))
     with whole_file(out, "--out") as staging, staging.open("w", encoding="utf-8") as stream:
         return look(run, request, Trace(names, lambda line: stream.write(line + "\n"), only, HEADING))

@@ -11,6 +11,7 @@ from miro_sim.cli.program import UserError, show
 from miro_sim.cli.subject import Request, look, open_run, subject_options
 from miro_sim.clock import PWM_PERIOD_TICKS
 from miro_sim.outdir import check_new, check_not_input, whole_file
+from miro_sim.scenario_errors import one_line
 
 SAVE_SUFFIX = ".gtkw"
 LATE_TICKS = 2 * PWM_PERIOD_TICKS
@@ -57,7 +58,7 @@ def vcd(request: Request, out: Path, force: bool) -> int:
                     f"{request.subject}: --from {request.from_tick}: {error}; look earlier"
                 ) from None
         with save_staging.open("w", encoding="utf-8", newline="\n") as stream:
-            write_save_file(stream, out.name, waveform.signals)
+            write_save_file(stream, one_line(out.name), waveform.signals)
     first_s, last_s = waveform.first_tick / run.tick_hz, waveform.written_tick / run.tick_hz
     show(f"{first_s:.6f} s to {last_s:.6f} s; gtkwave {out} {save}")
     return code

@@ -23,6 +23,7 @@ from miro_protocol.pcapng_reader import CaptureError
 from miro_protocol.stream import StreamError
 from miro_robot.image import ImageError
 from rich.console import Console, RenderableType
+from rich.text import Text
 
 from miro_sim.capture.hextext import HexError
 from miro_sim.inputs import InputError
@@ -85,12 +86,24 @@ def complain(message: str) -> None:
     click.echo(f"mirotwin: {one_line(message)}", err=True)
 
 
+def show_line(text: str) -> None:
+    """One line on stdout, whatever the text holds: names in files of others may hold codes that a terminal obeys."""
+    click.echo(one_line(text.expandtabs()))
+
+
+class _Plain(Console):
+    """A console for text of others: each string (a cell of a table, too) is one line without control characters."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(one_line(text), **options)
+
+
 def show(result: RenderableType) -> None:
     """Prints a result on stdout; what goes to a file or a pipe is not folded at 80 columns nor padded."""
     if sys.stdout.isatty():
-        Console(highlight=False, markup=False).print(result)
+        _Plain(highlight=False, markup=False).print(result)
         return
-    console = Console(highlight=False, markup=False, width=PIPE_COLUMNS)
+    console = _Plain(highlight=False, markup=False, width=PIPE_COLUMNS)
     with console.capture() as capture:
         console.print(result)
     click.echo("\n".join(line.rstrip(" ") for line in capture.get().split("\n")), nl=False)

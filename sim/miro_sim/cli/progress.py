@@ -11,6 +11,8 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from miro_sim.scenario_errors import one_line
+
 PATIENCE_S = 1.0
 
 
@@ -18,7 +20,7 @@ class ProgressBar:
     """`bar.to(done)` out of `total`. Draws nothing in the first second, nor when stderr is no terminal or closed."""
 
     def __init__(self, what: str, total: float | None, quiet: bool = False) -> None:
-        self.what = what
+        self.what = one_line(what)
         self.total = total
         stream = vars(sys)["stderr"]  # None where it is closed
         self._shown = not quiet and stream is not None and stream.isatty()
@@ -43,7 +45,7 @@ class ProgressBar:
             if time.monotonic() - self._began_s < PATIENCE_S:
                 return
             self._progress = Progress(
-                TextColumn("{task.description}"),
+                TextColumn("{task.description}", markup=False),
                 BarColumn(),
                 TaskProgressColumn(),
                 TimeRemainingColumn(),
