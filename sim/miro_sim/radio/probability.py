@@ -57,7 +57,7 @@ def fsk_exponent(eb_n0_db: float) -> float:
 
 
 def fsk_threshold(eb_n0_db: float) -> int:
-    """Bit errors of non-coherent FSK in white Gaussian noise, 0.5 exp(-Eb/2N0) (link.md section 2)."""
+    """Bit errors of non-coherent FSK in white Gaussian noise, 0.5 exp(-Eb/2N0) (Proakis, Digital Communications)."""
     return int(2147483648.0 * dmath.exp(-fsk_exponent(eb_n0_db)) + 0.5)
 
 

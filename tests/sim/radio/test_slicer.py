@@ -76,7 +76,7 @@ def wrong_bits(preamble_characters, keyup_ticks=24_000, frames=200):
 
 
 def test_key_up_without_enough_preamble_costs_bits():
-    """link.md section 1: 3 ms of 55h at least, 5 ms advised."""
+    """Radiometrix application note 3: 3 ms of 55h at least, 5 ms advised."""
     nominal = fsk_threshold(11.0) / 2**32
     none, three_ms, five_ms = (wrong_bits(count) for count in (0, 3, 5))
     assert none > 5 * nominal
