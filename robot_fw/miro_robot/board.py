@@ -42,8 +42,8 @@ _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_END
     19,
     20,
 )
-"""Ticks into a MOVX (AT89C52 sheet, section 5). When P2 goes back to its latch is not in it: CHOSEN, 2 ticks after
-the strobe."""
+"""Ticks into a MOVX (8051 Hardware Manual, 2.4 and 2.6; AT89S52 data sheet, section 28.1). When P2 goes back to its
+latch is not in them: CHOSEN, 2 ticks after the strobe."""
 _WR, _RD = 0x40, 0x80  # pins of P3
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
 _RESET_PULSE = RESET_PULSE

@@ -2,7 +2,7 @@
 
 Nothing is done per clock: a level is known to count from the moment it has been there long enough, so every
 input keeps the tick at which that will be (`due`). What is made of the counts (positions, flags) is in
-`chip.py`.
+`axis.py`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The digital filter: error in, 16-bit drive out, once per sample.
 
-Order and widths follow the sheet's 7.4 (data sheet: "PID Compensation Filter"); which coefficients are in
-force when is in `buffers.py`, the excessive-error test in `chip.py`.
+The law is the data sheet's ("PID Compensation Filter"); the order of its operations is chosen (README.md, F1 to F6).
+Which coefficients are in force when is in `buffers.py`, the excessive-error test in `axis.py`.
 """
 
 from __future__ import annotations

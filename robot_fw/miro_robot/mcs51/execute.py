@@ -1,13 +1,12 @@
 """The instructions: registers, internal RAM, ALU, and the loop that executes code.
 
-What belongs here: what each line of `opcodes.TABLE` does. Special function
-registers, time passing in peripherals, interrupts and idling are `Cpu`'s (cpu.py), which fills in the hooks
-at the end of the class.
+What belongs here: what each line of `opcodes.TABLE` does. What does not: special function registers, time passing in
+peripherals, interrupts and idling. They are `Cpu`'s (cpu.py), which fills in the hooks of `Core` (core.py).
 
-Timing inside an instruction (sections 1 and 11 of the AT89C52 sheet; where silicon is not pinned down this
-is the choice made): operands are read in the instruction's first cycle, `start`; results are written at the
-end of its last, `cycles`. The loop compares `cycles` with `limit` once per instruction and knows nothing
-else about time.
+Timing inside an instruction (8051 Hardware Manual, 2.4 and 2.5.2: a port latch changes at S6P2 of the last cycle; what
+the manual leaves open is chosen here): operands are read in the instruction's first cycle, results are written at the
+end of its last, `cycles`. The loop compares `cycles` with `limit` once per instruction and knows nothing else about
+time.
 
 The loop has one shape, a head and one choice among the rows, because the build copies the head to the end of each row
 (`setup.py`, `threaded`); what the head asks has to be rare.

@@ -3,7 +3,7 @@
 What belongs here: which source is asking since when, and which one the CPU has to take at an instruction's
 end. Who raises a flag (timers, serial port) is elsewhere; the two-cycle LCALL itself is `Cpu`'s.
 
-Timing (AT89C52 sheet section 6): flags are latched at S5P2 of every cycle and the latched copies are polled
+Timing (8051 Hardware Manual, 2.16): flags are latched at S5P2 of every cycle and the latched copies are polled
 in the next one; an LCALL follows the polling cycle if that was the last of an instruction. So at the
 boundary after cycle b - 1 those sources count that were latched in cycle b - 2. Each source is therefore
 kept as the window [since, until) of cycles whose S5P2 saw it. A cleared flag still counts in the poll of

@@ -3,10 +3,10 @@
 What belongs here: T2CON, T2MOD, TL2 TH2, RCAP2L RCAP2H, computed lazily like timers 0 and 1: `sync(cycle)`
 does all that happens in the cycles below `cycle`. Dividing its overflows down to bits is the serial port's.
 
-Timing (AT89C52 sheet section 8): as a timer it counts once per cycle, as a baud rate generator or clock
-output six times (fosc/2). TF2 is set at S2P2 and polled in the same cycle, a cycle sooner than TF0. Pins
-are sampled at S5P2 and act in the next cycle: a count, or a capture or reload that goes before that cycle's
-own count. Chosen, as no sheet says when EXF2 is polled: it is latched at S5P2 of that next cycle.
+Timing (8051 Hardware Manual, 2.12; AT89S52 data sheet, sections 10 to 13): as a timer it counts once per cycle, as a
+baud rate generator or clock output six times (fosc/2). TF2 is set at S2P2 and polled in the same cycle, a cycle
+sooner than TF0. Pins are sampled at S5P2 and act in the next cycle: a count, or a capture or reload that goes before
+that cycle's own count. Chosen, as no sheet says when EXF2 is polled: it is latched at S5P2 of that next cycle.
 """
 
 from __future__ import annotations

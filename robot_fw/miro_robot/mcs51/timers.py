@@ -3,7 +3,7 @@
 What belongs here: TMOD, the upper half of TCON, TL0 TH0 TL1 TH1, computed lazily: `sync(cycle)` does
 everything that happens in the cycles below `cycle` in one calculation. Timer 2 is in `timer2.py`.
 
-Timing (AT89C52 sheet section 7): TR and TMOD written at the end of cycle n act from n + 1 on, which counts.
+Timing (8051 Hardware Manual, 2.9 to 2.11): TR and TMOD written at the end of cycle n act from n + 1 on, which counts.
 A gate and a counter input are sampled at S5P2, and the register counts at S3P1 of the following cycle. TF
 is seen at S5P2 of the cycle that overflows.
 """

@@ -1,10 +1,11 @@
 """The serial port in modes 1 to 3: transmitter and receiver on line levels.
 
 What belongs here: SCON, SBUF, the two divide-by-16 counters, start bit search and majority vote. Where the
-16x ticks come from (timer 1, timer 2, crystal) is worked out by `Cpu`, which calls `set_clock`; mode 0 is
-in `shift.py`.
+16x ticks come from (timer 1, timer 2, crystal) is worked out by `Peripherals`, which calls `set_clock`;
+mode 0 is in `shift.py`.
 
-Timing (AT89C52 sheet section 9), all in crystal ticks: `sync(tick)` does everything below `tick`.
+Timing (8051 Hardware Manual, 2.13; states of the receiver: Oki MSM80C154S user's manual, serial port), all in crystal
+ticks: `sync(tick)` does everything below `tick`.
 Transmitter: a free-running divide-by-16 counter; the start bit begins at S1P1 after the first rollover that
 follows the write to SBUF, further bits one rollover apart, TI with the stop bit. Receiver: tests RXD on
 every 16x tick for a fall, samples each bit in counter states 7, 8, 9, acts in state 10; RI shows at the
