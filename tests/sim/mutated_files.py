@@ -334,7 +334,7 @@ def _main() -> int:
         numbers = range(options.only, options.only + 1)
     counts: Counter[tuple[str, int]] = Counter()
     slowest_s, bad = 0.0, 0
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, contextlib.suppress(KeyboardInterrupt):  # counts so far
         for number, case, outcome, took_s in campaign(Path(name), options.seed, numbers):
             slowest_s = max(slowest_s, took_s)
             if isinstance(outcome, int):
