@@ -157,7 +157,7 @@ class _Reader:
             self._count(kind, value)
         elif (kind in _DROPPED and colon) or not line or line.startswith("#"):
             pass
-        elif colon and kind.isupper() and kind != "SF":
+        elif colon and kind.isupper() and kind.isalpha() and len(kind) <= 8 and kind != "SF":
             raise _Refused(f"{kind} records are not kept", _USE_LCOV)
         else:
             raise _Refused("is no record of a tracefile")
