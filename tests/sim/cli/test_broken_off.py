@@ -19,6 +19,7 @@ from miro_sim.cli import run_files
 from miro_sim.outdir import OutputFolder
 from miro_sim.world import World
 
+from tests import children
 from tests.sim.cli.conftest import Result
 
 PARTS = ["run.part.mcap", "summary.part.json"]
@@ -224,7 +225,7 @@ def test_two_runs_into_one_folder_the_second_is_refused(
 
 def started(arguments: list[object], **more: object) -> "subprocess.CompletedProcess[str]":
     command = [sys.executable, "-c", PROGRAM, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, **more)  # type: ignore[call-overload,no-any-return]
+    return children.run(command, capture_output=True, text=True, timeout=300, check=False, **more)  # type: ignore[call-overload,no-any-return]
 
 
 def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(
@@ -251,7 +252,7 @@ def test_a_closed_stderr_is_no_terminal_and_takes_nothing_away(
 ) -> None:
     command = f'exec "$0" -c "{PROGRAM}" run "$1" --seed 5 --out "$2" 2>&-'
     arguments = ["sh", "-c", command, sys.executable, str(short), str(tmp_path / "out")]
-    done = subprocess.run(arguments, stdout=subprocess.PIPE, timeout=300, check=False)
+    done = children.run(arguments, stdout=subprocess.PIPE, timeout=300, check=False)
     assert done.returncode == 0
     assert b"digest" in done.stdout
     assert (tmp_path / "out" / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
@@ -268,7 +269,7 @@ def test_an_internal_error_shows_its_place_when_asked(
 
 
 def test_killed_runs_leave_recordings_that_lack_half_a_second_at_most() -> None:
-    done = subprocess.run(
+    done = children.run(
         [sys.executable, "-m", "tests.sim.cli.killed", "--times", "3"],
         capture_output=True,
         text=True,

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import children
+
 ROOT = Path(__file__).parents[3]
 MARK = b"started\n"
 PROGRAM = (
@@ -22,11 +24,10 @@ LONGEST_S = 1.2
 
 def interrupted(delay_s: float, *arguments: str) -> tuple[int, bytes, bytes]:
     """Exit code, stdout and stderr of the program, which is interrupted so long after our first line of code ran."""
-    with subprocess.Popen(
+    with children.start(
         [sys.executable, "-c", PROGRAM, *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         env={**os.environ, "PYTHONPATH": str(ROOT / "sim")},
     ) as process:
         assert process.stderr is not None
@@ -63,7 +64,7 @@ def test_ctrl_c_while_modules_are_loaded_ends_the_program_at_once() -> None:
 
 def test_a_program_that_was_started_with_ctrl_c_ignored_ignores_it() -> None:
     program = ["-c", f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); {PROGRAM}", "--version"]
-    with subprocess.Popen(
+    with children.start(
         [sys.executable, *program],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pytest
 
+from tests import children
 from tests.robot.inspect.programs import build
 from tests.sim.cli.conftest import Result, hex_file
 
@@ -55,7 +56,7 @@ def monitor(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def talk(image: Path, *options: object) -> Result:
     """A dialogue by script; stdout as the program sent it."""
     command = [MIROTWIN, "fw", "run", image, "--stdin", image.with_name("space"), *map(str, options)]
-    done = subprocess.run(command, capture_output=True, timeout=PATIENCE_S)
+    done = children.run(command, capture_output=True, timeout=PATIENCE_S)
     return done.returncode, done.stdout.decode(), done.stderr.decode()
 
 
@@ -103,7 +104,7 @@ def test_without_a_rate_the_monitor_hears_nothing(monitor: Path) -> None:
 
 def test_standard_input_is_sent_too(monitor: Path) -> None:
     command = [MIROTWIN, "fw", "run", monitor, "--baud", "9600", "--stdin", "-", "--stdin-gap", "20ms"]
-    done = subprocess.run(command, input=b" = 1+1\rq\r", capture_output=True, timeout=PATIENCE_S)
+    done = children.run(command, input=b" = 1+1\rq\r", capture_output=True, timeout=PATIENCE_S)
     assert (done.returncode, done.stdout) == (0, b"\r\nMonitor ready\r\n> = 1+1\r\n2\r\n> q\r\nbye\r\n")
 
 
@@ -144,7 +145,7 @@ def terminal(*arguments: object) -> Iterator[Talk]:
     master, slave = pty.openpty()
     before = termios.tcgetattr(slave)
     command = [str(MIROTWIN), "fw", "run", "--terminal", *map(str, arguments)]
-    child = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=subprocess.PIPE)
+    child = children.start(command, stdin=slave, stdout=slave, stderr=subprocess.PIPE)
     try:
         yield Talk(master, child)
         child.wait(PATIENCE_S)
