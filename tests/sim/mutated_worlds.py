@@ -197,7 +197,7 @@ def changed_values(count: int, seed: int, progress: Callable[[int], object]) -> 
         faulthandler.dump_traceback_later(LIMIT_S, exit=True)
         what = outcome(worlds[profile], with_values_changed(draw.choice(saves[profile]), draw))
         found[what if what in ("refused", "ran") else f"number {number}: {what}"] += 1
-        if what != "refused":
+        if what not in ("refused", "ran"):
             worlds[profile] = fresh(profile)
         progress(number)
     faulthandler.cancel_dump_traceback_later()
