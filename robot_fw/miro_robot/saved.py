@@ -72,8 +72,8 @@ def octets(state: Mapping[str, Any], name: str, count: int) -> bytes:
 
 def only(state: Mapping[str, Any], names: Mapping[str, object]) -> None:
     """Nothing but these names, and all of them."""
-    if set(state) != set(names):
-        wrong = sorted(str(name) for name in set(state) ^ set(names))
+    wrong = [str(name) for name in (*state, *names) if name not in state or name not in names]
+    if wrong:
         raise ValueError(f"{', '.join(wrong)[:80]} is missing or has no place in a saved state")
 
 
