@@ -3,7 +3,7 @@ cimport cython
 from miro_robot.lm629.axis cimport MotorAxis
 
 
-cdef int _RESETTING, _RUNNING
+cdef int _HELD, _RESETTING, _RUNNING
 cdef int _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR, _UPDATE_PENDING, _ACQUIRE_INDEX
 
 

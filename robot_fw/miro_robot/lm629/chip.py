@@ -15,7 +15,7 @@ from miro_robot.saved import whole
 
 __all__ = ["FAR", "PWM_TICKS", "SAMPLE_TICKS", "Lm629"]
 
-_RESETTING, _RUNNING = 1, 2
+_HELD, _RESETTING, _RUNNING = 0, 1, 2
 _MOTOR_OFF = signals.MOTOR_OFF
 _ON_TARGET = signals.ON_TARGET
 _STOP_ON_ERROR = signals.STOP_ON_ERROR
@@ -261,9 +261,25 @@ class Lm629(MotorAxis):
             raise ValueError(f"sample_tick is {self.sample_tick}, not from {earliest_tick} to {latest_tick}")
         if self.mode != _RUNNING and (self.sample_tick != FAR or self.pwm or self.pwm_magnitude):
             raise ValueError("a chip in reset takes no samples and drives no motor")
-        late = self.period_tick < earliest_tick - SAMPLE_TICKS or self.period_tick > latest_tick
-        if self.pwm_magnitude and late:
-            raise ValueError(f"period_tick is {self.period_tick}, not about {earliest_tick}")
+        if self.mode == _RUNNING and self.next_tick != self._due_tick():
+            raise ValueError(f"next_tick is {self.next_tick}, but the pulses make it {self._due_tick()}")
+        if self.reset_level == 0 and self.mode != _HELD:
+            raise ValueError("a chip whose /RST is low is held in reset")
+
+    def _due_tick(self) -> int:
+        """What `next_tick` follows from while the chip runs: a sample, the end of a period or an edge of its pulse.
+
+        -1 when the period is none of the four before the next sample, or there is a pulse of no length.
+        """
+        periods_left, off = divmod(self.sample_tick - self.period_tick, PWM_TICKS)
+        if self.pwm_magnitude == 0:
+            return -1 if self.pwm else self.sample_tick
+        if off or not 1 <= periods_left <= SAMPLE_TICKS // PWM_TICKS:
+            return -1
+        length = 16 * self.pwm_magnitude
+        if self.pulse_late:
+            return self.period_tick + (PWM_TICKS if self.pwm else PWM_TICKS - length)
+        return self.period_tick + (length if self.pwm else PWM_TICKS)
 
     def restore(self, state: dict[str, Any]) -> None:
         for name in self.PARTS:
