@@ -36,6 +36,14 @@ def start(command: Any, **named: Any) -> subprocess.Popen[Any]:
     return subprocess.Popen(command, **_with_reset(named))
 
 
+def fork() -> int:
+    """`os.fork`, with default signals in the child."""
+    process = os.fork()
+    if process == 0:
+        reset_signals()
+    return process
+
+
 def _with_reset(named: dict[str, Any]) -> dict[str, Any]:
     if os.name != "posix":
         return named  # no preexec_fn there, and none of the shells in question

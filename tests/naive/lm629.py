@@ -239,7 +239,6 @@ class NaiveLm629:
                 self.move(s * profile_speed(v, self.a, self.limit, distance), events)
 
     # -------------------------------------------------------------------------------------- pins
-
     def set_reset(self, tick: int, level: int) -> None:
         self.run_to(tick)
         if self.rst and not level:

@@ -26,6 +26,8 @@ from miro_sim.cli import main
 from miro_sim.recording import Recorder
 from miro_sim.records import Period
 
+from tests import children
+
 LONGEST_LOSS_S = 0.5
 LATEST_KILL_S = 2.0
 PERIODS = 18_000  # 600 s
@@ -34,7 +36,7 @@ duration_s = 600.0
 [[network]]
 [[network.robot]]
 slot = 0
-reference.kind = "line"
+reference = { kind = "line", drive_s = 5.0 }
 """
 _TIME = struct.Struct("<d")
 
@@ -73,13 +75,14 @@ def run_publishing(times: Times, scenario: Path, out: Path) -> None:
 def killed_run(scenario: Path, out: Path, delay_s: float) -> list[float]:
     """Starts a run, kills it `delay_s` after its first control period, returns when its periods were computed."""
     times = Times()
-    process = os.fork()
+    process = children.fork()
     if process == 0:
         try:
             run_publishing(times, scenario, out)
         finally:
             os._exit(1)  # it ended before it was killed
     while not times.get():
+        assert os.waitpid(process, os.WNOHANG) == (0, 0), "the run ended before its first control period"
         time.sleep(0.01)
     time.sleep(delay_s)
     os.kill(process, signal.SIGKILL)

@@ -79,7 +79,7 @@ def test_what_comes_from_outside_is_no_traceback_either(raised: BaseException, c
     assert (result.exit_code, result.stderr.lstrip("\n")) == (code, line)
 
 
-def test_a_mistake_of_the_program_itself_is_not_hidden() -> None:
+def test_a_mistake_of_the_program_itself_asks_for_a_report() -> None:
     @click.group(cls=Program)
     def group() -> None: ...
 
@@ -87,4 +87,7 @@ def test_a_mistake_of_the_program_itself_is_not_hidden() -> None:
     def stumble() -> None:
         raise ZeroDivisionError
 
-    assert isinstance(CliRunner().invoke(group, ["stumble"]).exception, ZeroDivisionError)
+    result = CliRunner().invoke(group, ["stumble"])
+    assert result.exit_code == 70
+    assert "ZeroDivisionError" in result.stderr
+    assert "report" in result.stderr
