@@ -6,7 +6,7 @@ What does not: anything about a single module (its types stand in its own `.pxd`
 
 Every extension is optional: with no C compiler the package installs all the same and runs from source,
 slowly and with the same bits. Each compiled module checks its stamp when it is imported
-(`miro_protocol.engine`), so one that no longer matches its source is refused.
+(`miro_exact.engine`), so one that no longer matches its source is refused.
 """
 
 import importlib.util
@@ -18,10 +18,16 @@ from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
 HERE = Path(__file__).parent
-ROOTS = {"miro_protocol": "protocol", "miro_robot": "robot_fw", "miro_host": "host", "miro_sim": "sim"}
+ROOTS = {
+    "miro_exact": "exact",
+    "miro_protocol": "protocol",
+    "miro_robot": "robot_fw",
+    "miro_host": "host",
+    "miro_sim": "sim",
+}
 STAMP = """
 
-from miro_protocol.engine import refuse_if_stale as _refuse_if_stale
+from miro_exact.engine import refuse_if_stale as _refuse_if_stale
 __source_sha256__ = "{sha}"
 _refuse_if_stale(__name__, __source_sha256__)
 """
@@ -46,7 +52,7 @@ FLAGS = {"unix": ["-O2", "-ffp-contract=off", "-fno-fast-math", "-w"], "msvc": [
 
 def engine():
     """The module that knows what is hot and how it is hashed, loaded from its file: nothing is installed yet."""
-    spec = importlib.util.spec_from_file_location("engine", HERE / "protocol/miro_protocol/engine.py")
+    spec = importlib.util.spec_from_file_location("engine", HERE / "exact/miro_exact/engine.py")
     module = importlib.util.module_from_spec(spec)
     sys.modules["engine"] = module
     spec.loader.exec_module(module)

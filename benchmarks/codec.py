@@ -16,10 +16,12 @@ from importlib import import_module
 from importlib.util import find_spec
 
 from crcmod import mkCrcFun
-from miro_protocol import crc, engine
+from serial.threaded import Packetizer
+
+from miro_exact import engine
+from miro_protocol import crc
 from miro_protocol.decoder import Decoder
 from miro_protocol.frames import TeamFrame, decode_fields, encode
-from serial.threaded import Packetizer
 
 N = 3
 CHUNK = 4096

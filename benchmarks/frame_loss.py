@@ -22,6 +22,10 @@ from math import exp
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks.interval import wilson
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.rng import Stream
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.table import BITS_PER_CHARACTER, DOWNLINK
@@ -31,11 +35,7 @@ from miro_robot.image import load_hex
 from miro_robot.mcs51.line import Line
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
-from miro_sim.clock import CONTROL_PERIOD_TICKS
 from miro_sim.radio import Downlink, RadioParams, SlicerParams, Uplink
-from miro_sim.rng import Stream
-
-from benchmarks.interval import wilson
 
 LEVELS_DB = (7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0)
 FIRST_TICK = 240_000  # after the firmware's start

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+
 from miro_protocol import crc, whitening
 from miro_protocol.decoder import Received
 from miro_protocol.scan import Scanner

@@ -9,13 +9,14 @@ import io
 import sys
 import time
 
-from miro_protocol import engine
+from miro_exact import engine
+from miro_exact.clock import seconds
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim import runner, scenario_file
-from miro_sim.clock import seconds
-from miro_sim.recording import Recorder, Source
-from miro_sim.world import World
+from miro_sim.scenario import file as scenario_file
+from miro_sim.world.world import World
+from mirotwin import runner
+from mirotwin.recording.recorder import Recorder, Source
 
 
 def ratio(name: str, recorded: bool) -> float:

@@ -22,7 +22,10 @@ from pathlib import Path
 from statistics import geometric_mean
 from typing import NamedTuple
 
-from miro_protocol import engine
+from benchmarks.realtime import ratio
+from tests.robot.ucsim import s51
+
+from miro_exact import engine
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
@@ -30,9 +33,6 @@ from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
 from miro_robot.mcs51.xram import XramBus
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
-
-from benchmarks.realtime import ratio
-from tests.robot.ucsim import s51
 
 PROGRAMS = ("crc", "arithmetic", "mix")
 FOLDER = Path(__file__).with_name("programs")

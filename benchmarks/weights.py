@@ -13,6 +13,7 @@ from __future__ import annotations
 from math import comb
 
 import numpy as np
+
 from miro_protocol.crc import crc16
 from miro_protocol.frames import layout_crc
 from miro_protocol.table import Format

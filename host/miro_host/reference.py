@@ -11,7 +11,7 @@ rho, which is used throughout, so that t = 0 is a time like any other.
 
 import msgspec
 
-from miro_host.dmath import sincos, wrap_pi
+from miro_exact.dmath import sincos, wrap_pi
 from miro_host.posture import Posture
 
 

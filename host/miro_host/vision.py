@@ -14,7 +14,7 @@ from collections import deque
 
 import msgspec
 
-from miro_host.dmath import wrap_pi
+from miro_exact.dmath import wrap_pi
 from miro_host.posture import Posture
 
 DEGREE = 0.017453292519943295

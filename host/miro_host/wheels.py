@@ -10,7 +10,7 @@ own limit.
 
 import msgspec
 
-from miro_host.domain import DomainError
+from miro_exact.domain import DomainError
 
 PI = 3.141592653589793
 TICKS_PER_S = 24_000_000

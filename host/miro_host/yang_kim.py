@@ -13,7 +13,7 @@ import math
 
 import msgspec
 
-from miro_host.dmath import atan2, sincos, wrap_pi
+from miro_exact.dmath import atan2, sincos, wrap_pi
 from miro_host.posture import Posture
 from miro_host.reference import Reference
 

@@ -1,5 +1,3 @@
-"""The wire between host and robot: frames, CRC, sans-IO decoder, command streams. Imports nothing of ours."""
+"""The wire between host and robot: frames, CRC, sans-IO decoder, command streams."""
 
-from miro_protocol import engine
-
-engine.install()
+import miro_exact  # noqa: F401  (puts the engine finder in place before any hot module loads)

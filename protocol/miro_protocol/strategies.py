@@ -2,7 +2,7 @@
 
 Needs the extra `strategies` (`pip install mirotwin[strategies]`). What belongs here: inputs that anybody
 testing a sender or a receiver of this wire wants. What does not: assertions, the radio and the robot
-(`miro_sim.testing`).
+(`mirotwin.testing`).
 
 * `host_frames`, `telemetry_frames`: messages
 * `valid_streams`, `damaged_streams`: characters as a receiver hears them, damaged by wrong bits, lost and added

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import octets, whole
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image, Symbols
 from miro_robot.lm629.bus_timing import LIMITS, RESET_PULSE, BusTiming
@@ -22,7 +23,6 @@ from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
 from miro_robot.probe import Probe
-from miro_robot.saved import octets, whole
 from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
 
 CYCLE_TICKS = 12

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import tick
 from miro_robot.lm629.chip import Lm629
-from miro_robot.saved import tick
 
 FAR = 1 << 62  # "never", in ticks
 LEFT = 0

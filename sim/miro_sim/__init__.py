@@ -1,3 +1,3 @@
-"""The physical world and the clock: radio, motors, chassis, scheduler, scenarios, recording, command line."""
+"""The physical world and its clock: scenarios, radio, motors, chassis, pitch, and the order in which they move."""
 
-import miro_protocol  # noqa: F401  (puts the engine finder in place before any hot module loads)
+import miro_exact  # noqa: F401  (puts the engine finder in place before any hot module loads)

@@ -1,1 +1,4 @@
-"""The `mirotwin` program: where it starts (`entry`). Nothing else is imported here, so that it starts at once."""
+"""Mirotwin: what people do with the world, and the name they import.
+
+Nothing is imported here, so that the program (`entry`) starts at once.
+"""

@@ -1,7 +1,7 @@
 """Where the `mirotwin` program starts: Ctrl-C is one line and exit code 130 from the first moment to the last.
 
 What belongs here: what Ctrl-C does while modules are loaded, while a command runs, and after it. What does not:
-anything that has to be imported first; the command line itself is `miro_sim.cli`.
+anything that has to be imported first; the command line itself is `mirotwin.cli`.
 
 Loading takes half a second, in which nothing has been opened yet: the process ends at once, whatever module is half
 imported. A command that runs gets KeyboardInterrupt and cleans up (`cli.program`). Once its exit code is known all is
@@ -44,7 +44,7 @@ if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is 
 def main() -> None:
     """Loads the command line, runs it and ends the process."""
     global _phase
-    from miro_sim.cli import main as command
+    from mirotwin.cli import main as command
 
     try:
         _phase = RUNNING

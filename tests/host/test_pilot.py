@@ -5,6 +5,7 @@ import json
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_host.integrator import Integrator, Limits
 from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
 from miro_host.posture import Posture

@@ -5,9 +5,9 @@ import math
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from miro_host.reference import Arc, Line, Ramp
-
 from tests.naive import host_control as naive
+
+from miro_host.reference import Arc, Line, Ramp
 
 ANGLES = st.floats(-3.1, 3.1)
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_host.station import Station
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ServiceFrame, TeamFrame

@@ -5,7 +5,8 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from miro_host.dmath import wrap_pi
+
+from miro_exact.dmath import wrap_pi
 from miro_host.posture import Posture
 from miro_host.vision import NO_ERRORS, Vision, VisionErrors, measure, to_grid
 

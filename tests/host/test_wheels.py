@@ -5,6 +5,7 @@ from fractions import Fraction
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_host.wheels import Wheels, nearest
 from miro_protocol.table import VELOCITY_SATURATION
 

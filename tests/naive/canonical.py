@@ -1,4 +1,4 @@
-"""The canonical encoding once more, from the table in `miro_sim.canonical`, and the decoder that proves it
+"""The canonical encoding once more, from the table in `miro_exact.canonical`, and the decoder that proves it
 injective."""
 
 from __future__ import annotations

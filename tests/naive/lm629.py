@@ -9,10 +9,10 @@ import math
 from collections.abc import Callable, Generator
 from fractions import Fraction
 
-from miro_robot.lm629.options import Lm629Options
-
 from tests.naive.lm629_encoder import NaiveEncoder
 from tests.naive.lm629_parts import LSB, NaivePid, between, modular, profile_speed
+
+from miro_robot.lm629.options import Lm629Options
 
 Words = Generator[None, int, None]
 HIGH_WORD_READS = {0x07: 2, 0x08: 2, 0x09: 2, 0x0A: 2, 0x0B: 1, 0x0C: 1, 0x0D: 1}

@@ -12,9 +12,9 @@ from fractions import Fraction
 from functools import cache
 from typing import NamedTuple
 
-from miro_sim.radio import ChainParams, RadioParams, SlicerParams
-
 from tests.naive import rng
+
+from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 
 Sent = list[tuple[int, bytes]]  # (tick of the first start bit at the transmitter, bytes)
 Edges = list[tuple[int, int]]  # (tick, level)

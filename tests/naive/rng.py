@@ -1,4 +1,4 @@
-"""Philox and the streams, written straight from the layout in `miro_sim.rng`: arbitrary integers, no cache,
+"""Philox and the streams, written straight from the layout in `miro_exact.rng`: arbitrary integers, no cache,
 mpmath.
 
 The Gaussian looks its cell up by walking a table that mpmath makes; it shares no code with the module it

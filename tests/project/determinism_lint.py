@@ -71,7 +71,7 @@ class Lint(ast.NodeVisitor):
 
     def check_member(self, node: ast.AST, module: str, name: str) -> None:
         if module == "math" and name not in EXACT_MATH:
-            self.found(node, f"math.{name} is not exact everywhere: use miro_host.dmath")
+            self.found(node, f"math.{name} is not exact everywhere: use miro_exact.dmath")
         if module == "numpy" and name in INEXACT_NUMPY:
             self.found(node, f"numpy.{name} differs between machines")
         if module == "os" and name in ("environ", "getenv", "urandom"):

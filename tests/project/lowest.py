@@ -32,9 +32,9 @@ SMOKE = (
     "tests/protocol/test_frames.py",
     "tests/protocol/test_pcapng.py",
     "tests/sim/test_scenario.py",
-    "tests/sim/test_recording.py",
-    "tests/sim/test_pytest_plugin.py",
-    "tests/sim/cli/test_scenarios_command.py",
+    "tests/mirotwin/test_recording.py",
+    "tests/mirotwin/test_pytest_plugin.py",
+    "tests/mirotwin/cli/test_scenarios_command.py",
 )
 
 

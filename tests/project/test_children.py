@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from tests import children
 
 TESTS = Path(__file__).parents[1]

@@ -11,14 +11,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from miro_protocol import engine
-from miro_robot.mcs51 import opcodes
-
 from tests import children
+
+from miro_exact import engine
+from miro_robot.mcs51 import opcodes
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
-SOURCES = ("protocol", "robot_fw", "host", "sim")
+SOURCES = ("exact", "protocol", "robot_fw", "host", "sim")
 
 
 @pytest.fixture
@@ -56,12 +56,12 @@ def python(tree, *arguments, **env):
 
 
 def run_short(tree, *options):
-    text = (tree / "sim/miro_sim/scenarios/fig6.toml").read_text()
+    text = (tree / "sim/miro_sim/scenario/builtin/fig6.toml").read_text()
     lines = ["duration_s = 0.5" if line.startswith("duration_s") else line for line in text.splitlines()]
     (tree / "short.toml").write_text("\n".join(lines))
     return python(
         tree,
-        *("-c", "from miro_sim.cli import main; main()"),
+        *("-c", "from mirotwin.cli import main; main()"),
         *("run", "short.toml", "--seed", "7", "--out", "out", "--quiet", *options),
     )
 
@@ -100,15 +100,15 @@ def test_a_compiled_module_whose_source_has_changed_is_refused(tree):
 @pytest.mark.skipif(engine.active() != "compiled", reason="no compiled modules here")
 def test_building_again_removes_the_compiled_twin_of_a_module_that_is_hot_no_more(tree):
     with_compiled_modules(tree)
-    orphan = engine.compiled_file(ROOT / "sim/miro_sim/rng.py")
+    orphan = engine.compiled_file(ROOT / "exact/miro_exact/rng.py")
     left_over = tree / "sim/miro_sim" / orphan.name.replace("rng", "clock")
     shutil.copy(orphan, left_over)
     built = python(
-        tree, "setup.py", "-q", "build_ext", "--inplace", "--only", "miro_sim.rng", CC="no-such-compiler"
+        tree, "setup.py", "-q", "build_ext", "--inplace", "--only", "miro_exact.rng", CC="no-such-compiler"
     )
     assert built.returncode == 0, built.stderr
     assert not left_over.exists()
-    assert engine.compiled_file(tree / "sim/miro_sim/rng.py").exists()
+    assert engine.compiled_file(tree / "exact/miro_exact/rng.py").exists()
 
 
 def test_each_instruction_of_the_compiled_cpu_jumps_to_the_next_by_itself(tree):

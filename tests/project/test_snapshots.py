@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("protocol", "robot_fw/miro_robot", "host", "sim")
+FOLDERS = ("exact", "protocol", "robot_fw/miro_robot", "host", "sim")
 
 
 def all_classes():

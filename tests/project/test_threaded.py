@@ -11,12 +11,12 @@ import shutil
 from pathlib import Path
 
 import pytest
-from miro_protocol import engine
-
 from tests import children
 
+from miro_exact import engine
+
 ROOT = Path(__file__).parents[2]
-info = importlib.import_module("miro_sim.cli.info")  # the package has the command under this name
+info = importlib.import_module("mirotwin.cli.info")  # the package has the command under this name
 PROGRAM = """
 #include <stdio.h>
 #define unlikely(x) __builtin_expect(!!(x), 0)

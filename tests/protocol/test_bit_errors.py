@@ -4,15 +4,15 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from benchmarks.line import decode_lines, line_bits, random_frames, receive
+from benchmarks.weights import covered_bits, syndromes
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_protocol.decoder import Received, WindowDecoder
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.strategies import host_frames, telemetry_frames
 from miro_protocol.table import DOWNLINK, TELEMETRY, downlink
-
-from benchmarks.line import decode_lines, line_bits, random_frames, receive
-from benchmarks.weights import covered_bits, syndromes
 
 FORMATS = (*DOWNLINK.values(), TELEMETRY)
 BY_FORMAT = pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)

@@ -4,10 +4,10 @@ import re
 import sys
 from pathlib import Path
 
+from tests import children
+
 from miro_protocol import c_header, crc, table, whitening
 from miro_protocol.frames import TeamFrame, encode
-
-from tests import children
 
 HEADER = Path(__file__).parents[2] / "robot_fw/firmware/protocol.h"
 

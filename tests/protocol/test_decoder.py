@@ -5,14 +5,14 @@ from itertools import pairwise
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from tests.naive.decoder import NaiveDecoder
+
 from miro_protocol import decoder as module
 from miro_protocol import table
 from miro_protocol.decoder import Damaged, Decoder, Reason, Received, WindowDecoder
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.strategies import Heard, damaged_streams, team_frames, valid_streams
 from miro_protocol.whitening import whiten
-
-from tests.naive.decoder import NaiveDecoder
 
 FRAMES = {n: encode(TeamFrame(0, 7, ((100, -100),) * n), n) for n in (3, 5)}
 LEAD = b"\x55" * 5 + b"\xff"

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import Phase, settings
+
 from miro_protocol import document
 from miro_protocol.decoder import Decoder, Received
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_protocol import frames, table
 from miro_protocol.frames import ContentError, EncodeError, ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.strategies import host_frames, robot_counts, telemetry_frames

@@ -2,6 +2,7 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_protocol.freshness import Freshness
 
 MS = 24_000

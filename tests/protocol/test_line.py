@@ -5,10 +5,10 @@ from itertools import pairwise
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.naive.mcs51_uart import NaiveUart
+
 from miro_protocol.line import LineReceiver, bits_of, edges_of
 from miro_protocol.table import HOST_BIT_TICKS, ROBOT_BIT_TICKS
-
-from tests.naive.mcs51_uart import NaiveUart
 
 levels = st.lists(st.integers(0, 1), max_size=80)
 

@@ -6,6 +6,7 @@ from collections import Counter
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_protocol import pcapng
 from miro_protocol.pcapng import MAX_DATA, MAX_TICK, Packet, render
 from miro_protocol.pcapng_reader import CaptureError, events_line, iterate

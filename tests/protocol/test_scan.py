@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_protocol import decoder, table
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.scan import TICK_LIMIT, Scanner

@@ -5,6 +5,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import Phase, find, given, settings
 from hypothesis import strategies as st
+
 from miro_protocol import stream
 from miro_protocol.decoder import Damaged, Decoder, Reason, Received
 from miro_protocol.strategies import FAR_TICKS, NEAR_TICKS, damaged_streams, robot_counts, transmissions

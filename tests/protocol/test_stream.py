@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_protocol import stream
 from miro_protocol.stream import StreamError, Transmission
 

@@ -5,9 +5,9 @@ from math import comb
 
 import numpy as np
 import pytest
-from miro_protocol.table import DOWNLINK, TELEMETRY, Format
-
 from benchmarks import weights
+
+from miro_protocol.table import DOWNLINK, TELEMETRY, Format
 
 FORMATS = pytest.mark.parametrize("form", [*DOWNLINK.values(), TELEMETRY], ids=lambda form: form.name)
 TINY = Format("tiny", b"", b"\x2d\xd4", 0x13, 1, 2500)  # HDR, one byte of payload, CRC: 2^16 code words

@@ -17,9 +17,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from miro_protocol import engine
-
 from tests import children
+
+from miro_exact import engine
 
 STRIDE_TICKS = 100_003
 """Between checkpoints, 4 ms: eight a control period, and never at the same place of one."""
@@ -48,11 +48,11 @@ def parse(line: str) -> Checkpoint:
 
 def run(instructions: int, scenario: str) -> Iterator[Checkpoint]:
     """Worlds of seed 0, 1, .. in this process's engine, until so many instructions were executed."""
+    from miro_exact.canonical import encode
     from miro_robot.firmware import image_path
     from miro_robot.image import load_hex
-    from miro_sim import scenario_file
-    from miro_sim.canonical import encode
-    from miro_sim.world import World
+    from miro_sim.scenario import file as scenario_file
+    from miro_sim.world.world import World
 
     image = load_hex(image_path())
     read = scenario_file.load(scenario).scenario

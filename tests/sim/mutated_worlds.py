@@ -21,11 +21,12 @@ from collections.abc import Callable
 from typing import Any
 
 import msgspec
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim import scenario_file
-from miro_sim.clock import CONTROL_PERIOD_TICKS
-from miro_sim.world import SAVE_BEGIN, World, sealed
+from miro_sim.scenario import file as scenario_file
+from miro_sim.world.world import SAVE_BEGIN, World, sealed
 
 LIMIT_S = 120
 """So long a load and a period may take; then the process ends with a traceback and exit code 1."""

@@ -3,15 +3,16 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from miro_host.pilot import STANDSTILL, Command
 from miro_host.wheels import Wheels
 from miro_protocol.decoder import Decoder, Received
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim.control_noise import NoisyCommands
-from miro_sim.scenario_file import ScenarioError, parse
-from miro_sim.scenario_radio import ControlNoise
-from miro_sim.world import World
+from miro_sim.scenario.file import ScenarioError, parse
+from miro_sim.scenario.radio_keys import ControlNoise
+from miro_sim.world.control_noise import NoisyCommands
+from miro_sim.world.world import World
 
 IMAGE = load_hex(image_path())
 WHEELS = Wheels()

@@ -6,16 +6,16 @@ import sys
 from pathlib import Path
 
 import pytest
-from miro_protocol import engine
+from tests import children
+
+from miro_exact import engine
+from miro_exact.canonical import encode
+from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim import scenario_file
-from miro_sim.canonical import encode
-from miro_sim.clock import CONTROL_PERIOD_TICKS
-from miro_sim.profiles import profiles
-from miro_sim.world import World
-
-from tests import children
+from miro_sim.scenario import file as scenario_file
+from miro_sim.scenario.profiles import profiles
+from miro_sim.world.world import World
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 GOLDEN = Path(__file__).parents[1] / "vectors" / "digests.json"
@@ -46,7 +46,7 @@ reference.kind = "line"
 
 def short_scenario(folder, name="fig6", duration_s=0.5):
     """The built-in scenario, cut short so that an uncompiled run stays bearable."""
-    scenarios = Path(__file__).parents[2] / "sim" / "miro_sim" / "scenarios"
+    scenarios = Path(__file__).parents[2] / "sim" / "miro_sim" / "scenario" / "builtin"
     text = (scenarios / f"{name}.toml").read_text()
     lines = [
         f"duration_s = {duration_s}" if line.startswith("duration_s") else line for line in text.splitlines()

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from miro_robot.image import Image, Symbols
-from miro_sim import scenario_file
-from miro_sim.canonical import encode
-from miro_sim.clock import CONTROL_PERIOD_TICKS
-from miro_sim.world import World
-
 from tests.robot.mcs51.asm import assemble
+
+from miro_exact.canonical import encode
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_robot.image import Image, Symbols
+from miro_sim.scenario import file as scenario_file
+from miro_sim.world.world import World
 
 SCENARIO = """
 name = "fast"

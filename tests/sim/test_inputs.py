@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+
 from miro_sim.inputs import InputError, check_regular, read_input
 
 

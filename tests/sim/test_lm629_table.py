@@ -1,12 +1,13 @@
 """The `[lm629]` table of a scenario: what it says reaches the chips, and what it must not say is named."""
 
 import pytest
+
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_robot.lm629.options import CHOICES
-from miro_sim import scenario_file
-from miro_sim.scenario_errors import ScenarioError
-from miro_sim.world import World
+from miro_sim.scenario import file as scenario_file
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.world.world import World
 
 SCENARIO = """name = "chips"
 duration_s = 0.1

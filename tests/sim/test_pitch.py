@@ -5,10 +5,11 @@ import math
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+
 from miro_host.posture import Posture
-from miro_sim import pitch
-from miro_sim.build import reference_for
-from miro_sim.scenario_file import ScenarioError, builtin_names, load, parse
+from miro_sim.pitch import ground as pitch
+from miro_sim.scenario.build import reference_for
+from miro_sim.scenario.file import ScenarioError, builtin_names, load, parse
 
 TEXT = """
 name = "place"

@@ -6,17 +6,18 @@ from pathlib import Path
 import msgspec
 import pytest
 from click.testing import CliRunner
+
+from miro_exact.canonical import encode
+from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim import profiles
-from miro_sim.build import radio_for
-from miro_sim.canonical import encode
-from miro_sim.cli import main
-from miro_sim.clock import CONTROL_PERIOD_TICKS
 from miro_sim.radio import ChainParams
-from miro_sim.scenario_file import ScenarioError, parse
-from miro_sim.scenario_radio import Bursts, Radio
-from miro_sim.world import World
+from miro_sim.scenario import profiles
+from miro_sim.scenario.build import radio_for
+from miro_sim.scenario.file import ScenarioError, parse
+from miro_sim.scenario.radio_keys import Bursts, Radio
+from miro_sim.world.world import World
+from mirotwin.cli import main
 
 README = Path(__file__).parents[2] / "sim/miro_sim/radio/README.md"
 IMAGE = load_hex(image_path())

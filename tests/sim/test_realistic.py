@@ -3,12 +3,13 @@
 import statistics
 
 import pytest
+
 from miro_protocol.decoder import Decoder, Received
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim import scenario_file
-from miro_sim.summary import errors_by_robot, tracking_of
-from miro_sim.world import World
+from miro_sim.scenario import file as scenario_file
+from miro_sim.world.world import World
+from mirotwin.report.summary import errors_by_robot, tracking_of
 
 SEEDS = range(10)
 

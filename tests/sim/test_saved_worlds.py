@@ -2,10 +2,10 @@
 
 import msgspec
 import pytest
-from miro_robot.mcs51.line import Line
-from miro_sim.world import SAVE_BEGIN, sealed
-
 from tests.sim.mutated_worlds import changed_bytes, changed_values, fresh, saved_worlds
+
+from miro_robot.mcs51.line import Line
+from miro_sim.world.world import SAVE_BEGIN, sealed
 
 
 @pytest.fixture(scope="module")

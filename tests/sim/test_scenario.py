@@ -8,8 +8,9 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from miro_sim.scenario import ArcRef, LineRef, Scenario
-from miro_sim.scenario_file import ScenarioError, builtin_names, builtin_text, load, parse
+
+from miro_sim.scenario.file import ScenarioError, builtin_names, builtin_text, load, parse
+from miro_sim.scenario.keys import ArcRef, LineRef, Scenario
 
 SMALL = """
 name = "small"

@@ -2,5 +2,5 @@
 
 What belongs here: everything that watches firmware at work and turns what it saw into text or records. What does
 not: the CPU itself (`mcs51/`), which knows of all this only that an inspector may run it, and the command line
-(`miro_sim.cli.fw_*`). Whoever watches changes no bit of what is watched.
+(`mirotwin.cli.fw_*`). Whoever watches changes no bit of what is watched.
 """

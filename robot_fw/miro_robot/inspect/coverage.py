@@ -13,8 +13,8 @@ from pathlib import Path
 
 import msgspec
 
-from miro_robot.debug_info import DebugInfo, Sources
 from miro_robot.image import Image
+from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.lcov import FileRecord, Tracefile
 from miro_robot.inspect.listing import Row, rows, text_lines

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import bisect
 
-from miro_robot.debug_info import DebugInfo
 from miro_robot.image import Image
+from miro_robot.image.debug_info import DebugInfo
 from miro_robot.mcs51.names import BITS, INTERRUPTS, SFRS, Names
 from miro_robot.mcs51.opcodes import LENGTH, goes_on, is_call, target
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct, convert
 
-from miro_robot.saved import only
+from miro_exact.saved import only
 
 MOTOR_OFF, STOP_ABRUPTLY, STOP_SMOOTHLY = 0x0100, 0x0200, 0x0400
 STOPS = MOTOR_OFF | STOP_ABRUPTLY | STOP_SMOOTHLY

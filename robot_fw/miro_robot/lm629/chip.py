@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import whole
 from miro_robot.lm629 import buffers, host_port, signals
 from miro_robot.lm629.axis import FAR, PWM_TICKS, RANGES, SAMPLE_TICKS, MotorAxis
 from miro_robot.lm629.commands import BY_OPCODE
-from miro_robot.saved import whole
 
 __all__ = ["FAR", "PWM_TICKS", "SAMPLE_TICKS", "Lm629"]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from miro_robot.saved import whole
+from miro_exact.saved import whole
 
 _FAR = 1 << 62
 _MOST_COUNTS = 1 << 40  # between two samples: far more than ticks

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import octets, whole
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
-from miro_robot.saved import octets, whole
 
 NOTHING, COMMAND, WORD, ANSWERED, MISUSE = 0, 1, 2, 3, 4
 """What a change of the pins led to: nothing yet; a

@@ -6,7 +6,7 @@ Which coefficients are in force when is in `buffers.py`, the excessive-error tes
 
 from __future__ import annotations
 
-from miro_robot.saved import whole
+from miro_exact.saved import whole
 
 RANGES = {
     **dict.fromkeys(("kp", "ki", "kd", "il"), (0, 0x7FFF)),

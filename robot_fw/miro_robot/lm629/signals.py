@@ -6,8 +6,8 @@ decided in `chip.py` (commands) and `axis.py` (samples).
 
 from __future__ import annotations
 
+from miro_exact.saved import whole
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
-from miro_robot.saved import whole
 
 INTERRUPT = 0x8000
 ACCELERATION_LOADED = 0x4000

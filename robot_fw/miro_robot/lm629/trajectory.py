@@ -7,7 +7,7 @@ outer properties; the algorithm is chosen (README.md, "Profile") and always ends
 
 from __future__ import annotations
 
-from miro_robot.saved import whole
+from miro_exact.saved import whole
 
 _NEVER = 1 << 62
 _HALF_SPACE = 1 << 46

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import octets, tick, whole
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.opcodes import LINE
-from miro_robot.saved import octets, tick, whole
 
 LAST_CYCLE = 1 << 55
 """Ticks and the counts of a timer up to then fit into 64 bits."""

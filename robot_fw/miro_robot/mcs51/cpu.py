@@ -11,12 +11,12 @@ from collections.abc import Callable
 from contextvars import ContextVar
 from typing import Any, Protocol
 
+from miro_exact.saved import tick, whole
 from miro_robot.faults import FaultKind
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.core import LAST_CYCLE
 from miro_robot.mcs51.execute import BREAKPOINT, REACHED, STOPPED, WIRE_FULL, Executor
 from miro_robot.mcs51.peripherals import Peripherals
-from miro_robot.saved import tick, whole
 
 __all__ = ["ASLEEP", "BREAKPOINT", "REACHED", "STOPPED", "WIRE_FULL", "Cpu"]
 

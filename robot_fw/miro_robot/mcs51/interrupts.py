@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from miro_robot.saved import whole, wholes
+from miro_exact.saved import whole, wholes
 
 _FAR = 1 << 62
 SOURCES = 6  # in polling order: INT0, timer 0, INT1, timer 1, serial, timer 2

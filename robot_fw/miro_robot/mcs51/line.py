@@ -19,7 +19,7 @@ from __future__ import annotations
 from array import array
 from typing import Any
 
-from miro_robot.saved import ascending, whole
+from miro_exact.saved import ascending, whole
 
 FAR = 1 << 62  # "never", for everybody
 _FAR = 1 << 62  # the same as a C constant

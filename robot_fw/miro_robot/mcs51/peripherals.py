@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import tick, whole
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.interrupts import ExternalInterrupts, Interrupts
 from miro_robot.mcs51.ports import Ports
@@ -19,7 +20,6 @@ from miro_robot.mcs51.shift import Shift
 from miro_robot.mcs51.timer2 import Timer2
 from miro_robot.mcs51.timers import Timers
 from miro_robot.mcs51.uart import Uart
-from miro_robot.saved import tick, whole
 
 _FAR = 1 << 62
 _UNIMPLEMENTED = 0xFF  # what a register address without a register reads as; undefined on silicon

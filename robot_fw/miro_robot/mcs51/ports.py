@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from msgspec import Meta, convert
 
-from miro_robot.saved import wholes
+from miro_exact.saved import wholes
 
 _FAR = 1 << 62
 _Push = tuple[

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import tick, whole
 from miro_robot.mcs51.line import Line
 from miro_robot.mcs51.uart import Uart
-from miro_robot.saved import tick, whole
 
 _REN, _TI, _RI = 0x10, 0x02, 0x01
 _FAR = 1 << 62

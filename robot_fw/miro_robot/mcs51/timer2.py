@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import tick, whole
 from miro_robot.mcs51.interrupts import Interrupts
-from miro_robot.saved import tick, whole
 
 _FAR = 1 << 62
 _NONE = -1

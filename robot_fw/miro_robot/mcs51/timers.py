@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import tick, whole, wholes
 from miro_robot.mcs51.interrupts import Interrupts
-from miro_robot.saved import tick, whole, wholes
 
 _FAR = 1 << 62
 _NONE = -1  # no counter edge waiting

@@ -16,10 +16,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import whole
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.interrupts import Interrupts
 from miro_robot.mcs51.line import Line
-from miro_robot.saved import whole
 
 _FAR = 1 << 62
 _STOPPED = 1 << 61  # next tick of a clock that does not run

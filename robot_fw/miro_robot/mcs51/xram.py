@@ -1,16 +1,16 @@
 """A bus with 64 KB of RAM on it and nothing else.
 
 What belongs here: the RAM, and handing on what the CPU reports. Feeding the serial port is
-`miro_robot.bare`'s.
+`miro_robot.bare.machine`'s.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+from miro_exact.saved import octets
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.saved import octets
 
 
 class XramBus(Bus):

@@ -1,6 +1,6 @@
 # C layout of miro_sim.plant.chassis.
 cimport cython
-from miro_host cimport dmath
+from miro_exact cimport dmath
 
 cdef double TICK_S
 cdef int SWEEPS

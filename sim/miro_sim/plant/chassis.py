@@ -14,9 +14,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from miro_host import dmath
-from miro_robot.saved import real
-
+from miro_exact import dmath
+from miro_exact.saved import real
 from miro_sim.plant.params import DriveParams
 
 TICK_S = 1.0 / 24e6

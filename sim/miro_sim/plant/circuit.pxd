@@ -1,6 +1,6 @@
 # C layout of miro_sim.plant.circuit.
 cimport cython
-from miro_host cimport dmath
+from miro_exact cimport dmath
 
 cdef int MAX_TICKS
 cdef double TICK_S

@@ -21,9 +21,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from miro_host import dmath
-from miro_robot.saved import real, whole
-
+from miro_exact import dmath
+from miro_exact.saved import real, whole
 from miro_sim.plant.params import DriveParams
 
 MAX_TICKS = 2048  # longest interval: one PWM period

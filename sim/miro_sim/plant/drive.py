@@ -13,10 +13,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.saved import tick
 from miro_robot.lm629.chip import Lm629
 from miro_robot.plant import Plant
-from miro_robot.saved import tick
-
 from miro_sim.plant.chassis import Body
 from miro_sim.plant.circuit import Winding
 from miro_sim.plant.encoder import Quadrature

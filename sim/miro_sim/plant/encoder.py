@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from miro_robot.saved import real, whole
+from miro_exact.saved import real, whole
 
 MOST_COUNTS = 1 << 50  # of a saved state: doubles still hold quarters of it
 _FAR = 1 << 62

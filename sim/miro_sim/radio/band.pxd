@@ -2,7 +2,7 @@ cimport cython
 
 from miro_robot.mcs51.line cimport Line
 from miro_sim.radio.chain cimport Chain
-from miro_sim.rng cimport Stream
+from miro_exact.rng cimport Stream
 
 cdef long long _FAR, _BIT, _HOLD
 

@@ -14,14 +14,14 @@ Sampling it as a UART is the business of `uplink`.
 
 from __future__ import annotations
 
-from miro_robot.mcs51.line import Line
-from miro_robot.saved import tick
 from msgspec import convert
 
-from miro_sim.clock import FAR, HOST_BIT_TICKS, HOST_CHARACTER_TICKS
+from miro_exact.clock import FAR, HOST_BIT_TICKS, HOST_CHARACTER_TICKS
+from miro_exact.rng import Stream
+from miro_exact.saved import tick
+from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
 from miro_sim.radio.params import RadioParams
-from miro_sim.rng import Stream
 
 _FAR = 1 << 62
 _BIT = 2500

@@ -1,6 +1,6 @@
 cimport cython
 
-from miro_sim.rng cimport Stream
+from miro_exact.rng cimport Stream
 
 cdef unsigned long long _ONE
 

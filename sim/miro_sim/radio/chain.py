@@ -17,8 +17,8 @@ Before slot 0 the state is good.
 
 from __future__ import annotations
 
+from miro_exact.rng import Stream
 from miro_sim.radio.params import ChainParams
-from miro_sim.rng import Stream
 
 _ONE = 1 << 32
 

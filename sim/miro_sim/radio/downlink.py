@@ -11,15 +11,15 @@ Networks on one frequency hear each other (`overhear`); the bands up stay apart.
 
 from __future__ import annotations
 
-from miro_robot.mcs51.line import Line
-from miro_robot.saved import tick
 from msgspec import convert
 
-from miro_sim.clock import HOST_BIT_TICKS, HOST_CHARACTER_TICKS
+from miro_exact.clock import HOST_BIT_TICKS, HOST_CHARACTER_TICKS
+from miro_exact.rng import Stream
+from miro_exact.saved import tick
+from miro_robot.mcs51.line import Line
 from miro_sim.radio.listener import Listener
 from miro_sim.radio.params import RadioParams
 from miro_sim.radio.sender import Sender
-from miro_sim.rng import Stream
 
 MEMORY_TICKS = 2 * HOST_BIT_TICKS
 """How long another network's transmission is kept after its end: a bit that it spoilt may still be going on."""

@@ -4,7 +4,7 @@ from miro_robot.mcs51.line cimport Line
 from miro_sim.radio.chain cimport Chain
 from miro_sim.radio.sender cimport Sender
 from miro_sim.radio.slicer cimport Slicer
-from miro_sim.rng cimport Stream
+from miro_exact.rng cimport Stream
 
 cdef long long _BIT, _CHARACTER
 cdef unsigned long long _ONE

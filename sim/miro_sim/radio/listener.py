@@ -21,15 +21,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.clock import CHARACTER_BITS, HOST_BIT_TICKS
+from miro_exact.rng import Stream
+from miro_exact.saved import tick
 from miro_robot.mcs51.line import Line
-from miro_robot.saved import tick
-
-from miro_sim.clock import CHARACTER_BITS, HOST_BIT_TICKS
 from miro_sim.radio.chain import Chain
 from miro_sim.radio.params import RadioParams
 from miro_sim.radio.sender import Sender
 from miro_sim.radio.slicer import Slicer
-from miro_sim.rng import Stream
 
 _BIT = 2500
 _CHARACTER = 10

@@ -1,7 +1,7 @@
 """What a radio band is like, in the units that the models count in: ticks and 2^-32.
 
 What belongs here: the parameters, their ranges and their conversion from the units that people write. What
-does not: the keys of a scenario (`miro_sim.scenario_radio`) and what a parameter does (the part it is for).
+does not: the keys of a scenario (`miro_sim.scenario.radio_keys`) and what a parameter does (the part it is for).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Literal
 
 import msgspec
 
-from miro_sim import clock
+from miro_exact import clock
 from miro_sim.radio.probability import (
     ONE,
     error_threshold,

@@ -1,16 +1,14 @@
 """Probabilities as thresholds of a 32-bit draw, and the bit errors of non-coherent FSK.
 
 What belongs here: conversions that run once, when a band is built; what comes out are integers. What does
-not: the draws (`miro_sim.rng`) and who makes them.
+not: the draws (`miro_exact.rng`) and who makes them.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
 
-from miro_host import dmath
-
-from miro_sim import clock
+from miro_exact import clock, dmath
 
 ONE = 1 << 32
 """The threshold that every draw is below."""

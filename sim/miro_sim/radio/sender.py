@@ -7,9 +7,8 @@ down from the exact fraction, so that nothing adds up. What does not: what recei
 
 from __future__ import annotations
 
-from miro_robot.saved import LAST_TICK
-
-from miro_sim.clock import CHARACTER_BITS
+from miro_exact.clock import CHARACTER_BITS
+from miro_exact.saved import LAST_TICK
 from miro_sim.radio.params import RadioParams, bit_ticks
 
 _CHARACTER = 10

@@ -17,8 +17,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from miro_robot.saved import tick, whole
-
+from miro_exact.saved import tick, whole
 from miro_sim.radio.params import SlicerParams
 
 _BIT = 2500

@@ -9,11 +9,11 @@ How the level comes about is the business of `band`, what the symbols mean that 
 
 from __future__ import annotations
 
-from miro_robot.mcs51.line import Line
-from miro_robot.saved import tick, whole
 from msgspec import convert
 
-from miro_sim.clock import CHARACTER_BITS
+from miro_exact.clock import CHARACTER_BITS
+from miro_exact.saved import tick, whole
+from miro_robot.mcs51.line import Line
 from miro_sim.radio.band import Band
 from miro_sim.radio.params import RadioParams
 

@@ -1,9 +1,9 @@
 """What happens without fresh frames, measured at the LM629."""
 
 import pytest
-from miro_protocol.frames import TeamFrame, encode
-
 from tests.robot.firmware.rig import CHARACTER, MS, SAMPLE, Rig
+
+from miro_protocol.frames import TeamFrame, encode
 
 STT, LTRJ = 0x01, 0x1F
 STOP, OFF = bytes.fromhex("0400"), bytes.fromhex("0100")

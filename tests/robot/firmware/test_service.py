@@ -1,7 +1,6 @@
 """Service frames: ping, filter gains, acceleration."""
 
 import pytest
-
 from tests.robot.firmware.rig import MS, SAMPLE, Command, Rig
 
 STT, UDF, LFIL, LTRJ, RDSIGS = 0x01, 0x04, 0x1E, 0x1F, 0x0C

@@ -3,11 +3,11 @@
 from itertools import pairwise
 
 import pytest
+from tests.robot.firmware.rig import Rig
+
 from miro_protocol.decoder import Received, TelemetryDecoder
 from miro_protocol.frames import TelemetryFrame
 from miro_protocol.table import Flags
-
-from tests.robot.firmware.rig import Rig
 
 
 def answers(rig: Rig) -> list[TelemetryFrame]:

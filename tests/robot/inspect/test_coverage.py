@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import shutil
 
-from miro_robot.bare import BareMachine
-from miro_robot.debug_info import DebugInfo, Sources
+from tests.robot.inspect.programs import SWITCH, build, line_of
+
+from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
+from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.coverage import (
     at_paths,
@@ -22,8 +24,6 @@ from miro_robot.inspect.coverage import (
 from miro_robot.inspect.lcov import FileRecord
 from miro_robot.inspect.watcher import attach
 from miro_robot.mcs51.opcodes import is_conditional
-
-from tests.robot.inspect.programs import SWITCH, build, line_of
 
 
 def counts_after(image, cycles):

@@ -6,12 +6,12 @@ import re
 import shutil
 
 import pytest
-from miro_robot.debug_info import DebugInfo, SourceLine, Sources
-from miro_robot.firmware import image_path, source_folder
-from miro_robot.image import ImageError, load_hex
-
 from tests import children
 from tests.robot.inspect.programs import PROGRAM, build, line_of
+
+from miro_robot.firmware import image_path, source_folder
+from miro_robot.image import ImageError, load_hex
+from miro_robot.image.debug_info import DebugInfo, SourceLine, Sources
 
 
 def copied(program, folder, *suffixes):

@@ -10,9 +10,9 @@ from copy import deepcopy
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from miro_robot.inspect.lcov import FileRecord, TracefileError, add, decode, encode
-
 from tests import children
+
+from miro_robot.inspect.lcov import FileRecord, TracefileError, add, decode, encode
 
 COUNTS = st.integers(0, 10**12)
 LINES = st.integers(1, 9999)

@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from hypothesis import HealthCheck, is_hypothesis_test, settings
-
 from tests.examples import NORM
 
 ROUND = 10

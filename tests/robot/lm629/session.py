@@ -9,7 +9,7 @@ import hashlib
 import sys
 from collections.abc import Iterator
 
-from miro_protocol import engine
+from miro_exact import engine
 
 
 def numbers(seed: int) -> Iterator[int]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from miro_robot.lm629.commands import BY_NAME, COMMANDS
-
 from tests.robot.lm629.bench import Bench
+
+from miro_robot.lm629.commands import BY_NAME, COMMANDS
 
 MOTOR_OFF, BREAKPOINT, EXCESS, WRAP, INDEX, COMPLETE, ERROR = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from miro_robot.lm629.chip import FAR, PWM_TICKS, SAMPLE_TICKS, Lm629
-
 from tests.robot.lm629.bench import Bench
+
+from miro_robot.lm629.chip import FAR, PWM_TICKS, SAMPLE_TICKS, Lm629
 
 
 def holding(kp: int = 10) -> Bench:

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from miro_protocol import engine
-from miro_robot.lm629.chip import Lm629
-
 from tests import children
 from tests.examples import examples
 from tests.robot.lm629.bench import Bench
 from tests.robot.lm629.session import play, steps
+
+from miro_exact import engine
+from miro_robot.lm629.chip import Lm629
 
 ROOT = Path(__file__).parents[3]
 FOLDER = ROOT / "robot_fw/miro_robot/lm629"

@@ -3,10 +3,10 @@
 from itertools import pairwise
 
 import pytest
-from miro_robot.bare import BareMachine, Ended
-from miro_robot.bare_input import Piece
-
 from tests.robot.mcs51.test_bare import AUTOBAUD, ECHO, SERIAL, image
+
+from miro_robot.bare.input import Piece
+from miro_robot.bare.machine import BareMachine, Ended
 
 PROMPT = (
     SERIAL

@@ -3,11 +3,11 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from miro_robot.bare import BareMachine, Ended
-from miro_robot.bare_input import Piece
-from miro_robot.bare_pins import PinError, PinEvent, read_pins
-
 from tests.robot.mcs51.test_bare import SERIAL, image
+
+from miro_robot.bare.input import Piece
+from miro_robot.bare.machine import BareMachine, Ended
+from miro_robot.bare.pins import PinError, PinEvent, read_pins
 
 
 def square_wave(port, bit, count, period, begin=240):

@@ -3,6 +3,7 @@
 import hashlib
 
 import pytest
+
 from miro_robot.image import ImageError, Symbol, Symbols, load_hex
 
 END = ":00000001FF"

@@ -5,6 +5,7 @@ from itertools import cycle, islice
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_robot.mcs51.line import FAR, Line
 
 EDGES = st.lists(st.tuples(st.integers(0, 20), st.integers(0, 1)), max_size=40)

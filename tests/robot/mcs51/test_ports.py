@@ -4,7 +4,6 @@
 """
 
 import pytest
-
 from tests.robot.mcs51.rig import cpu_with, sfr, stepped
 
 

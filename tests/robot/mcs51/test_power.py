@@ -1,7 +1,6 @@
 """Idle and power-down: what stops, what goes on, what ends them."""
 
 import pytest
-
 from tests.robot.mcs51.rig import cpu_with, sfr
 
 TIMER_WAKES = """

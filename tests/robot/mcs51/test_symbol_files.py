@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests import children
+
 from miro_robot.firmware import image_path
 from miro_robot.image import ImageError, load_hex
-from miro_robot.symbol_files import check_cdb, check_map
-
-from tests import children
+from miro_robot.image.evidence import check_cdb, check_map
 
 ROBOT = image_path()
 MAP = ROBOT.with_suffix(".map").read_text()

@@ -3,7 +3,6 @@ Manual, 1919D the AT89S52 data sheet, whose sections 10 to 12 have timer 2 too.
 """
 
 import pytest
-
 from tests.robot.mcs51.rig import cpu_with, sfr
 
 T2EX_LOW, T2_LOW = 0xFD, 0xFE  # on P1

@@ -9,14 +9,14 @@ import sys
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.line import FAR
-
 from tests import children
 from tests.naive.mcs51_timers import NaiveTimers
 from tests.naive.mcs51_uart import NaiveUart
 from tests.robot.mcs51.asm import SFRS
 from tests.robot.mcs51.rig import RecordingBus, cpu_with, sfr
+
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.line import FAR
 
 BIT = 2496  # ticks, with timer 2 reloading 65536 - 78
 TIMER1_9600 = "MOV TMOD,#20h\nMOV TH1,#0F3h\nMOV TL1,#0F3h\nORL PCON,#80h\nSETB TR1\n"
@@ -298,7 +298,7 @@ def test_a_character_that_is_put_on_rxd_between_two_runs_interrupts(before):
 
 
 HASTY = """
-from miro_protocol import engine
+from miro_exact import engine
 engine.select("python")
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.uart import Uart

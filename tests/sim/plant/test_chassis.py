@@ -5,6 +5,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from miro_sim.plant.chassis import Body
 from miro_sim.plant.params import Chassis, DriveParams, Motor
 

@@ -5,10 +5,10 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.naive.plant import winding_run
+
 from miro_sim.plant.circuit import Winding
 from miro_sim.plant.params import DriveParams
-
-from tests.naive.plant import winding_run
 
 PARAMS = DriveParams()
 BRIDGES = {1: (1, 1), -1: (1, 0), 0: (0, 1)}

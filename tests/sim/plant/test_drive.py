@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from miro_robot.lm629.chip import Lm629
-from miro_sim.plant.circuit import Winding
-from miro_sim.plant.drive import DifferentialDrive
-from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Encoder, Motor
-
 from tests import children
 from tests.naive.plant import NaiveDrive
 from tests.robot.lm629.bench import Bench
 from tests.sim.plant.runs import pwm, trace
+
+from miro_robot.lm629.chip import Lm629
+from miro_sim.plant.circuit import Winding
+from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Encoder, Motor
 
 PARAMS = DriveParams()
 MAGNITUDES = st.integers(-128, 128)
@@ -262,7 +262,7 @@ def test_a_restored_drive_goes_on_with_the_same_bits(left, right, next_left, nex
 
 
 SCRIPT = """
-from miro_protocol import engine
+from miro_exact import engine
 engine.select("python")
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import DriveParams

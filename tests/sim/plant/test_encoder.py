@@ -4,9 +4,9 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from miro_sim.plant.encoder import Quadrature
-
 from tests.naive.plant import quadrature_edges
+
+from miro_sim.plant.encoder import Quadrature
 
 FAR = 1 << 62
 MOVES = st.floats(-40.0, 40.0)

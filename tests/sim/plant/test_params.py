@@ -4,6 +4,7 @@ import math
 
 import msgspec
 import pytest
+
 from miro_sim.plant.params import Battery, Chassis, DriveParams, Encoder, Motor
 
 PARAMS = DriveParams()

@@ -2,6 +2,7 @@
 pieces."""
 
 from hypothesis import strategies as st
+
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 
 rates = st.sampled_from([0, 2**32 // 100, 2**32 // 4, 2**31, 2**32])

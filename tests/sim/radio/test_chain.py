@@ -3,12 +3,12 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from miro_sim import profiles
-from miro_sim.radio import ChainParams
-from miro_sim.radio.chain import Chain
-
 from tests.naive import radio as naive
 from tests.sim.radio.strategies import chains, seeds
+
+from miro_sim.radio import ChainParams
+from miro_sim.radio.chain import Chain
+from miro_sim.scenario import profiles
 
 SECONDS = 100
 SLOTS = 9600 * SECONDS

@@ -3,11 +3,11 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from miro_robot.mcs51.line import Line
-from miro_sim.radio import Downlink, RadioParams
-
 from tests.naive import radio as naive
 from tests.sim.radio.strategies import cuts, neighbours, params, seeds, transmissions
+
+from miro_robot.mcs51.line import Line
+from miro_sim.radio import Downlink, RadioParams
 
 UNTIL = 1_500_000
 

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from miro_robot.mcs51.line import Line
-from miro_sim.radio import Downlink, RadioParams, Uplink
-
 from tests import children
 from tests.naive import radio as naive
 from tests.sim.radio import exercise
 from tests.sim.radio.strategies import seeds, transmissions
+
+from miro_robot.mcs51.line import Line
+from miro_sim.radio import Downlink, RadioParams, Uplink
 
 
 def echo(params, seed, sent, until):
@@ -68,7 +68,7 @@ def test_the_measured_bit_error_rate_is_the_one_asked_for():
 @pytest.mark.parametrize("radio", ["PLAIN", "EVERYTHING"])
 def test_both_engines_hear_the_same_network(radio):
     script = (
-        "from miro_protocol import engine; engine.select('python');"
+        "from miro_exact import engine; engine.select('python');"
         f"from tests.sim.radio import exercise; print(exercise.exercise(77, exercise.{radio}))"
     )
     root = Path(__file__).parents[3]

@@ -3,6 +3,7 @@
 from fractions import Fraction
 
 import pytest
+
 from miro_sim.radio import RadioParams
 from miro_sim.radio.probability import error_threshold
 

@@ -4,6 +4,7 @@ import mpmath
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 from miro_sim.radio.probability import ONE, fsk_threshold, margin_table, mean_threshold, rate_threshold
 

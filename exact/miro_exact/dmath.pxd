@@ -1,0 +1,31 @@
+# C types of miro_exact.dmath.
+cimport cython
+
+cdef double _INV_PIO2, _PIO2_1, _PIO2_1T, _PIO2_2, _PIO2_2T, _PIO2_3, _PIO2_3T, _TWO_PI_1, _TWO_PI_2
+cdef double _TWO_PI_2T, _S1, _S2, _S3, _S4, _S5, _S6, _C1, _C2, _C3, _C4, _C5, _C6, _A0, _A1, _A2, _A3, _A4
+cdef double _A5, _A6, _A7, _A8, _A9, _A10, _PI_LO, _LN2_HI, _LN2_LO, _INV_LN2, _E1, _E2, _E3, _E4, _E5
+cdef double _EXP_MAX, _EXP_MIN, _L1, _L2, _L3, _L4, _L5, _L6, _L7, _SQRT2, _LARGEST, _PI, _LIMIT
+
+cpdef double sin(double x) except? -7.5
+cpdef double cos(double x) except? -7.5
+@cython.locals(scaled=double, n=cython.longlong, count=double, rest=double, carry=double, before=double,
+               high=double, low=double, z=double, w=double, v=double, r=double, half=double, top=double,
+               s=double, c=double, quadrant=cython.int)
+cpdef (double, double) sincos(double x)
+cpdef double atan(double x) except? -7.5
+@cython.locals(high=double, low=double, rest=double, z=double, w=double, odd=double, even=double)
+cdef double _atan(double a, double more, bint supplement) except? -7.5
+@cython.locals(spread=double, q_high=double, q_low=double, x_high=double, x_low=double, product=double, error=double)
+cdef double _lost(double q, double y, double x) except? -7.5
+@cython.locals(angle=double, ratio=double, more=double)
+cpdef double atan2(double y, double x) except? -7.5
+@cython.locals(scaled=double, turns=double, result=double)
+cpdef double wrap_pi(double x) except? -7.5
+@cython.locals(k=cython.int, high=double, low=double, r=double, t=double, c=double)
+cpdef double exp(double x) except? -7.5
+cdef double _scaled(double y, int k) noexcept
+@cython.locals(power=double)
+cdef double _power_of_two(int k) noexcept
+@cython.locals(k=cython.int, f=double, s=double, z=double, w=double, even=double, odd=double, half=double,
+               powers=double)
+cpdef double log(double x) except? -7.5

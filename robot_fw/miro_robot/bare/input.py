@@ -1,0 +1,178 @@
+"""What comes in on RXD of the bare machine: bytes from a file or a keyboard, as a person at a terminal would send them.
+
+What belongs here: when the next character is sent, and its edges. What does not: which options ask for what
+(`mirotwin.cli`), and other pins (`bare_pins.py`).
+
+The order of things: a piece of input begins when its condition is met (a text seen on the program's output, a time).
+Each character then waits until the one before is over, the gap has passed and the program listens: its receiver is on
+with RI down, or it polls P3 as a program does that measures the first character. The first character of a piece that
+has a condition does not wait for polls: whoever gave the condition knows that the program listens.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.line import FAR
+
+SLICE = 1_000  # cycles between two looks at whether the program listens
+MARGIN_TICKS = 240  # the CPU may look this far beyond the end of a run
+_IDLE_SLICE = 200_000  # cycles between two looks when nothing is left to send
+_POLLS = 32  # reads of P3 within a slice that count as listening on RXD
+_RI = 0x01  # in SCON
+_CHARACTER_BITS = 10
+_TICKS_PER_BIT = 32  # of the fastest receiver there is: mode 2 with SMOD
+
+
+class Piece(NamedTuple):
+    """Bytes with a condition: they begin `delay_ticks` after the program has sent `when`.
+
+    Without `when` the delay counts from the end of the piece before, or from the start. With neither (None), they
+    follow as soon as the program listens. `when` is looked for in what is sent after the piece before.
+    """
+
+    data: bytes
+    when: bytes = b""
+    delay_ticks: int | None = None
+
+    @property
+    def has_condition(self) -> bool:
+        return bool(self.when) or self.delay_ticks is not None
+
+
+class SerialInput:
+    """Sends `pieces` to the serial port of `cpu`, bit by bit at `baud`, or at the rate that its receiver is set to.
+
+    `gap_ticks`: least time from the end of a character to the begin of the next. `live`: more may be added any time.
+    Raises ValueError for a rate that the crystal does not allow.
+    """
+
+    NOT_STATE = ("cpu",)
+
+    def __init__(
+        self,
+        cpu: Cpu,
+        pieces: tuple[Piece, ...],
+        baud: int | None,
+        crystal_hz: int,
+        gap_ticks: int = 0,
+        live: bool = False,
+    ) -> None:
+        fastest = crystal_hz // _TICKS_PER_BIT
+        if baud is not None and not 50 <= baud <= fastest:
+            raise ValueError(f"baud {baud} is outside 50..{fastest} at {crystal_hz} Hz")
+        self.cpu = cpu
+        self.pieces = list(pieces)  # those not sent yet, the one being sent first
+        self.baud = baud
+        self.crystal_hz = crystal_hz
+        self.gap_ticks = gap_ticks
+        self.live = live
+        self.fed = 0  # bytes of the first piece that are on their way or received
+        self.tail = b""  # of what the program sent, as long as the text waited for
+        self.begin_tick = 0  # the first piece begins; FAR until its text was seen
+        self.char_end = 0  # tick at which the last character ends
+        self.polls = 0  # reads of P3 seen so far
+        self._arm()
+
+    def add(self, data: bytes) -> None:
+        """More input, to be sent as if its condition were met now."""
+        self.pieces.append(Piece(data, delay_ticks=0))
+        if len(self.pieces) == 1:
+            self._arm()
+
+    def heard(self, value: int, tick: int) -> None:
+        """The program has sent a character, whose stop bit began at `tick`."""
+        if self.waiting_for:
+            self.tail = (self.tail + bytes([value]))[-len(self.waiting_for) :]
+            if self.tail == self.waiting_for:
+                self.begin_tick = tick + (self.pieces[0].delay_ticks or 0)
+
+    @property
+    def waiting_for(self) -> bytes:
+        """The text that has to be seen before anything more is sent; empty if none."""
+        return self.pieces[0].when if self.pieces and self.begin_tick == FAR else b""
+
+    @property
+    def left(self) -> int:
+        """Bytes still to be sent."""
+        return sum(len(piece.data) for piece in self.pieces) - self.fed
+
+    def feed(self) -> int:
+        """Puts the next character on RXD if it is time, and says up to which cycle to run now."""
+        now = self.cpu.cycles
+        end = now + SLICE
+        listening = self._listening()
+        start = max(self.begin_tick, 12 * now + MARGIN_TICKS)
+        if self.char_end:
+            start = max(start, self.char_end + self.gap_ticks)
+        if self.pieces and 12 * now >= self.char_end and start < 12 * end + 2 * MARGIN_TICKS and listening:
+            self._send(start)
+        if self.live or (self.pieces and not self.waiting_for):
+            self.cpu.rxd.settled_tick = 12 * end + MARGIN_TICKS
+        else:
+            self.cpu.rxd.settled_tick = FAR
+        return end if self.live or self.pieces else now + _IDLE_SLICE
+
+    def _listening(self) -> bool:
+        """Whether a character sent now would be heard: by the receiver with RI down, or by software."""
+        reads = self.cpu.chip.p3_reads
+        polling = reads - self.polls >= _POLLS
+        self.polls = reads
+        if self.cpu.chip.bit_ticks():
+            return not self.cpu.sfr(0x98) & _RI
+        told = bool(self.pieces) and self.fed == 0 and self.pieces[0].has_condition
+        return self.baud is not None and (polling or told)
+
+    def _send(self, start: int) -> None:
+        """Start bit, eight data bits, stop bit."""
+        bits = self.pieces[0].data[self.fed] << 1 | 1 << (_CHARACTER_BITS - 1)
+        for number in range(_CHARACTER_BITS):
+            self.cpu.rxd.append(start + self._bit_offset(number), bits >> number & 1)
+        self.char_end = start + self._bit_offset(_CHARACTER_BITS)
+        self.fed += 1
+        if self.fed == len(self.pieces[0].data):
+            self.pieces.pop(0)
+            self._arm()
+
+    def _arm(self) -> None:
+        """Sets up the piece that is now the first."""
+        self.fed = 0
+        self.tail = b""
+        while self.pieces and not self.pieces[0].data:
+            self.pieces.pop(0)
+        if self.pieces:
+            piece = self.pieces[0]
+            self.begin_tick = FAR if piece.when else self.char_end + (piece.delay_ticks or 0)
+
+    def _bit_offset(self, number: int) -> int:
+        """Ticks from the start of a character to its bit `number`."""
+        if self.baud is None:
+            return number * self.cpu.chip.bit_ticks()
+        return (2 * number * self.crystal_hz + self.baud) // (2 * self.baud)
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "pieces": [tuple(piece) for piece in self.pieces],
+            "baud": self.baud,
+            "crystal_hz": self.crystal_hz,
+            "gap_ticks": self.gap_ticks,
+            "live": self.live,
+            "fed": self.fed,
+            "tail": self.tail,
+            "begin_tick": self.begin_tick,
+            "char_end": self.char_end,
+            "polls": self.polls,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.pieces = [Piece(*piece) for piece in state["pieces"]]
+        self.baud = state["baud"]
+        self.crystal_hz = state["crystal_hz"]
+        self.gap_ticks = state["gap_ticks"]
+        self.live = state["live"]
+        self.fed = state["fed"]
+        self.tail = state["tail"]
+        self.begin_tick = state["begin_tick"]
+        self.char_end = state["char_end"]
+        self.polls = state["polls"]

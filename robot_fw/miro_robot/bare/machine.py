@@ -1,0 +1,249 @@
+"""A bare board for `mirotwin fw run`: the CPU, 64 KB of external RAM, a terminal on the serial port, levels on pins.
+
+What belongs here: running an image to an address, a limit or its end, and dumping its memory. What comes in on RXD is
+`bare_input.py`, what comes in on other pins `bare_pins.py`, the robot's board with its motion controllers `board.py`.
+
+A program has ended when no input can make it do anything more: in power-down, asleep with nothing that could wake it,
+or in a jump to itself while no interrupt is enabled. The run goes on until the last character has been sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Any
+
+from miro_exact.saved import octets, wholes
+from miro_robot.bare.input import Piece, SerialInput
+from miro_robot.bare.pins import PinEvent, PinInput
+from miro_robot.faults import FaultKind, FirmwareFault
+from miro_robot.image import Image
+from miro_robot.mcs51.cpu import ASLEEP, BREAKPOINT, Cpu
+from miro_robot.mcs51.line import FAR
+from miro_robot.mcs51.opcodes import jumps_to_itself
+from miro_robot.mcs51.xram import XramBus
+
+CRYSTAL_HZ = 24_000_000
+CRYSTAL_RANGE_HZ = (32_768, 100_000_000)
+_SLICE = 200_000  # cycles after which a jump to itself that interrupts left is looked at anew
+_FAULTS_KEPT = 100
+_EA, _SOURCES = 0x80, 0x3F  # of IE
+_NEVER = 1 << 61  # tick from which on nothing is being sent: the transmitter is idle, or has no clock
+
+
+class Ended(StrEnum):
+    """Why a run ended."""
+
+    UNTIL = "until"  # the address asked for is next
+    CYCLES = "cycles"  # the limit is reached
+    FAULT = "fault"
+    PAUSED = "paused"  # where the caller wanted to look; it can go on
+    HALTED = "halted"  # nothing can ever make it go on: a jump to itself or asleep, with no interrupt to come
+
+
+class BareMachine:
+    """One AT89C52 with RAM and a terminal.
+
+    `stdin` is sent to the serial port byte by byte, see `SerialInput`: plain bytes as soon as the program listens.
+    The rate is the one the receiver is programmed for, or `baud`, which also serves a program that measures its first
+    character. `live`: `input.add` may add more at any time. `pins` are put on the ports.
+    `output` gets the characters sent. With `code_in_xram`, program and data share one 64 KB space (EA low).
+    A machine cycle is 12 periods of the crystal, a tick one. Raises ValueError for parameters out of range.
+    """
+
+    NOT_STATE = ("image", "loops", "output", "stop_on_fault")
+
+    def __init__(
+        self,
+        image: Image,
+        code_in_xram: bool = False,
+        stdin: bytes | tuple[Piece, ...] = b"",
+        baud: int | None = None,
+        output: Callable[[bytes], object] | None = None,
+        stop_on_fault: bool = True,
+        crystal_hz: int = CRYSTAL_HZ,
+        gap_ticks: int = 0,
+        live: bool = False,
+        pins: tuple[PinEvent, ...] = (),
+    ) -> None:
+        if not CRYSTAL_RANGE_HZ[0] <= crystal_hz <= CRYSTAL_RANGE_HZ[1]:
+            raise ValueError(
+                f"crystal {crystal_hz} Hz is outside {CRYSTAL_RANGE_HZ[0]}..{CRYSTAL_RANGE_HZ[1]}"
+            )
+        self.image = image
+        self.output = output
+        self.stop_on_fault = stop_on_fault
+        self.loops = _loops(image)
+        self.faults: list[FirmwareFault] = []  # the first hundred
+        self.faults_lost = 0  # how many more there were
+        self.next_feed = 0  # cycle at which to look after the inputs
+        self.next_check = 0  # ... and at which to set `ends` anew
+        self.ends: tuple[int, ...] = ()  # jumps to themselves that may be its end
+        self.dead = False  # it has ended; what it sent may still be on its way
+        self.bus = XramBus(self._sent, self._faulted)
+        self.cpu = Cpu(self.bus)
+        self.cpu.stop_asleep = 1
+        self.cpu.load(image.code, image.used)
+        if code_in_xram:
+            self.bus.fill(image.code)
+            self.bus.code_of = self.cpu
+        pieces = (Piece(stdin),) if isinstance(stdin, bytes) else stdin
+        self.input = SerialInput(self.cpu, pieces, baud, crystal_hz, gap_ticks, live)
+        self.pins = PinInput(self.cpu, pins)
+        if self.pins.uses_rxd and (live or self.input.pieces):
+            raise ValueError("P3.0 is RXD and cannot be a pin while serial input is sent there")
+
+    def run(
+        self,
+        until: int | None = None,
+        max_cycles: int | None = None,
+        progress: Callable[[int], object] | None = None,
+        pause: int | None = None,
+    ) -> Ended:
+        """Until the instruction at `until` is next, the program has ended, `cycles` >= `max_cycles`, or a fault.
+
+        `pause`: cycle at which to come back for the time being.
+        `progress` is called with the cycle count every now and then.
+        """
+        limit = FAR if max_cycles is None else max_cycles
+        stop = limit if pause is None else min(limit, pause)
+        faults = len(self.faults) + self.faults_lost
+        while self.cpu.cycles < stop:
+            if self.dead:
+                if self.cpu.cycles >= self._silent_cycle():
+                    return Ended.HALTED
+                self._sleep_on(min(self._silent_cycle(), stop))
+                continue
+            if self._run_on(until, stop):
+                return Ended.UNTIL
+            if self.stop_on_fault and len(self.faults) + self.faults_lost > faults:
+                return Ended.FAULT
+            if progress is not None:
+                progress(self.cpu.cycles)
+        return Ended.CYCLES if self.cpu.cycles >= limit else Ended.PAUSED
+
+    def _run_on(self, until: int | None, stop: int) -> bool:
+        """To the next look at the inputs, or what comes before; whether that is `until`."""
+        cpu = self.cpu
+        if cpu.cycles >= self.next_feed:
+            self.next_feed = min(self.input.feed(), self.pins.feed())
+        if cpu.cycles >= self.next_check:
+            self.ends = tuple(place for place in self.loops if jumps_to_itself(cpu.code_at, place))
+            self.next_check = cpu.cycles + _SLICE
+        end = min(self.next_feed, self.next_check, stop)
+        reason = cpu.run_until_any(self.ends if until is None else (*self.ends, until), end)
+        if reason == BREAKPOINT and cpu.pc == until:
+            return True
+        if reason == BREAKPOINT:
+            self._jump_to_itself()
+        elif reason == ASLEEP and (
+            cpu.powered_down or self.pins.next_tick == FAR or not self._interruptible()
+        ):
+            self.dead = True
+        elif reason == ASLEEP:
+            self._sleep_on(end)
+        return False
+
+    def _jump_to_itself(self) -> None:
+        """Executes it once: the end, or a place where the program waits for interrupts."""
+        place = self.cpu.pc
+        self.cpu.step()
+        if self.cpu.pc == place and not self._interruptible():
+            self.dead = True
+        else:
+            self.ends = tuple(end for end in self.ends if end != place)
+
+    def _sleep_on(self, until_cycle: int) -> None:
+        """Runs without asking what could wake the CPU."""
+        self.cpu.stop_asleep = 0
+        self.cpu.run(until_cycle)
+        self.cpu.stop_asleep = 1
+
+    def _silent_cycle(self) -> int:
+        """The cycle in which the last character has been sent; 0 if nothing is being sent."""
+        chip = self.cpu.chip
+        tick = min(chip.uart.ti_tick(), chip.shift.flag_tick())
+        return 0 if self.cpu.powered_down or tick >= _NEVER else tick // 12 + 1
+
+    def _interruptible(self) -> bool:
+        enabled = self.cpu.sfr(0xA8)
+        return bool(enabled & _EA and enabled & _SOURCES)
+
+    def changed_code(self) -> list[int]:
+        """Addresses of the image whose bytes the program has replaced; only `code_in_xram` lets it."""
+        if self.bus.code_of is None:
+            return []
+        now, image = self.bus.content(), self.image
+        return [at for first, end in image.used for at in range(first, end) if now[at] != image.code[at]]
+
+    def dump(self) -> dict[str, object]:
+        """Registers and memories; SFRs by two hex digits, ports at their latches."""
+        cpu = self.cpu
+        return {
+            "pc": cpu.pc,
+            "cycles": cpu.cycles,
+            "instructions": cpu.instructions,
+            "iram_hex": bytes(cpu.peek_iram(address) for address in range(0x100)).hex(),
+            "sfr": {f"{address:02x}": cpu.sfr(address) for address in range(0x80, 0x100)},
+            "xram_hex": self.bus.content().hex(),
+        }
+
+    def _sent(self, value: int, tick: int) -> None:
+        self.input.heard(value, tick)
+        if self.output is not None:
+            self.output(bytes([value]))
+
+    def _faulted(self, kind: int, pc: int, tick: int) -> None:
+        if len(self.faults) < _FAULTS_KEPT:
+            symbol = self.image.symbols.name_at(pc)
+            self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol))
+        else:
+            self.faults_lost += 1
+        if self.stop_on_fault:
+            self.cpu.request_stop()
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "cpu": self.cpu.snapshot(),
+            "bus": self.bus.snapshot(),
+            "loaded": bytes(self.cpu.is_loaded(address) for address in range(0x10000)),
+            "faults": [(int(fault.kind), fault.tick, fault.pc) for fault in self.faults],
+            "faults_lost": self.faults_lost,
+            "input": self.input.snapshot(),
+            "pins": self.pins.snapshot(),
+            "next_feed": self.next_feed,
+            "next_check": self.next_check,
+            "ends": self.ends,
+            "dead": self.dead,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """What `snapshot` gave, of a machine with the same image and pins."""
+        self.bus.restore(state["bus"])
+        self.cpu.load(self.image.code, ())
+        code = self.bus.content() if self.bus.code_of is not None else self.image.code
+        for address, loaded in enumerate(octets(state, "loaded", 0x10000)):
+            if loaded:
+                self.cpu.write_code(address, code[address])
+        self.cpu.restore(state["cpu"])
+        names = self.image.symbols
+        self.faults = [
+            FirmwareFault(FaultKind(k), tick, pc, names.name_at(pc)) for k, tick, pc in state["faults"]
+        ]
+        self.faults_lost = state["faults_lost"]
+        self.input.restore(state["input"])
+        self.pins.restore(state["pins"])
+        self.next_feed = state["next_feed"]
+        self.next_check = state["next_check"]
+        self.ends = tuple(wholes(state, "ends", len(state["ends"]), 0, 0xFFFF))
+        self.dead = bool(state["dead"])
+
+
+def _loops(image: Image) -> tuple[int, ...]:
+    """Loaded addresses at which a jump to itself stands, among them some in the middle of instructions."""
+    return tuple(
+        address
+        for first, end in image.used
+        for address in range(first, end)
+        if jumps_to_itself(image.code.__getitem__, address)
+    )

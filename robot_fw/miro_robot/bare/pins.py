@@ -1,0 +1,123 @@
+"""Levels that the outside puts on port pins of the bare machine, from a text file.
+
+What belongs here: reading the file, and handing its edges to the CPU in time. What does not: characters on RXD
+(`bare_input.py`).
+
+    # TICK * PIN LEVEL, in the order of time; a tick is a period of the crystal, 12 a machine cycle
+    0 * P3.2 1
+    24000 * P3.2 0     # /INT0 falls after 1 ms at 24 MHz
+    24120 * P3.2 1
+
+Pins are high until the file says otherwise. P1 to P3 are quasi-bidirectional and P0 is open drain: a pin is low if its
+latch or the outside pulls it low. The CPU samples pins once a machine cycle (AT89C52 data sheet, S5P2), so it may miss
+a pulse that is shorter than that.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from miro_robot.bare.input import MARGIN_TICKS, SLICE
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.line import FAR
+
+RXD = (3, 0)  # P3.0, whose level also is what the receiver sees
+_LATEST_TICK = 1 << 60
+_MOST_RXD = 2_000  # edges handed over at a time: the line keeps 4096
+_LINE = re.compile(r"(\d{1,20})\s+\*\s+P([0-3])\.([0-7])\s+([01])", re.ASCII)
+_FORM = "write TICK * P1.0 0|1, such as 24000 * P3.2 0"
+
+
+class PinError(ValueError):
+    """A file of pins that is refused: its name, the line, what is wrong, and what to do."""
+
+
+class PinEvent(NamedTuple):
+    """The outside puts `level` on P`port`.`bit` at `tick`."""
+
+    tick: int
+    port: int
+    bit: int
+    level: int
+
+
+def read_pins(text: str, path: str) -> tuple[PinEvent, ...]:
+    """The events of a file. Raises PinError."""
+    events: list[PinEvent] = []
+    last: dict[tuple[int, int], int] = {}  # tick of the last event of a pin
+    for number, line in enumerate(text.split("\n"), 1):
+        content = line.partition("#")[0].strip()
+        if not content:
+            continue
+        match = _LINE.fullmatch(content)
+        if match is None:
+            raise PinError(f"{path}:{number}: {content[:40]!r} is no pin event; {_FORM}")
+        event = PinEvent(*(int(part) for part in match.groups()))
+        if event.tick > _LATEST_TICK:
+            raise PinError(f"{path}:{number}: tick {event.tick} is too late; use ticks up to {_LATEST_TICK}")
+        if events and event.tick < events[-1].tick:
+            before = events[-1].tick
+            raise PinError(
+                f"{path}:{number}: tick {event.tick} comes after tick {before}; sort the lines by tick"
+            )
+        if last.get((event.port, event.bit)) == event.tick:
+            pin = f"P{event.port}.{event.bit}"
+            raise PinError(
+                f"{path}:{number}: {pin} has a level at tick {event.tick} already; leave one line out"
+            )
+        last[event.port, event.bit] = event.tick
+        events.append(event)
+    return tuple(events)
+
+
+class PinInput:
+    """Hands `events`, which are in the order of time, to `cpu`. `told(tick, port, levels)` gets each of them too."""
+
+    NOT_STATE = ("cpu", "events", "told", "uses_rxd")
+
+    def __init__(self, cpu: Cpu, events: tuple[PinEvent, ...]) -> None:
+        self.cpu = cpu
+        self.events = events
+        self.uses_rxd = any((event.port, event.bit) == RXD for event in events)
+        self.told: Callable[[int, int, int], object] | None = None
+        self.done = 0  # events handed over
+        self.levels = [0xFF] * 4
+
+    @property
+    def next_tick(self) -> int:
+        """Tick of the first event that the CPU does not know yet, FAR if it knows them all."""
+        return self.events[self.done].tick if self.done < len(self.events) else FAR
+
+    def feed(self) -> int:
+        """Hands over what comes soon, and says up to which cycle the CPU may run before it needs more."""
+        end_tick = 12 * (self.cpu.cycles + SLICE) + MARGIN_TICKS
+        rxd_edges = 0
+        while self.next_tick < end_tick and rxd_edges < _MOST_RXD:
+            event = self.events[self.done]
+            rxd_edges += (event.port, event.bit) == RXD
+            self._push(event)
+            self.done += 1
+        if self.uses_rxd:
+            self.cpu.rxd.settled_tick = self.next_tick
+        return max((self.next_tick - MARGIN_TICKS) // 12, self.cpu.cycles + 1)
+
+    def _push(self, event: PinEvent) -> None:
+        tick, port, bit, level = event
+        if (port, bit) == RXD:
+            self.cpu.rxd.append(tick, level)
+            return
+        levels = self.levels[port] & (0xFF ^ 1 << bit) | level << bit
+        if levels != self.levels[port]:
+            self.levels[port] = levels
+            self.cpu.set_external(port, levels, tick)
+            if self.told is not None:
+                self.told(tick, port, levels)
+
+    def snapshot(self) -> dict[str, object]:
+        return {"done": self.done, "levels": list(self.levels)}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.done = state["done"]
+        self.levels = list(state["levels"])

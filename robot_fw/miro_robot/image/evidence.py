@@ -1,0 +1,177 @@
+"""Whether the `.map` and `.cdb` beside an image were written with it, or belong to another one.
+
+What belongs here: evidence, and how much of it is enough. Reading names out of these files is `symbols.py`'s.
+
+A file that is only unusual must pass: images are filled up, merged with a boot loader, cut apart; symbols are
+absolute, mark the end of an area, or name data that has no bytes. So a file is refused on contradictions alone:
+* SDCC's start-up code jumps to `_main`, and the file has `_main` elsewhere (one displaced byte is enough for that);
+* the image has no byte at more than half of the places that the file names;
+* more than a sixth of the functions that it names begin nowhere: no call leads there, the bytes in front are no
+  instruction that goes elsewhere, and going by those behind the name before, they lie inside an instruction. Where both
+  belong together that happens to tables among hand-written code: to none in the robot's;
+* it lists instructions (`A$`, both files have that after `--debug`), and the image lacks more than a quarter of them,
+  or more than one in 64 runs on into something else than the next. Where both belong together that happens to an image
+  that was patched: to none of 1165 in the robot's, to none in six other programs.
+What moved nothing but a last function or two shows in the listing only (`debug_info.py`).
+"""
+
+from __future__ import annotations
+
+import re
+
+import msgspec
+
+from miro_robot.mcs51.opcodes import LENGTH, goes_on, target
+
+_AREA = re.compile(r"^(\S[\S .]*?)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) = .*bytes \(([A-Z,]+)\)")
+_NAME = re.compile(r"^(?:C:)?\s+([0-9A-F]{8})\s+(_\w+)\s")
+_INSTRUCTION = re.compile(r"^(?:L:A\$[^:]*:|C:\s+(?=[0-9A-F]{8}\s+A\$))([0-9A-F]{1,8})\b")
+_FEW_RECORDS, _FEW_NAMES, _FEW_STRAYS = 20, 4, 3  # fewer prove nothing
+_NO_FUNCTIONS = ("HOME", "GSINIT", "GSFINAL", "XINIT", "CONST")  # areas: start-up code in pieces, and data
+_JUMPS = (0x02, 0x12)  # LJMP, LCALL
+_SPACE = 0x10000
+
+
+class Contradiction(msgspec.Struct, frozen=True):
+    """Line of the symbol file (from 1), and what is wrong with it."""
+
+    line: int
+    reason: str
+
+
+class _Place(msgspec.Struct, frozen=True):
+    area: str
+    name: str
+    address: int
+    line: int
+
+
+def check_map(text: str, code: bytes, loaded: bytes) -> Contradiction | None:
+    """A map against an image. `code`: 64 KB; `loaded`: 1 for each address that the image has a byte for."""
+    places = _code_places(text)
+    return (
+        _check_start_up(places, code, loaded)
+        or _check_places(places, loaded)
+        or _check_instructions(text, code, loaded)
+        or _check_functions(places, code, loaded)
+    )
+
+
+def check_cdb(text: str, code: bytes, loaded: bytes) -> Contradiction | None:
+    """The same for a debug file."""
+    return _check_instructions(text, code, loaded)
+
+
+def _code_places(text: str) -> list[_Place]:
+    """Names inside relocatable code areas that have a size; a name at the end of its area marks the end."""
+    places = []
+    first = end = 0
+    inside = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if area := _AREA.match(line):
+            inside = area[1]
+            attributes = area[4].split(",")
+            first = int(area[2], 16)
+            end = first + int(area[3], 16) if "CODE" in attributes and "REL" in attributes else 0
+        elif (name := _NAME.match(line)) and first <= int(name[1], 16) < min(end, _SPACE):
+            places.append(_Place(inside, name[2], int(name[1], 16), number))
+    return places
+
+
+def _check_start_up(places: list[_Place], code: bytes, loaded: bytes) -> Contradiction | None:
+    by_name = {place.name: place for place in places}
+    start_up, main = by_name.get("__sdcc_program_startup"), by_name.get("_main")
+    if start_up is None or main is None or not all(loaded[start_up.address : start_up.address + 3]):
+        return None
+    opcode, high, low = (code[(start_up.address + offset) % _SPACE] for offset in range(3))
+    target = high << 8 | low
+    if opcode not in _JUMPS or target == main.address:
+        return None
+    return Contradiction(
+        main.line,
+        f"_main is at {main.address:#06x} here, and the image's start-up code jumps to {target:#06x}",
+    )
+
+
+def _check_places(places: list[_Place], loaded: bytes) -> Contradiction | None:
+    missing = [place for place in places if not loaded[place.address]]
+    if len(places) < _FEW_NAMES or 2 * len(missing) <= len(places):
+        return None
+    first = missing[0]
+    where = f"{first.name} ({first.address:#06x})"
+    count = f"{len(missing)} of {len(places)} code symbols"
+    return Contradiction(first.line, f"the image has no bytes for {count}, the first is {where}")
+
+
+def _check_functions(places: list[_Place], code: bytes, loaded: bytes) -> Contradiction | None:
+    functions = [
+        place
+        for place in places
+        if not place.area.startswith(_NO_FUNCTIONS)
+        and all(loaded[max(0, place.address - 3) : place.address + 1])
+    ]
+    before = [functions[0], *functions[:-1]] if functions else []
+    strays = [
+        place
+        for place, label in zip(functions, before, strict=True)
+        if _runs_into(code, place.address) and not _is_reached(code, label.address, place.address)
+    ]
+    if len(strays) >= _FEW_STRAYS:
+        called = {target(code, address) for address in range(_SPACE) if loaded[address]}
+        strays = [place for place in strays if place.address not in called]
+    if len(strays) < _FEW_STRAYS or 6 * len(strays) <= len(functions):
+        return None
+    first = strays[0]
+    count = f"{len(strays)} of {len(functions)} functions"
+    return Contradiction(
+        first.line,
+        f"no function of the image begins where {count} do, the first is {first.name} ({first.address:#06x})",
+    )
+
+
+def _runs_into(code: bytes, address: int) -> bool:
+    """Whether none of the instructions that may end in front of `address` goes elsewhere."""
+    return all(
+        LENGTH[code[address - size]] != size or goes_on(code[address - size])
+        for size in (1, 2, 3)
+        if address >= size
+    )
+
+
+def _is_reached(code: bytes, first: int, address: int) -> bool:
+    """Whether an instruction begins at `address`, going by those from `first` on."""
+    while first < address:
+        first += LENGTH[code[first]]
+    return first == address
+
+
+def _check_instructions(text: str, code: bytes, loaded: bytes) -> Contradiction | None:
+    records = _instructions(text)
+    if len(records) < _FEW_RECORDS:
+        return None
+    ends = [address + LENGTH[code[address]] for address, _ in records]
+    followers = [*(address for address, _ in records[1:]), ends[-1]]
+    missing = {index for index, (address, _) in enumerate(records) if not loaded[address]}
+    strays = {
+        index
+        for index, (address, _) in enumerate(records)
+        if ends[index] > followers[index] or (ends[index] < followers[index] and goes_on(code[address]))
+    } - missing
+    misfits = sorted(missing | strays)
+    few_strays = len(strays) < _FEW_STRAYS or 64 * len(strays) <= len(records) - len(missing)
+    if few_strays and 4 * len(misfits) <= len(records):
+        return None
+    address, line = records[misfits[0]]
+    return Contradiction(
+        line,
+        f"{len(misfits)} of its {len(records)} instructions are not in the image, the first at {address:#06x}",
+    )
+
+
+def _instructions(text: str) -> list[tuple[int, int]]:
+    """(address, line of the file) of every assembler line in the 64 KB space, by address, each address once."""
+    found: dict[int, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if (record := _INSTRUCTION.match(line)) and int(record[1], 16) < _SPACE:
+            found.setdefault(int(record[1], 16), number)
+    return sorted(found.items())

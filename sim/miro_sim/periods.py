@@ -1,0 +1,98 @@
+"""What one control period of the world leaves behind: the records that recording, summary, figure and
+replay read.
+
+What belongs here: plain frozen records, as the world fills them. What does not: how they are stored
+(`recording`), what is made of them (`summary`, `figure`), and the state of the world itself (`world`).
+
+One period is one camera frame, 800800 ticks of 24 MHz. Everything in a `RobotPeriod` is taken at the tick
+of the period's exposure, before the host acts on it, except `control`, which is what the host answers to
+it.
+"""
+
+import msgspec
+
+from miro_host.posture import Posture
+
+CommandRecord = tuple[int, int, str]
+"""A complete LM629 command: (tick of its last byte, opcode, data bytes in hex)."""
+
+
+class Axis(msgspec.Struct, frozen=True):
+    """One LM629 as an observer sees it, in the chip's own units.
+
+    `desired_position` and `real_position` in counts (the desired one rounded down), `desired_velocity` in
+    counts per sample with 16 fraction bits, `status` as read by RDSTAT, `pwm_magnitude` 0..127 with
+    `pwm_sign` 1 for negative torque. `commands` holds those completed since the period before.
+    """
+
+    desired_position: int
+    real_position: int
+    desired_velocity: int
+    status: int
+    pwm_sign: int
+    pwm_magnitude: int
+    commands: tuple[CommandRecord, ...] = ()
+
+
+class Control(msgspec.Struct, frozen=True):
+    """What the controller made of one measurement: equations (13), (15), (16) and the wheel split.
+
+    `v_m_s`, `w_rad_s` the velocities after the integrator; `u1` in m/s^2, `u2` in rad/s^2; `s1` in m/s,
+    `s2` in rad/s; `left`, `right` as sent, in 1/256 count per LM629 sample.
+    """
+
+    v_m_s: float
+    w_rad_s: float
+    u1: float
+    u2: float
+    s1: float
+    s2: float
+    left: int
+    right: int
+
+
+class RobotPeriod(msgspec.Struct, frozen=True):
+    """One robot in one control period.
+
+    `truth` has an unwrapped heading. `measurement` is None while the vision delay still fills or a frame
+    was missed, `control` is None when the host sent nothing for this robot. The counters are those of the
+    firmware (modulo 2^16), None where the image exports no such symbols.
+    """
+
+    network: int
+    slot: int
+    reference: Posture
+    truth: Posture
+    v_m_s: float
+    w_rad_s: float
+    measurement: Posture | None
+    control: Control | None
+    accepted: int | None
+    rejected: int | None
+    stale: int | None
+    left: Axis
+    right: Axis
+
+
+class WireRun(msgspec.Struct, frozen=True):
+    """Bytes that followed each other without a gap: `tick` is the start bit of the first.
+
+    `direction` is `>` (host to robot) or `<` (robot to host), as in a stream file; `slot` is -1 for host
+    frames.
+    """
+
+    tick: int
+    direction: str
+    network: int
+    slot: int
+    data: bytes
+
+
+class Period(msgspec.Struct, frozen=True):
+    """Control period `index`, which begins at `tick`; `digest` (hex) chains the states up to its end."""
+
+    index: int
+    tick: int
+    robots: tuple[RobotPeriod, ...]
+    wire: tuple[WireRun, ...]
+    digest: str

@@ -1,0 +1,1 @@
+"""The pitch: its size and axes, and whether a robot fits."""

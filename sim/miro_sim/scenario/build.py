@@ -1,0 +1,92 @@
+"""From the keys of a scenario to the objects that they describe.
+
+What belongs here: unit changes and names, nothing else: what a key means stands in `keys.py`, what an object
+does in its own module.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_host.integrator import Limits
+from miro_host.pilot import Pilot
+from miro_host.reference import Arc, Line, Ramp, Trajectory
+from miro_host.vision import NO_ERRORS, Vision, VisionErrors
+from miro_host.yang_kim import Gains, YangKim
+from miro_sim.plant.params import DriveParams
+from miro_sim.radio import ChainParams, RadioParams, SlicerParams
+from miro_sim.scenario import keys as sc
+from miro_sim.scenario.radio_keys import Radio
+
+DEGREE = 0.017453292519943295
+
+
+def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
+    """The reference trajectory in the paper's axes, which start at its own start. ValueError: see `Arc`."""
+    path = robot.reference
+    drive_s = max(duration_s, path.ramp_s) if path.drive_s is None else path.drive_s
+    ramp = Ramp(path.speed_m_s, path.ramp_s, drive_s, ramp_down=path.drive_s is not None)
+    if isinstance(path, sc.LineRef):
+        return Line(ramp, path.heading_deg * DEGREE)
+    return Arc(ramp, path.heading_deg * DEGREE, path.curvature_per_m)
+
+
+def pilot_for(robot: sc.Robot, reference: Trajectory) -> Pilot:
+    """The controller, its integrator and the wheel split."""
+    law = robot.controller
+    gains = Gains(**{name: getattr(law, name) for name in Gains.__struct_fields__})
+    limits = Limits(**{name: getattr(law, name) for name in Limits.__struct_fields__})
+    return Pilot(reference, YangKim(gains), limits, period_s=seconds(CONTROL_PERIOD_TICKS))
+
+
+def vision_for(camera: sc.Camera) -> Vision:
+    """Camera, grabber and tracker."""
+    if camera.noise == "none":
+        errors = msgspec.structs.replace(NO_ERRORS, pixel_m=camera.pixel_cm / 100.0)
+    else:
+        errors = VisionErrors(
+            camera.position_error_cm / 100.0, camera.heading_error_deg * DEGREE, camera.pixel_cm / 100.0
+        )
+    return Vision(errors, camera.delay_frames)
+
+
+def drive_for(robot: sc.Robot, left: float, right: float) -> DriveParams:
+    """The drive with this seed's wheels; `left`, `right` are the draws, uniform in [0, 1)."""
+    spread = robot.wheel_radius_mismatch
+    body = robot.drive.chassis
+    drawn = msgspec.structs.replace(
+        body,
+        left_radius_factor=body.left_radius_factor * (1.0 + spread * (2.0 * left - 1.0)),
+        right_radius_factor=body.right_radius_factor * (1.0 + spread * (2.0 * right - 1.0)),
+    )
+    return msgspec.structs.replace(robot.drive, chassis=drawn)
+
+
+def radio_for(radio: Radio) -> RadioParams:
+    """The air of one network."""
+    bursts, dropouts = radio.bursts, radio.dropouts
+    return RadioParams.of(
+        latency_s=radio.latency_s,
+        jitter_s=radio.jitter_s,
+        bit_error_rate=radio.bit_error_rate,
+        eb_n0_db=radio.eb_n0_db,
+        carrier=radio.carrier,
+        keyup_s=radio.keyup_s,
+        squelch=radio.squelch,
+        baud_offset_ppm=radio.baud_offset_ppm,
+        crystal_offset_ppm=radio.crystal_offset_ppm,
+        bursts=None if bursts is None else ChainParams.of(bursts.good_to_bad, bursts.bad_to_good),
+        burst_error_rate=0.5 if bursts is None else bursts.bit_error_rate,
+        dropouts=None if dropouts is None else ChainParams.lasting(dropouts.every_s, dropouts.length_s),
+        slicer=_slicer_for(radio),
+        false_starts_hz=radio.false_starts_hz,
+        lost_character_rate=radio.lost_character_rate,
+    )
+
+
+def _slicer_for(radio: Radio) -> SlicerParams | None:
+    slicer = radio.slicer
+    if slicer is None or radio.eb_n0_db is None:
+        return None
+    return SlicerParams.of(settle_s=slicer.settle_s, offset=slicer.offset, eb_n0_db=radio.eb_n0_db)

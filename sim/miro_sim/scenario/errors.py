@@ -1,0 +1,239 @@
+"""What is wrong with a scenario, in one line: file, key path, what, and what to write instead.
+
+What belongs here: the words. msgspec finds the faults and says where; this file turns that into the file's
+own terms. What does not: reading files (`file`) and the rules themselves (`keys`).
+"""
+
+import re
+from difflib import get_close_matches
+from typing import Any
+
+import msgspec
+
+from miro_sim.scenario.keys import Scenario
+
+UNITS = {
+    "s": "seconds",
+    "cm": "centimetres",
+    "m": "metres",
+    "rad": "radians",
+    "deg": "degrees",
+    "hz": "hertz",
+    "db": "decibels",
+    "ppm": "parts per million",
+    "m_s": "metres per second",
+    "rad_s": "radians per second",
+    "m_s2": "metres per second squared",
+    "rad_s2": "radians per second squared",
+    "per_s": "1/s",
+    "per_m": "1/m",
+    "kg": "kilograms",
+    "kg_m2": "kilogram square metres",
+    "v": "volts",
+    "ohm": "ohms",
+    "h": "henries",
+    "nm": "newton metres",
+}
+MORE_UNITS = (
+    "ms",
+    "us",
+    "ns",
+    "min",
+    "mm",
+    "km",
+    "turns",
+    "khz",
+    "mhz",
+    "ticks",
+    "cm_s",
+    "deg_s",
+    "g",
+    "gcm2",
+    "mv",
+    "uh",
+    "mnm",
+)
+LONGEST_END = 300  # characters of each end of a long message that are shown
+TYPE_NAMES = {
+    "float": "a number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "str": "a string",
+    "array": "an array of tables",
+    "object": "a table",
+}
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be used: `origin` (file or built-in name), `place` (key path or line), what,
+    remedy.
+    """
+
+    def __init__(self, origin: str, place: str, what: str, remedy: str = "") -> None:
+        self.origin = origin
+        self.place = place
+        self.what = what
+        self.remedy = remedy
+        place, what, remedy = (_shortened(part) for part in (place, what, remedy))
+        head = f"{origin}: {place}: {what}" if place else f"{origin}: {what}"
+        super().__init__(one_line(f"{head}; {remedy}" if remedy else head))
+
+
+def one_line(text: str) -> str:
+    """The text with everything that a terminal would not print as it stands escaped."""
+    return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)
+
+
+def _shortened(text: str) -> str:
+    """The text without the middle of what nobody reads to its end: a value or a key of a megabyte."""
+    return text if len(text) <= 2 * LONGEST_END else f"{text[:LONGEST_END]} .. {text[-LONGEST_END:]}"
+
+
+def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError:
+    """What msgspec found, in the words of the file: path without `$`, and a remedy."""
+    match = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
+    assert match is not None
+    what, path = match[1], match[2] or ""
+    unknown = re.fullmatch(r"(?s)Object contains unknown field `(.*)`", what)
+    if unknown:
+        known = _keys_at(raw, path)
+        place = f"{path}.{unknown[1]}" if path else unknown[1]
+        return ScenarioError(origin, place, "unknown key", remedy_for_key(unknown[1], known))
+    missing = re.fullmatch(r"Object missing required field `(.*)`", what)
+    if missing:
+        place = f"{path}.{missing[1]}" if path else missing[1]
+        return ScenarioError(origin, place, "this key is missing", _choices_at(place) or "add it")
+    inner = re.fullmatch(r"(?s)([a-z0-9_.]+(?:\[\d+\])?(?:\.[a-z0-9_]+)*): (.*)", what)
+    if inner:  # a rule between keys (`Network.__post_init__`) names the place below its own table
+        path = f"{path}.{inner[1]}" if path else inner[1]
+        what = inner[2]
+    limit = re.fullmatch(r"(\w+) must be (.*), got (.*)", what)
+    if limit:  # a parameter of the drive
+        return ScenarioError(
+            origin, f"{path}.{limit[1]}", f"{limit[3]} is out of range", f"must be {limit[2]}"
+        )
+    what, _, remedy = what.partition("; ")
+    value = _value_at(raw, path)
+    return ScenarioError(origin, path, *_explain(what, path, value, remedy or _choices_at(path)))
+
+
+def _explain(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
+    wrong_type = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", what)
+    if wrong_type:
+        want = " or ".join(
+            TYPE_NAMES.get(name, name) for name in wrong_type[1].split(" | ") if name != "null"
+        )
+        got = TYPE_NAMES.get(wrong_type[2], f"a {wrong_type[2]}")
+        what = f"expected {want}{_unit_of(path)}, got {got}{_shown(value)}"
+        if wrong_type[1] == "array" and isinstance(value, dict):
+            return what, "write its header in double brackets"
+        return what, _quoted_number(wrong_type[1], value) or remedy
+    limit = re.fullmatch(r"Expected `\w+` (>=|>|<=|<) (\S+)", what)
+    if limit:
+        return f"{value} is out of range", f"must be {limit[1]} {limit[2]}{_unit_of(path)}"
+    if what.startswith(("Invalid enum value", "Invalid value")):
+        return f"{value!r} is not one of the choices", remedy
+    if "matching regex" in what:
+        return f"{value!r} is not a name", "use a-z, 0-9, - and _, at most 64 characters"
+    return what[:1].lower() + what[1:], remedy
+
+
+def remedy_for_key(key: str, known: list[str]) -> str:
+    """What to write instead of an unknown key: the same quantity in its own unit, or the nearest spelling."""
+    stem = _stem(key)
+    for candidate in known:
+        if _stem(candidate) == stem and candidate != key and unit_name(candidate):
+            return f"use {candidate}, in {unit_name(candidate)}"
+    close = get_close_matches(key, known, n=1)
+    if close:
+        return f"did you mean {close[0]}?"
+    return f"keys here: {', '.join(known)}" if known else "remove it"
+
+
+def unit_name(key: str) -> str:
+    """The unit that ends a key, in words, or the empty string."""
+    for unit in sorted(UNITS, key=len, reverse=True):
+        if key.endswith(f"_{unit}"):
+            return UNITS[unit]
+    return ""
+
+
+def _stem(key: str) -> str:
+    for unit in sorted((*UNITS, *MORE_UNITS), key=len, reverse=True):
+        if key.endswith(f"_{unit}"):
+            return key[: -len(unit) - 1]
+    return key
+
+
+def _unit_of(path: str) -> str:
+    unit = unit_name(path)
+    return f" in {unit}" if unit else ""
+
+
+def _shown(value: Any) -> str:
+    return f" ({value!r})" if isinstance(value, (str, int, float)) else ""
+
+
+def _quoted_number(want: str, value: Any) -> str:
+    """The commonest slip has a remedy of its own: a number, perhaps with its unit, inside quotes."""
+    if want not in ("float", "int") or not isinstance(value, str):
+        return ""
+    number = re.match(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?", value)
+    return "write the number without quotes; the unit stands in the key" if number else ""
+
+
+def _value_at(raw: Any, path: str) -> Any:
+    """What stands at a key path like `network[0].radio.keyup_s`, or None."""
+    for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
+        try:
+            raw = raw[int(index)] if index else raw[key]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return raw
+
+
+def _type_at(path: str) -> msgspec.inspect.Type | None:
+    """What a scenario may have at a key path; below tagged tables, these tables."""
+    found: msgspec.inspect.Type = msgspec.inspect.type_info(Scenario)
+    for key, _ in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
+        if key and isinstance(found, msgspec.inspect.StructType):
+            fields = {field.encode_name: field.type for field in found.fields}
+            if key not in fields:
+                return None
+            found = fields[key]
+        if isinstance(found, msgspec.inspect.Metadata):
+            found = found.type
+        if not key and isinstance(found, msgspec.inspect.VarTupleType):
+            found = found.item_type
+    return found
+
+
+def _structs_at(path: str) -> list[msgspec.inspect.StructType]:
+    """The kinds of table that there may be at a key path: several where a key says which."""
+    found = _type_at(path)
+    options = found.types if isinstance(found, msgspec.inspect.UnionType) else (found,)
+    return [option for option in options if isinstance(option, msgspec.inspect.StructType)]
+
+
+def _keys_at(raw: Any, path: str) -> list[str]:
+    """The keys of the table at a key path, which has chosen its kind."""
+    value = _value_at(raw, path)
+    for struct in _structs_at(path):
+        tag = struct.tag_field
+        if tag is None or value.get(tag) == struct.tag:
+            return [*([tag] if tag else []), *struct.cls.__struct_encode_fields__]
+    return []
+
+
+def _choices_at(path: str) -> str:
+    """What a key may hold, if that is one of a few: words, numbers, or the kinds of its table."""
+    table, _, key = path.rpartition(".")
+    found = _type_at(path)
+    if isinstance(found, msgspec.inspect.LiteralType):
+        choices = [str(value) for value in found.values]
+    else:
+        choices = [str(struct.tag) for struct in _structs_at(table) if struct.tag_field == key]
+    if not choices:
+        return ""
+    *others, last = choices
+    return f"use {', '.join(others)} or {last}" if others else f"use {last}"

@@ -1,0 +1,209 @@
+"""The scenario: everything about a run that is chosen rather than drawn, as frozen structs.
+
+What belongs here: the keys a scenario file may have, with unit, default and range, and the rules between
+them; those of the radio are in `radio_keys`. What does not: reading files and reporting what is wrong in
+them (`file`), and what the keys do (`miro_host`, `radio`, `plant`, `world`).
+
+Every key carries its unit. Defaults are the "realistic" set: the paper's measurement error (2.40 cm and
+4.83 degrees as 3 sigma), one camera frame of vision delay, 3 ms of computing, a keyed carrier and a
+bit-error rate of 1e-4.
+"""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
+from miro_sim.plant.params import DriveParams
+from miro_sim.scenario.radio_keys import ControlNoise, Radio
+
+PERIOD_TICKS = 800_800
+CHARACTER_TICKS = 25_000  # 10 bits at 9600 baud
+FRAME_CHARACTERS = {3: 23, 5: 31}
+MAX_TORQUE_CONSTANT = 10.0  # Nm/A; beyond it a motor of this size is a mistyped unit
+MAX_NETWORKS = 32  # building and simulating one takes as long as a whole run of fig6
+MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
+
+Positive = Annotated[float, Meta(gt=0.0, le=1e6)]
+Duration = Annotated[float, Meta(gt=0.0, le=86_400.0)]
+Seconds = Annotated[float, Meta(ge=0.0, le=1e3)]
+PitchCm = Annotated[float, Meta(ge=-1_000.0, le=1_000.0)]
+TurnRad = Annotated[float, Meta(ge=-3.141592653589793, le=3.141592653589793)]
+TurnDeg = Annotated[float, Meta(ge=-180.0, le=180.0)]
+Gain = Annotated[float, Meta(ge=0.0, le=1e6)]
+Name = Annotated[str, Meta(pattern=r"\A[a-z0-9][a-z0-9_-]{0,63}\Z")]
+
+
+class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The camera and what the tracker makes of it: noise per axis, pixels, whole frames of delay.
+
+    `position_error_cm` and `heading_error_deg` are three standard deviations (paper section V-A: 2.40 cm,
+    4.83 degrees). `pixel_cm` 0 measures without quantisation; 0.4375 is a pitch of 140 x 105 cm on 320 x
+    240 pixels.
+    """
+
+    noise: Literal["gaussian", "none"] = "gaussian"
+    position_error_cm: Annotated[float, Meta(ge=0.0, le=100.0)] = 2.40
+    heading_error_deg: Annotated[float, Meta(ge=0.0, le=180.0)] = 4.83
+    pixel_cm: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.4375
+    delay_frames: Annotated[int, Meta(ge=0, le=30)] = 1
+
+
+class HostTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How long the PC computes between the camera frame and the key-up of the transmitter."""
+
+    compute_s: Annotated[float, Meta(ge=0.00001, le=0.030)] = 0.003
+
+
+class LineRef(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="line"
+):
+    """A straight line from the origin, run with a speed ramp: s = v t^2 / (2 t_r), then v (t - t_r / 2).
+
+    With `drive_s` the reference comes to rest by the same ramp, after so many seconds, and stands from then on.
+    Without, it moves for the whole duration.
+    """
+
+    heading_deg: TurnDeg = 0.0
+    speed_m_s: Annotated[float, Meta(ge=0.0, le=1.46)] = 0.20
+    ramp_s: Seconds = 0.5
+    drive_s: Annotated[float, Meta(ge=0.0, le=86_400.0)] | None = None
+
+
+class ArcRef(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="arc"
+):
+    """A circular arc from the origin: heading theta_0 + kappa s, the same speed ramp and `drive_s` as the line."""
+
+    heading_deg: TurnDeg = 60.0
+    curvature_per_m: Annotated[float, Meta(ge=-100.0, le=100.0)] = -1.0
+    speed_m_s: Annotated[float, Meta(ge=0.0, le=1.46)] = 0.20
+    ramp_s: Seconds = 0.5
+    drive_s: Annotated[float, Meta(ge=0.0, le=86_400.0)] | None = None
+
+
+class YangKim(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="law", tag="yang_kim"
+):
+    """The sliding-mode law of the paper, equations (13) and (16), with the guards it needs in a sampled loop.
+
+    `switching` sign is the paper's law to the letter; saturation replaces each sign by a boundary layer of
+    the width given beside it. `cosine_guard` is d in c (1 + d^2) / (c^2 + d^2), which stands for 1 / c;
+    `rho_floor_m` the smallest rho_c used as a divisor. The limits clamp the integrator (15) itself.
+    """
+
+    gamma1_per_s: Gain = 1.7
+    gamma2_per_s: Gain = 3.0
+    q1_per_s: Gain = 0.53
+    q2_per_s: Gain = 0.72
+    p1_m_s2: Gain = 0.19
+    p2_rad_s2: Gain = 0.69
+    switching: Literal["sign", "saturation"] = "saturation"
+    layer_s1_m_s: Positive = 0.022
+    layer_s2_rad_s: Positive = 0.19
+    layer_theta_rad: Positive = 0.015
+    cosine_guard: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.086
+    rho_floor_m: Positive = 0.024
+    max_v_m_s: Positive = 0.95
+    max_w_rad_s: Positive = 3.7
+    max_v_dot_m_s2: Positive = 8.0
+    max_w_dot_rad_s2: Positive = 120.0
+
+
+class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One robot: its slot on the network, where it starts, what it follows and who steers it.
+
+    Start and reference have to lie on the pitch (`places`).
+    The start is the start of the reference plus the errors (captions of the paper's Figs. 6 and 8). Each
+    wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `drive` replaces single
+    parameters of motors, bridges, battery, chassis and encoders (`plant.params`).
+    """
+
+    slot: Annotated[int, Meta(ge=0, le=4)] = 0
+    start_error_x_cm: PitchCm = 0.0
+    start_error_y_cm: PitchCm = 0.0
+    start_error_theta_rad: TurnRad = 0.0
+    wheel_radius_mismatch: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.015
+    reference: LineRef | ArcRef
+    controller: YangKim = YangKim()
+    drive: DriveParams = DriveParams()
+
+    def __post_init__(self) -> None:
+        motor, encoder, voltage_v = self.drive.motor, self.drive.encoder, self.drive.battery.voltage_v
+        constant = motor.torque_constant_nm_a
+        if constant > MAX_TORQUE_CONSTANT:
+            raise ValueError(
+                f"drive.motor.torque_constant_nm_a: {constant} is out of range; must be <= {MAX_TORQUE_CONSTANT}"
+            )
+        counts_per_s = voltage_v / constant * self.drive.counts_per_radian()
+        if counts_per_s > MAX_COUNTS_PER_S:
+            raise ValueError(
+                f"drive: {voltage_v} V, {constant} Nm/A and {encoder.lines} lines make {counts_per_s:.3g} counts/s"
+                f" without load; at most {MAX_COUNTS_PER_S:.0f} (the LM629 itself follows 1000000)"
+            )
+
+
+class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One radio frequency: one host, `robots` slots (the layout of its frames), and the robots that are
+    present.
+    """
+
+    robots: Literal[3, 5] = 3
+    radio: Radio = Radio()
+    control_noise: ControlNoise = ControlNoise()
+    robot: Annotated[tuple[Robot, ...], Meta(min_length=1)]
+
+    def __post_init__(self) -> None:
+        slots = [robot.slot for robot in self.robot]
+        for index, slot in enumerate(slots):
+            if slot >= self.robots:
+                raise ValueError(
+                    f"robot[{index}]: slot {slot} does not exist on a network of {self.robots} robots;"
+                    f" use 0 to {self.robots - 1}, or robots = 5"
+                )
+            if slot in slots[:index]:
+                raise ValueError(
+                    f"robot[{index}]: slot {slot} is taken by robot[{slots.index(slot)}];"
+                    " give each robot its own slot"
+                )
+        self._check_air_time()
+
+    def _check_air_time(self) -> None:
+        """A frame, with the transmitter's key-up, has to fit the camera period."""
+        radio, characters = self.radio, FRAME_CHARACTERS[self.robots]
+        air_ticks = characters * CHARACTER_TICKS * 1_000_000 / (1_000_000 + radio.baud_offset_ppm)
+        if air_ticks > PERIOD_TICKS:
+            raise ValueError(
+                f"radio.baud_offset_ppm: {radio.baud_offset_ppm} makes a frame of {characters} characters longer"
+                " than the camera period; use a smaller one"
+            )
+        longest_s = (PERIOD_TICKS - air_ticks) / 24e6
+        if radio.carrier == "keyed" and round(radio.keyup_s * 24e6) > PERIOD_TICKS - air_ticks:
+            raise ValueError(
+                f"radio.keyup_s: {radio.keyup_s} s and a frame of {characters} characters do"
+                f" not fit the camera period; at most {longest_s:.6f} s"
+            )
+
+
+class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A whole run. `stop_on_fault` ends it at the first firmware fault; otherwise faults are counted.
+
+    `lm629` turns readings of the chips' undocumented corners (`robot_fw/miro_robot/lm629/README.md`).
+    """
+
+    name: Name
+    title: Annotated[str, Meta(max_length=200)] = ""
+    duration_s: Duration
+    stop_on_fault: bool = True
+    lm629: Lm629Options = DEFAULT_OPTIONS
+    camera: Camera = Camera()
+    host: HostTimes = HostTimes()
+    networks: Annotated[tuple[Network, ...], Meta(min_length=1)] = msgspec.field(name="network")
+
+    def __post_init__(self) -> None:
+        if len(self.networks) > MAX_NETWORKS:
+            raise ValueError(
+                f"network: {len(self.networks)} networks, each of which costs as much time as a run of its own;"
+                f" at most {MAX_NETWORKS}, make several scenarios of them"
+            )

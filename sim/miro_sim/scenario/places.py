@@ -1,0 +1,90 @@
+"""Whether the robots of a scenario start on the pitch and are told to drive on it only.
+
+What belongs here: the check and its words. What does not: the geometry (`pitch`), all other rules (`keys`). What a
+robot does during a run is its own matter: `summary` counts the time that it spends off the pitch.
+
+Checked are the square of the robot at its start, and the same square at the reference, along the whole of its path: a
+robot that follows the reference without error has it there. Robots that start on top of each other are not refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from miro_host.posture import Posture
+from miro_sim.pitch import ground as pitch
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.keys import Robot, Scenario
+
+STEP_M = 0.005
+"""Distance along the path from one place that is checked to the next .."""
+STEP_RAD = 0.02
+""".. and the turn between them, whichever is less: between them a corner bulges by less than 0.1 mm."""
+
+
+def check_places(scenario: Scenario, origin: str) -> None:
+    """Raises ScenarioError for a start or a reference that is not on the pitch; `origin` names the scenario."""
+    for number, network in enumerate(scenario.networks):
+        for index, robot in enumerate(network.robot):
+            _check(robot, scenario.duration_s, origin, f"network[{number}].robot[{index}]")
+
+
+def _check(robot: Robot, duration_s: float, origin: str, place: str) -> None:
+    from miro_sim.scenario.build import reference_for  # needs hot modules: not before the engine was chosen
+
+    try:
+        reference = reference_for(robot, duration_s)
+    except ValueError as error:  # an arc of a full turn
+        what = f"{error}".partition(": ")[2].partition(";")[0]
+        raise ScenarioError(
+            origin, f"{place}.reference.curvature_per_m", what, "make the arc flatter, or end it with drive_s"
+        ) from None
+    at = reference.at(0.0).posture
+    start = Posture(
+        at.x_m + robot.start_error_x_cm / 100.0,
+        at.y_m + robot.start_error_y_cm / 100.0,
+        at.theta_rad + robot.start_error_theta_rad,
+    )
+    off = _off_pitch(start)
+    if off is not None:
+        axis, what = off
+        raise ScenarioError(
+            origin, f"{place}.start_error_{axis}_cm", f"the robot starts off the pitch: {what}"
+        )
+    on_s = 0.0
+    for t_s in _instants(robot, min(reference.ramp.duration_s, duration_s)):
+        off = _off_pitch(reference.at(t_s).posture)
+        if off is not None:
+            what = f"leaves the pitch after {t_s:.2f} s of {duration_s:g} s: {off[1]}"
+            remedy = f"let it stand in time, drive_s = {int(100.0 * on_s) / 100.0:g}, or slow it down"
+            raise ScenarioError(origin, f"{place}.reference", what, remedy if on_s else "start it elsewhere")
+        on_s = t_s
+
+
+def _instants(robot: Robot, moving_s: float) -> Iterator[float]:
+    """Times from 0 to `moving_s` between which the reference does not go far."""
+    path = robot.reference
+    curvature = getattr(path, "curvature_per_m", 0.0)
+    step_m = min(STEP_M, STEP_RAD / abs(curvature)) if curvature else STEP_M
+    step_s = step_m / path.speed_m_s if path.speed_m_s > 0.0 else moving_s
+    count = 0
+    while count * step_s < moving_s:
+        yield count * step_s
+        count += 1
+    yield moving_s
+
+
+def _off_pitch(at: Posture) -> tuple[str, str] | None:
+    """(axis, what) for a square that is not on the pitch."""
+    if pitch.holds(at):
+        return None
+    reach = pitch.reach_m(at.theta_rad)
+    for axis, centre, low, high in (
+        ("x", at.x_m, pitch.LEFT_M, pitch.RIGHT_M),
+        ("y", at.y_m, pitch.BOTTOM_M, pitch.TOP_M),
+    ):
+        if not low + reach <= centre <= high - reach:
+            span = f"{100.0 * (centre - reach):.2f} to {100.0 * (centre + reach):.2f} cm"
+            limits = f"{100.0 * low:.0f} to {100.0 * high:.0f} cm"
+            return axis, f"a square of 7.5 cm there takes {axis} = {span}; the pitch has {limits}"
+    return None

@@ -1,0 +1,87 @@
+"""Radio profiles: named sets of `[network.radio]` keys, and how a scenario's table is made of them.
+
+What belongs here: the names, and which key wins. What does not: what the keys mean (`radio_keys`) and
+whether their values are good (`file`).
+"""
+
+import tomllib
+from collections.abc import Mapping
+from difflib import get_close_matches
+from functools import cache
+from importlib import resources
+from typing import Any
+
+ERROR_KEYS = ("bit_error_rate", "eb_n0_db")
+"""Two ways to say one thing: a table that has one of them takes the other one away."""
+
+Table = dict[str, Any]
+
+
+class ProfileError(ValueError):
+    """A `profile` that names none, or does not go with the rest; `remedy` is what to write instead."""
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__(what)
+        self.remedy = remedy
+
+
+@cache
+def profiles() -> Mapping[str, Mapping[str, Any]]:
+    """Name -> `about` and keys of the profiles that come with the package, in the order of their file."""
+    text = (resources.files("miro_sim.scenario") / "profiles.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def keys_of(name: str) -> Table:
+    """The keys that a profile sets. Raises ProfileError."""
+    if name not in profiles():
+        close = get_close_matches(name, profiles(), n=1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        raise ProfileError(f"{name!r} is no profile", f"{hint}profiles: {', '.join(profiles())}")
+    return {key: value for key, value in profiles()[name].items() if key != "about"}
+
+
+def with_profiles(radio: Table) -> Table:
+    """A radio table with the keys of its profiles filled in; its own keys win. Raises ProfileError."""
+    named = radio.get("profile", [])
+    names = [named] if isinstance(named, str) else named
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ProfileError(
+            f"expected a name or a list of names, got {named!r}", "see `mirotwin scenarios profiles`"
+        )
+    merged: Table = {}
+    for name in names:
+        merged = overridden(merged, keys_of(name))
+    merged = overridden(merged, radio)
+    _check_slicer(names, radio, merged)
+    return merged
+
+
+def _check_slicer(names: list[str], radio: Table, merged: Table) -> None:
+    """Refuses a profile with a slicer whose Eb/N0 was taken away: no key in the scenario says `slicer`."""
+    slicers = [name for name in names if "slicer" in keys_of(name)]
+    if not slicers or "eb_n0_db" in merged:
+        return
+    what = f"{slicers[-1]} needs eb_n0_db, and"
+    if "bit_error_rate" in radio:
+        raise ProfileError(
+            f"{what} bit_error_rate is given in its place", "leave one of them out, or give eb_n0_db instead"
+        )
+    taker = [name for name in names if "bit_error_rate" in keys_of(name)][-1]
+    raise ProfileError(
+        f"{what} {taker} sets bit_error_rate in its place",
+        f"leave one of them out, name {slicers[-1]} after {taker}, or give eb_n0_db",
+    )
+
+
+def overridden(table: Table, winner: Table) -> Table:
+    """Both tables as one; where both have a key the second one's holds, and tables are merged likewise."""
+    merged = dict(table)
+    if any(key in winner for key in ERROR_KEYS):
+        for key in ERROR_KEYS:
+            merged.pop(key, None)
+    for key, value in winner.items():
+        below = merged.get(key)
+        both = isinstance(below, dict) and isinstance(value, dict)
+        merged[key] = {**below, **value} if both else value  # type: ignore[dict-item]
+    return merged

@@ -1,0 +1,160 @@
+"""One robot of the world: its electronics and drive, and the pilot on the PC that steers it.
+
+What belongs here: building both from a scenario's `[[network.robot]]` table, and reading off what observers record.
+What does not: time (`world.py`) and the radio that joins the two (`network.py`). The pilot never reads the robot:
+it gets the camera's measurement and answers with a command.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_exact.clock import seconds
+from miro_exact.domain import DomainError
+from miro_exact.rng import Stream
+from miro_exact.saved import whole
+from miro_host.pilot import Command, Pilot
+from miro_host.posture import Posture
+from miro_host.vision import Vision
+from miro_robot.board import Board
+from miro_robot.image import Image
+from miro_robot.lm629.chip import Lm629
+from miro_robot.wiring import load_wiring
+from miro_sim.periods import Axis, Control, RobotPeriod
+from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.scenario import keys as sc
+from miro_sim.scenario.build import drive_for, pilot_for, reference_for, vision_for
+
+MOST_FRAMES = 1 << 40
+COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
+
+
+class Robot:
+    """A robot on the pitch and its pilot. `network` and `spec.slot` name it in records and noise streams."""
+
+    NOT_STATE = (
+        "spec",
+        "network",
+        "reference",
+        "camera_noise",
+        "counter_addresses",
+        "drive",
+    )  # the board saves it
+
+    def __init__(
+        self, spec: sc.Robot, scenario: sc.Scenario, network: int, robots: int, seed: int, image: Image
+    ) -> None:
+        name = f"net{network}/robot{spec.slot}"
+        self.spec = spec
+        self.network = network
+        self.reference = reference_for(spec, scenario.duration_s)
+        start = self.reference.at(0.0).posture
+        wheels = Stream(seed, f"{name}/wheels")
+        try:
+            self.drive = DifferentialDrive(
+                drive_for(spec, wheels.uniform(0), wheels.uniform(1)),
+                start.x_m + spec.start_error_x_cm / 100.0,
+                start.y_m + spec.start_error_y_cm / 100.0,
+                start.theta_rad + spec.start_error_theta_rad,
+            )
+        except ArithmeticError as error:  # what follows from the parameters divides by zero
+            raise DomainError(f"{name}: what follows from its drive parameters is not finite") from error
+        self.board = Board(
+            load_wiring(), self.drive, spec.slot, robots, scenario.lm629, scenario.stop_on_fault
+        )
+        self.board.load(image)
+        self.camera_noise = Stream(seed, f"{name}/camera")
+        self.vision: Vision = vision_for(scenario.camera)
+        self.pilot: Pilot = pilot_for(spec, self.reference)
+        self.frame = 0
+        self.counter_addresses = [_iram_address(image, f"_{counter}") for counter in COUNTERS]
+
+    def expose(self, tick: int) -> Posture | None:
+        """The camera takes a frame at `tick`; returns the measurement that reaches the PC now, if one does."""
+        x_m, y_m, theta_rad = self.drive.pose_at(tick)
+        draws = [self.camera_noise.gauss(3 * self.frame + axis) for axis in range(3)]
+        self.frame += 1
+        return self.vision.frame(Posture(x_m, y_m, theta_rad), (draws[0], draws[1], draws[2]))
+
+    def steer(self, measured: Posture | None, tick: int) -> Command:
+        """The PC computes this robot's wheel commands from what it measured."""
+        return self.pilot.update(measured, seconds(tick))
+
+    def counter(self, index: int) -> int | None:
+        """A frame counter of the firmware (16 bit), or None when the image exports no such symbol."""
+        address = self.counter_addresses[index]
+        if address is None:
+            return None
+        cpu = self.board.cpu
+        return cpu.peek_iram(address) | cpu.peek_iram(address + 1) << 8
+
+    def record(self, tick: int, measured: Posture | None, command: Command | None) -> RobotPeriod:
+        """What observers see of this robot at `tick`; drains the lists of completed LM629 commands."""
+        x_m, y_m, theta_rad = self.drive.pose_at(tick)
+        v_m_s, w_rad_s = self.drive.velocity_at(tick)
+        return RobotPeriod(
+            network=self.network,
+            slot=self.spec.slot,
+            reference=self.reference.at(seconds(tick)).posture,
+            truth=Posture(x_m, y_m, theta_rad),
+            v_m_s=v_m_s,
+            w_rad_s=w_rad_s,
+            measurement=measured,
+            control=_control(command),
+            accepted=self.counter(0),
+            rejected=self.counter(1),
+            stale=self.counter(2),
+            left=_axis(self.board.left),
+            right=_axis(self.board.right),
+        )
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "board": self.board.snapshot(),
+            "vision": self.vision.snapshot(),
+            "pilot": self.pilot.snapshot(),
+            "frame": self.frame,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        self.board.restore(state["board"])
+        self.vision.restore(state["vision"])
+        self.pilot.restore(state["pilot"])
+        self.frame = whole(state, "frame", 0, MOST_FRAMES)
+
+    def __repr__(self) -> str:
+        return f"Robot(net{self.network}/robot{self.spec.slot}, {self.drive!r}, {self.board!r})"
+
+
+def _iram_address(image: Image, name: str) -> int | None:
+    symbol = image.symbols.find(name)
+    return symbol.address if symbol is not None and symbol.space == "iram" else None
+
+
+def _control(command: Command | None) -> Control | None:
+    if command is None:
+        return None
+    return Control(
+        command.v_m_s,
+        command.w_rad_s,
+        command.u1,
+        command.u2,
+        command.s1,
+        command.s2,
+        command.left,
+        command.right,
+    )
+
+
+def _axis(chip: Lm629) -> Axis:
+    commands = tuple((tick, opcode, data.hex()) for tick, opcode, data in chip.commands)
+    chip.commands.clear()
+    return Axis(
+        desired_position=chip.desired_position,
+        real_position=chip.real_position,
+        desired_velocity=chip.desired_velocity,
+        status=chip.status,
+        pwm_sign=chip.sign,
+        pwm_magnitude=chip.pwm_magnitude,
+        commands=commands,
+    )

@@ -1,0 +1,235 @@
+"""The world: every robot, radio and pilot of a scenario, moved on by one integer clock.
+
+What belongs here: the order in which the parties act, the digest chain, and save and load. What does not: what a
+party does (`network.py`, `robot.py`, `miro_host`, `miro_robot`), files, and the wall clock.
+
+Order on the tick of a camera frame: networks by index; within one, all robots are exposed (slot order), all pilots
+compute, the station composes its frame. The air of all networks is settled up to the next camera frame. Then each
+robot runs alone to that tick (networks by index, slot order), the PC's receivers hear what came back, and the state is
+hashed. `run_to` may stop anywhere in between; it gives the same bits however it is cut.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from itertools import permutations
+from typing import Any
+
+import msgspec
+
+from miro_exact.canonical import encode
+from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
+from miro_exact.saved import whole
+from miro_robot.faults import FirmwareFault
+from miro_robot.image import Image
+from miro_sim.periods import Period
+from miro_sim.scenario.keys import Scenario
+from miro_sim.world.network import Network
+
+ScriptRun = tuple[int, int, bytes]
+"""(tick of the first start bit, network, bytes) to send in place of what the station would send."""
+
+MAX_SEED = (1 << 63) - 1
+SAVE_FORMAT = 2
+"""Raised whenever a saved world of before would no longer mean the same."""
+MOST_PERIODS = 1 << 34
+"""Of a saved world: ticks up to then fit into 64 bits, and so do the products that are made of them."""
+SAVE_BEGIN = b"mirotwin world\n"
+_SUM_BYTES = hashlib.sha256().digest_size
+_NOT_A_STATE = (
+    *(KeyError, IndexError, TypeError, AttributeError, OverflowError, ZeroDivisionError),
+    *(AssertionError, RecursionError, ValueError),
+)
+"""What reading a state raises when it is not one."""
+
+
+class World:
+    """A deterministic machine: same scenario, same firmware, same seed, same bits.
+
+    `script` replaces the stations' frames (replay): runs in tick order, which must not overlap on one network.
+    """
+
+    NOT_STATE = ("scenario", "seed", "image", "periods", "last")
+
+    def __init__(
+        self, scenario: Scenario, seed: int, image: Image, script: Sequence[ScriptRun] | None = None
+    ) -> None:
+        if not 0 <= seed <= MAX_SEED:
+            raise ValueError(f"seed {seed} is out of range: 0 to {MAX_SEED}")
+        self.scenario = scenario
+        self.seed = seed
+        self.image = image
+        self.periods = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS))
+        self.networks = [
+            Network(
+                network,
+                scenario,
+                index,
+                seed,
+                image,
+                None if script is None else [(tick, data) for tick, net, data in script if net == index],
+            )
+            for index, network in enumerate(scenario.networks)
+        ]
+        for one, other in permutations(self.networks, 2):
+            if one.spec.radio.channel is not None and one.spec.radio.channel == other.spec.radio.channel:
+                one.share_frequency(other)
+        self.tick = 0
+        self.index = 0
+        self.in_period = False
+        self.stopped = False
+        self.chain = b""
+        self.last: Period | None = None
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 chain over the canonical state, one link per finished control period, in hex."""
+        return self.chain.hex()
+
+    @property
+    def finished(self) -> bool:
+        """Whether the scenario's duration has passed, or a firmware fault has stopped the run."""
+        return self.stopped or self.index >= self.periods
+
+    @property
+    def faults(self) -> list[FirmwareFault]:
+        """Firmware faults of all robots, in robot order."""
+        return [
+            fault for network in self.networks for robot in network.robots for fault in robot.board.faults
+        ]
+
+    def step(self) -> Period:
+        """Runs to the end of the control period that is under way and returns what it left behind."""
+        self.run_to((self.index + 1) * CONTROL_PERIOD_TICKS)
+        assert self.last is not None
+        return self.last
+
+    def run_to(self, tick: int) -> None:
+        """Moves everything on to `tick`, or to the control period in which a firmware fault stops the run."""
+        while self.tick < tick and not self.stopped:
+            end_tick = (self.index + 1) * CONTROL_PERIOD_TICKS
+            if not self.in_period:
+                for network in self.networks:
+                    network.begin_period(self.tick, end_tick)
+                for network in self.networks:
+                    network.settle(end_tick)
+                self.in_period = True
+            self.tick = min(tick, end_tick)
+            for network in self.networks:
+                self.stopped = network.run(self.tick) or self.stopped
+            if self.tick == end_tick or self.stopped:
+                self._end_period()
+
+    def _end_period(self) -> None:
+        wire = tuple(run for network in self.networks for run in network.end_period(self.tick))
+        robots = tuple(record for network in self.networks for record in network.seen)
+        index, begun = self.index, self.index * CONTROL_PERIOD_TICKS
+        self.in_period = False
+        self.index += 1
+        self.chain = hashlib.sha256(self.chain + encode(self.snapshot())).digest()
+        self.last = Period(index=index, tick=begun, robots=robots, wire=wire, digest=self.digest)
+
+    def counters(self) -> dict[str, dict[str, int | None]]:
+        """The `link` part of the summary, and the counted part of `firmware`, over all robots."""
+        robots = [robot for network in self.networks for robot in network.robots]
+        cpus = [robot.board.cpu for robot in robots]
+        return {
+            "link": {
+                "frames_sent": _total([network.frames_sent for network in self.networks]),
+                "frames_accepted": _total([robot.counter(0) for robot in robots]),
+                "frames_rejected": _total([robot.counter(1) for robot in robots]),
+                "frames_stale": _total([robot.counter(2) for robot in robots]),
+                "bit_errors": _total([network.bit_errors for network in self.networks]),
+            },
+            "firmware": {
+                "instructions": _total([cpu.instructions for cpu in cpus]),
+                "machine_cycles": _total([cpu.cycles for cpu in cpus]),
+                "idle_cycles": _total([cpu.idle_cycles for cpu in cpus]),
+                "faults": _total([robot.board.fault_count for robot in robots]),
+            },
+        }
+
+    def snapshot(self) -> dict[str, object]:
+        """Every mutable bit of the world, as nested plain values."""
+        return {
+            "tick": self.tick,
+            "index": self.index,
+            "in_period": self.in_period,
+            "stopped": self.stopped,
+            "chain": self.chain,
+            "networks": [network.snapshot() for network in self.networks],
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Puts back what `snapshot` gave."""
+        self.index = whole(state, "index", 0, MOST_PERIODS)
+        begun = self.index * CONTROL_PERIOD_TICKS
+        self.in_period = bool(whole(state, "in_period", 0, 1))
+        self.stopped = bool(whole(state, "stopped", 0, 1))
+        self.tick = whole(state, "tick", 0 if self.stopped else begun, begun + CONTROL_PERIOD_TICKS - 1)
+        self.chain = msgspec.convert(state["chain"], bytes)
+        for network, saved in zip(self.networks, state["networks"], strict=True):
+            network.restore(saved)
+            network.check_times(begun, self.tick, self.in_period)
+
+    def save(self) -> bytes:
+        """The whole state as bytes, to go on from with `load`: at any tick, also in the middle of a byte.
+
+        `SAVE_BEGIN`, the SHA-256 of the rest, and the rest: a map in msgpack.
+        """
+        return sealed(
+            msgspec.msgpack.encode({"format": SAVE_FORMAT, **self._identity(), "state": self.snapshot()})
+        )
+
+    def load(self, saved: bytes) -> None:
+        """Goes on from what `save` gave.
+
+        Raises ValueError when that was changed, or is from another scenario, seed, firmware or version; after that
+        this world may hold a part of it and is of no use.
+        """
+        try:
+            content = msgspec.msgpack.decode(_opened(saved))
+        except (msgspec.DecodeError, RecursionError) as error:
+            raise ValueError(f"not a saved world: {error}") from error
+        for key, own in {"format": SAVE_FORMAT, **self._identity()}.items():
+            found = content.get(key) if isinstance(content, dict) else None
+            if found != own:
+                raise ValueError(f"saved world has {key} {found!r}, this one has {own!r}")
+        try:
+            self.restore(content["state"])
+        except _NOT_A_STATE as error:
+            reason = error if isinstance(error, ValueError) else repr(error)
+            raise ValueError(f"not a saved world: {' '.join(str(reason).split())[:200]}") from error
+
+    def _identity(self) -> dict[str, object]:
+        scenario = hashlib.sha256(msgspec.json.encode(self.scenario, order="sorted")).hexdigest()
+        return {"scenario": scenario, "seed": self.seed, "firmware": self.image.sha256}
+
+    def __repr__(self) -> str:
+        return f"World({self.scenario.name}, seed={self.seed}, tick={self.tick}, digest={self.digest[:12]})"
+
+
+def sealed(content: bytes) -> bytes:
+    """`content` behind its checksum, as `World.load` expects it."""
+    return SAVE_BEGIN + hashlib.sha256(content).digest() + content
+
+
+def _opened(saved: bytes) -> bytes:
+    """What was sealed. Raises ValueError when a byte of it has changed since."""
+    if not saved.startswith(SAVE_BEGIN):
+        raise ValueError("not a saved world: it does not begin like one; save it again with this version")
+    content = saved[len(SAVE_BEGIN) + _SUM_BYTES :]
+    if sealed(content) != saved:
+        raise ValueError("not a saved world: its checksum is wrong, so it was changed or cut off")
+    return content
+
+
+def _total(values: Sequence[int | None]) -> int | None:
+    """The sum, or None when one of the parts is not known."""
+    total = 0
+    for value in values:
+        if value is None:
+            return None
+        total += value
+    return total

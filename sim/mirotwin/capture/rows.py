@@ -1,0 +1,105 @@
+"""Runs of characters decoded: frames with what they say and whether they are news, and damage with its reason.
+
+What belongs here: one decoder a network and direction, and one freshness a network. What does not: how rows look
+(`render`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from miro_protocol.events import Event, Received
+from miro_protocol.frames import ContentError, Message
+from miro_protocol.freshness import Freshness
+from miro_protocol.stream import DOWN
+from mirotwin.capture import Run
+from mirotwin.capture.source import READ_ERRORS, character_ticks
+
+if TYPE_CHECKING:
+    from miro_protocol.decoder import WindowDecoder
+
+
+class Row(msgspec.Struct, frozen=True):
+    """One frame or damaged run.
+
+    `offset` counts the characters of this network and direction before it. `fresh` is None for damage and for
+    telemetry, `message` for damage and for what says nothing known (then `unknown` says why).
+    """
+
+    offset: int
+    direction: str
+    network: int
+    event: Event
+    message: Message | None = None
+    fresh: bool | None = None
+    unknown: str = ""
+
+
+class _Ear:
+    """Hears one direction of one network."""
+
+    def __init__(self, direction: str, network: int, layout: int) -> None:
+        from miro_protocol.decoder import Decoder, TelemetryDecoder
+
+        self.direction = direction
+        self.network = network
+        self.layout = layout
+        self.step = character_ticks(direction)
+        self.decoder: WindowDecoder = Decoder(layout) if direction == DOWN else TelemetryDecoder()
+        self.freshness = Freshness()
+        self.offset = 0
+        self.end_tick = 0
+
+    def hear(self, run: Run) -> Iterator[Row]:
+        whole = len(run.data) - run.bad_stop
+        events = self.decoder.feed(run.data[:whole], run.tick)
+        if run.bad_stop:
+            events += self.decoder.feed_symbols([(run.data[-1], False, run.tick + whole * self.step)])
+        self.end_tick = run.tick + len(run.data) * self.step
+        return self.rows(events)
+
+    def flush(self) -> Iterator[Row]:
+        return self.rows(self.decoder.flush())
+
+    def rows(self, events: Iterable[Event]) -> Iterator[Row]:
+        for event in events:
+            yield self.row(event)
+            self.offset += len(event.data)
+
+    def row(self, event: Event) -> Row:
+        if not isinstance(event, Received):
+            return Row(self.offset, self.direction, self.network, event)
+        message, unknown = None, ""
+        try:
+            message = event.message(self.layout)
+        except ContentError as error:
+            unknown = str(error)
+        fresh = self.freshness.judge(event.seq, event.last_tick) if self.direction == DOWN else None
+        return Row(self.offset, self.direction, self.network, event, message, fresh, unknown)
+
+
+def rows(runs: Iterable[Run], layout: Callable[[int], int]) -> Iterator[Row]:
+    """Rows in the order in which their last characters came. An error of `runs` comes after all before it.
+
+    After a pause of two characters or more what came before it cannot become a frame any more: it is given out.
+    """
+    ears: dict[tuple[int, str], _Ear] = {}
+    failure: Exception | None = None
+    try:
+        for run in runs:
+            key = (run.network, run.direction)
+            if key not in ears:
+                ears[key] = _Ear(run.direction, run.network, layout(run.network))
+            for ear in ears.values():
+                if ear.decoder.pending and run.tick >= ear.end_tick + 2 * ear.step:
+                    yield from ear.flush()
+            yield from ears[key].hear(run)
+    except READ_ERRORS as error:  # what is pending comes first
+        failure = error
+    for ear in ears.values():
+        yield from ear.flush()
+    if failure is not None:
+        raise failure

@@ -1,0 +1,273 @@
+"""Options of an image on the bare processor: `fw run` and the other `fw` commands have them in common.
+
+What belongs here: the options, the machine that they ask for, and the words for how its run ended. What does not: what
+the machine does with them (`miro_robot.bare`), the live terminal (`cli.terminal`), and looking on (`cli.subject`).
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import click
+import msgspec
+
+from miro_exact import clock
+from miro_sim.inputs import TEXT_BYTES, read_input
+from mirotwin.cli.code_place import FLASH_BYTES, SPACE_BYTES, address_of, place_of
+from mirotwin.cli.options import Place, Whole, load_image
+from mirotwin.cli.program import (
+    DONE,
+    EXPECTATION_FAILED,
+    FIRMWARE_FAULT,
+    LIMIT_REACHED,
+    UserError,
+    complain,
+)
+
+if TYPE_CHECKING:
+    from miro_robot.bare.input import Piece
+    from miro_robot.bare.machine import BareMachine, Ended
+    from miro_robot.bare.pins import PinEvent
+    from miro_robot.image import Image
+
+STDIN = "-"
+UNITS = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 1_000_000)}
+
+
+class Time(msgspec.Struct, frozen=True):
+    """Seconds, or ticks of the crystal; which crystal is known only when all options are."""
+
+    value: Fraction
+    in_ticks: bool
+
+    def ticks(self, crystal_hz: int) -> int:
+        return int(self.value if self.in_ticks else self.value * crystal_hz)
+
+
+class Moment(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """Ticks, or a time with its unit (1.5s, 20ms, 100us), as a Time."""
+
+    name = "TIME"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Time:
+        if isinstance(value, Time):
+            return value
+        match = re.fullmatch(r"(\d{1,18}(?:\.\d{1,18})?)(s|ms|us|)", str(value))
+        if match is None or (not match[2] and "." in match[1]):
+            self.fail(f"{value!r} is no time; give ticks, or a number with s, ms or us.", param, ctx)
+        return Time(Fraction(match[1]) * UNITS.get(match[2], 1), not match[2])
+
+
+class CodeSize(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """A number of bytes up to 64 KB, or of KB with a k."""
+
+    name = "SIZE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        match = re.fullmatch(r"(\d{1,5})([kK]?)", str(value))
+        size = int(match[1]) << (10 if match[2] else 0) if match else 0
+        if not 1 <= size <= SPACE_BYTES:
+            self.fail(f"{value!r} is no size of a program; give bytes or KB, up to 64k.", param, ctx)
+        return size
+
+
+class BareRequest(msgspec.Struct, frozen=True):
+    """What the command line says about the bare processor; names as the options'."""
+
+    until: str | None = None
+    max_cycles: int | None = None
+    stdin: tuple[str, ...] = ()
+    stdin_when: tuple[str, ...] = ()
+    stdin_by_line: bool = False
+    stdin_after: Time | None = None
+    stdin_gap: Time | None = None
+    baud: int | None = None
+    pins: str | None = None
+    code_size: int | None = None
+    code_in_xram: bool = False
+    crystal: int | None = None
+    go_on: bool = False
+
+    @property
+    def crystal_hz(self) -> int:
+        return self.crystal or clock.TICKS_PER_SECOND
+
+    @property
+    def files(self) -> tuple[str | None, ...]:
+        """What is read, and so must not be written."""
+        return (*(path for path in self.stdin if path != STDIN), self.pins)
+
+    def given(self) -> list[str]:
+        """The options that were used, as one writes them."""
+        names = [name for name in self.__struct_fields__ if getattr(self, name) not in (None, False, ())]
+        return [f"--{name.replace('_', '-')}" for name in names]
+
+
+def bare_options(prefix: str = "") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Gives a command these options; `prefix` begins their help, for commands that look into other things too."""
+    words: tuple[tuple[str, dict[str, Any], str], ...] = (
+        ("--until", {"metavar": "SYMBOL|ADDRESS"}, "Stop before the instruction there (0x.. or a symbol's name)."),
+        ("--max-cycles", {"type": Whole(1), "metavar": "N"}, "Give up after N machine cycles, exit code 42."),
+        ("--stdin", {"type": Place(), "metavar": "FILE|-", "multiple": True},
+         "Bytes for the serial port, sent as soon as the program listens; several follow each other."),
+        ("--stdin-when", {"metavar": "TEXT", "multiple": True},
+         "--stdin begins when the program has sent TEXT. Given once for each --stdin, or for each but the first."),
+        ("--stdin-by-line", {"is_flag": True}, "Each line of --stdin waits for its --stdin-when anew."),
+        ("--stdin-after", {"type": Moment()},
+         "--stdin begins so long after the start, or after its TEXT: ticks, or 200ms, 1.5s."),
+        ("--stdin-gap", {"type": Moment()}, "Least pause between two characters of --stdin. Default 0."),
+        ("--baud", {"type": Whole(50)},
+         "Bit rate of --stdin. Default: what the receiver is set to; needed by programs that measure it."),
+        ("--pins", {"type": Place(), "metavar": "FILE"},
+         "Levels for port pins: lines TICK * P1.0 0|1 in order of time; # begins a comment."),
+        ("--code-size", {"type": CodeSize()},
+         "Program memory, up to 64k; external RAM stays separate. Default 8k."),
+        ("--code-in-xram", {"is_flag": True},
+         "EA low: program and data share 64 KB of RAM, so that data may overwrite the program."),
+        ("--crystal", {"type": Whole(32_768, 100_000_000), "metavar": "HZ"},
+         "The crystal: a tick is one period, a machine cycle 12. Default 24000000."),
+        ("--go-on", {"is_flag": True}, "Go on after a firmware fault; all are listed at the end, exit code 3."),
+    )  # fmt: skip
+
+    def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+        for name, settings, text in reversed(words):
+            command = click.option(name, help=f"{prefix}{text}", **settings)(command)
+        return command
+
+    return with_options
+
+
+def take_bare(given: dict[str, Any]) -> BareRequest:
+    """Takes these options out of a command's arguments."""
+    return BareRequest(**{name: given.pop(name) for name in BareRequest.__struct_fields__})
+
+
+def load_bare_image(path: str, request: BareRequest) -> Image:
+    """Raises UserError for an image that does not fit."""
+    if request.code_in_xram and request.code_size is not None:
+        raise UserError(
+            "--code-size: program and data share 64 KB with --code-in-xram; leave one of the two out"
+        )
+    return load_image(path, SPACE_BYTES if request.code_in_xram else request.code_size or FLASH_BYTES)
+
+
+def target_of(path: str, image: Image, request: BareRequest) -> int | None:
+    """The address of --until. Raises UserError."""
+    return None if request.until is None else address_of(request.until, image, path, "--until")
+
+
+def make_machine(
+    image: Image,
+    request: BareRequest,
+    output: Callable[[bytes], object] | None = None,
+    live: bool = False,
+) -> BareMachine:
+    """The machine that was asked for; the engine is fixed already. Raises UserError, and errors of the files read."""
+    from miro_robot.bare.machine import BareMachine
+
+    pieces = _pieces(request)
+    pins = _pins(request)
+    try:
+        return BareMachine(
+            image,
+            code_in_xram=request.code_in_xram,
+            stdin=pieces,
+            baud=request.baud,
+            output=output,
+            stop_on_fault=not request.go_on,
+            crystal_hz=request.crystal_hz,
+            gap_ticks=_ticks(request.stdin_gap, request) or 0,
+            live=live,
+            pins=pins,
+        )
+    except ValueError as error:
+        raise UserError(f"--{error}" if str(error).startswith("baud") else f"--pins: {error}") from None
+
+
+def report(machine: BareMachine, ended: Ended, request: BareRequest) -> int:
+    """Says on stderr why a run ended that did not end as planned; returns the exit code."""
+    from miro_robot.bare.machine import Ended
+
+    code = DONE
+    place = f"{place_of(machine.cpu.pc, machine.image)} after {machine.cpu.cycles} machine cycles"
+    for fault in machine.faults:
+        complain(f"firmware fault: {fault}")
+    if machine.faults_lost:
+        complain(f"firmware faults: {machine.faults_lost} more are not listed")
+    if ended is Ended.CYCLES:
+        complain(f"gave up at {place}")
+        code = LIMIT_REACHED
+    elif ended is Ended.HALTED:
+        complain(f"the firmware ended at {place}; no interrupt can wake it")
+        code = DONE if request.until is None else EXPECTATION_FAILED
+    waiting = machine.input.waiting_for
+    if waiting:
+        complain(
+            f"--stdin-when: {waiting!r} was not seen; {machine.input.left} bytes of --stdin were not sent"
+        )
+    changed = machine.changed_code()
+    if changed:
+        complain(
+            f"--code-in-xram: the program has overwritten {len(changed)} bytes of its image, "
+            f"the first at {changed[0]:#06x}"
+        )
+    return FIRMWARE_FAULT if machine.faults else code
+
+
+def _ticks(time: Time | None, request: BareRequest) -> int | None:
+    return None if time is None else time.ticks(request.crystal_hz)
+
+
+def _pieces(request: BareRequest) -> tuple[Piece, ...]:
+    """What --stdin and its conditions say, in order."""
+    from miro_robot.bare.input import Piece
+
+    texts = [text.encode(errors="surrogateescape") for text in request.stdin_when]
+    files = len(request.stdin)
+    if not files:
+        for name in ("--stdin-when", "--stdin-by-line", "--stdin-after", "--stdin-gap"):
+            if name in request.given():
+                raise UserError(f"{name}: there is no --stdin that it could apply to; give both")
+    if b"" in texts:
+        raise UserError("--stdin-when: the empty string is no text; say what the program sends first")
+    if request.stdin.count(STDIN) > 1:
+        raise UserError("--stdin: standard input can be read once only; name a file instead of the second -")
+    if texts and len(texts) not in (files, files - 1):
+        raise UserError(
+            f"--stdin-when: {len(texts)} for {files} --stdin; give one for each --stdin, or for each but the first"
+        )
+    if request.stdin_by_line and not texts:
+        raise UserError("--stdin-by-line: says that lines wait for --stdin-when; give that too")
+    delay = _ticks(request.stdin_after, request)
+    pieces: list[Piece] = []
+    for path, when in zip(request.stdin, [b""] * (files - len(texts)) + texts, strict=True):
+        data = _stdin_bytes(path)
+        parts = data.splitlines(keepends=True) if request.stdin_by_line and when else [data]
+        pieces += [Piece(part, when, delay if when or not pieces else None) for part in parts]
+    return tuple(pieces)
+
+
+def _stdin_bytes(path: str) -> bytes:
+    if path != STDIN:
+        return read_input(path)
+    if vars(sys)["stdin"] is None:
+        raise UserError("--stdin: standard input is closed; name a file")
+    data = sys.stdin.buffer.read(TEXT_BYTES + 1)
+    if len(data) > TEXT_BYTES:
+        raise UserError(f"--stdin: standard input holds more than {TEXT_BYTES >> 20} MiB; give less")
+    return data
+
+
+def _pins(request: BareRequest) -> tuple[PinEvent, ...]:
+    from miro_robot.bare.pins import PinError, read_pins
+
+    if request.pins is None:
+        return ()
+    try:
+        return read_pins(read_input(request.pins).decode("utf-8", errors="replace"), request.pins)
+    except PinError as error:
+        raise UserError(str(error)) from None

@@ -1,0 +1,74 @@
+"""Places in code memory as people write and read them: symbols, and addresses as 0x...
+
+What belongs here: both directions. What does not: symbol files (`miro_robot.image`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+from mirotwin.cli.program import UserError
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+    from miro_robot.inspect.symbol_names import SymbolNames
+
+FLASH_BYTES = 8192
+SPACE_BYTES = 65536
+
+
+def address_of(text: str, image: Image, path: str, option: str) -> int:
+    """A code address from 0x.. or from a symbol's name, with or without the underscore that C puts before
+    it.
+    """
+    if text[:2].lower() == "0x":
+        try:
+            address = int(text, 16)
+        except ValueError:
+            raise UserError(f"{option}: {text} is not a hexadecimal number") from None
+        if address >= SPACE_BYTES:
+            raise UserError(f"{option}: {text} is beyond the last code address; use 0x0000 to 0xffff")
+        return address
+    if not text:
+        raise UserError(f"{option}: the empty string is no place; give a symbol or an address as 0x..")
+    if text.isascii() and text.isdecimal() and len(text) <= 6:
+        raise UserError(f"{option}: {text} is no symbol; write {int(text):#x} for an address")
+    for name in (text, text.removeprefix("_")):
+        found = image.symbols.find(name)
+        if found is not None and found.space == "code":
+            return found.address
+    names = [name for name, symbol in image.symbols.names.items() if symbol.space == "code"]
+    close = get_close_matches(text, names, n=1) or get_close_matches(f"_{text}", names, n=1)
+    if close:
+        remedy = f"did you mean {close[0]}?"
+    elif names:
+        remedy = "see the map beside the image"
+    else:
+        remedy = "put its .map or .cdb beside it, or give an address as 0x.."
+    raise UserError(f"{path}: {option}: no symbol {text} in the code; {remedy}")
+
+
+def functions_at(places: Iterable[str], image: Image, names: SymbolNames, path: str) -> set[tuple[int, str]]:
+    """(first address, name) of the functions that --symbol names; static ones of several files may share a name.
+
+    An address stands for the function around it.
+    """
+    found = set()
+    for place in places:
+        address = address_of(place, image, path, "--symbol")
+        if not any(first <= address < end for first, end in image.used):
+            raise UserError(
+                f"{path}: --symbol: the image has no code at {address:#06x}; see mirotwin fw disasm"
+            )
+        around = names.function(address)
+        by_address = place[:2].lower() == "0x"
+        found |= {around} if by_address else {other for other in names.functions if other[1] == around[1]}
+    return found
+
+
+def place_of(address: int, image: Image) -> str:
+    """An address for people."""
+    name = image.symbols.name_at(address)
+    return f"{address:#06x} in {name}" if name else f"{address:#06x}"

@@ -1,0 +1,52 @@
+"""Debug files and sources of an image, as the `mirotwin fw` commands find them.
+
+What belongs here: where they are looked for. What does not: reading them (`miro_robot.image.debug_info`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mirotwin.cli.options import Place
+from mirotwin.cli.program import UserError
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+    from miro_robot.image.debug_info import Sources
+
+
+def sources_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    return click.option(
+        "--sources",
+        multiple=True,
+        metavar="FOLDER",
+        type=Place(),
+        help="Where the C files are, may be given several times. Default: beside the image.",
+    )(command)
+
+
+def sources_of(image: Image, given: Sequence[str]) -> Sources:
+    """The folders to look in: those given, the image's own, and the robot's firmware's."""
+    from miro_robot.firmware import source_folder
+    from miro_robot.image.debug_info import Sources
+
+    for folder in given:
+        if not Path(folder).is_dir():
+            raise UserError(f"{folder}: --sources: there is no such folder; name the one with the C files")
+    own = source_folder()
+    return Sources([*map(Path, given), image.path.parent, *([own] if own else [])])
+
+
+def with_debug_files(image: Image) -> Image:
+    """The image as it has debug files: one out of a recording that is the robot's own has that one's."""
+    from miro_robot.firmware import image_path
+    from miro_robot.image import load_hex
+
+    if image.path.is_file():
+        return image
+    own = load_hex(image_path())
+    return own if own.sha256 == image.sha256 else image

@@ -1,0 +1,116 @@
+"""`mirotwin decode`: what the bytes in a file say, frame by frame, and where they are damaged."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+
+import click
+
+from miro_protocol.stream import DOWN, UP
+from miro_protocol.table import ROBOT_COUNTS
+from miro_sim.scenario.errors import one_line
+from mirotwin.capture import Run, render
+from mirotwin.capture.detect import FORMATS, NAMES, detect
+from mirotwin.capture.input import Input
+from mirotwin.capture.layout import Layouts, look
+from mirotwin.capture.rows import Row, rows
+from mirotwin.capture.source import READ_ERRORS, Source, open_source
+from mirotwin.cli.options import Place, choose_engine, engine_option
+from mirotwin.cli.program import DONE, complain
+from mirotwin.cli.progress import ProgressBar
+
+DIRECTIONS = {"down": DOWN, "up": UP}
+PROGRESS_BYTES = 1 << 16
+
+
+@click.command(short_help="Decodes captured bytes to frames and damage.")
+@click.argument("file", metavar="FILE|-", type=Place())
+@click.option(
+    "--format", "format", type=click.Choice(FORMATS), help="What FILE is. Default: its beginning tells."
+)
+@click.option(
+    "--robots",
+    type=click.Choice([str(count) for count in ROBOT_COUNTS]),
+    help="Robots in the network. Default: what FILE says, else what makes more frames readable.",
+)
+@click.option(
+    "--direction",
+    type=click.Choice([*DIRECTIONS]),
+    help="Which way raw bytes and hex text went: down to the robots (default, unless they read as telemetry) or up.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line, for programs.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar.")
+@engine_option
+def decode(
+    file: str,
+    format: str | None,
+    robots: str | None,
+    direction: str | None,
+    as_json: bool,
+    quiet: bool,
+    engine: str | None,
+) -> int:
+    """Decodes FILE (standard input for -) and prints one line a frame or damaged run of bytes.
+
+    FILE may be hex text, raw bytes, a pcapng capture of a serial line, a recording (run.mcap) or a stream file; its
+    first bytes tell which, and the first line printed says so. Any bytes can be decoded. A capture that is cut
+    short or damaged is reported with the offset, after everything before it, and the exit code is 2.
+    """
+    choose_engine(engine)
+    with Input(file) as given:
+        if format is None:
+            format, note = detect(given.peek())
+            if note:
+                complain(f"{given.label}: {note} (--format says otherwise)")
+        source = open_source(given, format, complain, DIRECTIONS[direction or "down"])
+        layouts = look(source, None if robots is None else int(robots), complain, direction is None)
+        with ProgressBar("decoding", given.size, quiet or sys.stdout.isatty()) as bar:
+            found = rows(_counted(source.runs, given, bar), layouts.of)
+            return (
+                _print_json(given, source, found) if as_json else _print_table(given, source, layouts, found)
+            )
+
+
+def _counted(runs: Iterable[Run], given: Input, bar: ProgressBar) -> Iterator[Run]:
+    """Moves the bar; where somebody waits for the other end of a pipe, lets them see what there is."""
+    shown = 0
+    for run in runs:
+        yield run
+        if given.size is None:
+            sys.stdout.flush()
+        elif given.tell() >= shown + PROGRESS_BYTES:
+            shown = given.tell()
+            bar.to(shown)
+
+
+def _print_table(given: Input, source: Source, layouts: Layouts, found: Iterable[Row]) -> int:
+    out = sys.stdout
+    totals = render.Totals()
+    out.write(f"{one_line(given.label)}: {NAMES[source.format]}{layouts}\n{render.units_line()}\n")
+    out.write(f"{render.head_line(source.timed)}\n")
+    try:
+        for row in found:
+            totals.add(row)
+            out.write(f"{render.table_line(row, source.timed)}\n")
+    finally:
+        out.write(f"{totals}\n")
+    return DONE
+
+
+def _print_json(given: Input, source: Source, found: Iterable[Row]) -> int:
+    def put(line: bytes) -> None:
+        sys.stdout.write(line.decode() + "\n")
+
+    totals = render.Totals()
+    put(render.json_input(given.label, source.format, source.timed))
+    try:
+        for row in found:
+            totals.add(row)
+            put(render.json_line(row, source.timed))
+    except READ_ERRORS as error:
+        put(render.json_error(str(error)))
+        raise
+    finally:
+        put(render.json_end(totals))
+    return DONE

@@ -1,0 +1,132 @@
+"""`mirotwin export`: the characters of a run as a file for other programs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import click
+
+from miro_protocol.stream import DOWN
+from mirotwin.capture import Run, convert
+from mirotwin.capture.detect import NAMES, TIMED, detect
+from mirotwin.capture.input import STDIN, Input
+from mirotwin.capture.layout import look
+from mirotwin.capture.source import READ_ERRORS, open_source
+from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
+from mirotwin.cli.program import BAD_INPUT, DONE, UserError, complain, show
+from mirotwin.cli.progress import ProgressBar
+from mirotwin.files.outputs import check_new, check_not_input, whole_file
+
+TARGETS = ("pcapng", "stream")
+
+
+class Exported:
+    """Hands runs on and counts them. What cannot be read ends them, kept in `failure` if anything came before."""
+
+    def __init__(self, runs: Iterator[Run], network: int | None, given: Input, bar: ProgressBar) -> None:
+        self.runs = runs
+        self.network = network
+        self.given = given
+        self.bar = bar
+        self.down = 0
+        self.up = 0
+        self.networks: set[int] = set()
+        self.failure: Exception | None = None
+
+    def __iter__(self) -> Iterator[Run]:
+        try:
+            for run in self.runs:
+                self.networks.add(run.network)
+                if self.network in (None, run.network):
+                    self.down += run.direction == DOWN
+                    self.up += run.direction != DOWN
+                    yield run
+                self.bar.to(self.given.tell())
+        except READ_ERRORS as error:
+            if not self.down + self.up:
+                raise
+            self.failure = error
+
+
+@click.command(short_help="Writes a run's bytes as a capture for Wireshark, or as a stream file.")
+@click.argument("file", metavar="FILE|-", type=Place())
+@click.option("--out", required=True, type=Place(), help="File to write, or - for standard output.")
+@click.option(
+    "--to",
+    type=click.Choice(TARGETS),
+    help="What to write. Default: stream for *.stream and *.txt, else pcapng.",
+)
+@click.option("--format", type=click.Choice(TIMED), help="What FILE is. Default: its beginning tells.")
+@click.option("--network", type=Whole(0, 0xFFFF), help="Only this network. Default: all.")
+@click.option("--force", is_flag=True, help="Replace the file at --out.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no closing line.")
+@engine_option
+def export(
+    file: str,
+    out: str,
+    to: str | None,
+    format: str | None,
+    network: int | None,
+    force: bool,
+    quiet: bool,
+    engine: str | None,
+) -> int:
+    """Writes the characters in FILE (a recording, a stream file or a pcapng capture) as pcapng or as a stream file.
+
+    pcapng is for Wireshark and tshark: one packet a run of characters, with virtual time, direction, and the network
+    as interface; link type 250 (RTAC serial). `protocol/miro.lua` (or `python -m miro_protocol.dissector`)
+    shows the fields:
+
+    \b
+        mirotwin export run.mcap --out run.pcapng
+        tshark -X lua_script:miro.lua -d rtacser.data,miro -r run.pcapng -V
+
+    A stream file is for `mirotwin replay`, for editors and for git. The same input gives the same bytes. Of an input
+    that is cut short, all that could be read is written, and the exit code is 2. A run that was broken off
+    (run.part.mcap) is written as far as it goes, with a note.
+    """
+    if out != STDIN:
+        check_new(Path(out), "--out", force)
+        check_not_input(Path(out), "--out", file)
+    choose_engine(engine)
+    to = to or ("stream" if Path(out).suffix in (".stream", ".txt") else "pcapng")
+    with Input(file) as given, ProgressBar("exporting", given.size, quiet) as bar:
+        format = format or detect(given.peek())[0]
+        if format not in TIMED:
+            raise UserError(
+                f"{given.label}: {NAMES[format]} without times; give a recording, stream or capture"
+            )
+        source = open_source(given, format, complain)
+        layouts = look(source, None, complain) if to == "stream" else None
+        exported = Exported(source.runs, network, given, bar)
+        pieces = convert.to_stream(exported, layouts.of) if layouts else convert.to_pcapng(exported)
+        try:
+            _write(out, _some(pieces, exported, given.label))
+        except convert.ConversionError as error:
+            raise UserError(f"{given.label}: {error}") from None
+    if not quiet and out != STDIN:
+        show(f"{out}: {exported.down} runs from the host and {exported.up} from robots")
+    if exported.failure is not None:
+        complain(f"error: {exported.failure}; all before it was written")
+        return BAD_INPUT
+    return DONE
+
+
+def _some(pieces: Iterable[bytes], exported: Exported, label: str) -> Iterator[bytes]:
+    """The same; a network that was asked for and is not there is an error, before anything takes its place."""
+    yield from pieces
+    if exported.network is not None and not exported.down + exported.up and exported.failure is None:
+        there = ", ".join(map(str, sorted(exported.networks))) or "none"
+        raise UserError(f"{label}: --network {exported.network}: nothing of it; networks there: {there}")
+
+
+def _write(out: str, pieces: Iterable[bytes]) -> None:
+    if out == STDIN:
+        for piece in pieces:
+            sys.stdout.buffer.write(piece)
+        return
+    with whole_file(Path(out), "--out") as staging, staging.open("wb") as file:
+        for piece in pieces:
+            file.write(piece)

@@ -1,0 +1,220 @@
+"""How the command line fails: one line on stderr and an exit code, never a traceback for what a user can
+mend. An error that nobody has foreseen is one line too, which asks for a report; with MIROTWIN_TRACEBACK=1 in the
+environment its traceback goes before it.
+
+What belongs here: exit codes, the translation of errors, and the two consoles. What does not: any command.
+"""
+
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from io import TextIOWrapper
+from types import FrameType
+from typing import Any, NoReturn
+
+import click
+from rich.console import Console, RenderableType
+from rich.text import Text
+
+from miro_exact.domain import DomainError
+from miro_exact.engine import EngineError
+from miro_protocol.pcapng_reader import CaptureError
+from miro_protocol.stream import StreamError
+from miro_robot.image import ImageError
+from miro_sim.inputs import InputError
+from miro_sim.scenario.errors import ScenarioError, one_line
+from mirotwin.capture.hextext import HexError
+from mirotwin.files.outputs import OutputError
+from mirotwin.recording.container import RecordingError
+from mirotwin.replay.script import StreamContentError
+
+DONE = 0
+EXPECTATION_FAILED = 1
+BAD_INPUT = 2
+FIRMWARE_FAULT = 3
+DIVERGENCE = 4
+LIMIT_REACHED = 42
+INTERNAL_ERROR = 70
+"""EX_SOFTWARE of sysexits.h."""
+INTERRUPTED = 130
+SIGPIPE = 13
+SIGNALLED = 128
+"""Plus the number of the signal: what a shell reports for a program that a signal ended."""
+
+PIPE_COLUMNS = 200
+
+MAX_SEED = (1 << 63) - 1
+
+
+class UserError(Exception):
+    """What a command found wrong with its input, ready to print: `FILE: PLACE: what; remedy`."""
+
+
+class Terminated(BaseException):
+    """SIGTERM or SIGHUP: raised where the program stands, so that it cleans up as after Ctrl-C."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        super().__init__(signal.Signals(number).name)
+
+
+class ReaderGone(Exception):
+    """Nobody reads our output any more (`| head`)."""
+
+
+BAD_INPUTS = (
+    UserError,
+    ScenarioError,
+    InputError,
+    OutputError,
+    RecordingError,
+    StreamError,
+    StreamContentError,
+    CaptureError,
+    HexError,
+    EngineError,
+    ImageError,
+)
+
+
+def complain(message: str) -> None:
+    """One line on stderr, whatever the message holds."""
+    click.echo(f"mirotwin: {one_line(message)}", err=True)
+
+
+def show_line(text: str) -> None:
+    """One line on stdout, whatever the text holds: names in files of others may hold codes that a terminal obeys."""
+    click.echo(one_line(text.expandtabs()))
+
+
+class _Plain(Console):
+    """A console for text of others: each string (a cell of a table, too) is one line without control characters."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(one_line(text), **options)
+
+
+def show(result: RenderableType) -> None:
+    """Prints a result on stdout; what goes to a file or a pipe is not folded at 80 columns nor padded."""
+    if sys.stdout.isatty():
+        _Plain(highlight=False, markup=False).print(result)
+        return
+    console = _Plain(highlight=False, markup=False, width=PIPE_COLUMNS)
+    with console.capture() as capture:
+        console.print(result)
+    click.echo("\n".join(line.rstrip(" ") for line in capture.get().split("\n")), nl=False)
+
+
+@contextmanager
+def plain_parameters(label: str, done: str = "run") -> Iterator[None]:
+    """Within it, numbers with which nothing can be computed are the user's: `label` names the file they came from."""
+    try:
+        yield
+    except DomainError as error:
+        what = f"cannot be {done}: {error}; parameters far from any robot's can do this"
+        raise UserError(f"{label}: {what}") from None
+
+
+def _report(error: Exception) -> None:
+    """One line that asks for a report, after the traceback if that is wanted."""
+    if os.environ.get("MIROTWIN_TRACEBACK"):
+        click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+    text = f"{type(error).__name__}: {error}".rstrip(": ")
+    ask = "please report this line with the command (MIROTWIN_TRACEBACK=1 shows the place)"
+    complain(f"internal error: {text}; {ask}")
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Within it, SIGTERM and SIGHUP raise Terminated; a signal that is ignored (nohup) stays ignored."""
+
+    def terminate(number: int, frame: FrameType | None) -> NoReturn:
+        raise Terminated(number)
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for name in ("SIGTERM", "SIGHUP"):
+            number = getattr(signal, name, None)  # not every system has both
+            if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+                before[number] = signal.signal(number, terminate)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _give_up_stdout() -> None:
+    """What is still buffered has nowhere to go; without this the interpreter tries again when it ends."""
+    try:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (OSError, ValueError):  # not a real file: nothing will be tried
+        return
+
+
+class Program(click.Group):
+    """The group behind `mirotwin`: runs a command and turns what went wrong into a line and an exit code."""
+
+    def main(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any
+    ) -> NoReturn:
+        extra["standalone_mode"] = False
+        sys.exit(self._run(args, prog_name or "mirotwin", extra))
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """The library would make 1 of a reader that has gone, which here means that an expectation failed."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            raise ReaderGone from None
+
+    def _run(self, args: Sequence[str] | None, prog_name: str, extra: dict[str, Any]) -> int:
+        if vars(sys)["stderr"] is None:  # `2>&-`: the next file to be opened would take its place
+            sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+        if vars(sys)["stdout"] is None:  # `>&-`: the next file to be opened would take its place
+            complain("error: standard output is closed; send it to a file or a pipe")
+            return BAD_INPUT
+        if isinstance(sys.stdout, TextIOWrapper):  # a file's name may hold what stdout cannot
+            sys.stdout.reconfigure(errors="backslashreplace")
+        try:
+            with terminable():
+                code = super().main(args, prog_name, **extra)
+                sys.stdout.flush()
+        except click.exceptions.NoArgsIsHelpError as error:
+            error.show()
+            return BAD_INPUT
+        except click.UsageError as error:
+            path = error.ctx.command_path if error.ctx else prog_name
+            complain(f"error: {error.format_message()} See `{path} --help`.")
+            return BAD_INPUT
+        except click.ClickException as error:
+            complain(f"error: {error.format_message()}")
+            return BAD_INPUT
+        except BAD_INPUTS as error:
+            complain(f"error: {error}")
+            return BAD_INPUT
+        except (ReaderGone, BrokenPipeError):
+            _give_up_stdout()
+            return SIGNALLED + SIGPIPE
+        except OSError as error:
+            reason = error.strerror or str(error) or type(error).__name__
+            if error.filename is None:  # no file was being opened: stdout is full, or a disk
+                complain(f"error: reading or writing failed: {reason}")
+                _give_up_stdout()
+            else:
+                complain(f"error: {os.fsdecode(error.filename)}: {reason}")
+            return BAD_INPUT
+        except (click.Abort, KeyboardInterrupt):
+            complain("interrupted")
+            return INTERRUPTED
+        except Terminated as error:
+            complain(f"ended by {error}")
+            return SIGNALLED + error.number
+        except Exception as error:
+            _report(error)
+            return INTERNAL_ERROR
+        return code if isinstance(code, int) else DONE

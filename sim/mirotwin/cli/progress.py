@@ -1,0 +1,58 @@
+"""A progress bar for what takes more than a second, on stderr, and only where somebody looks at it.
+
+What belongs here: when to show it. What does not: what is counted. This is one of the few places that know
+the wall clock.
+"""
+
+import sys
+import time
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from miro_sim.scenario.errors import one_line
+
+PATIENCE_S = 1.0
+
+
+class ProgressBar:
+    """`bar.to(done)` out of `total`. Draws nothing in the first second, nor when stderr is no terminal or closed."""
+
+    def __init__(self, what: str, total: float | None, quiet: bool = False) -> None:
+        self.what = one_line(what)
+        self.total = total
+        stream = vars(sys)["stderr"]  # None where it is closed
+        self._shown = not quiet and stream is not None and stream.isatty()
+        self._began_s = time.monotonic()
+        self._progress: Progress | None = None
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> "ProgressBar":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._progress is not None:
+            self._progress.stop()
+
+    def to(self, done: float) -> None:
+        """Moves the bar. Cheap enough to call once a control period."""
+        if not self._shown:
+            return
+        if self._progress is None:
+            if time.monotonic() - self._began_s < PATIENCE_S:
+                return
+            self._progress = Progress(
+                TextColumn("{task.description}", markup=False),
+                BarColumn(),
+                TaskProgressColumn(),
+                TimeRemainingColumn(),
+                console=Console(stderr=True),
+                transient=True,
+            )
+            self._task = self._progress.add_task(self.what, total=self.total)
+            self._progress.start()
+        assert self._task is not None
+        self._progress.update(self._task, completed=done)

@@ -1,0 +1,92 @@
+"""What a file asks to be sent again: a recording with all that it was made from, or a text stream.
+
+What belongs here: from a file's content to scenario, seed, bytes to send, and image. What does not: running it
+(`replay`, `subject`), and the bytes themselves (`mirotwin.replay.compare`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from miro_protocol import stream
+from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
+from miro_sim.periods import Period
+from miro_sim.scenario.file import parse as parse_scenario
+from miro_sim.scenario.keys import Scenario
+from mirotwin.capture.detect import detect
+from mirotwin.capture.input import HEAD_BYTES
+from mirotwin.cli.options import choose_engine, load_image
+from mirotwin.cli.program import UserError, complain
+from mirotwin.files.outputs import RECORDING
+from mirotwin.recording.reader import Recording, parse
+from mirotwin.recording.writer import MAGIC
+from mirotwin.replay.script import ScriptRun, scenario_of_stream, script_of, script_of_stream
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+
+
+class Job(msgspec.Struct, frozen=True):
+    """What is to be replayed: a recording, or a text stream (then `recorded` is empty)."""
+
+    scenario: Scenario
+    seed: int
+    script: list[ScriptRun]
+    recorded: Sequence[Period]
+
+
+def load_job(file: str, firmware: str | None, engine: str | None) -> tuple[Job, Image]:
+    """Reads `file`, fixes the engine, and loads the image that was asked for, recorded, or the robot's own."""
+    check_no_folder(file, RECORDING)
+    data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
+    choose_engine(engine)
+    if MAGIC.startswith(data[: len(MAGIC)]):
+        recording = parse(data, file)
+        if recording.broken_off:
+            complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
+        job = _job_of_recording(recording, file)
+        return job, _recorded_image(recording, file) if firmware is None else load_image(firmware)
+    _refuse_other_formats(data, file)
+    return _job_of_stream(data, file), load_image(firmware)
+
+
+def _refuse_other_formats(data: bytes, path: str) -> None:
+    format, _ = detect(data[:HEAD_BYTES])
+    if format == "pcapng":
+        remedy = "make a stream file of it with `mirotwin export --out NAME.stream`"
+        raise UserError(f"{path}: offset 0: a capture, which cannot be replayed; {remedy}")
+    if format != "stream" and b"\0" in data[:4096]:
+        what = "neither a recording nor a stream file (UTF-8 text)"
+        raise UserError(
+            f"{path}: offset 0: {what}; give a run.mcap that `mirotwin run` wrote, or a stream file"
+        )
+
+
+def _job_of_recording(recording: Recording, path: str) -> Job:
+    source = recording.source
+    if not recording.periods:
+        raise UserError(f"{path}: the recording holds no control period; nothing can be replayed")
+    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml")
+    return Job(scenario, source.seed, script_of(recording.periods), recording.periods)
+
+
+def _job_of_stream(data: bytes, path: str) -> Job:
+    sent = stream.decode(data, path)
+    return Job(scenario_of_stream(sent, path), 0, script_of_stream(sent), ())
+
+
+def _recorded_image(recording: Recording, path: str) -> Image:
+    """The image in the recording, with the symbols it had when it was recorded."""
+    from miro_robot.image import ImageError, Symbol, Symbols, parse_hex
+
+    source = recording.source
+    try:
+        image = parse_hex(source.firmware, Path(path) / "firmware.ihx")
+    except ImageError as error:
+        raise UserError(str(error)) from None
+    symbols = Symbols({name: Symbol(address, space) for name, (address, space) in source.symbols.items()})
+    return msgspec.structs.replace(image, symbols=symbols)

@@ -1,0 +1,109 @@
+"""The files of a run while it is under way: what is written when, and what is left of a run that is broken off.
+
+What belongs here: the order recording, flushes, summary, figure, and the wall clock for them. What does not: names and
+locks (`files.outputs`), what a recording says (`recording`), and the command line (`run`).
+
+Signals are held except while the world is stepped, so no file is left between two states. What was recorded is flushed
+several times a second; a process that is killed loses no more.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from miro_sim.periods import Period
+from mirotwin import runner
+from mirotwin.cli.held_signals import Hold
+from mirotwin.cli.program import complain
+from mirotwin.cli.progress import ProgressBar
+from mirotwin.files.outputs import KEPT, RECORDING, OutputFolder, part_name
+from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.report.figure import draw
+from mirotwin.report.summary import Summary, summarise, to_json
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
+
+SUMMARY = "summary.json"
+FIGURE = "figure.png"
+FLUSH_S = 0.2
+"""Wall time between two flushes of the recording, which comes to half a second on a busy machine too."""
+
+
+class RunFiles:
+    """Runs `world` and fills `folder`, which is open and in which `hold` holds signals."""
+
+    def __init__(self, folder: OutputFolder, source: Source, world: World, engine: str, hold: Hold) -> None:
+        self.folder = folder
+        self.source = source
+        self.world = world
+        self.engine = engine
+        self.hold = hold
+        self.periods: list[Period] = []
+        self._wall_s = 0.0
+        self._flushed_s = -FLUSH_S
+
+    def fill(self, bar: ProgressBar, title: str) -> Summary:
+        """The whole run; returns its summary. Whatever it raises, parts of the recording and the summary are left."""
+        try:
+            self._record(bar)
+            summary = self._summary(complete=True)
+            self.folder.part(SUMMARY).write_bytes(to_json(summary))
+            if self.periods:
+                scenario, seed = self.source.scenario_name, self.source.seed
+                draw(self.periods, self.folder.part(FIGURE), scenario=scenario, seed=seed, title=title)
+        except BaseException:
+            self._leave_parts()
+            raise
+        return summary
+
+    def _record(self, bar: ProgressBar) -> None:
+        began_s = time.perf_counter()
+        try:
+            with (
+                self.folder.part(RECORDING).open("wb", buffering=0) as stream,
+                Recorder(stream, self.source, self.hold) as recorder,
+            ):
+                recorder.flush()
+                self._simulate(recorder, bar)
+        finally:
+            self._wall_s = time.perf_counter() - began_s
+
+    def _simulate(self, recorder: Recorder, bar: ProgressBar) -> None:
+        def keep(period: Period) -> None:
+            self.periods.append(period)
+            now_s = time.monotonic()
+            if now_s - self._flushed_s >= FLUSH_S:
+                recorder.flush()
+                self._flushed_s = now_s
+            bar.to(len(self.periods))
+
+        with bar, self.hold.released():
+            runner.run(self.world, recorder, self.source.record == "full", keep)
+
+    def _summary(self, complete: bool) -> Summary:
+        return summarise(
+            scenario=self.source.scenario_name,
+            seed=self.source.seed,
+            engine=self.engine,
+            periods=self.periods,
+            simulated_ticks=self.world.tick,
+            wall_s=self._wall_s,
+            counters=self.world.counters(),
+            firmware_sha256=self.source.firmware_sha256,
+            complete=complete,
+        )
+
+    def _leave_parts(self) -> None:
+        """What is left when the run is broken off: nothing, if not even one control period was recorded."""
+        if not self.periods:
+            return
+        self.folder.keep = KEPT
+        with suppress(OSError):  # a full disk, which is reported as what broke the run off
+            self.folder.part(SUMMARY).write_bytes(to_json(self._summary(complete=False)))
+        complain(
+            f"the run broke off after {len(self.periods)} control periods;"
+            f" they are in {self.folder.path / part_name(RECORDING)}"
+        )

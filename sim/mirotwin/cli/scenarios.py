@@ -1,0 +1,56 @@
+"""`mirotwin scenarios`: the built-in ones, and their files to copy from."""
+
+import json
+from typing import Any
+
+import click
+from rich.table import Table
+
+from miro_sim.scenario import file as scenario_file
+from miro_sim.scenario import profiles as radio_profiles
+from mirotwin.cli.program import show as print_result
+
+
+@click.group(invoke_without_command=True)
+@click.pass_context
+def scenarios(context: click.Context) -> None:
+    """Lists the built-in scenarios."""
+    if context.invoked_subcommand is not None:
+        return
+    table = Table(box=None, pad_edge=False)
+    table.add_column("scenario", style="bold")
+    table.add_column("duration", justify="right")
+    table.add_column("robots", justify="right")
+    table.add_column("what it shows")
+    for name in scenario_file.builtin_names():
+        scenario = scenario_file.load(name).scenario
+        robots = len([robot for network in scenario.networks for robot in network.robot])
+        table.add_row(name, f"{scenario.duration_s:g} s", str(robots), scenario.title)
+    print_result(table)
+
+
+@scenarios.command()
+@click.argument("name")
+def show(name: str) -> None:
+    """Prints the file of the built-in scenario NAME, to read or to start one's own from."""
+    click.echo(scenario_file.builtin_text(name), nl=False)
+
+
+@scenarios.command()
+def profiles() -> None:
+    """Lists the radio profiles and the keys that each sets, for `profile = ".."` in [network.radio]."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("profile", style="bold")
+    table.add_column("what it does")
+    table.add_column("keys")
+    for name, profile in radio_profiles.profiles().items():
+        table.add_row(name, profile["about"], _keys(radio_profiles.keys_of(name)))
+    print_result(table)
+
+
+def _keys(table: dict[str, Any]) -> str:
+    """A table as TOML in one line."""
+    return ", ".join(
+        f"{key} = {{ {_keys(value)} }}" if isinstance(value, dict) else f"{key} = {json.dumps(value)}"
+        for key, value in table.items()
+    )

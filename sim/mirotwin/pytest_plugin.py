@@ -1,0 +1,168 @@
+"""pytest plugin: which lines of the firmware a test session ran.
+
+    pytest --firmware-coverage=firmware.info [--firmware-image=mine.ihx] [--firmware-sources=DIR]
+
+What belongs here: watching every CPU that tests load the image into (in this process and in those of pytest-xdist),
+and the report at the end. What does not: the mapping to lines (`miro_robot.inspect.coverage`). Without the option
+nothing of the project is imported, and nothing is watched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+    from miro_robot.inspect.coverage import Counts
+    from miro_robot.mcs51.cpu import Cpu
+    from mirotwin.report.firmware_coverage import Report
+
+OUTPUT = "firmware_coverage"
+"""Under this name a pytest-xdist worker hands over its counts."""
+TABLE_COLUMNS = 160
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("mirotwin", "firmware coverage (mirotwin)")
+    group.addoption(
+        "--firmware-coverage",
+        metavar="FILE.info",
+        help="write which lines of the firmware the tests ran, as an lcov tracefile",
+    )
+    group.addoption(
+        "--firmware-image", metavar="IMAGE.ihx", help="the image to watch (default: the robot's own)"
+    )
+    group.addoption(
+        "--firmware-sources", metavar="DIR", action="append", default=[], help="where its C files are"
+    )
+    group.addoption(
+        "--firmware-coverage-fail-under",
+        metavar="PERCENT",
+        type=float,
+        default=0.0,
+        help="fail when fewer of the lines ran",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    share = config.getoption("--firmware-coverage-fail-under")
+    if not 0.0 <= share <= 100.0:
+        raise pytest.UsageError(f"--firmware-coverage-fail-under: {share} is no percentage; give 0 to 100")
+    if share and not config.getoption("--firmware-coverage"):
+        raise pytest.UsageError("--firmware-coverage-fail-under: goes with --firmware-coverage=FILE.info")
+    if config.getoption("--firmware-coverage") and not config.getoption("--collect-only"):
+        config.pluginmanager.register(FirmwareCoverage(config), "mirotwin-firmware-coverage")
+
+
+class FirmwareCoverage:
+    """Of one session. On the controller of pytest-xdist it adds up what its workers counted."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        from miro_robot.inspect.counters import Counters
+        from miro_robot.mcs51.cpu import on_load
+        from miro_sim.inputs import InputError
+        from mirotwin.files.outputs import OutputError, check_file, check_not_input
+
+        self.config = config
+        self.out = Path(config.getoption("--firmware-coverage"))
+        self.wanted: float = config.getoption("--firmware-coverage-fail-under")
+        self.from_workers: list[Counts] = []
+        self.counters = Counters()
+        try:
+            self.image = _image(config.getoption("--firmware-image"))
+            check_file(self.out, "--firmware-coverage")
+            check_not_input(self.out, "--firmware-coverage", self.image.path)
+            _check_folders(config.getoption("--firmware-sources"))
+        except (InputError, OutputError, ValueError) as error:
+            raise pytest.UsageError(str(error)) from None
+        on_load.set(self.watch)
+
+    def watch(self, cpu: Cpu) -> None:
+        """Counts what `cpu` does from now on, if it was the image that it got."""
+        from miro_robot.inspect.watcher import Inspector, attach
+
+        inspector = cpu.inspector
+        watched = isinstance(inspector, Inspector) and self.counters in inspector.watchers
+        if not watched and cpu.code == self.image.code:
+            attach(cpu, self.counters)
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        from miro_robot.inspect.coverage import counts_of
+
+        if hasattr(session.config, "workeroutput"):  # a worker of pytest-xdist: JSON has no numbers as keys
+            counts = counts_of(self.counters)
+            session.config.workeroutput[OUTPUT] = [[address, *both] for address, both in counts.items()]
+        elif session.exitstatus == pytest.ExitCode.OK and self._too_few():
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any) -> None:
+        handed: Iterable[tuple[int, int, int]] = getattr(node, "workeroutput", {}).get(OUTPUT, ())
+        self.from_workers.append({address: (executed, jumped) for address, executed, jumped in handed})
+
+    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+        from rich.console import Console
+
+        from mirotwin.report.firmware_coverage import table, write
+
+        if hasattr(self.config, "workeroutput"):  # the controller's file has the counts of all
+            return
+        report = self._report
+        write(report.tracefile, report, self.out, "--firmware-coverage")
+        terminalreporter.section(f"coverage of {self.image.path.name}, written to {self.out}")
+        console = Console(highlight=False, markup=False, width=TABLE_COLUMNS)
+        with console.capture() as capture:
+            console.print(table(report.tracefile))
+            console.print(f"instructions: {report.instructions}")
+        for line in capture.get().splitlines():
+            terminalreporter.write_line(line.rstrip())
+        if self._too_few():
+            terminalreporter.write_line(
+                f"fewer lines ran than the {self.wanted} % that were asked for", red=True
+            )
+
+    @cached_property
+    def _report(self) -> Report:
+        """Of the whole session: for when its last test has run."""
+        from miro_robot.firmware import source_folder
+        from miro_robot.image.debug_info import Sources
+        from miro_robot.inspect.coverage import counts_of, merged
+        from mirotwin.report.firmware_coverage import collect
+
+        own = source_folder()
+        folders = [
+            *map(Path, self.config.getoption("--firmware-sources")),
+            self.image.path.parent,
+            *([own] if own else []),
+        ]
+        counts = merged([counts_of(self.counters), *self.from_workers])
+        return collect(self.image, counts, Sources(folders), self.out)
+
+    def _too_few(self) -> bool:
+        from miro_robot.inspect.coverage import line_share
+
+        share = line_share(self._report.tracefile)
+        return bool(share.total) and 100.0 * share.hit / share.total < self.wanted
+
+
+def _image(path: str | None) -> Image:
+    from miro_robot.firmware import image_path
+    from miro_robot.image import load_hex
+    from miro_sim.inputs import check_regular
+
+    if path:
+        check_regular(path)
+    return load_hex(path or image_path())
+
+
+def _check_folders(folders: list[str]) -> None:
+    for folder in folders:
+        if not Path(folder).is_dir():
+            raise ValueError(
+                f"{folder}: --firmware-sources: there is no such folder; name the one with the C files"
+            )

@@ -1,0 +1,1 @@
+"""Recordings: a run as an MCAP file, its channels, and reading it back."""

@@ -1,0 +1,278 @@
+"""The channels of a recording: their messages, their JSON schemas, and how records become messages and back.
+
+What belongs here: one struct a channel, and the two directions of translation. What does not: MCAP
+(`recorder`, `reader`). Every message carries its tick; a period's messages are closed by its
+`/period` message.
+
+A robot's channels stand below `/net0/robot0`, with the numbers of its network and slot; the bytes on the
+air of a network are in `/net0/wire`.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+
+from miro_host.posture import Posture
+from miro_sim.periods import Axis, Control, Period, RobotPeriod, WireRun
+
+
+class PostureMessage(msgspec.Struct, frozen=True):
+    """`reference`, `measurement`: a posture in world axes."""
+
+    tick: int
+    x_m: float
+    y_m: float
+    theta_rad: float
+
+
+class TruthMessage(msgspec.Struct, frozen=True):
+    """`truth`: posture (heading unwrapped) and velocity of the robot."""
+
+    tick: int
+    x_m: float
+    y_m: float
+    theta_rad: float
+    v_m_s: float
+    w_rad_s: float
+
+
+class ControlMessage(msgspec.Struct, frozen=True):
+    """`control`: what the controller answered, see `periods.Control`."""
+
+    tick: int
+    v_m_s: float
+    w_rad_s: float
+    u1: float
+    u2: float
+    s1: float
+    s2: float
+    left: int
+    right: int
+
+
+class FirmwareMessage(msgspec.Struct, frozen=True):
+    """`firmware`: the robot's own frame counters, modulo 2^16; absent if its image exports none."""
+
+    tick: int
+    accepted: int
+    rejected: int
+    stale: int
+
+
+class CommandMessage(msgspec.Struct, frozen=True):
+    """A complete LM629 command; `data` in hex."""
+
+    tick: int
+    opcode: int
+    data: str
+
+
+class RegistersMessage(msgspec.Struct, frozen=True):
+    """One LM629: counts, counts per sample with 16 fraction bits, status byte, commands since the last
+    message.
+    """
+
+    desired_position: int
+    real_position: int
+    desired_velocity: int
+    status: int
+    commands: tuple[CommandMessage, ...]
+
+
+class Lm629Message(msgspec.Struct, frozen=True):
+    """`lm629`: both motion controllers."""
+
+    tick: int
+    left: RegistersMessage
+    right: RegistersMessage
+
+
+class DutyMessage(msgspec.Struct, frozen=True):
+    """Sign pin (1 = negative) and magnitude 0..127 of one LM629."""
+
+    sign: int
+    magnitude: int
+
+
+class PwmMessage(msgspec.Struct, frozen=True):
+    """`pwm`: what both L298 bridges are driven with."""
+
+    tick: int
+    left: DutyMessage
+    right: DutyMessage
+
+
+class SampleMessage(msgspec.Struct, frozen=True):
+    """`samples`, in full recordings only: both LM629 once a sample (8192 ticks)."""
+
+    tick: int
+    left_desired_position: int
+    left_real_position: int
+    left_desired_velocity: int
+    left_duty: int
+    right_desired_position: int
+    right_real_position: int
+    right_desired_velocity: int
+    right_duty: int
+
+
+class FaultMessage(msgspec.Struct, frozen=True):
+    """`fault`: what the firmware did that it must not do."""
+
+    tick: int
+    kind: int
+    pc: int
+    symbol: str
+    text: str
+
+
+class WireMessage(msgspec.Struct, frozen=True):
+    """`wire`: characters without a gap; `>` host to robot (slot -1), `<` robot to host; `data` in hex."""
+
+    tick: int
+    direction: str
+    slot: int
+    data: str
+
+
+class PeriodMessage(msgspec.Struct, frozen=True):
+    """`/period`: a control period that is over, and the digest of all states up to its end."""
+
+    tick: int
+    index: int
+    digest: str
+
+
+PERIOD_TOPIC = "/period"
+ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
+    "reference": PostureMessage,
+    "truth": TruthMessage,
+    "measurement": PostureMessage,
+    "control": ControlMessage,
+    "firmware": FirmwareMessage,
+    "lm629": Lm629Message,
+    "pwm": PwmMessage,
+    "samples": SampleMessage,
+    "fault": FaultMessage,
+}
+
+
+def robot_topic(network: int, slot: int, channel: str) -> str:
+    return f"/net{network}/robot{slot}/{channel}"
+
+
+def wire_topic(network: int) -> str:
+    return f"/net{network}/wire"
+
+
+def message_type(topic: str) -> type[msgspec.Struct] | None:
+    """The struct of a topic's messages, or None for a topic of somebody else."""
+    if topic == PERIOD_TOPIC:
+        return PeriodMessage
+    parts = topic.split("/")
+    if len(parts) == 3 and parts[2] == "wire":
+        return WireMessage
+    return ROBOT_CHANNELS.get(parts[-1]) if len(parts) == 4 else None
+
+
+def schema(kind: type[msgspec.Struct]) -> dict[str, object]:
+    """The JSON schema of a message, with references resolved: viewers want one plain tree."""
+    (tree,), parts = msgspec.json.schema_components([kind], ref_template="{name}")
+    resolved: dict[str, object] = _resolved(tree, parts)
+    return resolved
+
+
+def _resolved(node: Any, parts: dict[str, Any]) -> Any:
+    if isinstance(node, dict):
+        if "$ref" in node:
+            return _resolved(parts[node["$ref"]], parts)
+        return {key: _resolved(value, parts) for key, value in node.items()}
+    return [_resolved(item, parts) for item in node] if isinstance(node, list) else node
+
+
+def messages(period: Period) -> Iterator[tuple[str, int, msgspec.Struct]]:
+    """(topic, tick, message) of everything in a period, in the order of a recording."""
+    tick = period.tick
+    for robot in period.robots:
+        head = f"/net{robot.network}/robot{robot.slot}/"
+        for channel, message in _robot_messages(robot, tick):
+            yield head + channel, tick, message
+    for run in period.wire:
+        message = WireMessage(run.tick, run.direction, run.slot, run.data.hex())
+        yield wire_topic(run.network), run.tick, message
+    yield PERIOD_TOPIC, tick, PeriodMessage(tick, period.index, period.digest)
+
+
+def _robot_messages(robot: RobotPeriod, tick: int) -> Iterator[tuple[str, msgspec.Struct]]:
+    at, truth, seen, control = robot.reference, robot.truth, robot.measurement, robot.control
+    yield "reference", PostureMessage(tick, at.x_m, at.y_m, at.theta_rad)
+    yield "truth", TruthMessage(tick, truth.x_m, truth.y_m, truth.theta_rad, robot.v_m_s, robot.w_rad_s)
+    if seen is not None:
+        yield "measurement", PostureMessage(tick, seen.x_m, seen.y_m, seen.theta_rad)
+    if control is not None:
+        yield "control", ControlMessage(tick, *msgspec.structs.astuple(control))
+    if robot.accepted is not None and robot.rejected is not None and robot.stale is not None:
+        yield "firmware", FirmwareMessage(tick, robot.accepted, robot.rejected, robot.stale)
+    left, right = robot.left, robot.right
+    yield "lm629", Lm629Message(tick, _registers(left), _registers(right))
+    yield (
+        "pwm",
+        PwmMessage(
+            tick,
+            DutyMessage(left.pwm_sign, left.pwm_magnitude),
+            DutyMessage(right.pwm_sign, right.pwm_magnitude),
+        ),
+    )
+
+
+def _registers(axis: Axis) -> RegistersMessage:
+    return RegistersMessage(
+        axis.desired_position,
+        axis.real_position,
+        axis.desired_velocity,
+        axis.status,
+        tuple(CommandMessage(*command) for command in axis.commands),
+    )
+
+
+def wire_run(network: int, message: WireMessage) -> WireRun:
+    """The record of a wire message. Raises ValueError when its data is not hex."""
+    return WireRun(message.tick, message.direction, network, message.slot, bytes.fromhex(message.data))
+
+
+def robot_period(network: int, slot: int, found: dict[str, Any]) -> RobotPeriod:
+    """The record of one robot from its messages by channel. Raises KeyError when one is missing."""
+    truth, firmware, lm629, pwm = found["truth"], found.get("firmware"), found["lm629"], found["pwm"]
+    reference, seen, control = found["reference"], found.get("measurement"), found.get("control")
+    return RobotPeriod(
+        network=network,
+        slot=slot,
+        reference=_posture(reference),
+        truth=_posture(truth),
+        v_m_s=truth.v_m_s,
+        w_rad_s=truth.w_rad_s,
+        measurement=None if seen is None else _posture(seen),
+        control=None if control is None else Control(*msgspec.structs.astuple(control)[1:]),
+        accepted=None if firmware is None else firmware.accepted,
+        rejected=None if firmware is None else firmware.rejected,
+        stale=None if firmware is None else firmware.stale,
+        left=_axis(lm629.left, pwm.left),
+        right=_axis(lm629.right, pwm.right),
+    )
+
+
+def _posture(message: PostureMessage | TruthMessage) -> Posture:
+    return Posture(message.x_m, message.y_m, message.theta_rad)
+
+
+def _axis(registers: RegistersMessage, duty: DutyMessage) -> Axis:
+    return Axis(
+        desired_position=registers.desired_position,
+        real_position=registers.real_position,
+        desired_velocity=registers.desired_velocity,
+        status=registers.status,
+        pwm_sign=duty.sign,
+        pwm_magnitude=duty.magnitude,
+        commands=tuple((one.tick, one.opcode, one.data) for one in registers.commands),
+    )

@@ -1,0 +1,141 @@
+"""Writes a run to MCAP: everything that is needed to look at it, and to run it again, in one file.
+
+What belongs here: the file's header, attachments, channels and messages. What does not: what the messages say
+(`channels`), reading them (`reader`).
+
+Two runs of one scenario, seed and firmware give the same bytes: no wall clock, no version, no compression;
+log time is the tick in nanoseconds, rounded down.
+"""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
+from types import TracebackType
+from typing import Protocol
+
+import msgspec
+
+from miro_exact.clock import nanoseconds
+from miro_sim.periods import Period
+from mirotwin.recording import channels
+from mirotwin.recording.writer import McapWriter, Writable
+
+METADATA = "mirotwin"
+FORMAT = "1"
+SCENARIO_ATTACHMENT = "scenario.toml"
+FIRMWARE_ATTACHMENT = "firmware.ihx"
+SYMBOLS_ATTACHMENT = "symbols.json"
+BROKEN_OFF = "mirotwin.broken_off"
+"""Name of the metadata in a recording whose run did not come to its end."""
+
+
+class Fault(Protocol):
+    """What a recording keeps of a firmware fault (`miro_robot.faults.FirmwareFault`)."""
+
+    @property
+    def kind(self) -> int: ...
+    @property
+    def tick(self) -> int: ...
+    @property
+    def pc(self) -> int: ...
+    @property
+    def symbol(self) -> str: ...
+
+
+class Source(msgspec.Struct, frozen=True):
+    """What a run was made from: scenario text, seed, firmware file, and its symbols (name -> address,
+    space).
+    """
+
+    scenario_name: str
+    scenario_text: str
+    seed: int
+    firmware: bytes
+    firmware_sha256: str
+    symbols: dict[str, tuple[int, str]] = {}
+    record: str = "default"
+
+
+class Recorder:
+    """An open recording. Use as a context manager: an error ends the file too, and marks it as broken off.
+
+    `undisturbed` is entered wherever the file would be damaged by an exception out of the blue, such as Ctrl-C raises
+    between any two instructions: it has to put that off.
+    """
+
+    def __init__(
+        self,
+        stream: Writable,
+        source: Source,
+        undisturbed: AbstractContextManager[object] | None = None,
+    ) -> None:
+        self._undisturbed = undisturbed or nullcontext()
+        self._encoder = msgspec.json.Encoder()
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._writer = McapWriter(stream, profile=METADATA, library=METADATA)
+        self._writer.add_metadata(
+            METADATA,
+            {
+                "format": FORMAT,
+                "scenario": source.scenario_name,
+                "seed": str(source.seed),
+                "firmware_sha256": source.firmware_sha256,
+                "record": source.record,
+            },
+        )
+        self._writer.add_attachment(SCENARIO_ATTACHMENT, "application/toml", source.scenario_text.encode())
+        self._writer.add_attachment(FIRMWARE_ATTACHMENT, "text/plain", source.firmware)
+        symbols = msgspec.json.encode(source.symbols, order="deterministic")
+        self._writer.add_attachment(SYMBOLS_ATTACHMENT, "application/json", symbols)
+
+    def __enter__(self) -> "Recorder":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with self._undisturbed:
+            if error is not None:
+                self._writer.add_metadata(BROKEN_OFF, {"by": type(error).__name__})
+            self._writer.finish()
+
+    def flush(self) -> None:
+        """What was added up to now is kept even if this process is killed."""
+        with self._undisturbed:
+            self._writer.flush()
+
+    def write(self, period: Period) -> None:
+        """Adds everything in a control period."""
+        with self._undisturbed:
+            for topic, tick, message in channels.messages(period):
+                self._add(topic, tick, message)
+
+    def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
+        """Adds one LM629 sample of a robot (full recordings)."""
+        with self._undisturbed:
+            self._add(channels.robot_topic(network, slot, "samples"), sample.tick, sample)
+
+    def write_faults(self, network: int, slot: int, faults: Sequence[Fault]) -> None:
+        """Adds a robot's firmware faults."""
+        topic = channels.robot_topic(network, slot, "fault")
+        with self._undisturbed:
+            for fault in faults:
+                message = channels.FaultMessage(
+                    fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault)
+                )
+                self._add(topic, fault.tick, message)
+
+    def _add(self, topic: str, tick: int, message: msgspec.Struct) -> None:
+        channel = self._channels.get(topic)
+        if channel is None:
+            channel = self._register(topic, type(message))
+        self._writer.add_message(channel, nanoseconds(tick), self._encoder.encode(message))
+
+    def _register(self, topic: str, kind: type[msgspec.Struct]) -> int:
+        name = f"mirotwin.{kind.__name__.removesuffix('Message')}"
+        if name not in self._schemas:
+            text = msgspec.json.encode(channels.schema(kind))
+            self._schemas[name] = self._writer.add_schema(name, "jsonschema", text)
+        channel = self._writer.add_channel(topic, "json", self._schemas[name])
+        self._channels[topic] = channel
+        return channel

@@ -1,0 +1,258 @@
+"""Writes an MCAP file, uncompressed, which can be read at any moment of its making.
+
+What belongs here: the container: header, attachments, metadata, chunks with their indexes, summary, footer (MCAP
+specification, "Records"). What does not: what messages say (`recorder`), reading (`container`), and the clock:
+whoever writes says when to flush.
+
+A finished file is the bytes that `mcap.writer.Writer` gives without compression and with all checksums. That one keeps
+a chunk in memory until it has 1 MiB, minutes of a run, and a process that is killed loses it. Here `flush` brings the
+open chunk up to date in the file: first the new records at the end of the file, then the head of the chunk (lengths,
+times, CRC), which now takes them in. A file that ends anywhere in between has whole records outside of a chunk at its
+end, which the specification allows, and perhaps a part of one. Where chunks end depends on the messages only, so
+flushing changes no byte of a finished file.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Protocol
+from zlib import crc32
+
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+
+MAGIC = b"\x89MCAP0\r\n"
+CHUNK_SIZE = 1 << 20
+"""A chunk ends with the record that makes it longer than this."""
+_CHUNK = struct.Struct(
+    "<BQQQQIIQ"
+)  # opcode, length, times, size, CRC, compression's name (none), length of data
+_BEFORE_DATA = _CHUNK.size - 9  # what a chunk's length counts besides its data
+_MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
+_BEFORE_CONTENT = _MESSAGE.size - 9
+_INDEX = struct.Struct("<BQHI")  # opcode, length, channel, length of entries
+_ENTRY = 16  # bytes: time, offset
+_FOOTER = struct.Struct("<BQQQ")  # what the summary's CRC takes in of the footer
+_NEVER_NS = 1 << 64
+
+
+class Writable(Protocol):
+    """A file that can be patched; `write` may take less than it is given, as a raw file's does."""
+
+    def write(self, data: bytes | memoryview, /) -> int: ...
+    def seek(self, place: int, /) -> int: ...
+    def flush(self) -> None: ...
+
+
+class McapWriter:
+    """A file under way. `stream` is empty and seekable; whoever opened it closes it.
+
+    Attachments and metadata come before the first message, or end the chunk that is open. After an OSError (a full
+    disk) nothing more is written: what there is can be read.
+    """
+
+    def __init__(self, stream: Writable, profile: str, library: str) -> None:
+        self._stream = stream
+        self._end = 0  # of the file, without the open chunk
+        self._checksum = 0  # of all up to there
+        self._failed = False
+        self._schemas: list[Schema] = []
+        self._channels: list[Channel] = []
+        self._attachments: list[AttachmentIndex] = []
+        self._metadata: list[MetadataIndex] = []
+        self._chunks: list[ChunkIndex] = []
+        self._counts: dict[int, int] = {}  # messages by channel
+        self._times: list[int] = []  # of the first and last message of each chunk
+        self._first_ns: int = _NEVER_NS  # of the open chunk
+        self._last_ns: int = 0
+        self._begin_chunk()
+        self._put(MAGIC + _bytes(Header(profile, library)))
+
+    def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
+        """Adds a file; its times are 0."""
+        self._end_chunk()
+        offset = self._end
+        self._put(_bytes(Attachment(0, 0, name, media_type, data)))
+        length = self._end - offset
+        self._attachments.append(AttachmentIndex(offset, length, 0, 0, len(data), name, media_type))
+
+    def add_metadata(self, name: str, content: dict[str, str]) -> None:
+        """Adds a table of texts."""
+        self._end_chunk()
+        offset = self._end
+        self._put(_bytes(Metadata(name, content)))
+        self._metadata.append(MetadataIndex(offset, self._end - offset, name))
+
+    def add_schema(self, name: str, encoding: str, data: bytes) -> int:
+        """Adds a schema and returns its number."""
+        schema = Schema(len(self._schemas) + 1, data, encoding, name)
+        self._schemas.append(schema)
+        self._add(_bytes(schema))
+        return schema.id
+
+    def add_channel(self, topic: str, encoding: str, schema: int) -> int:
+        """Adds a channel and returns its number."""
+        channel = Channel(len(self._channels) + 1, topic, encoding, {}, schema)
+        self._channels.append(channel)
+        self._add(_bytes(channel))
+        return channel.id
+
+    def add_message(self, channel: int, time_ns: int, data: bytes) -> None:
+        """Adds a message; `time_ns` is both when it was logged and published."""
+        chunk = self._chunk
+        index = self._indexes.get(channel)
+        if index is None:
+            index = self._indexes[channel] = []
+        index += (time_ns, len(chunk))
+        if time_ns < self._first_ns:
+            self._first_ns = time_ns
+        if time_ns > self._last_ns:
+            self._last_ns = time_ns
+        length = _BEFORE_CONTENT + len(data)
+        chunk += _MESSAGE.pack(Opcode.MESSAGE, length, channel, 0, time_ns, time_ns)
+        chunk += data
+        if len(chunk) > CHUNK_SIZE:
+            self._end_chunk()
+
+    def flush(self) -> None:
+        """Brings everything so far into the file, so that it outlives this process."""
+        if self._indexes:
+            self._store_chunk()
+        self._stream.flush()
+
+    def finish(self) -> None:
+        """Writes the end of the file: summary and footer."""
+        self._end_chunk()
+        self._put(_bytes(DataEnd(self._checksum)))
+        start = self._end
+        summary, offsets = b"", b""
+        for opcode, group in self._summary():
+            records = b"".join(_bytes(record) for record in group)
+            offsets += _bytes(SummaryOffset(opcode, start + len(summary), len(records)))
+            summary += records
+        offset_start = start + len(summary)
+        head = _FOOTER.pack(Opcode.FOOTER, 20, start, offset_start)
+        checksum = crc32(head, crc32(offsets, crc32(summary)))
+        self._put(summary + offsets + _bytes(Footer(start, offset_start, checksum)) + MAGIC)
+        self._stream.flush()
+
+    def _summary(self) -> list[tuple[Opcode, list[McapRecord]]]:
+        """The groups of the summary section, in the order of the library's writer."""
+        messages = 0
+        for count in self._counts.values():
+            messages += count
+        statistics = Statistics(
+            attachment_count=len(self._attachments),
+            channel_count=len(self._channels),
+            channel_message_counts=self._counts,
+            chunk_count=len(self._chunks),
+            message_count=messages,
+            message_end_time=max(self._times, default=0),
+            message_start_time=min(self._times, default=0),
+            metadata_count=len(self._metadata),
+            schema_count=len(self._schemas),
+        )
+        return [
+            (Opcode.SCHEMA, [*self._schemas]),
+            (Opcode.CHANNEL, [*self._channels]),
+            (Opcode.STATISTICS, [statistics]),
+            (Opcode.CHUNK_INDEX, [*self._chunks]),
+            (Opcode.ATTACHMENT_INDEX, [*self._attachments]),
+            (Opcode.METADATA_INDEX, [*self._metadata]),
+        ]
+
+    def _begin_chunk(self) -> None:
+        self._chunk = bytearray()
+        self._indexes: dict[int, list[int]] = {}  # channel -> time and offset of each message, in one row
+        self._first_ns = _NEVER_NS
+        self._last_ns = 0
+        self._stored = 0  # bytes of the chunk that are in the file
+        self._chunk_checksum = 0  # of these
+
+    def _add(self, record: bytes) -> None:
+        """A schema or channel, which stands in the chunk of its first message."""
+        self._chunk += record
+        if len(self._chunk) > CHUNK_SIZE:
+            self._end_chunk()
+
+    def _end_chunk(self) -> None:
+        """Closes the open chunk, if there is a message in it, and writes the indexes of its messages."""
+        if not self._indexes:
+            return
+        head = self._store_chunk()
+        start, size = self._end, len(self._chunk)
+        self._end = start + len(head) + size
+        self._checksum = crc32(self._chunk, crc32(head, self._checksum))
+        index_start, offsets, rows = self._end, {}, bytearray()
+        for channel, index in self._indexes.items():
+            offsets[channel] = index_start + len(rows)
+            entries = _ENTRY * (len(index) // 2)
+            rows += _INDEX.pack(Opcode.MESSAGE_INDEX, _INDEX.size - 9 + entries, channel, entries)
+            rows += struct.pack(f"<{len(index)}Q", *index)
+            self._counts[channel] = self._counts.get(channel, 0) + len(index) // 2
+        self._put(rows)
+        self._times += (self._first_ns, self._last_ns)
+        length = len(head) + size
+        self._chunks.append(
+            ChunkIndex(length, start, "", size, self._last_ns, len(rows), offsets, self._first_ns, size)
+        )
+        self._begin_chunk()
+
+    def _store_chunk(self) -> bytes:
+        """Writes the new records of the open chunk, then the head that takes them in; returns the head."""
+        if not self._stored:  # its head first, of an empty chunk: what follows never stands in half a chunk
+            self._write(self._end, self._chunk_head(0, 0))
+        new = bytes(memoryview(self._chunk)[self._stored :])
+        size = len(self._chunk)
+        checksum = crc32(new, self._chunk_checksum)
+        head = self._chunk_head(size, checksum)
+        if new:
+            self._write(self._end + len(head) + self._stored, new)
+            self._stream.flush()
+            self._write(self._end, head)
+            self._stream.flush()
+        self._stored, self._chunk_checksum = size, checksum
+        return head
+
+    def _chunk_head(self, size: int, checksum: int) -> bytes:
+        length = _BEFORE_DATA + size
+        return _CHUNK.pack(Opcode.CHUNK, length, self._first_ns, self._last_ns, size, checksum, 0, size)
+
+    def _put(self, data: bytes | bytearray) -> None:
+        """Appends to the file, outside of chunks."""
+        self._write(self._end, data)
+        self._end += len(data)
+        self._checksum = crc32(data, self._checksum)
+
+    def _write(self, place: int, data: bytes | bytearray) -> None:
+        if self._failed:
+            return
+        rest = memoryview(data)
+        try:
+            self._stream.seek(place)
+            while rest:
+                rest = rest[self._stream.write(rest) :]
+        except OSError:
+            self._failed = True
+            raise
+
+
+def _bytes(record: McapRecord) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    return bytes(builder.end())  # type: ignore[no-untyped-call]

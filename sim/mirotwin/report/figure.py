@@ -1,0 +1,127 @@
+"""The picture of a run: the four panels of the paper's Figs. 6 to 10.
+
+What belongs here: x-y with the dotted reference, then x_e, y_e, theta_e against time. What does not: the
+numbers (`summary`). The same run gives the same bytes: fixed size, fixed fonts, no date.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from miro_exact.clock import seconds
+from miro_sim.periods import Period
+from mirotwin.report.summary import (
+    SETTLED_CM,
+    SETTLED_RAD,
+    ErrorSample,
+    errors_by_robot,
+    settling_text,
+    tracking_of,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLOURS = ("#1f5fa8", "#c8452d", "#2e8b57", "#8a5bb0", "#b07d12")
+REFERENCE = "#222222"
+STYLE: dict[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "axes.edgecolor": "#777777",
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "lines.linewidth": 1.5,
+    "lines.solid_capstyle": "round",
+}
+
+
+def draw(periods: Sequence[Period], path: Path, *, scenario: str, seed: int, title: str = "") -> None:
+    """Writes the PNG; raises ValueError when there is no period to draw."""
+    errors = errors_by_robot(periods)
+    if not errors:
+        raise ValueError("nothing to draw: the run has no control period")
+    import matplotlib.style  # here, because it takes longer to load than all the rest of the program
+
+    with matplotlib.style.context(STYLE, after_reset=True):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(9.6, 6.6), dpi=150, layout="constrained")
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.subplots(2, 2)
+        figure.suptitle(_heading(scenario, seed, title, next(iter(errors.values()))), fontsize=10.5)
+        _draw_path(axes[0, 0], periods, list(errors))
+        _draw_error(axes[0, 1], errors, "(b)  $x_e$", "cm", SETTLED_CM, lambda one: one.x_cm)
+        _draw_error(axes[1, 0], errors, "(c)  $y_e$", "cm", SETTLED_CM, lambda one: one.y_cm)
+        _draw_error(axes[1, 1], errors, r"(d)  $\theta_e$", "rad", SETTLED_RAD, lambda one: one.theta_rad)
+        canvas.print_png(path, metadata={"Software": None})  # type: ignore[no-untyped-call]
+
+
+def _heading(scenario: str, seed: int, title: str, errors: Sequence[ErrorSample]) -> str:
+    tracking = tracking_of(errors)
+    rms = f"rms of the last second {tracking.rms_position_cm:.2f} cm, {tracking.rms_theta_deg:.2f} degrees"
+    first = f"{scenario}, seed {seed}" + (f": {_plain(title)}" if title else "")
+    return f"{first}\n{rms}; {settling_text(errors)}"
+
+
+def _plain(text: str) -> str:
+    """Text that matplotlib prints as it stands."""
+    return text.replace("$", r"\$")
+
+
+def _draw_path(axes: Axes, periods: Sequence[Period], places: Sequence[tuple[int, int]]) -> None:
+    for index, place in enumerate(places):
+        colour = COLOURS[index % len(COLOURS)]
+        robots = [one for period in periods for one in period.robots if (one.network, one.slot) == place]
+        seen = [one.measurement for one in robots if one.measurement is not None]
+        reference = [(100.0 * one.reference.x_m, 100.0 * one.reference.y_m) for one in robots]
+        truth = [(100.0 * one.truth.x_m, 100.0 * one.truth.y_m) for one in robots]
+        first = index == 0
+        axes.plot(
+            [100.0 * one.x_m for one in seen],
+            [100.0 * one.y_m for one in seen],
+            linestyle="none",
+            marker=".",
+            markersize=2.5,
+            color=colour,
+            alpha=0.35,
+            label="camera" if first else None,
+        )
+        axes.plot(*zip(*reference, strict=True), ":", color=REFERENCE, label="reference" if first else None)
+        axes.plot(*zip(*truth, strict=True), color=colour, label=_label(place, places))
+        axes.plot(*truth[0], "o", color=colour, markersize=5, markerfacecolor="white")
+    axes.set_title("(a)  x-y, from the circle")
+    axes.set_xlabel("x [cm]")
+    axes.set_ylabel("y [cm]")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.legend(loc="best", fontsize=8)
+
+
+def _draw_error(
+    axes: Axes,
+    errors: dict[tuple[int, int], list[ErrorSample]],
+    title: str,
+    unit: str,
+    band: float,
+    value_of: Callable[[ErrorSample], float],
+) -> None:
+    axes.axhspan(-band, band, color="#f0f3f7", linewidth=0, zorder=0)
+    axes.axhline(0.0, linestyle=":", color=REFERENCE, linewidth=1.0)
+    for index, samples in enumerate(errors.values()):
+        times = [seconds(one.tick) for one in samples]
+        axes.plot(times, [value_of(one) for one in samples], color=COLOURS[index % len(COLOURS)])
+    axes.margins(x=0)
+    axes.set_title(f"{title}   (shaded: within {band:g} {unit})")
+    axes.set_xlabel("t [s]")
+    axes.set_ylabel(f"{title.split('  ')[1]} [{unit}]")
+
+
+def _label(place: tuple[int, int], places: Sequence[tuple[int, int]]) -> str:
+    return "robot" if len(places) == 1 else f"robot {place[0]}/{place[1]}"

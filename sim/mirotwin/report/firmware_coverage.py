@@ -1,0 +1,105 @@
+"""Firmware coverage as a report: what the command line and the pytest plugin make of counts.
+
+What belongs here: paths, the table for people, the files that are added to and written. What does not: the mapping to
+lines (`miro_robot.inspect.coverage`).
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+from rich.table import Table
+
+from miro_sim.inputs import InputError, read_input
+from miro_sim.scenario.errors import one_line
+from mirotwin.files.outputs import whole_file
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+    from miro_robot.image.debug_info import Sources
+    from miro_robot.inspect.coverage import Counts, Share
+    from miro_robot.inspect.lcov import Tracefile
+
+
+class Report(msgspec.Struct, frozen=True):
+    """`listing`: text of the listing whose lines were counted, None when C lines were."""
+
+    tracefile: Tracefile
+    instructions: Share
+    listing: str | None
+
+
+def has_listing(image: Image) -> bool:
+    """Whether the lines that are counted are those of a listing: no debug file names C lines."""
+    from miro_robot.image.debug_info import DebugInfo
+
+    return not DebugInfo.of(image).lines
+
+
+def listing_path(out: Path) -> Path:
+    """Where the listing belongs that goes with the tracefile at `out`."""
+    return out.with_name(f"{out.name}.lst")
+
+
+def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) -> Report:
+    """Coverage of `image` with paths as seen from the current folder."""
+    from miro_robot.image.debug_info import DebugInfo
+    from miro_robot.inspect.coverage import at_paths, by_line, by_listing, instruction_share
+
+    debug = DebugInfo.of(image)
+    share = instruction_share(image, debug, counts)
+    if debug.lines:
+        tracefile = at_paths(by_line(image, debug, counts), sources, Path.cwd())
+        return Report(tracefile, share, None)
+    listing, record = by_listing(image, counts)
+    return Report({str(listing_path(out or image.path)): record}, share, listing)
+
+
+def is_of_another_image(report: Report, out: Path) -> bool:
+    """Whether the listing beside `out` is not the one whose lines `report` counts: their numbers mean other things."""
+    beside = listing_path(out)
+    if report.listing is None or not beside.exists():
+        return False
+    return read_input(beside) != report.listing.encode("utf-8")
+
+
+def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
+    """Writes `total`, and the listing of `report` if it has one. Raises OutputError; then neither is written."""
+    from miro_robot.inspect.lcov import encode
+
+    with ExitStack() as files:
+        for path, text in ((listing_path(out), report.listing), (out, encode(total))):
+            if text is not None:
+                files.enter_context(whole_file(path, option)).write_bytes(
+                    text.encode("utf-8", "surrogateescape")
+                )
+
+
+def read_tracefile(path: Path) -> Tracefile:
+    """What a tracefile holds, nothing if there is none yet. Raises InputError."""
+    from miro_robot.inspect.lcov import TracefileError, decode
+
+    if not path.exists():
+        return {}
+    try:
+        return decode(read_input(path).decode("utf-8", "surrogateescape"), str(path))
+    except TracefileError as error:
+        what, _, remedy = str(error).removeprefix(f"{path}:").partition("; ")
+        raise InputError(str(path), f"line {what}", remedy) from None
+
+
+def table(tracefile: Tracefile) -> Table:
+    """A row a file and a total: lines, branches, and the lines that never ran."""
+    from miro_robot.inspect.coverage import branch_share, line_share, missed
+
+    result = Table(box=None, pad_edge=False)
+    for column in ("file", "lines", "branches", "never ran"):
+        result.add_column(column, overflow="fold")
+    for path in sorted(tracefile):
+        one = {path: tracefile[path]}
+        result.add_row(one_line(path), str(line_share(one)), str(branch_share(one)), missed(tracefile[path]))
+    result.add_row("all", str(line_share(tracefile)), str(branch_share(tracefile)), "")
+    return result

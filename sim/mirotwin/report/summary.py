@@ -1,0 +1,224 @@
+"""What a run amounts to, as numbers: `summary.json` and the table on the screen.
+
+What belongs here: the figures and their definitions. What does not: pictures (`figure`) and where files go
+(`files.outputs`). Errors are truth against the reference at the same tick, e = c - r in the paper's axes, heading
+wrapped to (-pi, pi].
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
+from miro_sim.periods import Period, RobotPeriod
+from miro_sim.pitch import ground as pitch
+
+TWO_PI = 6.283185307179586
+SETTLED_CM = 3.0
+SETTLED_RAD = 0.15
+
+
+class ErrorSample(msgspec.Struct, frozen=True):
+    """Tracking error of a robot at one tick, and whether a corner of it is off the pitch."""
+
+    tick: int
+    x_cm: float
+    y_cm: float
+    theta_rad: float
+    off_pitch: bool = False
+
+    @property
+    def position_cm(self) -> float:
+        return math.sqrt(self.x_cm * self.x_cm + self.y_cm * self.y_cm)
+
+    @property
+    def settled(self) -> bool:
+        """Within 3 cm and 0.15 rad."""
+        return self.position_cm <= SETTLED_CM and abs(self.theta_rad) <= SETTLED_RAD
+
+
+class Tracking(msgspec.Struct, frozen=True):
+    """How well a robot followed its reference.
+
+    `rms_*`: root mean square over the last second of the run (all of it, if shorter), one value a control
+    period; position is the distance. `settling_s`: the last time at which the robot was outside 3 cm or
+    0.15 rad; 0 if it never was, None if it never was inside. `off_pitch_s`: how long a corner of the robot's square was
+    beyond the edge of the pitch, in whole control periods.
+    """
+
+    rms_x_cm: float | None
+    rms_y_cm: float | None
+    rms_theta_deg: float | None
+    rms_position_cm: float | None
+    settling_s: float | None
+    off_pitch_s: float | None
+
+
+class RobotTracking(msgspec.Struct, frozen=True):
+    """The tracking of one robot among several."""
+
+    network: int
+    slot: int
+    tracking: Tracking
+
+
+class Link(msgspec.Struct, frozen=True):
+    """Frames sent by all hosts; accepted, rejected (CRC) and stale as counted by the robots' firmware,
+    added up.
+
+    `frames_*` of the robots are None when the firmware exports no counters. `bit_errors`: bits that the
+    radio turned over, both ways, all listeners.
+    """
+
+    frames_sent: int
+    frames_accepted: int | None
+    frames_rejected: int | None
+    frames_stale: int | None
+    bit_errors: int
+
+
+class Firmware(msgspec.Struct, frozen=True):
+    """The image and what it executed; `machine_cycles` includes `idle_cycles`; all robots added up."""
+
+    sha256: str
+    instructions: int
+    machine_cycles: int
+    idle_cycles: int
+    faults: int
+
+
+class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
+    """`summary.json`. `tracking` is the first robot's; `robots` lists all when there are several.
+
+    `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is
+    written only where it is false: the run was broken off, and all figures are of the part before.
+    """
+
+    scenario: str
+    seed: int
+    engine: str
+    digest: str
+    simulated_s: float
+    wall_s: float
+    realtime_factor: float
+    tracking: Tracking
+    link: Link
+    firmware: Firmware
+    robots: tuple[RobotTracking, ...] = ()
+    complete: bool = True
+
+
+def wrapped(angle_rad: float) -> float:
+    """The angle in (-pi, pi]."""
+    angle = math.fmod(angle_rad, TWO_PI)
+    if angle > math.pi:
+        return angle - TWO_PI
+    return angle + TWO_PI if angle <= -math.pi else angle
+
+
+def error_of(robot: RobotPeriod, tick: int) -> ErrorSample:
+    """The tracking error in a robot's record."""
+    truth, at = robot.truth, robot.reference
+    return ErrorSample(
+        tick,
+        100.0 * (truth.x_m - at.x_m),
+        100.0 * (truth.y_m - at.y_m),
+        wrapped(truth.theta_rad - at.theta_rad),
+        not pitch.holds(msgspec.structs.replace(truth, theta_rad=wrapped(truth.theta_rad))),
+    )
+
+
+def errors_by_robot(periods: Sequence[Period]) -> dict[tuple[int, int], list[ErrorSample]]:
+    """(network, slot) -> errors in the order of time; robots in the order of the world."""
+    found: dict[tuple[int, int], list[ErrorSample]] = {}
+    for period in periods:
+        for robot in period.robots:
+            found.setdefault((robot.network, robot.slot), []).append(error_of(robot, period.tick))
+    return found
+
+
+def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
+    """The figures of one robot; None throughout when there is no sample."""
+    if not samples:
+        return Tracking(None, None, None, None, None, None)
+    last = [sample for sample in samples if sample.tick > samples[-1].tick - TICKS_PER_SECOND]
+    return Tracking(
+        rms_x_cm=_rms([sample.x_cm for sample in last]),
+        rms_y_cm=_rms([sample.y_cm for sample in last]),
+        rms_theta_deg=_rms([math.degrees(sample.theta_rad) for sample in last]),
+        rms_position_cm=_rms([sample.position_cm for sample in last]),
+        settling_s=_settling_s(samples),
+        off_pitch_s=seconds(CONTROL_PERIOD_TICKS * len([sample for sample in samples if sample.off_pitch])),
+    )
+
+
+def _rms(values: Sequence[float]) -> float:
+    total = 0.0
+    for value in values:
+        total += value * value
+    return math.sqrt(total / len(values))
+
+
+def _settling_s(samples: Sequence[ErrorSample]) -> float | None:
+    if not any(sample.settled for sample in samples):
+        return None
+    outside = [sample.tick for sample in samples if not sample.settled]
+    return seconds(outside[-1]) if outside else 0.0
+
+
+def settling_text(samples: Sequence[ErrorSample]) -> str:
+    """When the robot settled, for people; one that is outside at the end has not, whatever `settling_s` is."""
+    settling_s = _settling_s(samples)
+    if settling_s is None or not samples[-1].settled:
+        return "not settled"
+    return f"settled at {settling_s:.2f} s"
+
+
+def summarise(
+    *,
+    scenario: str,
+    seed: int,
+    engine: str,
+    periods: Sequence[Period],
+    simulated_ticks: int,
+    wall_s: float,
+    counters: Mapping[str, Mapping[str, Any]],
+    firmware_sha256: str,
+    complete: bool = True,
+) -> Summary:
+    """The summary of a run; `counters` as `World.counters()` gives them."""
+    tracked = {place: tracking_of(samples) for place, samples in errors_by_robot(periods).items()}
+    everyone = tuple(RobotTracking(network, slot, tracking) for (network, slot), tracking in tracked.items())
+    return Summary(
+        scenario=scenario,
+        seed=seed,
+        engine=engine,
+        digest=periods[-1].digest if periods else "",
+        simulated_s=seconds(simulated_ticks),
+        wall_s=wall_s,
+        realtime_factor=seconds(simulated_ticks) / wall_s if wall_s > 0.0 else 0.0,
+        tracking=everyone[0].tracking if everyone else tracking_of([]),
+        link=Link(**counters["link"]),
+        firmware=Firmware(sha256=firmware_sha256, **counters["firmware"]),
+        robots=everyone if len(everyone) > 1 else (),
+        complete=complete,
+    )
+
+
+def off_pitch_text(summary: Summary) -> str:
+    """Which robots left the pitch and for how long, for people; empty if none did."""
+    everyone = summary.robots or (RobotTracking(0, -1, summary.tracking),)
+    left = [
+        f"{one.tracking.off_pitch_s:.2f} s"
+        + (f" (net{one.network}/robot{one.slot})" if summary.robots else "")
+        for one in everyone
+        if one.tracking.off_pitch_s
+    ]
+    return f"off it for {', '.join(left)}; there are no walls" if left else ""
+
+
+def to_json(summary: Summary) -> bytes:
+    """`summary.json`: indented, keys in the order above, a newline at the end."""
+    return msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n"

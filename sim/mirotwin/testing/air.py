@@ -1,0 +1,89 @@
+"""The wire between a radio's receiver and the robot's RXD, with hands on it: bursts of noise and dropped links.
+
+What belongs here: changing levels. What does not: the radio itself (`miro_sim.radio`).
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from msgspec import Struct, convert
+
+from miro_exact.clock import HOST_BIT_TICKS
+from miro_exact.rng import Stream
+from miro_protocol.line import Edge
+from miro_robot.mcs51.line import Line
+
+
+class Trouble(Struct, frozen=True, array_like=True):
+    """From `start_tick` to `end_tick`: "burst" gives fair random bits, "mark" a dropped link with squelch."""
+
+    start_tick: int
+    end_tick: int
+    kind: Literal["burst", "mark"]
+
+
+class Air:
+    """Takes levels from `heard`, gives them to `rxd`, but for the troubles announced; seeds as in `rng.Stream`."""
+
+    NOT_STATE = ("heard", "rxd", "noise")
+
+    def __init__(self, heard: Line, rxd: Line, seed: int, name: str) -> None:
+        self.heard = heard
+        self.rxd = rxd
+        self.noise = Stream(seed, f"{name}/bursts")
+        self.troubles: list[Trouble] = []
+        self.settled_tick = 0
+        self.level = 1
+        rxd.settled_tick = 0
+
+    def trouble(self, trouble: Trouble) -> None:
+        """Announces one, before the wire is settled there (ValueError) and after all announced before."""
+        free = max([self.settled_tick, *(one.end_tick for one in self.troubles)])
+        if trouble.start_tick < free:
+            raise ValueError(f"trouble at tick {trouble.start_tick}: the wire is spoken for up to {free}")
+        self.troubles.append(trouble)
+
+    def settle(self) -> list[Edge]:
+        """Carries on as far as `heard` goes; returns the new edges of `rxd`."""
+        until = self.heard.settled_tick
+        ticks = {self.settled_tick}
+        ticks.update(tick for tick, _ in self.heard.edges() if tick > self.settled_tick)
+        for trouble in self.troubles:
+            first = -(-trouble.start_tick // HOST_BIT_TICKS) * HOST_BIT_TICKS
+            ticks.update((trouble.start_tick, trouble.end_tick))
+            if trouble.kind == "burst":
+                ticks.update(range(first, trouble.end_tick, HOST_BIT_TICKS))
+        edges = []
+        for tick in sorted(ticks):
+            if not self.settled_tick <= tick < until:
+                continue
+            level = self._level(tick)
+            if level != self.level:
+                self.rxd.append(tick, level)
+                edges.append((tick, level))
+                self.level = level
+        self.heard.forget(until)
+        self.settled_tick = self.rxd.settled_tick = until
+        self.troubles = [trouble for trouble in self.troubles if trouble.end_tick > until]
+        return edges
+
+    def _level(self, tick: int) -> int:
+        for trouble in self.troubles:
+            if trouble.start_tick <= tick < trouble.end_tick:
+                return 1 if trouble.kind == "mark" else self.noise.bit(tick // HOST_BIT_TICKS)
+        return self.heard.level_at(tick)
+
+    def snapshot(self) -> dict[str, object]:
+        return {
+            "heard": self.heard.snapshot(),
+            "troubles": [[one.start_tick, one.end_tick, one.kind] for one in self.troubles],
+            "settled_tick": self.settled_tick,
+            "level": self.level,
+        }
+
+    def restore(self, state: dict[str, object]) -> None:
+        self.heard.restore(convert(state["heard"], dict[str, object]))
+        self.troubles = convert(state["troubles"], list[Trouble])
+        self.settled_tick = convert(state["settled_tick"], int)
+        self.level = convert(state["level"], int)

@@ -1,0 +1,54 @@
+"""The engine: compiled and source twins are never mixed, and a stale compiled module is refused."""
+
+import sys
+
+import pytest
+from tests import children
+
+from miro_exact import engine
+
+
+def test_a_stamp_that_is_not_the_sources_hash_is_refused_with_a_remedy():
+    with pytest.raises(engine.EngineError, match=r"stale.*pip install"):
+        engine.refuse_if_stale("miro_robot.nowhere", "0" * 64)
+
+
+def test_the_engine_cannot_be_changed_once_it_is_in_use():
+    script = (
+        "from miro_exact import engine\n"
+        "engine.select('python')\n"
+        "try:\n    engine.select('compiled')\n"
+        "except engine.EngineError as error:\n    print('refused:', error)\n"
+    )
+    done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("refused: engine python is already in use")
+
+
+@pytest.fixture
+def package(tmp_path):
+    """Three hot modules: `upper` builds upon the layout of `lower`, `other` stands alone."""
+    for name, layout in (
+        ("lower", "cdef class Lower:\n    cdef int a\n"),
+        ("upper", "from house.lower cimport Lower\n"),
+        ("other", "cdef class Other:\n    cdef int b\n"),
+    ):
+        (tmp_path / f"{name}.py").write_text(f'"""{name}"""\n')
+        (tmp_path / f"{name}.pxd").write_text(layout)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("file", "stale"),
+    [
+        ("lower.pxd", {"house.lower", "house.upper"}),
+        ("upper.pxd", {"house.upper"}),
+        ("lower.py", {"house.lower"}),
+        ("other.pxd", {"house.other"}),
+    ],
+)
+def test_a_module_is_stale_after_a_change_of_its_source_or_of_a_layout_it_builds_upon(package, file, stale):
+    before = engine.source_hashes({"house": package})
+    with (package / file).open("a") as changed:
+        changed.write("# changed\n")
+    after = engine.source_hashes({"house": package})
+    assert {name for name in after if after[name] != before[name]} == stale

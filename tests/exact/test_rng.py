@@ -1,0 +1,160 @@
+"""Random numbers: Philox against its published vectors, streams as pure functions, the Gaussian's shape."""
+
+import importlib.util
+from collections import Counter
+from itertools import pairwise
+
+import mpmath
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.naive import rng as naive
+
+from miro_exact import rng
+from miro_exact.rng import HALF_NORMAL, Stream, philox4x32
+
+seeds = st.integers(0, 2**63 - 1)
+indices = st.one_of(st.integers(0, 1000), st.integers(0, 2**56 - 1))
+DRAWS = ("u32", "u64", "bit", "uniform", "gauss")
+
+# Random123, tests/kat_vectors, lines "philox4x32 10": counter, key, expected
+VECTORS = [
+    ((0, 0, 0, 0), (0, 0), (0x6627E8D5, 0xE169C58D, 0xBC57AC4C, 0x9B00DBD8)),
+    ((0xFFFFFFFF,) * 4, (0xFFFFFFFF,) * 2, (0x408F276D, 0x41C83B0E, 0xA20BC7C6, 0x6D5451FD)),
+    (
+        (0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344),
+        (0xA4093822, 0x299F31D0),
+        (0xD16CFE09, 0x94FDCCEB, 0x5001E420, 0x24126EA1),
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """The same source, never compiled."""
+    path = rng.__file__.rpartition("/")[0] + "/rng.py"
+    spec = importlib.util.spec_from_file_location("plain_rng", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(("counter", "key", "expected"), VECTORS)
+def test_philox_gives_the_published_words(counter, key, expected):
+    assert philox4x32(*counter, *key) == expected
+    assert naive.philox4x32_10(counter, key) == expected
+
+
+@settings(deadline=None)
+@given(seeds, st.text(max_size=20), indices)
+def test_every_kind_of_draw_equals_its_naive_twin(seed, name, index):
+    stream = Stream(seed, name)
+    for draw in DRAWS:
+        assert getattr(stream, draw)(index) == getattr(naive, draw)(seed, name, index)
+
+
+@settings(deadline=None, max_examples=50)
+@given(seeds, st.text(max_size=20), st.lists(st.tuples(st.sampled_from(DRAWS), indices), max_size=30))
+def test_compiled_and_plain_source_give_the_same_bits_in_any_order(plain, seed, name, wanted):
+    ours, theirs = Stream(seed, name), plain.Stream(seed, name)
+    for draw, index in wanted:
+        assert getattr(ours, draw)(index) == getattr(theirs, draw)(index)
+
+
+@given(st.lists(st.tuples(st.sampled_from(DRAWS), st.integers(0, 600)), max_size=30), seeds)
+def test_a_draw_does_not_depend_on_the_draws_before_it(wanted, seed):
+    stream = Stream(seed, "noise")
+    values = [getattr(stream, draw)(index) for draw, index in wanted]
+    assert values == [getattr(Stream(seed, "noise"), draw)(index) for draw, index in wanted]
+
+
+def test_streams_differ_in_name_and_in_every_bit_of_the_seed():
+    draws = {Stream(1 << bit, "a").u64(0) for bit in range(63)} | {Stream(0, name).u64(0) for name in "abc"}
+    assert len(draws) == 66
+
+
+def test_kinds_of_draw_share_no_bits():
+    stream = Stream(3, "kinds")
+    assert stream.u32(0) != stream.u64(0) & 0xFFFFFFFF
+    assert [stream.bit(i) for i in range(32)] != [stream.u32(0) >> i & 1 for i in range(32)]
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63])
+def test_a_seed_outside_its_range_is_refused(seed):
+    with pytest.raises(ValueError, match="seed"):
+        Stream(seed, "x")
+
+
+@pytest.mark.parametrize("draw", DRAWS)
+@pytest.mark.parametrize("index", [-1, 2**56])
+def test_an_index_outside_its_range_is_refused(draw, index):
+    with pytest.raises(ValueError, match="index"):
+        getattr(Stream(0, "x"), draw)(index)
+
+
+def test_below_is_never_true_at_threshold_0_and_always_at_2_to_the_32():
+    stream = Stream(11, "edges")
+    assert not any(stream.below(i, 0) for i in range(1000))
+    assert all(stream.below(i, 2**32) for i in range(1000))
+
+
+def test_below_hits_as_often_as_its_threshold_says():
+    stream = Stream(12, "rate")
+    hits = sum(stream.below(i, 2**32 // 100) for i in range(100_000))
+    assert abs(hits - 1000) < 4 * 31.5  # four standard deviations
+
+
+def test_bits_are_balanced_and_independent_of_their_neighbours():
+    stream = Stream(13, "coin")
+    bits = [stream.bit(i) for i in range(100_000)]
+    pairs = Counter(pairwise(bits))
+    assert all(abs(pairs[pair] - 25_000) < 4 * 137 for pair in [(0, 0), (0, 1), (1, 0), (1, 1)])
+
+
+def test_uniform_lies_in_its_interval_with_the_right_mean_and_53_bits():
+    stream = Stream(14, "u")
+    values = [stream.uniform(i) for i in range(20_000)]
+    assert all(0.0 <= value < 1.0 and (value * 2**53).is_integer() for value in values)
+    assert abs(sum(values) / len(values) - 0.5) < 4 * 0.2887 / 20_000**0.5
+    assert any((value * 2**53) % 2 for value in values)
+
+
+def test_the_half_normal_table_is_right_to_the_last_bit():
+    assert [naive.half_normal(k) for k in range(len(HALF_NORMAL))] == HALF_NORMAL
+    assert HALF_NORMAL[0] == 0
+    assert HALF_NORMAL[-1] == 2**63
+    assert HALF_NORMAL[-2] < 2**63
+
+
+@settings(deadline=None)
+@given(seeds, indices)
+def test_gauss_is_close_to_exact_inversion_of_the_same_draw(seed, index):
+    exact = naive.exact_gauss(seed, "g", index)
+    assert abs(Stream(seed, "g").gauss(index) - exact) < 1e-5 + 2e-5 * abs(exact) + 3e-6 * exact * exact
+
+
+def test_gauss_has_the_moments_the_distance_and_the_tails_of_a_normal_distribution():
+    n = 100_000
+    stream = Stream(2024, "gauss")
+    values = sorted(stream.gauss(i) for i in range(n))
+    for power, expected, variance in [(1, 0, 1), (2, 1, 2), (3, 0, 15), (4, 3, 96), (6, 15, 10_170)]:
+        assert abs(sum(z**power for z in values) / n - expected) < 4 * (variance / n) ** 0.5
+    phi = [0.5 * (1 + float(mpmath.erf(z / 2**0.5))) for z in values[::50]]
+    distance = max(abs(p - i * 50 / n) for i, p in enumerate(phi))
+    assert distance < 1.63 / n**0.5  # Kolmogorov, 1 %
+    for limit, probability in [(2, 4.5500e-2), (3, 2.6998e-3), (4, 6.3342e-5)]:
+        beyond = sum(abs(z) > limit for z in values)
+        assert abs(beyond - n * probability) < 4 * (n * probability) ** 0.5 + 1
+
+
+def test_the_distribution_of_gauss_is_normal_to_two_millionths():
+    """Exactly, without sampling: its distribution function against the true one inside every cell."""
+    for k in range(len(HALF_NORMAL) - 1):
+        for place in (0.1, 0.25, 0.5, 0.75, 0.9):
+            z = (k + place - (k + 0.5) / 512 * place * (1 - place)) / 16
+            mass = (HALF_NORMAL[k] + place * (HALF_NORMAL[k + 1] - HALF_NORMAL[k])) / 2**63
+            assert abs(float(mpmath.erf(z / 2**0.5)) - mass) / 2 < 1.6e-6
+
+
+def test_a_stream_names_itself():
+    assert repr(Stream(7, "net0/robot1/noise")) == "Stream(7, 'net0/robot1/noise')"

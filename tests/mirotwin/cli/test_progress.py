@@ -1,0 +1,41 @@
+"""The progress bar: only for people, and only when there is something to wait for."""
+
+import io
+import sys
+
+import pytest
+
+from mirotwin.cli import progress
+from mirotwin.cli.progress import ProgressBar
+
+
+class Screen(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def drawn(
+    monkeypatch: pytest.MonkeyPatch, screen: io.StringIO, patience_s: float, quiet: bool = False
+) -> str:
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setattr(progress, "PATIENCE_S", patience_s)
+    with ProgressBar("simulating", 10, quiet) as bar:
+        for done in range(10):
+            bar.to(done)
+    return screen.getvalue()
+
+
+def test_a_bar_is_drawn_on_a_terminal_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    assert "simulating" in drawn(monkeypatch, Screen(), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("screen", "patience_s", "quiet"),
+    [(Screen(), 60.0, False), (io.StringIO(), 0.0, False), (Screen(), 0.0, True)],
+    ids=["soon over", "no terminal", "quiet"],
+)
+def test_otherwise_nothing_is_drawn(
+    monkeypatch: pytest.MonkeyPatch, screen: io.StringIO, patience_s: float, quiet: bool
+) -> None:
+    assert drawn(monkeypatch, screen, patience_s, quiet) == ""

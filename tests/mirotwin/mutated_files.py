@@ -1,0 +1,355 @@
+"""Damaged files of every kind through the command line: an exit code and a line, never a traceback or a long wait.
+
+    python -m tests.mirotwin.mutated_files --count 20000 --seed 0
+
+prints how many files of each kind ended in which exit code. A case is a pure function of (seed, number): `--only N`
+runs one again and leaves its file in the current folder. What belongs here: good files, how they are damaged, and
+which command reads them. What does not: what a format means.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import random
+import signal
+import struct
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from click.testing import CliRunner
+from tests.mirotwin.cli.conftest import SHORT
+
+from miro_robot.firmware import image_path
+from miro_sim.scenario.file import builtin_text
+from mirotwin.cli import main
+
+ALLOWED = (0, 1, 2, 3, 4, 42)
+SLOW_S = 5.0
+HANGS_S = 300  # of wall time: the machine may be busy
+ECHO = bytes.fromhex("7590 00 759852 758920 758DFD D28E 3098FD C298 8599E0 F599 80F4".replace(" ", ""))
+ECHO_C = "void main(void)\n{\n    init();\n    for (;;)\n        echo();\n}\n"
+ECHO_MAP = """\
+Area                                    Addr        Size        Decimal Bytes (Attributes)
+DSEG                                00000008    00000002 =           2. bytes (REL,CON)
+     00000008  _frames_accepted                   named
+CSEG                                00000000    0000001A =          26. bytes (REL,CON,CODE)
+C:   00000000  _main                              named
+C:   0000000C  A$named$5                          named
+C:   0000000E  _loop                              named
+CONST                               0000001A    00000000 =           0. bytes (REL,CON,CODE)
+named.rel                           [ ]
+"""
+ECHO_CDB = """\
+S:G$main$0_0$0({2}DF,SV:S),C,0,0
+S:G$total$0_0$0({1}SC:U),E,0,0
+L:G$main$0$0:0
+L:G$total$0$0:9
+L:C$named.c$1$0$0:0
+L:C$named.c$3$1$1:3
+L:C$named.c$5$1$1:E
+L:XG$main$0$0:17
+L:A$named$5:0
+"""
+ECHO_RST = """\
+                                    1 ;\tnamed.c:3: init();
+      000000 75 90 00         [24]  2 \tmov P1,#0
+      000003 75 98 52         [24]  3 \tmov SCON,#0x52
+                                    4 ;\tnamed.c:5: echo();
+      00000E 30 98 FD         [24]  5 \tjnb RI,.
+"""
+MOST_BYTES = 1 << 20
+NUMBERS = (
+    b"0",
+    b"-1",
+    b"4294967296",
+    b"99999999999999999999",
+    b"9" * 5000,
+    b"1e999",
+    b"nan",
+    b"0x" + b"f" * 5000,
+)
+BRACKETS = (
+    b"[",
+    b"{",
+    b"(",
+    b"a.",
+    b"[[",
+    b"\xff",
+    b"\x00",
+    b"\x1b[2J",
+    b"\n",
+    b"\\",
+    b'"',
+    b"'",
+    b"#",
+    b":",
+    b"$",
+)
+
+RESUMMED = "image, sums put right"
+
+Commands = list[list[str]]
+
+
+def hex_records(code: bytes) -> bytes:
+    """Intel HEX."""
+    lines = []
+    for place in range(0, len(code), 16):
+        body = (
+            bytes([len(code[place : place + 16])])
+            + place.to_bytes(2, "big")
+            + b"\0"
+            + code[place : place + 16]
+        )
+        lines.append(f":{(body + bytes([-sum(body) & 0xFF])).hex().upper()}\n")
+    return "".join([*lines, ":00000001FF\n"]).encode()
+
+
+class Seeds:
+    """Good files in `folder`. `kinds`: name -> (file name, content, commands of which one is chosen). `pieces`: more
+    files to take pieces of.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.kinds: dict[str, tuple[str, bytes, Commands]] = {}
+        image = image_path()
+        self.pieces = [image.with_suffix(suffix).read_bytes() for suffix in (".ihx", ".map", ".cdb", ".rst")]
+        for name in ("echo.ihx", "named.ihx"):
+            (folder / name).write_bytes(hex_records(ECHO))
+        (folder / "named.c").write_text(ECHO_C)
+        (folder / "short.toml").write_text(SHORT)
+        self._run("run", "short.toml", "--out", "out", "-q")
+        recording = (folder / "out" / "run.mcap").read_bytes()
+        self._run("export", "out/run.mcap", "--out", "run.pcapng", "-q")
+        self._run("export", "out/run.mcap", "--out", "run.stream", "-q")
+        self._run("fw", "coverage", "echo.ihx", "--max-cycles", "2000", "--out", "fw.info")
+        self._add_texts(image)
+        look = [["decode", "@"], ["decode", "@", "--json"], ["export", "@", "--out", "-"]]
+        self.kinds["recording"] = ("a.mcap", recording, [*look, ["replay", "@"]])
+        self.kinds["recording without sums"] = ("a.mcap", without_sums(recording), [*look, ["replay", "@"]])
+        self.kinds["capture"] = ("a.pcapng", (folder / "run.pcapng").read_bytes(), look)
+        stream = (folder / "run.stream").read_bytes()
+        self.kinds["stream"] = ("a.stream", stream, [*look, ["fw", "profile", "@", "--to", "1ms"]])
+        raw = bytes.fromhex("5555555555ff2dd4fc") + bytes(range(40))
+        self.kinds["raw"] = (
+            "a.bin",
+            raw * 3,
+            [["decode", "@"], ["decode", "@", "--format", "raw", "--json"]],
+        )
+        self.kinds["hex text"] = ("a.txt", raw.hex(" ").encode() + b" # end\n", [["decode", "@"]])
+
+    def _add_texts(self, image: Path) -> None:
+        steps = ["--max-cycles", "300"]
+        watch = [["fw", "trace", "named.ihx", *steps], ["fw", "profile", "named.ihx", *steps, "--json"]]
+        self.kinds["scenario"] = (
+            "a.toml",
+            builtin_text("fig6").encode(),
+            [["fw", "profile", "@", "--to", "100us"]],
+        )
+        self.kinds["image"] = (
+            "a.ihx",
+            image.read_bytes(),
+            [["fw", "run", "@", *steps]] * 5 + [["fw", "disasm", "@"], ["info", "--firmware", "@"]],
+        )
+        self.kinds[RESUMMED] = self.kinds["image"]
+        for suffix, lines in (".map", ECHO_MAP), (".cdb", ECHO_CDB), (".rst", ECHO_RST):
+            (self.folder / f"named{suffix}").write_text(lines)
+            cover = ["fw", "coverage", "named.ihx", *steps]
+            until = ["fw", "run", "named.ihx", "--until", "_loop", *steps]
+            commands = [cover, *watch, ["fw", "disasm", "named.ihx"], until]
+            self.kinds[suffix] = (f"named{suffix}", lines.encode(), commands)
+        self.kinds["tracefile"] = (
+            "a.info",
+            (self.folder / "fw.info").read_bytes(),
+            [["fw", "coverage", "echo.ihx", "--max-cycles", "50", "--out", "@", "--append"]],
+        )
+        self.kinds["serial input"] = (
+            "a.serial",
+            b"some characters\r\n\x00\xff",
+            [["fw", "run", "echo.ihx", "--stdin", "@", "--max-cycles", "20000"]],
+        )
+
+    def _run(self, *arguments: str) -> None:
+        with contextlib.chdir(self.folder):
+            result = CliRunner().invoke(main, list(arguments))
+        assert result.exit_code in (0, 42), (arguments, result.output, result.exception)
+
+
+def without_sums(recording: bytes) -> bytes:
+    """The same with sums of 0, which say nothing: so damage gets past them."""
+    data = bytearray(recording)
+    place = 8
+    while place + 9 <= len(data) - 8:
+        opcode, size = struct.unpack_from("<BQ", data, place)
+        body = place + 9
+        if opcode == 0x06:  # Chunk: times, size, then its CRC
+            data[body + 24 : body + 28] = bytes(4)
+        elif opcode in (0x02, 0x09, 0x0F):  # Footer, Attachment, DataEnd end in theirs
+            data[body + size - 4 : body + size] = bytes(4)
+        place = body + size
+    return bytes(data)
+
+
+def resummed(image: bytes) -> bytes:
+    """Intel HEX with lengths and sums put right, so that damage gets past them."""
+    lines = []
+    for line in image.split(b"\n"):
+        with contextlib.suppress(ValueError):
+            record = bytearray.fromhex(line[1:].decode("ascii", "replace"))
+            if 5 <= len(record) <= 260:
+                record[0] = len(record) - 5
+                record[-1] = -sum(record[:-1]) & 0xFF
+                line = b":" + record.hex().encode()
+        lines.append(line)
+    return b"\n".join(lines)
+
+
+def mutate(data: bytes, draw: random.Random, other: bytes) -> bytes:
+    """`data` with one to four damages; `other` is a file to take a piece of."""
+    for _ in range(draw.choice((1, 1, 2, 4))):
+        data = _damage(bytearray(data), draw, other)
+    return data[:MOST_BYTES]
+
+
+def _damage(data: bytearray, draw: random.Random, other: bytes) -> bytes:
+    at = draw.randrange(len(data) + 1)
+    length = min(len(data) - at, draw.choice((1, 1, 2, 8, 100, 2000)))
+    kind = draw.randrange(10)
+    if kind == 0 and data:  # a bit
+        data[at - 1] ^= 1 << draw.randrange(8)
+    elif kind == 1 and data:  # a byte
+        data[at - 1] = draw.randrange(256)
+    elif kind == 2:
+        del data[at : at + length]
+    elif kind == 3:
+        data[at:at] = bytes(draw.randrange(256) for _ in range(draw.choice((1, 3, 50))))
+    elif kind == 4:  # twice, or very often
+        data[at:at] = data[at : at + length] * draw.choice((1, 1, 2, 1000))
+    elif kind == 5:
+        del data[at:]
+    elif kind == 6:  # a piece of another file
+        begin = draw.randrange(len(other) + 1)
+        data[at : at + length] = other[begin : begin + draw.choice((10, 100, 3000))]
+    elif kind == 7:  # in place of a number
+        digits = (
+            [place for place in range(len(data)) if 0x30 <= data[place] <= 0x39]
+            if len(data) < 1 << 16
+            else []
+        )
+        at = draw.choice(digits) if digits else at
+        end = at
+        while end < len(data) and 0x30 <= data[end] <= 0x39:
+            end += 1
+        data[at:end] = draw.choice(NUMBERS)
+    elif kind == 8:  # deep nesting, or one of what has a meaning
+        data[at:at] = draw.choice(BRACKETS) * draw.choice((1, 1, 1, 300, 20_000))
+    else:  # two pieces exchanged
+        to = draw.randrange(len(data) + 1)
+        piece = bytes(data[at : at + length])
+        data[at : at + length] = data[to : to + length]
+        data[to : to + length] = piece
+    return bytes(data)
+
+
+class Slow(BaseException):
+    """A case that takes too long."""
+
+
+def _slow(number: int, frame: object) -> None:
+    raise Slow
+
+
+class Case:
+    """Case `number` of a campaign: which kind, which content, which command."""
+
+    def __init__(self, seeds: Seeds, seed: int, number: int) -> None:
+        names = list(seeds.kinds)
+        draw = random.Random(f"{seed}/{number}")
+        self.kind = names[number % len(names)]
+        self.name, content, commands = seeds.kinds[self.kind]
+        self.good = content
+        others = [*seeds.pieces, *(good for _, good, _ in seeds.kinds.values())]
+        self.content = mutate(content, draw, draw.choice(others))
+        if self.kind == RESUMMED:
+            self.content = resummed(self.content)
+        self.arguments = [self.name if word == "@" else word for word in draw.choice(commands)]
+
+    def run(self, folder: Path) -> tuple[object, float]:
+        """Exit code (or what was raised) and seconds of CPU time. The good file is put back."""
+        path = folder / self.name
+        path.write_bytes(self.content)
+        began_s = time.process_time()
+        signal.signal(signal.SIGALRM, _slow)
+        signal.alarm(HANGS_S)
+        try:
+            with contextlib.chdir(folder):
+                result = CliRunner().invoke(main, self.arguments)
+            signal.alarm(0)
+        except Slow:
+            return "hangs", time.process_time() - began_s
+        took_s = time.process_time() - began_s
+        path.write_bytes(self.good)
+        for left in folder.glob("*.lst"):
+            left.unlink()
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            return "".join(traceback.format_exception(result.exception)[-4:]), took_s
+        if result.exit_code not in ALLOWED or not _fit_for_people(result.stderr):
+            return f"exit code {result.exit_code}: {result.stderr[-300:]!r}", took_s
+        return result.exit_code, took_s
+
+
+def _fit_for_people(err: str) -> bool:
+    return all(line.isprintable() and len(line) < 2000 for line in err.splitlines())
+
+
+def campaign(
+    folder: Path, seed: int, numbers: range | list[int]
+) -> Iterator[tuple[int, Case, object, float]]:
+    """(number, case, exit code or what went wrong, seconds) of each case; good files are made in `folder` first."""
+    seeds = Seeds(folder)
+    for number in numbers:
+        case = Case(seeds, seed, number)
+        outcome, took_s = case.run(folder)
+        if took_s > SLOW_S and isinstance(outcome, int):
+            outcome = f"took {took_s:.1f} s"
+        yield number, case, outcome, took_s
+
+
+def _main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=20_000)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", type=int)
+    options = parser.parse_args()
+    numbers = range(options.first, options.first + options.count)
+    if options.only is not None:
+        numbers = range(options.only, options.only + 1)
+    counts: Counter[tuple[str, int]] = Counter()
+    slowest_s, bad = 0.0, 0
+    with tempfile.TemporaryDirectory() as name, contextlib.suppress(KeyboardInterrupt):  # counts so far
+        for number, case, outcome, took_s in campaign(Path(name), options.seed, numbers):
+            slowest_s = max(slowest_s, took_s)
+            if isinstance(outcome, int):
+                counts[case.kind, outcome] += 1
+            else:
+                bad += 1
+                print(f"{number}: {case.kind}: {' '.join(case.arguments)}: {outcome}", flush=True)
+            if options.only is not None:
+                Path(case.name).write_bytes(case.content)
+    for kind in dict.fromkeys(kind for kind, _ in sorted(counts)):
+        ends = ", ".join(f"{count} x {code}" for (one, code), count in sorted(counts.items()) if one == kind)
+        print(f"{kind:24} {ends}")
+    print(f"{sum(counts.values())} files, {bad} of them ended badly, the slowest took {slowest_s:.1f} s")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main())

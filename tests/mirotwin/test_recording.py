@@ -1,0 +1,266 @@
+"""Recordings: what goes in comes out, the same run gives the same bytes, nothing else is taken for one."""
+
+import io
+import json
+import re
+import struct
+import time
+import tracemalloc
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+from tests.mirotwin.synthetic import periods
+
+from mirotwin.recording import channels
+from mirotwin.recording.container import RecordingError, records
+from mirotwin.recording.reader import parse, read
+from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.writer import MAGIC
+
+SOURCE = Source(
+    scenario_name="fig6",
+    scenario_text="# ä\nname = 'fig6'\n",
+    seed=(1 << 63) - 1,
+    firmware=b":00000001FF\r\n",
+    firmware_sha256="ab" * 32,
+    symbols={"_main": (0x62, "code"), "_frames_accepted": (0x30, "iram")},
+)
+
+
+def recorded(count: int = 3, source: Source = SOURCE) -> bytes:
+    stream = io.BytesIO()
+    with Recorder(stream, source) as recorder:
+        for period in periods(count, [(0, 0), (0, 2), (1, 0)]):
+            recorder.write(period)
+    return stream.getvalue()
+
+
+RECORDED = recorded()
+
+
+def test_what_goes_in_comes_out_to_the_last_bit() -> None:
+    recording = parse(RECORDED, "run.mcap")
+    assert recording.source == SOURCE
+    assert recording.periods == tuple(periods(3, [(0, 0), (0, 2), (1, 0)]))
+    assert recording.digest == recording.periods[-1].digest
+
+
+def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(time, "time", lambda: 4e9)
+    monkeypatch.setattr(time, "time_ns", lambda: 4 * 10**18)
+    assert recorded() == RECORDED
+
+
+def test_an_ordinary_mcap_reader_finds_channels_schemas_and_attachments() -> None:
+    reader = make_reader(io.BytesIO(RECORDED))
+    summary = reader.get_summary()
+    assert summary is not None
+    topics = {channel.topic for channel in summary.channels.values()}
+    names = ("reference", "truth", "measurement", "control", "firmware", "lm629", "pwm")
+    assert topics >= {f"/net0/robot0/{name}" for name in names} | {"/net0/wire", "/period"}
+    assert {attachment.name for attachment in reader.iter_attachments()} == {
+        "scenario.toml",
+        "firmware.ihx",
+        "symbols.json",
+    }
+    for schema, _, message in reader.iter_messages():
+        assert schema is not None
+        tree = json.loads(schema.data)
+        assert tree["type"] == "object"
+        assert "$ref" not in schema.data.decode()
+        content = json.loads(message.data)
+        assert set(content) == set(tree["properties"])
+        assert message.log_time == content["tick"] * 125 // 3
+
+
+def test_every_channel_has_a_message_type_and_foreign_topics_have_none() -> None:
+    for name, kind in channels.ROBOT_CHANNELS.items():
+        assert channels.message_type(channels.robot_topic(1, 2, name)) is kind
+    assert channels.message_type(channels.wire_topic(7)) is channels.WireMessage
+    assert channels.message_type("/camera") is None
+    assert channels.message_type("/net0/robot0/unknown") is None
+
+
+def test_samples_and_faults_are_for_people_and_do_not_disturb_the_periods() -> None:
+    stream = io.BytesIO()
+    with Recorder(stream, SOURCE) as recorder:
+        recorder.write_sample(0, 0, channels.SampleMessage(8192, 1, 2, 3, -4, 5, 6, 7, 8))
+        for period in periods(2):
+            recorder.write(period)
+    assert parse(stream.getvalue(), "run.mcap").periods == tuple(periods(2))
+
+
+def broken_off(recorder: Recorder) -> None:
+    recorder.write(next(periods(1)))
+    raise ZeroDivisionError
+
+
+def test_what_was_written_up_to_an_error_is_a_recording_that_says_it_was_broken_off() -> None:
+    stream = io.BytesIO()
+    with pytest.raises(ZeroDivisionError), Recorder(stream, SOURCE) as recorder:
+        broken_off(recorder)
+    recording = parse(stream.getvalue(), "run.part.mcap")
+    assert len(recording.periods) == 1
+    assert recording.broken_off == "run.part.mcap: the run that wrote it was broken off"
+    assert parse(RECORDED, "run.mcap").broken_off == ""
+    assert make_reader(io.BytesIO(stream.getvalue())).get_summary() is not None
+
+
+def test_a_file_that_is_no_recording_is_named_with_its_place(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_bytes(b"PK\x03\x04")
+    with pytest.raises(RecordingError, match=r"run\.mcap: offset 0: not an MCAP file; give a run\.mcap"):
+        read(path)
+    path.write_bytes(b"")
+    with pytest.raises(RecordingError, match="offset 0: empty file"):
+        read(path)
+
+
+def test_somebody_elses_mcap_file_is_not_taken_for_a_recording() -> None:
+    stream = io.BytesIO()
+    writer = Writer(stream)
+    writer.start()
+    writer.finish()
+    with pytest.raises(RecordingError, match="not a recording of this program"):
+        parse(stream.getvalue(), "run.mcap")
+
+
+def blown_up(compression: CompressionType) -> bytes:
+    """A file of some KB that unpacks to 64 MB."""
+    stream = io.BytesIO()
+    writer = Writer(stream, compression=compression)
+    writer.start()
+    channel = writer.register_channel("/period", "json", 0)
+    for _ in range(4):
+        writer.add_message(channel, 0, bytes(16 << 20), 0)
+    writer.finish()  # type: ignore[no-untyped-call]
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("compression", "name"), [(CompressionType.ZSTD, "zstd"), (CompressionType.LZ4, "lz4")]
+)
+def test_a_compressed_chunk_is_refused_and_not_unpacked(compression: CompressionType, name: str) -> None:
+    data = blown_up(compression)
+    complaint = (
+        rf"run\.mcap: offset \d+: a chunk is compressed \({name}\), .*; make .* with `mcap decompress`"
+    )
+    tracemalloc.start()
+    try:
+        for size in (len(data), sections(data)["CHUNK"][0] + 60):  # whole, and cut within the chunk
+            with pytest.raises(RecordingError, match=complaint):
+                parse(data[:size], "run.mcap")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def chunk(data: bytes, size: int | None = None, data_size: int | None = None) -> bytes:
+    """An uncompressed chunk of `data` that may say something else about its length."""
+    sizes = (len(data) if size is None else size, len(data) if data_size is None else data_size)
+    body = struct.pack("<QQQIIQ", 0, 0, sizes[0], 0, 0, sizes[1]) + data
+    return struct.pack("<BQ", Opcode.CHUNK, len(body)) + body
+
+
+def nested(depth: int) -> bytes:
+    found = b""
+    for _ in range(depth):
+        found = chunk(found)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("record", "what"),
+    [
+        (chunk(bytes(100), size=3 << 30), "an uncompressed chunk of 100 bytes says that it has 3221225472"),
+        (chunk(bytes(100), data_size=3 << 30), "the lengths of a chunk and of its data do not agree"),
+        (chunk(struct.pack("<BQ", Opcode.MESSAGE, 1 << 40)), "the last record of a chunk ends behind it"),
+        (struct.pack("<BQ", Opcode.CHUNK, 3) + b"abc", "a chunk is too short"),
+        (nested(2), "a chunk within a chunk"),
+        (nested(3000), "a chunk within a chunk"),
+    ],
+    ids=["size", "length of the data", "last record", "too short", "two deep", "3000 deep"],
+)
+def test_a_chunk_that_says_more_than_it_holds_is_damaged(record: bytes, what: str) -> None:
+    with pytest.raises(RecordingError, match=rf"offset 8: damaged record \({what}\)"):
+        parse(MAGIC + record, "run.mcap")
+
+
+MESSAGES_OF_PERIODS = [
+    RECORDED.index(f'"digest":"{period.digest}"}}'.encode()) + len(period.digest) + 12
+    for period in periods(3, [(0, 0), (0, 2), (1, 0)])
+]
+"""Where the message ends that closes each period."""
+COMPLAINT = (
+    r"run\.mcap: offset \d+: the (file ends in the middle of a record; it was cut short; copy it again, or"
+    r" record the run again|recording has no end: the run that wrote it was broken off; record .*)"
+)
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.integers(1, len(RECORDED) - 1))
+def test_a_recording_cut_short_anywhere_gives_its_whole_periods_and_says_so(size: int) -> None:
+    if size < MESSAGES_OF_PERIODS[0]:
+        with pytest.raises(RecordingError, match=COMPLAINT):
+            parse(RECORDED[:size], "run.mcap")
+        return
+    recording = parse(RECORDED[:size], "run.mcap")
+    assert recording.source == SOURCE
+    whole = [end for end in MESSAGES_OF_PERIODS if end <= size]
+    assert recording.periods == tuple(periods(3, [(0, 0), (0, 2), (1, 0)]))[: len(whole)]
+    assert re.fullmatch(COMPLAINT, recording.broken_off)
+
+
+def sections(data: bytes) -> dict[str, tuple[int, int]]:
+    """First and last byte of the first record of each kind in a file, and of the magic at both ends."""
+    found = {"magic": (0, len(MAGIC) - 1), "magic at the end": (len(data) - len(MAGIC), len(data) - 1)}
+    place = len(MAGIC)
+    while place < len(data) - len(MAGIC):
+        opcode, size = struct.unpack_from("<BQ", data, place)
+        found.setdefault(Opcode(opcode).name, (place, place + 8 + size))
+        place += 9 + size
+    return found
+
+
+SECTIONS = sections(RECORDED)
+
+
+def test_a_recording_has_records_of_all_these_kinds() -> None:
+    kinds = {"HEADER", "METADATA", "ATTACHMENT", "CHUNK", "MESSAGE_INDEX", "DATA_END", "FOOTER"}
+    summary = {"SCHEMA", "CHANNEL", "STATISTICS", "CHUNK_INDEX", "ATTACHMENT_INDEX", "SUMMARY_OFFSET"}
+    assert kinds | summary < SECTIONS.keys()
+
+
+def refused_with_bit_turned(at: int, bit: int) -> None:
+    data = bytearray(RECORDED)
+    data[at] ^= 1 << bit
+    with pytest.raises(RecordingError, match=r"run\.mcap: offset \d+: (damaged record|not an MCAP file)"):
+        parse(bytes(data), "run.mcap")
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_one_wrong_bit_at_either_end_of_any_section_is_noticed(section: str) -> None:
+    first, last = SECTIONS[section]
+    for at in (*range(first, first + 5), last - 4, last):
+        refused_with_bit_turned(at, at % 8)
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.integers(0, len(RECORDED) - 1), st.integers(0, 7))
+def test_one_wrong_bit_anywhere_is_noticed(at: int, bit: int) -> None:
+    refused_with_bit_turned(at, bit)
+
+
+def test_checksums_of_zero_say_nothing_as_other_programs_write_them() -> None:
+    stream = io.BytesIO()
+    writer = Writer(stream, enable_crcs=False, enable_data_crcs=False)
+    writer.start()
+    writer.finish()  # type: ignore[no-untyped-call]
+    assert list(records(io.BytesIO(stream.getvalue()), "x.mcap")) == []

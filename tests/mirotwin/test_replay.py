@@ -1,0 +1,163 @@
+"""Replay without a world: scripts, the comparison of periods, and streams as scenarios."""
+
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.mirotwin.synthetic import periods
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from miro_host.posture import Posture
+from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
+from miro_protocol.stream import Transmission
+from miro_sim.periods import Axis, Period
+from miro_sim.scenario.places import check_places
+from mirotwin.capture import Run
+from mirotwin.capture.frame_list import frame_lines
+from mirotwin.replay.compare import compare
+from mirotwin.replay.script import (
+    StreamContentError,
+    robots_of_stream,
+    scenario_of_stream,
+    script_of,
+    script_of_stream,
+)
+
+PERIOD = list(periods(4, [(0, 0), (1, 2)]))[3]
+
+
+def changed(side: str | None = None, **fields: Any) -> Period:
+    """The period with something else about its second robot."""
+    first, second = PERIOD.robots
+    if side is None:
+        second = msgspec.structs.replace(second, **fields)
+    else:
+        axis = msgspec.structs.replace(getattr(second, side), **fields)
+        second = msgspec.structs.replace(second, **{side: axis})
+    return msgspec.structs.replace(PERIOD, robots=(first, second))
+
+
+def team(robots: int, seq: int = 3) -> bytes:
+    return encode(TeamFrame(0, seq, tuple((10 * slot, -slot) for slot in range(robots))), robots)
+
+
+def test_a_script_is_what_the_hosts_sent_and_nothing_else() -> None:
+    script = script_of(periods(3))
+    assert [tick for tick, _, _ in script] == [96_000 + index * CONTROL_PERIOD_TICKS for index in range(3)]
+    assert {data for _, _, data in script} == {bytes(range(23))}
+
+
+def test_a_period_equals_itself() -> None:
+    assert compare(PERIOD, PERIOD) is None
+
+
+def test_the_hosts_own_state_is_not_the_robots_response() -> None:
+    assert compare(PERIOD, changed(control=None, measurement=None)) is None
+    assert compare(PERIOD, msgspec.structs.replace(PERIOD, digest="00" * 32)) is None
+
+
+@pytest.mark.parametrize(
+    ("replayed", "expected"),
+    [
+        (changed(accepted=9), "/net1/robot2/firmware accepted: recorded 3, replayed 9"),
+        (
+            changed("left", real_position=298),
+            "/net1/robot2/lm629 left real_position: recorded 297, replayed 298",
+        ),
+        (changed("right", pwm_magnitude=0), "/net1/robot2/pwm right magnitude: recorded 3, replayed 0"),
+        (
+            changed("right", commands=()),
+            "right command: recorded 1Fh 1800002a at tick 2402406, replayed nothing",
+        ),
+        (changed(v_m_s=0.3), "/net1/robot2/truth v_m_s: recorded 0.30000000000000004, replayed 0.3"),
+        (changed(truth=Posture(0.0, 0.0, 0.0)), "/net1/robot2/truth: recorded Posture("),
+    ],
+)
+def test_the_first_difference_is_named_with_tick_robot_channel_and_both_values(
+    replayed: Period, expected: str
+) -> None:
+    found = compare(PERIOD, replayed)
+    assert found is not None
+    assert expected in str(found)
+    assert str(found).startswith("tick 240240")
+
+
+def test_a_different_command_comes_before_what_it_leads_to() -> None:
+    later = (PERIOD.robots[1].left.commands[0][0] + 1, 0x1F, "1800002b")
+    found = compare(PERIOD, changed("left", commands=(later,), real_position=5))
+    assert found is not None
+    assert found.channel == "lm629 left command"
+    assert found.tick == PERIOD.robots[1].left.commands[0][0]
+
+
+def test_an_answer_that_is_not_there_is_a_difference() -> None:
+    silent = msgspec.structs.replace(PERIOD, wire=PERIOD.wire[:1])
+    found = compare(PERIOD, silent)
+    assert found is not None
+    assert (found.channel, found.replayed, found.tick) == ("wire", "nothing", PERIOD.wire[1].tick)
+
+
+@given(
+    st.sampled_from([name for name in Axis.__struct_fields__ if name != "commands"]), st.sampled_from("lr")
+)
+def test_no_register_of_a_motion_controller_is_left_out(name: str, side: str) -> None:
+    whole = {"l": "left", "r": "right"}[side]
+    value = getattr(getattr(PERIOD.robots[1], whole), name)
+    assert compare(PERIOD, changed(whole, **{name: value + 1})) is not None
+
+
+@pytest.mark.parametrize("robots", [3, 5])
+def test_the_layout_of_a_stream_is_the_one_in_which_it_can_be_read(robots: int) -> None:
+    sent = [Transmission(index * 900_000, ">", team(robots, index)) for index in range(3)]
+    assert robots_of_stream(sent) == robots
+    scenario = scenario_of_stream(sent, "a.txt")
+    assert scenario.networks[0].robots == robots
+    assert [robot.slot for robot in scenario.networks[0].robot] == list(range(robots))
+    assert {robot.reference.drive_s for robot in scenario.networks[0].robot} == {0.0}
+    check_places(scenario, "a.txt")
+    radio = scenario.networks[0].radio
+    assert (radio.bit_error_rate, radio.carrier, radio.squelch) == (0.0, "on", True)
+    assert scenario.duration_s * TICKS_PER_SECOND >= 1_800_000 + TICKS_PER_SECOND
+
+
+def test_answers_in_a_stream_are_not_sent() -> None:
+    sent = [Transmission(0, ">", b"\x01"), Transmission(5, "<", b"\x02"), Transmission(50_000, ">", b"\x03")]
+    assert script_of_stream(sent) == [(0, 0, b"\x01"), (50_000, 0, b"\x03")]
+
+
+@pytest.mark.parametrize(
+    ("sent", "expected"),
+    [
+        ([], "a.txt: no line from host to robot"),
+        ([Transmission(0, "<", b"\x01")], "no line from host to robot"),
+        (
+            [Transmission(0, ">", b"\x01\x02"), Transmission(49_999, ">", b"\x03")],
+            "tick 49999: starts before the",
+        ),
+        ([Transmission(1 << 62, ">", b"\x01")], "more than a day"),
+    ],
+)
+def test_a_stream_that_cannot_have_been_sent_is_refused(sent: list[Transmission], expected: str) -> None:
+    with pytest.raises(StreamContentError, match=expected):
+        scenario_of_stream(sent, "a.txt")
+
+
+def test_frames_are_listed_as_people_read_them_and_no_byte_is_dropped() -> None:
+    answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
+    runs = [Run(1000, team(3)), Run(900_000, answer, "<"), Run(2_000_000, b"\x00\x01\x02")]
+    lines = list(frame_lines(runs, {0: 3}))
+    texts = [line.text for line in lines]
+    assert texts[0] == "team seq=3  +0/+0 +10/-1 +20/-2"
+    assert texts[1].startswith("telemetry seq=4 slot=1")
+    assert texts[2] == "3 bytes, no sync: 00 01 02"
+    assert [line.tick for line in lines] == [1000, 900_000, 2_000_000]
+    assert [line.slot for line in lines] == [-1, 1, -1]
+
+
+def test_an_answer_whose_run_ends_in_a_bad_stop_bit_is_not_listed_as_valid() -> None:
+    answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
+    (line,) = frame_lines([Run(0, answer, "<", bad_stop=True)], {0: 3})
+    assert (line.tick, line.slot) == (0, -1)
+    assert line.text.startswith("19 bytes, bad stop bit: 55 55")

@@ -1,0 +1,165 @@
+"""The summary: its keys, its definitions, and the picture that goes with it."""
+
+import json
+import math
+from pathlib import Path
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.mirotwin.synthetic import periods
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_sim.periods import Period
+from mirotwin.report.figure import draw
+from mirotwin.report.summary import (
+    ErrorSample,
+    Summary,
+    off_pitch_text,
+    settling_text,
+    summarise,
+    to_json,
+    tracking_of,
+    wrapped,
+)
+
+COUNTERS = {
+    "link": {
+        "frames_sent": 180,
+        "frames_accepted": 178,
+        "frames_rejected": 2,
+        "frames_stale": 0,
+        "bit_errors": 9,
+    },
+    "firmware": {"instructions": 5, "machine_cycles": 7, "idle_cycles": 2, "faults": 0},
+}
+KEYS = {
+    "": "scenario seed engine digest simulated_s wall_s realtime_factor tracking link firmware",
+    "tracking": "rms_x_cm rms_y_cm rms_theta_deg rms_position_cm settling_s off_pitch_s",
+    "link": "frames_sent frames_accepted frames_rejected frames_stale bit_errors",
+    "firmware": "sha256 instructions machine_cycles idle_cycles faults",
+}
+
+
+def summary_of(run: list[Period]) -> Summary:
+    return summarise(
+        scenario="fig6",
+        seed=7,
+        engine="compiled",
+        periods=run,
+        simulated_ticks=len(run) * CONTROL_PERIOD_TICKS,
+        wall_s=0.5,
+        counters=COUNTERS,
+        firmware_sha256="ab" * 32,
+    )
+
+
+def samples(*errors: tuple[float, float, float]) -> list[ErrorSample]:
+    return [ErrorSample(index * CONTROL_PERIOD_TICKS, *error) for index, error in enumerate(errors)]
+
+
+def test_the_file_has_exactly_the_keys_that_others_read() -> None:
+    written = json.loads(to_json(summary_of(list(periods(60)))))
+    for table, keys in KEYS.items():
+        found = written[table] if table else written
+        assert list(found) == keys.split()
+
+
+def test_several_robots_are_listed_beside_the_first() -> None:
+    written = json.loads(to_json(summary_of(list(periods(60, [(0, 0), (0, 2), (1, 1)])))))
+    assert [(one["network"], one["slot"]) for one in written["robots"]] == [(0, 0), (0, 2), (1, 1)]
+    assert written["robots"][0]["tracking"] == written["tracking"]
+
+
+def test_times_and_factor_follow_from_the_ticks() -> None:
+    summary = summary_of(list(periods(180)))
+    assert summary.simulated_s == 180 * 800_800 / 24e6
+    assert summary.realtime_factor == summary.simulated_s / 0.5
+    assert summary.digest == list(periods(180))[-1].digest
+
+
+def test_rms_is_taken_over_the_last_second_only() -> None:
+    run = samples(*[(100.0, 0.0, 0.0)] * 40, *[(3.0, 4.0, math.radians(2.0))] * 30)
+    tracking = tracking_of(run)
+    assert (tracking.rms_x_cm, tracking.rms_y_cm, tracking.rms_position_cm) == (3.0, 4.0, 5.0)
+    assert tracking.rms_theta_deg == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("errors", "settling"),
+    [
+        ([(0.0, 0.0, 0.0)] * 4, 0.0),
+        ([(5.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)], 0.0),
+        ([(5.0, 0.0, 0.0), (0.0, 0.0, 0.2), (1.0, 0.0, 0.0)], 800_800 / 24e6),
+        ([(0.0, 0.0, 0.0), (2.9, 2.9, 0.0)], 800_800 / 24e6),
+        ([(0.0, 0.0, 0.0), (0.0, 0.0, -0.151)], 800_800 / 24e6),
+        ([(5.0, 0.0, 0.0), (0.0, 0.0, 0.2)], None),
+        ([(3.0, 0.0, 0.15)], 0.0),
+    ],
+)
+def test_settling_is_the_last_time_outside_three_centimetres_or_0_15_radian(
+    errors: list[tuple[float, float, float]], settling: float | None
+) -> None:
+    assert tracking_of(samples(*errors)).settling_s == settling
+
+
+@pytest.mark.parametrize(
+    ("errors", "text"),
+    [
+        ([(5.0, 0.0, 0.0), (0.0, 0.0, 0.2), (1.0, 0.0, 0.0)], "settled at 0.03 s"),
+        ([(0.0, 0.0, 0.0), (2.9, 2.9, 0.0)], "not settled"),
+        ([(5.0, 0.0, 0.0), (0.0, 0.0, 0.2)], "not settled"),
+    ],
+)
+def test_a_robot_that_ends_outside_is_not_called_settled(
+    errors: list[tuple[float, float, float]], text: str
+) -> None:
+    assert settling_text(samples(*errors)) == text
+
+
+def test_the_time_off_the_pitch_is_counted_by_the_corners_of_the_robot() -> None:
+    run = list(
+        periods(200)
+    )  # along y = 0 at 0.2 m/s: its front edge crosses x = 120 cm at 116.25 cm, after 5.81 s
+    off = [period for period in run if period.robots[0].truth.x_m + 0.0375 > 1.2]
+    assert 20 < len(off) < 30
+    summary = summary_of(run)
+    assert summary.tracking.off_pitch_s == len(off) * 800_800 / 24e6
+    assert off_pitch_text(summary) == f"off it for {summary.tracking.off_pitch_s:.2f} s; there are no walls"
+
+
+def test_each_robot_that_left_the_pitch_is_named_and_no_other() -> None:
+    assert off_pitch_text(summary_of(list(periods(60)))) == ""
+    text = off_pitch_text(summary_of(list(periods(200, [(0, 0), (0, 2)]))))
+    assert "(net0/robot0)" in text
+    assert "(net0/robot2)" in text
+
+
+def test_a_run_without_a_period_has_no_tracking() -> None:
+    assert set(msgspec.structs.astuple(tracking_of([]))) == {None}
+
+
+@given(st.floats(-3.14, 3.14), st.integers(-20, 20))
+def test_a_heading_error_is_wrapped_whatever_turns_lie_behind_it(angle: float, turns: int) -> None:
+    assert wrapped(angle + turns * 2.0 * math.pi) == pytest.approx(angle, abs=1e-12)
+
+
+def test_half_a_turn_is_positive() -> None:
+    assert wrapped(-math.pi) == math.pi
+
+
+def test_the_same_run_gives_the_same_picture(tmp_path: Path) -> None:
+    run = list(periods(40, [(0, 0), (0, 1)]))
+    draw(run, tmp_path / "a.png", scenario="fig6", seed=1, title="costs $5 _ \\alpha")
+    draw(run, tmp_path / "b.png", scenario="fig6", seed=1, title="costs $5 _ \\alpha")
+    picture = (tmp_path / "a.png").read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    assert picture == (tmp_path / "b.png").read_bytes()
+    assert b"tEXt" not in picture
+    assert b"tIME" not in picture
+
+
+def test_nothing_cannot_be_drawn(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="nothing to draw"):
+        draw([], tmp_path / "a.png", scenario="fig6", seed=1)
