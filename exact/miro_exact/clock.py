@@ -41,8 +41,10 @@ CAMERA_FRAME_TICKS = 800_800
 CONTROL_PERIOD_TICKS = CAMERA_FRAME_TICKS
 """The host controls once per camera frame."""
 
-FAR = 1 << 62
-"""A tick that never comes."""
+NEVER_TICK = 1 << 62
+"""Tick of an event that will not happen."""
+
+FAR = NEVER_TICK
 
 
 def ticks(seconds: float | Fraction) -> int:

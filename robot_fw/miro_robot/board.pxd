@@ -1,4 +1,5 @@
 cimport cython
+from miro_robot.event_log cimport EventLog
 from miro_robot.lm629.bus_timing cimport BusTiming
 from miro_robot.lm629.chip cimport Lm629
 from miro_robot.mcs51.bus cimport Bus
@@ -10,6 +11,7 @@ from miro_robot.probe cimport Probe
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS
 cdef int _WR, _RD
 cdef int _RESET_PULSE
+cdef int _FAULT, _REACHED, _RECEIVED, _SENT
 cdef long long RESET_PULSE_TICKS
 
 
@@ -22,6 +24,7 @@ cdef class Board(Bus):
     cdef readonly Lm629 left
     cdef readonly Lm629 right
     cdef readonly Plant plant
+    cdef readonly EventLog log
     cdef public bint stop_on_fault
     cdef public long long fault_count
     cdef long long busy_writes
@@ -57,6 +60,8 @@ cdef class Board(Bus):
     cdef long long _next_interrupt(self, Lm629 chip)
     @cython.locals(now=cython.longlong)
     cpdef int sync(self, long long tick) except -1
+    cpdef byte_received(self, int value, int stop, long long tick)
+    cpdef byte_sent(self, int value, long long tick)
     cpdef port_written(self, int port, int latch, long long tick)
     cdef int _set_pins(self, int port, int levels, long long tick) except -1
     @cython.locals(start=cython.longlong, page=cython.int, heard=bint, index=cython.int, value=cython.int)

@@ -14,13 +14,14 @@ from __future__ import annotations
 from typing import Any
 
 from miro_exact.saved import octets, whole
+from miro_robot.event_log import FAULT, REACHED, RECEIVED, SENT, EventLog
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image, Symbols
 from miro_robot.lm629.bus_timing import LIMITS, RESET_PULSE, BusTiming
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.mcs51.bus import Bus
-from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
 from miro_robot.plant import Plant
 from miro_robot.probe import Probe
 from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
@@ -47,6 +48,7 @@ latch is not in them: CHOSEN, 2 ticks after the strobe."""
 _WR, _RD = 0x40, 0x80  # pins of P3
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
 _RESET_PULSE = RESET_PULSE
+_FAULT, _REACHED, _RECEIVED, _SENT = FAULT, REACHED, RECEIVED, SENT
 RESET_PULSE_TICKS = LIMITS[RESET_PULSE].ticks
 
 
@@ -61,7 +63,7 @@ class Board(Bus):
         "wiring", "plant", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_bank", "pin_bit", "pin_inverted", "hi_port", "hi_bit", "hi_inverted",
         "hi_count", "hi_side", "hi_seen", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus",
-        "left_timing", "right_timing",  # see there: no time of theirs outlasts an instruction
+        "log", "left_timing", "right_timing",  # see there: no time of theirs outlasts an instruction
     )  # fmt: skip
 
     def __init__(
@@ -77,8 +79,11 @@ class Board(Bus):
         self.plant = plant
         self.cpu = Cpu(self)
         self.cpu.main_loop_limit = MAIN_LOOP_LIMIT_CYCLES
+        self.log = EventLog()
         self.left = Lm629(options or Lm629Options())
         self.right = Lm629(options or Lm629Options())
+        self.left.tell(self.log, 0)
+        self.right.tell(self.log, 1)
         self.left_timing = BusTiming()
         self.right_timing = BusTiming()
         self.stop_on_fault = stop_on_fault
@@ -162,6 +167,22 @@ class Board(Bus):
                 break
         return stopped
 
+    def run_to_any(self, addresses: tuple[int, ...], until_tick: int) -> int:
+        """Like `run`, but notes REACHED before each instruction at one of `addresses`, and goes on."""
+        cpu = self.cpu
+        while True:
+            cpu.mark(addresses)
+            try:
+                stopped = self.run(until_tick)
+            finally:
+                cpu.unmark(addresses)
+            if stopped != BREAKPOINT:
+                return stopped
+            self.log.note(_REACHED, cpu.cycles * CYCLE_TICKS, cpu.instructions, cpu.pc)
+            stopped = self.run(cpu.cycles * CYCLE_TICKS + 1)
+            if stopped or cpu.cycles * CYCLE_TICKS >= until_tick:
+                return stopped
+
     def _next_interrupt(self, chip: Lm629) -> int:
         """The next tick at which the chip may raise HI by itself: a sample, or the end of its reset."""
         return chip.next_tick if chip.sample_tick == FAR else chip.sample_tick
@@ -213,6 +234,16 @@ class Board(Bus):
                 self.external[port] = levels
                 self.cpu.set_external(port, levels, tick)
             index += 1
+
+    # ---- what the serial port did --------------------------------------------------------------------------
+
+    def byte_received(self, value: int, stop: int, tick: int) -> None:
+        """Tells the log of a character that the serial port delivered."""
+        self.log.note(_RECEIVED, tick, stop, value)
+
+    def byte_sent(self, value: int, tick: int) -> None:
+        """Tells the log of a character that the serial port sent."""
+        self.log.note(_SENT, tick, 0, value)
 
     # ---- from CPU to chip ---------------------------------------------------------------------------------
 
@@ -353,6 +384,7 @@ class Board(Bus):
 
     def _note(self, kind: int, pc: int, tick: int, detail: str) -> None:
         self.fault_count += 1
+        self.log.note(_FAULT, tick, kind, pc)
         if len(self.faults) < FAULTS_KEPT:
             symbol = self.symbols.name_at(pc) if self.symbols is not None else ""
             self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol, detail))

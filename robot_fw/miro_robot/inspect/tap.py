@@ -55,6 +55,14 @@ UNKNOWN = 2
 """Level of a routine's place while one is in service that nobody saw begin."""
 
 
+def port_pins(levels: list[int], port: int) -> int:
+    """The pins of a port, by the levels of all places: the AND of all that drive them."""
+    pins = levels[_LATCH + port] & levels[_OUTSIDE + port]
+    if port == 3:
+        pins &= 0xFC | (levels[_RXD] & levels[_SHIFT]) | levels[_TXD] << 1
+    return pins
+
+
 class BoardTap(Probe):
     """Notes what happens on a board into `events`; `levels` are those noted last."""
 

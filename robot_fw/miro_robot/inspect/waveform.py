@@ -17,7 +17,7 @@ from vcd.writer import VCDWriter
 
 from miro_robot.board import Board
 from miro_robot.inspect.signals import PLACE_OF, SIGNALS, TOP, Signal
-from miro_robot.inspect.tap import UNKNOWN, CpuTap
+from miro_robot.inspect.tap import UNKNOWN, CpuTap, port_pins
 from miro_robot.inspect.watcher import attach, detach
 from miro_robot.mcs51.cpu import Cpu
 
@@ -165,11 +165,7 @@ class Waveform:
         levels = self._levels
         if not signal.place.startswith("port"):
             return levels[PLACE_OF[signal.place]]
-        port = int(signal.place[4:])
-        pins = levels[_LATCH + port] & levels[_OUTSIDE + port]
-        if port == 3:
-            pins &= 0xFC | (levels[_RXD] & levels[_SHIFT]) | levels[_TXD] << 1
-        return pins
+        return port_pins(levels, int(signal.place[4:]))
 
     def _signals_of(self, place: int) -> list[int]:
         """Which signals may change with a place."""

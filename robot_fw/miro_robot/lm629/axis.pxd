@@ -1,5 +1,6 @@
 cimport cython
 
+from miro_robot.event_log cimport EventLog
 from miro_robot.lm629.encoder cimport Encoder
 from miro_robot.lm629.host_port cimport HostPort
 from miro_robot.lm629.pid cimport Pid
@@ -27,6 +28,8 @@ cdef class MotorAxis:
     cdef readonly Pid pid
     cdef readonly Signals signals
     cdef readonly object trajectory_buffer, filter_buffer
+    cdef EventLog log
+    cdef int side
     cdef public list commands, encoder_edges
     cdef public long long writes_while_busy
     cdef public long long next_tick, sample_tick, period_tick, reset_tick

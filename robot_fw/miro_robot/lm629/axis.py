@@ -8,6 +8,7 @@ those of README.md in this folder.
 
 from __future__ import annotations
 
+from miro_robot.event_log import EventLog
 from miro_robot.lm629 import buffers, host_port, signals
 from miro_robot.lm629.buffers import FilterBuffer, TrajectoryBuffer
 from miro_robot.lm629.encoder import Encoder
@@ -80,7 +81,7 @@ class MotorAxis:
             "error_full",
             "error_repeats",
         ),
-        *("commands", "encoder_edges"),
+        *("commands", "encoder_edges", "log", "side"),
         *("hi", "writes_while_busy"),  # copies of what the parts hold
         "excessive",  # nobody asks for it, unless I2 is read the other way: then it is saved
     )
@@ -105,6 +106,8 @@ class MotorAxis:
         self.filter_buffer = FilterBuffer()
         self.commands: list[tuple[int, int, bytes]] = []
         self.encoder_edges: list[tuple[int, int, int]] | None = None
+        self.log: EventLog | None = None
+        self.side = 0
         self.writes_while_busy = 0
         self.reset_level = 1
         self.reset_tick = 0

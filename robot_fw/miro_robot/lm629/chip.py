@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from miro_exact.saved import whole
+from miro_robot.event_log import COMMAND, EventLog
 from miro_robot.lm629 import buffers, host_port, signals
 from miro_robot.lm629.axis import FAR, PWM_TICKS, RANGES, SAMPLE_TICKS, MotorAxis
 from miro_robot.lm629.commands import BY_OPCODE
@@ -76,8 +77,18 @@ class Lm629(MotorAxis):
         else:
             self.signals.raise_flags(signals.COMMAND_ERROR)
 
+    def tell(self, log: EventLog, side: int) -> None:
+        """From now on completed commands are noted in `log` too, as those of `side` (0 left, 1 right)."""
+        self.log = log
+        self.side = side
+
     def _finished(self, tick: int) -> None:
-        self.commands.append((tick, self.port.command, bytes(self.port.record)))
+        data = bytes(self.port.record)
+        self.commands.append((tick, self.port.command, data))
+        if self.log is not None:
+            code = self.side << 8 | self.port.command
+            high, low = int.from_bytes(data[:-7], "big"), int.from_bytes(data[-7:], "big")
+            self.log.note_long(COMMAND, tick, code, len(data), high, low)
 
     def _command(self, tick: int) -> None:
         """A command byte: act on it, prepare its answer, or wait for its words."""

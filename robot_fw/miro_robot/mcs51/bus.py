@@ -26,5 +26,8 @@ class Bus:
     def fault(self, kind: int, pc: int, tick: int) -> None:
         """The firmware did what it must not (`miro_robot.faults.FaultKind`) at the instruction at `pc`."""
 
+    def byte_received(self, value: int, stop: int, tick: int) -> None:
+        """The serial port set RI at `tick` for the character `value`; `stop`: bit RB8, the stop bit in mode 1."""
+
     def byte_sent(self, value: int, tick: int) -> None:
         """The serial port set TI for the character `value` (its 8 data bits)."""

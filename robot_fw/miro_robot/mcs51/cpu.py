@@ -161,13 +161,21 @@ class Cpu(Executor):
 
     def run_until_any(self, addresses: tuple[int, ...], until_cycle: int) -> int:
         """The same for several addresses; `pc` tells which it was."""
-        for address in addresses:
-            self.lines[address] = _MARK | (self.lines[address] & _OUTSIDE)
+        self.mark(addresses)
         try:
             return self.run(until_cycle)
         finally:
-            for address in addresses:
-                self.lines[address] = _OUTSIDE if self.lines[address] & _OUTSIDE else self.line_at(address)
+            self.unmark(addresses)
+
+    def mark(self, addresses: tuple[int, ...]) -> None:
+        """From now on a run ends before each instruction at one of `addresses`, with BREAKPOINT."""
+        for address in addresses:
+            self.lines[address] = _MARK | (self.lines[address] & _OUTSIDE)
+
+    def unmark(self, addresses: tuple[int, ...]) -> None:
+        """Takes the marks away."""
+        for address in addresses:
+            self.lines[address] = _OUTSIDE if self.lines[address] & _OUTSIDE else self.line_at(address)
 
     def request_stop(self) -> None:
         """Ends the run after the instruction in progress; for callbacks of the bus."""

@@ -285,6 +285,7 @@ class Uart:
         self.received = self.rx_frame & 0xFF
         self.scon = (self.scon & (0xFF ^ _RB8)) | (_RB8 if last else 0)
         self.raise_flag(_RI, tick)
+        self.bus.byte_received(self.received, last, tick)
 
     def ri_tick(self) -> int:
         """A tick before which RI will not go up, FAR if no character can come."""

@@ -101,6 +101,11 @@ class DriveParams(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         rolling = 0.5 * body.rolling_resistance * body.mass_kg * GRAVITY_M_S2 * body.wheel_radius_m
         return self.motor.friction_nm + rolling / (body.gear_ratio * body.gear_efficiency)
 
+    def top_speed_m_s(self) -> float:
+        """No-load speed of the faster wheel at full battery: no robot drives faster by itself."""
+        motor_rad_s = self.battery.voltage_v / self.motor.torque_constant_nm_a
+        return motor_rad_s / self.chassis.gear_ratio * max(self.radius_m(0), self.radius_m(1))
+
     def counts_per_radian(self) -> float:
         """Encoder counts per radian of the motor shaft."""
         return 4.0 * self.encoder.lines / 6.283185307179586

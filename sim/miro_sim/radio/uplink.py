@@ -78,6 +78,10 @@ class Uplink:
         """
         return self.band.full_tick()
 
+    def known_tick(self, start_tick: int) -> int:
+        """The first tick at which a symbol is known whose start bit began at `start_tick`."""
+        return start_tick + (2 * _STOP + 1) * self.numerator // self.denominator + 1
+
     def hunt(self, until: int) -> None:
         """Goes on to the next falling edge, or a place without one."""
         level = self.band.level(self.now) & 1

@@ -146,10 +146,11 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One radio frequency: one host, `robots` slots (the layout of its frames), and the robots that are
-    present.
+    present. A `silent` host sends nothing by itself: its frames come from who runs the scenario (`World.inject`).
     """
 
     robots: Literal[3, 5] = 3
+    host: Literal["controller", "silent"] = "controller"
     radio: Radio = Radio()
     control_noise: ControlNoise = ControlNoise()
     robot: Annotated[tuple[Robot, ...], Meta(min_length=1)]

@@ -7,7 +7,7 @@ itself (`radio/`), the order of networks and the clock (`world.py`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 from msgspec import convert
 
@@ -15,7 +15,8 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, HOST_CHARACTER_T
 from miro_exact.saved import LAST_TICK, whole
 from miro_host.pilot import Command
 from miro_host.station import Station
-from miro_protocol.decoder import Symbol, TelemetryDecoder
+from miro_protocol.decoder import Received, Symbol, TelemetryDecoder
+from miro_protocol.frames import TelemetryFrame
 from miro_robot.image import Image
 from miro_robot.mcs51.execute import STOPPED
 from miro_sim.periods import RobotPeriod, WireRun
@@ -23,10 +24,16 @@ from miro_sim.radio import Downlink, Uplink
 from miro_sim.scenario import keys as sc
 from miro_sim.scenario.build import radio_for
 from miro_sim.world.control_noise import NoisyCommands
+from miro_sim.world.events import Event, HostLog
+from miro_sim.world.outbox import LONGEST_BYTES, Outbox
 from miro_sim.world.robot import Robot
 
 SETTLE_TICKS = 120
 """How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
+
+
+Host = Literal["controller", "script", "silent"]
+"""Who sends: the PC's controller, once a control period; a script; or only who injects."""
 
 
 class Network:
@@ -38,10 +45,13 @@ class Network:
         "compute_ticks",
         "keyup_ticks",
         "noisy_commands",
-        "script",
+        "host",
         "sent",
         "seen",
-    )  # the last two: records
+        "log",  # these three: records
+        "outbox",
+        "heard",  # these two: see `pending`
+    )
 
     def __init__(
         self,
@@ -74,25 +84,26 @@ class Network:
             self.downlink.listen(robot.spec.slot, robot.board.cpu.rxd)
             self.uplink.listen(robot.board.cpu.txd, robot.spec.slot)
         self.telemetry = TelemetryDecoder()
-        self.script = list(script) if script is not None else None
-        self.script_next = 0
+        self.host: Host = "script" if script is not None else spec.host
+        self.outbox = Outbox(0 if radio.carrier == "on" else radio.keyup_ticks)
+        for tick, data in script or ():
+            self.outbox.inject(tick, bytes(data), 0)
         self.frames_sent = 0
         self.heard: list[Symbol] = []  # in this period so far
         self.sent: list[WireRun] = []
         self.seen: list[RobotPeriod] = []
+        self.log = HostLog(index, self.uplink.known_tick)
 
-    def begin_period(self, tick: int, end_tick: int) -> None:
+    def begin_period(self, tick: int) -> None:
         """Camera, PC and station, in this order."""
         measured = [robot.expose(tick) for robot in self.robots]
         self.sent = []
-        if self.script is None:
-            commands: list[Command | None] = [
+        commands: list[Command | None] = [None] * len(self.robots)
+        if self.host == "controller":
+            commands = [
                 robot.steer(posture, tick) for robot, posture in zip(self.robots, measured, strict=True)
             ]
             self._transmit(tick + self.compute_ticks + self.keyup_ticks, commands)
-        else:
-            commands = [None] * len(self.robots)
-            self._transmit_script(end_tick)
         self.seen = [
             robot.record(tick, posture, command)
             for robot, posture, command in zip(self.robots, measured, commands, strict=True)
@@ -102,29 +113,43 @@ class Network:
         """Lets the robots of this network hear the other one's transmitter too."""
         self.downlink.overhear(other.downlink)
 
-    def settle(self, end_tick: int) -> None:
-        """All networks have sent: the line is known up to the end of the period."""
-        self.downlink.settle(end_tick + SETTLE_TICKS)
+    def send_due(self, rendezvous_tick: int) -> None:
+        """Puts on the air what may come up before the tick up to which it is settled next."""
+        for tick, data in self.outbox.due(rendezvous_tick + SETTLE_TICKS):
+            self.downlink.send(tick, data)
+            self.frames_sent += 1
+            self.sent.append(WireRun(tick, ">", self.index, -1, data))
+            self.log.note(Event(tick=tick, what="sent", network=self.index, data=data))
+
+    def settle(self, rendezvous_tick: int) -> None:
+        """All networks have sent: the line is known up to where the robots stop next."""
+        self.downlink.settle(rendezvous_tick + SETTLE_TICKS)
+
+    def earliest_tick(self, now: int) -> int:
+        """The earliest first start bit of characters that are injected at tick `now`."""
+        return max(0, now + SETTLE_TICKS + self.outbox.lead_ticks - self.downlink.sender.latency)
+
+    def inject(self, data: bytes, at_tick: int | None, now: int) -> int:
+        """See `World.inject`."""
+        earliest = self.earliest_tick(now)
+        if not 0 < len(data) <= LONGEST_BYTES:
+            raise ValueError(f"net{self.index}: {len(data)} characters; give 1 to {LONGEST_BYTES}")
+        if at_tick is not None and at_tick < earliest:
+            raise ValueError(f"net{self.index}: tick {at_tick} is too early; the earliest is {earliest}")
+        free_tick = self.downlink.free_tick
+        tick = max(earliest, self.outbox.end_tick(free_tick)) if at_tick is None else at_tick
+        try:
+            self.outbox.inject(tick, bytes(data), free_tick)
+        except ValueError as error:
+            raise ValueError(f"net{self.index}: {error}") from None
+        return tick
 
     def _transmit(self, start_tick: int, commands: Sequence[Command | None]) -> None:
         wheels = [(0, 0)] * self.spec.robots
         for robot, noise, command in zip(self.robots, self.noisy_commands, commands, strict=True):
             if command is not None:
                 wheels[robot.spec.slot] = noise.wheels_of(command, robot.frame)
-        self._send(start_tick, self.station.frame(wheels))
-
-    def _transmit_script(self, end_tick: int) -> None:
-        """Announces every scripted run whose carrier may come up before the line is settled."""
-        assert self.script is not None
-        limit = end_tick + SETTLE_TICKS + self.keyup_ticks
-        while self.script_next < len(self.script) and self.script[self.script_next][0] <= limit:
-            self._send(*self.script[self.script_next])
-            self.script_next += 1
-
-    def _send(self, start_tick: int, data: bytes) -> None:
-        self.downlink.send(start_tick, data)
-        self.frames_sent += 1
-        self.sent.append(WireRun(start_tick, ">", self.index, -1, data))
+        self.outbox.post(start_tick, self.station.frame(wheels), self.downlink.free_tick)
 
     def run(self, tick: int) -> bool:
         """Runs every robot to `tick`, one after the other; true when a firmware fault stopped one.
@@ -134,20 +159,41 @@ class Network:
         content alone, so the PC hears the same however the run is cut.
         """
         while True:
-            reasons = [robot.board.run(tick) for robot in self.robots]
+            reasons = [robot.run(tick) for robot in self.robots]
             if STOPPED in reasons:
                 return True
             full_tick = self.uplink.full_tick()
             if full_tick >= tick:
                 return False
-            self.heard += self.uplink.receive(full_tick)
+            self.hear(full_tick)
 
-    def end_period(self, tick: int) -> list[WireRun]:
-        """The PC's receiver hears what the robots sent; returns all runs of bytes of the period."""
-        heard = [*self.heard, *self.uplink.receive(tick)]
+    def hear(self, tick: int) -> None:
+        """The PC's receiver hears what the robots sent up to `tick`."""
+        heard = self.uplink.receive(tick)
+        self.log.note_heard(heard)
+        for found in self.telemetry.feed_symbols(heard):
+            if isinstance(found, Received):
+                self._note_answer(self.uplink.known_tick(found.last_tick), found)
+        self.heard += heard
+
+    def _note_answer(self, tick: int, answer: Received) -> None:
+        message = answer.message(self.spec.robots)
+        slot = message.slot if isinstance(message, TelemetryFrame) else -1
+        self.log.note(Event(tick=tick, what="answer", network=self.index, value=slot, frame=answer))
+
+    def note_touch(self, tick: int, one: Robot, other: Robot) -> None:
+        """Two robots on the pitch have begun to touch, `one` of this network."""
+        slot = one.spec.slot
+        touch = Event(
+            tick=tick, what="touch", network=self.index, value=slot, other=(other.network, other.spec.slot)
+        )
+        self.log.note(touch)
+
+    def end_period(self) -> list[WireRun]:
+        """All runs of bytes of the period that is over."""
+        found = [*self.sent, *runs(self.heard, self.index)]
         self.heard = []
-        self.telemetry.feed_symbols(heard)
-        return [*self.sent, *runs(heard, self.index)]
+        return found
 
     @property
     def bit_errors(self) -> int:
@@ -157,6 +203,26 @@ class Network:
             down += listener.bit_errors
         return down + self.uplink.bit_errors
 
+    def records(self) -> list[Any]:
+        """What observers take away and no snapshot holds, to go back to with `put_back`."""
+        boards = [robot.board for robot in self.robots]
+        return [
+            list(self.sent),
+            self.log.end,
+            [(list(b.left.commands), list(b.right.commands), list(b.faults), b.log.end) for b in boards],
+        ]
+
+    def put_back(self, records: list[Any]) -> None:
+        """Takes back what `records` gave; nothing but more of the same may have happened since."""
+        sent, log_end, boards = records
+        self.sent = list(sent)
+        self.log.cut(log_end)
+        for robot, (left, right, faults, end) in zip(self.robots, boards, strict=True):
+            robot.board.left.commands[:] = left
+            robot.board.right.commands[:] = right
+            robot.board.faults[:] = faults
+            robot.board.log.cut(end)
+
     def snapshot(self) -> dict[str, object]:
         return {
             "robots": [robot.snapshot() for robot in self.robots],
@@ -164,35 +230,33 @@ class Network:
             "downlink": self.downlink.snapshot(),
             "uplink": self.uplink.snapshot(),
             "telemetry": self.telemetry.snapshot(),
-            "script_next": self.script_next,
+            "script_next": 0,
             "frames_sent": self.frames_sent,
-            **({"heard": list(self.heard)} if self.heard else {}),
         }
 
+    def pending(self) -> dict[str, object]:
+        """What is saved, but no part of the digest: it depends on when input was announced and the world stopped."""
+        return {"outbox": self.outbox.snapshot(), "heard": [list(one) for one in self.heard]}
+
     def restore(self, state: dict[str, Any]) -> None:
+        self.outbox.restore(state["outbox"])
+        self.heard = convert(state["heard"], list[Symbol])
         for robot, saved in zip(self.robots, state["robots"], strict=True):
             robot.restore(saved)
         self.station.restore(state["station"])
         self.downlink.restore(state["downlink"])
         self.uplink.restore(state["uplink"])
         self.telemetry.restore(state["telemetry"])
-        self.heard = convert(state.get("heard", []), list[Symbol])
-        self.script_next = whole(state, "script_next", 0, len(self.script or ()))
         self.frames_sent = whole(state, "frames_sent", 0, LAST_TICK)
 
-    def check_times(self, begun_tick: int, tick: int, in_period: bool) -> None:
+    def check_times(self, begun_tick: int, tick: int) -> None:
         """Raises ValueError unless the restored parts are at `tick`, in the period that began at `begun_tick`.
 
         A part that is far behind would take for ever to catch up.
         """
         settled_tick = self.downlink.settled_tick
-        until = begun_tick + (CONTROL_PERIOD_TICKS if in_period else 0)
-        if settled_tick != (until + SETTLE_TICKS if until else 0):
-            raise ValueError(
-                f"the radio is settled up to tick {settled_tick}, in the period from {begun_tick}"
-            )
-        if self.script is None and self.downlink.free_tick > until + CONTROL_PERIOD_TICKS:
-            raise ValueError(f"the station is busy until tick {self.downlink.free_tick}, at tick {tick}")
+        if settled_tick != tick + SETTLE_TICKS and settled_tick + tick != 0:
+            raise ValueError(f"the radio is settled up to tick {settled_tick}, at tick {tick}")
         if not begun_tick - CONTROL_PERIOD_TICKS <= self.uplink.now <= tick:
             raise ValueError(f"the PC has heard everything up to tick {self.uplink.now}, at tick {tick}")
         for robot in self.robots:

@@ -7,9 +7,10 @@ it gets the camera's measurement and answers with a command.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from miro_exact.clock import seconds
+from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_exact.domain import DomainError
 from miro_exact.rng import Stream
 from miro_exact.saved import whole
@@ -17,6 +18,7 @@ from miro_host.pilot import Command, Pilot
 from miro_host.posture import Posture
 from miro_host.vision import Vision
 from miro_robot.board import Board
+from miro_robot.event_log import TRUE
 from miro_robot.image import Image
 from miro_robot.lm629.chip import Lm629
 from miro_robot.wiring import load_wiring
@@ -38,8 +40,10 @@ class Robot:
         "reference",
         "camera_noise",
         "counter_addresses",
-        "drive",
-    )  # the board saves it
+        "drive",  # the board saves it
+        "marks",
+        "asked",
+    )
 
     def __init__(
         self, spec: sc.Robot, scenario: sc.Scenario, network: int, robots: int, seed: int, image: Image
@@ -67,7 +71,33 @@ class Robot:
         self.vision: Vision = vision_for(scenario.camera)
         self.pilot: Pilot = pilot_for(spec, self.reference)
         self.frame = 0
+        self.marks: tuple[int, ...] = ()
+        self.asked: list[tuple[Callable[[Robot], object], str]] = []
         self.counter_addresses = [_iram_address(image, f"_{counter}") for counter in COUNTERS]
+
+    def run(self, tick: int) -> int:
+        """Runs the board to `tick`, watching out for what a wait asked for; not 0 when a firmware fault stopped it."""
+        if self.asked:
+            return self._run_asking(tick)
+        if self.marks:
+            return self.board.run_to_any(self.marks, tick)
+        return self.board.run(tick)
+
+    def _run_asking(self, tick: int) -> int:
+        """The same in steps, with the predicates asked after each."""
+        board = self.board
+        stopped = 0
+        while not stopped and board.cpu.cycles * CYCLE_TICKS < tick:
+            now = board.cpu.cycles * CYCLE_TICKS
+            sample_tick = board.left.sample_tick
+            step_tick = now + 1 if any(at == "instruction" for _, at in self.asked) else sample_tick
+            step_tick = min(step_tick, tick)
+            stopped = board.run_to_any(self.marks, step_tick)
+            reached = board.cpu.cycles * CYCLE_TICKS if step_tick == now + 1 else step_tick
+            for predicate, at in self.asked:
+                if (at == "instruction" or step_tick == sample_tick) and predicate(self):
+                    board.log.note(TRUE, reached, 0, 0)
+        return stopped
 
     def expose(self, tick: int) -> Posture | None:
         """The camera takes a frame at `tick`; returns the measurement that reaches the PC now, if one does."""

@@ -4,9 +4,11 @@ What belongs here: the order in which the parties act, the digest chain, and sav
 party does (`network.py`, `robot.py`, `miro_host`, `miro_robot`), files, and the wall clock.
 
 Order on the tick of a camera frame: networks by index; within one, all robots are exposed (slot order), all pilots
-compute, the station composes its frame. The air of all networks is settled up to the next camera frame. Then each
-robot runs alone to that tick (networks by index, slot order), the PC's receivers hear what came back, and the state is
-hashed. `run_to` may stop anywhere in between; it gives the same bits however it is cut.
+compute, the station composes its frame. Then everything runs piece by piece from rendezvous to rendezvous: the end of
+the control period, where the caller wants to stop, the contact grid. In a piece the transmitters put on the air what
+may come up before its end, the air of all networks is settled a little beyond it, each robot runs alone to it (networks
+by index, slot order), and the PC's receivers hear what came back. At the end of the period the state is hashed.
+How a run is cut into pieces does not change a bit of it.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from itertools import permutations
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -25,13 +27,18 @@ from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.scenario.keys import Scenario
+from miro_sim.world.bodies import Bodies, Pair
+from miro_sim.world.conditions import Condition
+from miro_sim.world.events import Event
 from miro_sim.world.network import Network
+from miro_sim.world.robot import Robot
+from miro_sim.world.waits import Waits
 
 ScriptRun = tuple[int, int, bytes]
 """(tick of the first start bit, network, bytes) to send in place of what the station would send."""
 
 MAX_SEED = (1 << 63) - 1
-SAVE_FORMAT = 2
+SAVE_FORMAT = 3
 """Raised whenever a saved world of before would no longer mean the same."""
 MOST_PERIODS = 1 << 34
 """Of a saved world: ticks up to then fit into 64 bits, and so do the products that are made of them."""
@@ -44,13 +51,22 @@ _NOT_A_STATE = (
 """What reading a state raises when it is not one."""
 
 
+class Mark(NamedTuple):
+    """A moment of a world: its state, and the records of the period under way, which are no state."""
+
+    tick: int
+    state: dict[str, Any]
+    records: list[Any]
+    touching: list[Pair]
+
+
 class World:
     """A deterministic machine: same scenario, same firmware, same seed, same bits.
 
     `script` replaces the stations' frames (replay): runs in tick order, which must not overlap on one network.
     """
 
-    NOT_STATE = ("scenario", "seed", "image", "periods", "last")
+    NOT_STATE = ("scenario", "seed", "image", "periods", "last", "bodies", "waits")
 
     def __init__(
         self, scenario: Scenario, seed: int, image: Image, script: Sequence[ScriptRun] | None = None
@@ -81,6 +97,8 @@ class World:
         self.stopped = False
         self.chain = b""
         self.last: Period | None = None
+        self.bodies = Bodies([robot for network in self.networks for robot in network.robots])
+        self.waits = Waits(self)
 
     @property
     def digest(self) -> str:
@@ -108,27 +126,105 @@ class World:
     def run_to(self, tick: int) -> None:
         """Moves everything on to `tick`, or to the control period in which a firmware fault stops the run."""
         while self.tick < tick and not self.stopped:
-            end_tick = (self.index + 1) * CONTROL_PERIOD_TICKS
-            if not self.in_period:
-                for network in self.networks:
-                    network.begin_period(self.tick, end_tick)
-                for network in self.networks:
-                    network.settle(end_tick)
-                self.in_period = True
-            self.tick = min(tick, end_tick)
-            for network in self.networks:
-                self.stopped = network.run(self.tick) or self.stopped
-            if self.tick == end_tick or self.stopped:
-                self._end_period()
+            self.begin_period()
+            self.run_piece(self.rendezvous(tick))
+            if self.tick == self.period_end or self.stopped:
+                self.end_period()
 
-    def _end_period(self) -> None:
-        wire = tuple(run for network in self.networks for run in network.end_period(self.tick))
+    def run_until(self, condition: Condition | Sequence[Condition], within: int | None = None) -> Event:
+        """Moves everything on to the first tick at which `condition`, or one of several, is true.
+
+        Returns the event. What happens behind it, also on the same tick, is left to the next wait; so is what
+        happened since the last wait, as far as the logs hold it (2048 events a robot). Only where the run stops
+        depends on a wait. `within`: ticks after which WaitExpired is raised, with what was seen meanwhile; default:
+        the end of the scenario. Raises ValueError for a network, robot, pin or symbol that is not there.
+
+            world.run_until(conditions.Answer(robot=0), within=ticks(0.040))
+        """
+        conditions = [condition] if isinstance(condition, Condition) else list(condition)
+        return self.waits.until(conditions, within)
+
+    def inject(self, data: bytes, network: int = 0, at_tick: int | None = None) -> int:
+        """Puts characters on the air of `network`; returns the tick of the first start bit.
+
+        Without `at_tick` they queue behind what is being sent, as in the FIFO of a serial port. Key-up and radio
+        apply as for the station's own; a frame of the station that meets a busy transmitter is dropped and counted.
+        Raises ValueError for a network that is not there, a tick before `earliest_tick`, and a transmitter that is
+        busy then.
+        """
+        return self._network(network).inject(data, at_tick, self.tick)
+
+    def earliest_tick(self, network: int = 0) -> int:
+        """The earliest tick for the first start bit of what is injected now."""
+        return self._network(network).earliest_tick(self.tick)
+
+    def _network(self, index: int) -> Network:
+        if not 0 <= index < len(self.networks):
+            raise ValueError(f"there is no network {index}; there are {len(self.networks)}, from 0 on")
+        return self.networks[index]
+
+    def robot(self, network: int = 0, slot: int = 0) -> Robot:
+        """The robot in `slot` of `network`. Raises ValueError where there is none."""
+        robots = self._network(network).robots
+        for robot in robots:
+            if robot.spec.slot == slot:
+                return robot
+        there = ", ".join(str(robot.spec.slot) for robot in robots)
+        raise ValueError(f"net{network} has no robot in slot {slot}; there is {there}")
+
+    # Pieces of a control period, for `run_to` and `waits`
+
+    @property
+    def period_end(self) -> int:
+        """Tick at which the control period ends that is under way, or begins now."""
+        return (self.index + 1) * CONTROL_PERIOD_TICKS
+
+    def begin_period(self) -> None:
+        """The camera frame, unless the period has begun already."""
+        if not self.in_period:
+            for network in self.networks:
+                network.begin_period(self.tick)
+            self.in_period = True
+
+    def rendezvous(self, tick: int) -> int:
+        """Where everything meets next, going to `tick`."""
+        return min(tick, self.period_end, self.bodies.next_tick(self.tick))
+
+    def run_piece(self, tick: int) -> None:
+        """Everything on to `tick`, which is no later than the end of the period."""
+        for network in self.networks:
+            network.send_due(tick)
+        for network in self.networks:
+            network.settle(tick)
+        self.tick = tick
+        for network in self.networks:
+            self.stopped = network.run(tick) or self.stopped
+        for network in self.networks:
+            network.hear(tick)
+        for one, other in self.bodies.look(tick):
+            self.networks[one.network].note_touch(tick, one, other)
+
+    def end_period(self) -> None:
+        """The records of the period that is over, and its link in the digest chain."""
+        wire = tuple(run for network in self.networks for run in network.end_period())
         robots = tuple(record for network in self.networks for record in network.seen)
         index, begun = self.index, self.index * CONTROL_PERIOD_TICKS
         self.in_period = False
         self.index += 1
-        self.chain = hashlib.sha256(self.chain + encode(self.snapshot())).digest()
+        self.chain = hashlib.sha256(self.chain + encode(self.hashed())).digest()
         self.last = Period(index=index, tick=begun, robots=robots, wire=wire, digest=self.digest)
+
+    def mark(self) -> Mark:
+        """Where the world is, to go back to within the same period."""
+        records = [network.records() for network in self.networks]
+        return Mark(self.tick, self.snapshot(), records, self.bodies.touching)
+
+    def go_back(self, mark: Mark) -> None:
+        """To where `mark` was given."""
+        self.restore(mark.state)
+        for network, records in zip(self.networks, mark.records, strict=True):
+            network.put_back(records)
+        self.bodies.touching = mark.touching
 
     def counters(self) -> dict[str, dict[str, int | None]]:
         """The `link` part of the summary, and the counted part of `firmware`, over all robots."""
@@ -152,6 +248,12 @@ class World:
 
     def snapshot(self) -> dict[str, object]:
         """Every mutable bit of the world, as nested plain values."""
+        state = self.hashed()
+        state["networks"] = [{**network.snapshot(), **network.pending()} for network in self.networks]
+        return state
+
+    def hashed(self) -> dict[str, object]:
+        """The same without input that waits to be sent: what the digest is made of."""
         return {
             "tick": self.tick,
             "index": self.index,
@@ -171,7 +273,7 @@ class World:
         self.chain = msgspec.convert(state["chain"], bytes)
         for network, saved in zip(self.networks, state["networks"], strict=True):
             network.restore(saved)
-            network.check_times(begun, self.tick, self.in_period)
+            network.check_times(begun, self.tick)
 
     def save(self) -> bytes:
         """The whole state as bytes, to go on from with `load`: at any tick, also in the middle of a byte.
@@ -201,6 +303,7 @@ class World:
         except _NOT_A_STATE as error:
             reason = error if isinstance(error, ValueError) else repr(error)
             raise ValueError(f"not a saved world: {' '.join(str(reason).split())[:200]}") from error
+        self.waits.forget()
 
     def _identity(self) -> dict[str, object]:
         scenario = hashlib.sha256(msgspec.json.encode(self.scenario, order="sorted")).hexdigest()

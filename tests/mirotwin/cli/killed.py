@@ -21,13 +21,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from tests import children
+
 from miro_sim.periods import Period
 from mirotwin import runner
 from mirotwin.cli import main
 from mirotwin.recording import reader as recording_reader
 from mirotwin.recording.recorder import Recorder
-
-from tests import children
 
 LONGEST_LOSS_S = 0.5
 LATEST_KILL_S = 2.0

@@ -1,0 +1,144 @@
+"""What happened in a world, for those who wait: one record an event, from the logs of the boards and of the PC.
+
+What belongs here: the record, the PC's log, and reading the boards' logs. What does not: what somebody waits for
+(`conditions.py`) and the waiting (`waits.py`).
+
+    what        at the tick at which                                          fields
+    sent        the first start bit of a host's transmission leaves           data
+    heard       the PC has sampled the stop bit of a character                value, good_stop
+    answer      the PC has sampled the last stop bit of a robot's answer      frame, slot
+    received    a robot's serial port sets RI for a character                 value, good_stop
+    transmitted a robot's serial port sets TI for a character                 value
+    frame       ... for the last character of a valid frame                   frame
+    command     an LM629 has taken the last byte of a command                 side, opcode, data
+    fault       the firmware did what it must not                             value (the kind), address
+    reached     the instruction at an address is next                         address
+    edge        a pin changes                                                 pin, value (the new level)
+    true        a predicate is true                                           -
+    touch       two robots have begun to touch, seen every millisecond        value (slot), other (network, slot)
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+
+import msgspec
+
+from miro_protocol.events import Received
+from miro_robot import event_log
+from miro_robot.event_log import EventLog
+from miro_robot.lm629.commands import BY_OPCODE
+
+PC = -1
+"""Slot of what happens at the PC."""
+SIDES = ("left", "right")
+KEPT = 4096
+Symbol = tuple[int, bool, int]
+"""Character, whether its stop bit was good, start tick."""
+
+
+class Event(msgspec.Struct, frozen=True, kw_only=True):
+    """Something that happened at `tick`, on a robot or (`slot` -1) at the PC of a network."""
+
+    tick: int
+    what: str
+    network: int = 0
+    slot: int = PC
+    value: int = 0
+    good_stop: bool = True
+    data: bytes = b""
+    side: str = ""
+    opcode: int = -1
+    address: int = -1
+    pin: str = ""
+    other: tuple[int, int] | None = None
+    frame: Received | None = None
+
+    def __str__(self) -> str:
+        where = f"net{self.network}/" + ("pc" if self.slot == PC else f"robot{self.slot}")
+        return f"tick {self.tick}: {where}: {self.what}{self._detail()}"
+
+    def _detail(self) -> str:
+        if self.what in ("heard", "received", "transmitted"):
+            return f" {self.value:02X}h{'' if self.good_stop else ' with a bad stop bit'}"
+        if self.what == "command":
+            known = BY_OPCODE.get(self.opcode)
+            name = f"{self.opcode:02X}h" if known is None else known.name
+            return f" {self.side} {name} {self.data.hex(' ')}".rstrip()
+        if self.what == "edge":
+            return f" {self.pin} to {self.value}"
+        if self.what in ("reached", "fault"):
+            return f" {self.address:#06x}"
+        if self.what == "sent":
+            return f" {len(self.data)} characters"
+        return ""
+
+
+class HostLog:
+    """The last 4096 events at the PC of one network, with serial numbers as a board's log has them.
+
+    `known_tick`: when a symbol is known whose start bit began at a tick. Symbols become events when they are asked for.
+    """
+
+    NOT_STATE = ("network", "known_tick", "end", "kept")
+
+    def __init__(self, network: int, known_tick: Callable[[int], int]) -> None:
+        self.network = network
+        self.known_tick = known_tick
+        self.end = 0
+        self.kept: deque[Event | Symbol] = deque(maxlen=KEPT)
+
+    @property
+    def first(self) -> int:
+        return self.end - len(self.kept)
+
+    def note(self, event: Event) -> None:
+        self.kept.append(event)
+        self.end += 1
+
+    def note_heard(self, symbols: Sequence[Symbol]) -> None:
+        self.kept.extend(symbols)
+        self.end += len(symbols)
+
+    def since(self, serial: int) -> Iterator[tuple[int, Event]]:
+        """(serial number, event) of those from `serial` on that are kept."""
+        for place in range(max(0, serial - self.first), len(self.kept)):
+            one = self.kept[place]
+            yield self.first + place, one if isinstance(one, Event) else self._heard(*one)
+
+    def _heard(self, value: int, good_stop: bool, start_tick: int) -> Event:
+        tick = self.known_tick(start_tick)
+        return Event(tick=tick, what="heard", network=self.network, value=value, good_stop=good_stop)
+
+    def cut(self, serial: int) -> None:
+        """Forgets the events from `serial` on."""
+        while self.end > serial and self.kept:
+            self.kept.pop()
+            self.end -= 1
+
+
+def of_board(log: EventLog, serial: int, network: int, slot: int) -> Iterator[tuple[int, Event]]:
+    """(serial number, event) of a board's events from `serial` on that are kept."""
+    for number in range(max(serial, log.first), log.end):
+        tick, kind, code, size, value = log.event(number)
+        yield number, _event(tick, kind, code, size, value, network, slot)
+
+
+def _event(tick: int, kind: int, code: int, size: int, value: int, network: int, slot: int) -> Event:
+    if kind == event_log.COMMAND:
+        data = value.to_bytes(size, "big")
+        side, opcode = SIDES[code >> 8], code & 0xFF
+        return Event(
+            tick=tick, what="command", network=network, slot=slot, side=side, opcode=opcode, data=data
+        )
+    if kind == event_log.RECEIVED:
+        good = code == 1
+        return Event(tick=tick, what="received", network=network, slot=slot, value=value, good_stop=good)
+    if kind == event_log.SENT:
+        return Event(tick=tick, what="transmitted", network=network, slot=slot, value=value)
+    if kind == event_log.FAULT:
+        return Event(tick=tick, what="fault", network=network, slot=slot, value=code, address=value)
+    if kind == event_log.TRUE:
+        return Event(tick=tick, what="true", network=network, slot=slot)
+    return Event(tick=tick, what="reached", network=network, slot=slot, value=code, address=value)

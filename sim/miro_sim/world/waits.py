@@ -1,0 +1,185 @@
+"""Waiting in virtual time: moves a world to the first tick at which something that was asked for is true.
+
+What belongs here: the search for that tick. What does not: what can be asked for (`conditions.py`), what has to be
+watched for it (`watch.py`), what an event is (`events.py`), and moving the world (`world.py`).
+
+The world runs in pieces that end before the control period does. If what was asked for happened inside one, the world
+goes back to the piece's begin and runs again to the tick of the event: a run gives the same bits however it is cut, so
+nothing is lost and nothing is changed. Events behind that tick are left to the next wait.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from miro_exact.clock import NEVER_TICK
+from miro_protocol.decoder import Decoder, Received
+from miro_sim.world.conditions import Condition
+from miro_sim.world.events import PC, Event, of_board
+from miro_sim.world.watch import Watch
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import Mark, World
+
+FIRST_PIECE_TICKS = 24_000
+"""1 ms. Pieces double up to the end of the control period: most waits are short, and a piece costs a snapshot."""
+SEEN_AT_MOST = 1000
+Key = tuple[int, int, int, int]
+"""Order of events: (tick, network, slot, serial number in its log)."""
+Entry = tuple[Key, Event]
+
+
+class WaitExpired(TimeoutError):
+    """What was asked for did not happen in time. `seen`: the events meanwhile, at most the last 1000."""
+
+    def __init__(self, conditions: Sequence[Condition], tick: int, why: str, seen: Sequence[Event]) -> None:
+        self.conditions = tuple(conditions)
+        self.tick = tick
+        self.seen = list(seen)
+        wanted = " or ".join(map(str, conditions))
+        last = (
+            f"; the last of {len(self.seen)} events: {self.seen[-1]}" if self.seen else "; nothing happened"
+        )
+        super().__init__(f"tick {tick}: {why} without {wanted}{last}")
+
+
+class Waits:
+    """The waits of one world, and what happened since the last one ended.
+
+    `backlog`: events that no wait has consumed. `read`: by network and slot, up to where its log was read.
+    `reached`: the number of the instruction at which a wait ended before it was executed.
+    """
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.forget()
+
+    def forget(self) -> None:
+        """The world was put somewhere else: nothing that happened before counts."""
+        self.backlog: list[Entry] = []
+        self.read: dict[tuple[int, int], int] = {}
+        self.reached: dict[tuple[int, int], int] = {}
+        self.decoders: dict[tuple[int, int], Decoder] = {}
+        for index, network in enumerate(self.world.networks):
+            self.read[index, PC] = network.log.end
+            for robot in network.robots:
+                self.read[index, robot.spec.slot] = robot.board.log.end
+                self.decoders[index, robot.spec.slot] = Decoder(network.spec.robots)
+
+    def until(self, conditions: Sequence[Condition], within: int | None) -> Event:
+        """See `World.run_until`."""
+        world = self.world
+        if within is not None and within < 0:
+            raise ValueError(f"within {within}: give a number of ticks that is not negative")
+        deadline = NEVER_TICK if within is None else world.tick + within
+        seen: list[Event] = []
+        with Watch(world, conditions) as watch:
+            self.backlog += watch.true_now()
+            self._gather(watch)
+            found = self._consume(watch, world.tick, seen)
+            piece = FIRST_PIECE_TICKS
+            while found is None:
+                if world.finished or world.tick >= deadline:
+                    why = "the run ended" if world.finished else f"{within} ticks passed"
+                    raise WaitExpired(conditions, world.tick, why, seen)
+                self._run_piece(watch, min(deadline, world.tick + piece))
+                found = self._consume(watch, world.tick, seen)
+                piece *= 2
+            self._close_period()
+            self.backlog += watch.rest()
+        return found
+
+    def _run_piece(self, watch: Watch, until_tick: int) -> None:
+        """Runs to `until_tick`, the end of the control period, or the first event that is wanted."""
+        world = self.world
+        world.begin_period()
+        until_tick = world.rendezvous(until_tick)
+        place, mark = _Place(self, watch), world.mark()
+        world.run_piece(until_tick)
+        self._gather(watch)
+        first = min((key for key, event in self.backlog if watch.wants(event)), default=None)
+        if first is not None and first[0] < until_tick:
+            self._again_to(watch, place, mark, max(first[0], mark.tick))
+            if not any(key == first for key, _ in self.backlog):  # it begins where an instruction does
+                self._again_to(watch, place, mark, max(first[0], mark.tick) + 1)
+        if first is None:
+            self._close_period()
+
+    def _again_to(self, watch: Watch, place: _Place, mark: Mark, tick: int) -> None:
+        """Goes back and runs the piece again, to `tick`."""
+        self.world.go_back(mark)
+        self._go_back(place)
+        watch.begin_again(place.next_edge)
+        self.world.run_piece(tick)
+        self._gather(watch)
+
+    def _close_period(self) -> None:
+        world = self.world
+        if world.in_period and (world.tick == world.period_end or world.stopped):
+            world.end_period()
+
+    def _consume(self, watch: Watch, until_tick: int, seen: list[Event]) -> Event | None:
+        """Takes events out of the backlog, in order, up to `until_tick` or the first that is wanted."""
+        self.backlog.sort(key=lambda entry: entry[0])
+        found = None
+        count = 0
+        for key, event in self.backlog:
+            if key[0] > until_tick:
+                break
+            count += 1
+            if event.what == "reached":
+                self.reached[event.network, event.slot] = event.value
+            if watch.wants(event):
+                found = event
+                break
+            seen.append(event)
+        del self.backlog[:count]
+        del seen[:-SEEN_AT_MOST]
+        return found
+
+    # What happened
+
+    def _gather(self, watch: Watch) -> None:
+        """Reads what is new in all logs."""
+        for index, network in enumerate(self.world.networks):
+            for serial, event in network.log.since(self.read[index, PC]):
+                self.backlog.append(((event.tick, index, PC, serial), event))
+            self.read[index, PC] = network.log.end
+            for robot in network.robots:
+                place = (index, robot.spec.slot)
+                for serial, event in of_board(robot.board.log, self.read[place], *place):
+                    if event.what == "reached" and self.reached.get(place) == event.value:
+                        continue  # a wait has ended before this instruction already
+                    self.backlog.append(((event.tick, *place, serial), event))
+                    if event.what == "received":
+                        self._decode(place, serial, event)
+                self.read[place] = robot.board.log.end
+        self.backlog += watch.edges()
+
+    def _decode(self, place: tuple[int, int], serial: int, event: Event) -> None:
+        """Gives a character to the robot's decoder; a frame that it completes is an event right behind it."""
+        symbol = (event.value, event.good_stop, event.tick)
+        for result in self.decoders[place].feed_symbols([symbol]):
+            if isinstance(result, Received):
+                network, slot = place
+                frame = Event(tick=event.tick, what="frame", network=network, slot=slot, frame=result)
+                self.backlog.append(((event.tick, network, slot, serial), frame))
+
+    # Going back
+
+    def _go_back(self, place: _Place) -> None:
+        self.backlog = list(place.backlog)
+        self.read = dict(place.read)
+        for key, state in place.decoders.items():
+            self.decoders[key].restore(state)
+
+
+class _Place:
+    """What a wait had seen at the begin of a piece."""
+
+    def __init__(self, waits: Waits, watch: Watch) -> None:
+        self.next_edge = watch.next_edge
+        self.backlog = list(waits.backlog)
+        self.read = dict(waits.read)
+        self.decoders = {place: decoder.snapshot() for place, decoder in waits.decoders.items()}

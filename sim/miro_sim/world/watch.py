@@ -1,0 +1,148 @@
+"""What has to be watched for the conditions of one wait: marked addresses, pins, predicates.
+
+What belongs here: turning conditions into what robots look out for, and taking it away again. What does not: moving the
+world and the order of events (`waits.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from miro_exact.clock import CYCLE_TICKS
+from miro_sim.world.conditions import Condition, Edge, Reached, When, place_of
+from miro_sim.world.events import PC, Event
+from miro_sim.world.pins import PINS, PinWatch
+
+if TYPE_CHECKING:
+    from miro_sim.world.robot import Robot
+    from miro_sim.world.world import World
+
+_EDGES, _TRUE = 1 << 40, 1 << 41
+"""Serial numbers of events that are in no log begin here."""
+
+
+class Watch:
+    """A context: within it the robots of `world` look out for `conditions`.
+
+    Raises ValueError for a network, slot, pin or symbol that is not there.
+    """
+
+    def __init__(self, world: World, conditions: Sequence[Condition]) -> None:
+        self.world = world
+        self.conditions = [self._resolved(condition) for condition in conditions]
+        self.pins: dict[tuple[int, int], PinWatch] = {}
+        self.next_edge = _EDGES
+
+    def __enter__(self) -> Watch:
+        for condition in self.conditions:
+            robot = self._robot(condition)
+            if isinstance(condition, Reached):
+                assert robot is not None
+                robot.marks = (*robot.marks, condition.address)
+            elif isinstance(condition, When):
+                assert robot is not None
+                robot.asked.append((condition.predicate, condition.at))
+        self.begin_again(_EDGES)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for network in self.world.networks:
+            for robot in network.robots:
+                robot.marks = ()
+                robot.asked = []
+        self._close_pins()
+
+    def wants(self, event: Event) -> bool:
+        """Whether one of the conditions is met by `event`."""
+        for condition in self.conditions:
+            if (event.network, event.slot) == (condition.network, condition.slot) and condition.met_by(event):
+                return True
+        return False
+
+    # Pins
+
+    def begin_again(self, next_edge: int) -> None:
+        """Picks the pins up where the world is now; their edges are numbered from `next_edge` on."""
+        self.next_edge = next_edge
+        self._close_pins()
+        pins: dict[tuple[int, int], set[str]] = {}
+        for condition in self.conditions:
+            if isinstance(condition, Edge):
+                assert condition.slot is not None
+                pins.setdefault((condition.network, condition.slot), set()).add(condition.pin)
+        for (network, slot), names in pins.items():
+            self.pins[network, slot] = PinWatch(self.world.robot(network, slot).board, frozenset(names))
+
+    def edges(self) -> list[tuple[tuple[int, int, int, int], Event]]:
+        """The edges up to where the world is that were not taken yet."""
+        return self._taken(lambda pins: self.world.tick)
+
+    def rest(self) -> list[tuple[tuple[int, int, int, int], Event]]:
+        """Those behind that the CPU has made already, in the instruction with which it went past that tick."""
+        return self._taken(lambda pins: pins.board.cpu.cycles * CYCLE_TICKS)
+
+    def _taken(self, known_tick: Callable[[PinWatch], int]) -> list[tuple[tuple[int, int, int, int], Event]]:
+        found = []
+        for (network, slot), pins in self.pins.items():
+            for tick, pin, level in pins.take(known_tick(pins)):
+                edge = Event(tick=tick, what="edge", network=network, slot=slot, pin=pin, value=level)
+                found.append(((tick, network, slot, self.next_edge), edge))
+                self.next_edge += 1
+        return found
+
+    def _close_pins(self) -> None:
+        for pins in self.pins.values():
+            pins.close()
+        self.pins = {}
+
+    # Predicates
+
+    def true_now(self) -> list[tuple[tuple[int, int, int, int], Event]]:
+        """Predicates that are true before anything moves."""
+        tick = self.world.tick
+        found = []
+        for condition in self.conditions:
+            robot = self._robot(condition)
+            if isinstance(condition, When) and robot is not None and condition.predicate(robot):
+                network, slot = condition.network, robot.spec.slot
+                event = Event(tick=tick, what="true", network=network, slot=slot)
+                found.append(((tick, network, slot, _TRUE), event))
+        return found
+
+    # What the conditions mean
+
+    def _robot(self, condition: Condition) -> Robot | None:
+        if condition.slot is None or condition.slot == PC:
+            return None
+        return self.world.robot(condition.network, condition.slot)
+
+    def _resolved(self, condition: Condition) -> Condition:
+        """The condition with its slot, and with the address that it means."""
+        networks = self.world.networks
+        if not 0 <= condition.network < len(networks):
+            raise ValueError(f"there is no network {condition.network}; there are {len(networks)}, from 0 on")
+        slot = place_of(condition, networks[condition.network].robots[0].spec.slot)
+        if slot != PC:
+            self.world.robot(condition.network, slot)
+        if isinstance(condition, Edge) and condition.pin not in PINS:
+            raise ValueError(f"{condition.pin!r} is no pin; there are {', '.join(PINS)}")
+        if isinstance(condition, Reached):
+            condition = msgspec.structs.replace(condition, address=self._address(condition.place))
+        return msgspec.structs.replace(condition, slot=slot)
+
+    def _address(self, place: int | str) -> int:
+        if isinstance(place, int):
+            if not 0 <= place <= 0xFFFF:
+                raise ValueError(f"{place} is no address: give 0 to 0xffff")
+            return place
+        symbol = self.world.image.symbols.find(place)
+        if symbol is None or symbol.space != "code":
+            what = "is no symbol of" if symbol is None else "is not in code memory:"
+            raise ValueError(f"{place!r} {what} {self.world.image.path}")
+        return symbol.address

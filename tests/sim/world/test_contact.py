@@ -1,0 +1,125 @@
+"""Robots that touch are reported on the contact grid, and nothing else comes of it."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.sim.world.rig import image
+
+from miro_host.posture import Posture
+from miro_sim.pitch.contact import GRID_TICKS, next_look, touch
+from miro_sim.pitch.ground import ROBOT_HALF_M as HALF_M
+from miro_sim.plant.params import DriveParams
+from miro_sim.scenario import file
+from miro_sim.world import conditions as wait
+from miro_sim.world.world import World
+
+HEAD_ON = """
+name = "head-on"
+duration_s = 1.0
+
+[camera]
+noise = "none"
+
+[[network]]
+
+[[network.robot]]
+slot = 0
+reference.kind = "line"
+reference.speed_m_s = 0.3
+
+[[network.robot]]
+slot = 1
+start_error_x_cm = {gap_cm}
+reference.kind = "line"
+reference.speed_m_s = 0.0
+"""
+PLACES = st.floats(-0.2, 0.2)
+HEADINGS = st.floats(-3.2, 3.2)
+
+
+def corners(posture):
+    cos, sin = math.cos(posture.theta_rad), math.sin(posture.theta_rad)
+    for ahead, aside in ((1, 1), (1, -1), (-1, -1), (-1, 1)):
+        x, y = ahead * HALF_M, aside * HALF_M
+        yield posture.x_m + x * cos - y * sin, posture.y_m + x * sin + y * cos
+
+
+def clipped(polygon, inside_of):
+    """The part of a convex polygon inside another one, edge by edge (Sutherland and Hodgman)."""
+    edges = list(inside_of)
+    for (ax, ay), (bx, by) in zip(edges, edges[1:] + edges[:1], strict=True):
+        side = [(bx - ax) * (y - ay) - (by - ay) * (x - ax) for x, y in polygon]
+        result = []
+        for index, (x, y) in enumerate(polygon):
+            before = index - 1
+            if (side[index] <= 0) != (side[before] <= 0):
+                px, py = polygon[before]
+                part = side[before] / (side[before] - side[index])
+                result.append((px + part * (x - px), py + part * (y - py)))
+            if side[index] <= 0:
+                result.append((x, y))
+        polygon = result
+        if not polygon:
+            return 0.0
+    pairs = zip(polygon, polygon[1:] + polygon[:1], strict=True)
+    return abs(sum(x * v - u * y for (x, y), (u, v) in pairs)) / 2
+
+
+@given(PLACES, PLACES, HEADINGS, PLACES, PLACES, HEADINGS)
+def test_squares_touch_where_their_common_area_is_not_empty(x, y, theta, u, v, phi):
+    one, other = Posture(x, y, theta), Posture(u, v, phi)
+    area = clipped(list(corners(one)), list(corners(other)))
+    if area > 1e-9:
+        assert touch(one, other)
+    grown = clipped([*corners(one)], [*corners(other)])
+    if not touch(one, other):
+        assert grown <= 1e-9
+    assert touch(one, other) == touch(other, one)
+
+
+def test_squares_side_by_side_touch_up_to_their_edges():
+    assert touch(Posture(0, 0, 0), Posture(2 * HALF_M, 0.01, 0))
+    assert not touch(Posture(0, 0, 0), Posture(2 * HALF_M + 1e-9, 0.01, 0))
+    assert touch(Posture(0, 0, 0), Posture(HALF_M * (1 + math.sqrt(2)) - 1e-9, 0, math.pi / 4))
+    assert not touch(Posture(0, 0, 0), Posture(HALF_M * (1 + math.sqrt(2)) + 1e-9, 0, math.pi / 4))
+
+
+def test_no_look_is_needed_before_they_can_meet():
+    speed = 2 * DriveParams().top_speed_m_s()
+    far = next_look(0, Posture(0, 0, 0), Posture(1, 0, 0), speed)
+    assert far % GRID_TICKS == 0
+    assert 0.13 < far / 24e6 < 0.30
+    assert next_look(5, Posture(0, 0, 0), Posture(0.1, 0, 0), speed) == GRID_TICKS
+
+
+def head_on(gap_cm):
+    return World(file.parse(HEAD_ON.format(gap_cm=gap_cm), "head-on"), 3, image())
+
+
+def test_two_robots_that_meet_are_reported_at_the_first_tick_of_the_grid_at_which_they_touch():
+    world = head_on(10.0)
+    event = world.run_until(wait.Touch())
+    assert (event.value, event.other, event.tick % GRID_TICKS) == (0, (0, 1), 0)
+    for tick, touching in ((event.tick - GRID_TICKS, False), (event.tick, True)):
+        other = head_on(10.0)
+        other.run_to(tick)
+        one, two = (Posture(*robot.drive.pose_at(tick)) for robot in other.networks[0].robots)
+        assert touch(one, two) is touching
+
+
+@pytest.mark.parametrize("cut_ticks", [7_777, 100_003, 24_000])
+def test_a_report_does_not_depend_on_how_the_run_is_cut_and_changes_no_bit(cut_ticks):
+    whole, cut = head_on(10.0), head_on(10.0)
+    end_tick = 20 * 800_800
+    whole.run_to(end_tick)
+    while cut.tick < end_tick:
+        cut.run_to(min(end_tick, cut.tick + cut_ticks))
+    assert cut.digest == whole.digest
+    reports = [
+        [e for _, e in world.networks[0].log.since(0) if getattr(e, "what", "") == "touch"]
+        for world in (whole, cut)
+    ]
+    assert reports[0] == reports[1]
+    assert len(reports[0]) >= 1

@@ -1,0 +1,142 @@
+"""Characters from outside: when they go on the air, what they meet there, and that nothing else changes."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.sim.world.rig import PERIOD, fig6, two_networks
+
+from miro_exact.clock import HOST_CHARACTER_TICKS
+from miro_protocol.frames import TeamFrame, encode
+from miro_sim.world import conditions as wait
+
+FRAME = encode(TeamFrame(0, 5, ((100, 100), (0, 0), (0, 0))), 3)
+KEYUP_TICKS = 24_000
+
+
+def silent(**options):
+    return two_networks("host = 'silent'", **options)
+
+
+def recorded(periods=6):
+    """What the hosts of a run sent, and its digest with the same as a script."""
+    world = two_networks()
+    runs = []
+    for _ in range(periods):
+        runs += [(run.tick, run.network, run.data) for run in world.step().wire if run.direction == ">"]
+    scripted = two_networks(script=runs)
+    scripted.run_to(periods * PERIOD)
+    return runs, scripted.digest
+
+
+def test_a_silent_host_sends_nothing_by_itself():
+    world = silent()
+    periods = [world.step() for _ in range(3)]
+    assert {run.network for period in periods for run in period.wire if run.direction == ">"} == {1}
+
+
+def test_injected_bytes_of_a_recording_give_the_digest_of_a_scripted_run():
+    runs, digest = recorded()
+    world = two_networks(script=[])
+    for tick, network, data in runs:
+        world.run_to(max(world.tick, tick - 2 * PERIOD + 1))
+        world.inject(data, network, tick)
+    world.run_to(6 * PERIOD)
+    assert world.digest == digest
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.data())
+def test_when_input_is_announced_changes_nothing(data):
+    runs, digest = recorded(4)
+    world = two_networks(script=[])
+    for tick, network, sent in runs:
+        latest = tick - 120 - KEYUP_TICKS
+        world.run_to(data.draw(st.integers(min(world.tick, latest), latest)))
+        world.inject(sent, network, tick)
+    world.run_to(4 * PERIOD)
+    assert world.digest == digest
+
+
+def test_a_robot_hears_an_injected_frame():
+    world = silent()
+    tick = world.inject(FRAME)
+    event = world.run_until(wait.Frame(), within=PERIOD)
+    assert event.frame.message(3).velocities[0] == (100, 100)
+    assert tick + len(FRAME) * HOST_CHARACTER_TICKS > event.tick > tick + 22 * HOST_CHARACTER_TICKS
+
+
+def test_the_earliest_tick_is_kept_and_the_one_before_refused():
+    world = silent()
+    world.run_to(1_000_000)
+    earliest = world.earliest_tick()
+    assert earliest == 1_000_000 + 120 + KEYUP_TICKS
+    with pytest.raises(
+        ValueError, match=f"net0: tick {earliest - 1} is too early; the earliest is {earliest}"
+    ):
+        world.inject(FRAME, at_tick=earliest - 1)
+    assert world.inject(FRAME, at_tick=earliest) == earliest
+
+
+def test_without_a_tick_characters_queue_behind_each_other():
+    world = silent()
+    first = world.inject(b"\x55\x55")
+    assert world.inject(b"\x55") == first + 2 * HOST_CHARACTER_TICKS
+    assert world.inject(b"\x55") == first + 3 * HOST_CHARACTER_TICKS
+
+
+def test_a_transmission_over_another_one_is_refused():
+    world = silent()
+    world.inject(FRAME, at_tick=100_000)
+    busy = 100_000 + len(FRAME) * HOST_CHARACTER_TICKS
+    with pytest.raises(ValueError, match=f"the transmitter is busy from tick 100000 to {busy}"):
+        world.inject(b"\x00", at_tick=busy - 1)
+    world.run_to(150_000)
+    with pytest.raises(ValueError, match=f"busy until tick {busy}"):
+        world.inject(b"\x00", at_tick=busy - 1)
+    assert world.inject(b"\x00", at_tick=busy) == busy
+
+
+def test_a_frame_of_the_station_that_meets_a_busy_transmitter_is_dropped_and_counted():
+    world = fig6()
+    world.inject(b"\x55" * 4, at_tick=90_000)
+    world.step()
+    assert world.networks[0].outbox.dropped == 1
+    assert [run.data for run in world.last.wire if run.direction == ">"] == [b"\x55" * 4]
+    world.step()
+    assert world.networks[0].outbox.dropped == 1
+
+
+def test_an_injection_into_a_frame_of_the_station_is_refused():
+    world = fig6()
+    world.run_to(1000)
+    with pytest.raises(ValueError, match="the transmitter is busy from tick 96000"):
+        world.inject(b"\x55", at_tick=97_000)
+
+
+@pytest.mark.parametrize("network", [-1, 2])
+def test_a_network_that_is_not_there_is_refused(network):
+    with pytest.raises(ValueError, match=f"there is no network {network}; there are 2"):
+        silent().inject(FRAME, network)
+
+
+@pytest.mark.parametrize("data", [b"", bytes((1 << 20) + 1)])
+def test_no_characters_or_too_many_are_refused(data):
+    with pytest.raises(ValueError, match=f"net0: {len(data)} characters; give 1 to 1048576"):
+        silent().inject(data)
+
+
+def test_what_waits_to_be_sent_is_saved_but_not_part_of_the_digest():
+    world = silent()
+    world.step()
+    world.inject(FRAME, at_tick=3 * PERIOD)
+    other = silent()
+    other.load(world.save())
+    other.step()
+    without = silent()
+    without.step()
+    without.step()
+    assert other.digest == without.digest
+    other.run_to(5 * PERIOD)
+    world.run_to(5 * PERIOD)
+    assert other.digest == world.digest
+    assert other.networks[0].frames_sent == 1

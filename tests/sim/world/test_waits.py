@@ -1,0 +1,244 @@
+"""Waiting in virtual time: a wait ends at the first tick at which something is true, and loses nothing."""
+
+import contextlib
+import io
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.robot.inspect import reading
+from tests.sim.world.rig import PERIOD, fig6, two_networks
+
+from miro_exact.clock import LM629_SAMPLE_TICKS, ticks
+from miro_robot.inspect.waveform import Waveform
+from miro_sim.world import conditions as wait
+from miro_sim.world.waits import WaitExpired
+
+WAITS = {
+    "sent": wait.Sent(),
+    "byte": wait.Byte(),
+    "byte sent": wait.Byte(sent=True),
+    "frame": wait.Frame(),
+    "command": wait.Command(name="STT", side="right"),
+    "symbol": wait.Reached(place="motion_velocity"),
+    "edge of rxd": wait.Edge(pin="rxd"),
+    "edge of pwm": wait.Edge(pin="left.pwm"),
+    "answer": wait.Answer(),
+    "heard": wait.Heard(),
+    "moving": wait.When(predicate=lambda robot: robot.board.left.real_position > 2),
+}
+
+
+def all_events(world, condition, until_tick):
+    """Every event that fulfils the condition, one wait after the other."""
+    found = []
+    while True:
+        try:
+            found.append(world.run_until(condition, within=until_tick - world.tick))
+        except WaitExpired:
+            return found
+
+
+@pytest.fixture(scope="module")
+def uncut():
+    world = fig6()
+    world.run_to(8 * PERIOD)
+    return world.digest
+
+
+@pytest.mark.parametrize("name", WAITS)
+def test_a_wait_changes_no_bit_of_the_run(name, uncut):
+    world = fig6()
+    for _ in range(3):
+        world.run_until(WAITS[name], within=6 * PERIOD)
+    assert world.tick < 8 * PERIOD
+    world.run_to(8 * PERIOD)
+    assert world.digest == uncut
+
+
+@pytest.mark.parametrize("pin", ["rxd", "txd", "left.pwm", "right.sign", "left.wr", "P1.0", "P0.3"])
+def test_consecutive_waits_for_a_pin_find_the_edges_of_the_full_waveform(pin):
+    end_tick = 3 * PERIOD
+    watched = fig6()
+    out = io.StringIO()
+    board = watched.robot().board
+    waveform = Waveform(out, board).attach(board.cpu)
+    watched.run_to(end_tick + 4096)
+    waveform.close()
+    wire = {"left.pwm": "left_pwm", "right.sign": "right_sign", "left.wr": "left_wr_n"}.get(pin, pin)
+    wire = f"p{pin[1]}_{pin[3]}" if pin[0] == "P" else wire
+    expected = reading.read(out.getvalue().encode()).wires[wire][1:]
+    expected = [change for change in expected if change[0] <= end_tick]
+    world = fig6()
+    found = [(edge.tick, edge.value) for edge in all_events(world, wait.Edge(pin=pin), end_tick)]
+    assert found == expected
+    assert expected or pin == "right.sign"
+
+
+def test_a_wait_ends_where_the_pin_has_changed_and_not_a_tick_before():
+    world = fig6()
+    edge = world.run_until(wait.Edge(pin="txd", level=0), within=4 * PERIOD)
+    assert world.tick == edge.tick
+    again = fig6()
+    again.run_to(edge.tick - 12)
+    assert again.robot().board.cpu.txd.level_at(edge.tick - 1) == 1
+    again.run_to(edge.tick + 12)
+    assert again.robot().board.cpu.txd.level_at(edge.tick) == 0
+
+
+def test_a_wait_for_a_symbol_ends_before_its_instruction():
+    world = fig6()
+    reached = world.run_until(wait.Reached(place="main"))
+    cpu = world.robot().board.cpu
+    assert cpu.pc == reached.address == world.image.symbols.find("main").address
+    assert 12 * cpu.cycles == world.tick == reached.tick
+
+
+def test_the_next_wait_for_the_same_address_ends_at_its_next_execution():
+    world = fig6()
+    place = world.image.symbols.find("motion_velocity").address
+    counts = [world.run_until(wait.Reached(place=place)).value for _ in range(6)]
+    assert counts == sorted(set(counts))
+
+
+def test_every_command_of_a_run_is_found_one_wait_after_the_other():
+    full, world = fig6(), fig6()
+    expected = []
+    for _ in range(4):
+        full.step()
+    found = all_events(world, wait.Command(side="left"), 4 * PERIOD)
+    assert [event.tick for event in found] == sorted(event.tick for event in found)
+    robot = world.robot()
+    log = robot.board.log
+    expected = [log.event(serial)[:3] for serial in range(log.first, log.end) if log.event(serial)[1] == 2]
+    assert [event.tick for event in found] == [tick for tick, _, code in expected if code >> 8 == 0]
+
+
+def test_what_happens_between_two_waits_is_not_lost():
+    world = fig6()
+    first = world.run_until(wait.Answer(), within=4 * PERIOD)
+    world.run_to(first.tick + 4 * PERIOD)
+    second = world.run_until(wait.Answer(), within=1)
+    assert first.tick < second.tick < world.tick
+    other = fig6()
+    other.run_until(wait.Answer())
+    assert other.run_until(wait.Answer()).tick == second.tick
+
+
+def test_one_of_several_conditions_is_enough():
+    world = fig6()
+    event = world.run_until([wait.Answer(), wait.Command(name="STT")], within=4 * PERIOD)
+    assert event.what == "command"
+
+
+def test_a_predicate_is_asked_at_the_samples_of_the_robot():
+    world = fig6()
+    asked = []
+
+    def moved(robot):
+        asked.append(12 * robot.board.cpu.cycles)
+        return robot.board.left.real_position > 2
+
+    event = world.run_until(wait.When(predicate=moved), within=8 * PERIOD)
+    assert world.tick == event.tick
+    reset = fig6()
+    reset.run_to(event.tick)
+    assert reset.robot().board.left.real_position > 2
+    assert reset.robot().board.left.sample_tick == event.tick + LM629_SAMPLE_TICKS
+    before = fig6()
+    before.run_to(event.tick - 1)
+    assert before.robot().board.left.real_position <= 2
+
+
+def test_a_predicate_is_asked_after_each_instruction_on_request():
+    stack = []
+    world = fig6()
+    deep = wait.When(predicate=lambda robot: robot.board.cpu.sfr(0x81) > 0x60, at="instruction")
+    try:
+        event = world.run_until(deep, within=30_000)
+    except WaitExpired:
+        event = None
+    cpu = fig6().robot().board.cpu
+    del cpu
+    other = fig6()
+    board = other.robot().board
+    while 12 * board.cpu.cycles < 30_000 and board.cpu.sfr(0x81) <= 0x60:
+        other.run_to(12 * board.cpu.cycles + 1)
+        stack.append(board.cpu.sfr(0x81))
+    assert (event is None) == (board.cpu.sfr(0x81) <= 0x60)
+    if event is not None:
+        assert event.tick == 12 * board.cpu.cycles
+
+
+def test_a_wait_in_vain_ends_on_the_tick_and_says_what_was_seen():
+    world = fig6()
+    with pytest.raises(WaitExpired, match=r"tick 100000: 100000 ticks passed without Fault") as caught:
+        world.run_until(wait.Fault(), within=100_000)
+    assert world.tick == 100_000
+    assert {event.what for event in caught.value.seen} == {"sent"}
+
+
+def test_a_wait_without_end_ends_with_the_run():
+    world = two_networks()
+    with pytest.raises(WaitExpired, match="the run ended"):
+        world.run_until(wait.Fault())
+    assert world.finished
+
+
+@pytest.mark.parametrize(
+    ("condition", "message"),
+    [
+        (wait.Answer(network=2), "there is no network 2; there are 2"),
+        (wait.Byte(slot=1), "net0 has no robot in slot 1; there is 0, 2"),
+        (wait.Reached(place="mian"), "'mian' is no symbol of"),
+        (wait.Reached(place="frames_accepted"), "'frames_accepted' is not in code memory"),
+        (wait.Reached(place=0x10000), "65536 is no address"),
+        (wait.Edge(pin="P4.0"), "'P4.0' is no pin; there are rxd, txd"),
+    ],
+)
+def test_a_condition_on_what_is_not_there_is_refused_before_anything_moves(condition, message):
+    world = two_networks()
+    with pytest.raises(ValueError, match=message):
+        world.run_until(condition, within=1000)
+    assert world.tick == 0
+    assert world.run_until(wait.Sent(), within=100_000).tick == 96_000
+
+
+def test_no_command_of_that_name_is_refused_where_it_is_written():
+    with pytest.raises(ValueError, match="'SST' is no LM629 command"):
+        wait.Command(name="SST")
+
+
+def test_robots_of_several_networks_are_waited_for_apart():
+    world = two_networks()
+    events = [
+        world.run_until(wait.Command(network=network, slot=slot, name="STT"), within=ticks(0.2))
+        for network, slot in ((0, 0), (0, 2), (1, 1))
+    ]
+    assert [(event.network, event.slot) for event in events] == [(0, 0), (0, 2), (1, 1)]
+    rest = two_networks()
+    rest.run_to(8 * PERIOD)
+    world.run_to(8 * PERIOD)
+    assert world.digest == rest.digest
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from(sorted(WAITS)), st.integers(0, PERIOD)), max_size=6))
+def test_any_mixture_of_waits_and_stops_gives_the_digest_of_the_uncut_run(uncut_end, moves):
+    end_tick, digest = uncut_end
+    world = two_networks()
+    for name, step in moves:
+        if world.tick + step > end_tick:
+            break
+        with contextlib.suppress(WaitExpired):
+            world.run_until(WAITS[name], within=min(PERIOD, end_tick - world.tick))
+        world.run_to(min(world.tick + step, end_tick))
+    world.run_to(end_tick)
+    assert world.digest == digest
+
+
+@pytest.fixture(scope="module")
+def uncut_end():
+    world = two_networks()
+    world.run_to(5 * PERIOD)
+    return 5 * PERIOD, world.digest
