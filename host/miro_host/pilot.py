@@ -13,10 +13,10 @@ from typing import Annotated
 import msgspec
 
 from miro_host.integrator import Integrator, Limits
+from miro_host.laws.yang_kim import YangKim
 from miro_host.posture import Posture
 from miro_host.reference import Trajectory
 from miro_host.wheels import Wheels
-from miro_host.yang_kim import YangKim
 
 PERIOD_S = 1001.0 / 30000.0  # one NTSC frame, 800 800 ticks
 

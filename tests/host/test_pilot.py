@@ -7,12 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_host.integrator import Integrator, Limits
+from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
 from miro_host.posture import Posture
 from miro_host.reference import Arc, Line
 from miro_host.station import Station
 from miro_host.vision import Vision, VisionErrors
-from miro_host.yang_kim import Gains, YangKim
 
 LAW = YangKim(Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69))
 START = Posture(0.07, 0.02, -0.38)

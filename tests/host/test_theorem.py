@@ -6,9 +6,9 @@ from itertools import pairwise
 import pytest
 from tests.naive.host_ideal_loop import drive
 
+from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.posture import Posture
 from miro_host.reference import Arc, Line
-from miro_host.yang_kim import Gains, YangKim
 
 GAINS = Gains(1.7, 3.0, 0.53, 0.72, 0.35, 1.2, switching="sign", cosine_guard=0.0)
 STEP_S = 1e-4

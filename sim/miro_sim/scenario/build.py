@@ -10,10 +10,10 @@ import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_host.integrator import Limits
+from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.pilot import Pilot
 from miro_host.reference import Arc, Line, Ramp, Trajectory
 from miro_host.vision import NO_ERRORS, Vision, VisionErrors
-from miro_host.yang_kim import Gains, YangKim
 from miro_sim.plant.params import DriveParams
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 from miro_sim.scenario import keys as sc
