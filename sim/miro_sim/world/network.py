@@ -13,10 +13,11 @@ from msgspec import convert
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, HOST_CHARACTER_TICKS, ticks
 from miro_exact.saved import LAST_TICK, whole
+from miro_host.ear import Ear
 from miro_host.pilot import Command
 from miro_host.station import Station
-from miro_protocol.decoder import Received, Symbol, TelemetryDecoder
-from miro_protocol.frames import TelemetryFrame
+from miro_protocol.decoder import Received, Symbol
+from miro_protocol.frames import ContentError, Message, TelemetryFrame
 from miro_robot.image import Image
 from miro_robot.mcs51.execute import STOPPED
 from miro_sim.periods import RobotPeriod, WireRun
@@ -50,7 +51,7 @@ class Network:
         "seen",
         "log",  # these three: records
         "outbox",
-        "heard",  # these two: see `pending`
+        "heard",  # these two, and what the ear holds: see `pending`
     )
 
     def __init__(
@@ -83,7 +84,7 @@ class Network:
         for robot in self.robots:
             self.downlink.listen(robot.spec.slot, robot.board.cpu.rxd)
             self.uplink.listen(robot.board.cpu.txd, robot.spec.slot)
-        self.telemetry = TelemetryDecoder()
+        self.ear = Ear(spec.robots)
         self.host: Host = "script" if script is not None else spec.host
         self.outbox = Outbox(0 if radio.carrier == "on" else radio.keyup_ticks)
         for tick, data in script or ():
@@ -171,13 +172,16 @@ class Network:
         """The PC's receiver hears what the robots sent up to `tick`."""
         heard = self.uplink.receive(tick)
         self.log.note_heard(heard)
-        for found in self.telemetry.feed_symbols(heard):
+        for found in self.ear.hear(heard):
             if isinstance(found, Received):
                 self._note_answer(self.uplink.known_tick(found.last_tick), found)
         self.heard += heard
 
     def _note_answer(self, tick: int, answer: Received) -> None:
-        message = answer.message(self.spec.robots)
+        try:
+            message: Message | None = answer.message(self.spec.robots)
+        except ContentError:  # the CRC is good: a firmware that sets bits which the format keeps at 0
+            message = None
         slot = message.slot if isinstance(message, TelemetryFrame) else -1
         self.log.note(Event(tick=tick, what="answer", network=self.index, value=slot, frame=answer))
 
@@ -224,29 +228,39 @@ class Network:
             robot.board.log.cut(end)
 
     def snapshot(self) -> dict[str, object]:
+        """The hashed state; a saved world also holds what `pending` gives."""
         return {
             "robots": [robot.snapshot() for robot in self.robots],
             "station": self.station.snapshot(),
             "downlink": self.downlink.snapshot(),
             "uplink": self.uplink.snapshot(),
-            "telemetry": self.telemetry.snapshot(),
+            "telemetry": self.ear.decoder.snapshot(),
             "script_next": 0,
             "frames_sent": self.frames_sent,
         }
 
     def pending(self) -> dict[str, object]:
-        """What is saved, but no part of the digest: it depends on when input was announced and the world stopped."""
-        return {"outbox": self.outbox.snapshot(), "heard": [list(one) for one in self.heard]}
+        """What is saved, but no part of the digest.
+
+        Outbox and characters heard depend on when input was announced and the world stopped; the robots' last answers
+        follow from the hashed state and what came before.
+        """
+        return {
+            "outbox": self.outbox.snapshot(),
+            "heard": [list(one) for one in self.heard],
+            "answers": self.ear.snapshot()["heard"],
+        }
 
     def restore(self, state: dict[str, Any]) -> None:
         self.outbox.restore(state["outbox"])
         self.heard = convert(state["heard"], list[Symbol])
+        self.ear.restore_heard(state["answers"])
         for robot, saved in zip(self.robots, state["robots"], strict=True):
             robot.restore(saved)
         self.station.restore(state["station"])
         self.downlink.restore(state["downlink"])
         self.uplink.restore(state["uplink"])
-        self.telemetry.restore(state["telemetry"])
+        self.ear.decoder.restore(state["telemetry"])
         self.frames_sent = whole(state, "frames_sent", 0, LAST_TICK)
 
     def check_times(self, begun_tick: int, tick: int) -> None:

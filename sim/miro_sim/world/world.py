@@ -38,7 +38,7 @@ ScriptRun = tuple[int, int, bytes]
 """(tick of the first start bit, network, bytes) to send in place of what the station would send."""
 
 MAX_SEED = (1 << 63) - 1
-SAVE_FORMAT = 3
+SAVE_FORMAT = 4
 """Raised whenever a saved world of before would no longer mean the same."""
 MOST_PERIODS = 1 << 34
 """Of a saved world: ticks up to then fit into 64 bits, and so do the products that are made of them."""
@@ -253,7 +253,7 @@ class World:
         return state
 
     def hashed(self) -> dict[str, object]:
-        """The same without input that waits to be sent: what the digest is made of."""
+        """The same without what `Network.pending` adds: what the digest is made of."""
         return {
             "tick": self.tick,
             "index": self.index,
