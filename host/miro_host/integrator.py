@@ -1,25 +1,30 @@
 """Equation (15) on the host: the LM629 takes speeds, so the law's accelerations are summed up here.
 
-What belongs here: z_cmd and its limits. What does not: the law (`yang_kim`) and wheel speeds (`wheels`).
+What belongs here: z_cmd and its limits. What does not: the laws (`laws/`) and wheel speeds (`wheels`).
 
 The integrator's state is also the robot's velocity as the law sees it: differences of noisy postures are
 useless (0.8 cm of noise is 0.34 m/s after one frame).
 """
 
+from typing import Annotated
+
 import msgspec
+from msgspec import Meta
+
+Limit = Annotated[float, Meta(gt=0.0, le=1e6)]
 
 
-class Limits(msgspec.Struct, frozen=True):
+class Limits(msgspec.Struct, frozen=True, kw_only=True):
     """Bounds of the commanded velocity and of its rate, all greater than 0.
 
     Both are clamped: z_cmd, which is the anti-windup, and z', so that one noisy frame near
     cos(phi_c - theta_c) = 0 does not saturate the wheels.
     """
 
-    max_v_m_s: float = 0.95
-    max_w_rad_s: float = 3.7
-    max_v_dot_m_s2: float = 8.0
-    max_w_dot_rad_s2: float = 120.0
+    max_v_m_s: Limit = 0.95
+    max_w_rad_s: Limit = 3.7
+    max_v_dot_m_s2: Limit = 8.0
+    max_w_dot_rad_s2: Limit = 120.0
 
     def __post_init__(self) -> None:
         for name in ("max_v_m_s", "max_w_rad_s", "max_v_dot_m_s2", "max_w_dot_rad_s2"):
@@ -37,7 +42,10 @@ def clamp(x: float, limit: float) -> float:
 
 
 class Integrator:
-    """z_cmd = (v, w), advanced once per control period by z' = z_r' + u (equation 15 without f)."""
+    """z_cmd = (v, w), advanced once per control period by z' = z_r' + u (equation 15 without f).
+
+    A law that answers velocities instead sets z_cmd by `go_to`, within the same limits.
+    """
 
     NOT_STATE = ("limits", "period_s")
 
@@ -60,6 +68,14 @@ class Integrator:
         self.v_m_s = clamp(self.v_m_s + self.period_s * v_dot, limits.max_v_m_s)
         self.w_rad_s = clamp(self.w_rad_s + self.period_s * w_dot, limits.max_w_rad_s)
 
+    def go_to(self, v_m_s: float, w_rad_s: float) -> None:
+        """Take over the velocities of a law, as near as both limits allow; exactly, if they do."""
+        limits = self.limits
+        self.v_m_s = _near(self.v_m_s, clamp(v_m_s, limits.max_v_m_s), self.period_s * limits.max_v_dot_m_s2)
+        self.w_rad_s = _near(
+            self.w_rad_s, clamp(w_rad_s, limits.max_w_rad_s), self.period_s * limits.max_w_dot_rad_s2
+        )
+
     def snapshot(self) -> dict[str, object]:
         return {"v_m_s": self.v_m_s, "w_rad_s": self.w_rad_s}
 
@@ -70,3 +86,10 @@ class Integrator:
         if not (abs(v) <= self.limits.max_v_m_s and abs(w) <= self.limits.max_w_rad_s):
             raise ValueError(f"velocity ({v}, {w}) is beyond the limits")
         self.v_m_s, self.w_rad_s = v, w
+
+
+def _near(before: float, wanted: float, most: float) -> float:
+    """`wanted`, or the value that lies `most` from `before` on its side."""
+    if abs(wanted - before) <= most:
+        return wanted
+    return before + most if wanted > before else before - most

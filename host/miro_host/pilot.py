@@ -1,19 +1,24 @@
 """One robot's chain on the PC, once per camera frame: measurement, law, integrator, wheel commands.
 
-What belongs here: the order of these steps and what happens when a measurement is missing. What does not:
-the steps themselves, the clock (times are handed in), several robots (`station`).
+What belongs here: the order of these steps, what happens when a measurement is missing, and what a law may not do. What
+does not: the steps themselves, the clock (times are handed in), several robots (`station`).
 
 The law's velocities v_c, w_c are the commanded ones, the integrator's state before the update (`integrator`
-says why). Before the first measurement the command is zero. A lost measurement leaves the integrator alone
+says why). Before the first measurement the command is zero. A lost measurement leaves law and integrator alone
 and repeats the last command.
 """
 
-from typing import Annotated
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 import msgspec
 
-from miro_host.integrator import Integrator, Limits
-from miro_host.laws.yang_kim import YangKim
+from miro_exact.domain import DomainError
+from miro_host.ear import Heard
+from miro_host.integrator import Integrator
+from miro_host.laws.interface import NOTHING, Accelerations, Answer, Law, LawInput, Velocities
+from miro_host.parts import PartError, described
 from miro_host.posture import Posture
 from miro_host.reference import Trajectory
 from miro_host.wheels import Wheels
@@ -22,7 +27,7 @@ PERIOD_S = 1001.0 / 30000.0  # one NTSC frame, 800 800 ticks
 
 
 class Command(msgspec.Struct, frozen=True):
-    """What goes to the wheels, and how it came about: z_cmd in m/s and rad/s, u and s of the last update.
+    """What goes to the wheels, and how it came about: z_cmd in m/s and rad/s, the law's inner values by name.
 
     `left`, `right` in 1/256 count per LM629 sample.
     """
@@ -31,20 +36,16 @@ class Command(msgspec.Struct, frozen=True):
     right: int
     v_m_s: float
     w_rad_s: float
-    u1: float
-    u2: float
-    s1: float
-    s2: float
+    inner: Mapping[str, float] = NOTHING
 
 
 _Speed = Annotated[int, msgspec.Meta(ge=-0x8000, le=0x7FFF)]  # what a frame holds
-_SavedCommand = tuple[_Speed, _Speed, float, float, float, float, float, float]
 
-STANDSTILL = Command(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+STANDSTILL = Command(0, 0, 0.0, 0.0)
 
 
 class Pilot:
-    """Steers one robot along one reference.
+    """Steers one robot along one reference, within the limits among the law's parameters.
 
     `reference_lead_s` shifts the instant at which the reference is evaluated against the `t_s` handed to
     `update`; 0 is the paper's loop. The shift is ours, not the paper's: a positive value (up to the time
@@ -52,13 +53,12 @@ class Pilot:
     known delay without touching the law.
     """
 
-    NOT_STATE = ("law", "reference", "reference_lead_s", "wheels")
+    NOT_STATE = ("name", "reference", "reference_lead_s", "wheels")
 
     def __init__(
         self,
         reference: Trajectory,
-        law: YangKim,
-        limits: Limits,
+        law: Law[Any],
         wheels: Wheels | None = None,
         *,
         period_s: float = PERIOD_S,
@@ -66,36 +66,97 @@ class Pilot:
     ) -> None:
         self.reference = reference
         self.law = law
+        self.name = law.parameters.name()
         self.wheels = Wheels() if wheels is None else wheels
         self.reference_lead_s = reference_lead_s
-        self.integrator = Integrator(limits, period_s)
-        self.command = STANDSTILL
+        self.integrator = Integrator(law.parameters, period_s)
+        self.command = Command(0, 0, 0.0, 0.0, dict.fromkeys(law.INNER, 0.0))
 
     def __repr__(self) -> str:
         return f"Pilot({self.reference!r}, {self.law!r}, command={self.command!r})"
 
-    def update(self, measured: Posture | None, t_s: float) -> Command:
-        """One control period at `t_s` after the reference's start; `measured` may be missing (None)."""
+    def update(self, measured: Posture | None, t_s: float, heard: Heard | None = None) -> Command:
+        """One control period at `t_s` after the reference's start; `measured` and `heard` may be missing (None).
+
+        Raises PartError, and leaves integrator and command alone, when the law fails or answers what is no number.
+        """
         if measured is None:
             return self.command
-        reference = self.reference.at(t_s + self.reference_lead_s)
         z = self.integrator
-        control = self.law.control(reference, measured, z.v_m_s, z.w_rad_s)
-        z.step(reference.v_dot_m_s2 + control.u1, reference.w_dot_rad_s2 + control.u2)  # equation (15)
-        left, right = self.wheels.command(z.v_m_s, z.w_rad_s)
-        self.command = Command(
-            left, right, z.v_m_s, z.w_rad_s, control.u1, control.u2, control.s1, control.s2
+        at_s = t_s + self.reference_lead_s
+        reference = self.reference.at(at_s)
+        answer = self._ask(
+            LawInput(
+                t_s=at_s,
+                period_s=z.period_s,
+                reference=reference,
+                path=self.reference,
+                posture=measured,
+                v_m_s=z.v_m_s,
+                w_rad_s=z.w_rad_s,
+                heard=heard,
+            )
         )
+        inner = {name: answer.inner[name] for name in self.law.INNER}
+        if isinstance(answer, Accelerations):
+            z.step(answer.v_dot_m_s2, answer.w_dot_rad_s2)  # equation (15)
+        else:
+            z.go_to(answer.v_m_s, answer.w_rad_s)
+        left, right = self.wheels.command(z.v_m_s, z.w_rad_s)
+        self.command = Command(left, right, z.v_m_s, z.w_rad_s, inner)
         return self.command
 
+    def _ask(self, given: LawInput) -> Answer:
+        """The law's answer, checked: what it says and what it remembers are finite and as it declares."""
+        try:
+            answer = self.law.step(given)
+            check_answer(answer, self.law.INNER)
+            self.law.snapshot()
+        except Exception as error:
+            raise _failure(self.name, error) from error
+        return answer
+
     def snapshot(self) -> dict[str, object]:
-        return {"integrator": self.integrator.snapshot(), "command": msgspec.structs.astuple(self.command)}
+        command = self.command
+        numbers = (command.left, command.right, command.v_m_s, command.w_rad_s, *command.inner.values())
+        state: dict[str, object] = {"integrator": self.integrator.snapshot(), "command": numbers}
+        if self.law.STATE:
+            state["law"] = self.law.snapshot()
+        return state
 
     def restore(self, state: dict[str, object]) -> None:
-        integrator = state["integrator"]
+        integrator, command, memory = state["integrator"], state["command"], state.get("law", {})
         assert isinstance(integrator, dict)
+        assert isinstance(command, tuple | list)
+        assert isinstance(memory, dict)
+        try:
+            self.law.restore(memory)
+        except Exception as error:  # of another distribution's own `restore`, too
+            raise ValueError(f"law {self.name!r} takes back no such memory: {described(error)}") from error
         self.integrator.restore(integrator)
-        left, right, *rest = msgspec.convert(state["command"], _SavedCommand)
-        if not all(abs(value) < float("inf") for value in rest):
+        left, right = msgspec.convert(command[:2], tuple[_Speed, _Speed])
+        v_m_s, w_rad_s, *inner = numbers = msgspec.convert(command[2:], list[float])
+        if not all(math.isfinite(number) for number in numbers):
             raise ValueError("the command holds a value that is not finite")
-        self.command = Command(left, right, *rest)
+        self.command = Command(left, right, v_m_s, w_rad_s, dict(zip(self.law.INNER, inner, strict=True)))
+
+
+def _failure(name: str, error: Exception) -> PartError:
+    """What to raise for what a law raised: its name and the reason in one line."""
+    if isinstance(error, DomainError):
+        return PartError(f"law {name!r} failed: {error}", "parameters far from any robot's can do this")
+    reason = str(error) if type(error) is ValueError else described(error)
+    return PartError(f"law {name!r} failed: {reason}", "mend the law or its parameters")
+
+
+def check_answer(answer: object, inner: tuple[str, ...]) -> None:
+    """Raises ValueError for an answer that is none, for one without the inner values, and for NaN and infinity."""
+    if not isinstance(answer, Accelerations | Velocities):
+        raise ValueError(f"it answered {str(answer)[:40]!r}, neither Accelerations nor Velocities")
+    if sorted(answer.inner) != sorted(inner):
+        raise ValueError(f"its inner values are {sorted(answer.inner)}, INNER says {sorted(inner)}")
+    drive, values = msgspec.structs.asdict(answer), answer.inner
+    del drive["inner"]
+    for name, value in [*drive.items(), *values.items()]:
+        if type(value) is not float or not math.isfinite(value):
+            raise ValueError(f"it answered {name} = {str(value)[:40]}, which is not a finite float")

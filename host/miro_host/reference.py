@@ -9,6 +9,8 @@ the polar form of equation (9) is 0/0; on a line and on an arc it has a closed f
 rho, which is used throughout, so that t = 0 is a time like any other.
 """
 
+from typing import Protocol
+
 import msgspec
 
 from miro_exact.dmath import sincos, wrap_pi
@@ -148,4 +150,9 @@ class Arc(msgspec.Struct, frozen=True):
         )
 
 
-Trajectory = Line | Arc
+class Trajectory(Protocol):
+    """A reference over time."""
+
+    def at(self, t_s: float) -> Reference:
+        """The reference at `t_s` seconds after its start, for any time, also before 0 and after its end."""
+        ...

@@ -35,20 +35,17 @@ class Axis(msgspec.Struct, frozen=True):
 
 
 class Control(msgspec.Struct, frozen=True):
-    """What the controller made of one measurement: equations (13), (15), (16) and the wheel split.
+    """What the controller made of one measurement: z_cmd after its limits, the wheel split, and the law's inner values.
 
-    `v_m_s`, `w_rad_s` the velocities after the integrator; `u1` in m/s^2, `u2` in rad/s^2; `s1` in m/s,
-    `s2` in rad/s; `left`, `right` as sent, in 1/256 count per LM629 sample.
+    `left`, `right` in 1/256 count per LM629 sample, before the control noise of the scenario; `inner` by name, as the
+    law declares them (`u1` in m/s^2, `u2` in rad/s^2, `s1` in m/s, `s2` in rad/s of equations (13), (16)).
     """
 
     v_m_s: float
     w_rad_s: float
-    u1: float
-    u2: float
-    s1: float
-    s2: float
     left: int
     right: int
+    inner: dict[str, float]
 
 
 class RobotPeriod(msgspec.Struct, frozen=True):

@@ -39,7 +39,9 @@ def robot(index: int, slot: int = 0, network: int = 0, error: Posture | None = N
         v_m_s=0.1 + 0.2,
         w_rad_s=-1e-300,
         measurement=None if index == 0 else truth,
-        control=None if index == 0 else Control(0.2, -0.1, 0.5, 0.25, 1e-9, -2.0, 300, -300),
+        control=None
+        if index == 0
+        else Control(0.2, -0.1, 300, -300, {"u1": 0.5, "u2": 0.25, "s1": 1e-9, "s2": -2.0}),
         accepted=index,
         rejected=0,
         stale=0,

@@ -10,13 +10,17 @@ the surface theta_e = 0, so the robot then runs parallel to the path; V = s's/2 
 """
 
 import math
+from typing import Annotated, Literal
 
 import msgspec
+from msgspec import Meta
 
 from miro_exact.dmath import atan2, sincos, wrap_pi
+from miro_host.laws.interface import Accelerations, Law, LawInput, LawParameters
 from miro_host.posture import Posture
 from miro_host.reference import Reference
 
+POSITION_ERROR_M = 0.024  # rho_f of equation (11): the upper bound of the measurement error, section V-A
 NOT_NEGATIVE = (
     "gamma1_per_s",
     "gamma2_per_s",
@@ -26,10 +30,12 @@ NOT_NEGATIVE = (
     "p2_rad_s2",
     "cosine_guard",
 )
-POSITION_ERROR_M = 0.024  # rho_f of equation (11): the upper bound of the measurement error, section V-A
+
+Gain = Annotated[float, Meta(ge=0.0, le=1e6)]
+Width = Annotated[float, Meta(gt=0.0, le=1e6)]
 
 
-class Gains(msgspec.Struct, frozen=True):
+class Gains(LawParameters, frozen=True, tag="yang_kim"):
     """Parameters of equations (13) and (16) and of their guards.
 
     gamma, q and p are the paper's gamma_i, Q_i and P_i. With `switching` = "sign" every sgn is the sign
@@ -39,24 +45,25 @@ class Gains(msgspec.Struct, frozen=True):
 
     Guards: rho_c is taken as at least `rho_floor_m` where it is a denominator; 1/c, c = cos(phi_c - theta_c),
     becomes c (1 + d^2) / (c^2 + d^2) with d = `cosine_guard`: smooth, keeps the sign, 1 at c = 1, 0 at the
-    singularity of assumption 3. d = 0 leaves 1/c as it is.
+    singularity of assumption 3. d = 0 leaves 1/c as it is; a scenario cannot ask for that.
     ValueError for a parameter outside its range.
     """
 
-    gamma1_per_s: float
-    gamma2_per_s: float
-    q1_per_s: float
-    q2_per_s: float
-    p1_m_s2: float
-    p2_rad_s2: float
-    switching: str = "saturation"
-    layer_s1_m_s: float = 0.022
-    layer_s2_rad_s: float = 0.19
-    layer_theta_rad: float = 0.015
-    cosine_guard: float = 0.086
-    rho_floor_m: float = POSITION_ERROR_M
+    gamma1_per_s: Gain = 1.7
+    gamma2_per_s: Gain = 3.0
+    q1_per_s: Gain = 0.53
+    q2_per_s: Gain = 0.72
+    p1_m_s2: Gain = 0.19
+    p2_rad_s2: Gain = 0.69
+    switching: Literal["sign", "saturation"] = "saturation"
+    layer_s1_m_s: Width = 0.022
+    layer_s2_rad_s: Width = 0.19
+    layer_theta_rad: Width = 0.015
+    cosine_guard: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.086
+    rho_floor_m: Width = POSITION_ERROR_M
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.switching not in ("sign", "saturation"):
             raise ValueError(f"switching = {self.switching!r}: must be 'sign' or 'saturation'")
         positive = ["rho_floor_m"]
@@ -68,6 +75,9 @@ class Gains(msgspec.Struct, frozen=True):
         for name in NOT_NEGATIVE:
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: must be 0 or greater")
+
+    def law(self) -> "YangKim":
+        return YangKim(self)
 
 
 class Control(msgspec.Struct, frozen=True):
@@ -109,23 +119,24 @@ def curvature_term(v: float, w: float, rho: float, sin_alpha: float) -> float:
     return v * v / rho * sin_alpha * sin_alpha + v * w * sin_alpha
 
 
-class YangKim:
+class YangKim(Law[Gains]):
     """Equations (13) and (16) with one set of gains; without memory: the same inputs give the same output."""
 
-    NOT_STATE = ("gains",)
+    INNER = ("u1", "u2", "s1", "s2")
 
-    def __init__(self, gains: Gains) -> None:
-        self.gains = gains
-
-    def __repr__(self) -> str:
-        return f"YangKim({self.gains!r})"
+    def step(self, given: LawInput) -> Accelerations:
+        """v_r' + u1 and w_r' + u2, which equation (15) integrates."""
+        r = given.reference
+        c = self.control(r, given.posture, given.v_m_s, given.w_rad_s)
+        inner = {"u1": c.u1, "u2": c.u2, "s1": c.s1, "s2": c.s2}
+        return Accelerations(r.v_dot_m_s2 + c.u1, r.w_dot_rad_s2 + c.u2, inner)
 
     def control(self, reference: Reference, measured: Posture, v_m_s: float, w_rad_s: float) -> Control:
         """u1, u2 for a robot at `measured` that moves with (v_c, w_c) = (`v_m_s`, `w_rad_s`).
 
         ValueError at c = 0 exactly when there is no cosine guard (equation 12 is violated).
         """
-        g, r = self.gains, reference
+        g, r = self.parameters, reference
         rho = math.sqrt(measured.x_m * measured.x_m + measured.y_m * measured.y_m)
         phi = atan2(measured.y_m, measured.x_m)
         sin_alpha, cos_alpha = sincos(phi - measured.theta_rad)
@@ -158,13 +169,13 @@ class YangKim:
         return Control(rho_e, phi_e, theta_e, s1, s2, u1, u2)
 
     def _switch(self, x: float, width: float) -> float:
-        if self.gains.switching == "sign":
+        if self.parameters.switching == "sign":
             return sign(x)
         return saturation(x, width)
 
     def _inverse(self, cos_alpha: float) -> float:
         """The factor 1/cos(phi_c - theta_c) of equation (16), guarded."""
-        d = self.gains.cosine_guard
+        d = self.parameters.cosine_guard
         if d == 0.0:
             if cos_alpha == 0.0:
                 raise ValueError("cos(phi_c - theta_c) = 0: assumption 3 (equation 12) is violated")

@@ -9,8 +9,8 @@ from __future__ import annotations
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
-from miro_host.integrator import Limits
-from miro_host.laws.yang_kim import Gains, YangKim
+from miro_host.laws.interface import LawParameters
+from miro_host.parts import PartError, described
 from miro_host.pilot import Pilot
 from miro_host.reference import Arc, Line, Ramp, Trajectory
 from miro_host.vision import NO_ERRORS, Vision, VisionErrors
@@ -33,11 +33,16 @@ def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
 
 
 def pilot_for(robot: sc.Robot, reference: Trajectory) -> Pilot:
-    """The controller, its integrator and the wheel split."""
-    law = robot.controller
-    gains = Gains(**{name: getattr(law, name) for name in Gains.__struct_fields__})
-    limits = Limits(**{name: getattr(law, name) for name in Limits.__struct_fields__})
-    return Pilot(reference, YangKim(gains), limits, period_s=seconds(CONTROL_PERIOD_TICKS))
+    """The controller, its integrator and the wheel split. Raises PartError when the law cannot be made."""
+    parameters = robot.controller
+    assert isinstance(parameters, LawParameters)
+    try:
+        law = parameters.law()
+        law.snapshot()
+    except Exception as error:
+        what = f"law {parameters.name()!r} cannot be made: {described(error)}"
+        raise PartError(what, "mend the law or its parameters") from error
+    return Pilot(reference, law, period_s=seconds(CONTROL_PERIOD_TICKS))
 
 
 def vision_for(camera: sc.Camera) -> Vision:

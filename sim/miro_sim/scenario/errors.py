@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.parts import REGISTRIES, struct_of
 
 UNITS = {
     "s": "seconds",
@@ -102,7 +103,7 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
     missing = re.fullmatch(r"Object missing required field `(.*)`", what)
     if missing:
         place = f"{path}.{missing[1]}" if path else missing[1]
-        return ScenarioError(origin, place, "this key is missing", _choices_at(place) or "add it")
+        return ScenarioError(origin, place, "this key is missing", _choices_at(raw, place) or "add it")
     inner = re.fullmatch(r"(?s)([a-z0-9_.]+(?:\[\d+\])?(?:\.[a-z0-9_]+)*): (.*)", what)
     if inner:  # a rule between keys (`Network.__post_init__`) names the place below its own table
         path = f"{path}.{inner[1]}" if path else inner[1]
@@ -114,7 +115,7 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
         )
     what, _, remedy = what.partition("; ")
     value = _value_at(raw, path)
-    return ScenarioError(origin, path, *_explain(what, path, value, remedy or _choices_at(path)))
+    return ScenarioError(origin, path, *_explain(what, path, value, remedy or _choices_at(raw, path)))
 
 
 def _explain(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
@@ -192,10 +193,12 @@ def _value_at(raw: Any, path: str) -> Any:
     return raw
 
 
-def _type_at(path: str) -> msgspec.inspect.Type | None:
+def _type_at(raw: Any, path: str) -> msgspec.inspect.Type | None:
     """What a scenario may have at a key path; below tagged tables, these tables."""
     found: msgspec.inspect.Type = msgspec.inspect.type_info(Scenario)
-    for key, _ in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
+    for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
+        found = _chosen(found, raw)
+        raw = _value_at(raw, key or f"[{index}]")
         if key and isinstance(found, msgspec.inspect.StructType):
             fields = {field.encode_name: field.type for field in found.fields}
             if key not in fields:
@@ -208,9 +211,21 @@ def _type_at(path: str) -> msgspec.inspect.Type | None:
     return found
 
 
-def _structs_at(path: str) -> list[msgspec.inspect.StructType]:
+def _chosen(found: msgspec.inspect.Type, table: Any) -> msgspec.inspect.Type:
+    """The type itself; where it is any part's table, that of the part which the table names."""
+    if not isinstance(found, msgspec.inspect.CustomType):
+        return found
+    try:
+        return msgspec.inspect.type_info(struct_of(REGISTRIES[found.cls], table))
+    except (ValueError, TypeError, AttributeError):  # no part is named, or none can be used
+        return found
+
+
+def _structs_at(raw: Any, path: str) -> list[msgspec.inspect.StructType]:
     """The kinds of table that there may be at a key path: several where a key says which."""
-    found = _type_at(path)
+    found = _type_at(raw, path)
+    if found is not None:
+        found = _chosen(found, _value_at(raw, path))
     options = found.types if isinstance(found, msgspec.inspect.UnionType) else (found,)
     return [option for option in options if isinstance(option, msgspec.inspect.StructType)]
 
@@ -218,21 +233,23 @@ def _structs_at(path: str) -> list[msgspec.inspect.StructType]:
 def _keys_at(raw: Any, path: str) -> list[str]:
     """The keys of the table at a key path, which has chosen its kind."""
     value = _value_at(raw, path)
-    for struct in _structs_at(path):
+    for struct in _structs_at(raw, path):
         tag = struct.tag_field
-        if tag is None or value.get(tag) == struct.tag:
+        if tag is None or value.get(tag, struct.tag) == struct.tag:
             return [*([tag] if tag else []), *struct.cls.__struct_encode_fields__]
     return []
 
 
-def _choices_at(path: str) -> str:
+def _choices_at(raw: Any, path: str) -> str:
     """What a key may hold, if that is one of a few: words, numbers, or the kinds of its table."""
-    table, _, key = path.rpartition(".")
-    found = _type_at(path)
-    if isinstance(found, msgspec.inspect.LiteralType):
+    above, _, key = path.rpartition(".")
+    found, table = _type_at(raw, path), _type_at(raw, above)
+    if isinstance(table, msgspec.inspect.CustomType) and REGISTRIES[table.cls].key == key:
+        choices = REGISTRIES[table.cls].names()
+    elif isinstance(found, msgspec.inspect.LiteralType):
         choices = [str(value) for value in found.values]
     else:
-        choices = [str(struct.tag) for struct in _structs_at(table) if struct.tag_field == key]
+        choices = [str(struct.tag) for struct in _structs_at(raw, above) if struct.tag_field == key]
     if not choices:
         return ""
     *others, last = choices

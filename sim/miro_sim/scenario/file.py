@@ -17,6 +17,7 @@ import msgspec
 from miro_sim.inputs import InputError, read_input
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.parts import full_message, part_of
 from miro_sim.scenario.places import check_places
 from miro_sim.scenario.profiles import ProfileError, with_profiles
 
@@ -123,9 +124,9 @@ def _parse(text: str, origin: str) -> Scenario:
     _check_finite(raw, "", origin)
     _fill_in_profiles(raw, origin)
     try:
-        scenario = msgspec.convert(raw, Scenario)
+        scenario = msgspec.convert(raw, Scenario, dec_hook=part_of)
     except msgspec.ValidationError as error:
-        raise value_error(origin, raw, str(error)) from None
+        raise value_error(origin, raw, full_message(error)) from None
     check_places(scenario, origin)
     return scenario
 

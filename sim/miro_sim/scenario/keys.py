@@ -1,8 +1,9 @@
 """The scenario: everything about a run that is chosen rather than drawn, as frozen structs.
 
 What belongs here: the keys a scenario file may have, with unit, default and range, and the rules between
-them; those of the radio are in `radio_keys`. What does not: reading files and reporting what is wrong in
-them (`file`), and what the keys do (`miro_host`, `radio`, `plant`, `world`).
+them; those of the radio are in `radio_keys`, those of a law beside the law (`miro_host.laws`). What does not: reading
+files (`file`) and reporting what is wrong in them (`errors`), and what the keys do (`miro_host`, `radio`, `plant`,
+`world`).
 
 Every key carries its unit. Defaults are the "realistic" set: the paper's measurement error (2.40 cm and
 4.83 degrees as 3 sigma), one camera frame of vision delay, 3 ms of computing, a keyed carrier and a
@@ -14,6 +15,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from miro_host.laws.registry import DEFAULT_LAW, LAWS, Controller
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from miro_sim.plant.params import DriveParams
 from miro_sim.scenario.radio_keys import ControlNoise, Radio
@@ -25,13 +27,11 @@ MAX_TORQUE_CONSTANT = 10.0  # Nm/A; beyond it a motor of this size is a mistyped
 MAX_NETWORKS = 32  # building and simulating one takes as long as a whole run of fig6
 MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
 
-Positive = Annotated[float, Meta(gt=0.0, le=1e6)]
 Duration = Annotated[float, Meta(gt=0.0, le=86_400.0)]
 Seconds = Annotated[float, Meta(ge=0.0, le=1e3)]
 PitchCm = Annotated[float, Meta(ge=-1_000.0, le=1_000.0)]
 TurnRad = Annotated[float, Meta(ge=-3.141592653589793, le=3.141592653589793)]
 TurnDeg = Annotated[float, Meta(ge=-180.0, le=180.0)]
-Gain = Annotated[float, Meta(ge=0.0, le=1e6)]
 Name = Annotated[str, Meta(pattern=r"\A[a-z0-9][a-z0-9_-]{0,63}\Z")]
 
 
@@ -83,41 +83,14 @@ class ArcRef(
     drive_s: Annotated[float, Meta(ge=0.0, le=86_400.0)] | None = None
 
 
-class YangKim(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="law", tag="yang_kim"
-):
-    """The sliding-mode law of the paper, equations (13) and (16), with the guards it needs in a sampled loop.
-
-    `switching` sign is the paper's law to the letter; saturation replaces each sign by a boundary layer of
-    the width given beside it. `cosine_guard` is d in c (1 + d^2) / (c^2 + d^2), which stands for 1 / c;
-    `rho_floor_m` the smallest rho_c used as a divisor. The limits clamp the integrator (15) itself.
-    """
-
-    gamma1_per_s: Gain = 1.7
-    gamma2_per_s: Gain = 3.0
-    q1_per_s: Gain = 0.53
-    q2_per_s: Gain = 0.72
-    p1_m_s2: Gain = 0.19
-    p2_rad_s2: Gain = 0.69
-    switching: Literal["sign", "saturation"] = "saturation"
-    layer_s1_m_s: Positive = 0.022
-    layer_s2_rad_s: Positive = 0.19
-    layer_theta_rad: Positive = 0.015
-    cosine_guard: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.086
-    rho_floor_m: Positive = 0.024
-    max_v_m_s: Positive = 0.95
-    max_w_rad_s: Positive = 3.7
-    max_v_dot_m_s2: Positive = 8.0
-    max_w_dot_rad_s2: Positive = 120.0
-
-
 class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One robot: its slot on the network, where it starts, what it follows and who steers it.
 
     Start and reference have to lie on the pitch (`places`).
     The start is the start of the reference plus the errors (captions of the paper's Figs. 6 and 8). Each
-    wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `drive` replaces single
-    parameters of motors, bridges, battery, chassis and encoders (`plant.params`).
+    wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `controller` holds the parameters of the
+    law that it names. `drive` replaces single parameters of motors, bridges, battery, chassis and encoders
+    (`plant.params`).
     """
 
     slot: Annotated[int, Meta(ge=0, le=4)] = 0
@@ -126,7 +99,7 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     start_error_theta_rad: TurnRad = 0.0
     wheel_radius_mismatch: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.015
     reference: LineRef | ArcRef
-    controller: YangKim = YangKim()
+    controller: Controller = msgspec.field(default_factory=lambda: LAWS.find(DEFAULT_LAW)())
     drive: DriveParams = DriveParams()
 
     def __post_init__(self) -> None:

@@ -30,7 +30,8 @@ def check_places(scenario: Scenario, origin: str) -> None:
 
 
 def _check(robot: Robot, duration_s: float, origin: str, place: str) -> None:
-    from miro_sim.scenario.build import reference_for  # needs hot modules: not before the engine was chosen
+    from miro_host.reference import Arc, Line  # needs hot modules: not before the engine was chosen
+    from miro_sim.scenario.build import reference_for
 
     try:
         reference = reference_for(robot, duration_s)
@@ -51,6 +52,7 @@ def _check(robot: Robot, duration_s: float, origin: str, place: str) -> None:
         raise ScenarioError(
             origin, f"{place}.start_error_{axis}_cm", f"the robot starts off the pitch: {what}"
         )
+    assert isinstance(reference, Line | Arc)
     on_s = 0.0
     for t_s in _instants(robot, min(reference.ramp.duration_s, duration_s)):
         off = _off_pitch(reference.at(t_s).posture)

@@ -102,7 +102,8 @@ class Network:
         commands: list[Command | None] = [None] * len(self.robots)
         if self.host == "controller":
             commands = [
-                robot.steer(posture, tick) for robot, posture in zip(self.robots, measured, strict=True)
+                robot.steer(posture, self.ear.heard[robot.spec.slot], tick)
+                for robot, posture in zip(self.robots, measured, strict=True)
             ]
             self._transmit(tick + self.compute_ticks + self.keyup_ticks, commands)
         self.seen = [

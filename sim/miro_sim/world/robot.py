@@ -2,7 +2,7 @@
 
 What belongs here: building both from a scenario's `[[network.robot]]` table, and reading off what observers record.
 What does not: time (`world.py`) and the radio that joins the two (`network.py`). The pilot never reads the robot:
-it gets the camera's measurement and answers with a command.
+it gets the camera's measurement and the robot's last answer by radio, and answers with a command.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_exact.domain import DomainError
 from miro_exact.rng import Stream
 from miro_exact.saved import whole
+from miro_host.ear import Heard
+from miro_host.parts import PartError
 from miro_host.pilot import Command, Pilot
 from miro_host.posture import Posture
 from miro_host.vision import Vision
@@ -69,7 +71,10 @@ class Robot:
         self.board.load(image)
         self.camera_noise = Stream(seed, f"{name}/camera")
         self.vision: Vision = vision_for(scenario.camera)
-        self.pilot: Pilot = pilot_for(spec, self.reference)
+        try:
+            self.pilot: Pilot = pilot_for(spec, self.reference)
+        except PartError as error:
+            raise PartError(f"net{network}/robot{spec.slot}: {error.what}", error.remedy) from error
         self.frame = 0
         self.marks: tuple[int, ...] = ()
         self.asked: list[tuple[Callable[[Robot], object], str]] = []
@@ -106,9 +111,13 @@ class Robot:
         self.frame += 1
         return self.vision.frame(Posture(x_m, y_m, theta_rad), (draws[0], draws[1], draws[2]))
 
-    def steer(self, measured: Posture | None, tick: int) -> Command:
-        """The PC computes this robot's wheel commands from what it measured."""
-        return self.pilot.update(measured, seconds(tick))
+    def steer(self, measured: Posture | None, heard: Heard | None, tick: int) -> Command:
+        """The PC computes this robot's wheel commands from what it measured and heard. Raises PartError."""
+        try:
+            return self.pilot.update(measured, seconds(tick), heard)
+        except PartError as error:
+            place = f"net{self.network}/robot{self.spec.slot}: tick {tick} ({seconds(tick):.6f} s)"
+            raise PartError(f"{place}: {error.what}", error.remedy) from error
 
     def counter(self, index: int) -> int | None:
         """A frame counter of the firmware (16 bit), or None when the image exports no such symbol."""
@@ -164,16 +173,7 @@ def _iram_address(image: Image, name: str) -> int | None:
 def _control(command: Command | None) -> Control | None:
     if command is None:
         return None
-    return Control(
-        command.v_m_s,
-        command.w_rad_s,
-        command.u1,
-        command.u2,
-        command.s1,
-        command.s2,
-        command.left,
-        command.right,
-    )
+    return Control(command.v_m_s, command.w_rad_s, command.left, command.right, dict(command.inner))
 
 
 def _axis(chip: Lm629) -> Axis:

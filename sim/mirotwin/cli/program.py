@@ -22,6 +22,7 @@ from rich.text import Text
 
 from miro_exact.domain import DomainError
 from miro_exact.engine import EngineError
+from miro_host.parts import PartError
 from miro_protocol.pcapng_reader import CaptureError
 from miro_protocol.stream import StreamError
 from miro_robot.image import ImageError
@@ -111,12 +112,17 @@ def show(result: RenderableType) -> None:
 
 @contextmanager
 def plain_parameters(label: str, done: str = "run") -> Iterator[None]:
-    """Within it, numbers with which nothing can be computed are the user's: `label` names the file they came from."""
+    """Within it, numbers with which nothing can be computed and parts that fail are the user's.
+
+    `label` names the file they came from.
+    """
     try:
         yield
     except DomainError as error:
         what = f"cannot be {done}: {error}; parameters far from any robot's can do this"
         raise UserError(f"{label}: {what}") from None
+    except PartError as error:
+        raise UserError(f"{label}: cannot be {done}: {error}") from None
 
 
 def _report(error: Exception) -> None:

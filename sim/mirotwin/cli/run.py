@@ -58,7 +58,7 @@ def run(
     all that was recorded; one that is killed leaves run.part.mcap with all but the last half second. decode, export
     and replay read it. Files of an earlier run stay as they are until the new ones are complete.
     """
-    active = choose_engine(engine)
+    active = choose_engine(engine)  # first: a law from another distribution may import hot modules
     text = load(scenario)
     folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force)
     image = load_image(firmware)

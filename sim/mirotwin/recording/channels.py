@@ -38,17 +38,14 @@ class TruthMessage(msgspec.Struct, frozen=True):
 
 
 class ControlMessage(msgspec.Struct, frozen=True):
-    """`control`: what the controller answered, see `periods.Control`."""
+    """`control`: what the controller answered, see `periods.Control`; `inner` holds the values that the law names."""
 
     tick: int
     v_m_s: float
     w_rad_s: float
-    u1: float
-    u2: float
-    s1: float
-    s2: float
     left: int
     right: int
+    inner: dict[str, float]
 
 
 class FirmwareMessage(msgspec.Struct, frozen=True):
@@ -176,10 +173,17 @@ def message_type(topic: str) -> type[msgspec.Struct] | None:
     return ROBOT_CHANNELS.get(parts[-1]) if len(parts) == 4 else None
 
 
-def schema(kind: type[msgspec.Struct]) -> dict[str, object]:
-    """The JSON schema of a message, with references resolved: viewers want one plain tree."""
-    (tree,), parts = msgspec.json.schema_components([kind], ref_template="{name}")
+def schema(message: msgspec.Struct) -> dict[str, object]:
+    """The JSON schema of a message, with references resolved: viewers want one plain tree.
+
+    The keys of a map become properties, because viewers offer nothing else to choose from.
+    """
+    (tree,), parts = msgspec.json.schema_components([type(message)], ref_template="{name}")
     resolved: dict[str, object] = _resolved(tree, parts)
+    if isinstance(message, ControlMessage):
+        names = {name: {"type": "number"} for name in message.inner}
+        inner = {"type": "object", "properties": names, "required": list(names)}
+        resolved["properties"] = {**resolved["properties"], "inner": inner}  # type: ignore[dict-item]
     return resolved
 
 

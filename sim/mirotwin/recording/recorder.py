@@ -20,7 +20,7 @@ from mirotwin.recording import channels
 from mirotwin.recording.writer import McapWriter, Writable
 
 METADATA = "mirotwin"
-FORMAT = "1"
+FORMAT = "2"
 SCENARIO_ATTACHMENT = "scenario.toml"
 FIRMWARE_ATTACHMENT = "firmware.ihx"
 SYMBOLS_ATTACHMENT = "symbols.json"
@@ -71,7 +71,8 @@ class Recorder:
         self._undisturbed = undisturbed or nullcontext()
         self._encoder = msgspec.json.Encoder()
         self._channels: dict[str, int] = {}
-        self._schemas: dict[str, int] = {}
+        self._schemas: dict[bytes, int] = {}
+        self._named: dict[str, int] = {}
         self._writer = McapWriter(stream, profile=METADATA, library=METADATA)
         self._writer.add_metadata(
             METADATA,
@@ -128,14 +129,20 @@ class Recorder:
     def _add(self, topic: str, tick: int, message: msgspec.Struct) -> None:
         channel = self._channels.get(topic)
         if channel is None:
-            channel = self._register(topic, type(message))
+            channel = self._register(topic, message)
         self._writer.add_message(channel, nanoseconds(tick), self._encoder.encode(message))
 
-    def _register(self, topic: str, kind: type[msgspec.Struct]) -> int:
-        name = f"mirotwin.{kind.__name__.removesuffix('Message')}"
-        if name not in self._schemas:
-            text = msgspec.json.encode(channels.schema(kind))
-            self._schemas[name] = self._writer.add_schema(name, "jsonschema", text)
-        channel = self._writer.add_channel(topic, "json", self._schemas[name])
+    def _register(self, topic: str, message: msgspec.Struct) -> int:
+        channel = self._writer.add_channel(topic, "json", self._schema(message))
         self._channels[topic] = channel
         return channel
+
+    def _schema(self, message: msgspec.Struct) -> int:
+        """The schema of a message like this one. A second law's inner values make `mirotwin.Control2`, and so on."""
+        text = msgspec.json.encode(channels.schema(message))
+        if text not in self._schemas:
+            name = f"mirotwin.{type(message).__name__.removesuffix('Message')}"
+            number = self._named[name] = self._named.get(name, 0) + 1
+            name += str(number) if number > 1 else ""
+            self._schemas[text] = self._writer.add_schema(name, "jsonschema", text)
+        return self._schemas[text]

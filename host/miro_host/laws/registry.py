@@ -1,0 +1,27 @@
+"""The names of the tracking laws.
+
+What belongs here: the table of our own laws, and the type of a scenario's `controller`. What does not: the interface
+(`interface`) and the laws. No law is imported before a scenario names it.
+"""
+
+from miro_host.parts import Registry
+
+
+class Controller:
+    """Parameters of any law. A law's own struct derives from `interface.LawParameters`.
+
+    A plain class, because msgspec reads a struct as itself and never as one of the structs derived from it.
+    """
+
+    __slots__ = ()
+
+
+DEFAULT_LAW = "yang_kim"
+LAWS: Registry[Controller] = Registry(
+    "mirotwin.laws",
+    word="law",
+    key="law",
+    base="miro_host.laws.interface:LawParameters",
+    own={"yang_kim": "miro_host.laws.yang_kim:Gains"},
+    default=DEFAULT_LAW,
+)

@@ -1,0 +1,122 @@
+"""Parts that a scenario names: the table of our own, and those that other distributions add by entry points.
+
+What belongs here: from a name to a class, and what can be wrong on the way. What does not: what a part does (`laws`),
+and reading a scenario.
+
+A part is chosen by a frozen `msgspec` struct of its parameters whose tag is the part's name. A distribution adds one in
+its `pyproject.toml`:
+
+    [project.entry-points."mirotwin.laws"]
+    samson = "samson_law:Samson"
+
+Entry points are looked up only for a name that is not in our own table, because reading the metadata of all installed
+distributions takes tens of milliseconds. For the same reason a name in our table cannot be replaced from outside.
+"""
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any, Generic, TypeVar
+
+Part = TypeVar("Part")
+
+
+class PartError(ValueError):
+    """A part that cannot be found, loaded or used: `what` and `remedy`."""
+
+    def __init__(self, what: str, remedy: str = "") -> None:
+        self.what = what
+        self.remedy = remedy
+        super().__init__(f"{what}; {remedy}" if remedy else what)
+
+
+class Registry(Generic[Part]):
+    """Parts of one kind.
+
+    `group` is the name of the entry points, `word` what a message calls a part, `key` the scenario key that names it,
+    `base` the struct that all structs of parameters derive from (`module:class`), `own` our table: name to
+    `module:class`. `default` is the part of a table that does not say its name, if there is one.
+    """
+
+    def __init__(
+        self,
+        group: str,
+        *,
+        word: str,
+        key: str,
+        base: str,
+        own: Mapping[str, str],
+        default: str | None = None,
+    ) -> None:
+        self.group = group
+        self.word = word
+        self.key = key
+        self.base = base
+        self.own = own
+        self.default = default
+
+    def __repr__(self) -> str:
+        return f"Registry({self.group!r}, own={list(self.own)})"
+
+    def names(self) -> list[str]:
+        """All names that can be used: our own in the order of the table, then the others sorted."""
+        from importlib.metadata import entry_points  # slow to import, and rarely needed
+
+        found = {entry.name for entry in entry_points(group=self.group)}
+        return [*self.own, *sorted(found.difference(self.own))]
+
+    def find(self, name: str) -> type[Part]:
+        """The struct of parameters of the part `name`. Raises PartError with the reason in one line."""
+        if name in self.own:
+            return self._checked(_loaded(self.own[name]), name, self.own[name])
+        from importlib.metadata import entry_points
+
+        entries = list(entry_points(group=self.group, name=name))
+        if not entries:
+            raise PartError(f"{name!r} is not one of the choices", self._choices(name))
+        sources = [_source(entry) for entry in entries]
+        if len(entries) > 1:
+            raise PartError(f"{self.word} {name!r} is in {' and in '.join(sources)}", "uninstall one of them")
+        place = f"{entries[0].value}, from {sources[0]}"
+        try:
+            found = entries[0].load()
+        except (Exception, SystemExit) as error:
+            what = f"{self.word} {name!r} ({place}) cannot be imported: {described(error)}"
+            raise PartError(what, f"repair or uninstall {sources[0]}") from error
+        return self._checked(found, name, place)
+
+    def _choices(self, name: str) -> str:
+        names = self.names()
+        close = get_close_matches(name, names, n=1)
+        *others, last = names
+        choices = f"use {', '.join(others)} or {last}" if others else f"use {last}"
+        return f"did you mean {close[0]}? {choices}" if close else choices
+
+    def _checked(self, found: Any, name: str, place: str) -> type[Part]:
+        """`found` if it is a struct of parameters as this kind of part needs it."""
+        part = f"{self.word} {name!r} ({place})"
+        if not (isinstance(found, type) and issubclass(found, _loaded(self.base))):
+            raise PartError(f"{part} is not a struct of parameters", f"derive it from {self.base}")
+        struct: Any = found
+        config = struct.__struct_config__
+        if config.tag != name or config.tag_field != self.key:
+            raise PartError(f"{part} has the tag {config.tag!r}", f"give the class tag={name!r}")
+        if not (config.frozen and config.forbid_unknown_fields):
+            raise PartError(f"{part} can change, or takes unknown keys", "give the class frozen=True")
+        return found
+
+
+def _loaded(place: str) -> Any:
+    """The attribute that `module:attribute` names."""
+    module, _, attribute = place.partition(":")
+    return getattr(import_module(module), attribute)
+
+
+def _source(entry: Any) -> str:
+    return f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "an unknown distribution"
+
+
+def described(error: BaseException) -> str:
+    """Type and message of an exception in one line."""
+    text = f"{error}".strip().partition("\n")[0]
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -1,0 +1,164 @@
+"""The interface of a law: what it is given, how its answer is taken, and what is refused."""
+
+import math
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.host.own_laws import Leaky, LeakyParameters, Wrong, WrongParameters
+
+from miro_host.ear import Heard
+from miro_host.integrator import Integrator, Limits
+from miro_host.laws.interface import Law, LawParameters, Velocities
+from miro_host.laws.yang_kim import Gains
+from miro_host.parts import PartError
+from miro_host.pilot import PERIOD_S, Pilot
+from miro_host.posture import Posture
+from miro_host.reference import Line
+
+HERE = Posture(0.07, 0.02, -0.38)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+HEARD = Heard(1, 2, 0, 0, 0, 100, -100, 7, 0)
+
+
+class Listening(Law[LawParameters]):
+    """Keeps what it was given."""
+
+    NOT_STATE = ("parameters", "given")
+    given = None
+
+    def step(self, given):
+        self.given = given
+        return Velocities(0.1, 0.2)
+
+
+class Any(LawParameters, frozen=True, tag="any"):
+    pass
+
+
+def pilot(law, **options):
+    return Pilot(Line(), law, **options)
+
+
+def test_a_law_is_given_the_measurement_the_reference_and_the_last_answer_of_its_robot():
+    law = Listening(Any())
+    one = pilot(law, reference_lead_s=0.5)
+    one.update(HERE, 1.0, HEARD)
+    command = one.update(HERE, 1.0 + PERIOD_S, HEARD)
+    assert (law.given.posture, law.given.heard) == (HERE, HEARD)
+    assert law.given.t_s == 1.0 + PERIOD_S + 0.5
+    assert law.given.reference == law.given.path.at(law.given.t_s)
+    assert law.given.period_s == PERIOD_S
+    assert (law.given.v_m_s, law.given.w_rad_s) == (command.v_m_s, command.w_rad_s) == (0.1, 0.2)
+
+
+def test_a_law_is_not_asked_without_a_measurement():
+    law = Leaky(LeakyParameters())
+    one = pilot(law)
+    one.update(HERE, 0.0)
+    one.update(None, PERIOD_S)
+    assert law.periods == 1
+
+
+@given(st.tuples(FINITE, FINITE), st.tuples(FINITE, FINITE))
+def test_velocities_are_taken_as_far_as_the_limits_of_velocity_and_rate_allow(first, second):
+    limits = Limits(max_v_m_s=0.8, max_w_rad_s=4.0, max_v_dot_m_s2=6.0, max_w_dot_rad_s2=60.0)
+    one = Integrator(limits, PERIOD_S)
+    for v, w in (first, second):
+        before = (one.v_m_s, one.w_rad_s)
+        one.go_to(v, w)
+        for wanted, was, now, most, rate in (
+            (v, before[0], one.v_m_s, 0.8, 6.0),
+            (w, before[1], one.w_rad_s, 4.0, 60.0),
+        ):
+            inside = min(max(wanted, -most), most)
+            assert abs(now) <= most
+            assert now == inside if abs(inside - was) <= PERIOD_S * rate else abs(now - was) > 0.0
+            assert abs(now - was) <= PERIOD_S * rate * (1 + 1e-12)
+
+
+def test_before_the_first_measurement_every_inner_value_is_there_and_zero():
+    assert pilot(Leaky(LeakyParameters())).update(None, 0.0).inner == {"error_m": 0.0}
+
+
+def test_what_a_law_remembers_is_saved_with_the_pilot_and_makes_the_same_commands():
+    whole, cut = pilot(Leaky(LeakyParameters())), pilot(Leaky(LeakyParameters()))
+    postures = [Posture(0.01 * k, 0.0, 0.1 * k) for k in range(8)]
+    commands = [whole.update(posture, k * PERIOD_S) for k, posture in enumerate(postures)]
+    for k, posture in enumerate(postures):
+        other = pilot(Leaky(LeakyParameters()))
+        other.restore(msgspec.msgpack.decode(msgspec.msgpack.encode(cut.snapshot())))
+        cut = other
+        assert cut.update(posture, k * PERIOD_S) == commands[k]
+    assert cut.snapshot() == whole.snapshot()
+    assert cut.law.periods == 8
+
+
+def test_a_law_without_memory_adds_nothing_to_the_state():
+    assert set(pilot(Gains().law()).snapshot()) == {"integrator", "command"}
+
+
+@pytest.mark.parametrize(
+    ("how", "reason"),
+    [
+        ("nan", "it answered v_m_s = nan, which is not a finite float"),
+        ("infinite", "it answered w_dot_rad_s2 = -inf, which is not a finite float"),
+        ("inner nan", "it answered a = nan, which is not a finite float"),
+        ("inner names", r"its inner values are \['b'\], INNER says \['a'\]"),
+        ("int", "it answered v_m_s = 1, which is not a finite float"),
+        ("nothing", "it answered 'None', neither Accelerations nor Velocities"),
+        ("raises", "ZeroDivisionError: division by zero"),
+        ("memory nan", "attribute 'memory' is nan, not a finite float"),
+        ("memory type", "attribute 'memory' is text, not a finite float"),
+        ("undeclared", "attribute 'hidden' is neither in STATE nor in NOT_STATE"),
+    ],
+)
+def test_a_law_that_fails_is_named_and_leaves_the_command_as_it_was(how, reason):
+    one = pilot(Wrong(WrongParameters(how=how)))
+    before = one.update(HERE, 0.0)
+    with pytest.raises(PartError, match=rf"law 'wrong' failed: {reason}; mend the law"):
+        one.update(HERE, PERIOD_S)
+    assert one.command == before
+    assert math.isfinite(one.integrator.v_m_s)
+
+
+@pytest.mark.parametrize(
+    ("state", "reason"),
+    [
+        ({}, "a memory of nothing where"),
+        ({"error_m": 0.0, "periods": 1, "begun": True, "headings_rad": [0.0, 0.0], "x": 1}, "x where"),
+        ({"error_m": math.nan, "periods": 1, "begun": True, "headings_rad": [0.0, 0.0]}, "'error_m' is nan"),
+        ({"error_m": 0.0, "periods": 1 << 63, "begun": True, "headings_rad": [0.0, 0.0]}, "'periods' is 92"),
+        ({"error_m": 0.0, "periods": True, "begun": True, "headings_rad": [0.0, 0.0]}, "'periods' is True"),
+        ({"error_m": 0.0, "periods": 1, "begun": 1, "headings_rad": [0.0, 0.0]}, "'begun' is 1, not True"),
+        ({"error_m": 0.0, "periods": 1, "begun": True, "headings_rad": [0.0]}, "not a list of 2 items"),
+        (
+            {"error_m": 0.0, "periods": 1, "begun": True, "headings_rad": [0.0, "a"]},
+            r"headings_rad\[1\]' is a",
+        ),
+    ],
+)
+def test_a_memory_that_is_not_the_laws_is_refused_and_changes_nothing(state, reason):
+    law = Leaky(LeakyParameters())
+    with pytest.raises(ValueError, match=reason):
+        law.restore(state)
+    assert law.snapshot() == Leaky(LeakyParameters()).snapshot()
+
+
+def test_a_list_in_a_snapshot_is_a_copy():
+    law = Leaky(LeakyParameters())
+    state = law.snapshot()
+    law.headings_rad[0] = 5.0
+    assert state["headings_rad"] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("code", ["", "x", "0d", "dd", "65537d"])
+def test_a_type_that_the_table_does_not_know_is_refused(code):
+    class Odd(Law[LawParameters]):
+        STATE = {"x": code}
+
+    law = Odd(Any())
+    law.x = 1.0
+    with pytest.raises(ValueError, match=r"STATE\['x'\]"):
+        law.snapshot()
