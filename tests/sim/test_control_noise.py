@@ -20,7 +20,8 @@ TEXT = """
 name = "noisy"
 duration_s = 0.5
 [camera]
-noise = "none"
+position_error_cm = 0
+heading_error_deg = 0
 [[network]]
 radio.profile = "wire"
 {}

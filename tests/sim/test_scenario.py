@@ -103,7 +103,7 @@ def test_a_whole_number_is_a_number() -> None:
             "network[0].robot[0]: slot 3 does not exist on a network of 3 robots; use 0 to 2",
         ),
         ("slot = 0", "slot = 5", "network[0].robot[0].slot: 5 is out of range; must be <= 4"),
-        ("kind = ", "kid = ", "reference.kind: this key is missing; use line or arc"),
+        ('kind = "line"', 'kid = "line"', "reference.kind: this key is missing; use line or arc"),
         ('"line"', '"spiral"', "reference.kind: 'spiral' is not one of the choices; use line or arc"),
         (
             'switching = "saturation"',
@@ -112,9 +112,19 @@ def test_a_whole_number_is_a_number() -> None:
         ),
         ('law = "yang_kim"', 'law = "pid"', "controller.law: 'pid' is not one of the choices; use yang_kim"),
         (
-            'noise = "gaussian"',
-            "noise = true",
-            "expected a string, got true or false (True); use gaussian or none",
+            'kind = "gaussian"',
+            "kind = true",
+            "camera.kind: expected a string, got true or false (True); use gaussian",
+        ),
+        (
+            'kind = "gaussian"',
+            'kind = "pixel"',
+            "camera.kind: 'pixel' is not one of the choices; use gaussian",
+        ),
+        (
+            'kind = "gaussian"',
+            'noise = "none"',
+            "camera.noise: unknown key; keys here: kind, position_error_cm",
         ),
         ("squelch = false", "squelch = 0", "radio.squelch: expected true or false, got a whole number (0)"),
         (

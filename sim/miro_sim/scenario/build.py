@@ -13,7 +13,7 @@ from miro_host.laws.interface import LawParameters
 from miro_host.parts import PartError, described
 from miro_host.pilot import Pilot
 from miro_host.reference import Arc, Line, Ramp, Trajectory
-from miro_host.vision import NO_ERRORS, Vision, VisionErrors
+from miro_host.vision import Vision, VisionErrors
 from miro_sim.plant.params import DriveParams
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 from miro_sim.scenario import keys as sc
@@ -47,12 +47,9 @@ def pilot_for(robot: sc.Robot, reference: Trajectory) -> Pilot:
 
 def vision_for(camera: sc.Camera) -> Vision:
     """Camera, grabber and tracker."""
-    if camera.noise == "none":
-        errors = msgspec.structs.replace(NO_ERRORS, pixel_m=camera.pixel_cm / 100.0)
-    else:
-        errors = VisionErrors(
-            camera.position_error_cm / 100.0, camera.heading_error_deg * DEGREE, camera.pixel_cm / 100.0
-        )
+    errors = VisionErrors(
+        camera.position_error_cm / 100.0, camera.heading_error_deg * DEGREE, camera.pixel_cm / 100.0
+    )
     return Vision(errors, camera.delay_frames)
 
 

@@ -35,19 +35,24 @@ TurnDeg = Annotated[float, Meta(ge=-180.0, le=180.0)]
 Name = Annotated[str, Meta(pattern=r"\A[a-z0-9][a-z0-9_-]{0,63}\Z")]
 
 
-class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The camera and what the tracker makes of it: noise per axis, pixels, whole frames of delay.
+class GaussianCamera(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="gaussian"
+):
+    """The camera and what the tracker makes of it: white noise per axis, pixels, whole frames of delay.
 
     `position_error_cm` and `heading_error_deg` are three standard deviations (paper section V-A: 2.40 cm,
-    4.83 degrees). `pixel_cm` 0 measures without quantisation; 0.4375 is a pitch of 140 x 105 cm on 320 x
-    240 pixels.
+    4.83 degrees); 0 measures without error. `pixel_cm` 0 measures without quantisation; 0.4375 is a pitch of
+    140 x 105 cm on 320 x 240 pixels.
     """
 
-    noise: Literal["gaussian", "none"] = "gaussian"
     position_error_cm: Annotated[float, Meta(ge=0.0, le=100.0)] = 2.40
     heading_error_deg: Annotated[float, Meta(ge=0.0, le=180.0)] = 4.83
     pixel_cm: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.4375
     delay_frames: Annotated[int, Meta(ge=0, le=30)] = 1
+
+
+Camera = GaussianCamera
+"""Every kind of camera there is; another kind is another struct with a tag."""
 
 
 class HostTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -171,7 +176,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     duration_s: Duration
     stop_on_fault: bool = True
     lm629: Lm629Options = DEFAULT_OPTIONS
-    camera: Camera = Camera()
+    camera: Camera = GaussianCamera()
     host: HostTimes = HostTimes()
     networks: Annotated[tuple[Network, ...], Meta(min_length=1)] = msgspec.field(name="network")
 

@@ -20,7 +20,8 @@ name = "head-on"
 duration_s = 1.0
 
 [camera]
-noise = "none"
+position_error_cm = 0
+heading_error_deg = 0
 
 [[network]]
 
