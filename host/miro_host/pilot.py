@@ -112,6 +112,8 @@ class Pilot:
             answer = self.law.step(given)
             check_answer(answer, self.law.INNER)
             self.law.snapshot()
+        except PartError:  # of the reference, which the law may have asked
+            raise
         except Exception as error:
             raise _failure(self.name, error) from error
         return answer

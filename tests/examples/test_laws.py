@@ -174,7 +174,10 @@ class Broken(Law[Parameters]):
     [
         ("check", "controller: law 'broken' cannot check its parameters: KeyError: 'how'"),
         ("refuse", "controller.how: refuse is refused"),
-        ("construct", "net0/robot0: law 'broken' cannot be made: RuntimeError: no model file; mend the law"),
+        (
+            "construct",
+            "net0/robot0: tick 0 (0.000000 s): law 'broken' cannot be made: RuntimeError: no model file; mend the law",
+        ),
         (
             "nan",
             "net0/robot0: tick 2402400 (0.100100 s): law 'broken' failed: it answered v_m_s = nan, which is",

@@ -1,10 +1,12 @@
 """The pitch: starts and references that are not on it are refused with place and limits."""
 
 import math
+from pathlib import Path
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from tests.host.distribution import install
 
 from miro_host.posture import Posture
 from miro_sim.pitch import ground as pitch
@@ -132,3 +134,54 @@ def test_drive_s_says_when_the_reference_stands() -> None:
     reference = reference_for(scenario.networks[0].robot[1], 5.0)
     assert reference.at(2.0).posture.x_m == pytest.approx(0.2 * 1.5)
     assert reference.at(4.9).posture == reference.at(2.0).posture
+
+
+FOREIGN = """
+import msgspec
+from miro_host.posture import Posture
+from miro_host.reference import Line
+from miro_host.reference_keys import ReferenceParameters
+
+class Odd(ReferenceParameters, frozen=True, kw_only=True, tag="odd"):
+    how: str
+
+    def trajectory(self, duration_s):
+        if self.how == "not made":
+            raise RuntimeError("no file of points")
+        return Path(self.how)
+
+class Path:
+    def __init__(self, how):
+        self.how = how
+
+    def at(self, t_s):
+        found = Line().at(min(t_s, 1.0))
+        if t_s > 2.0 and self.how == "fails":
+            raise KeyError("t_s")
+        if t_s > 2.0 and self.how == "leaves":
+            return msgspec.structs.replace(found, posture=Posture(2.0, 0.0, 0.0))
+        if t_s > 2.0 and self.how == "turns":
+            return msgspec.structs.replace(found, posture=Posture(0.0, 0.0, 1e300))
+        return found
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "expected"),
+    [
+        ("leaves", "leaves the pitch after 2.00 s of 3 s: a square of 7.5 cm there takes x = 196.25 to"),
+        ("leaves", "the pitch has -10 to 120 cm; choose other parameters for it, or duration_s = 1.96"),
+        ("turns", "leaves the pitch: angle must be within"),
+        ("fails", "reference 'odd' failed at 2.002000 s: KeyError: 't_s'; mend the reference"),
+        ("not made", "reference 'odd' cannot be made: RuntimeError: no file of points; mend the reference"),
+    ],
+)
+def test_a_reference_of_another_distribution_is_checked_at_each_camera_frame(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str, expected: str
+) -> None:
+    monkeypatch.syspath_prepend(str(tmp_path))
+    install(tmp_path, "odd", "1", {"odd": "plug_odd:Odd"}, "references", plug_odd=FOREIGN)
+    message = refusal("", f'kind = "odd", how = "{how}"', 3.0)
+    assert message.startswith(f"my.toml: {HERE}.reference: ")
+    assert expected in message
+    parse(text("", 'kind = "odd", how = "good"', 86_400.0), "my.toml")

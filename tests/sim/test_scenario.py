@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miro_host.reference_keys import ArcRef, LineRef
 from miro_sim.scenario.file import ScenarioError, builtin_names, builtin_text, load, parse
-from miro_sim.scenario.keys import ArcRef, LineRef, Scenario
+from miro_sim.scenario.keys import Scenario
 
 SMALL = """
 name = "small"

@@ -12,7 +12,9 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_host.laws.interface import LawParameters
 from miro_host.parts import PartError, described
 from miro_host.pilot import Pilot
-from miro_host.reference import Arc, Line, Ramp, Trajectory
+from miro_host.reference import Trajectory
+from miro_host.reference_keys import CheckedReference, ReferenceParameters
+from miro_host.reference_registry import REFERENCES
 from miro_host.vision import Vision, VisionErrors
 from miro_sim.plant.params import DriveParams
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
@@ -23,13 +25,19 @@ DEGREE = 0.017453292519943295
 
 
 def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
-    """The reference trajectory in the paper's axes, which start at its own start. ValueError: see `Arc`."""
-    path = robot.reference
-    drive_s = max(duration_s, path.ramp_s) if path.drive_s is None else path.drive_s
-    ramp = Ramp(path.speed_m_s, path.ramp_s, drive_s, ramp_down=path.drive_s is not None)
-    if isinstance(path, sc.LineRef):
-        return Line(ramp, path.heading_deg * DEGREE)
-    return Arc(ramp, path.heading_deg * DEGREE, path.curvature_per_m)
+    """The reference trajectory in the paper's axes, which start at its own start.
+
+    Raises PartError when it cannot be made.
+    """
+    parameters = robot.reference
+    assert isinstance(parameters, ReferenceParameters)
+    name = parameters.name()
+    try:
+        trajectory = parameters.trajectory(duration_s)
+    except Exception as error:
+        what = f"reference {name!r} cannot be made: {described(error)}"
+        raise PartError(what, "mend the reference or its parameters") from error
+    return trajectory if name in REFERENCES.own else CheckedReference(trajectory, name)
 
 
 def pilot_for(robot: sc.Robot, reference: Trajectory) -> Pilot:

@@ -1,7 +1,7 @@
 """The scenario: everything about a run that is chosen rather than drawn, as frozen structs.
 
 What belongs here: the keys a scenario file may have, with unit, default and range, and the rules between
-them; those of the radio are in `radio_keys`, those of a law beside the law (`miro_host.laws`). What does not: reading
+them; those of the radio are in `radio_keys`, those of laws and references in `miro_host`. What does not: reading
 files (`file`) and reporting what is wrong in them (`errors`), and what the keys do (`miro_host`, `radio`, `plant`,
 `world`).
 
@@ -16,6 +16,7 @@ import msgspec
 from msgspec import Meta
 
 from miro_host.laws.registry import DEFAULT_LAW, LAWS, Controller
+from miro_host.reference_registry import AnyReference
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from miro_sim.plant.params import DriveParams
 from miro_sim.scenario.radio_keys import ControlNoise, Radio
@@ -28,10 +29,8 @@ MAX_NETWORKS = 32  # building and simulating one takes as long as a whole run of
 MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
 
 Duration = Annotated[float, Meta(gt=0.0, le=86_400.0)]
-Seconds = Annotated[float, Meta(ge=0.0, le=1e3)]
 PitchCm = Annotated[float, Meta(ge=-1_000.0, le=1_000.0)]
 TurnRad = Annotated[float, Meta(ge=-3.141592653589793, le=3.141592653589793)]
-TurnDeg = Annotated[float, Meta(ge=-180.0, le=180.0)]
 Name = Annotated[str, Meta(pattern=r"\A[a-z0-9][a-z0-9_-]{0,63}\Z")]
 
 
@@ -61,41 +60,14 @@ class HostTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     compute_s: Annotated[float, Meta(ge=0.00001, le=0.030)] = 0.003
 
 
-class LineRef(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="line"
-):
-    """A straight line from the origin, run with a speed ramp: s = v t^2 / (2 t_r), then v (t - t_r / 2).
-
-    With `drive_s` the reference comes to rest by the same ramp, after so many seconds, and stands from then on.
-    Without, it moves for the whole duration.
-    """
-
-    heading_deg: TurnDeg = 0.0
-    speed_m_s: Annotated[float, Meta(ge=0.0, le=1.46)] = 0.20
-    ramp_s: Seconds = 0.5
-    drive_s: Annotated[float, Meta(ge=0.0, le=86_400.0)] | None = None
-
-
-class ArcRef(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="arc"
-):
-    """A circular arc from the origin: heading theta_0 + kappa s, the same speed ramp and `drive_s` as the line."""
-
-    heading_deg: TurnDeg = 60.0
-    curvature_per_m: Annotated[float, Meta(ge=-100.0, le=100.0)] = -1.0
-    speed_m_s: Annotated[float, Meta(ge=0.0, le=1.46)] = 0.20
-    ramp_s: Seconds = 0.5
-    drive_s: Annotated[float, Meta(ge=0.0, le=86_400.0)] | None = None
-
-
 class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One robot: its slot on the network, where it starts, what it follows and who steers it.
 
     Start and reference have to lie on the pitch (`places`).
     The start is the start of the reference plus the errors (captions of the paper's Figs. 6 and 8). Each
-    wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `controller` holds the parameters of the
-    law that it names. `drive` replaces single parameters of motors, bridges, battery, chassis and encoders
-    (`plant.params`).
+    wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `reference` and `controller` hold the
+    parameters of the reference and of the law that they name. `drive` replaces single parameters of motors, bridges,
+    battery, chassis and encoders (`plant.params`).
     """
 
     slot: Annotated[int, Meta(ge=0, le=4)] = 0
@@ -103,7 +75,7 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     start_error_y_cm: PitchCm = 0.0
     start_error_theta_rad: TurnRad = 0.0
     wheel_radius_mismatch: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.015
-    reference: LineRef | ArcRef
+    reference: AnyReference
     controller: Controller = msgspec.field(default_factory=lambda: LAWS.find(DEFAULT_LAW)())
     drive: DriveParams = DriveParams()
 

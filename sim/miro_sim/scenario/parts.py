@@ -11,8 +11,9 @@ import msgspec
 
 from miro_host.laws.registry import LAWS, Controller
 from miro_host.parts import PartError, Registry, described
+from miro_host.reference_registry import REFERENCES, AnyReference
 
-REGISTRIES: dict[type, Registry[Any]] = {Controller: LAWS}
+REGISTRIES: dict[type, Registry[Any]] = {Controller: LAWS, AnyReference: REFERENCES}
 """By the type that a field of the scenario has."""
 
 

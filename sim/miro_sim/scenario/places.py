@@ -4,42 +4,60 @@ What belongs here: the check and its words. What does not: the geometry (`pitch`
 robot does during a run is its own matter: `summary` counts the time that it spends off the pitch.
 
 Checked are the square of the robot at its start, and the same square at the reference, along the whole of its path: a
-robot that follows the reference without error has it there. Robots that start on top of each other are not refused.
+robot that follows the reference without error has it there. Of a reference from another distribution, whose path is not
+known, the places at the camera frames are checked. Robots that start on top of each other are not refused.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
+from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_exact.domain import DomainError
+from miro_host.parts import PartError
 from miro_host.posture import Posture
 from miro_sim.pitch import ground as pitch
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.keys import Robot, Scenario
 
+if TYPE_CHECKING:
+    from miro_host.reference import Trajectory
+
 STEP_M = 0.005
 """Distance along the path from one place that is checked to the next .."""
 STEP_RAD = 0.02
 """.. and the turn between them, whichever is less: between them a corner bulges by less than 0.1 mm."""
+MOST_S = 3600.0
+"""So long a reference of another distribution is checked, at each camera frame: this takes a few seconds."""
 
 
 def check_places(scenario: Scenario, origin: str) -> None:
     """Raises ScenarioError for a start or a reference that is not on the pitch; `origin` names the scenario."""
     for number, network in enumerate(scenario.networks):
         for index, robot in enumerate(network.robot):
-            _check(robot, scenario.duration_s, origin, f"network[{number}].robot[{index}]")
+            place = f"network[{number}].robot[{index}]"
+            try:
+                _check(robot, scenario.duration_s, origin, place)
+            except PartError as error:
+                raise ScenarioError(origin, *_not_made(error, f"{place}.reference")) from error
+            except DomainError as error:  # a heading of a million radians
+                raise ScenarioError(origin, f"{place}.reference", f"leaves the pitch: {error}") from error
+
+
+def _not_made(error: PartError, place: str) -> tuple[str, str, str]:
+    """Place, what and remedy for a reference that cannot be made, or fails."""
+    cause = f"{error.__cause__}"
+    if cause.startswith("curvature_per_m = "):  # an arc of a full turn
+        what = cause.partition(": ")[2].partition(";")[0]
+        return f"{place}.curvature_per_m", what, "make the arc flatter, or end it with drive_s"
+    return place, error.what, error.remedy
 
 
 def _check(robot: Robot, duration_s: float, origin: str, place: str) -> None:
-    from miro_host.reference import Arc, Line  # needs hot modules: not before the engine was chosen
-    from miro_sim.scenario.build import reference_for
+    from miro_sim.scenario.build import reference_for  # needs hot modules: not before the engine was chosen
 
-    try:
-        reference = reference_for(robot, duration_s)
-    except ValueError as error:  # an arc of a full turn
-        what = f"{error}".partition(": ")[2].partition(";")[0]
-        raise ScenarioError(
-            origin, f"{place}.reference.curvature_per_m", what, "make the arc flatter, or end it with drive_s"
-        ) from None
+    reference = reference_for(robot, duration_s)
     at = reference.at(0.0).posture
     start = Posture(
         at.x_m + robot.start_error_x_cm / 100.0,
@@ -52,23 +70,31 @@ def _check(robot: Robot, duration_s: float, origin: str, place: str) -> None:
         raise ScenarioError(
             origin, f"{place}.start_error_{axis}_cm", f"the robot starts off the pitch: {what}"
         )
-    assert isinstance(reference, Line | Arc)
     on_s = 0.0
-    for t_s in _instants(robot, min(reference.ramp.duration_s, duration_s)):
+    for t_s in _instants(reference, duration_s):
         off = _off_pitch(reference.at(t_s).posture)
         if off is not None:
             what = f"leaves the pitch after {t_s:.2f} s of {duration_s:g} s: {off[1]}"
             remedy = f"let it stand in time, drive_s = {int(100.0 * on_s) / 100.0:g}, or slow it down"
+            if not hasattr(robot.reference, "drive_s"):
+                remedy = f"choose other parameters for it, or duration_s = {int(100.0 * on_s) / 100.0:g}"
             raise ScenarioError(origin, f"{place}.reference", what, remedy if on_s else "start it elsewhere")
         on_s = t_s
 
 
-def _instants(robot: Robot, moving_s: float) -> Iterator[float]:
-    """Times from 0 to `moving_s` between which the reference does not go far."""
-    path = robot.reference
-    curvature = getattr(path, "curvature_per_m", 0.0)
-    step_m = min(STEP_M, STEP_RAD / abs(curvature)) if curvature else STEP_M
-    step_s = step_m / path.speed_m_s if path.speed_m_s > 0.0 else moving_s
+def _instants(reference: Trajectory, duration_s: float) -> Iterator[float]:
+    """Times from 0 on between which the reference does not go far; camera frames, if its path is not known."""
+    from miro_host.reference import Arc, Line  # hot, too
+
+    if isinstance(reference, Line | Arc):
+        moving_s = min(reference.ramp.duration_s, duration_s)
+        curvature = reference.curvature_per_m if isinstance(reference, Arc) else 0.0
+        step_m = min(STEP_M, STEP_RAD / abs(curvature)) if curvature else STEP_M
+        speed_m_s = reference.ramp.speed_m_s
+        step_s = step_m / speed_m_s if speed_m_s > 0.0 else moving_s
+    else:
+        moving_s = min(duration_s, MOST_S)
+        step_s = seconds(CONTROL_PERIOD_TICKS)
     count = 0
     while count * step_s < moving_s:
         yield count * step_s

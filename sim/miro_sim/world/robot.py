@@ -7,7 +7,8 @@ it gets the camera's measurement and the robot's last answer by radio, and answe
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS, seconds
@@ -53,8 +54,10 @@ class Robot:
         name = f"net{network}/robot{spec.slot}"
         self.spec = spec
         self.network = network
-        self.reference = reference_for(spec, scenario.duration_s)
-        start = self.reference.at(0.0).posture
+        with self._named(0):
+            self.reference = reference_for(spec, scenario.duration_s)
+            start = self.reference.at(0.0).posture
+            self.pilot: Pilot = pilot_for(spec, self.reference)
         wheels = Stream(seed, f"{name}/wheels")
         try:
             self.drive = DifferentialDrive(
@@ -71,10 +74,6 @@ class Robot:
         self.board.load(image)
         self.camera_noise = Stream(seed, f"{name}/camera")
         self.vision: Vision = vision_for(scenario.camera)
-        try:
-            self.pilot: Pilot = pilot_for(spec, self.reference)
-        except PartError as error:
-            raise PartError(f"net{network}/robot{spec.slot}: {error.what}", error.remedy) from error
         self.frame = 0
         self.marks: tuple[int, ...] = ()
         self.asked: list[tuple[Callable[[Robot], object], str]] = []
@@ -113,8 +112,14 @@ class Robot:
 
     def steer(self, measured: Posture | None, heard: Heard | None, tick: int) -> Command:
         """The PC computes this robot's wheel commands from what it measured and heard. Raises PartError."""
-        try:
+        with self._named(tick):
             return self.pilot.update(measured, seconds(tick), heard)
+
+    @contextmanager
+    def _named(self, tick: int) -> Iterator[None]:
+        """Says of which robot and when, if a part of it fails."""
+        try:
+            yield
         except PartError as error:
             place = f"net{self.network}/robot{self.spec.slot}: tick {tick} ({seconds(tick):.6f} s)"
             raise PartError(f"{place}: {error.what}", error.remedy) from error
@@ -131,10 +136,12 @@ class Robot:
         """What observers see of this robot at `tick`; drains the lists of completed LM629 commands."""
         x_m, y_m, theta_rad = self.drive.pose_at(tick)
         v_m_s, w_rad_s = self.drive.velocity_at(tick)
+        with self._named(tick):
+            reference = self.reference.at(seconds(tick)).posture
         return RobotPeriod(
             network=self.network,
             slot=self.spec.slot,
-            reference=self.reference.at(seconds(tick)).posture,
+            reference=reference,
             truth=Posture(x_m, y_m, theta_rad),
             v_m_s=v_m_s,
             w_rad_s=w_rad_s,

@@ -74,6 +74,7 @@ def scenario_of_stream(sent: Sequence[Transmission], path: str) -> Scenario:
         )
     base = load(DEFAULT_SCENARIO).scenario
     first = base.networks[0].robot[0]
+    assert isinstance(first.reference, msgspec.Struct)  # parameters of a line
     standing = msgspec.structs.replace(first.reference, drive_s=0.0)  # nothing steers by it
     model = msgspec.structs.replace(first, wheel_radius_mismatch=0.0, reference=standing)
     robots = robots_of_stream(sent)
