@@ -8,6 +8,7 @@ import time
 import tracemalloc
 from pathlib import Path
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,7 +17,9 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from tests.mirotwin.synthetic import periods
 
+from miro_sim.periods import Control
 from mirotwin.recording import channels
+from mirotwin.recording import recorder as recorder_module
 from mirotwin.recording.container import RecordingError, records
 from mirotwin.recording.reader import parse, read
 from mirotwin.recording.recorder import Recorder, Source
@@ -78,6 +81,36 @@ def test_an_ordinary_mcap_reader_finds_channels_schemas_and_attachments() -> Non
         content = json.loads(message.data)
         assert set(content) == set(tree["properties"])
         assert message.log_time == content["tick"] * 125 // 3
+
+
+def test_inner_values_of_different_laws_have_schemas_that_name_them() -> None:
+    stream = io.BytesIO()
+    with Recorder(stream, SOURCE) as recorder:
+        for period in periods(3, [(0, 0), (0, 1), (0, 2)]):
+            first, second, third = period.robots
+            other = Control(0.1, 0.0, 5, 5, {"e1_m": 0.25})
+            robots = (first, msgspec.structs.replace(second, control=other), third)
+            recorder.write(msgspec.structs.replace(period, robots=robots))
+    summary = make_reader(io.BytesIO(stream.getvalue())).get_summary()
+    assert summary is not None
+    found = {}
+    for channel in summary.channels.values():
+        if channel.topic.endswith("/control"):
+            schema = summary.schemas[channel.schema_id]
+            inner = json.loads(schema.data)["properties"]["inner"]
+            found[channel.topic] = (schema.name, list(inner["properties"]))
+    assert found == {
+        "/net0/robot1/control": ("mirotwin.Control", ["e1_m"]),
+        "/net0/robot0/control": ("mirotwin.Control2", ["u1", "u2", "s1", "s2"]),
+        "/net0/robot2/control": ("mirotwin.Control2", ["u1", "u2", "s1", "s2"]),
+    }
+    assert parse(stream.getvalue(), "run.mcap").periods[1].robots[1].control == other
+
+
+def test_a_recording_of_the_format_before_is_refused_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recorder_module, "FORMAT", "1")
+    with pytest.raises(RecordingError, match="recording format '1'; this program reads format 2"):
+        parse(recorded(), "run.mcap")
 
 
 def test_every_channel_has_a_message_type_and_foreign_topics_have_none() -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.mirotwin.synthetic import periods
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_sim.periods import Period
+from miro_sim.periods import Control, Period
 from mirotwin.report.figure import draw
 from mirotwin.report.summary import (
     ErrorSample,
@@ -158,6 +158,31 @@ def test_the_same_run_gives_the_same_picture(tmp_path: Path) -> None:
     assert picture == (tmp_path / "b.png").read_bytes()
     assert b"tEXt" not in picture
     assert b"tIME" not in picture
+
+
+def size(picture: bytes) -> tuple[int, int]:
+    return int.from_bytes(picture[16:20], "big"), int.from_bytes(picture[20:24], "big")
+
+
+def test_inner_values_have_panels_below_up_to_eight_of_them(tmp_path: Path) -> None:
+    sizes = []
+    for count in (0, 4, 8, 40):
+        inner = {f"value_{index}": 0.5 * index for index in range(count)}
+        run = [
+            msgspec.structs.replace(
+                period,
+                robots=tuple(
+                    msgspec.structs.replace(robot, control=Control(0.2, 0.0, 1, 1, inner))
+                    for robot in period.robots
+                ),
+            )
+            for period in periods(5)
+        ]
+        draw(run, tmp_path / "a.png", scenario="fig6", seed=1)
+        sizes.append(size((tmp_path / "a.png").read_bytes()))
+    widths, heights = zip(*sizes, strict=True)
+    assert len(set(widths)) == 1
+    assert heights[0] < heights[1] < heights[2] == heights[3]
 
 
 def test_nothing_cannot_be_drawn(tmp_path: Path) -> None:

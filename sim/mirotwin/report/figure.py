@@ -1,7 +1,7 @@
-"""The picture of a run: the four panels of the paper's Figs. 6 to 10.
+"""The picture of a run: the four panels of the paper's Figs. 6 to 10, and below them the laws' inner values.
 
-What belongs here: x-y with the dotted reference, then x_e, y_e, theta_e against time. What does not: the
-numbers (`summary`). The same run gives the same bytes: fixed size, fixed fonts, no date.
+What belongs here: x-y with the dotted reference, then x_e, y_e, theta_e and the inner values against time. What does
+not: the numbers (`summary`). The same run gives the same bytes: fixed size, fixed fonts, no date.
 """
 
 from __future__ import annotations
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 
 COLOURS = ("#1f5fa8", "#c8452d", "#2e8b57", "#8a5bb0", "#b07d12")
 REFERENCE = "#222222"
+COLUMNS = 4
+MOST_INNER = 8
+"""So many inner values are drawn; a recording holds them all."""
+INNER_INCHES = 1.6
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
@@ -53,14 +57,22 @@ def draw(periods: Sequence[Period], path: Path, *, scenario: str, seed: int, tit
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(9.6, 6.6), dpi=150, layout="constrained")
+        inner = _inner_values(periods)
+        rows = -(-len(inner) // COLUMNS)
+        figure = Figure(figsize=(9.6, 6.6 + INNER_INCHES * rows), dpi=150, layout="constrained")
         canvas = FigureCanvasAgg(figure)
-        axes = figure.subplots(2, 2)
+        grid = figure.add_gridspec(2 + rows, COLUMNS, height_ratios=[3.0, 3.0, *[INNER_INCHES] * rows])
+        half = COLUMNS // 2
+        places = [(row, side) for row in (0, 1) for side in (slice(half), slice(half, None))]
+        path_axes, *error_axes = [figure.add_subplot(grid[place]) for place in places]
         figure.suptitle(_heading(scenario, seed, title, next(iter(errors.values()))), fontsize=10.5)
-        _draw_path(axes[0, 0], periods, list(errors))
-        _draw_error(axes[0, 1], errors, "(b)  $x_e$", "cm", SETTLED_CM, lambda one: one.x_cm)
-        _draw_error(axes[1, 0], errors, "(c)  $y_e$", "cm", SETTLED_CM, lambda one: one.y_cm)
-        _draw_error(axes[1, 1], errors, r"(d)  $\theta_e$", "rad", SETTLED_RAD, lambda one: one.theta_rad)
+        _draw_path(path_axes, periods, list(errors))
+        _draw_error(error_axes[0], errors, "(b)  $x_e$", "cm", SETTLED_CM, lambda one: one.x_cm)
+        _draw_error(error_axes[1], errors, "(c)  $y_e$", "cm", SETTLED_CM, lambda one: one.y_cm)
+        _draw_error(error_axes[2], errors, r"(d)  $\theta_e$", "rad", SETTLED_RAD, lambda one: one.theta_rad)
+        for index, (name, lines) in enumerate(inner.items()):
+            axes = figure.add_subplot(grid[2 + index // COLUMNS, index % COLUMNS])
+            _draw_inner(axes, name, lines, list(errors))
         canvas.print_png(path, metadata={"Software": None})  # type: ignore[no-untyped-call]
 
 
@@ -121,6 +133,33 @@ def _draw_error(
     axes.set_title(f"{title}   (shaded: within {band:g} {unit})")
     axes.set_xlabel("t [s]")
     axes.set_ylabel(f"{title.split('  ')[1]} [{unit}]")
+
+
+Line = tuple[list[float], list[float]]
+"""Times in s and values."""
+
+
+def _inner_values(periods: Sequence[Period]) -> dict[str, dict[tuple[int, int], Line]]:
+    """Name of an inner value -> robot -> its line; names in the order of the robots and of their laws."""
+    found: dict[str, dict[tuple[int, int], Line]] = {}
+    for period in periods:
+        for robot in period.robots:
+            for name, value in robot.control.inner.items() if robot.control is not None else ():
+                times, values = found.setdefault(name, {}).setdefault((robot.network, robot.slot), ([], []))
+                times.append(seconds(period.tick))
+                values.append(value)
+    return {name: found[name] for name in list(found)[:MOST_INNER]}
+
+
+def _draw_inner(
+    axes: Axes, name: str, lines: dict[tuple[int, int], Line], places: Sequence[tuple[int, int]]
+) -> None:
+    for place, (times, values) in lines.items():
+        axes.plot(times, values, color=COLOURS[places.index(place) % len(COLOURS)], linewidth=1.0)
+    axes.margins(x=0)
+    axes.set_title(_plain(name))
+    axes.tick_params(labelsize=7, labelbottom=False)  # time as in the panels above
+    axes.locator_params(nbins=3)  # labels are most of the time that a panel takes to draw
 
 
 def _label(place: tuple[int, int], places: Sequence[tuple[int, int]]) -> str:
