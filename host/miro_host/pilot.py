@@ -1,21 +1,24 @@
-"""One robot's chain on the PC, once per camera frame: measurement, law, integrator, wheel commands.
+"""One robot's chain on the PC, once per camera frame: measurement, estimator, law, integrator, wheel commands.
 
-What belongs here: the order of these steps, what happens when a measurement is missing, and what a law may not do. What
-does not: the steps themselves, the clock (times are handed in), several robots (`station`).
+What belongs here: the order of these steps, what happens when a measurement is missing, and what a part may not do.
+What does not: the steps themselves, the clock (times are handed in), several robots (`station`).
 
 The law's velocities v_c, w_c are the commanded ones, the integrator's state before the update (`integrator`
-says why). Before the first measurement the command is zero. A lost measurement leaves law and integrator alone
-and repeats the last command.
+says why). Before the first measurement the command is zero. Without an estimate law and integrator are
+left alone and the last command is repeated.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import msgspec
 
 from miro_exact.domain import DomainError
 from miro_host.ear import Heard
+from miro_host.estimators.interface import Estimate, Estimator, EstimatorInput
+from miro_host.estimators.none import NoEstimator
 from miro_host.integrator import Integrator
 from miro_host.laws.interface import NOTHING, Accelerations, Answer, Law, LawInput, Velocities
 from miro_host.parts import PartError, described
@@ -53,7 +56,7 @@ class Pilot:
     known delay without touching the law.
     """
 
-    NOT_STATE = ("name", "reference", "reference_lead_s", "wheels")
+    NOT_STATE = ("reference", "reference_lead_s", "wheels")
 
     def __init__(
         self,
@@ -61,12 +64,13 @@ class Pilot:
         law: Law[Any],
         wheels: Wheels | None = None,
         *,
+        estimator: Estimator[Any] | None = None,
         period_s: float = PERIOD_S,
         reference_lead_s: float = 0.0,
     ) -> None:
         self.reference = reference
         self.law = law
-        self.name = law.parameters.name()
+        self.estimator: Estimator[Any] = NoEstimator().estimator() if estimator is None else estimator
         self.wheels = Wheels() if wheels is None else wheels
         self.reference_lead_s = reference_lead_s
         self.integrator = Integrator(law.parameters, period_s)
@@ -80,10 +84,11 @@ class Pilot:
 
         Raises PartError, and leaves integrator and command alone, when the law fails or answers what is no number.
         """
-        if measured is None:
-            return self.command
         z = self.integrator
-        at_s = t_s + self.reference_lead_s
+        estimate = self._estimate(EstimatorInput(t_s, z.period_s, measured, z.v_m_s, z.w_rad_s, heard))
+        if estimate is None:
+            return self.command
+        at_s = estimate.t_s + self.reference_lead_s
         reference = self.reference.at(at_s)
         answer = self._ask(
             LawInput(
@@ -91,7 +96,7 @@ class Pilot:
                 period_s=z.period_s,
                 reference=reference,
                 path=self.reference,
-                posture=measured,
+                posture=estimate.posture,
                 v_m_s=z.v_m_s,
                 w_rad_s=z.w_rad_s,
                 heard=heard,
@@ -106,35 +111,39 @@ class Pilot:
         self.command = Command(left, right, z.v_m_s, z.w_rad_s, inner)
         return self.command
 
+    def _estimate(self, given: EstimatorInput) -> Estimate | None:
+        """The estimator's answer, checked like a law's."""
+        with _named("estimator", self.estimator):
+            estimate = self.estimator.step(given)
+            if estimate is not None:
+                check_estimate(estimate)
+            self.estimator.snapshot()
+        return estimate
+
     def _ask(self, given: LawInput) -> Answer:
         """The law's answer, checked: what it says and what it remembers are finite and as it declares."""
-        try:
+        with _named("law", self.law):
             answer = self.law.step(given)
             check_answer(answer, self.law.INNER)
             self.law.snapshot()
-        except PartError:  # of the reference, which the law may have asked
-            raise
-        except Exception as error:
-            raise _failure(self.name, error) from error
         return answer
 
     def snapshot(self) -> dict[str, object]:
         command = self.command
         numbers = (command.left, command.right, command.v_m_s, command.w_rad_s, *command.inner.values())
         state: dict[str, object] = {"integrator": self.integrator.snapshot(), "command": numbers}
-        if self.law.STATE:
-            state["law"] = self.law.snapshot()
+        for name, part in (("law", self.law), ("estimator", self.estimator)):
+            if part.STATE:
+                state[name] = part.snapshot()
         return state
 
     def restore(self, state: dict[str, object]) -> None:
-        integrator, command, memory = state["integrator"], state["command"], state.get("law", {})
+        integrator, command = state["integrator"], state["command"]
+        law, estimator = state.get("law", {}), state.get("estimator", {})
         assert isinstance(integrator, dict)
         assert isinstance(command, tuple | list)
-        assert isinstance(memory, dict)
-        try:
-            self.law.restore(memory)
-        except Exception as error:  # of another distribution's own `restore`, too
-            raise ValueError(f"law {self.name!r} takes back no such memory: {described(error)}") from error
+        _put_back("law", self.law, law)
+        _put_back("estimator", self.estimator, estimator)
         self.integrator.restore(integrator)
         left, right = msgspec.convert(command[:2], tuple[_Speed, _Speed])
         v_m_s, w_rad_s, *inner = numbers = msgspec.convert(command[2:], list[float])
@@ -143,12 +152,30 @@ class Pilot:
         self.command = Command(left, right, v_m_s, w_rad_s, dict(zip(self.law.INNER, inner, strict=True)))
 
 
-def _failure(name: str, error: Exception) -> PartError:
-    """What to raise for what a law raised: its name and the reason in one line."""
-    if isinstance(error, DomainError):
-        return PartError(f"law {name!r} failed: {error}", "parameters far from any robot's can do this")
-    reason = str(error) if type(error) is ValueError else described(error)
-    return PartError(f"law {name!r} failed: {reason}", "mend the law or its parameters")
+@contextmanager
+def _named(word: str, part: Law[Any] | Estimator[Any]) -> Iterator[None]:
+    """Names the part in what it raises."""
+    try:
+        yield
+    except PartError:  # of the reference, which the part may have asked
+        raise
+    except DomainError as error:
+        what = f"{word} {part.parameters.name()!r} failed: {error}"
+        raise PartError(what, "parameters far from any robot's can do this") from error
+    except Exception as error:
+        reason = str(error) if type(error) is ValueError else described(error)
+        what = f"{word} {part.parameters.name()!r} failed: {reason}"
+        raise PartError(what, f"mend the {word} or its parameters") from error
+
+
+def _put_back(word: str, part: Law[Any] | Estimator[Any], memory: object) -> None:
+    """Restores a part. Raises ValueError, also for what another distribution's own `restore` raises."""
+    assert isinstance(memory, dict)
+    try:
+        part.restore(memory)
+    except Exception as error:
+        name = part.parameters.name()
+        raise ValueError(f"{word} {name!r} takes back no such memory: {described(error)}") from error
 
 
 def check_answer(answer: object, inner: tuple[str, ...]) -> None:
@@ -157,8 +184,19 @@ def check_answer(answer: object, inner: tuple[str, ...]) -> None:
         raise ValueError(f"it answered {str(answer)[:40]!r}, neither Accelerations nor Velocities")
     if sorted(answer.inner) != sorted(inner):
         raise ValueError(f"its inner values are {sorted(answer.inner)}, INNER says {sorted(inner)}")
-    drive, values = msgspec.structs.asdict(answer), answer.inner
+    drive = msgspec.structs.asdict(answer)
     del drive["inner"]
-    for name, value in [*drive.items(), *values.items()]:
+    _check_finite({**drive, **answer.inner})
+
+
+def check_estimate(estimate: object) -> None:
+    """Raises ValueError for an estimate that is none, and for NaN and infinity."""
+    if not isinstance(estimate, Estimate) or not isinstance(estimate.posture, Posture):
+        raise ValueError(f"it answered {str(estimate)[:40]!r}, which is no Estimate of a Posture")
+    _check_finite({"t_s": estimate.t_s, **msgspec.structs.asdict(estimate.posture)})
+
+
+def _check_finite(values: Mapping[str, object]) -> None:
+    for name, value in values.items():
         if type(value) is not float or not math.isfinite(value):
             raise ValueError(f"it answered {name} = {str(value)[:40]}, which is not a finite float")

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.host.own_laws import Leaky, LeakyParameters
 
+from miro_host.estimators.predict import PredictParameters
 from miro_host.integrator import Integrator, Limits
 from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
@@ -123,7 +124,8 @@ def test_saved_after_any_frame_and_continued_the_bytes_are_the_same(cut):
 
 
 def test_every_field_of_a_stateful_object_is_in_its_snapshot_or_declared_constant():
-    parts = (Pilot(Arc(), Leaky(LeakyParameters())), *chain()[1:])
+    one = Pilot(Arc(), Leaky(LeakyParameters()), estimator=PredictParameters().estimator())
+    parts = (one, *chain()[1:])
     for part in (*parts, parts[0].integrator):
         assert set(vars(part)) == set(part.snapshot()) | set(part.NOT_STATE), repr(part)
 

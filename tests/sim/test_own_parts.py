@@ -6,12 +6,13 @@ from tests.host.own_laws import LeakyParameters, WrongParameters
 
 from miro_exact.canonical import encode
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_host.estimators.predict import PredictParameters
 from miro_host.laws.interface import Law, LawInput, LawParameters, Velocities
 from miro_host.laws.yang_kim import Gains
 from miro_host.parts import PartError
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim.scenario.file import load
+from miro_sim.scenario.file import load, parse
 from miro_sim.world.world import World
 
 PERIODS = 24
@@ -32,10 +33,11 @@ class Listener(Law[LawParameters]):
         return Velocities(0.1 + count * 1e-5, 0.0, {"position_left": count})
 
 
-def world(parameters, seed=7):
+def world(parameters, seed=7, estimator=None):
     scenario = load("fig6").scenario
     network = scenario.networks[0]
-    robot = msgspec.structs.replace(network.robot[0], controller=parameters)
+    chosen = {} if estimator is None else {"estimator": estimator}
+    robot = msgspec.structs.replace(network.robot[0], controller=parameters, **chosen)
     network = msgspec.structs.replace(network, robot=(robot,))
     return World(msgspec.structs.replace(scenario, networks=(network,)), seed, load_hex(image_path()))
 
@@ -45,10 +47,13 @@ def finish(one):
     return one.digest
 
 
-@pytest.mark.parametrize("parameters", [LeakyParameters(), ByEar()])
+@pytest.mark.parametrize(
+    ("parameters", "estimator"),
+    [(LeakyParameters(), None), (ByEar(), None), (Gains(), PredictParameters())],
+)
 @pytest.mark.parametrize("at_tick", [5_000, 1_000_003, 9_999_999, 10 * CONTROL_PERIOD_TICKS])
-def test_a_world_saved_anywhere_goes_on_with_the_memory_of_its_laws(parameters, at_tick):
-    whole, first, second = (world(parameters) for _ in range(3))
+def test_a_world_saved_anywhere_goes_on_with_the_memory_of_its_parts(parameters, estimator, at_tick):
+    whole, first, second = (world(parameters, estimator=estimator) for _ in range(3))
     first.run_to(at_tick)
     second.load(first.save())
     assert finish(second) == finish(first) == finish(whole)
@@ -85,6 +90,40 @@ def test_the_ear_follows_the_wheel_counts_beyond_sixteen_bits():
     assert one.tick - heard.tick < 5 * CONTROL_PERIOD_TICKS
 
 
+QUIET = """
+name = "quiet"
+duration_s = 5
+
+[camera]
+position_error_cm = 0
+heading_error_deg = 0
+pixel_cm = 0
+
+[[network]]
+radio = { bit_error_rate = 0, squelch = true }
+
+[[network.robot]]
+wheel_radius_mismatch = 0
+reference.kind = "line"
+start_error_x_cm = 2
+controller = { gamma2_per_s = 9, p2_rad_s2 = 5.2, layer_s2_rad_s = 0.35 }
+estimator.kind = "KIND"
+"""
+
+
+def behind_m(kind):
+    """How far the robot runs from the reference in the end, along the line."""
+    one = World(parse(QUIET.replace("KIND", kind), "quiet"), 0, load_hex(image_path()))
+    while not one.finished:
+        last = one.step().robots[0]
+    return abs(last.truth.x_m - last.reference.x_m)
+
+
+def test_prediction_takes_the_dead_time_out_of_the_loop():
+    assert behind_m("none") == pytest.approx(0.2 * 1001 / 30000, abs=3e-4)  # a frame ahead at 0.2 m/s
+    assert behind_m("predict") < 5e-4
+
+
 def test_a_saved_world_of_another_law_is_refused():
     with pytest.raises(ValueError, match="saved world has scenario"):
         world(LeakyParameters()).load(world(LeakyParameters(gain_per_s=2.5)).save())
@@ -93,7 +132,7 @@ def test_a_saved_world_of_another_law_is_refused():
 def test_a_law_that_fails_names_robot_and_tick_and_leaves_no_nan_in_the_state():
     one = world(WrongParameters(how="nan"))
     with pytest.raises(
-        PartError, match=r"net0/robot0: tick 1601600 \(0.066733 s\): law 'wrong' failed: .* v_m_s = nan"
+        PartError, match=r"net0/robot0: tick 1601600 \(0.066733 s\): law .wrong. failed: .* = nan"
     ):
         finish(one)
     assert encode(one.snapshot())

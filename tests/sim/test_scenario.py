@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miro_host.estimators.none import NoEstimator
+from miro_host.estimators.predict import PredictParameters
 from miro_host.reference_keys import ArcRef, LineRef
 from miro_sim.scenario.file import ScenarioError, builtin_names, builtin_text, load, parse
 from miro_sim.scenario.keys import Scenario
@@ -144,6 +146,24 @@ def test_a_whole_number_is_a_number() -> None:
 )
 def test_a_bad_key_is_named_with_its_place_and_its_remedy(old: str, new: str, expected: str) -> None:
     assert expected in refusal(edited(old, new))
+
+
+def test_an_estimator_is_chosen_and_checked_like_a_law() -> None:
+    table = "[network.robot.estimator]\n"
+    chosen = (
+        parse(SMALL + table + 'kind = "predict"\nahead_s = 0.02\n', "small").networks[0].robot[0].estimator
+    )
+    assert chosen == PredictParameters(ahead_s=0.02)
+    assert parse(SMALL, "small").networks[0].robot[0].estimator == NoEstimator()
+    assert "estimator.kind: 'kalman' is not one of the choices; use none or predict" in refusal(
+        SMALL + table + 'kind = "kalman"\n'
+    )
+    assert "estimator.ahead: unknown key; use ahead_s, in seconds" in refusal(
+        SMALL + table + 'kind = "predict"\nahead = 1\n'
+    )
+    assert "estimator.ahead_s: 1 is out of range; must be <= 0.25 in seconds" in refusal(
+        SMALL + table + 'kind = "predict"\nahead_s = 1\n'
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,1 +1,1 @@
-"""Tracking laws: the interface (`interface`), what a law remembers (`memory`), and the paper's law (`yang_kim`)."""
+"""Tracking laws: their names (`registry`), the interface (`interface`), and the paper's law (`yang_kim`)."""

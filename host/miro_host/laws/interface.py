@@ -1,16 +1,16 @@
 """What a tracking law is given, what it answers, and what it must declare about itself.
 
 What belongs here: the interface. What does not: any law, the order of the steps on the PC (`pilot`), how a scenario
-finds a law by its name (`registry`), how a law's memory is saved (`memory`).
+finds a law by its name (`registry`), how a law's memory is saved (`miro_host.memory`).
 
 A law is two classes. The parameters are a frozen struct whose tag is the law's name; they are the scenario's
 `controller` table, and their `law` method makes the law. The law itself has a `step`, which is called once in each
 control period in which a posture is known:
 
-    camera ─► posture ─┐
-    reference(t) ──────┼─► law.step ─► velocities, or accelerations ─► limits ─► z_cmd = (v, w) ─► wheels
-    z_cmd, telemetry ──┘                       │
-                                               └─► inner values, for the recording only
+    camera ─► estimator ─► posture ─┐
+    reference(t) ───────────────────┼─► law.step ─► velocities, or accelerations ─► limits ─► z_cmd = (v, w) ─► wheels
+    z_cmd, telemetry ───────────────┘       │
+                                            └─► inner values, for the recording only
 
 The mistake that this design prevents is memory outside the saved state: a law keeps what it remembers in attributes
 that `STATE` declares, and an attribute that is declared nowhere is refused. A law sees what the PC could have seen. It
@@ -24,8 +24,8 @@ import msgspec
 
 from miro_host.ear import Heard
 from miro_host.integrator import Limits
-from miro_host.laws import memory
 from miro_host.laws.registry import Controller
+from miro_host.memory import Remembering
 from miro_host.posture import Posture
 from miro_host.reference import Reference, Trajectory
 
@@ -36,8 +36,9 @@ class LawInput(msgspec.Struct, frozen=True):
     """What a law is given in one control period.
 
     `t_s` is the time since the start of the reference at which `reference` was evaluated; `path` gives the reference at
-    any other time. `posture` is the latest measurement. `v_m_s`, `w_rad_s` are the commanded velocities that the last
-    period ended with. `heard` is the robot's last answer by radio, None before the first.
+    any other time. `posture` is what the estimator made of the camera's measurements. `v_m_s`, `w_rad_s` are the
+    commanded velocities that the last period ended with. `heard` is the robot's last answer by radio, None before the
+    first.
     """
 
     t_s: float
@@ -91,17 +92,15 @@ class LawParameters(
 P = TypeVar("P", bound=LawParameters, covariant=True)
 
 
-class Law(Generic[P]):
+class Law(Remembering, Generic[P]):
     """Base of every law.
 
     `INNER` names the values that are recorded beside the command, in the order of the recording; every answer gives all
-    of them. `STATE` declares what the law remembers from period to period: attribute to type, see `memory`. `NOT_STATE`
-    names the attributes that stay as they were made.
+    of them. `STATE` declares what the law remembers from period to period: attribute to type, see `miro_host.memory`.
+    `NOT_STATE` names the attributes that stay as they were made.
     """
 
     INNER: ClassVar[tuple[str, ...]] = ()
-    STATE: ClassVar[Mapping[str, str]] = {}
-    NOT_STATE: ClassVar[tuple[str, ...]] = ("parameters",)
 
     def __init__(self, parameters: P) -> None:
         self.parameters = parameters
@@ -112,11 +111,3 @@ class Law(Generic[P]):
     def step(self, given: LawInput) -> Answer:
         """One control period. Called in the order of time; a period without a posture is left out."""
         raise NotImplementedError(f"{type(self).__name__} has no method `step`")
-
-    def snapshot(self) -> dict[str, object]:
-        """The memory as plain values. Raises ValueError naming an attribute that is not as declared."""
-        return memory.taken(self, self.STATE, self.NOT_STATE)
-
-    def restore(self, state: dict[str, object]) -> None:
-        """Puts back what `snapshot` gave. Raises ValueError for anything else, and changes nothing then."""
-        memory.put_back(self, self.STATE, state)

@@ -6,9 +6,13 @@ does in its own module.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_host.estimators.interface import EstimatorParameters
 from miro_host.laws.interface import LawParameters
 from miro_host.parts import PartError, described
 from miro_host.pilot import Pilot
@@ -25,32 +29,37 @@ DEGREE = 0.017453292519943295
 
 
 def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
-    """The reference trajectory in the paper's axes, which start at its own start.
-
-    Raises PartError when it cannot be made.
-    """
+    """The reference trajectory in the paper's axes, which start at its own start. Raises PartError."""
     parameters = robot.reference
     assert isinstance(parameters, ReferenceParameters)
     name = parameters.name()
-    try:
-        trajectory = parameters.trajectory(duration_s)
-    except Exception as error:
-        what = f"reference {name!r} cannot be made: {described(error)}"
-        raise PartError(what, "mend the reference or its parameters") from error
+    trajectory = _made("reference", name, lambda: parameters.trajectory(duration_s))
     return trajectory if name in REFERENCES.own else CheckedReference(trajectory, name)
 
 
 def pilot_for(robot: sc.Robot, reference: Trajectory) -> Pilot:
-    """The controller, its integrator and the wheel split. Raises PartError when the law cannot be made."""
-    parameters = robot.controller
-    assert isinstance(parameters, LawParameters)
+    """Estimator and law, integrator and wheel split. Raises PartError when one of the first two cannot be made."""
+    chosen, controller = robot.estimator, robot.controller
+    assert isinstance(chosen, EstimatorParameters)
+    assert isinstance(controller, LawParameters)
+    estimator = _made("estimator", chosen.name(), lambda: _remembering(chosen.estimator()))
+    law = _made("law", controller.name(), lambda: _remembering(controller.law()))
+    return Pilot(reference, law, estimator=estimator, period_s=seconds(CONTROL_PERIOD_TICKS))
+
+
+def _remembering(part: Any) -> Any:
+    """The part itself, once its memory was found to be as declared."""
+    part.snapshot()
+    return part
+
+
+def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
+    """A new part; whatever goes wrong with it is a PartError that names it."""
     try:
-        law = parameters.law()
-        law.snapshot()
+        return make()
     except Exception as error:
-        what = f"law {parameters.name()!r} cannot be made: {described(error)}"
-        raise PartError(what, "mend the law or its parameters") from error
-    return Pilot(reference, law, period_s=seconds(CONTROL_PERIOD_TICKS))
+        what = f"{word} {name!r} cannot be made: {described(error)}"
+        raise PartError(what, f"mend the {word} or its parameters") from error
 
 
 def vision_for(camera: sc.Camera) -> Vision:

@@ -15,6 +15,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from miro_host.estimators.registry import DEFAULT_ESTIMATOR, ESTIMATORS, AnyEstimator
 from miro_host.laws.registry import DEFAULT_LAW, LAWS, Controller
 from miro_host.reference_registry import AnyReference
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
@@ -65,9 +66,9 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     Start and reference have to lie on the pitch (`places`).
     The start is the start of the reference plus the errors (captions of the paper's Figs. 6 and 8). Each
-    wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `reference` and `controller` hold the
-    parameters of the reference and of the law that they name. `drive` replaces single parameters of motors, bridges,
-    battery, chassis and encoders (`plant.params`).
+    wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `reference`,
+    `estimator` and `controller` hold the parameters of the reference, the estimator and the law that they name. `drive`
+    replaces single parameters of motors, bridges, battery, chassis and encoders (`plant.params`).
     """
 
     slot: Annotated[int, Meta(ge=0, le=4)] = 0
@@ -76,6 +77,7 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     start_error_theta_rad: TurnRad = 0.0
     wheel_radius_mismatch: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.015
     reference: AnyReference
+    estimator: AnyEstimator = msgspec.field(default_factory=lambda: ESTIMATORS.find(DEFAULT_ESTIMATOR)())
     controller: Controller = msgspec.field(default_factory=lambda: LAWS.find(DEFAULT_LAW)())
     drive: DriveParams = DriveParams()
 

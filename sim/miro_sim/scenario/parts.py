@@ -9,11 +9,16 @@ from typing import Any
 
 import msgspec
 
+from miro_host.estimators.registry import ESTIMATORS, AnyEstimator
 from miro_host.laws.registry import LAWS, Controller
 from miro_host.parts import PartError, Registry, described
 from miro_host.reference_registry import REFERENCES, AnyReference
 
-REGISTRIES: dict[type, Registry[Any]] = {Controller: LAWS, AnyReference: REFERENCES}
+REGISTRIES: dict[type, Registry[Any]] = {
+    AnyReference: REFERENCES,
+    AnyEstimator: ESTIMATORS,
+    Controller: LAWS,
+}
 """By the type that a field of the scenario has."""
 
 

@@ -1,4 +1,4 @@
-"""The memory of a law as plain values: by a table of attributes, checked both ways.
+"""The memory of a part, such as a law, as plain values: by a table of attributes, checked both ways.
 
 What belongs here: taking, putting back, and the types that a table may name:
 
@@ -7,17 +7,33 @@ What belongs here: taking, putting back, and the types that a table may name:
     ?    True or False
     3d   a list of three of them; any other number likewise
 
-What does not: the digest (`miro_exact.canonical`) and when a law's memory is taken (`pilot`).
+What does not: the digest (`miro_exact.canonical`) and when a memory is taken (`pilot`).
 """
 
 import math
 import re
 from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 LARGEST = (1 << 63) - 1
 TYPES = {"d": "a finite float", "q": "an int of 64 bits", "?": "True or False"}
 LONGEST = 65536
-"""Items of one list. A law with more would make each period's digest slow."""
+"""Items of one list. A part with more would make each period's digest slow."""
+
+
+class Remembering:
+    """A part with a memory: `STATE` declares it, attribute to type; `NOT_STATE` names what stays as it was made."""
+
+    STATE: ClassVar[Mapping[str, str]] = {}
+    NOT_STATE: ClassVar[tuple[str, ...]] = ("parameters",)
+
+    def snapshot(self) -> dict[str, object]:
+        """The memory as plain values. Raises ValueError naming an attribute that is not as declared."""
+        return taken(self, self.STATE, self.NOT_STATE)
+
+    def restore(self, state: dict[str, object]) -> None:
+        """Puts back what `snapshot` gave. Raises ValueError for anything else, and changes nothing then."""
+        put_back(self, self.STATE, state)
 
 
 def taken(owner: object, table: Mapping[str, str], constant: Sequence[str]) -> dict[str, object]:

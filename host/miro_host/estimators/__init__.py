@@ -1,0 +1,1 @@
+"""Posture estimators: names (`registry`), the interface, the paper's loop (`none`), and a predictor (`predict`)."""

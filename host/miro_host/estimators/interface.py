@@ -1,0 +1,71 @@
+"""What a posture estimator is given, and what it answers.
+
+What belongs here: the interface. What does not: any estimator, the laws, the order of the steps on the PC (`pilot`).
+
+An estimator is two classes, as a law is: a frozen struct of parameters whose tag is its name and whose `estimator`
+method makes it, and a class with `step`. It is called in every control period, also without a measurement, so that it
+can count periods. It sees what the PC could have seen: no true posture.
+"""
+
+from typing import Any, Generic, TypeVar
+
+import msgspec
+
+from miro_host.ear import Heard
+from miro_host.estimators.registry import AnyEstimator
+from miro_host.memory import Remembering
+from miro_host.posture import Posture
+
+
+class EstimatorInput(msgspec.Struct, frozen=True):
+    """What an estimator is given at `t_s` after the start of the reference.
+
+    `measured` is what the camera's tracker hands over now, None in a frame in which the robot was not found. `v_m_s`,
+    `w_rad_s` are the velocities that were commanded one period ago. `heard` is the robot's last answer by radio.
+    """
+
+    t_s: float
+    period_s: float
+    measured: Posture | None
+    v_m_s: float
+    w_rad_s: float
+    heard: Heard | None = None
+
+
+class Estimate(msgspec.Struct, frozen=True):
+    """A posture and the time it is to be compared with the reference at."""
+
+    t_s: float
+    posture: Posture
+
+
+class EstimatorParameters(
+    msgspec.Struct, AnyEstimator, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"
+):
+    """Base of every estimator's parameters. Derive with `frozen=True, kw_only=True, tag="its_name"`."""
+
+    def estimator(self) -> "Estimator[Any]":
+        """A new estimator with these parameters, as it is before its first period."""
+        raise NotImplementedError(f"{type(self).__name__} has no method `estimator`")
+
+    @classmethod
+    def name(cls) -> str:
+        """The estimator's name in scenario files."""
+        return str(cls.__struct_config__.tag)
+
+
+P = TypeVar("P", bound=EstimatorParameters, covariant=True)
+
+
+class Estimator(Remembering, Generic[P]):
+    """Base of every estimator; its memory is declared as a law's is."""
+
+    def __init__(self, parameters: P) -> None:
+        self.parameters = parameters
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.parameters!r}, memory={self.snapshot()!r})"
+
+    def step(self, given: EstimatorInput) -> Estimate | None:
+        """One control period. None: no posture is known, and the last command is repeated."""
+        raise NotImplementedError(f"{type(self).__name__} has no method `step`")

@@ -1,0 +1,30 @@
+"""The names of the posture estimators.
+
+What belongs here: the table of our own estimators, and the type of a scenario's `estimator`. What does not: the
+interface (`interface`) and the estimators. None is imported before a scenario names it.
+"""
+
+from miro_host.parts import Registry
+
+
+class AnyEstimator:
+    """Parameters of any estimator. An estimator's own struct derives from `interface.EstimatorParameters`.
+
+    A plain class, because msgspec reads a struct as itself and never as one of the structs derived from it.
+    """
+
+    __slots__ = ()
+
+
+DEFAULT_ESTIMATOR = "none"
+ESTIMATORS: Registry[AnyEstimator] = Registry(
+    "mirotwin.estimators",
+    word="estimator",
+    key="kind",
+    base="miro_host.estimators.interface:EstimatorParameters",
+    own={
+        "none": "miro_host.estimators.none:NoEstimator",
+        "predict": "miro_host.estimators.predict:PredictParameters",
+    },
+    default=DEFAULT_ESTIMATOR,
+)

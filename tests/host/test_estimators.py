@@ -1,0 +1,125 @@
+"""Posture estimators: the paper's loop without one, and prediction through the dead time."""
+
+import math
+from itertools import pairwise
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from miro_host.estimators.interface import Estimate, Estimator, EstimatorInput, EstimatorParameters
+from miro_host.estimators.none import NoEstimator
+from miro_host.estimators.predict import PredictParameters, moved
+from miro_host.estimators.registry import ESTIMATORS
+from miro_host.laws.yang_kim import Gains
+from miro_host.parts import PartError
+from miro_host.pilot import PERIOD_S, Pilot
+from miro_host.posture import Posture
+from miro_host.reference import Line
+
+HERE = Posture(0.07, 0.02, -0.38)
+COMMANDS = st.lists(st.tuples(st.floats(-0.9, 0.9), st.floats(-4.0, 4.0)), min_size=20, max_size=20)
+
+
+def near(one, other, within=1e-9):
+    turn = math.remainder(one.theta_rad - other.theta_rad, math.tau)
+    return max(abs(one.x_m - other.x_m), abs(one.y_m - other.y_m), abs(turn)) < within
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
+def test_an_arc_ends_where_many_small_steps_end(length_m, turn_rad, theta_rad):
+    steps, x, y = 2000, 0.1, -0.2
+    for index in range(steps):
+        middle = theta_rad + turn_rad * (index + 0.5) / steps
+        x += length_m / steps * math.cos(middle)
+        y += length_m / steps * math.sin(middle)
+    ended = moved(Posture(0.1, -0.2, theta_rad), length_m, turn_rad)
+    assert near(ended, Posture(x, y, theta_rad + turn_rad), 1e-6)
+
+
+def test_our_own_estimators_have_names():
+    assert ESTIMATORS.names() == ["none", "predict"]
+
+
+def test_without_an_estimator_a_measurement_is_the_posture_at_its_arrival():
+    one = NoEstimator().estimator()
+    assert one.step(EstimatorInput(0.5, PERIOD_S, HERE, 0.2, 0.0)) == Estimate(0.5, HERE)
+    assert one.step(EstimatorInput(0.5, PERIOD_S, None, 0.2, 0.0)) is None
+
+
+def truth_at(time_s, commands, ahead_s):
+    """Posture of a robot that does at once what was commanded `ahead_s` before, from rest in the origin."""
+    posture = Posture(0.0, 0.0, 0.0)
+    edges = [index * PERIOD_S + ahead_s for index in range(len(commands) + 1)]
+    for (begin_s, end_s), (v_m_s, w_rad_s) in zip(pairwise(edges), commands, strict=True):
+        held_s = min(max(time_s - begin_s, 0.0), end_s - begin_s)
+        posture = moved(posture, v_m_s * held_s, w_rad_s * held_s)
+    return posture
+
+
+@given(COMMANDS, st.floats(0.0, 0.25), st.floats(0.0, 0.25))
+def test_a_robot_that_follows_at_once_is_where_it_was_predicted(commands, age_s, ahead_s):
+    one = PredictParameters(age_s=age_s, ahead_s=ahead_s).estimator()
+    before = (0.0, 0.0)
+    for index, command in enumerate(commands):
+        now_s = index * PERIOD_S
+        seen = truth_at(now_s - age_s, commands, ahead_s) if index % 3 else None
+        estimate = one.step(EstimatorInput(now_s, PERIOD_S, seen, *before))
+        before = command
+        if seen is None:
+            assert estimate is None
+        else:
+            assert estimate.t_s == now_s + ahead_s
+            assert near(estimate.posture, truth_at(now_s + ahead_s, commands, ahead_s))
+
+
+def test_the_law_is_given_the_reference_of_the_time_that_was_predicted():
+    plain, led = Gains().law(), Pilot(Line(), Gains().law(), reference_lead_s=0.03)
+    one = Pilot(Line(), plain, estimator=PredictParameters(age_s=0.0, ahead_s=0.03).estimator())
+    assert one.update(HERE, 1.0) == led.update(HERE, 1.0)  # at rest nothing moves, only the time differs
+
+
+def test_what_was_sent_is_remembered_over_a_save():
+    def pilot():
+        return Pilot(Line(), Gains().law(), estimator=PredictParameters().estimator())
+
+    whole, cut = pilot(), pilot()
+    for k in range(6):
+        again = pilot()
+        again.restore(msgspec.msgpack.decode(msgspec.msgpack.encode(cut.snapshot())))
+        cut = again
+        assert cut.update(HERE, k * PERIOD_S) == whole.update(HERE, k * PERIOD_S)
+    assert cut.snapshot() == whole.snapshot()
+
+
+class Odd(EstimatorParameters, frozen=True, tag="odd"):
+    answer: object = None
+
+    def estimator(self):
+        return Answering(self)
+
+
+class Answering(Estimator[Odd]):
+    def step(self, given):
+        return self.parameters.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        (Estimate(0.0, Posture(math.nan, 0.0, 0.0)), "it answered x_m = nan, which is not a finite float"),
+        (Estimate(math.inf, HERE), "it answered t_s = inf, which is not a finite float"),
+        (HERE, "which is no Estimate of a Posture"),
+    ],
+)
+def test_an_estimator_that_fails_is_named(answer, reason):
+    one = Pilot(Line(), Gains().law(), estimator=Odd(answer).estimator())
+    with pytest.raises(PartError, match=f"estimator 'odd' failed: .*{reason}; mend the estimator"):
+        one.update(HERE, 0.0)
+
+
+@pytest.mark.parametrize("name", ["age_s", "ahead_s"])
+def test_a_delay_out_of_range_is_refused(name):
+    with pytest.raises(ValueError, match=f"{name}: 0.3 is out of range"):
+        PredictParameters(**{name: 0.3})
