@@ -9,8 +9,7 @@ left alone and the last command is repeated.
 """
 
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import msgspec
@@ -113,19 +112,27 @@ class Pilot:
 
     def _estimate(self, given: EstimatorInput) -> Estimate | None:
         """The estimator's answer, checked like a law's."""
-        with _named("estimator", self.estimator):
+        try:
             estimate = self.estimator.step(given)
             if estimate is not None:
                 check_estimate(estimate)
             self.estimator.snapshot()
+        except PartError:  # of the reference, which the part may have asked
+            raise
+        except Exception as error:
+            raise _failure("estimator", self.estimator, error) from error
         return estimate
 
     def _ask(self, given: LawInput) -> Answer:
         """The law's answer, checked: what it says and what it remembers are finite and as it declares."""
-        with _named("law", self.law):
+        try:
             answer = self.law.step(given)
             check_answer(answer, self.law.INNER)
             self.law.snapshot()
+        except PartError:  # of the reference, which the part may have asked
+            raise
+        except Exception as error:
+            raise _failure("law", self.law, error) from error
         return answer
 
     def snapshot(self) -> dict[str, object]:
@@ -152,20 +159,13 @@ class Pilot:
         self.command = Command(left, right, v_m_s, w_rad_s, dict(zip(self.law.INNER, inner, strict=True)))
 
 
-@contextmanager
-def _named(word: str, part: Law[Any] | Estimator[Any]) -> Iterator[None]:
-    """Names the part in what it raises."""
-    try:
-        yield
-    except PartError:  # of the reference, which the part may have asked
-        raise
-    except DomainError as error:
-        what = f"{word} {part.parameters.name()!r} failed: {error}"
-        raise PartError(what, "parameters far from any robot's can do this") from error
-    except Exception as error:
-        reason = str(error) if type(error) is ValueError else described(error)
-        what = f"{word} {part.parameters.name()!r} failed: {reason}"
-        raise PartError(what, f"mend the {word} or its parameters") from error
+def _failure(word: str, part: Law[Any] | Estimator[Any], error: Exception) -> PartError:
+    """What to raise for what a part raised: its name and the reason in one line."""
+    known = type(error) in (ValueError, DomainError)
+    what = f"{word} {part.parameters.name()!r} failed: {error if known else described(error)}"
+    if isinstance(error, DomainError):
+        return PartError(what, "parameters far from any robot's can do this")
+    return PartError(what, f"mend the {word} or its parameters")
 
 
 def _put_back(word: str, part: Law[Any] | Estimator[Any], memory: object) -> None:
@@ -180,23 +180,31 @@ def _put_back(word: str, part: Law[Any] | Estimator[Any], memory: object) -> Non
 
 def check_answer(answer: object, inner: tuple[str, ...]) -> None:
     """Raises ValueError for an answer that is none, for one without the inner values, and for NaN and infinity."""
-    if not isinstance(answer, Accelerations | Velocities):
+    if isinstance(answer, Accelerations):
+        _check("v_dot_m_s2", answer.v_dot_m_s2)
+        _check("w_dot_rad_s2", answer.w_dot_rad_s2)
+    elif isinstance(answer, Velocities):
+        _check("v_m_s", answer.v_m_s)
+        _check("w_rad_s", answer.w_rad_s)
+    else:
         raise ValueError(f"it answered {str(answer)[:40]!r}, neither Accelerations nor Velocities")
-    if sorted(answer.inner) != sorted(inner):
+    if tuple(answer.inner) != inner and sorted(answer.inner) != sorted(inner):
         raise ValueError(f"its inner values are {sorted(answer.inner)}, INNER says {sorted(inner)}")
-    drive = msgspec.structs.asdict(answer)
-    del drive["inner"]
-    _check_finite({**drive, **answer.inner})
+    for name, value in answer.inner.items():
+        _check(name, value)
 
 
 def check_estimate(estimate: object) -> None:
     """Raises ValueError for an estimate that is none, and for NaN and infinity."""
     if not isinstance(estimate, Estimate) or not isinstance(estimate.posture, Posture):
         raise ValueError(f"it answered {str(estimate)[:40]!r}, which is no Estimate of a Posture")
-    _check_finite({"t_s": estimate.t_s, **msgspec.structs.asdict(estimate.posture)})
+    posture = estimate.posture
+    _check("t_s", estimate.t_s)
+    _check("x_m", posture.x_m)
+    _check("y_m", posture.y_m)
+    _check("theta_rad", posture.theta_rad)
 
 
-def _check_finite(values: Mapping[str, object]) -> None:
-    for name, value in values.items():
-        if type(value) is not float or not math.isfinite(value):
-            raise ValueError(f"it answered {name} = {str(value)[:40]}, which is not a finite float")
+def _check(name: str, value: object) -> None:
+    if type(value) is not float or not math.isfinite(value):
+        raise ValueError(f"it answered {name} = {str(value)[:40]}, which is not a finite float")

@@ -1,8 +1,10 @@
 """Names of laws: our own, those of other distributions, and what is wrong with those that cannot be used."""
 
+import importlib.metadata
 import sys
 
 import pytest
+from tests import children
 from tests.host.distribution import install
 
 from miro_host.laws.registry import LAWS
@@ -44,6 +46,19 @@ def reason(name):
 def test_our_own_law_is_found_by_its_name():
     assert LAWS.find("yang_kim") is Gains
     assert LAWS.names() == ["yang_kim"]
+
+
+def test_our_own_law_is_found_without_a_look_at_other_distributions(monkeypatch):
+    monkeypatch.setattr(importlib.metadata, "entry_points", None)
+    assert LAWS.find("yang_kim") is Gains
+
+
+def test_naming_laws_imports_none_of_them():
+    code = "import sys, mirotwin.cli; print([name for name in sys.modules if name.startswith('miro_host')])"
+    done = children.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "miro_host.laws.registry" in done.stdout
+    for name in ("miro_host.laws.yang_kim", "miro_host.estimators.predict", "miro_host.reference"):
+        assert f"'{name}'" not in done.stdout
 
 
 def test_a_law_of_another_distribution_is_found_by_its_entry_point(site):
