@@ -105,6 +105,11 @@ def test_the_command_line_runs_it_records_its_inner_values_and_replays_it(site, 
     assert list(last.inner) == ["e1_m", "e2_m", "e3_rad"]
     assert abs(last.inner["e3_rad"]) > 0.0
     assert mirotwin(site, "replay", out / "run.mcap", "--quiet").returncode == 0
+    line = refusal(mirotwin("", "replay", out / "run.mcap", "--quiet"))  # where it is not installed
+    assert (
+        "run.mcap: scenario.toml: network[0].robot[0].controller.law: 'samson' is not one of the choices"
+        in line
+    )
 
 
 def test_it_tracks_the_line(site, tmp_path):
