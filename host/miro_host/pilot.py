@@ -170,9 +170,8 @@ def _failure(word: str, part: Law[Any] | Estimator[Any], error: Exception) -> Pa
 
 def _put_back(word: str, part: Law[Any] | Estimator[Any], memory: object) -> None:
     """Restores a part. Raises ValueError, also for what another distribution's own `restore` raises."""
-    assert isinstance(memory, dict)
     try:
-        part.restore(memory)
+        part.restore(msgspec.convert(memory, dict[str, object]))
     except Exception as error:
         name = part.parameters.name()
         raise ValueError(f"{word} {name!r} takes back no such memory: {described(error)}") from error

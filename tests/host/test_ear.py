@@ -79,3 +79,21 @@ def test_saved_in_the_middle_of_an_answer_the_rest_is_understood():
 def test_answers_of_another_network_are_not_taken_over():
     with pytest.raises(ValueError, match="answers of 5 robots where 3 belong"):
         Ear(3).restore_heard([None] * 5)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("tick", -1), ("seq", 256), ("flags", -1), ("position_left", 1 << 63), ("position_right", 0.5)],
+)
+def test_saved_answers_that_no_frame_can_hold_are_refused(field, value):
+    ear = Ear(3)
+    ear.hear(answer(0, slot=1))
+    (row,) = (row for row in ear.snapshot()["heard"] if row is not None)
+    with pytest.raises(ValueError, match=field):
+        Ear(3).restore_heard([None, {**row, field: value}, None])
+
+
+def test_what_the_decoder_found_is_handed_on():
+    ear = Ear(3)
+    (event,) = ear.hear(answer(0, slot=1))
+    assert event.start_tick == ear.heard[1].tick == 0

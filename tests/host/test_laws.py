@@ -124,6 +124,45 @@ def test_a_law_that_fails_is_named_and_leaves_the_command_as_it_was(how, reason)
 
 
 @pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        ([0x8000, 0, 0.1, 0.0, 0.0], "Expected `int` <= 32767"),
+        ([0, -0x8001, 0.1, 0.0, 0.0], "Expected `int` >= -32768"),
+        ([0, 0, math.inf, 0.0, 0.0], "not finite"),
+        ([0, 0, 0.1, 0.0, math.nan], "not finite"),
+        ([0, 0, 0.1, 0.0], "shorter"),
+        ([0, 0, 0.1, 0.0, 0.0, 0.0], "longer"),
+        ([0, 0, 0.1], "not enough values"),
+        ([], "Expected `array` of length 2"),
+    ],
+)
+def test_a_saved_command_that_no_pilot_gave_is_refused(command, reason):
+    one = pilot(Leaky(LeakyParameters()))
+    with pytest.raises(ValueError, match=reason):
+        one.restore({**one.snapshot(), "command": command})
+
+
+class Stubborn(Law[LawParameters]):
+    """Puts back its memory in its own way, which fails."""
+
+    def restore(self, state):
+        raise RuntimeError("no such file")
+
+
+def test_what_a_laws_own_restore_raises_is_a_value_error_that_names_the_law():
+    one = pilot(Stubborn(Any()))
+    reason = "law 'any' takes back no such memory: RuntimeError: no such file"
+    with pytest.raises(ValueError, match=reason):
+        one.restore(one.snapshot())
+
+
+def test_numbers_far_from_any_robots_are_not_called_a_mistake_of_the_law():
+    one = pilot(Gains().law())
+    with pytest.raises(PartError, match=r"law 'yang_kim' failed: angle .*; parameters far from any robot's"):
+        one.update(Posture(0.0, 0.0, 1e300), 1.0)
+
+
+@pytest.mark.parametrize(
     ("state", "reason"),
     [
         ({}, "a memory of nothing where"),

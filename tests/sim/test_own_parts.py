@@ -13,7 +13,7 @@ from miro_host.parts import PartError
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import load, parse
-from miro_sim.world.world import World
+from miro_sim.world.world import SAVE_BEGIN, World, sealed
 
 PERIODS = 24
 
@@ -136,3 +136,33 @@ def test_a_law_that_fails_names_robot_and_tick_and_leaves_no_nan_in_the_state():
     ):
         finish(one)
     assert encode(one.snapshot())
+
+
+def changed(saved, change):
+    """A saved world with something in its first network changed, sealed again."""
+    content = msgspec.msgpack.decode(saved[len(SAVE_BEGIN) + 32 :])
+    change(content["state"]["networks"][0])
+    return sealed(msgspec.msgpack.encode(content))
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (
+            lambda network: network["robots"][0]["pilot"]["law"].update(periods="1"),
+            "law 'leaky' takes back no such memory: ValueError: attribute 'periods' is 1, not an int",
+        ),
+        (
+            lambda network: network["robots"][0]["pilot"].update(law=None),
+            "law 'leaky' takes back no such memory: ValidationError: Expected `object`, got `null`",
+        ),
+        (lambda network: network["answers"].pop(), "answers of 2 robots where 3 belong"),
+        (lambda network: network["answers"][0].update(tick=1 << 40), "last answer came after tick 4000000"),
+        (lambda network: network.pop("answers"), "KeyError.*answers"),
+    ],
+)
+def test_a_saved_world_with_another_memory_is_refused(change, reason):
+    one = world(LeakyParameters())
+    one.run_to(4_000_000)
+    with pytest.raises(ValueError, match=f"not a saved world: .*{reason}"):
+        one.load(changed(one.save(), change))

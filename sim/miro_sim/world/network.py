@@ -274,6 +274,8 @@ class Network:
             raise ValueError(f"the radio is settled up to tick {settled_tick}, at tick {tick}")
         if not begun_tick - CONTROL_PERIOD_TICKS <= self.uplink.now <= tick:
             raise ValueError(f"the PC has heard everything up to tick {self.uplink.now}, at tick {tick}")
+        if any(answer is not None and answer.tick > tick for answer in self.ear.heard):
+            raise ValueError(f"a robot's last answer came after tick {tick}")
         for robot in self.robots:
             cpu = robot.board.cpu
             if not begun_tick - CONTROL_PERIOD_TICKS <= cpu.cycles * CYCLE_TICKS <= tick + SETTLE_TICKS:
