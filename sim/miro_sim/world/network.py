@@ -7,9 +7,9 @@ itself (`radio/`), the order of networks and the clock (`world.py`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from msgspec import convert
+from msgspec import Meta, convert
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, HOST_CHARACTER_TICKS, ticks
 from miro_exact.saved import LAST_TICK, whole
@@ -35,6 +35,9 @@ SETTLE_TICKS = 120
 
 Host = Literal["controller", "script", "silent"]
 """Who sends: the PC's controller, once a control period; a script; or only who injects."""
+
+
+SavedSymbol = tuple[Annotated[int, Meta(ge=0, le=0xFF)], bool, Annotated[int, Meta(ge=0, le=LAST_TICK)]]
 
 
 class Network:
@@ -254,7 +257,7 @@ class Network:
 
     def restore(self, state: dict[str, Any]) -> None:
         self.outbox.restore(state["outbox"])
-        self.heard = convert(state["heard"], list[Symbol])
+        self.heard = convert(state["heard"], list[SavedSymbol])
         self.ear.restore_heard(state["answers"])
         for robot, saved in zip(self.robots, state["robots"], strict=True):
             robot.restore(saved)

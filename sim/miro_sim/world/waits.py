@@ -98,13 +98,22 @@ class Waits:
         place, mark = _Place(self, watch), world.mark()
         world.run_piece(until_tick)
         self._gather(watch)
-        first = min((key for key, event in self.backlog if watch.wants(event)), default=None)
-        if first is not None and first[0] < until_tick:
-            self._again_to(watch, place, mark, max(first[0], mark.tick))
-            if not any(key == first for key, _ in self.backlog):  # it begins where an instruction does
-                self._again_to(watch, place, mark, max(first[0], mark.tick) + 1)
-        if first is None:
+        wanted = [entry for entry in self.backlog if watch.wants(entry[1])]
+        if not wanted:
             self._close_period()
+            return
+        first, event = min(wanted, key=lambda entry: entry[0])
+        if first[0] < until_tick:
+            tick = max(first[0], mark.tick)
+            self._again_to(watch, place, mark, tick)
+            if any(key == first for key, _ in self.backlog):
+                return
+            if (
+                event.what == "reached"
+            ):  # the CPU stands before the instruction and has not looked at it again
+                self.backlog.append((first, event))
+            else:  # it happens with the cycle that begins there
+                self._again_to(watch, place, mark, tick + 1)
 
     def _again_to(self, watch: Watch, place: _Place, mark: Mark, tick: int) -> None:
         """Goes back and runs the piece again, to `tick`."""

@@ -134,10 +134,12 @@ class World:
     def run_until(self, condition: Condition | Sequence[Condition], within: int | None = None) -> Event:
         """Moves everything on to the first tick at which `condition`, or one of several, is true.
 
-        Returns the event. What happens behind it, also on the same tick, is left to the next wait; so is what
-        happened since the last wait, as far as the logs hold it (2048 events a robot). Only where the run stops
-        depends on a wait. `within`: ticks after which WaitExpired is raised, with what was seen meanwhile; default:
-        the end of the scenario. Raises ValueError for a network, robot, pin or symbol that is not there.
+        Returns the event; the world stands at its tick, or one behind it where the event belongs to the machine cycle
+        that begins there (an edge of TXD on the boundary of two cycles). What happens later, also on the same tick, is
+        left to the next wait; so is what happened since the last wait, as far as the logs hold it (2048 events a
+        robot). Only where the run stops depends on a wait. `within`: ticks after which WaitExpired is raised, with
+        what was seen meanwhile; default: the end of the scenario. Raises ValueError for a network, robot, pin or
+        symbol that is not there.
 
             world.run_until(conditions.Answer(robot=0), within=ticks(0.040))
         """
