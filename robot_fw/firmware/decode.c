@@ -1,6 +1,6 @@
 /* Finds valid frames: a window of F characters that slides over the ring, one character a call.
  *
- * What belongs here: "valid" as the contract has it: sync matches F back, all F stop bits good, all F - 1 spacings
+ * What belongs here: "valid" as protocol/README.md has it: sync matches F back, all F stop bits good, all F - 1 spacings
  * good, CRC good; then the window is cleared. What does not: whether the frame is new (failsafe.c) and what it says
  * (motion.c).
  *

@@ -1,6 +1,6 @@
 /* The age of the last fresh frame: which frame is fresh, when the wheels stop, when the motors go off.
  *
- * What belongs here: Timer 1 as the tick, the contract's 150, 110 and 500 ms. What does not: how to stop (motion.c).
+ * What belongs here: Timer 1 as the tick, the 150, 110 and 500 ms of protocol/README.md. What does not: how to stop (motion.c).
  *
  * Every fresh frame restarts Timer 1, so the age does not depend on where the frame fell between two ticks. It counts
  * from the frame's last character, not from the end of its decoding, and it runs ahead by the time that the command to

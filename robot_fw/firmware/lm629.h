@@ -12,7 +12,7 @@
 #define RIGHT           0xEF
 #define BOTH            0xE7
 
-/* Commands, data sheet table 1. */
+/* Commands: data sheet SNVS781, User Command Set. */
 #define STT             0x01    /* start motion: trajectory buffers take effect at the next sample */
 #define UDF             0x04    /* filter buffers take effect at the next sample */
 #define RDRP            0x0A    /* read real position */

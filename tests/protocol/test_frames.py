@@ -1,4 +1,4 @@
-"""The codec: what is sent comes back, what may not be sent is refused by name, sizes are the contract's."""
+"""The codec: what is sent comes back, what may not be sent is refused by name, sizes are as calculated by hand."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_all_host_frames_of_a_network_have_the_same_length(data, n):
     assert len(encode(data.draw(host_frames(n)), n)) == {3: 23, 5: 31}[n]
 
 
-def test_frames_last_as_long_on_the_air_as_the_contract_says():
+def test_frames_last_as_long_on_the_air_as_calculated_by_hand():
     air_ms = {name: form.air_ticks / table.TICKS_PER_MS for name, form in table.DOWNLINK.items()}
     assert air_ms[3] == pytest.approx(24.0, abs=0.05)
     assert air_ms[5] == pytest.approx(32.3, abs=0.05)

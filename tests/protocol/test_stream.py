@@ -25,7 +25,7 @@ def test_what_is_written_is_read_back(sent):
     assert stream.parse(stream.format_stream(sent)) == sent
 
 
-def test_a_line_looks_as_the_contract_shows_it():
+def test_a_line_looks_as_the_protocol_page_shows_it():
     line = stream.format_line(Transmission(792000, ">", b"\x55\xff\x2d\xd4", "team seq=3"))
     assert line == "792000 > 55 ff 2d d4  # team seq=3"
 

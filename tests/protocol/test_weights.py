@@ -1,4 +1,4 @@
-"""Exact weight enumeration: against listing all code words where they are few, and against the data sheets."""
+"""Exact weight enumeration: against listing all code words where they are few, and against another calculation."""
 
 from itertools import combinations
 from math import comb
@@ -67,5 +67,6 @@ def test_the_low_weights_are_what_listing_them_gives(form):
     ("form", "rate", "probability"),
     [(DOWNLINK[3], 1e-3, 2.8e-12), (DOWNLINK[3], 1e-4, 3.1e-17), (DOWNLINK[5], 1e-3, 2.3e-11)],
 )
-def test_the_probabilities_are_those_of_the_study_that_chose_the_polynomial(form, rate, probability):
+def test_the_probabilities_are_those_of_another_calculation(form, rate, probability):
+    """By another program, from the weights of the dual code (MacWilliams identity), to two digits."""
     assert weights.undetected_probability(form, rate) == pytest.approx(probability, rel=0.03)

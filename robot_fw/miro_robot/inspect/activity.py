@@ -2,9 +2,9 @@
 
 What belongs here: measuring. Cycles by address are `counters.py`'s, the table for people `profile.py`'s.
 
-The latency of an interrupt is counted as the 8051 Hardware Manual does (2.16): full machine cycles between the one in
-which the flag is latched and the first one of the routine; 3 at least. A request that stays up through its own routine
-counts from that routine's end.
+The latency of an interrupt is counted as Atmel's 8051 Hardware Manual does (4316E, section 2.16, response time): full
+machine cycles between the one in which the flag is latched and the first one of the routine; 3 at least. A request that
+stays up through its own routine counts from that routine's end.
 """
 
 from __future__ import annotations

@@ -226,7 +226,7 @@ class MotorAxis:
         return now == self.period_tick + _PWM_TICKS - 16 * self.pwm_magnitude
 
     def _sample(self, now: int) -> None:
-        """One sample, in the order of README.md, "Inside a sample" (chosen)."""
+        """One sample; its order is chosen (README.md, "Inside a sample")."""
         flags = self._latch_position(now)
         if self.signals.word & _MOTOR_OFF:
             self.trajectory.follow(self.real_position)

@@ -1,7 +1,8 @@
 """The digital filter: error in, 16-bit drive out, once per sample.
 
-The law is the data sheet's ("PID Compensation Filter"); the order of its operations is chosen (README.md, F1 to F6).
-Which coefficients are in force when is in `buffers.py`, the excessive-error test in `axis.py`.
+Equation and widths: data sheet (SNVS781), "PID Compensation Filter". Order, rounding and saturation are chosen
+(README.md, rules F1 to F6). Which coefficients are in force when is in `buffers.py`, the excessive-error test in
+`chip.py`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """The trapezoidal profile generator: working registers and one step per sample.
 
 All integers: positions are 1/65536 counts, velocities 1/65536 counts per sample, accelerations 1/65536 counts
-per sample^2. What the host loads and when it takes effect is in `buffers.py`. The data sheet names only the
-outer properties; the algorithm is chosen (README.md, "Profile") and always ends exactly on the target.
+per sample^2. What the host loads and when it takes effect is in `buffers.py`. The data sheet (SNVS781, "Velocity
+Profile (Trajectory) Generation") names only the outer properties; the algorithm is chosen (README.md, "Profile") and
+always ends exactly on the target.
 """
 
 from __future__ import annotations

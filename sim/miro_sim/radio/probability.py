@@ -55,7 +55,10 @@ def fsk_exponent(eb_n0_db: float) -> float:
 
 
 def fsk_threshold(eb_n0_db: float) -> int:
-    """Bit errors of non-coherent FSK in white Gaussian noise, 0.5 exp(-Eb/2N0) (Proakis, Digital Communications)."""
+    """Bit errors of non-coherent FSK in white Gaussian noise, 0.5 exp(-Eb/2N0).
+
+    Source: J. G. Proakis, Digital Communications, non-coherent detection of binary orthogonal FSK.
+    """
     return int(2147483648.0 * dmath.exp(-fsk_exponent(eb_n0_db)) + 0.5)
 
 

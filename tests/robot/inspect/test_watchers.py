@@ -166,19 +166,19 @@ START = "MOV TMOD,#02h\nMOV TH0,#9Ch\nMOV IE,#82h\nSETB TR0\n"
 
 
 def test_an_interrupt_out_of_sleep_has_the_least_latency_of_the_data_sheet():
-    """8051 Hardware Manual, 2.16: flag latched in cycle n, first cycle of the routine n + 4: three full cycles."""
+    """4316E section 2.16: flag latched in cycle n, first cycle of the routine n + 4: three full cycles."""
     latency, count = timer_latencies(START + "again:\nORL PCON,#01h\nSJMP again")
     assert (latency, count > 10) == (3, True)
 
 
 def test_a_division_adds_its_remaining_cycles():
-    """2.16: polling waits for the last cycle of the instruction; DIV has four."""
+    """4316E section 2.16: polling waits for the last cycle of the instruction; DIV has four."""
     latency, _ = timer_latencies(START + "again:\nDIV AB\nDIV AB\nDIV AB\nDIV AB\nSJMP again")
     assert latency == 6
 
 
 def test_an_access_to_ie_before_a_division_makes_the_longest_latency():
-    """2.16: one more instruction runs after an access to IE; at worst a DIV: 8 cycles."""
+    """4316E section 2.16: one more instruction runs after an access to IE; at worst a DIV: 8 cycles."""
     latency, _ = timer_latencies(START + "again:\nSETB EA\nDIV AB\nSJMP again")
     assert 6 < latency <= 8
 

@@ -1,4 +1,4 @@
-"""The digital filter: the sheet's regression vectors, and random errors against the slow twin."""
+"""The digital filter: vectors calculated by hand (rules F1 to F6), and random errors against the slow twin."""
 
 from __future__ import annotations
 

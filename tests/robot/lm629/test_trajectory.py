@@ -1,4 +1,4 @@
-"""The profile generator: the sheet's regression vectors, and random moves against the slow twin."""
+"""The profile generator: vectors calculated by hand from the README's rules, and random moves against the slow twin."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Timer 2: the cycle in which T2EX and T2 act, calculated by hand from the sheet. 4316E is Atmel's 8051 Hardware
-Manual, 1919D the AT89S52 data sheet, whose sections 10 to 12 have timer 2 too.
+"""Timer 2: the cycle in which T2EX and T2 act, calculated by hand. 4316E is Atmel's 8051 Hardware Manual, 1919D the
+AT89S52 data sheet, whose sections 10 to 12 have timer 2 too.
 """
 
 import pytest

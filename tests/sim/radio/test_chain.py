@@ -13,8 +13,8 @@ from miro_sim.scenario import profiles
 SECONDS = 100
 SLOTS = 9600 * SECONDS
 
-# Rayleigh fading at 433.92 MHz and 1.46 m/s (Rice's crossing rate and mean duration):
-# margin in dB, time below, fades a second, mean fade in ms, frames hit (31 characters)
+# Margin in dB, time below, fades a second, mean fade in ms, frames hit (31 characters). Rayleigh fading: level crossing
+# rate and mean fade duration (Rappaport, Wireless Communications, 5.7.3) at 433.92 MHz and 1.46 m/s: 2.11 Hz Doppler.
 RAYLEIGH = [
     ("fade5", 0.27, 2.17, 125, 0.34),
     ("fade10", 0.095, 1.52, 63, 0.14),
