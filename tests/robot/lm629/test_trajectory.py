@@ -91,7 +91,7 @@ def test_the_target_may_move_behind_the_axis_on_the_way():
         (1, 1, 1, 65536, 1),
     ],
 )
-def test_long_moves_take_as_many_samples_as_the_sheet_says(
+def test_long_moves_take_as_many_samples_as_calculated_by_hand(
     a: int, limit: int, target: int, samples: int, peak: int
 ):
     velocities, positions = run(generator(a, limit, target))

@@ -29,14 +29,15 @@ def speed_after(params, magnitude, seconds=1.5):
     return drive.velocity_at(drive.tick)[0]
 
 
-@pytest.mark.parametrize(("volts", "sheet_m_s"), [(6.0, 1.75), (7.2, 2.18)])
-def test_full_duty_reaches_the_speed_of_the_sheet(volts, sheet_m_s):
+@pytest.mark.parametrize(("volts", "written_m_s"), [(6.0, 1.73), (7.2, 2.16)])
+def test_full_duty_reaches_the_speed_that_drop_and_friction_leave(volts, written_m_s):
+    """From the catalogue figures; `written_m_s` stands in the plant's README."""
     params = DriveParams(battery=Battery(voltage_v=volts))
     friction_a = params.friction_nm() / params.motor.torque_constant_nm_a
     rad_s = (volts - 1.0 - friction_a * (1.94 + 1.35 + 0.15)) / params.motor.torque_constant_nm_a
     speed = speed_after(params, 128)
     assert speed == pytest.approx(rad_s * 0.020 / 8, rel=1e-4)
-    assert speed == pytest.approx(sheet_m_s, rel=0.015)
+    assert round(speed, 2) == written_m_s
 
 
 def test_the_first_push_is_that_of_the_stall_torque_less_friction():
