@@ -1,8 +1,29 @@
 """The AT89C52 as a board sees it: reset, run, pins in and out, observers, snapshots.
 
-What belongs here: the registers of the core (ACC, B, PSW, SP, DPTR, PCON), when interrupts are taken, idle
-and power-down, MOVX, and the public face. Instructions are in `execute.py`, the rest of the chip in
-`peripherals.py`.
+               +---------v---------+
+      T2  P1.0 | 1              40 | VCC
+    T2EX  P1.1 | 2           39-32 | P0.0-P0.7  address low and data of MOVX; open drain, pulled up
+     P1.2-P1.7 | 3-8            31 | /EA        high: 8 KB of program inside
+           RST | 9              30 | ALE        not modelled (X5)
+     RXD  P3.0 | 10             29 | /PSEN      not modelled (X5)
+     TXD  P3.1 | 11          28-21 | P2.7-P2.0  address high of MOVX
+   /INT0  P3.2 | 12                |
+   /INT1  P3.3 | 13                |   RST      `reset`
+      T0  P3.4 | 14                |   P0-P3    in: `set_external`, out: `Bus.port_written`
+      T1  P3.5 | 15                |   RXD      `rxd`, a Line that the outside writes
+     /WR  P3.6 | 16                |   TXD      `txd`, a Line that the chip writes
+     /RD  P3.7 | 17                |   /RD /WR  `Bus.movx_read`, `Bus.movx_write`
+         XTAL2 | 18                |   XTAL1    24 MHz, the tick of everything
+         XTAL1 | 19                |
+           GND | 20                |   A pin of P3 is its latch AND its second function.
+               +-------------------+
+
+   pins -> ports -> INT0 INT1, T0 T1, T2 T2EX, RXD -> timers, serial port -> flags -> interrupts -> LCALL
+                                   instructions -> SFRs -> timers, serial port, latches -> pins
+
+What belongs here: the registers of the core (ACC, B, PSW, SP, DPTR, PCON), when interrupts are taken, idle and
+power-down, MOVX, and the public face. Instructions are in `execute.py`, the rest of the chip in `peripherals.py`. Rules
+with letters (C1, I1, ..) are those of README.md in this folder, numbers like 4316E its sources.
 """
 
 from __future__ import annotations
@@ -29,9 +50,9 @@ _STOP_REQUESTED = 1
 _WIRE_FULL = WIRE_FULL
 _P0, _SP, _PCON, _IE, _IP, _PSW = 0x80, 0x81, 0x87, 0xA8, 0xB8, 0xD0
 _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
-_PCON_BITS = 0x8F  # the others are not implemented and read as 0
-_READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end
-_FLOATING = 0xFF  # what an undriven external bus reads as
+_PCON_BITS = 0x8F  # the others are not implemented and read as 0 (C5)
+_READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end (X1)
+_FLOATING = 0xFF  # what an undriven external bus reads as (X4)
 _MAIN_LOOP_STARVED = int(FaultKind.MAIN_LOOP_STARVED)
 _MARK_CYCLES = 2000  # 1 ms: how often a look is taken at whether the main loop gets time
 _ONE_INSTRUCTION = 4  # cycles of the longest: what the hardware lets main level do between two interrupts
@@ -75,7 +96,7 @@ class Cpu(Executor):
         self.idle = 0
         self.powered_down = 0
         self.next_event = 0
-        self.blocked = -1  # boundary at which no interrupt is taken: after RETI and writes to IE, IP
+        self.blocked = -1  # boundary at which no interrupt is taken: after RETI and writes to IE, IP (I1)
         self.main_loop_limit = 0  # cycles after which interrupts that leave it no time are a fault; 0: never
         self.next_mark = _FAR
         self.marks = 0  # marks passed since interrupts took over
@@ -134,7 +155,7 @@ class Cpu(Executor):
         return self.inspector.run(until_cycle)
 
     def reset(self) -> None:
-        """RST: registers and PC as after power-on, ports FF; RAM and time stay."""
+        """RST: registers and PC as after power-on, ports FF; RAM and time stay (C7)."""
         now = self.cycles
         self.chip.clear(now)
         self.pc = 0
@@ -367,7 +388,7 @@ class Cpu(Executor):
         self.user_flags = value & 0x22
 
     def write_pcon(self, value: int) -> None:
-        """Power-down wins over idle; the AT89C52 leaves it by reset only."""
+        """Power-down wins over idle; the AT89C52 leaves it by reset only (data sheet 0313H)."""
         if (value ^ self.pcon) & _SMOD:
             self.chip.write_smod(value >> 7, self.cycles)
         self.pcon = value & _PCON_BITS
@@ -395,7 +416,7 @@ class Cpu(Executor):
         return self.chip.ports.latches[2] << 8
 
     def movx_read(self, address: int) -> int:
-        """Without a strobe (P3.7 latched low) nobody drives the bus."""
+        """Without a strobe (P3.7 latched low, X3) nothing drives the bus."""
         value = _FLOATING
         if self.chip.ports.latches[3] & 0x80:
             value = self.bus.movx_read(address, 12 * self.start + _READ_SAMPLE) & 0xFF
@@ -403,7 +424,7 @@ class Cpu(Executor):
         return value
 
     def movx_write(self, address: int, value: int) -> None:
-        """Without a strobe (P3.6 latched low) nothing is written."""
+        """Without a strobe (P3.6 latched low, X3) nothing is written."""
         if self.chip.ports.latches[3] & 0x40:
             self.bus.movx_write(address, value, 12 * self.start + _WRITE_RISES)
         self.write_port(0, 0xFF)

@@ -1,12 +1,11 @@
 """The instructions: registers, internal RAM, ALU, and the loop that executes code.
 
-What belongs here: what each line of `opcodes.TABLE` does. What does not: special function registers, time passing in
-peripherals, interrupts and idling. They are `Cpu`'s (cpu.py), which fills in the hooks of `Core` (core.py).
+What belongs here: what each line of `opcodes.TABLE` does. Special function registers, time passing in peripherals,
+interrupts and idling are `Cpu`'s (cpu.py), which fills in the hooks at the end of the class.
 
-Timing inside an instruction (8051 Hardware Manual, 2.4 and 2.5.2: a port latch changes at S6P2 of the last cycle; what
-the manual leaves open is chosen here): operands are read in the instruction's first cycle, results are written at the
-end of its last, `cycles`. The loop compares `cycles` with `limit` once per instruction and knows nothing else about
-time.
+Timing inside an instruction (4316E section 2.4; what it leaves open is rule C1 in README.md): operands are read in the
+instruction's first cycle, `start`; results are written at the end of its last, `cycles`. The loop compares `cycles`
+with `limit` once per instruction and knows nothing else about time.
 
 The loop has one shape, a head and one choice among the rows, because the build copies the head to the end of each row
 (`setup.py`, `threaded`); what the head asks has to be rare.
@@ -243,7 +242,7 @@ class Executor(Core):
                 self.b = value >> 8
                 self.cy = 0
                 self.ov = 1 if value > 0xFF else 0
-            elif row == 0xA5:  # undefined: runs as NOP
+            elif row == 0xA5:  # undefined: runs as NOP (C2)
                 self.fault(_UNDEFINED_OPCODE)
             elif row == 0xA6:  # MOV @Ri,dir
                 value = self.read(first)
@@ -266,7 +265,7 @@ class Executor(Core):
                 pc = self.compare(iram[iram[self.bank + (op & 1)]], first, second)
             elif row == 0xB8:  # CJNE Rn,#imm,rel
                 pc = self.compare(iram[self.bank + (op & 7)], first, second)
-            elif row == 0xC0:  # PUSH dir: SP counts first, so PUSH SP stores the new one
+            elif row == 0xC0:  # PUSH dir: SP counts first, so PUSH SP stores the new one (C4)
                 self.claim()
                 value = self.read(first)
                 iram[self.sp] = value
@@ -290,7 +289,7 @@ class Executor(Core):
                 value = iram[self.bank + (op & 7)]
                 iram[self.bank + (op & 7)] = self.a
                 self.a = value
-            elif row == 0xD0:  # POP dir: SP counts first, so POP SP ends with the byte popped
+            elif row == 0xD0:  # POP dir: SP counts first, so POP SP ends with the byte popped (C4)
                 value = self.pop()
                 self.write(first, value)
             elif row == 0xD2:  # SETB bit
@@ -456,7 +455,7 @@ class Executor(Core):
         return self.pc if left == right else self.branch(offset)
 
     def divide(self) -> None:
-        """Dividing by zero leaves A and B as they were (silicon: undefined) and sets OV."""
+        """Dividing by zero leaves A and B as they were (undefined on silicon: C3) and sets OV."""
         self.cy = 0
         self.ov = 1 if self.b == 0 else 0
         if self.b:

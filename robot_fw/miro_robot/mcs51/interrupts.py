@@ -1,13 +1,19 @@
 """Interrupts: the six sources, their priorities, and the two external inputs.
 
-What belongs here: which source is asking since when, and which one the CPU has to take at an instruction's
-end. Who raises a flag (timers, serial port) is elsewhere; the two-cycle LCALL itself is `Cpu`'s.
+   INT0 --> IE0 ------+
+   timer 0 --> TF0 ---+
+   INT1 --> IE1 ------+--> latched at S5P2 --> polled with IE in the next cycle, --> highest level, then in this order:
+   timer 1 --> TF1 ---+    [since, until)      if it is the last of an instruction   LCALL, in service
+   serial --> RI TI --+
+   timer 2 --> TF2 EXF2
 
-Timing (8051 Hardware Manual, 2.16): flags are latched at S5P2 of every cycle and the latched copies are polled
-in the next one; an LCALL follows the polling cycle if that was the last of an instruction. So at the
-boundary after cycle b - 1 those sources count that were latched in cycle b - 2. Each source is therefore
-kept as the window [since, until) of cycles whose S5P2 saw it. A cleared flag still counts in the poll of
-its last cycle.
+What belongs here: which source is asking since when, and which one the CPU has to take at an instruction's end. Who
+raises a flag (timers, serial port) is elsewhere; the two-cycle LCALL itself is `Cpu`'s.
+
+Timing (4316E section 2.16; letters are rules in README.md): flags are latched at S5P2 of every cycle and the latched
+copies are polled in the next one; an LCALL follows the polling cycle if that was the last of an instruction. So at the
+boundary after cycle b - 1 those sources count that were latched in cycle b - 2. Each source is therefore kept as the
+window [since, until) of cycles whose S5P2 saw it. A cleared flag still counts in the poll of its last cycle (I4).
 """
 
 from __future__ import annotations

@@ -1,11 +1,20 @@
 """Everything on the chip beside the core, wired together: timers, serial port, interrupts, port pins.
 
+   pins                    parts                   flags
+   P3.2 P3.3  INT0 INT1 -> external interrupts --- IE0 IE1 ---+
+   P3.2-P3.5  gates, T0 -> timers 0, 1 ----------- TF0 TF1 ---+--> interrupts --> LCALL of the core
+   P1.0 P1.1  T2 T2EX ---> timer 2 --------------- TF2 EXF2 --+
+                             | overflows of timers 1 and 2,   |
+                             v or the crystal: 16x ticks      |
+   P3.0 RXD -------------> serial port ----------- RI TI -----+
+   P3.1 TXD <------------- (uart, shift)
+
 What belongs here: which register address is whose, which pin goes where, which timer clocks the serial
 port, and the event horizon: `sync(cycle)` does all below a cycle that the core can notice, `next_event`
 says when it has to ask again. Registers of the core itself (ACC, PSW, PCON ...) are `Cpu`'s.
 
 Timers and serial port are left behind until one of them could raise a flag (`timer_wait`, `serial_wait`)
-or somebody looks at them (`settle`): in between nothing of theirs is stepped.
+or somebody looks at them (`settle`): in between nothing of theirs is stepped. Letters are rules in README.md.
 """
 
 from __future__ import annotations
@@ -22,13 +31,13 @@ from miro_robot.mcs51.timers import Timers
 from miro_robot.mcs51.uart import Uart
 
 _FAR = 1 << 62
-_UNIMPLEMENTED = 0xFF  # what a register address without a register reads as; undefined on silicon
+_UNIMPLEMENTED = 0xFF  # what an address without a register reads as (C5)
 _P0, _P1, _P2, _P3 = 0x80, 0x90, 0xA0, 0xB0
 _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1 = 0x88, 0x89, 0x8A, 0x8B, 0x8C, 0x8D
 _SCON, _SBUF, _IE, _IP = 0x98, 0x99, 0xA8, 0xB8
 _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2 = 0xC8, 0xC9, 0xCA, 0xCB, 0xCC, 0xCD
 _TF2, _RCLK, _TCLK = 0x80, 0x20, 0x10
-_S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows
+_S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows (U2)
 _SERIAL, _TIMER2 = 0x10, 0x20  # in IE
 _REN = 0x10  # in SCON
 _NO_PERIOD = 1 << 40  # of a clock that stands
@@ -183,7 +192,7 @@ class Peripherals:
         if mode == 0:
             self.uart.set_clock(_FAR, 0, _FAR, 0)
             return
-        next1 = 12 * self.timers.synced + 1  # mode 2: fosc/32 or fosc/64, in phase with the cycle
+        next1 = 12 * self.timers.synced + 1  # mode 2: fosc/32 or fosc/64, in phase with the cycle (U8)
         period1 = 2 if self.smod else 4
         next2 = next1
         period2 = period1
@@ -203,7 +212,7 @@ class Peripherals:
         )
 
     def _timer1_tick(self) -> int:
-        """The next overflow of timer 1 that is a 16x tick: with SMOD = 0 every second one is."""
+        """The next overflow of timer 1 that is a 16x tick: with SMOD = 0 every second one since reset (U1)."""
         if self.timers.counts_pin(1):
             return _FAR
         cycle = self.timers.next_overflow(1)

@@ -4,7 +4,7 @@ What belongs here: levels. Which pins carry timer inputs and interrupts is `peri
 
 A pin is the wired AND of its latch and the outside (P1 to P3 quasi-bidirectional, P0 open drain with pull-
 ups). The CPU samples pins at S5P2, so a push with a tick takes effect in the first cycle whose S5P2 is not
-before it. The latch changes at the end of an instruction and the pin with the next cycle.
+before it (P1, P2). The latch changes at the end of an instruction and the pin with the next cycle.
 """
 
 from __future__ import annotations

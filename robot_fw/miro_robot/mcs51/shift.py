@@ -2,7 +2,7 @@
 
 What belongs here: its eight bit cycles. Registers and flags are the `Uart`'s.
 
-Timing (8051 Hardware Manual, 2.13, mode 0): one full cycle lies between the write that starts it and the first bit;
+Timing (4316E section 2.13, mode 0): one full cycle lies between the write that starts it and the first bit;
 each bit takes one cycle, lowest first, sampled at S5P2; the shift clock on TXD is low from S3P1 to S6P1; TI
 or RI goes up at S1P1 of the tenth cycle after the write. Data leave on RXD: `data` is what the chip drives
 there.

@@ -1,12 +1,18 @@
 """Timer 2: capture, auto-reload up and down, baud rate generator, clock output.
 
+   fosc/12: timer ---------+
+   fosc/2: baud, output ---+--> [TH2|TL2] -- overflow --> TF2, or 16x ticks of the serial port, or P1.0
+   fall of T2: counter ----+     |     ^
+                         capture v     | reload
+   fall of T2EX, EXEN2 ----> [RCAP2H|RCAP2L], and EXF2; with DCEN T2EX says up or down
+
 What belongs here: T2CON, T2MOD, TL2 TH2, RCAP2L RCAP2H, computed lazily like timers 0 and 1: `sync(cycle)`
 does all that happens in the cycles below `cycle`. Dividing its overflows down to bits is the serial port's.
 
-Timing (8051 Hardware Manual, 2.12; AT89S52 data sheet, sections 10 to 13): as a timer it counts once per cycle, as a
-baud rate generator or clock output six times (fosc/2). TF2 is set at S2P2 and polled in the same cycle, a cycle
-sooner than TF0. Pins are sampled at S5P2 and act in the next cycle: a count, or a capture or reload that goes before
-that cycle's own count. Chosen, as no sheet says when EXF2 is polled: it is latched at S5P2 of that next cycle.
+Timing (4316E section 2.12, 1919D sections 10 to 13; letters are rules in README.md): as a timer it counts once per
+cycle, as a baud rate generator or clock output six times (fosc/2). TF2 is set at S2P2 and polled in the same cycle, a
+cycle sooner than TF0. Pins are sampled at S5P2 and act in the next cycle: a count, or a capture or reload that goes
+before that cycle's own count (T4), with EXF2 latched at S5P2 of that cycle (I3).
 """
 
 from __future__ import annotations

@@ -1,15 +1,20 @@
 """The serial port in modes 1 to 3: transmitter and receiver on line levels.
 
-What belongs here: SCON, SBUF, the two divide-by-16 counters, start bit search and majority vote. Where the
-16x ticks come from (timer 1, timer 2, crystal) is worked out by `Peripherals`, which calls `set_clock`;
-mode 0 is in `shift.py`.
+   16x ticks --> /16, free running --> rollover: next bit, at S1P1        latch P3.1
+   write SBUF --> [ start | D0 .. D7 | TB8 | stop ] ---------------------------(&)--> TXD;  with the stop bit: TI
 
-Timing (8051 Hardware Manual, 2.13; states of the receiver: Oki MSM80C154S user's manual, serial port), all in crystal
-ticks: `sync(tick)` does everything below `tick`.
-Transmitter: a free-running divide-by-16 counter; the start bit begins at S1P1 after the first rollover that
-follows the write to SBUF, further bits one rollover apart, TI with the stop bit. Receiver: tests RXD on
-every 16x tick for a fall, samples each bit in counter states 7, 8, 9, acts in state 10; RI shows at the
-next S3P1. Between bits nothing is stepped: an idle receiver asks the Line for its next edge.
+        latch P3.0
+   RXD ----(&)--+--> 1 then 0 at a 16x tick: reset and start --> /16
+                +--> levels in its states 7, 8, 9 --> majority in state 10 --> [ D0 .. D7 | RB8 ] --> SBUF, RI
+
+What belongs here: SCON, SBUF, the two divide-by-16 counters, start bit search and majority vote. Where the 16x ticks
+come from (timer 1, timer 2, crystal) is worked out by `Peripherals`, which calls `set_clock`; mode 0 is in `shift.py`.
+
+Timing (4316E section 2.13; letters are rules in README.md), all in crystal ticks: `sync(tick)` does everything below
+`tick`. Transmitter: the start bit begins at S1P1 after the first rollover that follows the write to SBUF, further bits
+one rollover apart, TI with the stop bit. Receiver: tests RXD on every 16x tick for a fall, samples each bit in counter
+states 7, 8, 9, acts in state 10; RI shows at the next S3P1 (U6). Between bits nothing is stepped: an idle receiver asks
+the Line for its next edge.
 """
 
 from __future__ import annotations
@@ -53,7 +58,7 @@ class Uart:
         self.tx_bits = 0  # what is still to be sent, next bit lowest
         self.tx_left = 0  # how many bits that is; 0 idle
         self.tx_value = 0
-        self.tx_delay = 0  # from rollover to pin; 0 before the start bit
+        self.tx_delay = 0  # from rollover to pin (U3); 0 before the start bit
         self.tx_level = 1  # what the transmitter puts on TXD
         self.tx_edge = _FAR  # tick at which tx_coming replaces it
         self.tx_coming = 1
@@ -120,7 +125,7 @@ class Uart:
     # Registers
 
     def write_scon(self, value: int, cycle: int) -> None:
-        """SCON is written; `cycle` is the first to see it. Another mode aborts what is on its way."""
+        """SCON is written; `cycle` is the first to see it. Another mode aborts what is on its way (U5)."""
         if (value ^ self.scon) & (_SM0 | _SM1):
             self.abort(12 * cycle)
         self.scon = value
@@ -134,7 +139,7 @@ class Uart:
 
     def write_sbuf(self, value: int) -> None:
         """Loads the transmitter; a character on its way is cut off and the new one begins at the next
-        rollover.
+        rollover (U4).
         """
         self.tx_value = value
         if self.nine_bits():
@@ -272,7 +277,7 @@ class Uart:
             self.rx_done = (now + 7) // 12 * 12 + 4
             if not self.nine_bits():
                 self.rx_count = 0
-        else:  # the stop bit of a nine-bit frame: ignored, but the search begins only now
+        else:  # the stop bit of a nine-bit frame: ignored, but the search begins only now (U7)
             self.rx_count = 0
 
     def _deliver(self) -> None:

@@ -174,6 +174,14 @@ def test_a_flag_set_by_software_is_answered_as_one_that_hardware_sets_in_the_nex
     assert cpu.peek_iram(0x30) == 2
 
 
+def test_a_flag_that_software_clears_counts_in_the_poll_of_its_last_cycle():
+    """Rule I4: SETB TF0 ends with cycle 5 and CLR TF0 with 6, so S5P2 of cycle 6 alone sees the flag. It is polled in
+    7, LCALL in 8 and 9: the routine runs with TF0 clear.
+    """
+    cpu = ran("MOV IE,#82h\nNOP\nSETB TF0\nCLR TF0\n" + "NOP\n" * 20, [], 40)
+    assert entries(cpu) == [(1, 10)]
+
+
 @pytest.mark.parametrize(
     ("name", "ie", "flag"),
     [
