@@ -1,5 +1,15 @@
 """The robot's board: one AT89C52, two LM629, the L298 inputs, wired as a board file says.
 
+                 P0 ------- D7-D0 -----------+-------------+
+    AT89C52      P2.0-2.4 - PS /RD /WR /CS --+-------------+        the MIRO's wiring (boards/miro.toml)
+                 P2.5 ----- /RST ------------+-------------+
+                                        LM629 left    LM629 right
+                 P3.2 /INT0 <-- NOT <------- HI            |
+                 P3.3 /INT1 <-- NOT <-------------------- HI
+    straps ----> P1.0-1.3                PWM MAG, SIGN  PWM MAG, SIGN
+    radio -----> P3.0 RXD                    |             |
+    radio <----- P3.1 TXD                `Plant`: MAG -> EN, SIGN -> IN2 and inverted IN1 of the L298; A, B come back
+
 What belongs here: carrying levels from pin to pin, and the order in which the parts move on. What does not: what a
 part does with its pins (`mcs51/`, `lm629/`), what the motors make of the bridge (`Plant`), and how a board is
 described (`wiring.py`).
@@ -43,8 +53,8 @@ _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_END
     19,
     20,
 )
-"""Ticks into a MOVX (8051 Hardware Manual, 2.4 and 2.6; AT89S52 data sheet, section 28.1). When P2 goes back to its
-latch is not in them: CHOSEN, 2 ticks after the strobe."""
+"""Ticks into a MOVX: Atmel 8051 Hardware Manual (4316E), section 2.6, and the timing table of external data memory in
+the AT89S52 data sheet (1919D), section 28. Neither says when P2 goes back to its latch: rule X2."""
 _WR, _RD = 0x40, 0x80  # pins of P3
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
 _RESET_PULSE = RESET_PULSE

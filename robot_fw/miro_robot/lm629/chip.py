@@ -1,7 +1,28 @@
 """The LM629: its pins, and what each command of the host does.
 
+                +--------v--------+
+       /IN    1 |                 | 28  VDD        A B, /IN   encoder: `set_encoder`, `set_index`
+         A    2 |                 | 27  /RST       D7-D0, /CS /RD /WR, PS
+         B    3 |                 | 26  CLK                   host: `set_bus`; the chip drives `data_out`
+     D7-D0 4-11 |                 | 25-20          PS         0 command and status, 1 data
+       /CS   12 |                 | 19  PWM MAG    HI         `hi`, high: an interrupt for the host
+       /RD   13 |                 | 18  PWM SIGN   PWM MAG    `pwm`, 128 steps of 4 clocks in 512
+       GND   14 |                 | 17  HI         PWM SIGN   `sign`, 1: negative torque
+                |                 | 16  PS         /RST       `set_reset`
+                |                 | 15  /WR        CLK        6 MHz, a quarter of the tick
+                +-----------------+
+
+    host --> host port --> trajectory buffers --STT--> profile --> desired position --> (+)
+      ^          |     |                                                                 |
+      |          |     +-> filter buffers -----UDF--> kp ki kd il --> PID <--- error <---+
+      +-- status, registers                                            |                 |
+                                        bridge, motor <-- PWM <--------+                 |
+                                              |                                          |
+                                           encoder --> A, B, /IN --> decoder, index --> (-) real position
+
 What belongs here: the side of the chip that its host and its encoder see. What it does by itself is `axis.py`'s; how
-bytes make words is `host_port.py`'s. Rule names in comments (T1, D1, ...) are those of README.md in this folder.
+bytes make words is `host_port.py`'s. Rule names in comments (T1, D1, ...) are those of README.md in this folder. Pins:
+data sheet SNVS781, connection diagram of the 28-pin package.
 """
 
 from __future__ import annotations

@@ -1,5 +1,11 @@
 """The drive of one robot: two bridges, two motors, gears, wheels, chassis and encoders behind `Plant`.
 
+    battery --> L298 half --U--> winding --i--> shaft impulse --+
+      EN, IN1, IN2 ^              ^ e = kM w                    v
+                                  +------- shaft speeds <-- inertia of both wheels (coupled), friction
+                                                |
+    A, B to the LM629 <-- quadrature <-- angle -+--> posture (x, y, heading)        once per step, left and right
+
 What belongs here: the order of a step and the reporting of edges. What does not: the physics of the parts
 (`circuit`, `chassis`, `encoder`), figures (`params`).
 
