@@ -1,0 +1,64 @@
+"""The digest of a run, in this process's engine: `python -m tests.sim.digest_of --engine compiled "fig6 0.5 s seed 7"`.
+
+What belongs here: a run named as in `tests/vectors/digests.json`, and nothing that only a full installation has: other
+machines run this file too (`aarch64.py`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from typing import NamedTuple
+
+from miro_exact import engine
+
+_NAME = re.compile(r"(?P<scenario>\S+) (?P<duration_s>[0-9.]+) s seed (?P<seed>[0-9]+)")
+
+
+class Entry(NamedTuple):
+    """A run: a built-in scenario, cut to a duration, with a seed."""
+
+    scenario: str
+    duration_s: float
+    seed: int
+
+
+def parse(name: str) -> Entry:
+    """The entry of a name like `fig6 0.5 s seed 7`. Raises ValueError if it is none."""
+    match = _NAME.fullmatch(name)
+    if match is None:
+        raise ValueError(f"{name!r} names no run: write it like 'fig6 0.5 s seed 7'")
+    return Entry(match["scenario"], float(match["duration_s"]), int(match["seed"]))
+
+
+def digest(name: str) -> str:
+    """Runs it from begin to end."""
+    import msgspec
+
+    from miro_robot.firmware import image_path
+    from miro_robot.image import load_hex
+    from miro_sim.scenario import file as scenario_file
+    from miro_sim.world.world import World
+
+    entry = parse(name)
+    scenario = msgspec.structs.replace(
+        scenario_file.load(entry.scenario).scenario, duration_s=entry.duration_s
+    )
+    world = World(scenario, entry.seed, load_hex(image_path()))
+    while not world.finished:
+        world.step()
+    return world.digest
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("name", nargs="+")
+    parser.add_argument("--engine", choices=engine.ENGINES, default="compiled")
+    options = parser.parse_args()
+    engine.select(options.engine)
+    for name in options.name:
+        print(digest(name), flush=True)
+
+
+if __name__ == "__main__":
+    main()
