@@ -1,4 +1,97 @@
 """Mirotwin: what people do with the world, and the name they import.
 
-Nothing is imported here, so that the program (`entry`) starts at once.
+    import mirotwin
+
+    image = mirotwin.load_hex(mirotwin.image_path())
+    world = mirotwin.World(mirotwin.load_scenario("fig6").scenario, seed=7, image=image)
+    answer = world.run_until(mirotwin.conditions.Answer(), within=mirotwin.ticks(0.2))
+
+The names below are loaded when they are asked for: importing this package costs next to nothing, and the program
+(`entry`) starts at once.
 """
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from miro_exact.clock import seconds as seconds
+    from miro_exact.clock import ticks as ticks
+    from miro_protocol import frames as frames
+    from miro_protocol.decoder import Decoder as Decoder
+    from miro_protocol.decoder import TelemetryDecoder as TelemetryDecoder
+    from miro_robot.firmware import image_path as image_path
+    from miro_robot.image import Image as Image
+    from miro_robot.image import load_hex as load_hex
+    from miro_sim.scenario.file import load as load_scenario
+    from miro_sim.scenario.file import parse as parse_scenario
+    from miro_sim.scenario.keys import Scenario as Scenario
+    from miro_sim.world import conditions as conditions
+    from miro_sim.world.events import Event as Event
+    from miro_sim.world.waits import WaitExpired as WaitExpired
+    from miro_sim.world.world import World as World
+    from mirotwin import recording as recording
+    from mirotwin import replay as replay
+    from mirotwin import testing as testing
+    from mirotwin.recording.reader import read as read_recording
+
+_PLACES = {
+    "Decoder": "miro_protocol.decoder:Decoder",
+    "Event": "miro_sim.world.events:Event",
+    "Image": "miro_robot.image:Image",
+    "Scenario": "miro_sim.scenario.keys:Scenario",
+    "TelemetryDecoder": "miro_protocol.decoder:TelemetryDecoder",
+    "WaitExpired": "miro_sim.world.waits:WaitExpired",
+    "World": "miro_sim.world.world:World",
+    "conditions": "miro_sim.world.conditions",
+    "frames": "miro_protocol.frames",
+    "image_path": "miro_robot.firmware:image_path",
+    "load_hex": "miro_robot.image:load_hex",
+    "load_scenario": "miro_sim.scenario.file:load",
+    "parse_scenario": "miro_sim.scenario.file:parse",
+    "read_recording": "mirotwin.recording.reader:read",
+    "recording": "mirotwin.recording",
+    "replay": "mirotwin.replay",
+    "seconds": "miro_exact.clock:seconds",
+    "testing": "mirotwin.testing",
+    "ticks": "miro_exact.clock:ticks",
+}
+"""Public name -> the module that it is, or the module and the name in it."""
+
+__all__ = [
+    "Decoder",
+    "Event",
+    "Image",
+    "Scenario",
+    "TelemetryDecoder",
+    "WaitExpired",
+    "World",
+    "conditions",
+    "frames",
+    "image_path",
+    "load_hex",
+    "load_scenario",
+    "parse_scenario",
+    "read_recording",
+    "recording",
+    "replay",
+    "seconds",
+    "testing",
+    "ticks",
+]
+
+
+def __getattr__(name: str) -> Any:
+    place = _PLACES.get(name)
+    if place is None:
+        raise AttributeError(f"module 'mirotwin' has no attribute {name!r}; it has {', '.join(_PLACES)}")
+    module, _, inner = place.partition(":")
+    found = import_module(module)
+    value = getattr(found, inner) if inner else found
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

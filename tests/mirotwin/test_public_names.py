@@ -1,0 +1,37 @@
+"""`import mirotwin`: the public names, loaded when they are asked for."""
+
+import sys
+
+import pytest
+from tests import children
+
+import mirotwin
+
+
+@pytest.mark.parametrize("name", mirotwin.__all__)
+def test_every_public_name_is_there(name):
+    assert getattr(mirotwin, name) is not None
+
+
+def test_the_list_of_names_is_the_one_that_is_looked_up():
+    assert sorted(mirotwin.__all__) == sorted(mirotwin._PLACES)
+
+
+def test_a_name_that_is_not_public_is_refused_with_those_that_are():
+    with pytest.raises(AttributeError, match="'mirotwin' has no attribute 'Wrold'; it has Decoder, Event"):
+        _ = mirotwin.Wrold
+
+
+def test_importing_the_package_imports_nothing_else_of_ours():
+    script = (
+        "import sys, mirotwin; print(sorted(n for n in sys.modules if n.split('.')[0].startswith('miro')))"
+    )
+    done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "['mirotwin']\n"
+
+
+def test_the_example_in_its_documentation_runs():
+    lines = [line.strip() for line in mirotwin.__doc__.splitlines() if line.startswith("    ")]
+    names = {}
+    exec("\n".join(lines), names)
+    assert names["answer"].what == "answer"
