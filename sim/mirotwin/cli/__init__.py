@@ -1,32 +1,39 @@
 """The `mirotwin` command.
 
 What belongs here: the entry point and the list of commands. What does not: what a command does (one file
-each), and anything that could be done without a command line (`miro_sim`). Simulation code is imported
-inside the commands, because the engine has to be chosen first.
+each), and anything that could be done without a command line (`miro_sim`). A command's module is loaded when the
+command is used; simulation code is imported inside the commands, because the engine has to be chosen first.
 """
 
 import click
 
-from mirotwin.cli.decode import decode
-from mirotwin.cli.export import export
-from mirotwin.cli.fw import fw
-from mirotwin.cli.info import info, version_of
-from mirotwin.cli.program import Program
-from mirotwin.cli.replay import replay
-from mirotwin.cli.run import run
-from mirotwin.cli.scenarios import scenarios
-from mirotwin.cli.vectors import vectors
+from mirotwin.cli.program import Program, print_version
+
+COMMANDS = {
+    "run": "Runs a scenario and writes its files.",
+    "replay": "Sends recorded bytes again and compares.",
+    "decode": "Decodes captured bytes to frames and damage.",
+    "export": "Writes a run's bytes for Wireshark, or as a stream file.",
+    "scenarios": "Lists the built-in scenarios, or shows one.",
+    "info": "Shows versions, engine and firmware.",
+    "fw": "Firmware: run it on the bare processor, or look into it at work.",
+    "vectors": "Writes single-step test vectors of the processor.",
+}
+"""Name, which is the module's and the function's too, and what `--help` says of it."""
 
 
-@click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(version_of("mirotwin"), prog_name="mirotwin")
+@click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]}, commands_about=COMMANDS)
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=print_version,
+    help="Show the version.",
+)
 def main() -> None:
     """A bit-exact twin of a vision-guided soccer robot.
 
     Exit codes: 0 done, 1 expectation failed, 2 bad input, 3 firmware fault, 4 divergence,
     42 cycle limit reached; 70 internal error, 130 and 143 ended by Ctrl-C and SIGTERM.
     """
-
-
-for command in (run, replay, decode, export, scenarios, info, fw, vectors):
-    main.add_command(command)

@@ -28,7 +28,7 @@ from mirotwin.cli.terminal import check_terminal, run_terminal
 from mirotwin.files.outputs import check_file, check_not_input, whole_file
 
 
-@click.group()
+@click.group(short_help="Firmware: run it on the bare processor, or look into it at work.")
 def fw() -> None:
     """Firmware: run it on the bare processor, or look into it at work.
 

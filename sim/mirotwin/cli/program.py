@@ -10,8 +10,9 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from io import TextIOWrapper
 from types import FrameType
 from typing import Any, NoReturn
@@ -49,6 +50,15 @@ SIGNALLED = 128
 PIPE_COLUMNS = 200
 
 MAX_SEED = (1 << 63) - 1
+
+
+def print_version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+    """`--version`."""
+    if wanted:
+        from importlib.metadata import version
+
+        click.echo(f"mirotwin, version {version('mirotwin')}")
+        context.exit()
 
 
 class UserError(Exception):
@@ -163,7 +173,32 @@ def _give_up_stdout() -> None:
 
 
 class Program(click.Group):
-    """The group behind `mirotwin`: runs a command and turns what went wrong into a line and an exit code."""
+    """The group behind `mirotwin`: runs a command and turns what went wrong into a line and an exit code.
+
+    `commands_about`: name of a command -> what `--help` says of it. The command is the function of that name in the
+    module of that name in this package, which is loaded when the command is used.
+    """
+
+    def __init__(self, *args: Any, commands_about: Mapping[str, str] | None = None, **named: Any) -> None:
+        super().__init__(*args, **named)
+        self.commands_about = dict(commands_about or {})
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return [*self.commands_about, *super().list_commands(ctx)]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.commands_about:
+            return super().get_command(ctx, cmd_name)
+        command = getattr(import_module(f"mirotwin.cli.{cmd_name}"), cmd_name)
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        if not self.commands_about:
+            super().format_commands(ctx, formatter)
+            return
+        with formatter.section("Commands"):
+            formatter.write_dl(list(self.commands_about.items()))
 
     def main(  # type: ignore[override]
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any

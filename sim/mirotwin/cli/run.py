@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     help="full: also every LM629 sample. Default: every control period and all bytes on the wire.",
 )
 @click.option("--force", is_flag=True, help="Replace the files of an earlier run in the folder.")
+@click.option("--no-figure", is_flag=True, help="Draw no figure.png, which takes most of a short run's time.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no table.")
 def run(
     scenario: str,
@@ -50,6 +51,7 @@ def run(
     engine: str | None,
     record: str,
     force: bool,
+    no_figure: bool,
     quiet: bool,
 ) -> int:
     """Runs SCENARIO (a built-in name, or a .toml file) and writes run.mcap, figure.png and summary.json.
@@ -70,7 +72,7 @@ def run(
     with plain_parameters(text.origin), held_signals() as hold, folder:
         run_files = RunFiles(folder, source, world, active, hold)
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
-        summary = run_files.fill(bar, text.scenario.title)
+        summary = run_files.fill(bar, None if no_figure else text.scenario.title)
     if not quiet:
         _print(summary, run_files.periods, folder.path)
     return report_faults(world)

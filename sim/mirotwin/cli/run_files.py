@@ -20,7 +20,6 @@ from mirotwin.cli.program import complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.recording.recorder import Recorder, Source
-from mirotwin.report.figure import draw
 from mirotwin.report.summary import Summary, summarise, to_json
 
 if TYPE_CHECKING:
@@ -45,13 +44,18 @@ class RunFiles:
         self._wall_s = 0.0
         self._flushed_s = -FLUSH_S
 
-    def fill(self, bar: ProgressBar, title: str) -> Summary:
-        """The whole run; returns its summary. Whatever it raises, parts of the recording and the summary are left."""
+    def fill(self, bar: ProgressBar, title: str | None) -> Summary:
+        """The whole run; returns its summary. Whatever it raises, parts of the recording and the summary are left.
+
+        `title` None: no figure.
+        """
         try:
             self._record(bar)
             summary = self._summary(complete=True)
             self.folder.part(SUMMARY).write_bytes(to_json(summary))
-            if self.periods:
+            if self.periods and title is not None:
+                from mirotwin.report.figure import draw  # takes half a second to load
+
                 scenario, seed = self.source.scenario_name, self.source.seed
                 draw(self.periods, self.folder.part(FIGURE), scenario=scenario, seed=seed, title=title)
         except BaseException:

@@ -11,7 +11,7 @@ from miro_sim.scenario import profiles as radio_profiles
 from mirotwin.cli.program import show as print_result
 
 
-@click.group(invoke_without_command=True)
+@click.group(invoke_without_command=True, short_help="Lists the built-in scenarios, or shows one.")
 @click.pass_context
 def scenarios(context: click.Context) -> None:
     """Lists the built-in scenarios."""
