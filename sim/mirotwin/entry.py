@@ -52,6 +52,9 @@ def main() -> None:
             command()
         finally:
             _phase = ENDED
+            if signal.getsignal(signal.SIGINT) is _on_interrupt:
+                # In its last moments the interpreter takes handlers away, and would end by the signal.
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
     except KeyboardInterrupt:  # outside of what the command guards: nothing is open
         _leave()
     sys.exit(0)

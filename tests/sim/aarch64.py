@@ -19,12 +19,12 @@ import argparse
 import json
 import os
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
+from tests import children
 from tests.sim.digest_of import parse
 
 from miro_exact import engine
@@ -131,7 +131,7 @@ def digests(folder: Path, lib: Path, names: Sequence[str], which: str) -> list[s
 
 def run(command: Sequence[str], cwd: Path = ROOT, env: dict[str, str] | None = None) -> str:
     """What it prints. Raises Missing with the end of its complaint if it fails."""
-    done = subprocess.run(command, cwd=cwd, env={**os.environ, **(env or {})}, capture_output=True, text=True)
+    done = children.run(command, cwd=cwd, env={**os.environ, **(env or {})}, capture_output=True, text=True)
     if done.returncode:
         end = "\n".join((done.stderr or done.stdout).splitlines()[-20:])
         raise Missing(f"{' '.join(command[:3])} .. failed with {done.returncode}:\n{end}")

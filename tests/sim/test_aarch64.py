@@ -2,12 +2,12 @@
 
 import json
 import os
-import subprocess
 import sys
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests import children
 from tests.sim import digest_of
 from tests.sim.aarch64 import GOLDEN, ROOT
 
@@ -16,7 +16,7 @@ from tests.sim.aarch64 import GOLDEN, ROOT
     not os.environ.get("CI"), reason="a minute and packages from the net: python -m tests.sim.aarch64 --quick"
 )
 def test_an_aarch64_processor_gives_the_golden_digest():
-    done = subprocess.run(
+    done = children.run(
         [sys.executable, "-m", "tests.sim.aarch64", "--quick"], cwd=ROOT, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr

@@ -28,8 +28,8 @@ cdef class MotorAxis:
     cdef readonly Pid pid
     cdef readonly Signals signals
     cdef readonly object trajectory_buffer, filter_buffer
-    cdef EventLog log
-    cdef int side
+    cdef readonly EventLog log
+    cdef readonly int side
     cdef public list commands, encoder_edges
     cdef public long long writes_while_busy
     cdef public long long next_tick, sample_tick, period_tick, reset_tick

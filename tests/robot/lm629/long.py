@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from hypothesis import HealthCheck, is_hypothesis_test, settings
-from tests.examples import NORM
+from tests.example_count import NORM
 
 ROUND = 10
 """Times the examples of the test suite."""

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from hypothesis import example, given
 from hypothesis import strategies as st
-from tests.examples import examples
+from tests.example_count import examples
 from tests.robot.lm629.bench import Bench
 from tests.robot.lm629.pair import Pair
 

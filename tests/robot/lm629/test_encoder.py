@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.examples import examples
+from tests.example_count import examples
 from tests.naive.lm629_encoder import FORWARD, NaiveEncoder
 from tests.robot.lm629.bench import Bench
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.examples import examples
+from tests.example_count import examples
 from tests.naive.lm629 import NaivePid
 from tests.robot.lm629.bench import Bench
 

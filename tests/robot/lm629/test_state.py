@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests import children
-from tests.examples import examples
+from tests.example_count import examples
 from tests.robot.lm629.bench import Bench
 from tests.robot.lm629.session import play, steps
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.examples import examples
+from tests.example_count import examples
 from tests.naive.lm629 import NaiveLm629
 
 from miro_robot.lm629.options import DEFAULT_OPTIONS
