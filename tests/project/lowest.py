@@ -25,6 +25,7 @@ from tests import children
 
 ROOT = Path(__file__).parents[2]
 PLACE = ROOT / "build" / "lowest"
+PACKAGE_FOLDERS = ("exact", "protocol", "robot_fw", "host", "sim")
 ENGINES = ("*.so", "*.pyd")
 REQUIREMENT = re.compile(r"(?P<name>[\w.-]+)>=(?P<bound>[\w.]+)(,<[\w.]+)?")
 SMOKE = (
@@ -72,7 +73,7 @@ def copy_tree(target: Path, patterns: Iterable[str]) -> None:
     """Copies what git tracks, and files of this tree's packages that fit `patterns`."""
     tracked = children.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
     names = [Path(name) for name in tracked.stdout.split("\0") if name and (ROOT / name).exists()]
-    for package in ("protocol", "robot_fw", "host", "sim"):
+    for package in PACKAGE_FOLDERS:
         names += [path.relative_to(ROOT) for pattern in patterns for path in (ROOT / package).rglob(pattern)]
     for name in names:
         (target / name).parent.mkdir(parents=True, exist_ok=True)
@@ -103,7 +104,7 @@ def install(tree: Path, python: Path, smoke: bool) -> None:
         ).stdout.strip()
     )
     children.run([str(python), "setup.py", "-q", "dist_info", "-o", str(site)], cwd=tree, check=True)
-    roots = (str(tree / package) for package in ("protocol", "robot_fw", "host", "sim"))
+    roots = (str(tree / package) for package in PACKAGE_FOLDERS)
     (site / "mirotwin.pth").write_text("\n".join(roots) + "\n", encoding="utf-8")
 
 
