@@ -151,23 +151,16 @@ def test_a_predicate_is_asked_at_the_samples_of_the_robot():
 
 
 def test_a_predicate_is_asked_after_each_instruction_on_request():
-    stack = []
-    world = fig6()
-    deep = wait.When(predicate=lambda robot: robot.board.cpu.sfr(0x81) > 0x60, at="instruction")
-    try:
-        event = world.run_until(deep, within=30_000)
-    except WaitExpired:
-        event = None
-    cpu = fig6().robot().board.cpu
-    del cpu
+    def deep(robot):
+        return robot.board.cpu.sfr(0x81) > 0xA9  # SP, two bytes above where the stack of main begins
+
+    event = fig6().run_until(wait.When(predicate=deep, at="instruction"), within=PERIOD)
     other = fig6()
     board = other.robot().board
-    while 12 * board.cpu.cycles < 30_000 and board.cpu.sfr(0x81) <= 0x60:
+    while not deep(other.robot()):
         other.run_to(12 * board.cpu.cycles + 1)
-        stack.append(board.cpu.sfr(0x81))
-    assert (event is None) == (board.cpu.sfr(0x81) <= 0x60)
-    if event is not None:
-        assert event.tick == 12 * board.cpu.cycles
+    assert event.tick == 12 * board.cpu.cycles
+    assert 0 < event.tick < PERIOD
 
 
 def test_a_wait_in_vain_ends_on_the_tick_and_says_what_was_seen():
