@@ -91,7 +91,7 @@ def install(tree: Path, python: Path, smoke: bool) -> None:
     if not smoke:
         children.run([*pip, "-e", ".[test]"], cwd=tree, env=environment, check=True)
         return
-    # What an editable install consists of, without its build: the metadata and the way to the packages.
+    # What an editable install consists of, without its build: metadata, the way to the packages, the program.
     children.run(
         [*pip, *(f"{name}=={version}" for name, version in lowest.items())], env=environment, check=True
     )
@@ -106,6 +106,9 @@ def install(tree: Path, python: Path, smoke: bool) -> None:
     children.run([str(python), "setup.py", "-q", "dist_info", "-o", str(site)], cwd=tree, check=True)
     roots = (str(tree / package) for package in PACKAGE_FOLDERS)
     (site / "mirotwin.pth").write_text("\n".join(roots) + "\n", encoding="utf-8")
+    program = python.with_name("mirotwin")
+    program.write_text(f"#!{python}\nfrom mirotwin.entry import main\n\nmain()\n", encoding="utf-8")
+    program.chmod(0o755)
 
 
 def main(arguments: list[str]) -> int:
