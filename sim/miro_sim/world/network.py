@@ -239,7 +239,7 @@ class Network:
             "downlink": self.downlink.snapshot(),
             "uplink": self.uplink.snapshot(),
             "telemetry": self.ear.decoder.snapshot(),
-            "script_next": 0,
+            "script_next": 0,  # no state any more; stays until the digest is defined anew
             "frames_sent": self.frames_sent,
         }
 
