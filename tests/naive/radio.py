@@ -16,7 +16,8 @@ from tests.naive import rng
 
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 
-Sent = list[tuple[int, bytes]]  # (tick of the first start bit at the transmitter, bytes)
+Sent = list[tuple[int, bytes] | tuple[int, bytes, tuple[int, ...]]]
+"""(tick of the first start bit at the transmitter, bytes, indices of those with a bad stop bit, if any)."""
 Edges = list[tuple[int, int]]  # (tick, level)
 Symbol = tuple[int, bool, int]
 NOBODY: list[tuple[RadioParams, str, Sent]] = []
@@ -43,12 +44,16 @@ def chain_bad(params: ChainParams | None, seed: int, name: str, slot: int) -> bo
 
 
 class OnAir(NamedTuple):
-    """What a sender has on the air: `bit` is the number of a data bit, or None for the idle carrier."""
+    """What a sender has on the air: `bit` is the number of a data bit, or None for the idle carrier.
+
+    `back`: a bad stop bit has gone back to mark.
+    """
 
     level: int
     begin: int
     bit: int | None = None
     arrival: int = 0
+    back: bool = False
 
 
 class Sender:
@@ -60,28 +65,36 @@ class Sender:
         self.bit_ticks = Fraction(
             2500 * (10**6 + listener.crystal_offset_ppm), 10**6 + params.baud_offset_ppm
         )
-        self.arrivals: list[tuple[int, list[int], list[int]]] = []  # arrival, bits, ticks at which they begin
+        # arrival, bits, ticks at which they begin, and for bad stop bits the tick at which they go back to mark
+        self.arrivals: list[tuple[int, list[int], list[int], dict[int, int]]] = []
         over = 0
-        for start, data in sent:
+        for start, data, *bad_stop in sent:
             late = rng.u32(seed, f"{name}/jitter", start // 2500) * (params.jitter_ticks + 1) // 2**32
             arrival = max(start + params.latency_ticks + late, over)
             bits = wire_bits(data)
             begins = [arrival + int(number * self.bit_ticks) for number in range(len(bits) + 1)]
-            self.arrivals.append((arrival, bits, begins))
+            backs = {}
+            for place in bad_stop[0] if bad_stop else ():
+                number = 10 * place + 9
+                bits[number] = 0
+                backs[number] = arrival + int((number + Fraction(3, 4)) * self.bit_ticks)
+            self.arrivals.append((arrival, bits, begins, backs))
             over = arrival + max(25_000 * len(data), int(10 * len(data) * own))
 
     def on_air(self, tick: int) -> OnAir | None:
-        for arrival, bits, begins in self.arrivals:
+        for arrival, bits, begins, backs in self.arrivals:
             if begins[0] <= tick < begins[-1]:
                 number = bisect_right(begins, tick) - 1
+                if tick >= backs.get(number, tick + 1):
+                    return OnAir(1, begins[number], number, arrival, True)
                 return OnAir(bits[number], begins[number], number, arrival)
-        keyed = any(0 < arrival - tick <= self.params.keyup_ticks for arrival, _, _ in self.arrivals)
+        keyed = any(0 < arrival - tick <= self.params.keyup_ticks for arrival, *_ in self.arrivals)
         return OnAir(1, tick - tick % 2500) if keyed or self.params.carrier == "on" else None
 
     def event_ticks(self) -> set[int]:
         ticks = set()
-        for arrival, _, begins in self.arrivals:
-            ticks |= {arrival - self.params.keyup_ticks, *begins}
+        for arrival, _, begins, backs in self.arrivals:
+            ticks |= {arrival - self.params.keyup_ticks, *begins, *backs.values()}
         return ticks
 
 
@@ -129,12 +142,12 @@ def downlink_edges(
         )
         key = (
             rank,
-            None if on_air is None else on_air._replace(level=0),
+            None if on_air is None else on_air._replace(level=0, back=False),
             tick // 2500 if on_air is None else 0,
         )
         if key not in decided:
             decided[key] = decide(tick, rank, on_air, senders, params, slicer, seed, robot)
-        levels[tick] = decided[key]
+        levels[tick] = 1 if on_air is not None and on_air.back else decided[key]
     return changes(levels.__getitem__, levels)
 
 

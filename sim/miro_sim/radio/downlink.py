@@ -16,6 +16,7 @@ from msgspec import convert
 from miro_exact.clock import HOST_BIT_TICKS, HOST_CHARACTER_TICKS
 from miro_exact.rng import Stream
 from miro_exact.saved import tick
+from miro_protocol.transmission import check_bad_stop
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.listener import Listener
 from miro_sim.radio.params import RadioParams
@@ -55,7 +56,7 @@ class Downlink:
         self.busy_tick = 0
 
     def __repr__(self) -> str:
-        waiting = [(start, data.hex(" ")) for start, data in self.sender.transmissions]
+        waiting = [(start, data.hex(" ")) for start, data, _ in self.sender.transmissions]
         robots = [*self.listeners]
         return f"Downlink({self.name!r}, robots {robots}, settled_tick={self.settled_tick}, {waiting})"
 
@@ -79,10 +80,11 @@ class Downlink:
         self.overheard.append(heard)
         other.audience.append((self, heard))
 
-    def send(self, start_tick: int, data: bytes) -> int:
+    def send(self, start_tick: int, data: bytes, bad_stop: tuple[int, ...] = ()) -> int:
         """Transmits `data` without a gap, the first start bit at `start_tick`; returns `free_tick`.
 
-        Raises TransmissionError when nothing is to be sent, when the previous transmission is not over by then,
+        `bad_stop`: indices of the characters whose stop bit is bad (`sender`). Raises ValueError for indices of no
+        characters, and TransmissionError when nothing is to be sent, when the previous transmission is not over by then,
         and when a robot that hears it is settled past the tick at which the carrier comes up.
         """
         if not data:
@@ -99,10 +101,14 @@ class Downlink:
                     f"{self.name}: the carrier for tick {start_tick} reaches the robots at tick {key_tick},"
                     f" but they are settled up to {link.settled_tick}"
                 )
+        check_bad_stop(bad_stop, len(data))
+        stops = bytearray(len(data) if bad_stop else 0)
+        for place in bad_stop:
+            stops[place] = 1
         late = self.jitter.u32(start_tick // HOST_BIT_TICKS) * (self.params.jitter_ticks + 1) >> 32
         arrival = max(start_tick + self.sender.latency + late, self.busy_tick)
         for sender in (self.sender, *(sender for _, sender in self.audience)):
-            sender.transmissions.append((arrival, bytes(data)))
+            sender.transmissions.append((arrival, bytes(data), bytes(stops)))
         air_ticks = len(data) * HOST_CHARACTER_TICKS
         self.free_tick = start_tick + air_ticks
         self.busy_tick = max(arrival + air_ticks, self.sender.end(len(self.sender.transmissions) - 1))
@@ -139,10 +145,10 @@ class Downlink:
         self.settled_tick = tick(state, "settled_tick")
         self.free_tick = tick(state, "free_tick")
         self.busy_tick = tick({"busy_tick": self.free_tick + self.sender.latency, **state}, "busy_tick")
-        self.sender.restore(convert(state["transmissions"], list[tuple[int, bytes]]))
+        self.sender.restore(convert(state["transmissions"], list[list[object]]))
         heard = convert(state["listeners"], list[dict[str, object]])
         for listener, its_state in zip(self.listeners.values(), heard, strict=True):
             listener.restore(its_state)
-        others = convert(state.get("overheard", []), list[list[tuple[int, bytes]]])
+        others = convert(state.get("overheard", []), list[list[list[object]]])
         for sender, its_transmissions in zip(self.overheard, others, strict=True):
             sender.restore(its_transmissions)

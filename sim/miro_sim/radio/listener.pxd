@@ -19,7 +19,7 @@ cdef class Listener:
     cdef unsigned long long threshold, burst_threshold, false_start, lost_threshold
     cdef bint squelch, perfect_idle
 
-    @cython.locals(sender=Sender, index=Py_ssize_t, start='long long', data=bytes, stop='long long')
+    @cython.locals(sender=Sender, index=Py_ssize_t, start='long long', data=bytes, stops=bytes, stop='long long')
     cpdef fill(self, long long tick, long long until, list senders, Py_ssize_t rank)
     @cython.locals(sender=Sender)
     cdef long long pause(self, long long tick, long long until, list senders, Py_ssize_t rank) except? -1
@@ -30,10 +30,18 @@ cdef class Listener:
     cdef void hear_idle(self, long long tick, long long until, list senders, Py_ssize_t rank) except *
     @cython.locals(level=int, chance='unsigned long long')
     cdef int idle_level(self, long long tick, long long slot, list senders, Py_ssize_t rank) except -1
-    @cython.locals(sender=Sender, first='long long', number='long long', begin='long long', level=int)
+    @cython.locals(sender=Sender, first='long long', number='long long', begin='long long', sent=int, level=int)
     cdef void hear_data(
-        self, long long tick, long long until, long long start, bytes data, list senders, Py_ssize_t rank
+        self,
+        long long tick,
+        long long until,
+        long long start,
+        bytes data,
+        bytes stops,
+        list senders,
+        Py_ssize_t rank,
     ) except *
+    cdef void hear_bad_stop(self, long long tick, long long until, long long begin, long long back) except *
     @cython.locals(level=int, chance='unsigned long long')
     cdef int bit(
         self, long long begin, int sent, long long draw, bint fresh, list senders, Py_ssize_t rank

@@ -91,7 +91,7 @@ class Listener:
             return
         sender = senders[rank]
         for index in range(len(sender.transmissions)):
-            start, data = sender.transmissions[index]
+            start, data, stops = sender.transmissions[index]
             tick = self.pause(tick, min(until, start - sender.keyup), senders, rank)
             stop = min(until, start)
             if tick < stop:
@@ -99,7 +99,7 @@ class Listener:
                 tick = stop
             stop = min(until, sender.end(index))
             if tick < stop:
-                self.hear_data(tick, stop, start, data, senders, rank)
+                self.hear_data(tick, stop, start, data, stops, senders, rank)
                 tick = stop
         self.pause(tick, until, senders, rank)
 
@@ -162,7 +162,14 @@ class Listener:
         return level
 
     def hear_data(
-        self, tick: int, until: int, start: int, data: bytes, senders: list[Sender], rank: int
+        self,
+        tick: int,
+        until: int,
+        start: int,
+        data: bytes,
+        stops: bytes,
+        senders: list[Sender],
+        rank: int,
     ) -> None:
         """Part of a transmission whose first start bit arrives at `start`."""
         sender = senders[rank]
@@ -170,13 +177,24 @@ class Listener:
         number = sender.number(tick - start)
         begin = sender.begin(start, number)
         while begin < until:
-            level = self.bit(begin, sender.bit(data, number), first + number, begin >= tick, senders, rank)
+            sent = sender.bit(data, stops, number)
+            level = self.bit(begin, sent, first + number, begin >= tick, senders, rank)
             if self.lost_threshold:
                 if self.lost.below(first + number - number % _CHARACTER, self.lost_threshold):
                     level = 1
-            self.line.append(max(begin, tick), level)
+            if level == 0 and sender.bad_stop(stops, number):
+                self.hear_bad_stop(tick, until, begin, sender.back(start, number))
+            else:
+                self.line.append(max(begin, tick), level)
             number += 1
             begin = sender.begin(start, number)
+
+    def hear_bad_stop(self, tick: int, until: int, begin: int, back: int) -> None:
+        """Space from `begin` to `back`, then mark, as far as that lies in `tick` to `until`."""
+        if tick < back:
+            self.line.append(max(begin, tick), 0)
+        if back < until:
+            self.line.append(max(back, tick), 1)
 
     def bit(self, begin: int, sent: int, draw: int, fresh: bool, senders: list[Sender], rank: int) -> int:
         """The level in a bit that begins at `begin`; not `fresh`: it was asked for before, or is cut."""

@@ -9,11 +9,13 @@ cdef class Sender:
     cdef readonly bint always_on
 
     cdef long long begin(self, long long start, long long number) except? -1
+    cdef long long back(self, long long start, long long number) except? -1
     cdef long long number(self, long long since) except? -1
-    @cython.locals(start='long long', data=bytes)
+    @cython.locals(start='long long')
     cpdef long long end(self, Py_ssize_t index) except? -1
     @cython.locals(place='long long')
-    cdef int bit(self, bytes data, long long number) except -1
-    @cython.locals(index=Py_ssize_t, start='long long', data=bytes)
+    cdef int bit(self, bytes data, bytes stops, long long number) except -1
+    cdef bint bad_stop(self, bytes stops, long long number) except -1
+    @cython.locals(index=Py_ssize_t, start='long long', data=bytes, stops=bytes, number='long long')
     cdef int level(self, long long tick) except? -2
     cpdef forget(self, long long until)

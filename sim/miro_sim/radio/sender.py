@@ -3,9 +3,15 @@
 What belongs here: transmissions under way and their bit times on the robots' clock. A robot's clock is the
 tick, so the PC's baud rate and the robot's crystal show as one ratio; a bit begins at a whole tick, rounded
 down from the exact fraction, so that nothing adds up. What does not: what receivers make of it (`listener`).
+
+A character with a bad stop bit has space in place of it for three quarters of a bit, and mark for the last one. An 8051
+samples the stop bit at 7, 8 and 9 sixteenths and looks for the next start bit from 10 sixteenths on, a UART that
+samples once does both in the middle: all of them take the stop bit for bad and see the fall of the next start bit.
 """
 
 from __future__ import annotations
+
+from msgspec import convert
 
 from miro_exact.clock import CHARACTER_BITS
 from miro_exact.saved import LAST_TICK
@@ -18,7 +24,8 @@ assert CHARACTER_BITS == _CHARACTER
 class Sender:
     """One transmitter, on the clock of robots whose crystals are off by `crystal_offset_ppm`.
 
-    `transmissions`: (tick at which the first start bit arrives, bytes), in order.
+    `transmissions`: (tick at which the first start bit arrives, bytes, stops), in order. `stops`: empty, or a byte
+    for each character, which is 1 where the stop bit is bad.
     """
 
     NOT_STATE = ("always_on", "denominator", "keyup", "latency", "numerator")
@@ -30,15 +37,19 @@ class Sender:
         self.latency = params.latency_ticks
         self.keyup = params.keyup_ticks
         self.always_on = params.carrier == "on"
-        self.transmissions: list[tuple[int, bytes]] = []
+        self.transmissions: list[tuple[int, bytes, bytes]] = []
 
     def __repr__(self) -> str:
-        waiting = [(start, data.hex(" ")) for start, data in self.transmissions]
+        waiting = [(start, data.hex(" ")) for start, data, _ in self.transmissions]
         return f"Sender({self.numerator}/{self.denominator} ticks a bit, {waiting})"
 
     def begin(self, start: int, number: int) -> int:
         """Tick at which bit `number` of a transmission begins."""
         return start + number * self.numerator // self.denominator
+
+    def back(self, start: int, number: int) -> int:
+        """Tick at which bit `number`, a bad stop bit, goes back to mark."""
+        return start + (4 * number + 3) * self.numerator // (4 * self.denominator)
 
     def number(self, since: int) -> int:
         """Number of the bit that is on the air `since` ticks after the start."""
@@ -46,24 +57,33 @@ class Sender:
 
     def end(self, index: int) -> int:
         """Tick at which the last stop bit of a waiting transmission is over."""
-        start, data = self.transmissions[index]
+        start, data, _ = self.transmissions[index]
         return self.begin(start, _CHARACTER * len(data))
 
-    def bit(self, data: bytes, number: int) -> int:
-        """The level of bit `number` of these characters."""
+    def bit(self, data: bytes, stops: bytes, number: int) -> int:
+        """The level at the beginning of bit `number` of these characters."""
         place = number % _CHARACTER
         if place == 0:
             return 0
         if place == _CHARACTER - 1:
-            return 1
+            return 0 if self.bad_stop(stops, number) else 1
         return (data[number // _CHARACTER] >> (place - 1)) & 1
+
+    def bad_stop(self, stops: bytes, number: int) -> bool:
+        """Whether bit `number` is a bad stop bit."""
+        if len(stops) == 0 or number % _CHARACTER != _CHARACTER - 1:
+            return False
+        return stops[number // _CHARACTER] != 0
 
     def level(self, tick: int) -> int:
         """What is on the air at `tick`: 0 space, 1 mark, -1 no carrier."""
         for index in range(len(self.transmissions)):
-            start, data = self.transmissions[index]
+            start, data, stops = self.transmissions[index]
             if start <= tick < self.end(index):
-                return self.bit(data, self.number(tick - start))
+                number = self.number(tick - start)
+                if self.bad_stop(stops, number) and tick >= self.back(start, number):
+                    return 1
+                return self.bit(data, stops, number)
             if start - self.keyup <= tick < start:
                 return 1
         return 1 if self.always_on else -1
@@ -74,13 +94,17 @@ class Sender:
             del self.transmissions[0]
 
     def snapshot(self) -> list[list[object]]:
-        return [[start, data] for start, data in self.transmissions]
+        """Stops only where a stop bit is bad: a run without any has the bits that it had before there were stops."""
+        return [[start, data, stops] if stops else [start, data] for start, data, stops in self.transmissions]
 
-    def restore(self, state: list[tuple[int, bytes]]) -> None:
+    def restore(self, state: list[list[object]]) -> None:
         """Raises ValueError unless they are in order, from tick 0 on, and hold at least a byte each."""
+        rows = [convert(row if len(row) == 3 else [*row, b""], tuple[int, bytes, bytes]) for row in state]
         before = 0
-        for start, data in state:
+        for start, data, stops in rows:
             if not before <= start <= LAST_TICK // 2 or not data:
                 raise ValueError(f"a transmission of {len(data)} bytes at tick {start}, after tick {before}")
+            if len(stops) not in (0, len(data)):
+                raise ValueError(f"{len(stops)} stop bits of {len(data)} characters")
             before = start + len(data)
-        self.transmissions = state
+        self.transmissions = rows

@@ -6,6 +6,7 @@ What belongs here: putting a downlink on RXD and running the chip. What does not
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 from tests.robot.firmware.rig import BOOTED, MS, Rig
 from tests.robot.mcs51.rig import cpu_with
@@ -40,12 +41,12 @@ def slow_receiver(tens: int) -> Cpu:
     return cpu_with("MOV R0,#30h\n" + TIMER2_9600 + "MOV SCON,#50h\n" + SLOW.format(tens=tens))
 
 
-def hears(cpu: Cpu, radio: RadioParams, seed: int, sent: Iterable[tuple[int, bytes]], until: int) -> Cpu:
+def hears(cpu: Cpu, radio: RadioParams, seed: int, sent: Iterable[tuple[Any, ...]], until: int) -> Cpu:
     """The CPU after listening to these transmissions up to a tick; stream names begin with net/robot0."""
     downlink = Downlink(radio, seed, "net")
     downlink.listen(0, cpu.rxd)
-    for start, data in sent:
-        downlink.send(start, data)
+    for one in sent:
+        downlink.send(*one)
     downlink.settle(until + MS)
     cpu.run(until // 12)
     return cpu

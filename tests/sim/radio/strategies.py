@@ -56,7 +56,17 @@ def transmissions(draw, most=4):
     return sent
 
 
-neighbours = st.lists(st.tuples(params, transmissions(most=3)), max_size=2)
+@st.composite
+def flawed(draw, most=4):
+    """The same with indices of characters whose stop bit is bad."""
+    sent = draw(transmissions(most))
+    places = [
+        st.sets(st.integers(0, len(data) - 1)).map(lambda some: tuple(sorted(some))) for _, data in sent
+    ]
+    return [(start, data, draw(bad_stop)) for (start, data), bad_stop in zip(sent, places, strict=True)]
+
+
+neighbours = st.lists(st.tuples(params, flawed(most=3)), max_size=2)
 
 
 def cuts(until):

@@ -4,8 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.naive import radio as naive
-from tests.sim.radio.strategies import cuts, neighbours, params, seeds, transmissions
+from tests.sim.radio.strategies import cuts, flawed, neighbours, params, seeds
 
+from miro_protocol.line import LineReceiver
+from miro_protocol.transmission import Transmission
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import Downlink, RadioParams
 
@@ -31,20 +33,20 @@ def shared(radio, seed, others, robots=(0,)):
 
 
 def announcements(radio, sent, others):
-    """(tick at which the carrier comes up here, link number, start, bytes) of all networks, in order."""
+    """(tick at which the carrier comes up here, link number, start, bytes, bad stops) of all networks, in order."""
     waiting = []
     for number, (its, its_sent) in enumerate([(radio, sent), *others]):
         lead = 0 if its.carrier == "on" else its.keyup_ticks
-        waiting += [(start - lead + its.latency_ticks, number, start, data) for start, data in its_sent]
+        waiting += [(one[0] - lead + its.latency_ticks, number, *one) for one in its_sent]
     return sorted(waiting)
 
 
 @settings(deadline=None, max_examples=60)
-@given(params, seeds, transmissions(), neighbours)
+@given(params, seeds, flawed(), neighbours)
 def test_every_robot_hears_what_the_naive_twin_evaluates_from_the_definitions(radio, seed, sent, others):
     links, lines = shared(radio, seed, others, (0, 2))
-    for _, link, start, data in announcements(radio, sent, others):
-        links[link].send(start, data)
+    for _, link, *one in announcements(radio, sent, others):
+        links[link].send(*one)
     links[0].settle(UNTIL)
     heard = [(its, f"other{number}", its_sent) for number, (its, its_sent) in enumerate(others)]
     for robot, line in lines.items():
@@ -55,33 +57,33 @@ def test_every_robot_hears_what_the_naive_twin_evaluates_from_the_definitions(ra
 
 
 @settings(deadline=None, max_examples=200)
-@given(params, seeds, transmissions(), neighbours, cuts(UNTIL), st.data())
+@given(params, seeds, flawed(), neighbours, cuts(UNTIL), st.data())
 def test_edges_errors_and_snapshots_do_not_depend_on_how_settling_is_cut(
     radio, seed, sent, others, ticks, data
 ):
     (whole, *whole_others), whole_lines = shared(radio, seed, others)
     (cut, *cut_others), cut_lines = shared(radio, seed, others)
-    for _, link, start, text in announcements(radio, sent, others):
-        [whole, *whole_others][link].send(start, text)
+    for _, link, *one in announcements(radio, sent, others):
+        [whole, *whole_others][link].send(*one)
     whole.settle(UNTIL)
     waiting = announcements(radio, sent, others)
     for tick in ticks:
         while waiting and (waiting[0][0] < tick or data.draw(st.booleans())):
-            _, link, start, text = waiting.pop(0)
-            [cut, *cut_others][link].send(start, text)
+            _, link, *one = waiting.pop(0)
+            [cut, *cut_others][link].send(*one)
         cut.settle(tick)
-    for _, link, start, text in waiting:
-        [cut, *cut_others][link].send(start, text)
+    for _, link, *one in waiting:
+        [cut, *cut_others][link].send(*one)
     assert cut_lines[0].edges() == whole_lines[0].edges()
     assert cut.snapshot() == whole.snapshot()
 
 
 @settings(deadline=None)
-@given(params, seeds, transmissions(), neighbours, st.integers(1, UNTIL))
+@given(params, seeds, flawed(), neighbours, st.integers(1, UNTIL))
 def test_a_snapshot_at_any_tick_carries_the_bytes_in_the_air(radio, seed, sent, others, tick):
     links, first_lines = shared(radio, seed, others)
-    for _, link, start, data in announcements(radio, sent, others):
-        links[link].send(start, data)
+    for _, link, *one in announcements(radio, sent, others):
+        links[link].send(*one)
     first = links[0]
     first.settle(tick)
     (second, *_), second_lines = shared(radio, seed, others)
@@ -194,3 +196,48 @@ def test_a_downlink_shows_what_it_is_about_to_send():
     downlink, _ = band(RadioParams())
     downlink.send(100_000, b"\x55\xff")
     assert repr(downlink) == "Downlink('net', robots [0], settled_tick=0, [(100000, '55 ff')])"
+
+
+def test_a_snapshot_without_a_bad_stop_bit_is_as_it_was_before_there_were_any():
+    downlink, _ = band(RadioParams())
+    downlink.send(100_000, b"\x55")
+    assert downlink.snapshot()["transmissions"] == [[100_000, b"\x55"]]
+    downlink.send(200_000, b"ab", (1,))
+    assert downlink.snapshot()["transmissions"][1] == [200_000, b"ab", b"\0\1"]
+
+
+def test_a_bad_stop_bit_is_space_for_three_quarters_of_a_bit():
+    downlink, lines = band(RadioParams(carrier="on"))
+    downlink.send(100_000, b"\xff\xff", (0,))
+    downlink.settle(200_000)
+    bad = 100_000 + 9 * 2500
+    assert lines[0].edges() == [
+        *((100_000, 0), (102_500, 1), (bad, 0), (bad + 1875, 1)),
+        *((125_000, 0), (127_500, 1)),
+    ]
+
+
+@settings(deadline=None)
+@given(flawed())
+def test_a_plain_uart_hears_the_characters_and_which_stop_bits_were_bad(sent):
+    downlink, lines = band(RadioParams(carrier="on"))
+    for one in sent:
+        downlink.send(*one)
+    downlink.settle(UNTIL)
+    symbols = [symbol for one in sent for symbol in Transmission(one[0], ">", one[1], 0, one[2]).symbols()]
+    assert LineReceiver().feed(lines[0].edges(), UNTIL) == symbols
+
+
+@pytest.mark.parametrize("bad_stop", [(2,), (-1,), (1, 1), (1, 0)])
+def test_a_bad_stop_bit_of_no_character_is_refused(bad_stop):
+    with pytest.raises(ValueError, match="must be ascending indices of 2 characters"):
+        band(RadioParams())[0].send(100_000, b"ab", bad_stop)
+
+
+@pytest.mark.parametrize("stops", [b"\1", b"\1\0\0"])
+def test_stops_of_another_length_are_no_snapshot(stops):
+    downlink, _ = band(RadioParams())
+    state = downlink.snapshot()
+    state["transmissions"] = [[5, b"ab", stops]]
+    with pytest.raises(ValueError, match="stop bits of 2 characters"):
+        downlink.restore(state)

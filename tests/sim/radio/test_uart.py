@@ -111,6 +111,22 @@ def test_a_frame_with_a_wrong_stop_bit_is_no_frame_and_not_a_bad_crc_either():
     assert rig.downlink.listeners[0].bit_errors == 1
 
 
+def test_characters_sent_with_a_bad_stop_bit_are_received_with_it_and_the_next_ones_too():
+    sent = [(START, b"UVWX", (1, 3))]
+    heard = pairs(hears(receiver(), QUIET, 0, sent, START + 25_000 * 7))
+    assert heard == [(0x55, 1), (0x56, 0), (0x57, 1), (0x58, 0)]
+
+
+@pytest.mark.parametrize("place", [LEAD, 12, 22])
+def test_a_frame_sent_with_a_bad_stop_bit_is_no_frame_and_the_next_one_is_taken(place):
+    rig = RadioRig(QUIET, 0, 3)
+    first, second = frames(2)
+    rig.downlink.send(200_000, first, (place,))
+    rig.downlink.send(200_000 + PERIOD, second)
+    rig.run_to(200_000 + 2 * PERIOD)
+    assert rig.counters == (1, 0, 0)
+
+
 def test_a_frame_with_a_wrong_data_bit_is_counted_as_a_bad_crc():
     rig = damaged_robot(lambda found: len(found) == 1 and found[0] > 80 and found[0] % 10 not in (0, 9))
     assert rig.counters == (0, 1, 0)

@@ -1,0 +1,102 @@
+"""Characters that follow each other without a pause: the one word for them, from the host's station to a capture file.
+
+What belongs here: the record, what makes characters one transmission, and how long a character takes. What does not:
+files of transmissions (`stream.py`, `pcapng.py`), and what the characters say (`decoder.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from miro_protocol.table import (
+    BITS_PER_CHARACTER,
+    HOST_BIT_TICKS,
+    ROBOT_BIT_TICKS,
+    SPACING_TICKS,
+    SPACING_TOLERANCE_TICKS,
+)
+
+if TYPE_CHECKING:
+    from miro_protocol.scan import Symbol
+
+DOWN = ">"
+UP = "<"
+DIRECTIONS = (DOWN, UP)
+
+
+class Transmission(msgspec.Struct, frozen=True, gc=False):
+    """`data` on the wire of `network`, the first start bit at `tick` (24 MHz), without a pause.
+
+    `direction` is `>` (host to robot) or `<` (robot to host). `bad_stop`: indices into `data`, ascending, of the
+    characters whose stop bit is space.
+    """
+
+    tick: int
+    direction: str
+    data: bytes
+    network: int = 0
+    bad_stop: tuple[int, ...] = ()
+
+    @property
+    def end_tick(self) -> int:
+        """Tick at which the last stop bit is over."""
+        return self.tick + len(self.data) * character_ticks(self.direction)
+
+    def symbols(self) -> list[Symbol]:
+        """The characters one by one, as decoders take them: byte, stop bit good, tick of the start bit."""
+        step, bad = character_ticks(self.direction), set(self.bad_stop)
+        return [(byte, place not in bad, self.tick + place * step) for place, byte in enumerate(self.data)]
+
+
+def character_ticks(direction: str) -> int:
+    """Length of a character as the sender in that direction sends it."""
+    return BITS_PER_CHARACTER * (ROBOT_BIT_TICKS if direction == UP else HOST_BIT_TICKS)
+
+
+def check_bad_stop(bad_stop: tuple[int, ...], count: int) -> None:
+    """Raises ValueError unless these are indices of `count` characters, ascending."""
+    before = -1
+    for place in bad_stop:
+        if not before < place < count:
+            what = f"bad_stop holds {place} behind {before}" if before >= 0 else f"bad_stop holds {place}"
+            raise ValueError(f"{what}: must be ascending indices of {count} characters")
+        before = place
+
+
+def follows(last_tick: int, tick: int) -> bool:
+    """Whether characters that begin at these ticks follow each other without a pause, as receivers judge it."""
+    return abs(tick - last_tick - SPACING_TICKS) <= SPACING_TOLERANCE_TICKS
+
+
+def of_symbols(symbols: Iterable[Symbol], direction: str, network: int = 0) -> list[Transmission]:
+    """Received characters as transmissions; a pause begins a new one."""
+    found: list[Transmission] = []
+    data, bad_stop = bytearray(), []
+    start_tick = last_tick = 0
+    for byte, stop_good, tick in symbols:
+        if data and not follows(last_tick, tick):
+            found.append(Transmission(start_tick, direction, bytes(data), network, tuple(bad_stop)))
+            data, bad_stop = bytearray(), []
+        if not data:
+            start_tick = tick
+        if not stop_good:
+            bad_stop.append(len(data))
+        data.append(byte)
+        last_tick = tick
+    if data:
+        found.append(Transmission(start_tick, direction, bytes(data), network, tuple(bad_stop)))
+    return found
+
+
+def joined(one: Transmission, other: Transmission) -> Transmission | None:
+    """Both as one transmission, or None unless `other` goes on where `one` ends."""
+    step = character_ticks(one.direction)
+    if (one.network, one.direction) != (other.network, other.direction):
+        return None
+    if not follows(one.end_tick - step, other.tick):
+        return None
+    shifted = tuple(len(one.data) + place for place in other.bad_stop)
+    return msgspec.structs.replace(one, data=one.data + other.data, bad_stop=one.bad_stop + shifted)
