@@ -21,7 +21,8 @@ from __future__ import annotations
 import hashlib
 from bisect import bisect_right
 
-SEEDS = 1 << 63
+from miro_exact.seed import MAX_SEED
+
 INDICES = 1 << 56
 
 _INDICES = 1 << 56  # C constants when compiled
@@ -59,8 +60,8 @@ class Stream:
     NOT_STATE = ("block", "k0", "k1", "name", "name0", "name1", "seed", "w0", "w1", "w2", "w3")
 
     def __init__(self, seed: int, name: str) -> None:
-        if not 0 <= seed < SEEDS:
-            raise ValueError(f"seed {seed} is outside 0 .. {SEEDS - 1}")
+        if not 0 <= seed <= MAX_SEED:
+            raise ValueError(f"seed {seed} is outside 0 .. {MAX_SEED}")
         tag = hashlib.sha256(name.encode()).digest()
         self.seed = seed
         self.name = name

@@ -13,7 +13,7 @@ from typing import cast
 from crcmod import mkCrcFun
 
 POLYNOMIAL = 0x5935
-POLYNOMIAL_REFLECTED = 0xAC9A
+POLYNOMIAL_REFLECTED = int(f"{POLYNOMIAL:016b}"[::-1], 2)
 INITIAL = 0xFFFF
 XOR_OUT = 0xFFFF
 CHECK_TEXT = b"123456789"

@@ -11,14 +11,16 @@ from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from operator import index
 
+from miro_exact import clock
+
 # -- Time: ticks of the robot's 24 MHz crystal ---------------------------------------------------------------
 
-TICKS_PER_US = 24
+TICKS_PER_US = clock.TICKS_PER_SECOND // 1_000_000
 TICKS_PER_MS = 1000 * TICKS_PER_US
-TICKS_PER_CYCLE = 12  # 8051 machine cycle
-BITS_PER_CHARACTER = 10  # 8N1
-HOST_BIT_TICKS = 2500  # 9600 baud
-ROBOT_BIT_TICKS = 2496  # Timer 2 reload 65536 - 78: 9615.38 baud
+TICKS_PER_CYCLE = clock.CYCLE_TICKS  # 8051 machine cycle
+BITS_PER_CHARACTER = clock.CHARACTER_BITS  # 8N1
+HOST_BIT_TICKS = clock.HOST_BIT_TICKS  # 9600 baud
+ROBOT_BIT_TICKS = clock.ROBOT_BIT_TICKS  # Timer 2 reload 65536 - 78: 9615.38 baud
 TIMER2_RELOAD = 65536 - 78
 KEYUP_TICKS = 1 * TICKS_PER_MS  # carrier on before the first start bit
 

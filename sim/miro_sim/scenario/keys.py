@@ -15,16 +15,15 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_host.estimators.registry import DEFAULT_ESTIMATOR, ESTIMATORS, AnyEstimator
 from miro_host.laws.registry import DEFAULT_LAW, LAWS, Controller
 from miro_host.reference_registry import AnyReference
+from miro_protocol.table import DOWNLINK
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from miro_sim.plant.params import DriveParams
 from miro_sim.scenario.radio_keys import ControlNoise, Radio
 
-PERIOD_TICKS = 800_800
-CHARACTER_TICKS = 25_000  # 10 bits at 9600 baud
-FRAME_CHARACTERS = {3: 23, 5: 31}
 MAX_TORQUE_CONSTANT = 10.0  # Nm/A; beyond it a motor of this size is a mistyped unit
 MAX_NETWORKS = 32  # building and simulating one takes as long as a whole run of fig6
 MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
@@ -124,15 +123,17 @@ class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     def _check_air_time(self) -> None:
         """A frame, with the transmitter's key-up, has to fit the camera period."""
-        radio, characters = self.radio, FRAME_CHARACTERS[self.robots]
-        air_ticks = characters * CHARACTER_TICKS * 1_000_000 / (1_000_000 + radio.baud_offset_ppm)
-        if air_ticks > PERIOD_TICKS:
+        radio, frame = self.radio, DOWNLINK[self.robots]
+        characters = frame.wire_size
+        air_ticks = frame.air_ticks * 1_000_000 / (1_000_000 + radio.baud_offset_ppm)
+        if air_ticks > CONTROL_PERIOD_TICKS:
             raise ValueError(
                 f"radio.baud_offset_ppm: {radio.baud_offset_ppm} makes a frame of {characters} characters longer"
                 " than the camera period; use a smaller one"
             )
-        longest_s = (PERIOD_TICKS - air_ticks) / 24e6
-        if radio.carrier == "keyed" and round(radio.keyup_s * 24e6) > PERIOD_TICKS - air_ticks:
+        longest_s = (CONTROL_PERIOD_TICKS - air_ticks) / TICKS_PER_SECOND
+        keyup_ticks = round(radio.keyup_s * TICKS_PER_SECOND)
+        if radio.carrier == "keyed" and keyup_ticks > CONTROL_PERIOD_TICKS - air_ticks:
             raise ValueError(
                 f"radio.keyup_s: {radio.keyup_s} s and a frame of {characters} characters do"
                 f" not fit the camera period; at most {longest_s:.6f} s"

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import click
 from rich.table import Table
 
+from miro_exact.seed import MAX_SEED
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText, load
 from mirotwin import runner
 from mirotwin.cli.held_signals import held_signals
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option, firmware_option, load_image
-from mirotwin.cli.program import DONE, FIRMWARE_FAULT, MAX_SEED, UserError, complain, plain_parameters, show
+from mirotwin.cli.program import DONE, FIRMWARE_FAULT, UserError, complain, plain_parameters, show
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.run_files import RunFiles
 from mirotwin.files.outputs import OutputFolder

@@ -16,6 +16,7 @@ import click
 import msgspec
 
 from miro_exact import clock
+from miro_exact.seed import MAX_SEED
 from miro_sim.scenario.file import builtin_names, load
 from mirotwin.cli.bare_options import (
     BareRequest,
@@ -29,7 +30,7 @@ from mirotwin.cli.bare_options import (
     target_of,
 )
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option, firmware_option, load_image
-from mirotwin.cli.program import MAX_SEED, UserError, plain_parameters
+from mirotwin.cli.program import UserError, plain_parameters
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import load_job
 

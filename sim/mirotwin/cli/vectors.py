@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from miro_exact.seed import MAX_SEED
 from mirotwin.cli.held_signals import held_signals
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
-from mirotwin.cli.program import MAX_SEED
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import OutputFolder
 

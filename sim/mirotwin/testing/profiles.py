@@ -8,6 +8,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from miro_exact.clock import TICKS_PER_SECOND
+from miro_exact.seed import MAX_SEED
 from miro_sim.radio import RadioParams, error_threshold
 from miro_sim.radio.params import ChainParams
 
@@ -37,4 +38,4 @@ def link_profiles() -> st.SearchStrategy[RadioParams]:
 
 def seeds() -> st.SearchStrategy[int]:
     """Of all noise on the air."""
-    return st.integers(0, (1 << 63) - 1)
+    return st.integers(0, MAX_SEED)
