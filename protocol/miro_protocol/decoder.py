@@ -15,6 +15,7 @@ from __future__ import annotations
 from miro_protocol.events import Damaged, Event, Reason, Received
 from miro_protocol.scan import RUN_LIMIT, Scanner, Symbol
 from miro_protocol.table import TELEMETRY, downlink
+from miro_protocol.transmission import Transmission
 
 __all__ = [
     "RUN_LIMIT",
@@ -31,6 +32,12 @@ __all__ = [
 
 class WindowDecoder(Scanner):
     """Decoder of one wire format; see `Scanner` for what it can be fed."""
+
+    def hear(self, sent: Transmission) -> list[Event]:
+        """The events that the characters of a transmission complete."""
+        if sent.bad_stop:
+            return self.feed_symbols(sent.symbols())
+        return self.feed(sent.data, sent.tick)
 
     def __repr__(self) -> str:
         counts = f"{self.valid} valid, {self.rejected} rejected, {self.pending} characters pending"

@@ -16,8 +16,8 @@ from collections.abc import Iterable, Iterator
 from miro_protocol import crc, table, whitening
 from miro_protocol.dissector_code import CODE
 from miro_protocol.pcapng import EVENTS
-from miro_protocol.stream import DOWN, UP
 from miro_protocol.table import DOWNLINK, TELEMETRY, Field, Format, FrameType, Opcode
+from miro_protocol.transmission import DOWN, UP
 
 _HEAD = """\
 -- Wireshark dissector of the Mirotwin radio frames. Written by `python -m miro_protocol.dissector`; do not edit.

@@ -1,14 +1,14 @@
-"""Runs of characters as a capture that Wireshark opens: pcapng, link type 250 (RTAC serial).
+"""Transmissions as a capture that Wireshark opens: pcapng, link type 250 (RTAC serial).
 
 What belongs here: packets to pcapng. What does not: reading captures (`pcapng_reader.py`), and what the
 characters say (`decoder.py`, `dissector.py`).
 
-One packet is one run of characters that follow each other; one interface is one radio network. A packet has
+One packet is one transmission; one interface is one radio network. A packet has
 the 12-byte RTAC header (tcpdump.org/linktypes/LINKTYPE_RTAC_SERIAL.html), big-endian: seconds,
 microseconds, event type, control lines, footer. Event type DATA_TX_START is host to robot, DATA_RX_START
 robot to host, as a capture on the PC's port would have it; EPB flags say the same. Times are ticks in
 nanoseconds, rounded down, from which the tick comes back exactly; tick 0 is shown as 1970-01-01. Nothing
-else goes in, so the same packets are the same bytes.
+else goes in, so the same transmissions are the same bytes. A capture does not hold stop bits: `bad_stop` is lost.
 
 Written by hand: three kinds of block (draft-ietf-opsawg-pcapng, section 4) are less than a dependency.
 """
@@ -18,11 +18,10 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 from miro_protocol import files
-from miro_protocol.stream import DIRECTIONS, DOWN, UP
 from miro_protocol.table import TICKS_PER_MS
+from miro_protocol.transmission import DIRECTIONS, DOWN, UP, Transmission
 
 LINK_TYPE = 250
 BAUD = 9600
@@ -42,27 +41,17 @@ MAX_NETWORK = 0xFFFF
 MAX_DATA = 0x40000 - RTAC.size  # Wireshark refuses packets of more than 262 144 bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Packet:
-    """Characters that follow each other: first start bit, `>` or `<`, and the network they were sent in."""
-
-    tick: int
-    direction: str
-    data: bytes
-    network: int = 0
-
-
-def render(packets: Iterable[Packet]) -> bytes:
+def render(packets: Iterable[Transmission]) -> bytes:
     """The whole file; ValueError naming field, value and limits when a packet cannot be written."""
     return b"".join(blocks(packets))
 
 
-def write(path: str | os.PathLike[str], packets: Iterable[Packet]) -> None:
+def write(path: str | os.PathLike[str], packets: Iterable[Transmission]) -> None:
     """Writes the whole file or none; OSError when it cannot be written."""
     files.replace(path, render(packets))
 
 
-def blocks(packets: Iterable[Packet]) -> Iterator[bytes]:
+def blocks(packets: Iterable[Transmission]) -> Iterator[bytes]:
     """The file block by block."""
     yield _block(SECTION, struct.pack("<IHHq", BYTE_ORDER, 1, 0, -1))
     interfaces = 0
@@ -74,7 +63,7 @@ def blocks(packets: Iterable[Packet]) -> Iterator[bytes]:
         yield _packet(packet)
 
 
-def _check(packet: Packet) -> None:
+def _check(packet: Transmission) -> None:
     if not 0 <= packet.tick <= MAX_TICK:
         raise ValueError(f"tick = {packet.tick}: must be 0..{MAX_TICK}")
     if packet.direction not in DIRECTIONS:
@@ -108,7 +97,7 @@ def _interface(number: int) -> bytes:
     return _block(INTERFACE, struct.pack("<HHI", LINK_TYPE, 0, 0) + b"".join(options))
 
 
-def _packet(packet: Packet) -> bytes:
+def _packet(packet: Transmission) -> bytes:
     time = packet.tick * 125 // 3
     seconds, rest = divmod(time, 10**9)
     data = RTAC.pack(seconds, rest // 1000, EVENTS[packet.direction], 0, 0) + packet.data

@@ -1,6 +1,7 @@
 """Reads pcapng captures of serial lines (link type 250), our own and other people's.
 
-What belongs here: pcapng to packets. What does not: writing (`pcapng.py`, which describes the format).
+What belongs here: pcapng to transmissions, one a packet. What does not: writing (`pcapng.py`, which describes the
+format).
 """
 
 from __future__ import annotations
@@ -23,9 +24,8 @@ from miro_protocol.pcapng import (
     RTAC,
     SECTION,
     TICKS_PER_SECOND,
-    Packet,
 )
-from miro_protocol.stream import DOWN, UP
+from miro_protocol.transmission import DOWN, UP, Transmission
 
 MAGIC = b"\x0a\x0d\x0d\x0a"
 MAX_BLOCK = 64 << 20  # a longer block is no packet of a serial line: its length is damaged
@@ -66,7 +66,7 @@ class CaptureError(Exception):
 
 def iterate(
     data: bytes | Readable, source: str = "<capture>", passed_over: Counter[int] | None = None
-) -> Iterator[Packet]:
+) -> Iterator[Transmission]:
     """Reads packet by packet; CaptureError at the first place that makes no sense, after all before it.
 
     From bytes, or from an open binary file or pipe, of which one block at a time is kept. Captures by others are
@@ -107,7 +107,7 @@ class _Reader:
         self.order = "<"
         self.interfaces: list[_Interface] = []
 
-    def packets(self) -> Iterator[Packet]:
+    def packets(self) -> Iterator[Transmission]:
         while (head := self.stream.read(_HEAD)) or self.place == 0:
             kind, body = self._block(head)
             if kind == SECTION:
@@ -193,7 +193,7 @@ class _Reader:
             yield code, data[place + 4 : place + 4 + size]
             place += 4 + size + -size % 4
 
-    def _enhanced(self, body: bytes) -> Packet | None:
+    def _enhanced(self, body: bytes) -> Transmission | None:
         """The packet, or None when it carries no characters."""
         if len(body) < 20:
             raise self.malformed("packet block too short")
@@ -223,7 +223,7 @@ class _Reader:
         tick += interface.offset * TICKS_PER_SECOND
         if not 0 <= tick <= MAX_TICK:
             raise self.malformed(f"tick {tick} is not in 0..{MAX_TICK}")
-        return Packet(tick, _DIRECTIONS[event], data, number)
+        return Transmission(tick, _DIRECTIONS[event], data, number)
 
 
 def _foreign(head: bytes) -> tuple[str, str]:

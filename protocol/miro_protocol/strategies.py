@@ -19,7 +19,6 @@ from hypothesis import strategies as st
 from miro_protocol.decoder import Symbol
 from miro_protocol.frames import Message, ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.line import LineReceiver, bits_of, edges_of
-from miro_protocol.stream import DOWN, Transmission
 from miro_protocol.table import (
     BITS_PER_CHARACTER,
     FLAG_MEANINGS,
@@ -37,6 +36,7 @@ from miro_protocol.table import (
     Opcode,
     downlink,
 )
+from miro_protocol.transmission import DOWN, Transmission
 
 NEAR_TICKS = 20 * TICKS_PER_US  # pauses that any receiver takes for none ...
 FAR_TICKS = 80 * TICKS_PER_US  # ... and for one: in between, two right receivers may differ

@@ -1,111 +1,136 @@
-"""Recorded command streams: text, one transmission a line, made to be compared by `diff` and kept in git.
+"""Recorded command streams: text, one transmission or event a line, made to be compared by `diff` and kept in git.
 
-    # mirotwin stream 1
+    # mirotwin stream 2
+    #: scenario = "fig6"
     792000 > 55 55 55 55 55 ff 2d d4 fc ..  # team seq=3
+    900000 *@0/1 reset 1
 
 TICK (24 MHz) of the first start bit, `>` host to robot or `<` robot to host, the characters in hexadecimal,
 which follow each other without a pause, then a comment for people. Ticks do not go backwards from line to
-line; two lines may have the same one. What belongs here: the text form. What does not: judging the bytes; any
-bytes may be recorded.
+line; two lines may have the same one. What belongs here: whole files. What does not: the grammar of a line
+(`stream_line.py`) and of the header (`stream_header.py`), and judging the bytes; any bytes may be recorded.
+
+A file is written as version 1 if that has words for everything in it: no header, no event, one network and no bad stop
+bit. What is written is read back as the same.
 """
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from reprlib import repr as brief
 
-from miro_protocol import files
+import msgspec
 
-FIRST_LINE = "# mirotwin stream 1"
-DOWN = ">"
-UP = "<"
-DIRECTIONS = (DOWN, UP)
-MAX_TICK = (1 << 61) - 1  # decoders count ticks in 64 bits
+from miro_protocol import files, stream_header
+from miro_protocol.stream_error import StreamError as StreamError
+from miro_protocol.stream_events import WHO_CAN
+from miro_protocol.stream_header import PREFIX, Header
+from miro_protocol.stream_line import (
+    FIRST_LINE,
+    MAX_TICK,
+    Entry,
+    Happening,
+    Line,
+    format_line,
+    needs_version_2,
+)
+from miro_protocol.transmission import Transmission
 
-_VERSION = re.compile(r"#\s*mirotwin stream\b\s*(.*?)\s*$")
-_TOKEN = re.compile(r"\S+")
-_HEX = re.compile(r"[0-9a-fA-F]{2}")
-_TICK = re.compile(r"[0-9]{1,19}")
+__all__ = [
+    "MAX_TICK",
+    "Entry",
+    "Header",
+    "Reader",
+    "Stream",
+    "StreamError",
+    "decode",
+    "format_line",
+    "format_stream",
+    "parse",
+    "read",
+    "write",
+]
 
 
-class StreamError(Exception):
-    """A line that cannot be read: file, line and column (from 1), the reason, and what to do about it."""
+class Stream(msgspec.Struct, frozen=True):
+    """A stream file: what it says about itself, and its lines in the order of time. `source` names it in errors."""
 
-    def __init__(self, source: str, line: int, column: int, reason: str, remedy: str) -> None:
-        super().__init__(f"{source}:{line}:{column}: {reason}; {remedy}")
+    entries: tuple[Entry, ...]
+    header: Header = Header()
+    source: str = "<stream>"
+
+    def transmissions(self) -> list[Transmission]:
+        """All transmissions. Raises StreamError for an event: for readers that cannot act on any."""
+        return [characters(entry, self.source) for entry in self.entries]
+
+
+def characters(entry: Entry, source: str) -> Transmission:
+    """The transmission in a line. Raises StreamError for an event, which says who can act on it."""
+    if isinstance(entry.what, Transmission):
+        return entry.what
+    what = "an event, which this command cannot act on"
+    raise StreamError(source, entry.line, 1, what, WHO_CAN[type(entry.what)])
+
+
+class Reader:
+    """Reads line by line: an iterator of entries. StreamError at the first line that is wrong.
+
+    `source` names the file in errors. `header` is read when the first entry, or the end, has come.
+    """
+
+    def __init__(self, lines: Iterable[str], source: str = "<stream>") -> None:
         self.source = source
-        self.line = line
-        self.column = column
-        self.reason = reason
-        self.remedy = remedy
+        self.version = 1
+        self.header = Header()
+        self._lines = lines
+        self._header_lines: list[tuple[int, str]] = []
+        self._in_header = True
+
+    def __iter__(self) -> Iterator[Entry]:
+        last = 0
+        for number, text in enumerate(self._lines, 1):
+            line = Line(self.source, number, text.rstrip("\r\n"))
+            if number == 1:
+                self.version = line.version()
+            if self.version > 1 and line.text.startswith(PREFIX):
+                self._take_header(line)
+                continue
+            entry = line.parse(self.version)
+            if entry is None:
+                continue
+            self._close_header()
+            if entry.what.tick < last:
+                remedy = f"lines are in the order of time: {last} came before it"
+                raise line.error(line.first_column(), f"tick {entry.what.tick} goes backwards", remedy)
+            last = entry.what.tick
+            yield entry
+        self._close_header()
+
+    def _take_header(self, line: Line) -> None:
+        if not self._in_header:
+            raise line.error(1, "a line of the header behind the first tick", "put it above all ticks")
+        self._header_lines.append((line.number, line.text))
+
+    def _close_header(self) -> None:
+        if self._in_header:
+            self.header = stream_header.parse(self._header_lines, self.source)
+            self._in_header = False
 
 
-@dataclass(frozen=True, slots=True)
-class Transmission:
-    """One line: `data` on the wire from `tick` on, without a pause. `direction` is `>` or `<`."""
-
-    tick: int
-    direction: str
-    data: bytes
-    comment: str = ""
+def parse(text: str, source: str = "<stream>") -> Stream:
+    """A stream file from its text."""
+    reader = Reader(text.split("\n"), source)
+    entries = tuple(reader)
+    return Stream(entries, reader.header, source)
 
 
-def format_line(sent: Transmission) -> str:
-    """The line without its newline. ValueError when it could not be read back as the same transmission."""
-    if not 0 <= sent.tick <= MAX_TICK:
-        raise ValueError(f"tick = {sent.tick}: must be 0..{MAX_TICK}")
-    if sent.direction not in DIRECTIONS:
-        raise ValueError(f"direction = {sent.direction!r}: must be {DOWN!r} or {UP!r}")
-    if not sent.data:
-        raise ValueError("data is empty: a transmission has at least one character")
-    if sent.comment != sent.comment.strip() or len(sent.comment.splitlines()) > 1:
-        raise ValueError(f"comment = {sent.comment!r}: must be one line without blanks around it")
-    line = f"{sent.tick} {sent.direction} {sent.data.hex(' ')}"
-    return f"{line}  # {sent.comment}" if sent.comment else line
-
-
-def format_stream(sent: Iterable[Transmission]) -> str:
-    """The whole file. ValueError also when ticks go backwards."""
-    lines, last = [FIRST_LINE], 0
-    for one in sent:
-        lines.append(format_line(one))
-        if one.tick < last:
-            raise ValueError(f"tick = {one.tick}: must not be before {last}, the one of the line above")
-        last = one.tick
-    return "".join(f"{line}\n" for line in lines)
-
-
-def iterate(lines: Iterable[str], source: str = "<stream>") -> Iterator[Transmission]:
-    """Reads line by line; StreamError at the first that is wrong. `source` names the file in errors."""
-    last = 0
-    for number, text in enumerate(lines, 1):
-        line = _Line(source, number, text.rstrip("\r\n"))
-        if number == 1:
-            line.check_version()
-        sent = line.parse()
-        if sent is None:
-            continue
-        if sent.tick < last:
-            remedy = f"lines are in the order of time: {last} came before it"
-            raise line.error(line.first_column(), f"tick {sent.tick} goes backwards", remedy)
-        last = sent.tick
-        yield sent
-
-
-def parse(text: str, source: str = "<stream>") -> list[Transmission]:
-    return list(iterate(text.split("\n"), source))
-
-
-def read(path: str | os.PathLike[str]) -> list[Transmission]:
+def read(path: str | os.PathLike[str]) -> Stream:
     """Reads a stream file; StreamError, or OSError when it cannot be opened."""
     return decode(Path(path).read_bytes(), os.fspath(path))
 
 
-def decode(data: bytes, source: str = "<stream>") -> list[Transmission]:
+def decode(data: bytes, source: str = "<stream>") -> Stream:
     """A stream file from its bytes; `source` names it in a StreamError."""
     try:
         text = data.decode("utf-8-sig")
@@ -117,60 +142,25 @@ def decode(data: bytes, source: str = "<stream>") -> list[Transmission]:
     return parse(text, source)
 
 
-def write(path: str | os.PathLike[str], sent: Iterable[Transmission]) -> None:
-    """Writes a stream file whole or not at all: whoever looks finds the old content or the new."""
-    files.replace(path, format_stream(sent).encode())
-
-
-@dataclass(frozen=True, slots=True)
-class _Line:
-    source: str
-    number: int
-    text: str
-
-    def error(self, column: int, reason: str, remedy: str) -> StreamError:
-        return StreamError(self.source, self.number, column, reason, remedy)
-
-    def first_column(self) -> int:
-        return len(self.text) - len(self.text.lstrip()) + 1
-
-    def check_version(self) -> None:
-        found = _VERSION.match(self.text)
-        if found and found[1] != "1":
-            reason = f"stream version {brief(found[1] or 'missing')}"
-            raise self.error(
-                found.start(1) + 1, reason, "this program reads version 1; use the one that wrote it"
+def format_stream(lines: Iterable[Entry | Happening], header: Header | None = None) -> str:
+    """The whole file. ValueError for what could not be read back, and when ticks go backwards."""
+    written, last = [], 0
+    version = 1 if header is None or not header.text else 2
+    for one in lines:
+        entry = one if isinstance(one, Entry) else Entry(one)
+        written.append(format_line(entry.what, entry.comment))
+        if entry.what.tick < last:
+            raise ValueError(
+                f"tick = {entry.what.tick}: must not be before {last}, the one of the line above"
             )
+        last = entry.what.tick
+        version = max(version, 1 + needs_version_2(entry.what))
+    head = [FIRST_LINE.format(version), *stream_header.lines(header or Header())]
+    return "".join(f"{line}\n" for line in (*head, *written))
 
-    def parse(self) -> Transmission | None:
-        """The transmission, or None for a line that holds none."""
-        body, _, comment = self.text.partition("#")
-        tokens = list(_TOKEN.finditer(body))
-        if not tokens:
-            return None
-        tick = self._tick(tokens[0])
-        direction = self._direction(tokens, len(body.rstrip()) + 1)
-        if len(tokens) == 2:
-            raise self.error(len(body.rstrip()) + 1, "no characters", "write at least one as two hex digits")
-        data = bytes(self._character(token) for token in tokens[2:])
-        return Transmission(tick, direction, data, comment.strip())
 
-    def _tick(self, token: re.Match[str]) -> int:
-        if not _TICK.fullmatch(token[0]) or int(token[0]) > MAX_TICK:
-            reason = f"{brief(token[0])} is not a tick"
-            raise self.error(token.start() + 1, reason, f"a line starts with a whole number 0..{MAX_TICK}")
-        return int(token[0])
-
-    def _direction(self, tokens: list[re.Match[str]], end: int) -> str:
-        remedy = f"write {DOWN} for host to robot or {UP} for robot to host after the tick"
-        if len(tokens) == 1:
-            raise self.error(end, "no direction", remedy)
-        if tokens[1][0] not in DIRECTIONS:
-            raise self.error(tokens[1].start() + 1, f"{brief(tokens[1][0])} is not a direction", remedy)
-        return tokens[1][0]
-
-    def _character(self, token: re.Match[str]) -> int:
-        if not _HEX.fullmatch(token[0]):
-            reason = f"{brief(token[0])} is not a character"
-            raise self.error(token.start() + 1, reason, "write two hex digits each, with blanks between")
-        return int(token[0], 16)
+def write(
+    path: str | os.PathLike[str], lines: Iterable[Entry | Happening], header: Header | None = None
+) -> None:
+    """Writes a stream file whole or not at all: whoever looks finds the old content or the new."""
+    files.replace(path, format_stream(lines, header).encode())

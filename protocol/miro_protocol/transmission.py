@@ -74,7 +74,8 @@ def follows(last_tick: int, tick: int) -> bool:
 def of_symbols(symbols: Iterable[Symbol], direction: str, network: int = 0) -> list[Transmission]:
     """Received characters as transmissions; a pause begins a new one."""
     found: list[Transmission] = []
-    data, bad_stop = bytearray(), []
+    data = bytearray()
+    bad_stop: list[int] = []
     start_tick = last_tick = 0
     for byte, stop_good, tick in symbols:
         if data and not follows(last_tick, tick):

@@ -12,6 +12,7 @@ it.
 import msgspec
 
 from miro_host.posture import Posture
+from miro_protocol.transmission import Transmission
 
 CommandRecord = tuple[int, int, str]
 """A complete LM629 command: (tick of its last byte, opcode, data bytes in hex)."""
@@ -71,25 +72,11 @@ class RobotPeriod(msgspec.Struct, frozen=True):
     right: Axis
 
 
-class WireRun(msgspec.Struct, frozen=True):
-    """Bytes that followed each other without a gap: `tick` is the start bit of the first.
-
-    `direction` is `>` (host to robot) or `<` (robot to host), as in a stream file; `slot` is -1 for host
-    frames.
-    """
-
-    tick: int
-    direction: str
-    network: int
-    slot: int
-    data: bytes
-
-
 class Period(msgspec.Struct, frozen=True):
     """Control period `index`, which begins at `tick`; `digest` (hex) chains the states up to its end."""
 
     index: int
     tick: int
     robots: tuple[RobotPeriod, ...]
-    wire: tuple[WireRun, ...]
+    wire: tuple[Transmission, ...]
     digest: str

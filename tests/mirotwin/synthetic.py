@@ -10,7 +10,8 @@ from collections.abc import Iterator, Sequence
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.posture import Posture
-from miro_sim.periods import Axis, Control, Period, RobotPeriod, WireRun
+from miro_protocol.transmission import Transmission
+from miro_sim.periods import Axis, Control, Period, RobotPeriod
 
 
 def axis(index: int, side: int) -> Axis:
@@ -56,7 +57,7 @@ def periods(count: int, robots: Sequence[tuple[int, int]] = ((0, 0),)) -> Iterat
     for index in range(count):
         tick = index * CONTROL_PERIOD_TICKS
         chain = hashlib.sha256(chain + index.to_bytes(8, "little")).digest()
-        down = WireRun(tick + 96_000, ">", 0, -1, bytes(range(23)))
-        up = WireRun(tick + 300_000, "<", 0, 0, bytes(range(19)))
+        down = Transmission(tick + 96_000, ">", bytes(range(23)))
+        up = Transmission(tick + 300_000, "<", bytes(range(19)), 0, (3, 18))
         seen = tuple(robot(index, slot, network) for network, slot in robots)
         yield Period(index, tick, seen, (down, up), chain.hex())

@@ -18,7 +18,7 @@ from mcap.writer import CompressionType, Writer
 from tests.mirotwin.synthetic import periods
 
 from miro_sim.periods import Control
-from mirotwin.recording import channels
+from mirotwin.recording import channels, topics
 from mirotwin.recording import recorder as recorder_module
 from mirotwin.recording.container import RecordingError, records
 from mirotwin.recording.reader import parse, read
@@ -107,18 +107,48 @@ def test_inner_values_of_different_laws_have_schemas_that_name_them() -> None:
     assert parse(stream.getvalue(), "run.mcap").periods[1].robots[1].control == other
 
 
+def message_type_of(topic: str) -> type[msgspec.Struct] | None:
+    place = topics.place_of(topic)
+    return None if place is None else channels.message_type(place)
+
+
+@pytest.mark.parametrize(
+    ("topic", "place"),
+    [
+        ("/period", topics.Place("/period")),
+        ("/net0/wire", topics.Place("wire", 0)),
+        ("/net12/robot3/lm629", topics.Place("lm629", 12, 3)),
+        ("/net0/robot/lm629", None),
+        ("/net\u0663/wire", None),
+        ("/period/", None),
+    ],
+)
+def test_a_topic_says_what_it_names(topic: str, place: topics.Place | None) -> None:
+    assert topics.place_of(topic) == place
+
+
+@pytest.mark.parametrize("change", [b'"bad_stop":[3,19]', b'"bad_stop":[18,3]', b'"bad_stop":[3,-1]'])
+def test_bad_stop_bits_of_no_characters_are_refused(change: bytes) -> None:
+    data = recorded().replace(b'"bad_stop":[3,18]', change)
+    assert data != recorded()
+    with pytest.raises(RecordingError, match="damaged record"):
+        parse(data, "run.mcap")
+
+
 def test_a_recording_of_the_format_before_is_refused_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recorder_module, "FORMAT", "1")
-    with pytest.raises(RecordingError, match="recording format '1'; this program reads format 2"):
+    monkeypatch.setattr(recorder_module, "FORMAT", "2")
+    with pytest.raises(
+        RecordingError, match="recording format '2'; this program reads format 3; use the version"
+    ):
         parse(recorded(), "run.mcap")
 
 
 def test_every_channel_has_a_message_type_and_foreign_topics_have_none() -> None:
     for name, kind in channels.ROBOT_CHANNELS.items():
-        assert channels.message_type(channels.robot_topic(1, 2, name)) is kind
-    assert channels.message_type(channels.wire_topic(7)) is channels.WireMessage
-    assert channels.message_type("/camera") is None
-    assert channels.message_type("/net0/robot0/unknown") is None
+        assert message_type_of(topics.robot_topic(1, 2, name)) is kind
+    assert message_type_of(topics.wire_topic(7)) is channels.WireMessage
+    assert message_type_of("/camera") is None
+    assert message_type_of("/net0/robot0/unknown") is None
 
 
 def test_samples_and_faults_are_for_people_and_do_not_disturb_the_periods() -> None:

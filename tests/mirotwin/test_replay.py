@@ -11,10 +11,9 @@ from tests.mirotwin.synthetic import periods
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_host.posture import Posture
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
-from miro_protocol.stream import Transmission
+from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis, Period
 from miro_sim.scenario.places import check_places
-from mirotwin.capture import Run
 from mirotwin.capture.frame_list import frame_lines
 from mirotwin.replay.compare import compare
 from mirotwin.replay.script import (
@@ -45,8 +44,8 @@ def team(robots: int, seq: int = 3) -> bytes:
 
 def test_a_script_is_what_the_hosts_sent_and_nothing_else() -> None:
     script = script_of(periods(3))
-    assert [tick for tick, _, _ in script] == [96_000 + index * CONTROL_PERIOD_TICKS for index in range(3)]
-    assert {data for _, _, data in script} == {bytes(range(23))}
+    assert [sent.tick for sent in script] == [96_000 + index * CONTROL_PERIOD_TICKS for index in range(3)]
+    assert {sent.data for sent in script} == {bytes(range(23))}
 
 
 def test_a_period_equals_itself() -> None:
@@ -124,7 +123,7 @@ def test_the_layout_of_a_stream_is_the_one_in_which_it_can_be_read(robots: int) 
 
 def test_answers_in_a_stream_are_not_sent() -> None:
     sent = [Transmission(0, ">", b"\x01"), Transmission(5, "<", b"\x02"), Transmission(50_000, ">", b"\x03")]
-    assert script_of_stream(sent) == [(0, 0, b"\x01"), (50_000, 0, b"\x03")]
+    assert script_of_stream(sent) == [sent[0], sent[2]]
 
 
 @pytest.mark.parametrize(
@@ -146,8 +145,12 @@ def test_a_stream_that_cannot_have_been_sent_is_refused(sent: list[Transmission]
 
 def test_frames_are_listed_as_people_read_them_and_no_byte_is_dropped() -> None:
     answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
-    runs = [Run(1000, team(3)), Run(900_000, answer, "<"), Run(2_000_000, b"\x00\x01\x02")]
-    lines = list(frame_lines(runs, {0: 3}))
+    sent = [
+        Transmission(1000, ">", team(3)),
+        Transmission(900_000, "<", answer),
+        Transmission(2_000_000, ">", b"\x00\x01\x02"),
+    ]
+    lines = list(frame_lines(sent, {0: 3}))
     texts = [line.text for line in lines]
     assert texts[0] == "team seq=3  +0/+0 +10/-1 +20/-2"
     assert texts[1].startswith("telemetry seq=4 slot=1")
@@ -156,8 +159,9 @@ def test_frames_are_listed_as_people_read_them_and_no_byte_is_dropped() -> None:
     assert [line.slot for line in lines] == [-1, 1, -1]
 
 
-def test_an_answer_whose_run_ends_in_a_bad_stop_bit_is_not_listed_as_valid() -> None:
+@pytest.mark.parametrize("place", [5, 12, 18])
+def test_an_answer_with_a_bad_stop_bit_is_not_listed_as_valid(place: int) -> None:
     answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
-    (line,) = frame_lines([Run(0, answer, "<", bad_stop=True)], {0: 3})
+    (line,) = frame_lines([Transmission(0, "<", answer, 0, (place,))], {0: 3})
     assert (line.tick, line.slot) == (0, -1)
     assert line.text.startswith("19 bytes, bad stop bit: 55 55")

@@ -12,7 +12,8 @@ from tests import children
 from miro_protocol import dissector
 from miro_protocol.decoder import Damaged, Decoder, Received
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
-from miro_protocol.pcapng import Packet, write
+from miro_protocol.pcapng import write
+from miro_protocol.transmission import Transmission
 
 SCRIPT = Path(__file__).parents[2] / "protocol/miro.lua"
 TEAM = TeamFrame(3, 7, ((100, -100), (0, 1), (-32767, 32767)))
@@ -68,7 +69,7 @@ def dissected(capture, *options):
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    packets = [Packet(800_800 * at, way, data, at % 2) for at, (way, data) in enumerate(PACKETS)]
+    packets = [Transmission(800_800 * at, way, data, at % 2) for at, (way, data) in enumerate(PACKETS)]
     return tshark(packets, tmp_path_factory.mktemp("capture"))
 
 
@@ -171,7 +172,9 @@ def test_tshark_finds_the_frames_the_decoder_finds(tmp_path):
     draw = random.Random(4)
     pieces = [encode(TEAM, 3), with_a_wrong_bit(encode(TEAM, 3)), encode(TEAM, 3)[:-4], b"\x2d\xd4", b"noise"]
     runs = [b"".join(draw.choices(pieces, k=draw.randint(1, 5))) for _ in range(100)]
-    layers = tshark([Packet(at, ">", run) for at, run in enumerate(runs)], tmp_path, "-o", "miro.robots:3")
+    layers = tshark(
+        [Transmission(at, ">", run) for at, run in enumerate(runs)], tmp_path, "-o", "miro.robots:3"
+    )
     for (frames, damage), tree in zip(judged(runs), layers, strict=True):
         fields = values(tree)
         assert as_list(fields.get("miro.seq", [])) == frames

@@ -8,17 +8,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_protocol import pcapng
-from miro_protocol.pcapng import MAX_DATA, MAX_TICK, Packet, render
+from miro_protocol.pcapng import MAX_DATA, MAX_TICK, render
 from miro_protocol.pcapng_reader import CaptureError, events_line, iterate
+from miro_protocol.transmission import Transmission
 
 packets = st.builds(
-    Packet,
+    Transmission,
     st.integers(0, MAX_TICK),
     st.sampled_from("<>"),
     st.binary(min_size=1, max_size=40),
     st.integers(0, 3),
 )
-SOME = [Packet(0, ">", b"abc"), Packet(800_800, "<", b"\0" * 4, 1), Packet(MAX_TICK, ">", b"z")]
+SOME = [
+    Transmission(0, ">", b"abc"),
+    Transmission(800_800, "<", b"\0" * 4, 1),
+    Transmission(MAX_TICK, ">", b"z"),
+]
 
 
 def read(data):
@@ -39,7 +44,7 @@ def test_what_is_written_comes_back_to_the_tick(some):
 
 
 def test_the_bytes_are_these_whenever_and_wherever_they_are_written():
-    assert render([Packet(800_800, "<", b"hi")]).hex(" ", 4) == (
+    assert render([Transmission(800_800, "<", b"hi")]).hex(" ", 4) == (
         "0a0d0d0a 1c000000 4d3c2b1a 01000000 ffffffff ffffffff 1c000000"
         " 01000000 3c000000 fa000000 00000000 02000900 6e657477 6f726b20 30000000"
         " 08000800 80250000 00000000 09000100 09000000 00000000 3c000000"
@@ -51,12 +56,12 @@ def test_the_bytes_are_these_whenever_and_wherever_they_are_written():
 @pytest.mark.parametrize(
     ("packet", "message"),
     [
-        (Packet(-1, ">", b"a"), "tick = -1: must be 0.."),
-        (Packet(MAX_TICK + 1, ">", b"a"), "must be 0.."),
-        (Packet(0, "!", b"a"), "direction = '!'"),
-        (Packet(0, ">", b"a", -1), "network = -1"),
-        (Packet(0, ">", b""), "data of 0 characters"),
-        (Packet(0, ">", bytes(MAX_DATA + 1)), "characters: a packet has 1.."),
+        (Transmission(-1, ">", b"a"), "tick = -1: must be 0.."),
+        (Transmission(MAX_TICK + 1, ">", b"a"), "must be 0.."),
+        (Transmission(0, "!", b"a"), "direction = '!'"),
+        (Transmission(0, ">", b"a", -1), "network = -1"),
+        (Transmission(0, ">", b""), "data of 0 characters"),
+        (Transmission(0, ">", bytes(MAX_DATA + 1)), "characters: a packet has 1.."),
     ],
 )
 def test_a_packet_that_cannot_be_written_is_refused_by_name(packet, message):
@@ -85,7 +90,7 @@ def test_any_bytes_give_packets_or_one_capture_error_and_nothing_else(noise, pla
     whole = render(SOME)
     place = min(place, len(whole))
     found, _ = read(whole[:place] + noise + whole[place + len(noise) * replace :])
-    assert all(isinstance(packet, Packet) for packet in found)
+    assert all(isinstance(packet, Transmission) for packet in found)
 
 
 def big_endian(event=1, units=None, linktype=250, offset=None, captured=None):
@@ -118,7 +123,7 @@ def big_endian(event=1, units=None, linktype=250, offset=None, captured=None):
     ],
 )
 def test_captures_of_other_programs_are_read(capture, tick, direction):
-    assert read(capture) == ([Packet(tick, direction, b"data")], None)
+    assert read(capture) == ([Transmission(tick, direction, b"data")], None)
 
 
 def test_events_without_characters_are_passed_over_and_counted():

@@ -84,8 +84,8 @@ class Downlink:
         """Transmits `data` without a gap, the first start bit at `start_tick`; returns `free_tick`.
 
         `bad_stop`: indices of the characters whose stop bit is bad (`sender`). Raises ValueError for indices of no
-        characters, and TransmissionError when nothing is to be sent, when the previous transmission is not over by then,
-        and when a robot that hears it is settled past the tick at which the carrier comes up.
+        characters, and TransmissionError when nothing is to be sent, when the previous transmission is not over by
+        then, and when a robot that hears it is settled past the tick at which the carrier comes up.
         """
         if not data:
             raise TransmissionError(f"{self.name}: a transmission needs at least one byte")

@@ -6,7 +6,6 @@ functions, whatever the text.
 """
 
 import math
-import re
 import tomllib
 from difflib import get_close_matches
 from importlib import resources
@@ -14,22 +13,13 @@ from typing import Any
 
 import msgspec
 
+from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, too_long
 from miro_sim.inputs import InputError, read_input
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.parts import full_message, part_of
 from miro_sim.scenario.places import check_places
 from miro_sim.scenario.profiles import ProfileError, with_profiles
-
-TEXT_KIB = 512
-"""Most KiB of a scenario file: a built-in one has 4."""
-KEY_PARTS = 16
-"""Most parts of a dotted key: the deepest key of a scenario has 6. The time of `tomllib` grows with their square; a
-whole file of such keys takes it 2.5 s.
-"""
-
-_KEY_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
-_LONG_KEY = re.compile(rf"(?<![\w-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{KEY_PARTS}}}")
 
 
 class ScenarioText(msgspec.Struct, frozen=True):
@@ -95,32 +85,45 @@ def parse(text: str, origin: str) -> Scenario:
     """
     _check_size(text, origin)
     try:
-        return _parse(text, origin)
+        raw = _loads(text, origin)
     except RecursionError:
-        raise ScenarioError(
-            origin, "", "nested too deeply", "a scenario has tables in at most 5 levels"
-        ) from None
+        raise _too_deep(origin) from None
+    return of_table(raw, origin)
+
+
+def of_table(raw: dict[str, Any], origin: str) -> Scenario:
+    """A Scenario from the tables that TOML text gave, which may be filled in. Raises ScenarioError as `parse` does."""
+    try:
+        return _converted(raw, origin)
+    except RecursionError:
+        raise _too_deep(origin) from None
+
+
+def _too_deep(origin: str) -> ScenarioError:
+    return ScenarioError(origin, "", "nested too deeply", "a scenario has tables in at most 5 levels")
 
 
 def _check_size(text: str, origin: str) -> None:
     """Refuses what would take `tomllib` minutes."""
-    if len(text) > TEXT_KIB << 10:
+    if too_long(text):
         what = f"holds more than {TEXT_KIB} KiB"
         raise ScenarioError(origin, "", what, "name the file that was meant")
-    long_key = _LONG_KEY.search(text)
-    if long_key is not None:
-        line = text.count("\n", 0, long_key.start()) + 1
+    line = long_key_line(text)
+    if line is not None:
         what = f"a key of more than {KEY_PARTS} parts"
         raise ScenarioError(origin, f"line {line}", what, "remove it; no key of a scenario has more than 6")
 
 
-def _parse(text: str, origin: str) -> Scenario:
+def _loads(text: str, origin: str) -> dict[str, Any]:
     try:
-        raw = tomllib.loads(text)
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(origin, text, str(error)) from None
     except ValueError:  # an integer with more digits than Python converts
         raise ScenarioError(origin, "", "an integer of thousands of digits") from None
+
+
+def _converted(raw: dict[str, Any], origin: str) -> Scenario:
     _check_finite(raw, "", origin)
     _fill_in_profiles(raw, origin)
     try:

@@ -11,16 +11,17 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta, convert
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, HOST_CHARACTER_TICKS, ticks
+from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, ticks
 from miro_exact.saved import LAST_TICK, whole
 from miro_host.ear import Ear
 from miro_host.pilot import Command
 from miro_host.station import Station
 from miro_protocol.decoder import Received, Symbol
 from miro_protocol.frames import ContentError, Message, TelemetryFrame
+from miro_protocol.transmission import DOWN, UP, Transmission, check_bad_stop, of_symbols
 from miro_robot.image import Image
 from miro_robot.mcs51.execute import STOPPED
-from miro_sim.periods import RobotPeriod, WireRun
+from miro_sim.periods import RobotPeriod
 from miro_sim.radio import Downlink, Uplink
 from miro_sim.scenario import keys as sc
 from miro_sim.scenario.build import radio_for
@@ -64,7 +65,7 @@ class Network:
         index: int,
         seed: int,
         image: Image,
-        script: Sequence[tuple[int, bytes]] | None,
+        script: Sequence[Transmission] | None,
     ) -> None:
         self.spec = spec
         self.index = index
@@ -89,12 +90,13 @@ class Network:
             self.uplink.listen(robot.board.cpu.txd, robot.spec.slot)
         self.ear = Ear(spec.robots)
         self.host: Host = "script" if script is not None else spec.host
-        self.outbox = Outbox(0 if radio.carrier == "on" else radio.keyup_ticks)
-        for tick, data in script or ():
-            self.outbox.inject(tick, bytes(data), 0)
+        self.outbox = Outbox(0 if radio.carrier == "on" else radio.keyup_ticks, index)
+        for sent in script or ():
+            check_bad_stop(sent.bad_stop, len(sent.data))
+            self.outbox.inject(sent, 0)
         self.frames_sent = 0
         self.heard: list[Symbol] = []  # in this period so far
-        self.sent: list[WireRun] = []
+        self.sent: list[Transmission] = []
         self.seen: list[RobotPeriod] = []
         self.log = HostLog(index, self.uplink.known_tick)
 
@@ -120,11 +122,11 @@ class Network:
 
     def send_due(self, rendezvous_tick: int) -> None:
         """Puts on the air what may come up before the tick up to which it is settled next."""
-        for tick, data in self.outbox.due(rendezvous_tick + SETTLE_TICKS):
-            self.downlink.send(tick, data)
+        for sent in self.outbox.due(rendezvous_tick + SETTLE_TICKS):
+            self.downlink.send(sent.tick, sent.data, sent.bad_stop)
             self.frames_sent += 1
-            self.sent.append(WireRun(tick, ">", self.index, -1, data))
-            self.log.note(Event(tick=tick, what="sent", network=self.index, data=data))
+            self.sent.append(sent)
+            self.log.note(Event(tick=sent.tick, what="sent", network=self.index, data=sent.data))
 
     def settle(self, rendezvous_tick: int) -> None:
         """All networks have sent: the line is known up to where the robots stop next."""
@@ -134,7 +136,7 @@ class Network:
         """The earliest first start bit of characters that are injected at tick `now`."""
         return max(0, now + SETTLE_TICKS + self.outbox.lead_ticks - self.downlink.sender.latency)
 
-    def inject(self, data: bytes, at_tick: int | None, now: int) -> int:
+    def inject(self, data: bytes, at_tick: int | None, now: int, bad_stop: tuple[int, ...]) -> int:
         """See `World.inject`."""
         earliest = self.earliest_tick(now)
         if not 0 < len(data) <= LONGEST_BYTES:
@@ -144,7 +146,8 @@ class Network:
         free_tick = self.downlink.free_tick
         tick = max(earliest, self.outbox.end_tick(free_tick)) if at_tick is None else at_tick
         try:
-            self.outbox.inject(tick, bytes(data), free_tick)
+            check_bad_stop(bad_stop, len(data))
+            self.outbox.inject(Transmission(tick, DOWN, bytes(data), self.index, bad_stop), free_tick)
         except ValueError as error:
             raise ValueError(f"net{self.index}: {error}") from None
         return tick
@@ -154,7 +157,8 @@ class Network:
         for robot, noise, command in zip(self.robots, self.noisy_commands, commands, strict=True):
             if command is not None:
                 wheels[robot.spec.slot] = noise.wheels_of(command, robot.frame)
-        self.outbox.post(start_tick, self.station.frame(wheels), self.downlink.free_tick)
+        sent = Transmission(start_tick, DOWN, self.station.frame(wheels), self.index)
+        self.outbox.post(sent, self.downlink.free_tick)
 
     def run(self, tick: int) -> bool:
         """Runs every robot to `tick`, one after the other; true when a firmware fault stopped one.
@@ -197,9 +201,9 @@ class Network:
         )
         self.log.note(touch)
 
-    def end_period(self) -> list[WireRun]:
-        """All runs of bytes of the period that is over."""
-        found = [*self.sent, *runs(self.heard, self.index)]
+    def end_period(self) -> list[Transmission]:
+        """What the host sent and what it heard in the period that is over."""
+        found = [*self.sent, *of_symbols(self.heard, UP, self.index)]
         self.heard = []
         return found
 
@@ -287,20 +291,3 @@ class Network:
                 raise ValueError(
                     f"RXD is settled up to tick {cpu.rxd.settled_tick}, the radio up to {settled_tick}"
                 )
-
-
-def runs(symbols: Sequence[tuple[int, bool, int]], network: int) -> list[WireRun]:
-    """Received symbols as runs of bytes without a gap; a bad stop bit ends a run after its byte."""
-    found: list[WireRun] = []
-    start, data, expected = 0, bytearray(), -1
-    for byte, stop_good, tick in symbols:
-        if data and tick > expected:
-            found.append(WireRun(start, "<", network, -1, bytes(data)))
-            data = bytearray()
-        if not data:
-            start = tick
-        data.append(byte)
-        expected = tick + HOST_CHARACTER_TICKS + HOST_CHARACTER_TICKS // 20 if stop_good else -1
-    if data:
-        found.append(WireRun(start, "<", network, -1, bytes(data)))
-    return found

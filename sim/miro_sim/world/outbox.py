@@ -10,104 +10,111 @@ is saved, but no part of the digest: a run does not depend on when it was announ
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from msgspec import convert
 
-from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_exact.saved import LAST_TICK, whole
+from miro_protocol.transmission import DOWN, Transmission, check_bad_stop
 
 STATION, INJECTED = 0, 1
 LONGEST_BYTES = 1 << 20
 """Of one transmission: 18 minutes on the air."""
 
 
+class Waiting(NamedTuple):
+    """A transmission that waits; `origin` is STATION or INJECTED."""
+
+    sent: Transmission
+    origin: int
+
+
 class Outbox:
-    """Transmissions that wait, as (first start bit, data, STATION or INJECTED). `lead_ticks`: key-up of the carrier.
+    """Transmissions of the host of `network` that wait, in order. `lead_ticks`: key-up of the carrier.
 
     `dropped`: frames of the station that found the transmitter busy.
     """
 
-    NOT_STATE = ("lead_ticks",)
+    NOT_STATE = ("lead_ticks", "network")
 
-    def __init__(self, lead_ticks: int) -> None:
+    def __init__(self, lead_ticks: int, network: int = 0) -> None:
         self.lead_ticks = lead_ticks
-        self.waiting: list[tuple[int, bytes, int]] = []
+        self.network = network
+        self.waiting: list[Waiting] = []
         self.dropped = 0
 
     def __repr__(self) -> str:
-        return f"Outbox({[(tick, data.hex(' ')) for tick, data, _ in self.waiting]}, dropped={self.dropped})"
+        waiting = [(one.sent.tick, one.sent.data.hex(" ")) for one in self.waiting]
+        return f"Outbox({waiting}, dropped={self.dropped})"
 
-    def post(self, tick: int, data: bytes, free_tick: int) -> bool:
-        """A frame of the station for `tick`; False if the transmitter is busy then, which drops it.
+    def post(self, sent: Transmission, free_tick: int) -> bool:
+        """A frame of the station; False if the transmitter is busy then, which drops it.
 
         `free_tick`: when the last transmission on the air is over.
         """
-        end = tick + len(data) * HOST_CHARACTER_TICKS
-        if tick < free_tick or any(start < end and tick < _end(start, old) for start, old, _ in self.waiting):
+        if sent.tick < free_tick or any(_overlap(one.sent, sent) for one in self.waiting):
             self.dropped += 1
             return False
-        self._add(tick, data, STATION)
+        self._add(Waiting(sent, STATION))
         return True
 
-    def inject(self, tick: int, data: bytes, free_tick: int) -> None:
-        """Characters of the caller's for `tick`. Raises ValueError where the transmitter is busy then.
+    def inject(self, sent: Transmission, free_tick: int) -> None:
+        """Characters of the caller. Raises ValueError where the transmitter is busy then.
 
         A frame of the station that waits and begins later gives way.
         """
-        end = tick + len(data) * HOST_CHARACTER_TICKS
-        if tick < free_tick:
-            raise ValueError(f"tick {tick}: the transmitter is busy until tick {free_tick}")
-        for start, old, origin in self.waiting:
-            if start < end and tick < _end(start, old) and (origin == INJECTED or start < tick):
-                busy = f"is busy from tick {start} to {_end(start, old)}"
+        if sent.tick < free_tick:
+            raise ValueError(f"tick {sent.tick}: the transmitter is busy until tick {free_tick}")
+        for old, origin in self.waiting:
+            if _overlap(old, sent) and (origin == INJECTED or old.tick < sent.tick):
+                busy = f"is busy from tick {old.tick} to {old.end_tick}"
+                count = len(sent.data)
                 raise ValueError(
-                    f"tick {tick}: the transmitter {busy}; {len(data)} characters end at tick {end}"
+                    f"tick {sent.tick}: the transmitter {busy}; {count} characters end at tick {sent.end_tick}"
                 )
-        self.waiting = [
-            (start, old, origin)
-            for start, old, origin in self.waiting
-            if origin == INJECTED or start >= end or _end(start, old) <= tick or self._drop()
-        ]
-        self._add(tick, data, INJECTED)
+        kept = [one for one in self.waiting if not _overlap(one.sent, sent)]
+        self.dropped += len(self.waiting) - len(kept)
+        self.waiting = kept
+        self._add(Waiting(sent, INJECTED))
 
-    def _drop(self) -> bool:
-        self.dropped += 1
-        return False
-
-    def _add(self, tick: int, data: bytes, origin: int) -> None:
-        self.waiting.append((tick, data, origin))
-        self.waiting.sort(key=lambda one: one[0])
+    def _add(self, one: Waiting) -> None:
+        self.waiting.append(one)
+        self.waiting.sort(key=lambda one: one.sent.tick)
 
     def end_tick(self, free_tick: int) -> int:
         """When the transmitter is free behind everything that waits."""
-        return max([free_tick, *(_end(tick, data) for tick, data, _ in self.waiting)])
+        return max([free_tick, *(one.sent.end_tick for one in self.waiting)])
 
-    def due(self, until_tick: int) -> list[tuple[int, bytes]]:
+    def due(self, until_tick: int) -> list[Transmission]:
         """Takes out what may come up on the air before `until_tick`, in order."""
         count = 0
-        while count < len(self.waiting) and self.waiting[count][0] <= until_tick + self.lead_ticks:
+        while count < len(self.waiting) and self.waiting[count].sent.tick <= until_tick + self.lead_ticks:
             count += 1
-        taken = [(tick, data) for tick, data, _ in self.waiting[:count]]
+        taken = [one.sent for one in self.waiting[:count]]
         del self.waiting[:count]
         return taken
 
     def snapshot(self) -> dict[str, object]:
-        return {"waiting": [list(one) for one in self.waiting], "dropped": self.dropped}
+        waiting = [[sent.tick, sent.data, origin, list(sent.bad_stop)] for sent, origin in self.waiting]
+        return {"waiting": waiting, "dropped": self.dropped}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Raises ValueError unless the transmissions are in order and hold at least a byte each."""
-        waiting = convert(state["waiting"], list[tuple[int, bytes, int]])
+        waiting = []
         free_tick = 0
-        for tick, data, origin in waiting:
+        rows = convert(state["waiting"], list[tuple[int, bytes, int, tuple[int, ...]]])
+        for tick, data, origin, bad_stop in rows:
             if not free_tick <= tick <= LAST_TICK or not 0 < len(data) <= LONGEST_BYTES:
                 raise ValueError(f"{len(data)} characters wait for tick {tick}, behind tick {free_tick}")
             if origin not in (STATION, INJECTED):
                 raise ValueError(f"characters of an unknown origin {origin} wait")
-            free_tick = _end(tick, data)
+            check_bad_stop(bad_stop, len(data))
+            sent = Transmission(tick, DOWN, data, self.network, bad_stop)
+            waiting.append(Waiting(sent, origin))
+            free_tick = sent.end_tick
         self.waiting = waiting
         self.dropped = whole(state, "dropped", 0, LAST_TICK)
 
 
-def _end(tick: int, data: bytes) -> int:
-    return tick + len(data) * HOST_CHARACTER_TICKS
+def _overlap(one: Transmission, other: Transmission) -> bool:
+    return one.tick < other.end_tick and other.tick < one.end_tick

@@ -23,6 +23,8 @@ import msgspec
 from miro_exact.canonical import encode
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
 from miro_exact.saved import whole
+from miro_exact.seed import MAX_SEED
+from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import Period
@@ -34,11 +36,7 @@ from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.waits import Waits
 
-ScriptRun = tuple[int, int, bytes]
-"""(tick of the first start bit, network, bytes) to send in place of what the station would send."""
-
-MAX_SEED = (1 << 63) - 1
-SAVE_FORMAT = 4
+SAVE_FORMAT = 5
 """Raised whenever a saved world of before would no longer mean the same."""
 MOST_PERIODS = 1 << 34
 """Of a saved world: ticks up to then fit into 64 bits, and so do the products that are made of them."""
@@ -63,16 +61,21 @@ class Mark(NamedTuple):
 class World:
     """A deterministic machine: same scenario, same firmware, same seed, same bits.
 
-    `script` replaces the stations' frames (replay): runs in tick order, which must not overlap on one network.
+    `script` replaces the stations' frames (replay): transmissions of the hosts, which must not overlap on one network.
+    Raises ValueError for those that do, that are of no host, or of a network that the scenario does not have.
     """
 
     NOT_STATE = ("scenario", "seed", "image", "periods", "last", "bodies", "waits")
 
     def __init__(
-        self, scenario: Scenario, seed: int, image: Image, script: Sequence[ScriptRun] | None = None
+        self, scenario: Scenario, seed: int, image: Image, script: Sequence[Transmission] | None = None
     ) -> None:
         if not 0 <= seed <= MAX_SEED:
             raise ValueError(f"seed {seed} is out of range: 0 to {MAX_SEED}")
+        for sent in script or ():
+            if sent.direction != DOWN or not 0 <= sent.network < len(scenario.networks):
+                sender = f"{sent.direction!r} of network {sent.network}"
+                raise ValueError(f"tick {sent.tick}: {sender} is none of the {len(scenario.networks)} hosts")
         self.scenario = scenario
         self.seed = seed
         self.image = image
@@ -84,7 +87,7 @@ class World:
                 index,
                 seed,
                 image,
-                None if script is None else [(tick, data) for tick, net, data in script if net == index],
+                None if script is None else [sent for sent in script if sent.network == index],
             )
             for index, network in enumerate(scenario.networks)
         ]
@@ -146,15 +149,18 @@ class World:
         conditions = [condition] if isinstance(condition, Condition) else list(condition)
         return self.waits.until(conditions, within)
 
-    def inject(self, data: bytes, network: int = 0, at_tick: int | None = None) -> int:
+    def inject(
+        self, data: bytes, network: int = 0, at_tick: int | None = None, bad_stop: tuple[int, ...] = ()
+    ) -> int:
         """Puts characters on the air of `network`; returns the tick of the first start bit.
 
         Without `at_tick` they queue behind what is being sent, as in the FIFO of a serial port. Key-up and radio
         apply as for the station's own; a frame of the station that meets a busy transmitter is dropped and counted.
-        Raises ValueError for a network that is not there, a tick before `earliest_tick`, and a transmitter that is
-        busy then.
+        `bad_stop`: indices of the characters whose stop bit is to be bad: space for three quarters of a bit.
+        Raises ValueError for a network that is not there, a tick before `earliest_tick`, a transmitter that is busy
+        then, and indices of no characters.
         """
-        return self._network(network).inject(data, at_tick, self.tick)
+        return self._network(network).inject(data, at_tick, self.tick, bad_stop)
 
     def earliest_tick(self, network: int = 0) -> int:
         """The earliest tick for the first start bit of what is injected now."""

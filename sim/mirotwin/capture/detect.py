@@ -6,7 +6,7 @@ What belongs here: the rules, in the order in which they are tried. What does no
 |---|---|
 | the four bytes that a pcapng or an old pcap file begins with | pcapng |
 | at least four of the bytes that an MCAP file begins with | recording |
-| comments or none, then `TICK >` or `TICK <`; or `# mirotwin stream` | stream |
+| comments or none, then `TICK >`, `TICK <` or `TICK *`; or `# mirotwin stream` | stream |
 | nothing but pairs of hexadecimal digits, separators and comments | hex |
 | anything else, nothing included | raw |
 
@@ -37,7 +37,7 @@ NAMES = {
 
 _ENOUGH = 4
 _PACKED = {b"\x1f\x8b\x08": "gzip", b"PK\x03\x04": "zip", b"\xfd7zXZ\0": "xz", b"\x28\xb5\x2f\xfd": "zstd"}
-_STREAM = re.compile(rb"(?:\xef\xbb\xbf)?(?:#\s*mirotwin stream\b|(?:\s|#[^\n]*+\n)*+[0-9]+[ \t]+[<>])")
+_STREAM = re.compile(rb"(?:\xef\xbb\xbf)?(?:#\s*mirotwin stream\b|(?:\s|#[^\n]*+\n)*+[0-9]+[ \t]+[<>*])")
 _TEXT = bytes(string.printable, "ascii")
 
 

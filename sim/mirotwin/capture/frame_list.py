@@ -11,7 +11,7 @@ import msgspec
 
 from miro_protocol.events import Damaged
 from miro_protocol.frames import TeamFrame, TelemetryFrame, describe
-from mirotwin.capture import Run
+from miro_protocol.transmission import Transmission
 from mirotwin.capture.rows import Row, rows
 
 
@@ -28,12 +28,12 @@ class FrameLine(msgspec.Struct, frozen=True):
     text: str
 
 
-def frame_lines(runs: Iterable[Run], robots: Mapping[int, int]) -> Iterator[FrameLine]:
-    """The lines of everything in `runs`; `robots` is the layout (3 or 5) of each network.
+def frame_lines(sent: Iterable[Transmission], robots: Mapping[int, int]) -> Iterator[FrameLine]:
+    """The lines of everything in `sent`; `robots` is the layout (3 or 5) of each network.
 
-    A run of the host's bytes is as sent, before the radio.
+    What the host sent is listed as sent, before the radio.
     """
-    for row in rows(runs, robots.__getitem__):
+    for row in rows(sent, robots.__getitem__):
         slot = row.message.slot if isinstance(row.message, TelemetryFrame) else -1
         yield FrameLine(row.event.start_tick, row.direction, row.network, slot, _text(row))
 

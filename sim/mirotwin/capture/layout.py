@@ -1,6 +1,6 @@
 """How many robots a network has, where the file does not say: whatever makes more frames readable.
 
-What belongs here: looking at the first runs of a file. What does not: decoding for the user (`rows`).
+What belongs here: looking at the first transmissions of a file. What does not: decoding for the user (`rows`).
 """
 
 from __future__ import annotations
@@ -9,10 +9,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 
-from miro_protocol.stream import DOWN, UP
 from miro_protocol.table import ROBOT_COUNTS
+from miro_protocol.transmission import DOWN, UP, Transmission
 from miro_sim.inputs import InputError
-from mirotwin.capture import Run
 from mirotwin.capture.source import READ_ERRORS, Source
 
 HEAD_CHARACTERS = 1 << 16
@@ -20,52 +19,52 @@ MOST_NETWORKS = 64
 SHOWN_NETWORKS = 8
 
 
-def head_of(runs: Iterator[Run]) -> tuple[list[Run], Iterator[Run]]:
-    """The first runs (`HEAD_CHARACTERS` of them or all), and an iterator over all; an error comes in its place."""
-    head: list[Run] = []
+def head_of(sent: Iterator[Transmission]) -> tuple[list[Transmission], Iterator[Transmission]]:
+    """The first transmissions, and an iterator over all; an error comes in its place."""
+    head: list[Transmission] = []
     size = 0
     failure: Exception | None = None
     try:
-        while size < HEAD_CHARACTERS and (run := next(runs, None)) is not None:
-            head.append(run)
-            size += len(run.data)
+        while size < HEAD_CHARACTERS and (one := next(sent, None)) is not None:
+            head.append(one)
+            size += len(one.data)
     except READ_ERRORS as error:
         failure = error
 
-    def everything() -> Iterator[Run]:
+    def everything() -> Iterator[Transmission]:
         yield from head
         if failure is not None:
             raise failure
-        yield from runs
+        yield from sent
 
     return head, everything()
 
 
-def frame_counts(runs: Iterable[Run]) -> dict[int, int]:
+def frame_counts(sent: Iterable[Transmission]) -> dict[int, int]:
     """Valid frames from a host in each layout, 3 and 5."""
     from miro_protocol.decoder import Decoder  # a hot module: not before the engine was chosen
 
     decoders = {count: Decoder(count) for count in ROBOT_COUNTS}
-    for run in runs:
+    for one in sent:
         for decoder in decoders.values():
-            decoder.feed(run.data, run.tick)
+            decoder.hear(one)
     return {count: decoder.valid for count, decoder in decoders.items()}
 
 
-def telemetry_count(runs: Iterable[Run]) -> int:
-    """Valid frames from robots, whatever direction the runs are said to have."""
+def telemetry_count(sent: Iterable[Transmission]) -> int:
+    """Valid frames from robots, whatever direction they are said to have."""
     from miro_protocol.decoder import TelemetryDecoder
 
     decoder = TelemetryDecoder()
-    for run in runs:
-        decoder.feed(run.data, run.tick)
+    for one in sent:
+        decoder.hear(one)
     return decoder.valid
 
 
-def robots_in(head: Sequence[Run], network: int) -> tuple[int, str]:
-    """(3 or 5, what to tell the user or nothing) for a network whose first runs are in `head`."""
-    runs = [run for run in head if run.network == network and run.direction == DOWN]
-    return chosen(frame_counts(runs), bool(runs), network)
+def robots_in(head: Sequence[Transmission], network: int) -> tuple[int, str]:
+    """(3 or 5, what to tell the user or nothing) for a network whose first transmissions are in `head`."""
+    sent = [one for one in head if one.network == network and one.direction == DOWN]
+    return chosen(frame_counts(sent), bool(sent), network)
 
 
 def chosen(counts: Mapping[int, int], any_data: bool, network: int) -> tuple[int, str]:
@@ -81,7 +80,7 @@ def chosen(counts: Mapping[int, int], any_data: bool, network: int) -> tuple[int
     return best, f"network {network}: {what} (--robots says otherwise)"
 
 
-def is_telemetry(head: Sequence[Run]) -> bool:
+def is_telemetry(head: Sequence[Transmission]) -> bool:
     """Whether raw bytes read as robots' answers rather than as a host's frames."""
     return telemetry_count(head) > max(frame_counts(head).values())
 
@@ -93,7 +92,7 @@ class Layouts:
     """
 
     def __init__(
-        self, said: int | None, source: Source, head: Sequence[Run], tell: Callable[[str], None]
+        self, said: int | None, source: Source, head: Sequence[Transmission], tell: Callable[[str], None]
     ) -> None:
         self.said = said
         self.source = source
@@ -120,7 +119,7 @@ class Layouts:
 
     def __str__(self) -> str:
         """`, network 0 of 3 robots` of all networks in the head, if they are few."""
-        networks = sorted({run.network for run in self.head})
+        networks = sorted({one.network for one in self.head})
         if len(networks) > SHOWN_NETWORKS:
             return f", {len(networks)} networks"
         return "".join(f", network {network} of {self.of(network)} robots" for network in networks)
@@ -130,11 +129,11 @@ def look(
     source: Source, said: int | None, tell: Callable[[str], None], guess_direction: bool = False
 ) -> Layouts:
     """Looks at the beginning of `source` for what it does not say: layout, and the direction of raw bytes."""
-    head: list[Run] = []
+    head: list[Transmission] = []
     guess_direction = guess_direction and not source.timed
     if said is None or guess_direction:
-        head, source.runs = head_of(source.runs)
+        head, source.sent = head_of(source.sent)
     if guess_direction and is_telemetry(head):
-        head = [msgspec.structs.replace(run, direction=UP) for run in head]
-        source.runs = (msgspec.structs.replace(run, direction=UP) for run in source.runs)
+        head = [msgspec.structs.replace(one, direction=UP) for one in head]
+        source.sent = (msgspec.structs.replace(one, direction=UP) for one in source.sent)
     return Layouts(said, source, head, tell)

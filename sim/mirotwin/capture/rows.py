@@ -1,4 +1,4 @@
-"""Runs of characters decoded: frames with what they say and whether they are news, and damage with its reason.
+"""Transmissions decoded: frames with what they say and whether they are news, and damage with its reason.
 
 What belongs here: one decoder a network and direction, and one freshness a network. What does not: how rows look
 (`render`).
@@ -14,9 +14,8 @@ import msgspec
 from miro_protocol.events import Event, Received
 from miro_protocol.frames import ContentError, Message
 from miro_protocol.freshness import Freshness
-from miro_protocol.stream import DOWN
-from mirotwin.capture import Run
-from mirotwin.capture.source import READ_ERRORS, character_ticks
+from miro_protocol.transmission import DOWN, Transmission, character_ticks
+from mirotwin.capture.source import READ_ERRORS
 
 if TYPE_CHECKING:
     from miro_protocol.decoder import WindowDecoder
@@ -53,13 +52,9 @@ class _Ear:
         self.offset = 0
         self.end_tick = 0
 
-    def hear(self, run: Run) -> Iterator[Row]:
-        whole = len(run.data) - run.bad_stop
-        events = self.decoder.feed(run.data[:whole], run.tick)
-        if run.bad_stop:
-            events += self.decoder.feed_symbols([(run.data[-1], False, run.tick + whole * self.step)])
-        self.end_tick = run.tick + len(run.data) * self.step
-        return self.rows(events)
+    def hear(self, sent: Transmission) -> Iterator[Row]:
+        self.end_tick = sent.end_tick
+        return self.rows(self.decoder.hear(sent))
 
     def flush(self) -> Iterator[Row]:
         return self.rows(self.decoder.flush())
@@ -81,22 +76,22 @@ class _Ear:
         return Row(self.offset, self.direction, self.network, event, message, fresh, unknown)
 
 
-def rows(runs: Iterable[Run], layout: Callable[[int], int]) -> Iterator[Row]:
-    """Rows in the order in which their last characters came. An error of `runs` comes after all before it.
+def rows(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator[Row]:
+    """Rows in the order in which their last characters came. An error of `sent` comes after all before it.
 
     After a pause of two characters or more what came before it cannot become a frame any more: it is given out.
     """
     ears: dict[tuple[int, str], _Ear] = {}
     failure: Exception | None = None
     try:
-        for run in runs:
-            key = (run.network, run.direction)
+        for one in sent:
+            key = (one.network, one.direction)
             if key not in ears:
-                ears[key] = _Ear(run.direction, run.network, layout(run.network))
+                ears[key] = _Ear(one.direction, one.network, layout(one.network))
             for ear in ears.values():
-                if ear.decoder.pending and run.tick >= ear.end_tick + 2 * ear.step:
+                if ear.decoder.pending and one.tick >= ear.end_tick + 2 * ear.step:
                     yield from ear.flush()
-            yield from ears[key].hear(run)
+            yield from ears[key].hear(one)
     except READ_ERRORS as error:  # what is pending comes first
         failure = error
     for ear in ears.values():

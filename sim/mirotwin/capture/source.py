@@ -1,4 +1,4 @@
-"""Opens a file of any format as runs of characters.
+"""Opens a file of any format as transmissions.
 
 What belongs here: which reader a format has. What does not: telling formats apart (`detect`).
 """
@@ -13,27 +13,27 @@ import msgspec
 
 from miro_protocol import pcapng_reader, stream
 from miro_protocol.pcapng_reader import CaptureError
-from miro_protocol.stream import DOWN, UP, StreamError
-from miro_protocol.table import HOST_BIT_TICKS, TELEMETRY
+from miro_protocol.stream import StreamError
+from miro_protocol.transmission import DOWN, Transmission, character_ticks
 from miro_sim.inputs import InputError
-from mirotwin.capture import Run, recorded
+from mirotwin.capture import recorded
 from mirotwin.capture.detect import TIMED
 from mirotwin.capture.hextext import HexError, HexText
 from mirotwin.capture.input import Input
 from mirotwin.recording.container import RecordingError
 
 READ_ERRORS = (CaptureError, HexError, InputError, RecordingError, StreamError)
-"""What reading runs may raise: all that could be read has come before it."""
+"""What reading may raise: all that could be read has come before it."""
 LINE_BYTES = 16 << 20
 _ESCAPED = re.compile(r"[\udc80-\udcff]")
 
 
 class Source(msgspec.Struct):
-    """`runs` in the order of the file; `robots` (network -> 3 or 5) is what the file itself says about layouts."""
+    """`sent` in the order of the file; `robots` (network -> 3 or 5) is what the file itself says about layouts."""
 
     label: str
     format: str
-    runs: Iterator[Run]
+    sent: Iterator[Transmission]
     robots: dict[int, int]
 
     @property
@@ -51,16 +51,11 @@ def open_source(given: Input, format: str, tell: Callable[[str], None], directio
     if format == "pcapng":
         return Source(given.label, format, _pcapng(given, tell), robots)
     if format == "recording":
-        return Source(given.label, format, recorded.runs(given, robots, tell), robots)
+        return Source(given.label, format, recorded.transmissions(given, robots, tell), robots)
     if format == "stream":
         return Source(given.label, format, _stream(given), robots)
     pieces = _raw(given) if format == "raw" else _hex(given)
     return Source(given.label, format, _contiguous(pieces, direction), robots)
-
-
-def character_ticks(direction: str) -> int:
-    """Length of a character as whoever speaks in that direction sends it."""
-    return TELEMETRY.character_ticks if direction == UP else 10 * HOST_BIT_TICKS
 
 
 def _raw(given: Input) -> Iterator[bytes]:
@@ -75,20 +70,19 @@ def _hex(given: Input) -> Iterator[bytes]:
     text.finish()
 
 
-def _contiguous(pieces: Iterator[bytes], direction: str) -> Iterator[Run]:
+def _contiguous(pieces: Iterator[bytes], direction: str) -> Iterator[Transmission]:
     step, count = character_ticks(direction), 0
     for data in pieces:
         if data:
-            yield Run(count * step, data, direction)
+            yield Transmission(count * step, direction, data)
             count += len(data)
 
 
-def _pcapng(given: Input, tell: Callable[[str], None]) -> Iterator[Run]:
+def _pcapng(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]:
     passed_over: Counter[int] = Counter()
     failure: CaptureError | None = None
     try:
-        for packet in pcapng_reader.iterate(given, given.label, passed_over):
-            yield Run(packet.tick, packet.data, packet.direction, packet.network)
+        yield from pcapng_reader.iterate(given, given.label, passed_over)
     except CaptureError as error:
         failure = error
     if passed_over:
@@ -97,9 +91,9 @@ def _pcapng(given: Input, tell: Callable[[str], None]) -> Iterator[Run]:
         raise failure
 
 
-def _stream(given: Input) -> Iterator[Run]:
-    for sent in stream.iterate(_lines(given), given.label):
-        yield Run(sent.tick, sent.data, sent.direction)
+def _stream(given: Input) -> Iterator[Transmission]:
+    for entry in stream.Reader(_lines(given), given.label):
+        yield stream.characters(entry, given.label)
 
 
 def _lines(given: Input) -> Iterator[str]:

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator
 
 import click
 
-from miro_protocol.stream import DOWN, UP
 from miro_protocol.table import ROBOT_COUNTS
+from miro_protocol.transmission import DOWN, UP, Transmission
 from miro_sim.scenario.errors import one_line
-from mirotwin.capture import Run, render
+from mirotwin.capture import render
 from mirotwin.capture.detect import FORMATS, NAMES, detect
 from mirotwin.capture.input import Input
 from mirotwin.capture.layout import Layouts, look
@@ -66,17 +66,17 @@ def decode(
         source = open_source(given, format, complain, DIRECTIONS[direction or "down"])
         layouts = look(source, None if robots is None else int(robots), complain, direction is None)
         with ProgressBar("decoding", given.size, quiet or sys.stdout.isatty()) as bar:
-            found = rows(_counted(source.runs, given, bar), layouts.of)
+            found = rows(_counted(source.sent, given, bar), layouts.of)
             return (
                 _print_json(given, source, found) if as_json else _print_table(given, source, layouts, found)
             )
 
 
-def _counted(runs: Iterable[Run], given: Input, bar: ProgressBar) -> Iterator[Run]:
+def _counted(sent: Iterable[Transmission], given: Input, bar: ProgressBar) -> Iterator[Transmission]:
     """Moves the bar; where somebody waits for the other end of a pipe, lets them see what there is."""
     shown = 0
-    for run in runs:
-        yield run
+    for one in sent:
+        yield one
         if given.size is None:
             sys.stdout.flush()
         elif given.tell() >= shown + PROGRESS_BYTES:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from miro_protocol.stream import DOWN
-from mirotwin.capture import Run, convert
+from miro_protocol.transmission import DOWN, Transmission
+from mirotwin.capture import convert
 from mirotwin.capture.detect import NAMES, TIMED, detect
 from mirotwin.capture.input import STDIN, Input
 from mirotwin.capture.layout import look
@@ -23,26 +23,30 @@ TARGETS = ("pcapng", "stream")
 
 
 class Exported:
-    """Hands runs on and counts them. What cannot be read ends them, kept in `failure` if anything came before."""
+    """Hands transmissions on and counts them. What cannot be read ends them; `failure` if anything came before."""
 
-    def __init__(self, runs: Iterator[Run], network: int | None, given: Input, bar: ProgressBar) -> None:
-        self.runs = runs
+    def __init__(
+        self, sent: Iterator[Transmission], network: int | None, given: Input, bar: ProgressBar
+    ) -> None:
+        self.sent = sent
         self.network = network
         self.given = given
         self.bar = bar
         self.down = 0
         self.up = 0
+        self.bad_stops = 0
         self.networks: set[int] = set()
         self.failure: Exception | None = None
 
-    def __iter__(self) -> Iterator[Run]:
+    def __iter__(self) -> Iterator[Transmission]:
         try:
-            for run in self.runs:
-                self.networks.add(run.network)
-                if self.network in (None, run.network):
-                    self.down += run.direction == DOWN
-                    self.up += run.direction != DOWN
-                    yield run
+            for one in self.sent:
+                self.networks.add(one.network)
+                if self.network in (None, one.network):
+                    self.down += one.direction == DOWN
+                    self.up += one.direction != DOWN
+                    self.bad_stops += len(one.bad_stop)
+                    yield one
                 self.bar.to(self.given.tell())
         except READ_ERRORS as error:
             if not self.down + self.up:
@@ -75,17 +79,17 @@ def export(
 ) -> int:
     """Writes the characters in FILE (a recording, a stream file or a pcapng capture) as pcapng or as a stream file.
 
-    pcapng is for Wireshark and tshark: one packet a run of characters, with virtual time, direction, and the network
-    as interface; link type 250 (RTAC serial). `protocol/miro.lua` (or `python -m miro_protocol.dissector`)
-    shows the fields:
+    pcapng is for Wireshark and tshark: one packet a transmission (characters without a pause), with virtual time,
+    direction, and the network as interface; link type 250 (RTAC serial). `protocol/miro.lua` (or `python -m
+    miro_protocol.dissector`) shows the fields:
 
     \b
         mirotwin export run.mcap --out run.pcapng
         tshark -X lua_script:miro.lua -d rtacser.data,miro -r run.pcapng -V
 
-    A stream file is for `mirotwin replay`, for editors and for git. The same input gives the same bytes. Of an input
-    that is cut short, all that could be read is written, and the exit code is 2. A run that was broken off
-    (run.part.mcap) is written as far as it goes, with a note.
+    A stream file is for `mirotwin replay`, for editors and for git; a capture does not hold stop bits, a stream file
+    does. The same input gives the same bytes. Of an input that is cut short, all that could be read is written, and the
+    exit code is 2. A run that was broken off (run.part.mcap) is written as far as it goes, with a note.
     """
     if out != STDIN:
         check_new(Path(out), "--out", force)
@@ -100,14 +104,18 @@ def export(
             )
         source = open_source(given, format, complain)
         layouts = look(source, None, complain) if to == "stream" else None
-        exported = Exported(source.runs, network, given, bar)
+        exported = Exported(source.sent, network, given, bar)
         pieces = convert.to_stream(exported, layouts.of) if layouts else convert.to_pcapng(exported)
         try:
             _write(out, _some(pieces, exported, given.label))
         except convert.ConversionError as error:
             raise UserError(f"{given.label}: {error}") from None
     if not quiet and out != STDIN:
-        show(f"{out}: {exported.down} runs from the host and {exported.up} from robots")
+        show(f"{out}: {exported.down} transmissions from the host and {exported.up} from robots")
+    if exported.bad_stops and to == "pcapng":
+        complain(
+            f"{exported.bad_stops} bad stop bits are not in {out}: a capture holds none, a stream file does"
+        )
     if exported.failure is not None:
         complain(f"error: {exported.failure}; all before it was written")
         return BAD_INPUT

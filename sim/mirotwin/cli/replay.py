@@ -8,11 +8,11 @@ import click
 from rich.table import Table
 
 from miro_exact.clock import seconds
-from miro_protocol import stream
+from miro_protocol.transmission import DOWN
 from miro_sim.periods import Period
 from mirotwin import runner
 from mirotwin.capture.frame_list import FrameLine, frame_lines
-from mirotwin.capture.recorded import runs_of
+from mirotwin.capture.recorded import transmissions_of
 from mirotwin.cli.options import Place, engine_option, firmware_option
 from mirotwin.cli.program import DIVERGENCE, DONE, UserError, complain, plain_parameters, show
 from mirotwin.cli.progress import ProgressBar
@@ -37,9 +37,7 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
     A text stream runs over an ideal link in the default
     scenario, and there is nothing to compare.
 
-    The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them. No file
-    holds stop bits: an answer that was refused for its very last one is listed as valid (protocol/README.md, "Stop bits
-    in files").
+    The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
     job, image = load_job(file, firmware, engine)
     from miro_sim.radio.downlink import TransmissionError
@@ -72,7 +70,9 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
 
 def _print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> None:
     robots = {index: network.robots for index, network in enumerate(job.scenario.networks)}
-    lines = sorted(frame_lines(runs_of(job.recorded or replayed), robots), key=lambda line: line.tick)
+    lines = sorted(
+        frame_lines(transmissions_of(job.recorded or replayed), robots), key=lambda line: line.tick
+    )
     shown: Sequence[FrameLine] = lines if everything else lines[:SHOWN]
     table = Table(box=None, pad_edge=False)
     table.add_column("tick", justify="right")
@@ -81,9 +81,7 @@ def _print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> Non
     table.add_column("from")
     table.add_column("frame", overflow="fold")
     for line in shown:
-        sender = (
-            "host" if line.direction == stream.DOWN else "robot ?" if line.slot < 0 else f"robot {line.slot}"
-        )
+        sender = "host" if line.direction == DOWN else "robot ?" if line.slot < 0 else f"robot {line.slot}"
         if len(robots) > 1:
             sender = f"net{line.network} {sender}"
         table.add_row(str(line.tick), f"{seconds(line.tick):.4f}", line.direction, sender, line.text)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from miro_protocol import stream
+from miro_protocol.transmission import Transmission
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period
 from miro_sim.scenario.file import parse as parse_scenario
@@ -24,7 +25,7 @@ from mirotwin.cli.program import UserError, complain
 from mirotwin.files.outputs import RECORDING
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
-from mirotwin.replay.script import ScriptRun, scenario_of_stream, script_of, script_of_stream
+from mirotwin.replay.script import check_order, scenario_of_stream, script_of, script_of_stream
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
@@ -35,7 +36,7 @@ class Job(msgspec.Struct, frozen=True):
 
     scenario: Scenario
     seed: int
-    script: list[ScriptRun]
+    script: list[Transmission]
     recorded: Sequence[Period]
 
 
@@ -51,7 +52,11 @@ def load_job(file: str, firmware: str | None, engine: str | None) -> tuple[Job, 
         job = _job_of_recording(recording, file)
         return job, _recorded_image(recording, file) if firmware is None else load_image(firmware)
     _refuse_other_formats(data, file)
-    return _job_of_stream(data, file), load_image(firmware)
+    given = stream.decode(data, file)
+    _refuse_what_cannot_be_done(given.header, file)
+    image = load_image(firmware)
+    _check_firmware(given.header, image, file, firmware)
+    return _job_of_stream(given, file), image
 
 
 def _refuse_other_formats(data: bytes, path: str) -> None:
@@ -71,12 +76,33 @@ def _job_of_recording(recording: Recording, path: str) -> Job:
     if not recording.periods:
         raise UserError(f"{path}: the recording holds no control period; nothing can be replayed")
     scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml")
-    return Job(scenario, source.seed, script_of(recording.periods), recording.periods)
+    script = script_of(recording.periods)
+    check_order(script, path)
+    return Job(scenario, source.seed, script, recording.periods)
 
 
-def _job_of_stream(data: bytes, path: str) -> Job:
-    sent = stream.decode(data, path)
-    return Job(scenario_of_stream(sent, path), 0, script_of_stream(sent), ())
+def _job_of_stream(given: stream.Stream, path: str) -> Job:
+    sent = given.transmissions()
+    scenario = scenario_of_stream(sent, path, given.header)
+    return Job(scenario, given.header.seed or 0, script_of_stream(sent), ())
+
+
+def _refuse_what_cannot_be_done(header: stream.Header, path: str) -> None:
+    for key in ("set", "expect"):
+        if getattr(header, key) is not None:
+            what = f"header: {key} is not carried out by this version"
+            raise UserError(f"{path}: {what}; remove it, or write the whole scenario as [scenario]")
+
+
+def _check_firmware(header: stream.Header, image: Image, path: str, firmware: str | None) -> None:
+    """An image that was named may be another one: that is what a replay is for."""
+    wanted = header.firmware_sha256
+    if wanted is None or wanted == image.sha256:
+        return
+    what = f"the stream is for firmware {wanted[:12]}.., this is {image.sha256[:12]}.. ({image.path})"
+    if firmware is None:
+        raise UserError(f"{path}: header: {what}; name the image with --firmware")
+    complain(f"{path}: {what}")
 
 
 def _recorded_image(recording: Recording, path: str) -> Image:

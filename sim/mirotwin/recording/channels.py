@@ -4,8 +4,7 @@ What belongs here: one struct a channel, and the two directions of translation. 
 (`recorder`, `reader`). Every message carries its tick; a period's messages are closed by its
 `/period` message.
 
-A robot's channels stand below `/net0/robot0`, with the numbers of its network and slot; the bytes on the
-air of a network are in `/net0/wire`.
+Where a channel stands: `topics`.
 """
 
 from collections.abc import Iterator
@@ -14,7 +13,10 @@ from typing import Any
 import msgspec
 
 from miro_host.posture import Posture
-from miro_sim.periods import Axis, Control, Period, RobotPeriod, WireRun
+from miro_protocol.stream import MAX_TICK
+from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
+from miro_sim.periods import Axis, Control, Period, RobotPeriod
+from mirotwin.recording import topics
 
 
 class PostureMessage(msgspec.Struct, frozen=True):
@@ -125,12 +127,15 @@ class FaultMessage(msgspec.Struct, frozen=True):
 
 
 class WireMessage(msgspec.Struct, frozen=True):
-    """`wire`: characters without a gap; `>` host to robot (slot -1), `<` robot to host; `data` in hex."""
+    """`wire`: characters without a pause; `>` host to robot, as sent; `<` robot to host, as the PC heard them.
+
+    `data` in hex; `bad_stop`: indices of the characters whose stop bit is bad.
+    """
 
     tick: int
     direction: str
-    slot: int
     data: str
+    bad_stop: tuple[int, ...]
 
 
 class PeriodMessage(msgspec.Struct, frozen=True):
@@ -141,7 +146,6 @@ class PeriodMessage(msgspec.Struct, frozen=True):
     digest: str
 
 
-PERIOD_TOPIC = "/period"
 ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
     "reference": PostureMessage,
     "truth": TruthMessage,
@@ -155,22 +159,14 @@ ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
 }
 
 
-def robot_topic(network: int, slot: int, channel: str) -> str:
-    return f"/net{network}/robot{slot}/{channel}"
+OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {topics.PERIOD: PeriodMessage, topics.WIRE: WireMessage}
 
 
-def wire_topic(network: int) -> str:
-    return f"/net{network}/wire"
-
-
-def message_type(topic: str) -> type[msgspec.Struct] | None:
-    """The struct of a topic's messages, or None for a topic of somebody else."""
-    if topic == PERIOD_TOPIC:
-        return PeriodMessage
-    parts = topic.split("/")
-    if len(parts) == 3 and parts[2] == "wire":
-        return WireMessage
-    return ROBOT_CHANNELS.get(parts[-1]) if len(parts) == 4 else None
+def message_type(place: topics.Place) -> type[msgspec.Struct] | None:
+    """The struct of the messages there, or None if there is no such channel."""
+    if place.slot >= 0:
+        return ROBOT_CHANNELS.get(place.channel)
+    return OTHER_CHANNELS.get(place.channel)
 
 
 def schema(message: msgspec.Struct) -> dict[str, object]:
@@ -199,13 +195,12 @@ def messages(period: Period) -> Iterator[tuple[str, int, msgspec.Struct]]:
     """(topic, tick, message) of everything in a period, in the order of a recording."""
     tick = period.tick
     for robot in period.robots:
-        head = f"/net{robot.network}/robot{robot.slot}/"
         for channel, message in _robot_messages(robot, tick):
-            yield head + channel, tick, message
-    for run in period.wire:
-        message = WireMessage(run.tick, run.direction, run.slot, run.data.hex())
-        yield wire_topic(run.network), run.tick, message
-    yield PERIOD_TOPIC, tick, PeriodMessage(tick, period.index, period.digest)
+            yield topics.robot_topic(robot.network, robot.slot, channel), tick, message
+    for sent in period.wire:
+        message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
+        yield topics.wire_topic(sent.network), sent.tick, message
+    yield topics.PERIOD, tick, PeriodMessage(tick, period.index, period.digest)
 
 
 def _robot_messages(robot: RobotPeriod, tick: int) -> Iterator[tuple[str, msgspec.Struct]]:
@@ -240,9 +235,13 @@ def _registers(axis: Axis) -> RegistersMessage:
     )
 
 
-def wire_run(network: int, message: WireMessage) -> WireRun:
-    """The record of a wire message. Raises ValueError when its data is not hex."""
-    return WireRun(message.tick, message.direction, network, message.slot, bytes.fromhex(message.data))
+def transmission(network: int, message: WireMessage) -> Transmission:
+    """What a wire message says. Raises ValueError when it cannot be."""
+    data = bytes.fromhex(message.data)
+    if not 0 <= message.tick <= MAX_TICK or message.direction not in DIRECTIONS or not data:
+        raise ValueError(f"{len(data)} characters {message.direction!r} at tick {message.tick}")
+    check_bad_stop(message.bad_stop, len(data))
+    return Transmission(message.tick, message.direction, data, network, message.bad_stop)
 
 
 def robot_period(network: int, slot: int, found: dict[str, Any]) -> RobotPeriod:

@@ -16,11 +16,12 @@ import msgspec
 
 from miro_exact.clock import nanoseconds
 from miro_sim.periods import Period
-from mirotwin.recording import channels
+from mirotwin.recording import channels, topics
 from mirotwin.recording.writer import McapWriter, Writable
 
 METADATA = "mirotwin"
-FORMAT = "2"
+FORMAT = "3"
+"""Raised whenever a recording of before would be read as something else: 3 has stop bits on the wire channels."""
 SCENARIO_ATTACHMENT = "scenario.toml"
 FIRMWARE_ATTACHMENT = "firmware.ihx"
 SYMBOLS_ATTACHMENT = "symbols.json"
@@ -114,11 +115,11 @@ class Recorder:
     def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
         """Adds one LM629 sample of a robot (full recordings)."""
         with self._undisturbed:
-            self._add(channels.robot_topic(network, slot, "samples"), sample.tick, sample)
+            self._add(topics.robot_topic(network, slot, "samples"), sample.tick, sample)
 
     def write_faults(self, network: int, slot: int, faults: Sequence[Fault]) -> None:
         """Adds a robot's firmware faults."""
-        topic = channels.robot_topic(network, slot, "fault")
+        topic = topics.robot_topic(network, slot, "fault")
         with self._undisturbed:
             for fault in faults:
                 message = channels.FaultMessage(

@@ -12,12 +12,13 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import seconds
-from miro_protocol.stream import DOWN
-from miro_sim.periods import Axis, Period, RobotPeriod, WireRun
+from miro_protocol.transmission import DOWN, Transmission
+from miro_sim.periods import Axis, Period, RobotPeriod
+from mirotwin.recording.topics import WIRE, robot_topic, wire_topic
 
 
 class Difference(msgspec.Struct, frozen=True):
-    """The first value that a replay has otherwise. `slot` -1: of a whole network."""
+    """The first value that a replay has otherwise. `slot` -1: on the wire of a network."""
 
     tick: int
     network: int
@@ -27,8 +28,9 @@ class Difference(msgspec.Struct, frozen=True):
     replayed: str
 
     def __str__(self) -> str:
-        robot = f"/robot{self.slot}" if self.slot >= 0 else ""
-        place = f"tick {self.tick} ({seconds(self.tick):.6f} s), /net{self.network}{robot}/{self.channel}"
+        of_robot = self.slot >= 0
+        topic = robot_topic(self.network, self.slot, self.channel) if of_robot else wire_topic(self.network)
+        place = f"tick {self.tick} ({seconds(self.tick):.6f} s), {topic}"
         return f"{place}: recorded {self.recorded}, replayed {self.replayed}"
 
 
@@ -97,25 +99,26 @@ def _first_command(axis: Axis, twin: Axis) -> tuple[Any, Any] | None:
 def _compare_telemetry(recorded: Period, replayed: Period) -> Difference | None:
     one, other = _answers(recorded), _answers(replayed)
     for index in range(max(len(one), len(other))):
-        run = one[index] if index < len(one) else None
+        heard = one[index] if index < len(one) else None
         twin = other[index] if index < len(other) else None
-        if run != twin:
-            place = run or twin
+        if heard != twin:
+            place = heard or twin
             assert place is not None
-            return Difference(place.tick, place.network, place.slot, "wire", _shown(run), _shown(twin))
+            return Difference(place.tick, place.network, -1, WIRE, _shown(heard), _shown(twin))
     return None
 
 
-def _answers(period: Period) -> list[WireRun]:
-    return [run for run in period.wire if run.direction != DOWN]
+def _answers(period: Period) -> list[Transmission]:
+    return [heard for heard in period.wire if heard.direction != DOWN]
 
 
 def _shown(value: Any) -> str:
     """A value in the words of the recording."""
     if value is None:
         return "nothing"
-    if isinstance(value, WireRun):
-        return f"{value.data.hex(' ')} at tick {value.tick}"
+    if isinstance(value, Transmission):
+        bad = f", bad stop bits at {', '.join(map(str, value.bad_stop))}" if value.bad_stop else ""
+        return f"{value.data.hex(' ')} at tick {value.tick}{bad}"
     if isinstance(value, tuple):
         tick, opcode, data = value
         return f"{opcode:02X}h {data} at tick {tick}".replace("  ", " ")

@@ -7,87 +7,126 @@ The bytes go in before the radio: with the recorded seed it disturbs them as it 
 """
 
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND, seconds
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds, ticks
 from miro_protocol.events import Received
-from miro_protocol.stream import DOWN, Transmission
+from miro_protocol.stream_header import Header
+from miro_protocol.table import ROBOT_COUNTS
+from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.periods import Period
-from miro_sim.scenario.file import load
-from miro_sim.scenario.keys import Network, Scenario
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.file import builtin_names, load, of_table
+from miro_sim.scenario.keys import MAX_NETWORKS, Network, Scenario
 from miro_sim.scenario.radio_keys import Radio
 
-ScriptRun = tuple[int, int, bytes]
 DEFAULT_SCENARIO = "fig6"
 AFTERMATH_TICKS = TICKS_PER_SECOND
 LONGEST_TICKS = 86_400 * TICKS_PER_SECOND
 
 
 class StreamContentError(ValueError):
-    """A stream file whose lines are well formed but cannot have been sent: file, tick, what, remedy."""
+    """A stream file whose lines are well formed but cannot be sent: file, tick, what, remedy."""
 
 
-def script_of(periods: Iterable[Period]) -> list[ScriptRun]:
-    """(tick, network, bytes) of everything the hosts of a recording sent."""
-    return [
-        (run.tick, run.network, run.data)
-        for period in periods
-        for run in period.wire
-        if run.direction == DOWN
-    ]
+def script_of(periods: Iterable[Period]) -> list[Transmission]:
+    """Everything the hosts of a recording sent."""
+    return script_of_stream(sent for period in periods for sent in period.wire)
 
 
-def robots_of_stream(sent: Sequence[Transmission]) -> int:
-    """3 or 5: the layout in which more of the stream's frames can be read."""
-    counts = {robots: _frames(sent, robots) for robots in (3, 5)}
+def script_of_stream(sent: Iterable[Transmission]) -> list[Transmission]:
+    """Everything the hosts send."""
+    return [one for one in sent if one.direction == DOWN]
+
+
+def check_order(script: Sequence[Transmission], path: str) -> None:
+    """Raises StreamContentError for transmissions of one network that overlap."""
+    before: dict[int, Transmission] = {}
+    for one in script:
+        last = before.get(one.network)
+        if last is not None and one.tick < last.end_tick:
+            what = f"starts before the transmission of tick {last.tick} has ended (tick {last.end_tick})"
+            raise StreamContentError(f"{path}: tick {one.tick}: {what}; move it back")
+        before[one.network] = one
+
+
+def robots_of_stream(sent: Iterable[Transmission]) -> int:
+    """3 or 5: the layout in which more of the frames from hosts can be read."""
+    script = script_of_stream(sent)
+    counts = {robots: _frames(script, robots) for robots in ROBOT_COUNTS}
     return 5 if counts[5] > counts[3] else 3
 
 
-def _frames(sent: Sequence[Transmission], robots: int) -> int:
+def _frames(script: Iterable[Transmission], robots: int) -> int:
     from miro_protocol.decoder import Decoder  # a hot module: not before the engine was chosen
 
     decoder = Decoder(robots)
-    events = [event for one in sent if one.direction == DOWN for event in decoder.feed(one.data, one.tick)]
-    return len([event for event in events if isinstance(event, Received)])
+    return len([event for one in script for event in decoder.hear(one) if isinstance(event, Received)])
 
 
-def scenario_of_stream(sent: Sequence[Transmission], path: str) -> Scenario:
-    """The default scenario with an ideal link, and its robot in every slot of the stream's layout, all at one start.
+def scenario_of_stream(sent: Sequence[Transmission], path: str, header: Header | None = None) -> Scenario:
+    """The scenario that the header names or holds; without one the default scenario with an ideal link.
 
-    Runs for a second longer than the stream, so that the failsafe is seen. Raises StreamContentError for a
-    stream with nothing to send, for transmissions that overlap, and for one that takes more than a day.
+    Raises StreamContentError for a stream with nothing to send, for transmissions that overlap, that take more than a
+    day, or that have no place in the scenario of the header; ScenarioError for that scenario.
     """
-    down = [one for one in sent if one.direction == DOWN]
-    if not down:
+    script = script_of_stream(sent)
+    if not script:
         raise StreamContentError(f"{path}: no line from host to robot; nothing can be replayed")
-    for before, after in pairwise(down):
-        end_tick = before.tick + len(before.data) * HOST_CHARACTER_TICKS
-        if after.tick < end_tick:
-            what = f"starts before the transmission of tick {before.tick} has ended (tick {end_tick})"
-            raise StreamContentError(f"{path}: tick {after.tick}: {what}; move it back")
-    end_tick = down[-1].tick + len(down[-1].data) * HOST_CHARACTER_TICKS + AFTERMATH_TICKS
+    check_order(script, path)
+    if header is None or header.scenario is None:
+        return _default_scenario(script, path)
+    scenario = _scenario_of_header(header.scenario, f"{path}: header: scenario")
+    end_tick = ticks(scenario.duration_s)
+    for one in script:
+        if one.network >= len(scenario.networks):
+            what = f"network {one.network}, but the scenario has {len(scenario.networks)}, numbered from 0"
+            raise StreamContentError(f"{path}: tick {one.tick}: {what}")
+        if one.end_tick > end_tick:
+            what = (
+                f"ends at tick {one.end_tick}, but the scenario ends at tick {end_tick}; raise its duration_s"
+            )
+            raise StreamContentError(f"{path}: tick {one.tick}: {what}")
+    return scenario
+
+
+def _scenario_of_header(scenario: str | dict[str, object], place: str) -> Scenario:
+    if not isinstance(scenario, str):
+        return of_table(scenario, place)
+    if scenario not in builtin_names():
+        remedy = f"give one of {', '.join(builtin_names())}, or a whole scenario as a table"
+        raise ScenarioError(place, "", f"{scenario[:40]!r} is no built-in scenario", remedy)
+    return load(scenario).scenario
+
+
+def _default_scenario(script: Sequence[Transmission], path: str) -> Scenario:
+    """The default one with ideal links, and its robot in every slot of each network's layout, all at one start.
+
+    Runs for a second longer than the stream, so that the failsafe is seen.
+    """
+    end_tick = max(one.end_tick for one in script) + AFTERMATH_TICKS
     if end_tick > LONGEST_TICKS:
-        raise StreamContentError(
-            f"{path}: tick {down[-1].tick}: more than a day; let the stream start near tick 0"
-        )
+        last = max(one.tick for one in script)
+        raise StreamContentError(f"{path}: tick {last}: more than a day; let the stream start near tick 0")
+    count = 1 + max(one.network for one in script)
+    if count > MAX_NETWORKS:
+        what = f"network {count - 1}: a scenario has at most {MAX_NETWORKS} networks, numbered from 0"
+        raise StreamContentError(f"{path}: {what}")
     base = load(DEFAULT_SCENARIO).scenario
-    first = base.networks[0].robot[0]
-    assert isinstance(first.reference, msgspec.Struct)  # parameters of a line
-    standing = msgspec.structs.replace(first.reference, drive_s=0.0)  # nothing steers by it
-    model = msgspec.structs.replace(first, wheel_radius_mismatch=0.0, reference=standing)
-    robots = robots_of_stream(sent)
-    network = Network(
-        robots=5 if robots == 5 else 3,
-        radio=Radio(bit_error_rate=0.0, carrier="on", squelch=True),
-        robot=tuple(msgspec.structs.replace(model, slot=slot) for slot in range(robots)),
-    )
+    model = base.networks[0].robot[0]
+    assert isinstance(model.reference, msgspec.Struct)  # parameters of a line
+    standing = msgspec.structs.replace(model.reference, drive_s=0.0)  # nothing steers by it
+    model = msgspec.structs.replace(model, wheel_radius_mismatch=0.0, reference=standing)
+    networks = []
+    for index in range(count):
+        robots = robots_of_stream(one for one in script if one.network == index)
+        network = Network(
+            robots=5 if robots == 5 else 3,
+            radio=Radio(bit_error_rate=0.0, carrier="on", squelch=True),
+            robot=tuple(msgspec.structs.replace(model, slot=slot) for slot in range(robots)),
+        )
+        networks.append(network)
     periods = -(-end_tick // CONTROL_PERIOD_TICKS)
     duration_s = seconds(periods * CONTROL_PERIOD_TICKS)
-    return msgspec.structs.replace(base, name="stream", duration_s=duration_s, networks=(network,))
-
-
-def script_of_stream(sent: Sequence[Transmission]) -> list[ScriptRun]:
-    """(tick, network 0, bytes) of everything the stream's host sends."""
-    return [(one.tick, 0, one.data) for one in sent if one.direction == DOWN]
+    return msgspec.structs.replace(base, name="stream", duration_s=duration_s, networks=tuple(networks))

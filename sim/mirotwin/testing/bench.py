@@ -23,8 +23,9 @@ from miro_protocol.decoder import Decoder, Received, Symbol, TelemetryDecoder
 from miro_protocol.frames import Message, TelemetryFrame, describe, encode
 from miro_protocol.freshness import Freshness
 from miro_protocol.line import Edge, LineReceiver
-from miro_protocol.stream import DOWN, Transmission, format_stream
-from miro_protocol.table import FRESH_AGAIN_TICKS, SPACING_TOLERANCE_TICKS, downlink
+from miro_protocol.stream import Entry, format_stream
+from miro_protocol.table import FRESH_AGAIN_TICKS, downlink
+from miro_protocol.transmission import DOWN, Transmission, of_symbols
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
@@ -95,7 +96,7 @@ class Bench:
         self.uplink = Uplink(self.radio, seed, "up")
         self.uplink.listen(self.board.cpu.txd)
         self.now = 0
-        self.sent: list[Transmission] = []
+        self.sent: list[Entry] = []
         self.heard: list[Symbol] = []
         self.answers: list[tuple[int, TelemetryFrame]] = []
         self.receiver = LineReceiver()
@@ -119,7 +120,7 @@ class Bench:
     def begin(self, data: bytes, comment: str = "") -> int:
         """Begins to send as soon as the channel is free; returns the tick at which it will have been dealt with."""
         start = self._start_tick()
-        self.sent.append(Transmission(start, DOWN, data, comment))
+        self.sent.append(Entry(Transmission(start, DOWN, data), comment))
         self.downlink.send(start, data)
         return start + len(data) * HOST_CHARACTER_TICKS + self.radio.latency_ticks + LOOKING_TICKS
 
@@ -220,25 +221,18 @@ class Bench:
                 self.fail(f"tick {self.now}: robot {self.slot} answers {answer} and counts {self.counters}")
             self.answers.append((event.start_tick, answer))
 
-    def heard_stream(self) -> list[Transmission]:
-        """What the robot heard since power-on, as a host could have sent it over an ideal link.
+    def heard_stream(self) -> list[Entry]:
+        """What the robot heard since power-on, as a host could have sent it over an ideal link."""
+        entries: list[Entry] = []
+        free_tick = 0
+        for heard in of_symbols(self.heard, DOWN):
+            sent = msgspec.structs.replace(heard, tick=max(heard.tick, free_tick))
+            entries.append(Entry(sent, self._comment(heard)))
+            free_tick = sent.end_tick
+        return entries
 
-        Characters with a bad stop bit cannot be sent; a pause in their place does the same to a receiver.
-        """
-        runs: list[tuple[int, bytearray]] = []
-        for byte, stop_good, tick in self.heard:
-            free = runs[-1][0] + len(runs[-1][1]) * HOST_CHARACTER_TICKS if runs else 0
-            if not stop_good:
-                continue
-            if runs and tick - free <= SPACING_TOLERANCE_TICKS:
-                runs[-1][1].append(byte)
-            else:
-                runs.append((max(tick, free), bytearray([byte])))
-        return [Transmission(tick, DOWN, bytes(data), self._comment(bytes(data))) for tick, data in runs]
-
-    def _comment(self, data: bytes) -> str:
-        events = Decoder(self.n).feed(data)
-        found = [event for event in events if isinstance(event, Received)]
+    def _comment(self, heard: Transmission) -> str:
+        found = [event for event in Decoder(self.n).hear(heard) if isinstance(event, Received)]
         return "; ".join(f"type={event.type} seq={event.seq}" for event in found)
 
     # ---- state ---------------------------------------------------------------------------------------------

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_protocol import stream
-from miro_protocol.pcapng import Packet, render
+from miro_protocol.pcapng import render
+from miro_protocol.transmission import Transmission
 from mirotwin.capture.detect import FORMATS, detect
 from mirotwin.capture.input import HEAD_BYTES
 
@@ -29,7 +30,7 @@ from mirotwin.capture.input import HEAD_BYTES
         (b"\n  # note\n\n 0 < 55", "stream"),
         (b"# mirotwin stream 1\n", "stream"),
         (b"\xef\xbb\xbf# mirotwin stream 1\n", "stream"),
-        (render([Packet(0, ">", b"a")]), "pcapng"),
+        (render([Transmission(0, ">", b"a")]), "pcapng"),
         (b"\xd4\xc3\xb2\xa1", "pcapng"),
         (b"\x89MCAP0\r\n", "recording"),
         (b"\x89MCA", "recording"),
@@ -65,11 +66,9 @@ def test_any_bytes_have_a_format(head: bytes) -> None:
 
 
 @given(
-    st.lists(
-        st.builds(stream.Transmission, st.just(5), st.sampled_from("<>"), st.binary(min_size=1)), min_size=1
-    )
+    st.lists(st.builds(Transmission, st.just(5), st.sampled_from("<>"), st.binary(min_size=1)), min_size=1)
 )
-def test_what_the_library_writes_as_a_stream_is_a_stream(sent: list[stream.Transmission]) -> None:
+def test_what_the_library_writes_as_a_stream_is_a_stream(sent: list[Transmission]) -> None:
     text = stream.format_stream(sent)
     assert detect(text.encode())[0] == "stream"
     assert detect(text.partition("\n")[2].encode())[0] == "stream"

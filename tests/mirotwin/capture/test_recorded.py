@@ -14,9 +14,10 @@ from mcap.writer import Writer
 from tests.mirotwin.synthetic import periods
 
 from miro_protocol.frames import TelemetryFrame, encode
-from miro_sim.periods import Period, WireRun
+from miro_protocol.transmission import Transmission
+from miro_sim.periods import Period
 from miro_sim.scenario.file import load
-from mirotwin.capture import Run, recorded
+from mirotwin.capture import recorded
 from mirotwin.capture.input import Input
 from mirotwin.recording.container import RecordingError
 from mirotwin.recording.recorder import Recorder, Source
@@ -27,7 +28,7 @@ ANSWER = encode(TelemetryFrame(3, 1), 3)
 TEXT = load("fig6").text
 
 
-def recording(wires: list[tuple[WireRun, ...]], text: str = TEXT) -> bytes:
+def recording(wires: list[tuple[Transmission, ...]], text: str = TEXT) -> bytes:
     stream = BytesIO()
     source = Source(scenario_name="x", scenario_text=text, seed=1, firmware=b"", firmware_sha256="")
     with Recorder(stream, source) as recorder:
@@ -47,24 +48,24 @@ def somebody_elses() -> bytes:
 
 def read(
     path: Path, tell: Callable[[str], None] = lambda text: None
-) -> tuple[list[Run], dict[int, int], RecordingError | None]:
+) -> tuple[list[Transmission], dict[int, int], RecordingError | None]:
     robots: dict[int, int] = {}
-    found: list[Run] = []
+    found: list[Transmission] = []
     with Input(str(path)) as given:
         try:
-            for run in recorded.runs(given, robots, tell):
+            for run in recorded.transmissions(given, robots, tell):
                 found.append(run)
         except RecordingError as error:
             return found, robots, error
     return found, robots, None
 
 
-def down(tick: int, data: bytes = b"down", network: int = 0) -> WireRun:
-    return WireRun(tick, ">", network, -1, data)
+def down(tick: int, data: bytes = b"down", network: int = 0) -> Transmission:
+    return Transmission(tick, ">", data, network)
 
 
-def up(tick: int, data: bytes, network: int = 0) -> WireRun:
-    return WireRun(tick, "<", network, -1, data)
+def up(tick: int, data: bytes, network: int = 0, bad_stop: tuple[int, ...] = ()) -> Transmission:
+    return Transmission(tick, "<", data, network, bad_stop)
 
 
 def test_runs_come_in_the_order_of_time_with_the_layout_of_their_network(tmp_path: Path) -> None:
@@ -89,25 +90,33 @@ def test_an_answer_that_goes_on_over_the_end_of_periods_is_one_run(tmp_path: Pat
     wires = [(up(7 + start * UP, ANSWER[start:end]),) for start, end in pairwise(places)]
     path = tmp_path / "run.mcap"
     path.write_bytes(recording([*wires, ()]))
-    assert read(path)[0] == [Run(7, ANSWER, "<")]
+    assert read(path)[0] == [up(7, ANSWER)]
 
 
-def test_a_run_right_behind_another_of_its_period_tells_of_a_bad_stop_bit(tmp_path: Path) -> None:
+def test_bad_stop_bits_are_told_wherever_they_are(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    path.write_bytes(recording([(up(7, b"abc"), up(7 + 3 * UP, b"de"), up(7 + 6 * UP, b"f"))]))
-    found = [(run.data, run.bad_stop) for run in read(path)[0]]
-    assert found == [(b"abc", True), (b"de", False), (b"f", False)]
+    first = up(7, ANSWER[:8], bad_stop=(2, 7))
+    second = up(7 + 8 * UP, ANSWER[8:], bad_stop=(0, 10))
+    path.write_bytes(recording([(first,), (second,)]))
+    assert read(path)[0] == [up(7, ANSWER, bad_stop=(2, 7, 8, 18))]
 
 
-def test_periods_in_memory_give_the_same_runs_as_their_recording(tmp_path: Path) -> None:
-    first = (down(5), up(7, b"abc"), up(7 + 3 * UP, b"de"), up(7 + 9 * UP, ANSWER[:4], network=1))
-    second = (down(PERIOD + 9), up(7 + 5 * UP, b"f"), up(7 + 13 * UP, ANSWER[4:], network=1))
+def test_what_comes_after_a_pause_is_another_transmission(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    sent = [up(7, b"abc"), up(7 + 3 * UP + 1300, b"de"), up(7 + 9 * UP, b"f", 1), up(7 + 20 * UP, b"g")]
+    path.write_bytes(recording([tuple(sent[:1]), tuple(sent[1:]), ()]))
+    assert read(path)[0] == sent
+
+
+def test_periods_in_memory_give_the_same_as_their_recording(tmp_path: Path) -> None:
+    first = (down(5), up(7, b"abc"), up(7 + 5 * UP, b"de"), up(7 + 9 * UP, ANSWER[:4], 1, (3,)))
+    second = (down(PERIOD + 9), up(7 + 7 * UP, b"f"), up(7 + 13 * UP, ANSWER[4:], 1))
     path = tmp_path / "run.mcap"
     path.write_bytes(recording([first, second, ()]))
-    found = recorded.runs_of([Period(index, 0, (), wire, "") for index, wire in enumerate((first, second))])
+    wires = enumerate((first, second))
+    found = recorded.transmissions_of([Period(index, index * PERIOD, (), wire, "") for index, wire in wires])
     assert found == read(path)[0]
-    assert [run.data for run in found if run.network] == [ANSWER]
-    assert [run.bad_stop for run in found].count(True) == 1
+    assert [sent.data for sent in found] == [b"down", b"abc", b"def", ANSWER, b"down"]
 
 
 def test_every_recorded_character_of_a_run_is_there(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Runs of characters as rows: nothing is lost, memory stays small, freshness is the robot's, pauses end frames."""
+"""Transmissions as rows: nothing is lost, memory stays small, freshness is the robot's, pauses end frames."""
 
 import tracemalloc
 from collections.abc import Iterable
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from miro_protocol.events import Damaged, Reason, Received
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
-from mirotwin.capture import Run
+from miro_protocol.transmission import Transmission
 from mirotwin.capture.detect import FORMATS
 from mirotwin.capture.input import Input
 from mirotwin.capture.rows import Row, rows
@@ -22,8 +22,8 @@ def team(seq: int, n: int = 3) -> bytes:
     return encode(TeamFrame(0, seq, ((seq, -seq),) * n), n)
 
 
-def decoded(runs: Iterable[Run], n: int = 3) -> list[Row]:
-    return list(rows(runs, lambda network: n))
+def decoded(sent: Iterable[Transmission], n: int = 3) -> list[Row]:
+    return list(rows(sent, lambda network: n))
 
 
 def read(path: Path, format: str) -> tuple[list[Row], Exception | None]:
@@ -31,7 +31,7 @@ def read(path: Path, format: str) -> tuple[list[Row], Exception | None]:
     found: list[Row] = []
     with Input(str(path)) as given:
         try:
-            for row in rows(open_source(given, format, print).runs, lambda network: 3):
+            for row in rows(open_source(given, format, print).sent, lambda network: 3):
                 found.append(row)
         except READ_ERRORS as error:
             return found, error
@@ -69,20 +69,20 @@ def test_any_bytes_in_any_format_give_rows_and_at_most_the_formats_own_error(  #
 
 
 def test_freshness_is_judged_as_the_robot_does() -> None:
-    runs = [Run(at * 800_800, team(seq)) for at, seq in enumerate([0, 1, 1, 20, 2])]
-    runs.append(Run(10 * 800_800, team(30)))
-    assert [row.fresh for row in decoded(runs)] == [True, True, False, False, True, True]
+    sent = [Transmission(at * 800_800, ">", team(seq)) for at, seq in enumerate([0, 1, 1, 20, 2])]
+    sent.append(Transmission(10 * 800_800, ">", team(30)))
+    assert [row.fresh for row in decoded(sent)] == [True, True, False, False, True, True]
 
 
 def test_both_directions_and_networks_are_decoded_apart() -> None:
     answer = encode(TelemetryFrame(0, 1), 3)
-    runs = []
+    sent = []
     for at in range(0, 23, 5):  # five characters of each in turn
-        runs.append(Run(at * CHARACTER, team(7)[at : at + 5]))
-        runs.append(Run(at * CHARACTER, team(8)[at : at + 5], ">", 1))
+        sent.append(Transmission(at * CHARACTER, ">", team(7)[at : at + 5]))
+        sent.append(Transmission(at * CHARACTER, ">", team(8)[at : at + 5], 1))
         if answer[at : at + 5]:
-            runs.append(Run(at * 24960, answer[at : at + 5], "<"))
-    found = decoded(runs)
+            sent.append(Transmission(at * 24960, "<", answer[at : at + 5]))
+    found = decoded(sent)
     assert sorted((row.network, row.direction, row.event.data) for row in found) == [
         (0, "<", answer),
         (0, ">", team(7)),
@@ -91,21 +91,21 @@ def test_both_directions_and_networks_are_decoded_apart() -> None:
 
 
 def test_a_pause_of_two_characters_gives_out_what_can_be_no_frame_any_more() -> None:
-    first, second = decoded([Run(0, team(1)[:-1]), Run(24 * CHARACTER, team(2))])
+    first, second = decoded([Transmission(0, ">", team(1)[:-1]), Transmission(24 * CHARACTER, ">", team(2))])
     assert first.event == Damaged(team(1)[:-1], Reason.CUT_SHORT, 0)
     assert isinstance(second.event, Received)
 
 
 def test_a_bad_stop_bit_spoils_the_frame_it_is_in() -> None:
     wire = team(1)
-    runs = [Run(0, wire[:12], bad_stop=True), Run(12 * CHARACTER, wire[12:])]
-    (row,) = decoded(runs)
-    assert row.event == Damaged(wire, Reason.BAD_STOP_BIT, 0)
+    for place in range(6, len(wire)):
+        (row,) = decoded([Transmission(0, ">", wire, 0, (place,))])
+        assert row.event == Damaged(wire, Reason.BAD_STOP_BIT, 0)
 
 
 def test_a_frame_that_says_nothing_known_is_a_frame_all_the_same() -> None:
     wire = encode(TelemetryFrame(3, 4), 5)  # slot 4 in a network of three
-    (row,) = decoded([Run(0, wire, "<")])
+    (row,) = decoded([Transmission(0, "<", wire)])
     assert row.message is None
     assert "slot = 4" in row.unknown
 
@@ -115,7 +115,7 @@ def test_memory_does_not_grow_with_the_input(tmp_path: Path) -> None:
     path.write_bytes(bytes(range(256)) * (1 << 14))  # 4 MiB
     with Input(str(path)) as given:
         tracemalloc.start()
-        for _ in rows(open_source(given, "raw", print).runs, lambda network: 3):
+        for _ in rows(open_source(given, "raw", print).sent, lambda network: 3):
             pass
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()

@@ -17,8 +17,9 @@ from tests import children
 from tests.mirotwin.cli.conftest import Result
 
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
-from miro_protocol.pcapng import Packet, render
-from miro_protocol.stream import Transmission, format_stream
+from miro_protocol.pcapng import render
+from miro_protocol.stream import format_stream
+from miro_protocol.transmission import Transmission
 from mirotwin.cli import main
 
 PROGRAM = [sys.executable, "-c", "from mirotwin.cli import main; main()"]
@@ -29,7 +30,7 @@ ANSWER = encode(TelemetryFrame(1, 2, 0x18, 0x80, 0x90, 5, 65531, 1, 0), 3)
 BROKEN = TEAM[:12] + bytes([TEAM[12] ^ 1]) + TEAM[13:]
 SENT = [(0, ">", TEAM), (800_800, "<", ANSWER), (1_601_600, ">", BROKEN), (2_402_400, ">", SERVICE)]
 DOWN = TEAM + BROKEN + SERVICE
-PCAPNG = render([Packet(*sent) for sent in SENT])
+PCAPNG = render([Transmission(*sent) for sent in SENT])
 STREAM = format_stream([Transmission(*sent) for sent in SENT]).encode()
 
 
@@ -181,7 +182,7 @@ def test_what_cannot_be_read_is_named_after_all_that_could(
 
 
 def test_a_capture_of_very_many_networks_does_not_fill_the_memory() -> None:
-    crowd = render([Packet(at, ">", TEAM, at) for at in range(200)])
+    crowd = render([Transmission(at, ">", TEAM, at) for at in range(200)])
     code, lines, err = decode(crowd)
     assert code == 2
     assert lines[0] == "standard input: pcapng capture, 200 networks"
@@ -230,7 +231,13 @@ def test_packets_of_unknown_events_are_counted_on_stderr(
     mirotwin: Callable[..., Result], tmp_path: Path, command: str, arguments: tuple[str, ...], cut: int
 ) -> None:
     odd = bytearray(
-        render([Packet(0, ">", DOWN), Packet(800_800, ">", DOWN), Packet(2 * 800_800, ">", DOWN)])
+        render(
+            [
+                Transmission(0, ">", DOWN),
+                Transmission(800_800, ">", DOWN),
+                Transmission(2 * 800_800, ">", DOWN),
+            ]
+        )
     )
     at = odd.index(DOWN, odd.index(DOWN) + 1) - 4
     odd[at] = 0x42

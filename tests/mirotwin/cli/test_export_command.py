@@ -12,13 +12,14 @@ from tests.mirotwin.cli.conftest import Result
 
 from miro_protocol import stream
 from miro_protocol.frames import TeamFrame, encode
-from miro_protocol.pcapng import Packet, render
+from miro_protocol.pcapng import render
 from miro_protocol.pcapng_reader import iterate
-from miro_protocol.stream import Transmission, format_stream
+from miro_protocol.stream import format_stream
+from miro_protocol.transmission import Transmission
 from mirotwin.recording import reader as recording_reader
 
 FRAMES = [encode(TeamFrame(0, seq, ((seq, -seq),) * 3), 3) for seq in range(3)]
-PACKETS = [Packet(index * 800_800, ">", data) for index, data in enumerate(FRAMES)]
+PACKETS = [Transmission(index * 800_800, ">", data) for index, data in enumerate(FRAMES)]
 
 
 def test_a_recording_becomes_packets_in_the_order_of_time_both_ways(
@@ -56,10 +57,11 @@ def test_a_stream_and_a_capture_become_each_other(mirotwin: Callable[..., Result
     (tmp_path / "a.pcapng").write_bytes(render(PACKETS))
     code, out, err = mirotwin("export", tmp_path / "a.pcapng", "--out", tmp_path / "b.stream")
     assert (code, err) == (0, "")
-    assert "b.stream: 3 runs from the host and 0 from robots" in out
+    assert "b.stream: 3 transmissions from the host and 0 from robots" in out
     text = (tmp_path / "b.stream").read_text()
-    assert [(sent.tick, sent.data, sent.comment) for sent in stream.parse(text)] == [
-        (packet.tick, packet.data, f"team seq={index}") for index, packet in enumerate(PACKETS)
+    assert text.startswith("# mirotwin stream 1\n")
+    assert [(entry.what, entry.comment) for entry in stream.parse(text).entries] == [
+        (packet, f"team seq={index}") for index, packet in enumerate(PACKETS)
     ]
     assert mirotwin("export", tmp_path / "b.stream", "--out", tmp_path / "c.pcapng")[0] == 0
     assert (tmp_path / "c.pcapng").read_bytes() == render(PACKETS)
@@ -75,25 +77,46 @@ def test_the_stream_of_a_recording_is_taken_by_replay(
 
 
 def test_damage_is_called_so_in_the_comment(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
-    (tmp_path / "a").write_bytes(render([Packet(5, ">", b"xx" + FRAMES[1]), Packet(800_800, "<", b"abc")]))
+    (tmp_path / "a").write_bytes(
+        render([Transmission(5, ">", b"xx" + FRAMES[1]), Transmission(800_800, "<", b"abc")])
+    )
     assert mirotwin("export", tmp_path / "a", "--to", "stream", "--out", tmp_path / "b")[0] == 0
-    comments = [sent.comment for sent in stream.read(tmp_path / "b")]
+    comments = [entry.comment for entry in stream.read(tmp_path / "b").entries]
     assert comments == ["2 bytes, no sync; team seq=1", "3 bytes, no sync"]
 
 
-def test_one_of_several_networks_can_be_chosen_and_for_a_stream_must_be(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
-    packets = [Packet(5, ">", b"a"), Packet(6, ">", b"b", 1), Packet(7, "<", b"c", 1)]
+def test_one_of_several_networks_can_be_chosen(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    packets = [Transmission(5, ">", b"a"), Transmission(6, ">", b"b", 1), Transmission(7, "<", b"c", 1)]
     (tmp_path / "a").write_bytes(render(packets))
-    code, _, err = mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.stream")
-    assert code == 2
-    assert "tick 6: characters of network 1 after those of network 0; a stream file has one" in err
-    assert not (tmp_path / "b.stream").exists()
     assert mirotwin("export", tmp_path / "a", "--network", 1, "--out", tmp_path / "b.stream")[0] == 0
-    assert [sent.data for sent in stream.read(tmp_path / "b.stream")] == [b"b", b"c"]
+    assert stream.read(tmp_path / "b.stream").transmissions() == packets[1:]
     assert mirotwin("export", tmp_path / "a", "--network", 1, "--out", tmp_path / "b.pcapng")[0] == 0
     assert list(iterate((tmp_path / "b.pcapng").read_bytes())) == packets[1:]
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        [Transmission(5, ">", b"a"), Transmission(6, ">", b"b", 1), Transmission(7, "<", b"c", 1)],
+        [Transmission(5, ">", b"abc", 0, (0, 2))],
+    ],
+)
+def test_more_networks_or_bad_stop_bits_make_a_stream_of_version_2(
+    mirotwin: Callable[..., Result], tmp_path: Path, sent: list[Transmission]
+) -> None:
+    stream.write(tmp_path / "a.stream", sent)
+    assert mirotwin("export", tmp_path / "a.stream", "--out", tmp_path / "b.stream")[0] == 0
+    assert (tmp_path / "b.stream").read_text().startswith("# mirotwin stream 2\n")
+    assert stream.read(tmp_path / "b.stream").transmissions() == sent
+
+
+def test_bad_stop_bits_that_a_capture_cannot_hold_are_counted(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    stream.write(tmp_path / "a.stream", [Transmission(5, ">", b"abc", 0, (0, 2))])
+    code, _, err = mirotwin("export", tmp_path / "a.stream", "--out", tmp_path / "b.pcapng")
+    assert code == 0
+    assert "2 bad stop bits were left out" in err
 
 
 def test_of_an_input_cut_short_all_that_could_be_read_is_written(

@@ -8,8 +8,9 @@ import pytest
 from tests.mirotwin.cli.conftest import Result, hex_file
 
 from miro_protocol.frames import TeamFrame, encode
-from miro_protocol.pcapng import Packet, render
-from miro_protocol.stream import Transmission, write
+from miro_protocol.pcapng import render
+from miro_protocol.stream import write
+from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
 from mirotwin.recording import reader as recording_reader
 from mirotwin.recording.recorder import Recorder, Source
@@ -102,7 +103,10 @@ def test_other_firmware_is_shown_where_it_answers_otherwise(
         (b"", "offset 0: empty file"),
         (b"\x89PNG\r\n\x1a\n\0\0", "offset 0: neither a recording nor a stream file"),
         ("0 > 55\n".encode("utf-16"), "neither a recording nor a stream file (UTF-8 text)"),
-        (render([Packet(0, ">", b"a")]), "offset 0: a capture, which cannot be replayed; make a stream file"),
+        (
+            render([Transmission(0, ">", b"a")]),
+            "offset 0: a capture, which cannot be replayed; make a stream file",
+        ),
         (b"0 > 55\0\n", ":1:5: '55\\x00' is not a character"),
         (b"12 > zz\n", ":1:6: 'zz' is not a character"),
         (b"# only a comment\n", "no line from host to robot"),

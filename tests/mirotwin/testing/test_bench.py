@@ -122,7 +122,7 @@ def test_a_count_that_differs_is_a_failure_with_what_was_heard() -> None:
     bench.send(team(5))
     with pytest.raises(LinkFailure, match=r"firmware counts \(1, 0, 0\) .*, Python \(1, 0, 1\)") as caught:
         bench.send(team(5))
-    assert [sent.comment for sent in stream.parse(caught.value.stream)] == ["type=0 seq=5"] * 2
+    assert [entry.comment for entry in stream.parse(caught.value.stream).entries] == ["type=0 seq=5"] * 2
 
 
 def test_an_image_without_counters_is_refused() -> None:

@@ -85,7 +85,7 @@ def test_a_planted_fault_is_found_and_shrunk_to_a_stream_file_that_shows_it_agai
             settings=settings(max_examples=60, stateful_step_count=3, deadline=None, database=None),
         )
     assert any("mirotwin replay" in note for note in caught.value.__notes__)
-    sent = stream.read(tmp_path / "failure.stream")
+    sent = stream.read(tmp_path / "failure.stream").transmissions()
     (frame,) = [
         event for one in sent for event in Decoder(3).feed(one.data) if isinstance(event, Received)
     ] or [event for one in sent for event in Decoder(5).feed(one.data) if isinstance(event, Received)]

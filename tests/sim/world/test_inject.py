@@ -7,6 +7,7 @@ from tests.sim.world.rig import PERIOD, fig6, two_networks
 
 from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.frames import TeamFrame, encode
+from miro_protocol.transmission import Transmission
 from miro_sim.world import conditions as wait
 
 FRAME = encode(TeamFrame(0, 5, ((100, 100), (0, 0), (0, 0))), 3)
@@ -22,7 +23,7 @@ def recorded(periods=6):
     world = two_networks()
     runs = []
     for _ in range(periods):
-        runs += [(run.tick, run.network, run.data) for run in world.step().wire if run.direction == ">"]
+        runs += [sent for sent in world.step().wire if sent.direction == ">"]
     scripted = two_networks(script=runs)
     scripted.run_to(periods * PERIOD)
     return runs, scripted.digest
@@ -37,9 +38,9 @@ def test_a_silent_host_sends_nothing_by_itself():
 def test_injected_bytes_of_a_recording_give_the_digest_of_a_scripted_run():
     runs, digest = recorded()
     world = two_networks(script=[])
-    for tick, network, data in runs:
-        world.run_to(max(world.tick, tick - 2 * PERIOD + 1))
-        world.inject(data, network, tick)
+    for sent in runs:
+        world.run_to(max(world.tick, sent.tick - 2 * PERIOD + 1))
+        world.inject(sent.data, sent.network, sent.tick, sent.bad_stop)
     world.run_to(6 * PERIOD)
     assert world.digest == digest
 
@@ -49,10 +50,10 @@ def test_injected_bytes_of_a_recording_give_the_digest_of_a_scripted_run():
 def test_when_input_is_announced_changes_nothing(data):
     runs, digest = recorded(4)
     world = two_networks(script=[])
-    for tick, network, sent in runs:
-        latest = tick - 120 - KEYUP_TICKS
+    for sent in runs:
+        latest = sent.tick - 120 - KEYUP_TICKS
         world.run_to(data.draw(st.integers(min(world.tick, latest), latest)))
-        world.inject(sent, network, tick)
+        world.inject(sent.data, sent.network, sent.tick)
     world.run_to(4 * PERIOD)
     assert world.digest == digest
 
@@ -111,6 +112,70 @@ def test_an_injection_into_a_frame_of_the_station_is_refused():
     world.run_to(1000)
     with pytest.raises(ValueError, match="the transmitter is busy from tick 96000"):
         world.inject(b"\x55", at_tick=97_000)
+
+
+@pytest.mark.parametrize("place", [8, 22])
+def test_a_frame_with_a_bad_stop_bit_is_recorded_as_sent_and_refused_by_the_robot(place):
+    world = silent()
+    tick = world.inject(FRAME, at_tick=100_000, bad_stop=(place,))
+    world.run_to(tick + place * HOST_CHARACTER_TICKS)
+    event = world.run_until(wait.Byte(value=FRAME[place]), within=2 * HOST_CHARACTER_TICKS)
+    while event.tick < tick + place * HOST_CHARACTER_TICKS:
+        event = world.run_until(wait.Byte(value=FRAME[place]), within=2 * HOST_CHARACTER_TICKS)
+    assert not event.good_stop
+    second = world.inject(FRAME, at_tick=2 * PERIOD)
+    world.run_to(4 * PERIOD)
+    assert world.robot().counter(0) == 1
+    sent = [Transmission(tick, ">", FRAME, 0, (place,)), Transmission(second, ">", FRAME)]
+    scripted = two_networks(script=sent)
+    wire = [one for _ in range(4) for one in scripted.step().wire if one.direction == ">"]
+    assert wire == sent
+    assert scripted.robot().counter(0) == 1
+
+
+def test_bad_stop_bits_that_wait_or_are_on_the_air_are_saved():
+    straight, cut = silent(), silent()
+    for world in (straight, cut):
+        world.inject(FRAME, at_tick=100_000, bad_stop=(0, 9))
+        world.inject(FRAME, at_tick=3 * PERIOD, bad_stop=(22,))
+        world.run_to(300_000)
+    other = silent()
+    other.load(cut.save())
+    for world in (straight, other):
+        world.run_to(5 * PERIOD)
+    assert other.digest == straight.digest
+    assert other.networks[0].frames_sent == 2
+
+
+def test_a_bad_stop_bit_is_part_of_the_digest():
+    digests = set()
+    for bad_stop in ((), (3,), (4,)):
+        world = silent()
+        world.inject(FRAME, at_tick=PERIOD - 100_000, bad_stop=bad_stop)
+        world.step()
+        digests.add(world.digest)
+    assert len(digests) == 3
+
+
+@pytest.mark.parametrize("bad_stop", [(23,), (-1,), (2, 1)])
+def test_a_bad_stop_bit_of_no_character_is_refused(bad_stop):
+    with pytest.raises(
+        ValueError, match=r"net0: bad_stop holds .*: must be ascending indices of 23 characters"
+    ):
+        silent().inject(FRAME, bad_stop=bad_stop)
+
+
+@pytest.mark.parametrize(
+    ("sent", "what"),
+    [
+        (Transmission(5, "<", b"a"), "tick 5: '<' of network 0 is none of the 2 hosts"),
+        (Transmission(5, ">", b"a", 2), "tick 5: '>' of network 2 is none of the 2 hosts"),
+        (Transmission(5, ">", b"a", 0, (1,)), "must be ascending indices of 1 characters"),
+    ],
+)
+def test_a_script_that_no_host_can_send_is_refused(sent, what):
+    with pytest.raises(ValueError, match=what):
+        two_networks(script=[sent])
 
 
 @pytest.mark.parametrize("network", [-1, 2])

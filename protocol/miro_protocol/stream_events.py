@@ -1,0 +1,46 @@
+"""What a stream file may say besides characters: resets, radios switched off, levels on pins.
+
+What belongs here: one record a kind of event. What does not: how they are written down (`stream_line.py`), and doing
+what they say.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+
+class Reset(msgspec.Struct, frozen=True):
+    """`TICK *@N/SLOT reset 0|1`: the level of a robot's reset, 1 holds its processor in reset."""
+
+    tick: int
+    network: int
+    slot: int
+    level: int
+
+
+class RadioState(msgspec.Struct, frozen=True):
+    """`TICK *@N radio up|down|noise`: from then on the radio of a network works, is off, or gives noise."""
+
+    tick: int
+    network: int
+    state: Literal["up", "down", "noise"]
+
+
+class PinLevel(msgspec.Struct, frozen=True):
+    """`TICK * P1.0 0|1`: the level that is put on a port pin of the bare machine."""
+
+    tick: int
+    pin: str
+    level: int
+
+
+StreamEvent = Reset | RadioState | PinLevel
+
+WHO_CAN = {
+    Reset: "no command acts on it yet; in Python `mirotwin.testing.bench.Bench.reset` resets a robot",
+    RadioState: "no command acts on it yet; in Python `mirotwin.testing.bench.Bench.trouble` disturbs a radio",
+    PinLevel: "`mirotwin fw run --pins FILE` puts levels on the pins of a bare processor",
+}
+"""For a reader that cannot act on an event: who can."""

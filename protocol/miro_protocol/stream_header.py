@@ -1,0 +1,140 @@
+"""The header of a stream file of version 2: the lines that begin with `#:`, which are one TOML document.
+
+    #: scenario = "fig6"
+    #: seed = 7
+
+What belongs here: the keys, their types, and the place of what is wrong. What does not: what a scenario may say
+(`miro_sim.scenario`), and doing what the keys ask for. One blank behind `#:` is not part of the document.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from difflib import get_close_matches
+from typing import Annotated, Any, NoReturn
+
+import msgspec
+from msgspec import Meta
+
+from miro_exact.seed import MAX_SEED
+from miro_protocol.stream_error import StreamError
+from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, too_long
+
+PREFIX = "#:"
+_PLACE = re.compile(r"(.*?) \(at (?:line (\d+), column (\d+)|end of document)\)$", re.DOTALL)
+
+
+class Header(msgspec.Struct, frozen=True, kw_only=True):
+    """What a stream file says about itself; None where it does not. `text` is the document, without prefixes.
+
+    `scenario`: the name of a built-in scenario, or a whole one. `set`: changes to the scenario, by the path of a key.
+    `expect`: checks, as in a scenario. `version`: of the program that wrote the file.
+    """
+
+    text: str = ""
+    scenario: str | dict[str, Any] | None = None
+    seed: Annotated[int, Meta(ge=0, le=MAX_SEED)] | None = None
+    firmware_sha256: Annotated[str, Meta(pattern=r"\A[0-9a-f]{64}\Z")] | None = None
+    set: dict[str, Any] | None = None
+    expect: dict[str, Any] | None = None
+    version: str | None = None
+
+
+KEYS = {field.name: field.type for field in msgspec.structs.fields(Header) if field.name != "text"}
+
+
+def of_text(text: str) -> Header:
+    """The header that a TOML document makes. Raises StreamError with lines of the document."""
+    return parse(
+        [(number, f"{PREFIX} {line}") for number, line in enumerate(text.split("\n"), 1)], "<header>"
+    )
+
+
+def lines(header: Header) -> list[str]:
+    """The header's lines, without newlines. ValueError when they could not be read back."""
+    if not header.text:
+        return []
+    if "\r" in header.text:
+        raise ValueError("the header holds a carriage return, which ends no line of a stream file")
+    return [f"{PREFIX} {line}" if line else PREFIX for line in header.text.split("\n")]
+
+
+def parse(numbered: Sequence[tuple[int, str]], source: str) -> Header:
+    """The header in the lines with these numbers, prefixes included. Raises StreamError."""
+    return _Document(numbered, source).header() if numbered else Header()
+
+
+class _Document:
+    def __init__(self, numbered: Sequence[tuple[int, str]], source: str) -> None:
+        self.source = source
+        self.numbers = [number for number, _ in numbered]
+        behind = [line[len(PREFIX) :] for _, line in numbered]
+        self.blanks = [line.startswith(" ") for line in behind]
+        self.lines = [line.removeprefix(" ") for line in behind]
+
+    def header(self) -> Header:
+        text = "\n".join(self.lines)
+        raw = self._loads(text)
+        for key in raw:
+            if key not in KEYS:
+                close = get_close_matches(key, KEYS, n=1)
+                hint = f"did you mean {close[0]}? " if close else ""
+                self._fail(
+                    *self._place(key), f"unknown key {key[:40]!r}", f"{hint}a header has {', '.join(KEYS)}"
+                )
+        found = {key: self._value(key, value) for key, value in raw.items()}
+        return Header(text=text, **found)
+
+    def _loads(self, text: str) -> dict[str, Any]:
+        if too_long(text):
+            self._fail(0, 0, f"a header of more than {TEXT_KIB} KiB", "is this a stream file?")
+        long_line = long_key_line(text)
+        if long_line is not None:
+            self._fail(long_line - 1, 0, f"a key of more than {KEY_PARTS} parts", "no key has more than 6")
+        try:
+            return tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            self._not_toml(str(error))
+        except RecursionError:
+            self._fail(0, 0, "the header is nested too deeply", "a scenario has tables in at most 5 levels")
+        except ValueError:  # an integer with more digits than Python converts
+            self._fail(0, 0, "the header holds an integer of thousands of digits", "write a smaller one")
+
+    def _not_toml(self, message: str) -> NoReturn:
+        found = _PLACE.match(message)
+        line, column = len(self.lines) - 1, 0
+        if found is not None:
+            message = found[1]
+            if found[2] is not None:
+                line, column = int(found[2]) - 1, int(found[3]) - 1
+        self._fail(line, column, f"not TOML: {message}", "the lines that begin with #: are one TOML document")
+
+    def _value(self, key: str, value: Any) -> Any:
+        try:
+            return msgspec.convert(value, KEYS[key])
+        except msgspec.ValidationError as error:
+            self._fail(*self._place(key), f"{key}: {str(error).partition(' - at ')[0]}", _REMEDIES[key])
+
+    def _place(self, key: str) -> tuple[int, int]:
+        """Line and column, from 0, where `key` stands."""
+        named = re.compile(rf"""\s*\[?\s*["']?{re.escape(key)}["']?\s*[]=.]""")
+        for number, line in enumerate(self.lines):
+            if named.match(line):
+                return number, line.index(key)
+        return 0, 0
+
+    def _fail(self, line: int, column: int, reason: str, remedy: str) -> NoReturn:
+        before = len(PREFIX) + self.blanks[line] + 1
+        raise StreamError(self.source, self.numbers[line], column + before, reason, remedy) from None
+
+
+_REMEDIES = {
+    "scenario": "give the name of a built-in scenario, or a whole one as a table",
+    "seed": f"give a whole number 0..{MAX_SEED}",
+    "firmware_sha256": "give 64 hex digits in small letters",
+    "set": "give a table: paths of keys and their values",
+    "expect": "give a table: checks and what they expect",
+    "version": "give the version as text",
+}

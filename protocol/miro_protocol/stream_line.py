@@ -1,0 +1,210 @@
+"""One line of a stream file: what happens at a tick, as text and back.
+
+    792000 > 55 55 ff 2d d4        characters from the host of network 0
+    792000 <@1 55 55! ff           ... from a robot of network 1; the second one has a bad stop bit
+    800000 *@1/2 reset 1           events, see `stream_events.py`
+    800000 *@1 radio down
+    800000 * P1.0 0
+
+What belongs here: the grammar of lines, of both versions. What does not: the order of lines, the first line and the
+header (`stream.py`, `stream_header.py`). Version 1 has characters of network 0 with good stop bits, and nothing else.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from reprlib import repr as brief
+
+from miro_protocol.stream_error import StreamError
+from miro_protocol.stream_events import PinLevel, RadioState, Reset, StreamEvent
+from miro_protocol.table import ROBOT_COUNTS
+from miro_protocol.transmission import DIRECTIONS, DOWN, UP, Transmission, check_bad_stop
+
+MAX_TICK = (1 << 61) - 1  # decoders count ticks in 64 bits
+MAX_NETWORK = 0xFFFF
+MAX_SLOT = max(ROBOT_COUNTS) - 1
+HAND = "*"
+FIRST_LINE = "# mirotwin stream {}"
+VERSIONS = (1, 2)
+RADIO_STATES = ("up", "down", "noise")
+
+_VERSION = re.compile(r"#\s*mirotwin stream\b\s*(.*?)\s*$")
+_TOKEN = re.compile(r"\S+")
+_TICK = re.compile(r"[0-9]{1,19}")
+_CHARACTER = re.compile(r"([0-9a-fA-F]{2})(!?)")
+_PLACE = re.compile(r"([<>*])(?:@([0-9]{1,5})(?:/([0-9]{1,5}))?)?")
+_PIN = re.compile(r"P[0-3]\.[0-7]")
+_EVENTS = "write `*@N/SLOT reset 0|1`, `*@N radio up|down|noise` or `* P1.0 0|1`"
+
+Happening = Transmission | StreamEvent
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What one line says, the comment behind it, and the number of the line (0: of no file)."""
+
+    what: Happening
+    comment: str = ""
+    line: int = field(default=0, compare=False)
+
+
+def needs_version_2(what: Happening) -> bool:
+    """Whether version 1 has no words for it."""
+    return not isinstance(what, Transmission) or bool(what.network or what.bad_stop)
+
+
+def format_line(what: Happening, comment: str = "") -> str:
+    """The line without its newline. ValueError when it could not be read back as the same."""
+    if not 0 <= what.tick <= MAX_TICK:
+        raise ValueError(f"tick = {what.tick}: must be 0..{MAX_TICK}")
+    if comment != comment.strip() or len(comment.splitlines()) > 1:
+        raise ValueError(f"comment = {comment!r}: must be one line without blanks around it")
+    said = _characters(what) if isinstance(what, Transmission) else _event(what)
+    line = f"{what.tick} {said}"
+    return f"{line}  # {comment}" if comment else line
+
+
+def _characters(sent: Transmission) -> str:
+    if sent.direction not in DIRECTIONS:
+        raise ValueError(f"direction = {sent.direction!r}: must be {DOWN!r} or {UP!r}")
+    if not sent.data:
+        raise ValueError("data is empty: a transmission has at least one character")
+    check_bad_stop(sent.bad_stop, len(sent.data))
+    _check("network", sent.network, MAX_NETWORK)
+    place = f"{sent.direction}@{sent.network}" if sent.network else sent.direction
+    if not sent.bad_stop:
+        return f"{place} {sent.data.hex(' ')}"
+    bad = set(sent.bad_stop)
+    return f"{place} " + " ".join(f"{byte:02x}{'!' * (at in bad)}" for at, byte in enumerate(sent.data))
+
+
+def _event(event: StreamEvent) -> str:
+    if isinstance(event, PinLevel):
+        if not _PIN.fullmatch(event.pin):
+            raise ValueError(f"pin = {event.pin!r}: must be P0.0..P3.7")
+        _check("level", event.level, 1)
+        return f"{HAND} {event.pin} {event.level}"
+    _check("network", event.network, MAX_NETWORK)
+    if isinstance(event, Reset):
+        _check("slot", event.slot, MAX_SLOT)
+        _check("level", event.level, 1)
+        return f"{HAND}@{event.network}/{event.slot} reset {event.level}"
+    if event.state not in RADIO_STATES:
+        raise ValueError(f"state = {event.state!r}: must be {', '.join(RADIO_STATES)}")
+    return f"{HAND}@{event.network} radio {event.state}"
+
+
+def _check(name: str, value: int, high: int) -> None:
+    if not 0 <= value <= high:
+        raise ValueError(f"{name} = {value}: must be 0..{high}")
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """Line `number` of the file `source`, to be read."""
+
+    source: str
+    number: int
+    text: str
+
+    def error(self, column: int, reason: str, remedy: str) -> StreamError:
+        return StreamError(self.source, self.number, column, reason, remedy)
+
+    def first_column(self) -> int:
+        return len(self.text) - len(self.text.lstrip()) + 1
+
+    def version(self) -> int:
+        """What the first line of a file says; 1 if it says nothing."""
+        found = _VERSION.match(self.text)
+        if found is None:
+            return 1
+        if found[1] not in map(str, VERSIONS):
+            reason = f"stream version {brief(found[1] or 'missing')}"
+            remedy = "this program reads versions 1 and 2; use the one that wrote it"
+            raise self.error(found.start(1) + 1, reason, remedy)
+        return int(found[1])
+
+    def parse(self, version: int) -> Entry | None:
+        """What the line says, or None for a line that says nothing."""
+        body, _, comment = self.text.partition("#")
+        tokens = list(_TOKEN.finditer(body))
+        if not tokens:
+            return None
+        end = len(body.rstrip()) + 1
+        tick = self._tick(tokens[0])
+        kind, network, slot = self._place(tokens, end, version)
+        if kind == HAND:
+            what: Happening = self._read_event(tick, network, slot, tokens, end)
+        else:
+            what = self._read_characters(tick, kind, network or 0, tokens, end, version)
+        return Entry(what, comment.strip(), self.number)
+
+    def _tick(self, token: re.Match[str]) -> int:
+        if not _TICK.fullmatch(token[0]) or int(token[0]) > MAX_TICK:
+            reason = f"{brief(token[0])} is not a tick"
+            raise self.error(token.start() + 1, reason, f"a line starts with a whole number 0..{MAX_TICK}")
+        return int(token[0])
+
+    def _place(
+        self, tokens: list[re.Match[str]], end: int, version: int
+    ) -> tuple[str, int | None, int | None]:
+        """Direction or `*`, network, slot."""
+        remedy = f"write {DOWN} for host to robot or {UP} for robot to host after the tick"
+        if len(tokens) == 1:
+            raise self.error(end, "no direction", remedy)
+        token = tokens[1]
+        found = _PLACE.fullmatch(token[0])
+        if found is None or (found[3] is not None and found[1] != HAND):
+            raise self.error(token.start() + 1, f"{brief(token[0])} is not a direction", remedy)
+        if version == 1 and token[0] not in DIRECTIONS:
+            raise self._too_new(token)
+        network = None if found[2] is None else self._number(token, found[2], "network", MAX_NETWORK)
+        return (
+            found[1],
+            network,
+            None if found[3] is None else self._number(token, found[3], "slot", MAX_SLOT),
+        )
+
+    def _number(self, token: re.Match[str], digits: str, name: str, high: int) -> int:
+        if int(digits) > high:
+            raise self.error(token.start() + 1, f"{name} {digits}", f"there are {name}s 0..{high}")
+        return int(digits)
+
+    def _too_new(self, token: re.Match[str]) -> StreamError:
+        reason = f"{brief(token[0])} is not known in stream version 1"
+        return self.error(token.start() + 1, reason, f"begin the file with `{FIRST_LINE.format(2)}`")
+
+    def _read_characters(
+        self, tick: int, direction: str, network: int, tokens: list[re.Match[str]], end: int, version: int
+    ) -> Transmission:
+        if len(tokens) == 2:
+            raise self.error(end, "no characters", "write at least one as two hex digits")
+        data, bad_stop = bytearray(), []
+        for token in tokens[2:]:
+            found = _CHARACTER.fullmatch(token[0])
+            if found is None:
+                reason = f"{brief(token[0])} is not a character"
+                raise self.error(token.start() + 1, reason, "write two hex digits each, with blanks between")
+            if found[2]:
+                if version == 1:
+                    raise self._too_new(token)
+                bad_stop.append(len(data))
+            data.append(int(found[1], 16))
+        return Transmission(tick, direction, bytes(data), network, tuple(bad_stop))
+
+    def _read_event(
+        self, tick: int, network: int | None, slot: int | None, tokens: list[re.Match[str]], end: int
+    ) -> StreamEvent:
+        if len(tokens) != 4:
+            raise self.error(end, "not an event", _EVENTS)
+        word, value = tokens[2][0], tokens[3][0]
+        if word == "reset" and slot is not None and network is not None and value in ("0", "1"):
+            return Reset(tick, network, slot, int(value))
+        if word == "radio" and slot is None and network is not None and value in RADIO_STATES:
+            return RadioState(tick, network, value)  # type: ignore[arg-type]
+        if _PIN.fullmatch(word) and network is None and value in ("0", "1"):
+            return PinLevel(tick, word, int(value))
+        raise self.error(
+            tokens[1].start() + 1, f"{brief(self.text[tokens[1].start() : end - 1])} is no event", _EVENTS
+        )

@@ -1,0 +1,42 @@
+"""The topics of a recording: their names, and what they name.
+
+What belongs here: text to place and back. What does not: what is said there (`channels`).
+
+    /period                  a control period of the whole world
+    /net0/wire               the characters on the air of network 0
+    /net0/robot2/lm629       a channel of the robot in slot 2 of network 0
+"""
+
+import re
+from typing import NamedTuple
+
+PERIOD = "/period"
+WIRE = "wire"
+_TOPIC = re.compile(r"/net([0-9]{1,9})(?:/robot([0-9]{1,9}))?/([a-z0-9_]+)")
+
+
+class Place(NamedTuple):
+    """What a topic names. `network`, `slot`: -1 where it is of the world, or of a whole network."""
+
+    channel: str
+    network: int = -1
+    slot: int = -1
+
+
+def robot_topic(network: int, slot: int, channel: str) -> str:
+    return f"/net{network}/robot{slot}/{channel}"
+
+
+def wire_topic(network: int) -> str:
+    return f"/net{network}/{WIRE}"
+
+
+def place_of(topic: str) -> Place | None:
+    """What `topic` names; None if it has not the form of one of ours."""
+    if topic == PERIOD:
+        return Place(PERIOD)
+    found = _TOPIC.fullmatch(topic)
+    if found is None:
+        return None
+    network, slot, channel = found.groups()
+    return Place(channel, int(network), -1 if slot is None else int(slot))
