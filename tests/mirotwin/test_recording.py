@@ -315,6 +315,12 @@ def test_one_wrong_bit_at_either_end_of_any_section_is_noticed(section: str) -> 
         refused_with_bit_turned(at, at % 8)
 
 
+@pytest.mark.parametrize("place", range(4))
+def test_one_wrong_bit_in_the_length_of_a_compressions_name_is_damage(place: int) -> None:
+    for bit in range(8):
+        refused_with_bit_turned(SECTIONS["CHUNK"][0] + 9 + 28 + place, bit)
+
+
 @settings(deadline=None, max_examples=150)
 @given(st.integers(0, len(RECORDED) - 1), st.integers(0, 7))
 def test_one_wrong_bit_anywhere_is_noticed(at: int, bit: int) -> None:

@@ -34,6 +34,7 @@ _HEAD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")  # times, uncompressed size, CRC, length of the compression's name
 _DATA_LENGTH = 8  # bytes, behind the compression's name
 _CRC = 4  # bytes
+_COMPRESSIONS = (b"lz4", b"zstd")  # but for none
 _READ: dict[int, Callable[[ReadDataStream], McapRecord]] = {
     Opcode.ATTACHMENT: Attachment.read,
     Opcode.CHANNEL: Channel.read,
@@ -197,7 +198,10 @@ def _in_chunk(body: bytes, whole: bool) -> Iterator[McapRecord]:
         return
     _, _, size, checksum, name_length = _CHUNK.unpack_from(body)
     if name_length:
-        raise _Compressed(body[_CHUNK.size : _CHUNK.size + min(name_length, 16)].decode("ascii", "replace"))
+        name = body[_CHUNK.size : _CHUNK.size + min(name_length, 16)]
+        if name not in _COMPRESSIONS:  # no well-known one of the MCAP specification: a damaged length, most likely
+            raise ValueError(f"a chunk of unknown compression {name!r}")
+        raise _Compressed(name.decode("ascii"))
     first = _CHUNK.size + _DATA_LENGTH
     if whole:
         if len(body) < first or int.from_bytes(body[_CHUNK.size : first], "little") != len(body) - first:
