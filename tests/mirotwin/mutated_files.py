@@ -63,6 +63,13 @@ ECHO_RST = """\
                                     4 ;\tnamed.c:5: echo();
       00000E 30 98 FD         [24]  5 \tjnb RI,.
 """
+_SCENARIO = "".join(f"#: {line}\n" for line in SHORT.replace("[network", "[scenario.network").splitlines())
+_FRAME = "55! 55 55 55 55 ff 2d d4 fc e0 11! 22 33"
+STREAMS_2 = {
+    "stream 2": f"# mirotwin stream 2\n96000 > {_FRAME}\n400000 <@1 {_FRAME}  # more\n900000 >@1 55 55!\n".encode(),
+    "stream 2, header": f"# mirotwin stream 2\n#: seed = 7\n#: [scenario]\n{_SCENARIO}96000 > {_FRAME}\n".encode(),
+}
+EVENTS = b"5 *@0/1 reset 1\n6 *@0 radio down\n7 * P1.0 0\n#: set = {}\n#: expect = {no_fault = true}\n"
 MOST_BYTES = 1 << 20
 NUMBERS = (
     b"0",
@@ -137,6 +144,9 @@ class Seeds:
         self.kinds["capture"] = ("a.pcapng", (folder / "run.pcapng").read_bytes(), look)
         stream = (folder / "run.stream").read_bytes()
         self.kinds["stream"] = ("a.stream", stream, [*look, ["fw", "profile", "@", "--to", "1ms"]])
+        for name, content in STREAMS_2.items():
+            self.kinds[name] = ("a.stream", content, [*look, ["fw", "profile", "@", "--to", "1ms"]])
+        self.pieces.append(EVENTS)
         raw = bytes.fromhex("5555555555ff2dd4fc") + bytes(range(40))
         self.kinds["raw"] = (
             "a.bin",
