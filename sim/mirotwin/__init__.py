@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from miro_protocol import frames as frames
     from miro_protocol.decoder import Decoder as Decoder
     from miro_protocol.decoder import TelemetryDecoder as TelemetryDecoder
+    from miro_protocol.transmission import Transmission as Transmission
     from miro_robot.firmware import image_path as image_path
     from miro_robot.image import Image as Image
     from miro_robot.image import load_hex as load_hex
@@ -42,6 +43,7 @@ _PLACES = {
     "Image": "miro_robot.image:Image",
     "Scenario": "miro_sim.scenario.keys:Scenario",
     "TelemetryDecoder": "miro_protocol.decoder:TelemetryDecoder",
+    "Transmission": "miro_protocol.transmission:Transmission",
     "WaitExpired": "miro_sim.world.waits:WaitExpired",
     "World": "miro_sim.world.world:World",
     "conditions": "miro_sim.world.conditions",
@@ -65,6 +67,7 @@ __all__ = [
     "Image",
     "Scenario",
     "TelemetryDecoder",
+    "Transmission",
     "WaitExpired",
     "World",
     "conditions",

@@ -25,7 +25,7 @@ from mirotwin.cli.program import UserError, complain
 from mirotwin.files.outputs import RECORDING
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
-from mirotwin.replay.script import check_order, scenario_of_stream, script_of, script_of_stream
+from mirotwin.replay.script import check_script, scenario_of_stream, script_of, script_of_stream
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
@@ -77,7 +77,7 @@ def _job_of_recording(recording: Recording, path: str) -> Job:
         raise UserError(f"{path}: the recording holds no control period; nothing can be replayed")
     scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml")
     script = script_of(recording.periods)
-    check_order(script, path)
+    check_script(script, path, len(scenario.networks))
     return Job(scenario, source.seed, script, recording.periods)
 
 

@@ -199,7 +199,9 @@ def _in_chunk(body: bytes, whole: bool) -> Iterator[McapRecord]:
     _, _, size, checksum, name_length = _CHUNK.unpack_from(body)
     if name_length:
         name = body[_CHUNK.size : _CHUNK.size + min(name_length, 16)]
-        if name not in _COMPRESSIONS:  # no well-known one of the MCAP specification: a damaged length, most likely
+        if (
+            name not in _COMPRESSIONS
+        ):  # no well-known one of the MCAP specification: a damaged length, most likely
             raise ValueError(f"a chunk of unknown compression {name!r}")
         raise _Compressed(name.decode("ascii"))
     first = _CHUNK.size + _DATA_LENGTH

@@ -40,10 +40,13 @@ def script_of_stream(sent: Iterable[Transmission]) -> list[Transmission]:
     return [one for one in sent if one.direction == DOWN]
 
 
-def check_order(script: Sequence[Transmission], path: str) -> None:
-    """Raises StreamContentError for transmissions of one network that overlap."""
+def check_script(script: Sequence[Transmission], path: str, networks: int) -> None:
+    """Raises StreamContentError for transmissions of a network that overlap, or that is not there."""
     before: dict[int, Transmission] = {}
     for one in script:
+        if one.network >= networks:
+            what = f"network {one.network}, but the scenario has {networks}, numbered from 0"
+            raise StreamContentError(f"{path}: tick {one.tick}: {what}")
         last = before.get(one.network)
         if last is not None and one.tick < last.end_tick:
             what = f"starts before the transmission of tick {last.tick} has ended (tick {last.end_tick})"
@@ -74,15 +77,13 @@ def scenario_of_stream(sent: Sequence[Transmission], path: str, header: Header |
     script = script_of_stream(sent)
     if not script:
         raise StreamContentError(f"{path}: no line from host to robot; nothing can be replayed")
-    check_order(script, path)
     if header is None or header.scenario is None:
+        check_script(script, path, MAX_NETWORKS)
         return _default_scenario(script, path)
     scenario = _scenario_of_header(header.scenario, f"{path}: header: scenario")
+    check_script(script, path, len(scenario.networks))
     end_tick = ticks(scenario.duration_s)
     for one in script:
-        if one.network >= len(scenario.networks):
-            what = f"network {one.network}, but the scenario has {len(scenario.networks)}, numbered from 0"
-            raise StreamContentError(f"{path}: tick {one.tick}: {what}")
         if one.end_tick > end_tick:
             what = (
                 f"ends at tick {one.end_tick}, but the scenario ends at tick {end_tick}; raise its duration_s"
@@ -110,9 +111,6 @@ def _default_scenario(script: Sequence[Transmission], path: str) -> Scenario:
         last = max(one.tick for one in script)
         raise StreamContentError(f"{path}: tick {last}: more than a day; let the stream start near tick 0")
     count = 1 + max(one.network for one in script)
-    if count > MAX_NETWORKS:
-        what = f"network {count - 1}: a scenario has at most {MAX_NETWORKS} networks, numbered from 0"
-        raise StreamContentError(f"{path}: {what}")
     base = load(DEFAULT_SCENARIO).scenario
     model = base.networks[0].robot[0]
     assert isinstance(model.reference, msgspec.Struct)  # parameters of a line

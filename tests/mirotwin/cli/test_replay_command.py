@@ -170,3 +170,26 @@ def test_a_recording_cut_short_in_its_first_bytes_is_called_truncated(
     code, out, err = mirotwin("replay", tmp_path / "run.mcap")
     assert (code, out) == (2, "")
     assert "the file ends in the middle of a record; it was cut short; copy it again" in err
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ({"network": 7}, "tick 96000: network 7, but the scenario has 1, numbered from 0"),
+        ({"tick": 96_000 + 800_800 - 1}, "starts before the transmission of tick 896799 has ended"),
+    ],
+)
+def test_a_recording_whose_characters_no_host_can_have_sent_is_refused(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path, change: dict[str, int], what: str
+) -> None:
+    def changed(period: Period) -> Period:
+        if period.index:
+            return period
+        first, *others = period.wire
+        return msgspec.structs.replace(period, wire=(msgspec.structs.replace(first, **change), *others))
+
+    path = rewritten(finished / "run.mcap", tmp_path / "odd.mcap", changed)
+    code, out, err = mirotwin("replay", path)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"mirotwin: error: {path}: ")
+    assert what in err

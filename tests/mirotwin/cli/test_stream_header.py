@@ -87,7 +87,7 @@ def test_a_built_in_scenario_is_taken_by_its_name(mirotwin: Callable[..., Result
         (f"firmware_sha256 = '{OTHER}'", "", "header: the stream is for firmware 0123456789ab.., this is"),
         ("", "2000000 *@0/1 reset 1", ":6:1: an event, which this command cannot act on; no command acts"),
         ("", "2000000 * P1.0 1", ":6:1: an event, which this command cannot act on; `mirotwin fw run"),
-        ("", "1701700 >@31 55\n1800000 >@32 55", "network 32: a scenario has at most 32 networks"),
+        ("", "1701700 >@31 55\n1800000 >@32 55", "tick 1800000: network 32, but the scenario has 32"),
         (
             "",
             "1701700 >@1 55\n1702000 >@1 55",
