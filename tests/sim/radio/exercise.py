@@ -42,8 +42,9 @@ def exercise(seed: int, radio: RadioParams) -> str:
     for period in range(15):
         begin = period * PERIOD
         data = bytes(payload.u32(period * 23 + i) & 255 for i in range(23))
-        down.send(begin + 96_000, data)
-        neighbour.send(begin + 350_000, data[::-1])
+        bad_stop = tuple(i for i in range(23) if period % 2 and data[i] % 4 == 0)
+        down.send(begin + 96_000, data, bad_stop)
+        neighbour.send(begin + 350_000, data[::-1], bad_stop)
         for i, level in enumerate(wire_bits(data[:19])):
             txd[period % ROBOTS].append(begin + 1000 + 2496 * i, level)
         for until in (begin + 123_456, begin + PERIOD):
