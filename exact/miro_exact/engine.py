@@ -18,6 +18,8 @@ from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec, SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 
+from miro_exact.bad_input import BadInput
+
 PACKAGES = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim")
 ENGINES = ("compiled", "python")
 DISPATCH_MARK = b"mirotwin: dispatch replicated"
@@ -26,8 +28,11 @@ _CIMPORT = re.compile(r"^from (\S+) cimport ([^#\n]+)", re.MULTILINE)
 REMEDY = "reinstall with `pip install -e .` (or `pip install .`), or run with `--engine python`"
 
 
-class EngineError(ImportError):
+class EngineError(BadInput, ImportError):  # type: ignore[misc]  # both have a `path`, which here is ""
     """A compiled module that does not belong to its source, or an engine that is not there."""
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__("", "", what, remedy)
 
 
 def hot_sources(package_dirs: dict[str, Path]) -> dict[str, Path]:
@@ -97,7 +102,7 @@ def refuse_if_stale(name: str, stamp: str) -> None:
     """Called by every compiled module at import with the hash it was built from."""
     expected = _installed_hashes().get(name)
     if expected != stamp:
-        raise EngineError(f"compiled {name} is stale: its source has changed since it was built; {REMEDY}")
+        raise EngineError(f"compiled {name} is stale: its source has changed since it was built", REMEDY)
 
 
 def compiled_file(source: Path) -> Path | None:
@@ -161,14 +166,13 @@ def select(engine: str) -> None:
     has no compiled twin.
     """
     if engine not in ENGINES:
-        raise EngineError(f"unknown engine {engine!r}: choose one of {', '.join(ENGINES)}")
+        raise EngineError(f"unknown engine {engine!r}", f"choose one of {', '.join(ENGINES)}")
     finder = install()
     if finder.engine not in (None, engine):
-        raise EngineError(
-            f"engine {finder.engine} is already in use in this process, cannot change to {engine}"
-        )
+        what = f"engine {finder.engine} is already in use in this process, cannot change to {engine}"
+        raise EngineError(what, "select the engine before anything else is imported")
     if engine == "compiled" and finder.missing():
-        raise EngineError(f"no compiled module for {', '.join(finder.missing())}; {REMEDY}")
+        raise EngineError(f"no compiled module for {', '.join(finder.missing())}", REMEDY)
     finder.engine = engine
 
 

@@ -18,16 +18,16 @@ from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, Generic, TypeVar
 
+from miro_exact.bad_input import BadInput
+
 Part = TypeVar("Part")
 
 
-class PartError(ValueError):
+class PartError(BadInput):
     """A part that cannot be found, loaded or used: `what` and `remedy`."""
 
     def __init__(self, what: str, remedy: str = "") -> None:
-        self.what = what
-        self.remedy = remedy
-        super().__init__(f"{what}; {remedy}" if remedy else what)
+        super().__init__("", "", what, remedy)
 
 
 class Registry(Generic[Part]):

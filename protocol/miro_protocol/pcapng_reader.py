@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from io import BytesIO
 from typing import Protocol
 
+from miro_exact.bad_input import BadInput
 from miro_protocol.pcapng import (
     BYTE_ORDER,
     ENHANCED,
@@ -53,15 +54,12 @@ class Readable(Protocol):
         ...
 
 
-class CaptureError(Exception):
+class CaptureError(BadInput):
     """A capture that cannot be read on: file, offset of the block, the reason, and what to do about it."""
 
     def __init__(self, source: str, offset: int, reason: str, remedy: str) -> None:
-        super().__init__(f"{source}: offset {offset}: {reason}; {remedy}")
-        self.source = source
+        super().__init__(source, f"offset {offset}", reason, remedy)
         self.offset = offset
-        self.reason = reason
-        self.remedy = remedy
 
 
 def iterate(

@@ -17,6 +17,8 @@ from pathlib import Path
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
+
 SIDES = ("left", "right")
 CHIP_INPUTS = ("cs", "rd", "wr", "ps", "rst")
 PORTS = 4
@@ -27,8 +29,8 @@ CONSTANT_BANK = PORTS + MAX_LATCHES
 _PORT_PIN = re.compile(r"P([0-3])\.([0-7])$")
 
 
-class WiringError(ValueError):
-    """A board file that cannot be built; the message names file, net and remedy."""
+class WiringError(BadInput):
+    """A board file that cannot be built: file, key, what, remedy."""
 
 
 class Latch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -67,7 +69,7 @@ class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """(bank, bit, inverted) that drives an LM629 input."""
         net = f"{side}.{pin}"
         if net not in self.nets:
-            raise WiringError(f"{self.name}: nets: {net} is not connected; add a line for it")
+            raise WiringError(self.name, "nets", f"{net} is not connected", "add a line for it")
         source = self.nets[net]
         inverted = int(source.startswith("!"))
         name = source.lstrip("!")
@@ -77,7 +79,7 @@ class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             return int(match[1]), int(match[2]), inverted
         latch, dot, bit = name.partition(".")
         if not dot or bit not in tuple("01234567"):
-            raise WiringError(f"{self.name}: nets: {net} = {source!r} is no source of an LM629 input")
+            raise WiringError(self.name, "nets", f"{net} = {source!r} is no source of an LM629 input")
         return self._latch_bank(latch, net), int(bit), inverted
 
     def cpu_inputs(self) -> list[tuple[int, int, str, int]]:
@@ -87,13 +89,13 @@ class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if match := _PORT_PIN.match(net):
                 inputs.append((int(match[1]), int(match[2]), source.lstrip("!"), int(source.startswith("!"))))
             elif net.partition(".")[0] not in SIDES or net.partition(".")[2] not in CHIP_INPUTS:
-                raise WiringError(f"{self.name}: nets: {net} is neither a port pin nor an LM629 input")
+                raise WiringError(self.name, "nets", f"{net} is neither a port pin nor an LM629 input")
         for port, _, source, _ in inputs:
             if source not in ("left.hi", "right.hi", "slot.0", "slot.1", "slot.2", "three", "0", "1"):
-                raise WiringError(f"{self.name}: nets: {source!r} cannot drive a pin of P{port}")
+                raise WiringError(self.name, "nets", f"{source!r} cannot drive a pin of P{port}")
             if f"P{port}" == self.data:
                 raise WiringError(
-                    f"{self.name}: nets: P{port} is the data bus, nothing else can drive its pins"
+                    self.name, "nets", f"P{port} is the data bus, nothing else can drive its pins"
                 )
         return inputs
 
@@ -101,7 +103,7 @@ class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         for index, latch in enumerate(self.latch):
             if latch.name == name:
                 return PORTS + index
-        raise WiringError(f"{self.name}: {net}: there is no latch called {name!r}")
+        raise WiringError(self.name, net, f"there is no latch called {name!r}")
 
 
 def load_wiring(path: Path | None = None) -> Wiring:
@@ -111,11 +113,11 @@ def load_wiring(path: Path | None = None) -> Wiring:
         text = path.read_text("utf-8") if path else _builtin("miro.toml")
         wiring = msgspec.convert(tomllib.loads(text), Wiring)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
-        raise WiringError(f"{origin}: {error}") from error
+        raise WiringError(origin, "", f"{error}") from error
     if len(wiring.latch) > MAX_LATCHES:
-        raise WiringError(f"{origin}: latch: {len(wiring.latch)} latches, at most {MAX_LATCHES} fit")
+        raise WiringError(origin, "latch", f"{len(wiring.latch)} latches, at most {MAX_LATCHES} fit")
     if wiring.crystal_hz != 24_000_000:
-        raise WiringError(f"{origin}: crystal_hz: only 24000000 is supported, time is counted in its ticks")
+        raise WiringError(origin, "crystal_hz", "only 24000000 is supported, time is counted in its ticks")
     wiring.data_bank()
     wiring.cpu_inputs()
     for side in SIDES:

@@ -7,20 +7,19 @@ import os
 import stat
 from pathlib import Path
 
+from miro_exact.bad_input import BadInput
+
 TEXT_BYTES = 64 << 20
 """For what is written by hand or by a tool chain: scenarios, images, streams, serial input."""
 RECORDING_BYTES = 16 << 30
 CHUNK_BYTES = 1 << 20
 
 
-class InputError(ValueError):
+class InputError(BadInput):
     """A file that is not read: `path`, what, remedy."""
 
     def __init__(self, path: str, what: str, remedy: str) -> None:
-        self.path = path
-        self.what = what
-        self.remedy = remedy
-        super().__init__(f"{path}: {what}; {remedy}")
+        super().__init__(path, "", what, remedy)
 
 
 def check_no_folder(path: str | Path, likely: str = "") -> None:

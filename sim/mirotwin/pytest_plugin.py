@@ -65,8 +65,7 @@ class FirmwareCoverage:
     def __init__(self, config: pytest.Config) -> None:
         from miro_robot.inspect.counters import Counters
         from miro_robot.mcs51.cpu import on_load
-        from miro_sim.inputs import InputError
-        from mirotwin.files.outputs import OutputError, check_file, check_not_input
+        from mirotwin.files.outputs import check_file, check_not_input
 
         self.config = config
         self.out = Path(config.getoption("--firmware-coverage"))
@@ -78,7 +77,7 @@ class FirmwareCoverage:
             check_file(self.out, "--firmware-coverage")
             check_not_input(self.out, "--firmware-coverage", self.image.path)
             _check_folders(config.getoption("--firmware-sources"))
-        except (InputError, OutputError, ValueError) as error:
+        except ValueError as error:
             raise pytest.UsageError(str(error)) from None
         on_load.set(self.watch)
 

@@ -54,7 +54,7 @@ def test_our_own_law_is_found_without_a_look_at_other_distributions(monkeypatch)
 
 
 def test_naming_laws_imports_none_of_them():
-    code = "import sys, mirotwin.cli; print([name for name in sys.modules if name.startswith('miro_host')])"
+    code = "import sys, miro_sim.scenario.keys; print([name for name in sys.modules if name.startswith('miro_host')])"
     done = children.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "miro_host.laws.registry" in done.stdout
     for name in ("miro_host.laws.yang_kim", "miro_host.estimators.predict", "miro_host.reference"):

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.mirotwin.synthetic import periods
 
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_host.posture import Posture
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
@@ -17,7 +18,6 @@ from miro_sim.scenario.places import check_places
 from mirotwin.capture.frame_list import frame_lines
 from mirotwin.replay.compare import compare
 from mirotwin.replay.script import (
-    StreamContentError,
     robots_of_stream,
     scenario_of_stream,
     script_of,
@@ -139,7 +139,7 @@ def test_answers_in_a_stream_are_not_sent() -> None:
     ],
 )
 def test_a_stream_that_cannot_have_been_sent_is_refused(sent: list[Transmission], expected: str) -> None:
-    with pytest.raises(StreamContentError, match=expected):
+    with pytest.raises(BadInput, match=expected):
         scenario_of_stream(sent, "a.txt")
 
 

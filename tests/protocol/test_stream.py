@@ -160,7 +160,8 @@ def test_a_wrong_line_is_named_with_place_reason_and_remedy(text, line, column, 
     with pytest.raises(StreamError) as caught:
         stream.parse(text, "game.stream")
     error = caught.value
-    assert reason in error.reason
+    assert (error.path, error.place) == ("game.stream", (line, column))
+    assert reason in error.what
     assert remedy in error.remedy
     assert (error.source, error.line, error.column) == ("game.stream", line, column)
     assert str(error).startswith(f"game.stream:{line}:{column}: ")

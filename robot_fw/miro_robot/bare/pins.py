@@ -19,6 +19,7 @@ import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from miro_exact.bad_input import BadInput
 from miro_robot.bare.input import MARGIN_TICKS, SLICE
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.line import FAR
@@ -28,10 +29,6 @@ _LATEST_TICK = 1 << 60
 _MOST_RXD = 2_000  # edges handed over at a time: the line keeps 4096
 _LINE = re.compile(r"(\d{1,20})\s+\*\s+P([0-3])\.([0-7])\s+([01])", re.ASCII)
 _FORM = "write TICK * P1.0 0|1, such as 24000 * P3.2 0"
-
-
-class PinError(ValueError):
-    """A file of pins that is refused: its name, the line, what is wrong, and what to do."""
 
 
 class PinEvent(NamedTuple):
@@ -44,7 +41,7 @@ class PinEvent(NamedTuple):
 
 
 def read_pins(text: str, path: str) -> tuple[PinEvent, ...]:
-    """The events of a file. Raises PinError."""
+    """The events of a file. Raises BadInput."""
     events: list[PinEvent] = []
     last: dict[tuple[int, int], int] = {}  # tick of the last event of a pin
     for number, line in enumerate(text.split("\n"), 1):
@@ -53,19 +50,19 @@ def read_pins(text: str, path: str) -> tuple[PinEvent, ...]:
             continue
         match = _LINE.fullmatch(content)
         if match is None:
-            raise PinError(f"{path}:{number}: {content[:40]!r} is no pin event; {_FORM}")
+            raise BadInput(path, number, f"{content[:40]!r} is no pin event", _FORM)
         event = PinEvent(*(int(part) for part in match.groups()))
         if event.tick > _LATEST_TICK:
-            raise PinError(f"{path}:{number}: tick {event.tick} is too late; use ticks up to {_LATEST_TICK}")
+            raise BadInput(path, number, f"tick {event.tick} is too late", f"use ticks up to {_LATEST_TICK}")
         if events and event.tick < events[-1].tick:
             before = events[-1].tick
-            raise PinError(
-                f"{path}:{number}: tick {event.tick} comes after tick {before}; sort the lines by tick"
+            raise BadInput(
+                path, number, f"tick {event.tick} comes after tick {before}", "sort the lines by tick"
             )
         if last.get((event.port, event.bit)) == event.tick:
             pin = f"P{event.port}.{event.bit}"
-            raise PinError(
-                f"{path}:{number}: {pin} has a level at tick {event.tick} already; leave one line out"
+            raise BadInput(
+                path, number, f"{pin} has a level at tick {event.tick} already", "leave one line out"
             )
         last[event.port, event.bit] = event.tick
         events.append(event)

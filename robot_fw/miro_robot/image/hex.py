@@ -13,6 +13,7 @@ from pathlib import Path
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
 from miro_robot.image.evidence import check_cdb, check_map
 from miro_robot.image.symbols import Symbols
 
@@ -22,16 +23,8 @@ _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START_LINEAR = range(6)  # reco
 _REBUILD = "rebuild the image, or copy it again in full"
 
 
-class ImageError(ValueError):
-    """An image that cannot be used: which file, which line (0: the whole file), why, and what to do."""
-
-    def __init__(self, path: Path, line: int, reason: str, remedy: str) -> None:
-        self.path = path
-        self.line = line
-        self.reason = reason
-        self.remedy = remedy
-        place = f"{path}:{line}" if line else str(path)
-        super().__init__(f"{place}: {reason}; {remedy}")
+class ImageError(BadInput):
+    """An image that cannot be used: file, line (0: the whole file), what, remedy."""
 
 
 class Image(msgspec.Struct, frozen=True):

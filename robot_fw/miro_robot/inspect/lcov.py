@@ -12,6 +12,8 @@ from collections.abc import Iterable, Mapping
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
+
 Branch = tuple[int, int, int]
 """(line, block, branch): a block is one conditional jump of the line, branch 0 jumps, branch 1 goes on."""
 
@@ -41,13 +43,6 @@ _DROPPED = (*_DERIVED, "TN", "VER")
 _LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"  # where str.splitlines cuts
 _NAME_ANOTHER = "give a file that was written as lcov tracefile"
 _USE_LCOV = "add the files up with `lcov --add-tracefile`"
-
-
-class TracefileError(ValueError):
-    """A text that is no tracefile, or holds counts that have no place here: file, line, what, remedy."""
-
-    def __init__(self, path: str, line: int, what: str, remedy: str) -> None:
-        super().__init__(f"{path}:{line}: {what}; {remedy}")
 
 
 class FileRecord(msgspec.Struct):
@@ -117,13 +112,13 @@ def _in_one_line(name: str) -> str:
 
 
 def decode(text: str, path: str) -> Tracefile:
-    """A tracefile, also another program's. Raises TracefileError naming `path` and the line."""
+    """A tracefile, also another program's. Raises BadInput with `path` and the line."""
     reader = _Reader()
     for number, line in enumerate(text.splitlines(), start=1):
         try:
             reader.take(line.strip())
         except _Refused as refused:
-            raise TracefileError(path, number, refused.what, refused.remedy) from None
+            raise BadInput(path, number, refused.what, refused.remedy) from None
     found: Tracefile = {}
     for name, part in reader.parts:
         add(found, {name: part})

@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.parts import REGISTRIES, struct_of
 
@@ -54,7 +55,6 @@ MORE_UNITS = (
     "uh",
     "mnm",
 )
-LONGEST_END = 300  # characters of each end of a long message that are shown
 TYPE_NAMES = {
     "float": "a number",
     "int": "a whole number",
@@ -65,29 +65,8 @@ TYPE_NAMES = {
 }
 
 
-class ScenarioError(ValueError):
-    """A scenario that cannot be used: `origin` (file or built-in name), `place` (key path or line), what,
-    remedy.
-    """
-
-    def __init__(self, origin: str, place: str, what: str, remedy: str = "") -> None:
-        self.origin = origin
-        self.place = place
-        self.what = what
-        self.remedy = remedy
-        place, what, remedy = (_shortened(part) for part in (place, what, remedy))
-        head = f"{origin}: {place}: {what}" if place else f"{origin}: {what}"
-        super().__init__(one_line(f"{head}; {remedy}" if remedy else head))
-
-
-def one_line(text: str) -> str:
-    """The text with everything that a terminal would not print as it stands escaped."""
-    return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)
-
-
-def _shortened(text: str) -> str:
-    """The text without the middle of what nobody reads to its end: a value or a key of a megabyte."""
-    return text if len(text) <= 2 * LONGEST_END else f"{text[:LONGEST_END]} .. {text[-LONGEST_END:]}"
+class ScenarioError(BadInput):
+    """A scenario that cannot be used: file or built-in name, key path or line, what, remedy."""
 
 
 def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError:

@@ -143,7 +143,7 @@ def _fill_in_profiles(raw: dict[str, Any], origin: str) -> None:
                 network["radio"] = with_profiles(network["radio"])
             except ProfileError as error:
                 place = f"network[{index}].radio.profile"
-                raise ScenarioError(origin, place, str(error), error.remedy) from None
+                raise ScenarioError(origin, place, error.what, error.remedy) from None
 
 
 def _syntax_error(origin: str, text: str, message: str) -> ScenarioError:

@@ -11,18 +11,19 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
+from miro_exact.bad_input import BadInput
+
 ERROR_KEYS = ("bit_error_rate", "eb_n0_db")
 """Two ways to say one thing: a table that has one of them takes the other one away."""
 
 Table = dict[str, Any]
 
 
-class ProfileError(ValueError):
-    """A `profile` that names none, or does not go with the rest; `remedy` is what to write instead."""
+class ProfileError(BadInput):
+    """A `profile` that names none, or does not go with the rest: what, and what to write instead."""
 
     def __init__(self, what: str, remedy: str) -> None:
-        super().__init__(what)
-        self.remedy = remedy
+        super().__init__("", "profile", what, remedy)
 
 
 @cache

@@ -8,6 +8,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 
+from miro_exact.bad_input import BadInput
 from miro_protocol import pcapng, stream
 from miro_protocol.stream_line import FIRST_LINE, needs_version_2
 from miro_protocol.transmission import Transmission, character_ticks
@@ -17,11 +18,11 @@ from mirotwin.capture.rows import rows
 PIECE_BYTES = 1 << 16
 
 
-class ConversionError(ValueError):
+class ConversionError(BadInput):
     """Transmissions that the other format cannot hold: tick, what, remedy."""
 
     def __init__(self, tick: int, what: str, remedy: str) -> None:
-        super().__init__(f"tick {tick}: {what}; {remedy}")
+        super().__init__("", f"tick {tick}", what, remedy)
 
 
 def to_pcapng(sent: Iterable[Transmission]) -> Iterator[bytes]:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import re
 
+from miro_exact.bad_input import BadInput
+
 BOM = b"\xef\xbb\xbf"
 _SEPARATORS = rb"(?:[\s,;:]|\xef\xbb\xbf)"
 _PIECES = re.compile(rb"(?:" + _SEPARATORS + rb"|0[xX]|[0-9a-fA-F]{2}|#[^\n]*+)*+")
@@ -15,15 +17,12 @@ _NOT_DIGITS = re.compile(rb"#[^\n]*|0[xX]|" + _SEPARATORS)
 _DIGIT = re.compile(rb"[0-9a-fA-F]")
 
 
-class HexError(ValueError):
+class HexError(BadInput):
     """Text that is no pair of digits: path, line and column (from 1), what, remedy."""
 
     def __init__(self, path: str, line: int, column: int, what: str) -> None:
         remedy = "write two hex digits a character, or force another --format"
-        super().__init__(f"{path}:{line}:{column}: {what}; {remedy}")
-        self.path = path
-        self.line = line
-        self.column = column
+        super().__init__(path, (line, column), what, remedy)
 
 
 class HexText:

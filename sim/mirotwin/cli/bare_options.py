@@ -16,6 +16,7 @@ import click
 import msgspec
 
 from miro_exact import clock
+from miro_exact.bad_input import BadInput
 from miro_sim.inputs import TEXT_BYTES, read_input
 from mirotwin.cli.code_place import FLASH_BYTES, SPACE_BYTES, address_of, place_of
 from mirotwin.cli.options import Place, Whole, load_image
@@ -24,7 +25,6 @@ from mirotwin.cli.program import (
     EXPECTATION_FAILED,
     FIRMWARE_FAULT,
     LIMIT_REACHED,
-    UserError,
     complain,
 )
 
@@ -147,16 +147,16 @@ def take_bare(given: dict[str, Any]) -> BareRequest:
 
 
 def load_bare_image(path: str, request: BareRequest) -> Image:
-    """Raises UserError for an image that does not fit."""
+    """Raises BadInput for an image that does not fit."""
     if request.code_in_xram and request.code_size is not None:
-        raise UserError(
-            "--code-size: program and data share 64 KB with --code-in-xram; leave one of the two out"
+        raise BadInput(
+            "", "--code-size", "program and data share 64 KB with --code-in-xram", "leave one of the two out"
         )
     return load_image(path, SPACE_BYTES if request.code_in_xram else request.code_size or FLASH_BYTES)
 
 
 def target_of(path: str, image: Image, request: BareRequest) -> int | None:
-    """The address of --until. Raises UserError."""
+    """The address of --until. Raises BadInput."""
     return None if request.until is None else address_of(request.until, image, path, "--until")
 
 
@@ -166,7 +166,7 @@ def make_machine(
     output: Callable[[bytes], object] | None = None,
     live: bool = False,
 ) -> BareMachine:
-    """The machine that was asked for; the engine is fixed already. Raises UserError, and errors of the files read."""
+    """The machine that was asked for; the engine is fixed already. Raises BadInput, and errors of the files read."""
     from miro_robot.bare.machine import BareMachine
 
     pieces = _pieces(request)
@@ -185,7 +185,9 @@ def make_machine(
             pins=pins,
         )
     except ValueError as error:
-        raise UserError(f"--{error}" if str(error).startswith("baud") else f"--pins: {error}") from None
+        raise BadInput(
+            "", "", f"--{error}" if str(error).startswith("baud") else f"--pins: {error}"
+        ) from None
 
 
 def report(machine: BareMachine, ended: Ended, request: BareRequest) -> int:
@@ -231,17 +233,22 @@ def _pieces(request: BareRequest) -> tuple[Piece, ...]:
     if not files:
         for name in ("--stdin-when", "--stdin-by-line", "--stdin-after", "--stdin-gap"):
             if name in request.given():
-                raise UserError(f"{name}: there is no --stdin that it could apply to; give both")
+                raise BadInput("", name, "there is no --stdin that it could apply to", "give both")
     if b"" in texts:
-        raise UserError("--stdin-when: the empty string is no text; say what the program sends first")
+        raise BadInput("", "--stdin-when", "the empty string is no text", "say what the program sends first")
     if request.stdin.count(STDIN) > 1:
-        raise UserError("--stdin: standard input can be read once only; name a file instead of the second -")
+        raise BadInput(
+            "", "--stdin", "standard input can be read once only", "name a file instead of the second -"
+        )
     if texts and len(texts) not in (files, files - 1):
-        raise UserError(
-            f"--stdin-when: {len(texts)} for {files} --stdin; give one for each --stdin, or for each but the first"
+        raise BadInput(
+            "",
+            "--stdin-when",
+            f"{len(texts)} for {files} --stdin",
+            "give one for each --stdin, or for each but the first",
         )
     if request.stdin_by_line and not texts:
-        raise UserError("--stdin-by-line: says that lines wait for --stdin-when; give that too")
+        raise BadInput("", "--stdin-by-line", "says that lines wait for --stdin-when", "give that too")
     delay = _ticks(request.stdin_after, request)
     pieces: list[Piece] = []
     for path, when in zip(request.stdin, [b""] * (files - len(texts)) + texts, strict=True):
@@ -255,19 +262,16 @@ def _stdin_bytes(path: str) -> bytes:
     if path != STDIN:
         return read_input(path)
     if vars(sys)["stdin"] is None:
-        raise UserError("--stdin: standard input is closed; name a file")
+        raise BadInput("", "--stdin", "standard input is closed", "name a file")
     data = sys.stdin.buffer.read(TEXT_BYTES + 1)
     if len(data) > TEXT_BYTES:
-        raise UserError(f"--stdin: standard input holds more than {TEXT_BYTES >> 20} MiB; give less")
+        raise BadInput("", "--stdin", f"standard input holds more than {TEXT_BYTES >> 20} MiB", "give less")
     return data
 
 
 def _pins(request: BareRequest) -> tuple[PinEvent, ...]:
-    from miro_robot.bare.pins import PinError, read_pins
+    from miro_robot.bare.pins import read_pins
 
     if request.pins is None:
         return ()
-    try:
-        return read_pins(read_input(request.pins).decode("utf-8", errors="replace"), request.pins)
-    except PinError as error:
-        raise UserError(str(error)) from None
+    return read_pins(read_input(request.pins).decode("utf-8", errors="replace"), request.pins)

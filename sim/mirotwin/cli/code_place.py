@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from mirotwin.cli.program import UserError
+from miro_exact.bad_input import BadInput
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
@@ -27,14 +27,14 @@ def address_of(text: str, image: Image, path: str, option: str) -> int:
         try:
             address = int(text, 16)
         except ValueError:
-            raise UserError(f"{option}: {text} is not a hexadecimal number") from None
+            raise BadInput("", option, f"{text} is not a hexadecimal number") from None
         if address >= SPACE_BYTES:
-            raise UserError(f"{option}: {text} is beyond the last code address; use 0x0000 to 0xffff")
+            raise BadInput("", option, f"{text} is beyond the last code address", "use 0x0000 to 0xffff")
         return address
     if not text:
-        raise UserError(f"{option}: the empty string is no place; give a symbol or an address as 0x..")
+        raise BadInput("", option, "the empty string is no place", "give a symbol or an address as 0x..")
     if text.isascii() and text.isdecimal() and len(text) <= 6:
-        raise UserError(f"{option}: {text} is no symbol; write {int(text):#x} for an address")
+        raise BadInput("", option, f"{text} is no symbol", f"write {int(text):#x} for an address")
     for name in (text, text.removeprefix("_")):
         found = image.symbols.find(name)
         if found is not None and found.space == "code":
@@ -47,7 +47,7 @@ def address_of(text: str, image: Image, path: str, option: str) -> int:
         remedy = "see the map beside the image"
     else:
         remedy = "put its .map or .cdb beside it, or give an address as 0x.."
-    raise UserError(f"{path}: {option}: no symbol {text} in the code; {remedy}")
+    raise BadInput(path, option, f"no symbol {text} in the code", remedy)
 
 
 def functions_at(places: Iterable[str], image: Image, names: SymbolNames, path: str) -> set[tuple[int, str]]:
@@ -59,8 +59,8 @@ def functions_at(places: Iterable[str], image: Image, names: SymbolNames, path: 
     for place in places:
         address = address_of(place, image, path, "--symbol")
         if not any(first <= address < end for first, end in image.used):
-            raise UserError(
-                f"{path}: --symbol: the image has no code at {address:#06x}; see mirotwin fw disasm"
+            raise BadInput(
+                path, "--symbol", f"the image has no code at {address:#06x}", "see mirotwin fw disasm"
             )
         around = names.function(address)
         by_address = place[:2].lower() == "0x"

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from miro_exact.bad_input import BadInput
 from mirotwin.cli.options import Place
-from mirotwin.cli.program import UserError
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
@@ -36,7 +36,7 @@ def sources_of(image: Image, given: Sequence[str]) -> Sources:
 
     for folder in given:
         if not Path(folder).is_dir():
-            raise UserError(f"{folder}: --sources: there is no such folder; name the one with the C files")
+            raise BadInput(folder, "--sources", "there is no such folder", "name the one with the C files")
     own = source_folder()
     return Sources([*map(Path, given), image.path.parent, *([own] if own else [])])
 

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 
 import click
 
+from miro_exact.bad_input import one_line
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DOWN, UP, Transmission
-from miro_sim.scenario.errors import one_line
 from mirotwin.capture import render
 from mirotwin.capture.detect import FORMATS, NAMES, detect
 from mirotwin.capture.input import Input

@@ -8,14 +8,16 @@ from pathlib import Path
 
 import click
 
+from miro_exact.bad_input import BadInput
 from miro_protocol.transmission import DOWN, Transmission
 from mirotwin.capture import convert
 from mirotwin.capture.detect import NAMES, TIMED, detect
 from mirotwin.capture.input import STDIN, Input
 from mirotwin.capture.layout import look
 from mirotwin.capture.source import READ_ERRORS, open_source
+from mirotwin.cli.console import show
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
-from mirotwin.cli.program import BAD_INPUT, DONE, UserError, complain, show
+from mirotwin.cli.program import BAD_INPUT, DONE, complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import check_new, check_not_input, whole_file
 
@@ -99,8 +101,8 @@ def export(
     with Input(file) as given, ProgressBar("exporting", given.size, quiet) as bar:
         format = format or detect(given.peek())[0]
         if format not in TIMED:
-            raise UserError(
-                f"{given.label}: {NAMES[format]} without times; give a recording, stream or capture"
+            raise BadInput(
+                given.label, "", f"{NAMES[format]} without times", "give a recording, stream or capture"
             )
         source = open_source(given, format, complain)
         layouts = look(source, None, complain) if to == "stream" else None
@@ -109,7 +111,7 @@ def export(
         try:
             _write(out, _some(pieces, exported, given.label))
         except convert.ConversionError as error:
-            raise UserError(f"{given.label}: {error}") from None
+            raise BadInput(given.label, error.place, error.what, error.remedy) from None
     if not quiet and out != STDIN:
         show(f"{out}: {exported.down} transmissions from the host and {exported.up} from robots")
     if exported.bad_stops and to == "pcapng":
@@ -127,7 +129,7 @@ def _some(pieces: Iterable[bytes], exported: Exported, label: str) -> Iterator[b
     yield from pieces
     if exported.network is not None and not exported.down + exported.up and exported.failure is None:
         there = ", ".join(map(str, sorted(exported.networks))) or "none"
-        raise UserError(f"{label}: --network {exported.network}: nothing of it; networks there: {there}")
+        raise BadInput(label, f"--network {exported.network}", "nothing of it", f"networks there: {there}")
 
 
 def _write(out: str, pieces: Iterable[bytes]) -> None:

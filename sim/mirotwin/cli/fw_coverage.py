@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from miro_exact.bad_input import BadInput
+from mirotwin.cli.console import show
 from mirotwin.cli.debug import sources_of, sources_option, with_debug_files
 from mirotwin.cli.options import Place
-from mirotwin.cli.program import UserError, show
 from mirotwin.cli.subject import Request, look, open_run, subject_options
 from mirotwin.files.outputs import check_new, check_not_input
 from mirotwin.report.firmware_coverage import (
@@ -43,7 +44,7 @@ def coverage(request: Request, out: Path | None, append: bool, force: bool, sour
     For an image without debug files the lines are those of its listing, written beside FILE.info as FILE.info.lst.
     """
     if append and force:
-        raise UserError("--append adds to the file, --force replaces it; give one of the two")
+        raise BadInput("", "", "--append adds to the file, --force replaces it", "give one of the two")
     total: Tracefile = {}
     if out is not None:
         _check(out, request, append or force)
@@ -61,8 +62,11 @@ def coverage(request: Request, out: Path | None, append: bool, force: bool, sour
     code = look(run, request, counters)
     report = collect(image, counts_of(counters), folders, out)
     if append and out is not None and is_of_another_image(report, out):
-        raise UserError(
-            f"{listing_path(out)}: is the listing of another image; name another file with --out, or use --force"
+        raise BadInput(
+            listing_path(out),
+            "",
+            "is the listing of another image",
+            "name another file with --out, or use --force",
         )
     add(total, report.tracefile)
     if out is not None:

@@ -8,8 +8,8 @@ import click
 import msgspec
 from rich.table import Table
 
+from mirotwin.cli.console import show
 from mirotwin.cli.debug import with_debug_files
-from mirotwin.cli.program import show
 from mirotwin.cli.subject import Request, image_name, look, open_run, subject_options
 
 if TYPE_CHECKING:

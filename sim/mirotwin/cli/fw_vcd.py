@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
+from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import PWM_PERIOD_TICKS
-from miro_sim.scenario.errors import one_line
+from mirotwin.cli.console import show
 from mirotwin.cli.options import Place
-from mirotwin.cli.program import UserError, show
 from mirotwin.cli.subject import Request, look, open_run, subject_options
 from mirotwin.files.outputs import check_new, check_not_input, whole_file
 
@@ -40,7 +40,9 @@ def vcd(request: Request, out: Path, force: bool) -> int:
         check_not_input(path, "--out", *request.files)
         check_new(path, "--out", force)
     if save == out:
-        raise UserError(f"--out {out}: that is the save file's name; give the VCD file another ending, .vcd")
+        raise BadInput(
+            "", f"--out {out}", "that is the save file's name", "give the VCD file another ending, .vcd"
+        )
     run = open_run(request)
     from miro_robot.inspect.gtkw import write_save_file
     from miro_robot.inspect.waveform import SETTLING_TICKS, Waveform
@@ -54,8 +56,8 @@ def vcd(request: Request, out: Path, force: bool) -> int:
             try:
                 waveform.close()
             except ValueError as error:
-                raise UserError(
-                    f"{request.subject}: --from {request.from_tick}: {error}; look earlier"
+                raise BadInput(
+                    request.subject, f"--from {request.from_tick}", f"{error}", "look earlier"
                 ) from None
         with save_staging.open("w", encoding="utf-8", newline="\n") as stream:
             write_save_file(stream, one_line(out.name), waveform.signals)

@@ -8,8 +8,9 @@ import click
 from rich.table import Table
 
 from miro_exact import engine as engines
+from mirotwin.cli.console import show
 from mirotwin.cli.options import choose_engine, engine_option, firmware_option, load_image
-from mirotwin.cli.program import BAD_INPUT, DONE, complain, show
+from mirotwin.cli.program import BAD_INPUT, DONE, complain
 
 PACKAGES = (
     "numpy",

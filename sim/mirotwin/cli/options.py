@@ -1,21 +1,24 @@
 """Options that several commands share, and what is loaded because of them.
 
-What belongs here: the options' words, the choice of engine, loading a firmware image. What does not: single
-commands.
+What belongs here: the options' words, the choice of engine, loading a firmware image, and what is said of parameters
+that cannot be simulated. What does not: single commands.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from miro_exact import engine as engines
+from miro_exact.bad_input import BadInput
+from miro_exact.domain import DomainError
+from miro_host.parts import PartError
 from miro_sim.inputs import TEXT_BYTES, check_regular
-from mirotwin.cli.program import UserError
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
@@ -63,19 +66,31 @@ def choose_engine(engine: str | None) -> str:
 
 
 def load_image(path: str | Path | None, limit: int = 8192) -> Image:
-    """The firmware image at `path`, or the robot's own. Raises UserError for what is no image or does not
+    """The firmware image at `path`, or the robot's own. Raises BadInput for what is no image or does not
     fit.
     """
     from miro_robot.firmware import image_path
-    from miro_robot.image import ImageError, load_hex
+    from miro_robot.image import load_hex
 
     if path is not None:
         if not os.path.exists(path):
-            raise UserError(f"{path}: there is no such file; give the path of an .ihx or .hex file")
+            raise BadInput(path, "", "there is no such file", "give the path of an .ihx or .hex file")
         check_regular(path)
         if os.path.getsize(path) > TEXT_BYTES:
-            raise UserError(f"{path}: holds more than {TEXT_BYTES >> 20} MiB; give an .ihx or .hex file")
+            raise BadInput(path, "", f"holds more than {TEXT_BYTES >> 20} MiB", "give an .ihx or .hex file")
+    return load_hex(image_path() if path is None else Path(path), limit=limit)
+
+
+@contextmanager
+def plain_parameters(label: str, done: str = "run") -> Iterator[None]:
+    """Within it, numbers with which nothing can be computed and parts that fail are bad input.
+
+    `label` names the file that they came from.
+    """
     try:
-        return load_hex(image_path() if path is None else Path(path), limit=limit)
-    except ImageError as error:
-        raise UserError(str(error)) from None
+        yield
+    except DomainError as error:
+        what = f"cannot be {done}: {error}; parameters far from any robot's can do this"
+        raise BadInput(label, "", what) from None
+    except PartError as error:
+        raise BadInput(label, "", f"cannot be {done}: {error.what}", error.remedy) from None

@@ -2,7 +2,8 @@
 mend. An error that nobody has foreseen is one line too, which asks for a report; with MIROTWIN_TRACEBACK=1 in the
 environment its traceback goes before it.
 
-What belongs here: exit codes, the translation of errors, and the two consoles. What does not: any command.
+What belongs here: exit codes, the translation of errors, single lines on stdout and stderr. What does not: any command,
+tables (`console`), and imports that `mirotwin --help` does not need.
 """
 
 import os
@@ -18,21 +19,8 @@ from types import FrameType
 from typing import Any, NoReturn
 
 import click
-from rich.console import Console, RenderableType
-from rich.text import Text
 
-from miro_exact.domain import DomainError
-from miro_exact.engine import EngineError
-from miro_host.parts import PartError
-from miro_protocol.pcapng_reader import CaptureError
-from miro_protocol.stream import StreamError
-from miro_robot.image import ImageError
-from miro_sim.inputs import InputError
-from miro_sim.scenario.errors import ScenarioError, one_line
-from mirotwin.capture.hextext import HexError
-from mirotwin.files.outputs import OutputError
-from mirotwin.recording.container import RecordingError
-from mirotwin.replay.script import StreamContentError
+from miro_exact.bad_input import BadInput, one_line
 
 DONE = 0
 EXPECTATION_FAILED = 1
@@ -47,8 +35,6 @@ SIGPIPE = 13
 SIGNALLED = 128
 """Plus the number of the signal: what a shell reports for a program that a signal ended."""
 
-PIPE_COLUMNS = 200
-
 MAX_SEED = (1 << 63) - 1
 
 
@@ -59,10 +45,6 @@ def print_version(context: click.Context, option: click.Parameter, wanted: bool)
 
         click.echo(f"mirotwin, version {version('mirotwin')}")
         context.exit()
-
-
-class UserError(Exception):
-    """What a command found wrong with its input, ready to print: `FILE: PLACE: what; remedy`."""
 
 
 class Terminated(BaseException):
@@ -77,21 +59,6 @@ class ReaderGone(Exception):
     """Nobody reads our output any more (`| head`)."""
 
 
-BAD_INPUTS = (
-    UserError,
-    ScenarioError,
-    InputError,
-    OutputError,
-    RecordingError,
-    StreamError,
-    StreamContentError,
-    CaptureError,
-    HexError,
-    EngineError,
-    ImageError,
-)
-
-
 def complain(message: str) -> None:
     """One line on stderr, whatever the message holds."""
     click.echo(f"mirotwin: {one_line(message)}", err=True)
@@ -100,39 +67,6 @@ def complain(message: str) -> None:
 def show_line(text: str) -> None:
     """One line on stdout, whatever the text holds: names in files of others may hold codes that a terminal obeys."""
     click.echo(one_line(text.expandtabs()))
-
-
-class _Plain(Console):
-    """A console for text of others: each string (a cell of a table, too) is one line without control characters."""
-
-    def render_str(self, text: str, **options: Any) -> Text:
-        return super().render_str(one_line(text), **options)
-
-
-def show(result: RenderableType) -> None:
-    """Prints a result on stdout; what goes to a file or a pipe is not folded at 80 columns nor padded."""
-    if sys.stdout.isatty():
-        _Plain(highlight=False, markup=False).print(result)
-        return
-    console = _Plain(highlight=False, markup=False, width=PIPE_COLUMNS)
-    with console.capture() as capture:
-        console.print(result)
-    click.echo("\n".join(line.rstrip(" ") for line in capture.get().split("\n")), nl=False)
-
-
-@contextmanager
-def plain_parameters(label: str, done: str = "run") -> Iterator[None]:
-    """Within it, numbers with which nothing can be computed and parts that fail are the user's.
-
-    `label` names the file they came from.
-    """
-    try:
-        yield
-    except DomainError as error:
-        what = f"cannot be {done}: {error}; parameters far from any robot's can do this"
-        raise UserError(f"{label}: {what}") from None
-    except PartError as error:
-        raise UserError(f"{label}: cannot be {done}: {error}") from None
 
 
 def _report(error: Exception) -> None:
@@ -235,7 +169,7 @@ class Program(click.Group):
         except click.ClickException as error:
             complain(f"error: {error.format_message()}")
             return BAD_INPUT
-        except BAD_INPUTS as error:
+        except BadInput as error:
             complain(f"error: {error}")
             return BAD_INPUT
         except (ReaderGone, BrokenPipeError):

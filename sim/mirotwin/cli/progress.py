@@ -11,7 +11,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from miro_sim.scenario.errors import one_line
+from miro_exact.bad_input import one_line
 
 PATIENCE_S = 1.0
 

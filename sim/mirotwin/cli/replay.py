@@ -7,14 +7,16 @@ from collections.abc import Sequence
 import click
 from rich.table import Table
 
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import seconds
 from miro_protocol.transmission import DOWN
 from miro_sim.periods import Period
 from mirotwin import runner
 from mirotwin.capture.frame_list import FrameLine, frame_lines
 from mirotwin.capture.recorded import transmissions_of
-from mirotwin.cli.options import Place, engine_option, firmware_option
-from mirotwin.cli.program import DIVERGENCE, DONE, UserError, complain, plain_parameters, show
+from mirotwin.cli.console import show
+from mirotwin.cli.options import Place, engine_option, firmware_option, plain_parameters
+from mirotwin.cli.program import DIVERGENCE, DONE, complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import Job, load_job
 from mirotwin.cli.run import report_faults
@@ -61,7 +63,7 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
             with plain_parameters(file, "replayed"):
                 runner.run(world, None, False, check)
         except TransmissionError as error:
-            raise UserError(f"{file}: cannot be replayed beyond tick {world.tick}: {error}") from None
+            raise BadInput(file, "", f"cannot be replayed beyond tick {world.tick}: {error}") from None
     if not quiet:
         _print_frames(job, replayed, everything)
     faults = report_faults(world)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
 from miro_protocol import stream
 from miro_protocol.transmission import Transmission
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
@@ -21,7 +22,7 @@ from miro_sim.scenario.keys import Scenario
 from mirotwin.capture.detect import detect
 from mirotwin.capture.input import HEAD_BYTES
 from mirotwin.cli.options import choose_engine, load_image
-from mirotwin.cli.program import UserError, complain
+from mirotwin.cli.program import complain
 from mirotwin.files.outputs import RECORDING
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
@@ -63,18 +64,16 @@ def _refuse_other_formats(data: bytes, path: str) -> None:
     format, _ = detect(data[:HEAD_BYTES])
     if format == "pcapng":
         remedy = "make a stream file of it with `mirotwin export --out NAME.stream`"
-        raise UserError(f"{path}: offset 0: a capture, which cannot be replayed; {remedy}")
+        raise BadInput(path, "offset 0", "a capture, which cannot be replayed", remedy)
     if format != "stream" and b"\0" in data[:4096]:
         what = "neither a recording nor a stream file (UTF-8 text)"
-        raise UserError(
-            f"{path}: offset 0: {what}; give a run.mcap that `mirotwin run` wrote, or a stream file"
-        )
+        raise BadInput(path, "offset 0", what, "give a run.mcap that `mirotwin run` wrote, or a stream file")
 
 
 def _job_of_recording(recording: Recording, path: str) -> Job:
     source = recording.source
     if not recording.periods:
-        raise UserError(f"{path}: the recording holds no control period; nothing can be replayed")
+        raise BadInput(path, "", "the recording holds no control period", "nothing can be replayed")
     scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml")
     script = script_of(recording.periods)
     check_script(script, path, len(scenario.networks))
@@ -90,8 +89,8 @@ def _job_of_stream(given: stream.Stream, path: str) -> Job:
 def _refuse_what_cannot_be_done(header: stream.Header, path: str) -> None:
     for key in ("set", "expect"):
         if getattr(header, key) is not None:
-            what = f"header: {key} is not carried out by this version"
-            raise UserError(f"{path}: {what}; remove it, or write the whole scenario as [scenario]")
+            what = f"{key} is not carried out by this version"
+            raise BadInput(path, "header", what, "remove it, or write the whole scenario as [scenario]")
 
 
 def _check_firmware(header: stream.Header, image: Image, path: str, firmware: str | None) -> None:
@@ -101,18 +100,15 @@ def _check_firmware(header: stream.Header, image: Image, path: str, firmware: st
         return
     what = f"the stream is for firmware {wanted[:12]}.., this is {image.sha256[:12]}.. ({image.path})"
     if firmware is None:
-        raise UserError(f"{path}: header: {what}; name the image with --firmware")
+        raise BadInput(path, "header", what, "name the image with --firmware")
     complain(f"{path}: {what}")
 
 
 def _recorded_image(recording: Recording, path: str) -> Image:
     """The image in the recording, with the symbols it had when it was recorded."""
-    from miro_robot.image import ImageError, Symbol, Symbols, parse_hex
+    from miro_robot.image import Symbol, Symbols, parse_hex
 
     source = recording.source
-    try:
-        image = parse_hex(source.firmware, Path(path) / "firmware.ihx")
-    except ImageError as error:
-        raise UserError(str(error)) from None
+    image = parse_hex(source.firmware, Path(path) / "firmware.ihx")
     symbols = Symbols({name: Symbol(address, space) for name, (address, space) in source.symbols.items()})
     return msgspec.structs.replace(image, symbols=symbols)

@@ -9,13 +9,23 @@ from typing import TYPE_CHECKING
 import click
 from rich.table import Table
 
+from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText, load
 from mirotwin import runner
+from mirotwin.cli.console import show
 from mirotwin.cli.held_signals import held_signals
-from mirotwin.cli.options import Place, Whole, choose_engine, engine_option, firmware_option, load_image
-from mirotwin.cli.program import DONE, FIRMWARE_FAULT, UserError, complain, plain_parameters, show
+from mirotwin.cli.options import (
+    Place,
+    Whole,
+    choose_engine,
+    engine_option,
+    firmware_option,
+    load_image,
+    plain_parameters,
+)
+from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.run_files import RunFiles
 from mirotwin.files.outputs import OutputFolder
@@ -83,7 +93,7 @@ def source_of(text: ScenarioText, seed: int, image: Image, record: str) -> Sourc
     """What a recording says that a run was made from."""
     firmware = image.path.read_bytes()
     if hashlib.sha256(firmware).hexdigest() != image.sha256:
-        raise UserError(f"{image.path}: changed while it was read; start again once it is built")
+        raise BadInput(image.path, "", "changed while it was read", "start again once it is built")
     return Source(
         scenario_name=text.scenario.name,
         scenario_text=text.text,

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as radio_profiles
-from mirotwin.cli.program import show as print_result
+from mirotwin.cli.console import show as print_result
 
 
 @click.group(invoke_without_command=True, short_help="Lists the built-in scenarios, or shows one.")

@@ -16,6 +16,7 @@ import click
 import msgspec
 
 from miro_exact import clock
+from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
 from miro_sim.scenario.file import builtin_names, load
 from mirotwin.cli.bare_options import (
@@ -29,8 +30,15 @@ from mirotwin.cli.bare_options import (
     take_bare,
     target_of,
 )
-from mirotwin.cli.options import Place, Whole, choose_engine, engine_option, firmware_option, load_image
-from mirotwin.cli.program import UserError, plain_parameters
+from mirotwin.cli.options import (
+    Place,
+    Whole,
+    choose_engine,
+    engine_option,
+    firmware_option,
+    load_image,
+    plain_parameters,
+)
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import load_job
 
@@ -94,18 +102,24 @@ def subject_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def open_run(request: Request) -> Run:
-    """The run that was asked for, at its first tick. Fixes the engine. Raises UserError."""
+    """The run that was asked for, at its first tick. Fixes the engine. Raises BadInput."""
     if request.to_tick is not None and request.to_tick <= request.from_tick:
-        raise UserError(
-            f"--from {request.from_tick} --to {request.to_tick}: the window is empty; --to must be later"
+        raise BadInput(
+            "",
+            f"--from {request.from_tick} --to {request.to_tick}",
+            "the window is empty",
+            "--to must be later",
         )
     if request.subject.lower().endswith(IMAGE_SUFFIXES):
         run: Run = _bare_run(request)
     else:
         run = _robot_run(request)
     if run.end_tick is not None and request.from_tick >= run.end_tick:
-        raise UserError(
-            f"{request.subject}: --from {request.from_tick}: the run ends at tick {run.end_tick}; look earlier"
+        raise BadInput(
+            request.subject,
+            f"--from {request.from_tick}",
+            f"the run ends at tick {run.end_tick}",
+            "look earlier",
         )
     return run
 
@@ -114,7 +128,7 @@ def look(run: Run, request: Request, *watchers: Watcher, early_ticks: int = 0, l
     """Runs it under the eyes of `watchers` and says how it ended; returns the exit code.
 
     They look on from `early_ticks` before the window to `late_ticks` behind it, as far as the run goes.
-    Raises UserError when the run was over before there was anything to look at.
+    Raises BadInput when the run was over before there was anything to look at.
     """
     from miro_sim.radio.downlink import TransmissionError
     from mirotwin.watched import watch
@@ -128,11 +142,11 @@ def look(run: Run, request: Request, *watchers: Watcher, early_ticks: int = 0, l
                 reached = watch(run, watchers, first_tick, last_tick, bar.to)
         except TransmissionError as error:
             now = run.cpu.cycles * clock.CYCLE_TICKS
-            raise UserError(f"{request.subject}: cannot be run beyond tick {now}: {error}") from None
+            raise BadInput(request.subject, "", f"cannot be run beyond tick {now}: {error}") from None
     if not reached:
         end = run.cpu.cycles * clock.CYCLE_TICKS
-        raise UserError(
-            f"{request.subject}: --from {request.from_tick}: the run ended at tick {end}; look earlier"
+        raise BadInput(
+            request.subject, f"--from {request.from_tick}", f"the run ended at tick {end}", "look earlier"
         )
     return _verdict(run, request)
 
@@ -146,7 +160,7 @@ def _refuse(request: Request, kind: str, *options: str) -> None:
         value = getattr(request, option)
         if value is not None and value is not False:
             name = option.replace("_", "-")
-            raise UserError(f"{request.subject}: is {kind}, --{name} does not apply to it; leave it out")
+            raise BadInput(request.subject, "", f"is {kind}, --{name} does not apply to it", "leave it out")
 
 
 def _bare_run(request: Request) -> BareRun:
@@ -161,7 +175,7 @@ def _bare_run(request: Request) -> BareRun:
 
 def _robot_run(request: Request) -> RobotRun:
     for option in request.bare.given():
-        raise UserError(f"{request.subject}: is no image, {option} does not apply to it; leave it out")
+        raise BadInput(request.subject, "", f"is no image, {option} does not apply to it", "leave it out")
     subject = request.subject
     is_path = os.path.exists(subject) or "/" in subject or "\\" in subject
     periods = None
@@ -188,16 +202,16 @@ def _which_robot(world: World, request: Request) -> tuple[int, int]:
     """(network, place among its robots) of the robot that was asked for."""
     network = request.network or 0
     if network >= len(world.networks):
-        raise UserError(
-            f"{request.subject}: --network {network}: there are {len(world.networks)}, numbered from 0"
+        raise BadInput(
+            request.subject, f"--network {network}", f"there are {len(world.networks)}, numbered from 0"
         )
     slots = [robot.spec.slot for robot in world.networks[network].robots]
     if request.robot is None:
         return network, 0
     if request.robot not in slots:
         there = ", ".join(map(str, slots))
-        raise UserError(
-            f"{request.subject}: --robot {request.robot}: no robot in that slot; there is {there}"
+        raise BadInput(
+            request.subject, f"--robot {request.robot}", "no robot in that slot", f"there is {there}"
         )
     return network, slots.index(request.robot)
 

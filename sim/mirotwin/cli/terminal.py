@@ -17,9 +17,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from miro_exact.bad_input import BadInput
 from mirotwin.cli.bare_options import STDIN, BareRequest
 from mirotwin.cli.code_place import place_of
-from mirotwin.cli.program import UserError, complain
+from mirotwin.cli.program import complain
 
 if TYPE_CHECKING:
     from miro_robot.bare.machine import BareMachine, Ended
@@ -31,17 +32,19 @@ READ_BYTES = 1024
 
 
 def check_terminal(request: BareRequest) -> None:
-    """Raises UserError where there is no terminal to be live on."""
+    """Raises BadInput where there is no terminal to be live on."""
     if vars(sys)["stdin"] is None or not sys.stdin.isatty():
-        raise UserError(
-            "--terminal: standard input is no terminal; run it in one, or give input with --stdin"
+        raise BadInput(
+            "", "--terminal", "standard input is no terminal", "run it in one, or give input with --stdin"
         )
     if STDIN in request.stdin:
-        raise UserError("--stdin: - is the keyboard, which --terminal uses already; name a file")
+        raise BadInput("", "--stdin", "- is the keyboard, which --terminal uses already", "name a file")
     try:
         import termios  # noqa: F401
     except ImportError:
-        raise UserError("--terminal: this system has no POSIX terminals; give input with --stdin") from None
+        raise BadInput(
+            "", "--terminal", "this system has no POSIX terminals", "give input with --stdin"
+        ) from None
 
 
 def run_terminal(machine: BareMachine, target: int | None, request: BareRequest) -> Ended:

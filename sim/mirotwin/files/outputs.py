@@ -16,6 +16,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
+from miro_exact.bad_input import BadInput
+
 RECORDING = "run.mcap"
 FILES = (RECORDING, "figure.png", "summary.json")
 """What a run writes; `--force` replaces these, and the parts of them that a run broken off has left."""
@@ -25,12 +27,11 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """What a disk says that takes no more: only writing can meet it, and the error names no file."""
 
 
-class OutputError(ValueError):
+class OutputError(BadInput):
     """A folder that cannot be written to: `path`, what, remedy."""
 
     def __init__(self, path: Path, what: str, remedy: str) -> None:
-        self.path = path
-        super().__init__(f"{path}: {what}; {remedy}")
+        super().__init__(path, "", what, remedy)
 
 
 def part_name(name: str) -> str:

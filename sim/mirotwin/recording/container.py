@@ -27,6 +27,7 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, McapRecord, Message, Metadata
 
+from miro_exact.bad_input import BadInput
 from mirotwin.recording.writer import MAGIC
 
 LONGEST = 256 << 20  # of a record; ours are chunks of 1 MiB and attachments of some KiB
@@ -44,15 +45,8 @@ _IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 _BAD = (McapError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
 
 
-class RecordingError(ValueError):
+class RecordingError(BadInput):
     """A file that is no whole recording: `path`, `place` (byte offset), what, remedy."""
-
-    def __init__(self, path: str, place: str, what: str, remedy: str) -> None:
-        self.path = path
-        self.place = place
-        self.what = what
-        self.remedy = remedy
-        super().__init__(f"{path}: {place}: {what}; {remedy}")
 
 
 class Cut(RecordingError):

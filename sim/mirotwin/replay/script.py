@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds, ticks
 from miro_protocol.events import Received
 from miro_protocol.stream_header import Header
@@ -26,10 +27,6 @@ AFTERMATH_TICKS = TICKS_PER_SECOND
 LONGEST_TICKS = 86_400 * TICKS_PER_SECOND
 
 
-class StreamContentError(ValueError):
-    """A stream file whose lines are well formed but cannot be sent: file, tick, what, remedy."""
-
-
 def script_of(periods: Iterable[Period]) -> list[Transmission]:
     """Everything the hosts of a recording sent."""
     return script_of_stream(sent for period in periods for sent in period.wire)
@@ -41,16 +38,16 @@ def script_of_stream(sent: Iterable[Transmission]) -> list[Transmission]:
 
 
 def check_script(script: Sequence[Transmission], path: str, networks: int) -> None:
-    """Raises StreamContentError for transmissions of a network that overlap, or that is not there."""
+    """Raises BadInput for transmissions of a network that overlap, or that is not there."""
     before: dict[int, Transmission] = {}
     for one in script:
         if one.network >= networks:
             what = f"network {one.network}, but the scenario has {networks}, numbered from 0"
-            raise StreamContentError(f"{path}: tick {one.tick}: {what}")
+            raise BadInput(path, f"tick {one.tick}", what)
         last = before.get(one.network)
         if last is not None and one.tick < last.end_tick:
             what = f"starts before the transmission of tick {last.tick} has ended (tick {last.end_tick})"
-            raise StreamContentError(f"{path}: tick {one.tick}: {what}; move it back")
+            raise BadInput(path, f"tick {one.tick}", what, "move it back")
         before[one.network] = one
 
 
@@ -71,12 +68,12 @@ def _frames(script: Iterable[Transmission], robots: int) -> int:
 def scenario_of_stream(sent: Sequence[Transmission], path: str, header: Header | None = None) -> Scenario:
     """The scenario that the header names or holds; without one the default scenario with an ideal link.
 
-    Raises StreamContentError for a stream with nothing to send, for transmissions that overlap, that take more than a
+    Raises BadInput for a stream with nothing to send, for transmissions that overlap, that take more than a
     day, or that have no place in the scenario of the header; ScenarioError for that scenario.
     """
     script = script_of_stream(sent)
     if not script:
-        raise StreamContentError(f"{path}: no line from host to robot; nothing can be replayed")
+        raise BadInput(path, "", "no line from host to robot", "nothing can be replayed")
     if header is None or header.scenario is None:
         check_script(script, path, MAX_NETWORKS)
         return _default_scenario(script, path)
@@ -85,10 +82,8 @@ def scenario_of_stream(sent: Sequence[Transmission], path: str, header: Header |
     end_tick = ticks(scenario.duration_s)
     for one in script:
         if one.end_tick > end_tick:
-            what = (
-                f"ends at tick {one.end_tick}, but the scenario ends at tick {end_tick}; raise its duration_s"
-            )
-            raise StreamContentError(f"{path}: tick {one.tick}: {what}")
+            what = f"ends at tick {one.end_tick}, but the scenario ends at tick {end_tick}"
+            raise BadInput(path, f"tick {one.tick}", what, "raise its duration_s")
     return scenario
 
 
@@ -109,7 +104,7 @@ def _default_scenario(script: Sequence[Transmission], path: str) -> Scenario:
     end_tick = max(one.end_tick for one in script) + AFTERMATH_TICKS
     if end_tick > LONGEST_TICKS:
         last = max(one.tick for one in script)
-        raise StreamContentError(f"{path}: tick {last}: more than a day; let the stream start near tick 0")
+        raise BadInput(path, f"tick {last}", "more than a day", "let the stream start near tick 0")
     count = 1 + max(one.network for one in script)
     base = load(DEFAULT_SCENARIO).scenario
     model = base.networks[0].robot[0]

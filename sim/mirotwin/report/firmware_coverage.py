@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import msgspec
 from rich.table import Table
 
-from miro_sim.inputs import InputError, read_input
-from miro_sim.scenario.errors import one_line
+from miro_exact.bad_input import one_line
+from miro_sim.inputs import read_input
 from mirotwin.files.outputs import whole_file
 
 if TYPE_CHECKING:
@@ -79,16 +79,12 @@ def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
 
 
 def read_tracefile(path: Path) -> Tracefile:
-    """What a tracefile holds, nothing if there is none yet. Raises InputError."""
-    from miro_robot.inspect.lcov import TracefileError, decode
+    """What a tracefile holds, nothing if there is none yet. Raises BadInput."""
+    from miro_robot.inspect.lcov import decode
 
     if not path.exists():
         return {}
-    try:
-        return decode(read_input(path).decode("utf-8", "surrogateescape"), str(path))
-    except TracefileError as error:
-        what, _, remedy = str(error).removeprefix(f"{path}:").partition("; ")
-        raise InputError(str(path), f"line {what}", remedy) from None
+    return decode(read_input(path).decode("utf-8", "surrogateescape"), str(path))
 
 
 def table(tracefile: Tracefile) -> Table:

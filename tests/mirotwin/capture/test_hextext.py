@@ -66,7 +66,7 @@ def read(pieces: list[bytes]) -> tuple[bytes, tuple[int, int] | None]:
             found += reader.feed(piece)
         reader.finish()
     except HexError as error:
-        return found, (error.line, error.column)
+        return found, error.place
     return found, None
 
 

@@ -317,7 +317,7 @@ def test_output_that_cannot_be_written_is_refused_before_the_run(
     (tmp_path / "x.info").write_text("hello\n")
     code, _, err = mirotwin("fw", "coverage", "fig6", "--out", tmp_path / "x.info", "--append")
     assert code == 2
-    assert "x.info: line 1: is no record of a tracefile" in err
+    assert "x.info:1: is no record of a tracefile" in err
 
 
 @pytest.mark.parametrize("command", ["trace", "coverage", "vcd"])

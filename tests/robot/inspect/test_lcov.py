@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests import children
 
-from miro_robot.inspect.lcov import FileRecord, TracefileError, add, decode, encode
+from miro_exact.bad_input import BadInput
+from miro_robot.inspect.lcov import FileRecord, add, decode, encode
 
 COUNTS = st.integers(0, 10**12)
 LINES = st.integers(1, 9999)
@@ -130,19 +131,19 @@ def test_both_forms_of_functions_say_the_same(tracefile):
     ],
 )
 def test_nothing_is_lost_without_a_word(record, said):
-    with pytest.raises(TracefileError) as caught:
+    with pytest.raises(BadInput) as caught:
         decode(LCOV_2.replace("LF:2", record), "x.info")
     assert str(caught.value).startswith(f"x.info:16: {said}")
 
 
 def test_functions_of_one_file_do_not_lend_their_lines_to_the_next():
-    with pytest.raises(TracefileError, match=r"x\.info:21: names function 0, which no FNL record"):
+    with pytest.raises(BadInput, match=r"x\.info:21: names function 0, which no FNL record"):
         decode(LCOV_2 + "TN:\nSF:b.cpp\nFNA:0,1,f\nend_of_record\n", "x.info")
 
 
 @given(st.text(max_size=200))
 def test_any_text_is_a_tracefile_or_is_refused(text):
-    with suppress(TracefileError):
+    with suppress(BadInput):
         assert isinstance(decode(text, "x.info"), dict)
 
 
@@ -151,7 +152,7 @@ def test_any_text_is_a_tracefile_or_is_refused(text):
     [("DA:1,2\n", 1), ("SF:a.c\nDA:1\n", 2), ("SF:a.c\nend_of_record\nDA:1,2\n", 3), ("TN:\nhello\n", 2)],
 )
 def test_a_record_out_of_place_is_named(text, line):
-    with pytest.raises(TracefileError, match=rf"^x\.info:{line}: .*; give a file"):
+    with pytest.raises(BadInput, match=rf"^x\.info:{line}: .*; give a file"):
         decode(text, "x.info")
 
 
@@ -172,7 +173,7 @@ def test_lcov_counts_what_is_written(tmp_path):
 
 def test_a_long_word_is_no_kind_of_record_and_is_not_repeated() -> None:
     for word in ("X" * 20_000, "\x00" * 20_000 + "A", "A\udcff"):
-        with pytest.raises(TracefileError) as caught:
+        with pytest.raises(BadInput) as caught:
             decode(f"{word}:1\n", "x.info")
         assert (
             str(caught.value)

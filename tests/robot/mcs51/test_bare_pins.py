@@ -5,9 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.robot.mcs51.test_bare import SERIAL, image
 
+from miro_exact.bad_input import BadInput
 from miro_robot.bare.input import Piece
 from miro_robot.bare.machine import BareMachine, Ended
-from miro_robot.bare.pins import PinError, PinEvent, read_pins
+from miro_robot.bare.pins import PinEvent, read_pins
 
 
 def square_wave(port, bit, count, period, begin=240):
@@ -123,7 +124,7 @@ def test_a_file_has_comments_and_empty_lines():
     ],
 )
 def test_a_line_that_is_none_is_refused_with_its_place(text, said):
-    with pytest.raises(PinError) as error:
+    with pytest.raises(BadInput) as error:
         read_pins(text, "a.pins")
     assert str(error.value).startswith(said)
 
@@ -132,6 +133,6 @@ def test_a_line_that_is_none_is_refused_with_its_place(text, said):
 def test_any_text_is_read_or_refused(text):
     try:
         events = read_pins(text, "a.pins")
-    except PinError:
+    except BadInput:
         return
     assert list(events) == sorted(events, key=lambda event: event.tick)

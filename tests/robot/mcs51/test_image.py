@@ -62,8 +62,8 @@ def test_a_damaged_image_is_refused_by_line(tmp_path, lines, line, reason):
     path = written(tmp_path, *lines)
     with pytest.raises(ImageError) as caught:
         load_hex(path)
-    assert caught.value.line == line
-    assert reason in caught.value.reason
+    assert caught.value.place == line
+    assert reason in caught.value.what
     assert caught.value.remedy
     assert str(caught.value).startswith(f"{path}:{line}: " if line else f"{path}: ")
 

@@ -35,7 +35,7 @@ def refusal(path: Path) -> ImageError:
     with pytest.raises(ImageError) as caught:
         load_hex(path)
     assert caught.value.remedy == "it belongs to another image: rebuild both together, or take it away"
-    assert str(caught.value).startswith(f"{caught.value.path}:{caught.value.line}: ")
+    assert str(caught.value).startswith(f"{caught.value.path}:{caught.value.place}: ")
     return caught.value
 
 
@@ -45,8 +45,8 @@ def test_the_map_of_the_robot_beside_a_small_program_is_refused(tmp_path):
     path.with_suffix(".map").write_text(MAP)
     error = refusal(path)
     assert error.path.name == "blink.map"
-    assert "C:   00000026  __sdcc_program_startup" in MAP.splitlines()[error.line - 1]
-    assert error.reason == (
+    assert "C:   00000026  __sdcc_program_startup" in MAP.splitlines()[error.place - 1]
+    assert error.what == (
         "the image has no bytes for 33 of 33 code symbols, the first is __sdcc_program_startup (0x0026)"
     )
 
@@ -56,8 +56,10 @@ def test_a_map_in_which_main_moved_is_refused(tmp_path):
     shutil.copy(ROBOT, path)
     path.with_suffix(".map").write_text(MAP.replace("000000E7  _main", "000000E8  _main"))
     error = refusal(path)
-    assert "000000E8  _main" in MAP.replace("000000E7  _main", "000000E8  _main").splitlines()[error.line - 1]
-    assert error.reason == "_main is at 0x00e8 here, and the image's start-up code jumps to 0x00e7"
+    assert (
+        "000000E8  _main" in MAP.replace("000000E7  _main", "000000E8  _main").splitlines()[error.place - 1]
+    )
+    assert error.what == "_main is at 0x00e8 here, and the image's start-up code jumps to 0x00e7"
 
 
 @pytest.mark.parametrize("by", [-7, -2, -1, 1, 2, 3, 30])
@@ -109,8 +111,8 @@ def test_a_debug_file_whose_instructions_stand_elsewhere_is_refused(tmp_path):
     path.with_suffix(".cdb").write_text(CDB)
     error = refusal(path)
     assert error.path.name == "robot.cdb"
-    assert CDB.splitlines()[error.line - 1].startswith("L:A$")
-    assert " of its 1165 instructions are not in the image, the first at 0x0" in error.reason
+    assert CDB.splitlines()[error.place - 1].startswith("L:A$")
+    assert " of its 1165 instructions are not in the image, the first at 0x0" in error.what
 
 
 def test_the_files_of_the_robot_belong_to_it():
@@ -235,4 +237,4 @@ def test_the_symbols_of_yesterday_are_refused_today(tmp_path):
         shutil.copy(yesterday.with_suffix(suffix), mixed.with_suffix(suffix))
         error = refusal(mixed)
         assert error.path.suffix == suffix
-        assert " instructions are not in the image, the first at 0x" in error.reason
+        assert " instructions are not in the image, the first at 0x" in error.what

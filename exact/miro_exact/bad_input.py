@@ -1,0 +1,46 @@
+"""The error of input that cannot be used: one line `FILE: PLACE: what; remedy`.
+
+What belongs here: this one class, and how its line is made. What does not: the errors of single formats, which derive
+from it where they are, and the exit code (`mirotwin.cli.program`), which follows from this class alone.
+"""
+
+from os import PathLike
+
+LONGEST_END = 300
+"""Characters of each end of a long part that are shown."""
+
+
+class BadInput(ValueError):
+    """Input that cannot be used.
+
+    `path`: the file, or what else the input came from. `place`: where in it. A line number and a (line, column), from
+    1, follow the path as in a compiler's message; a text (a key, an option, `offset 8`) stands for itself; 0 and "" are
+    the whole file. `what` is wrong, and `remedy` is what to do about it. Each may be "".
+    """
+
+    def __init__(
+        self, path: str | PathLike[str], place: str | int | tuple[int, int], what: str, remedy: str = ""
+    ) -> None:
+        self.path = path
+        self.place = place
+        self.what = what
+        self.remedy = remedy
+        head = f"{path}"
+        if isinstance(place, tuple):
+            head += f":{place[0]}:{place[1]}"
+        elif isinstance(place, int):
+            head += f":{place}" if place else ""
+        else:
+            head = ": ".join(part for part in (head, shortened(place)) if part)
+        text = ": ".join(part for part in (head, shortened(what)) if part)
+        super().__init__(one_line(f"{text}; {shortened(remedy)}" if remedy else text))
+
+
+def one_line(text: str) -> str:
+    """The text with everything that a terminal would not print as it stands escaped."""
+    return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)
+
+
+def shortened(text: str) -> str:
+    """The text without its middle where it is too long to be read: a value or a key of a megabyte."""
+    return text if len(text) <= 2 * LONGEST_END else f"{text[:LONGEST_END]} .. {text[-LONGEST_END:]}"

@@ -1,0 +1,34 @@
+"""What a command shows as its result: tables and text, on a terminal or in a pipe.
+
+What belongs here: the console, and what it does to the text of others. What does not: single lines and errors
+(`program`), which need not wait for `rich` to be loaded.
+"""
+
+import sys
+from typing import Any
+
+import click
+from rich.console import Console, RenderableType
+from rich.text import Text
+
+from miro_exact.bad_input import one_line
+
+PIPE_COLUMNS = 200
+
+
+class _Plain(Console):
+    """A console for text of others: each string (a cell of a table, too) is one line without control characters."""
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(one_line(text), **options)
+
+
+def show(result: RenderableType) -> None:
+    """Prints a result on stdout; what goes to a file or a pipe is not folded at 80 columns nor padded."""
+    if sys.stdout.isatty():
+        _Plain(highlight=False, markup=False).print(result)
+        return
+    console = _Plain(highlight=False, markup=False, width=PIPE_COLUMNS)
+    with console.capture() as capture:
+        console.print(result)
+    click.echo("\n".join(line.rstrip(" ") for line in capture.get().split("\n")), nl=False)
