@@ -50,11 +50,11 @@ SWITCH_OF_A_LOOP = re.compile(
 FLAGS = {"unix": ["-O2", "-ffp-contract=off", "-fno-fast-math", "-w"], "msvc": ["/O2", "/fp:strict"]}
 
 
-def engine():
+def hot_modules():
     """The module that knows what is hot and how it is hashed, loaded from its file: nothing is installed yet."""
-    spec = importlib.util.spec_from_file_location("engine", HERE / "exact/miro_exact/engine.py")
+    spec = importlib.util.spec_from_file_location("hot_modules", HERE / "exact/miro_exact/hot_modules.py")
     module = importlib.util.module_from_spec(spec)
-    sys.modules["engine"] = module
+    sys.modules["hot_modules"] = module
     spec.loader.exec_module(module)
     return module
 
@@ -67,13 +67,13 @@ def hot_extensions():
     dirs = package_dirs()
     return [
         Extension(name, [str(path.relative_to(HERE))], optional=True)
-        for name, path in engine().hot_sources(dirs).items()
+        for name, path in hot_modules().hot_sources(dirs).items()
     ]
 
 
 def remove_orphans():
     """Compiled twins in the tree of modules that are hot no more: Python would take them for the module itself."""
-    hot = engine().hot_sources(package_dirs())
+    hot = hot_modules().hot_sources(package_dirs())
     for package, folder in package_dirs().items():
         for built in [*folder.rglob("*.so"), *folder.rglob("*.pyd")]:
             relative = Path(package) / built.relative_to(folder).with_name(built.name.split(".")[0])
@@ -106,7 +106,7 @@ def threaded(c):
         )
         arms = re.sub(rf"^{indent}  break;\n", step.replace("\\", r"\\"), arms, flags=re.M)
         first, last = switch.span("arms")
-        mark = f'static const char dispatch[] __attribute__((used)) = "{engine().DISPATCH_MARK.decode()}";\n'
+        mark = f'static const char dispatch[] __attribute__((used)) = "{hot_modules().DISPATCH_MARK.decode()}";\n'
         return before + table + loop + head + c[switch.start() : first] + arms + c[last:] + mark
     return c
 
@@ -157,7 +157,7 @@ class BuildHot(build_ext):
 
     def _stamp(self, target):
         """Copies packages to `target` , hot modules with their stamp; unchanged files keep their time."""
-        hashes = engine().source_hashes(package_dirs())
+        hashes = hot_modules().source_hashes(package_dirs())
         hot = {}
         for package, folder in package_dirs().items():
             for path in sorted([*folder.rglob("*.py"), *folder.rglob("*.pxd")]):

@@ -5,7 +5,7 @@ import sys
 import pytest
 from tests import children
 
-from miro_exact import engine
+from miro_exact import engine, hot_modules
 
 
 def test_a_stamp_that_is_not_the_sources_hash_is_refused_with_a_remedy():
@@ -47,8 +47,8 @@ def package(tmp_path):
     ],
 )
 def test_a_module_is_stale_after_a_change_of_its_source_or_of_a_layout_it_builds_upon(package, file, stale):
-    before = engine.source_hashes({"house": package})
+    before = hot_modules.source_hashes({"house": package})
     with (package / file).open("a") as changed:
         changed.write("# changed\n")
-    after = engine.source_hashes({"house": package})
+    after = hot_modules.source_hashes({"house": package})
     assert {name for name in after if after[name] != before[name]} == stale

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from tests import children
 
-from miro_exact import engine
+from miro_exact import engine, hot_modules
 from miro_robot.mcs51 import opcodes
 
 ROOT = Path(__file__).parents[2]
@@ -36,8 +36,8 @@ def tree(tmp_path):
 
 
 def with_compiled_modules(tree):
-    for source in engine.hot_sources({"": ROOT}).values():
-        built = engine.compiled_file(source)
+    for source in hot_modules.hot_sources({"": ROOT}).values():
+        built = hot_modules.compiled_file(source)
         if built is not None and ".venv" not in built.parts and "build" not in built.parts:
             shutil.copy(built, tree / built.relative_to(ROOT))
     return tree
@@ -100,7 +100,7 @@ def test_a_compiled_module_whose_source_has_changed_is_refused(tree):
 @pytest.mark.skipif(engine.active() != "compiled", reason="no compiled modules here")
 def test_building_again_removes_the_compiled_twin_of_a_module_that_is_hot_no_more(tree):
     with_compiled_modules(tree)
-    orphan = engine.compiled_file(ROOT / "exact/miro_exact/rng.py")
+    orphan = hot_modules.compiled_file(ROOT / "exact/miro_exact/rng.py")
     left_over = tree / "sim/miro_sim" / orphan.name.replace("rng", "clock")
     shutil.copy(orphan, left_over)
     built = python(
@@ -108,7 +108,7 @@ def test_building_again_removes_the_compiled_twin_of_a_module_that_is_hot_no_mor
     )
     assert built.returncode == 0, built.stderr
     assert not left_over.exists()
-    assert engine.compiled_file(tree / "exact/miro_exact/rng.py").exists()
+    assert hot_modules.compiled_file(tree / "exact/miro_exact/rng.py").exists()
 
 
 def test_each_instruction_of_the_compiled_cpu_jumps_to_the_next_by_itself(tree):

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from tests import children
 
-from miro_exact import engine
+from miro_exact import engine, hot_modules
 
 ROOT = Path(__file__).parents[2]
 info = importlib.import_module("mirotwin.cli.info")  # the package has the command under this name
@@ -70,8 +70,8 @@ def test_a_loop_over_many_instructions_is_threaded_and_does_the_same(threaded, t
         children.run(["cc", "-o", tmp_path / name, tmp_path / f"{name}.c"], check=True)
         said.append(children.run([tmp_path / name], capture_output=True, text=True, check=True).stdout)
     assert said[0] == said[1] != "0 0\n"
-    assert not engine.dispatch_replicated([tmp_path / "plain"])
-    assert engine.dispatch_replicated([tmp_path / "plain", tmp_path / "threaded"])
+    assert not hot_modules.dispatch_replicated([tmp_path / "plain"])
+    assert hot_modules.dispatch_replicated([tmp_path / "plain", tmp_path / "threaded"])
 
 
 @pytest.mark.parametrize(
@@ -93,13 +93,13 @@ def test_anything_else_stays_as_it_is(threaded, text):
 @pytest.mark.skipif(os.name == "nt", reason="labels as values are of GCC and Clang")
 def test_the_loop_of_the_cpu_that_is_installed_is_threaded():
     """Fails where Cython writes other C than `threaded` knows: see there."""
-    assert engine.dispatch_replicated(engine.install().compiled())
+    assert hot_modules.dispatch_replicated(engine.install().compiled())
 
 
 @pytest.mark.parametrize(
     ("mark", "said"),
     [
-        (engine.DISPATCH_MARK, "dispatch replicated"),
+        (hot_modules.DISPATCH_MARK, "dispatch replicated"),
         (b"", f"dispatch plain: slower, the same bits; {info.PLAIN_REMEDY}"),
     ],
 )

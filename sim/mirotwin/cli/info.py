@@ -8,6 +8,7 @@ import click
 from rich.table import Table
 
 from miro_exact import engine as engines
+from miro_exact import hot_modules
 from mirotwin.cli.console import show
 from mirotwin.cli.options import choose_engine, engine_option, firmware_option, load_image
 from mirotwin.cli.program import BAD_INPUT, DONE, complain
@@ -72,7 +73,7 @@ def _engine_line(active: str) -> str:
 
 def _dispatch() -> str:
     """Whether the build gave the CPU's loop the shape that processors predict well; the bits do not depend on it."""
-    if engines.dispatch_replicated(engines.install().compiled()):
+    if hot_modules.dispatch_replicated(engines.install().compiled()):
         return "dispatch replicated"
     return f"dispatch plain: slower, the same bits; {PLAIN_REMEDY}"
 

@@ -23,14 +23,13 @@ def test_help_lists_every_command(mirotwin):
     assert [line.split()[0] for line in out.split("Commands:\n")[1].splitlines()] == list(COMMANDS)
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"]])
-def test_help_loads_no_command_and_nothing_hot(arguments):
+def test_the_version_loads_no_command_and_nothing_hot():
     script = (
         "import sys\ntry:\n    from mirotwin.cli import main; main()\nexcept SystemExit: pass\n"
         "print(*sorted(n for n in sys.modules if n.startswith(('matplotlib', 'numpy', 'mirotwin.cli.r'))))"
     )
     done = children.run(
-        [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=True
+        [sys.executable, "-c", script, "--version"], capture_output=True, text=True, check=True
     )
     assert done.stdout.splitlines()[-1] == ""
 
@@ -42,3 +41,25 @@ def test_a_run_without_a_figure_writes_the_other_files(mirotwin, tmp_path):
     code, _, err = mirotwin("run", short, "--out", tmp_path / "out", "--no-figure")
     assert (code, err) == (0, "")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["run.mcap", "summary.json"]
+
+
+def test_help_loads_click_and_nothing_that_is_slow() -> None:
+    script = (
+        "import sys\nfrom mirotwin.cli import main\n"
+        "try:\n    main(['--help'])\n"
+        "finally:\n    print('loaded:', *sorted(sys.modules), file=sys.stderr)\n"
+    )
+    done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("Usage: mirotwin")
+    loaded = done.stderr.rpartition("loaded: ")[2].split()
+    slow = {"numpy", "msgspec", "rich", "mcap", "matplotlib", "hashlib", "tomllib", "importlib.metadata"}
+    assert not slow.intersection(loaded)
+    ours = [name for name in loaded if name.startswith("miro")]
+    assert ours == [
+        "miro_exact",
+        "miro_exact.bad_input",
+        "miro_exact.engine",
+        "mirotwin",
+        "mirotwin.cli",
+        "mirotwin.cli.program",
+    ]

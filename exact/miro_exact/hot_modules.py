@@ -1,0 +1,79 @@
+"""Hot modules: which there are, the compiled file of one, and the hash that ties both together.
+
+A hot module is an `x.py` with an `x.pxd` beside it. What does not belong here: which twin an import gets (`engine`).
+`setup.py` loads this file by its path, before anything is installed: it imports nothing of ours.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+
+DISPATCH_MARK = b"mirotwin: dispatch replicated"
+"""Bytes that the build leaves in a compiled module whose interpreter loop it could reshape (`setup.py`, `threaded`)."""
+_CIMPORT = re.compile(r"^from (\S+) cimport ([^#\n]+)", re.MULTILINE)
+
+
+def hot_sources(package_dirs: dict[str, Path]) -> dict[str, Path]:
+    """Dotted name -> source file of every hot module below the given package folders."""
+    found = {}
+    for package, folder in package_dirs.items():
+        for pxd in sorted(folder.rglob("*.pxd")):
+            source = pxd.with_suffix(".py")
+            if source.exists():
+                relative = source.relative_to(folder).with_suffix("")
+                found[".".join((package, *relative.parts))] = source
+    return found
+
+
+def source_hashes(package_dirs: dict[str, Path]) -> dict[str, str]:
+    """Dotted name -> SHA-256 over the module's source, its `.pxd` and every `.pxd` that this one builds upon.
+
+    These files fix the C layout that a compiled module relies on.
+    """
+    sources = hot_sources(package_dirs)
+    texts = {name: _text(source.with_suffix(".pxd")) for name, source in sources.items()}
+    import hashlib  # slow to load
+
+    hashes = {}
+    for name, source in sources.items():
+        found = hashlib.sha256()
+        for used in sorted(_layout(name, texts)):
+            found.update(f"{used}\n".encode() + texts[used])
+        hashes[name] = hashlib.sha256(found.digest() + _text(source)).hexdigest()
+    return hashes
+
+
+def _layout(name: str, texts: dict[str, bytes]) -> set[str]:
+    """The hot modules whose `.pxd` is part of this one's, itself among them."""
+    layout: set[str] = set()
+    waiting = [name]
+    while waiting:
+        used = waiting.pop()
+        if used in layout:
+            continue
+        layout.add(used)
+        for package, names in _CIMPORT.findall(texts[used].decode()):
+            modules = [package, *(f"{package}.{part.strip()}" for part in names.split(","))]
+            waiting += [module for module in modules if module in texts]
+    return layout
+
+
+def _text(path: Path) -> bytes:
+    return path.read_bytes().replace(b"\r\n", b"\n")
+
+
+def compiled_file(source: Path) -> Path | None:
+    """The extension module that stands for this source, if one was built."""
+    for suffix in EXTENSION_SUFFIXES:
+        candidate = source.with_name(source.stem + suffix)
+        if candidate.exists():
+            return candidate
+    return None
+
+
+def dispatch_replicated(modules: Iterable[Path]) -> bool:
+    """Whether one of these compiled modules has an interpreter loop with the dispatch at the end of each arm."""
+    return any(DISPATCH_MARK in module.read_bytes() for module in modules)
