@@ -156,7 +156,11 @@ def _image(path: str | None) -> Image:
 
     if path:
         check_regular(path)
-    return load_hex(path or image_path())
+    image = load_hex(path or image_path())
+    _ = (
+        image.symbols.names
+    )  # the listing needs them: what is wrong with their files is said before the tests run
+    return image
 
 
 def _check_folders(folders: list[str]) -> None:

@@ -1,6 +1,7 @@
 """A firmware image and what the tool chain said about it: Intel HEX, symbols, C lines."""
 
 from miro_robot.image.hex import FLASH_BYTES, SPACE_BYTES, Image, ImageError, load_hex, parse_hex
-from miro_robot.image.symbols import Symbol, Symbols
+from miro_robot.image.symbol_files import Symbol
+from miro_robot.image.symbols import Symbols
 
 __all__ = ["FLASH_BYTES", "SPACE_BYTES", "Image", "ImageError", "Symbol", "Symbols", "load_hex", "parse_hex"]

@@ -1,42 +1,31 @@
 """What the compiler said about an image: which C line an instruction belongs to, and where functions are.
 
-What belongs here: reading lines from the `.rst` listings beside an image or else from its `.cdb`, functions from the
-`.cdb`, and finding source files. (SDCC 4.2 leaves the lines of inlined functions out of the `.cdb`.) What does not:
-names of addresses (`image.Symbols`), and everything one does with lines (`inspect/`). An image without these files has
-an empty DebugInfo: all still works, by address.
+What belongs here: lines, from the `.rst` listings beside an image or else from its `.cdb`, functions from the `.cdb`,
+and finding source files. (SDCC 4.2 leaves the lines of inlined functions out of the `.cdb`.) What does not: reading
+these files (`symbol_files`), names of addresses (`symbols`), and everything one does with lines (`inspect/`). An image
+without these files has an empty DebugInfo: all still works, by address.
 """
 
 from __future__ import annotations
 
 import bisect
 import os
-import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import msgspec
 
-from miro_robot.image import Image, ImageError
+from miro_robot.image.hex import Image, ImageError
+from miro_robot.image.symbol_files import (
+    CdbFile,
+    SourceLine,
+    map_constants,
+    map_modules,
+    parse_cdb,
+    parse_listing,
+    read_text,
+)
 from miro_robot.mcs51.opcodes import LENGTH
-
-# Numbers have at most as many digits as SDCC writes, with some to spare: a longer one is damage, and no record.
-_CDB_LINE = re.compile(r"^L:C\$([^$\n]+)\$([0-9]{1,9})\$\w+\$\w+:([0-9A-F]{1,8})$", re.MULTILINE)
-_CDB_BEGIN = re.compile(r"^L:(G|F\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]{1,8})$", re.MULTILINE)
-_CDB_END = re.compile(r"^L:X(G|F\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]{1,8})$", re.MULTILINE)
-_MAP_MODULE = re.compile(r"^(\S+)\.rel\s+\[", re.MULTILINE)
-_MAP_CONSTANTS = re.compile(r"^(?:CONST|XINIT)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) =", re.MULTILINE)
-_RST_LINE = re.compile(r"^\s*[0-9]+ ;\t([^\s:]+\.\w+):([0-9]{1,9}): ")
-_RST_CODE = re.compile(r"^ {6}([0-9A-F]{6})((?: [0-9A-F]{2})+) +(\[\d+\])?")
-
-
-class SourceLine(msgspec.Struct, frozen=True, order=True):
-    """A line of a source file, by the name the compiler was given; lines count from 1."""
-
-    file: str
-    line: int
-
-    def __str__(self) -> str:
-        return f"{self.file}:{self.line}"
 
 
 class Function(msgspec.Struct, frozen=True):
@@ -75,23 +64,20 @@ class DebugInfo:
 
         Raises ImageError for a listing whose bytes are not the image's.
         """
-        cdb = _text(image.path.with_suffix(".cdb"))
-        link_map = _text(image.path.with_suffix(".map"))
-        constants = [
-            (int(first, 16), int(first, 16) + int(size, 16))
-            for first, size in dict.fromkeys(_MAP_CONSTANTS.findall(link_map))
-            if int(size, 16)
-        ]
+        cdb = parse_cdb(read_text(image.path.with_suffix(".cdb")))
+        link_map = read_text(image.path.with_suffix(".map"))
         listed = [
             found for listing in _listings(image.path, link_map) for found in _read_listing(listing, image)
         ]
         lines = [(address, line) for address, _, line in listed if line is not None]
         tables = [(address, end) for address, end, line in listed if line is None]
         known = {_name(line.file) for _, line in lines}
-        lines += [(address, line) for address, line in _cdb_lines(cdb) if _name(line.file) not in known]
+        lines += [(address, line) for address, line in cdb.lines if _name(line.file) not in known]
         paths = {_name(line.file): line.file for _, line in lines}
         symbols = [symbol.address for symbol in image.symbols.names.values() if symbol.space == "code"]
-        return cls(lines, _cdb_functions(cdb, image.code, paths), [*constants, *tables], symbols)
+        return cls(
+            lines, _cdb_functions(cdb, image.code, paths), [*map_constants(link_map), *tables], symbols
+        )
 
     def line_at(self, address: int) -> SourceLine | None:
         """The source line of the instruction there; None outside C functions."""
@@ -137,32 +123,22 @@ class Sources:
     def text(self, line: SourceLine) -> str:
         """What stands in that line, "" if the file is not there or is shorter."""
         path = self.path(line.file)
-        lines = [] if path is None else _text(path).splitlines()
+        lines = [] if path is None else read_text(path).splitlines()
         return lines[line.line - 1].strip() if 0 < line.line <= len(lines) else ""
 
 
-def _text(path: Path) -> str:
-    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
-
-
-def _cdb_lines(cdb: str) -> Iterator[tuple[int, SourceLine]]:
-    for file, line, address in _CDB_LINE.findall(cdb):
-        yield int(address, 16), SourceLine(file, int(line))
-
-
-def _cdb_functions(cdb: str, code: bytes, paths: dict[str, str]) -> Iterator[Function]:
+def _cdb_functions(cdb: CdbFile, code: bytes, paths: dict[str, str]) -> Iterator[Function]:
     """From begin and end records; the end record stands at the returning instruction. `paths`: files as lines have
     them, by the names alone that the .cdb has.
     """
     declared: dict[int, SourceLine] = {}
-    for address, line in _cdb_lines(cdb):  # the first line at a function's first place is its head
+    for address, line in cdb.lines:  # the first line at a function's first place is its head
         declared.setdefault(address, SourceLine(paths.get(line.file, line.file), line.line))
-    begins = {(scope, name): int(address, 16) for scope, name, address in _CDB_BEGIN.findall(cdb)}
-    for scope, name, address in _CDB_END.findall(cdb):
-        first, last = begins.get((scope, name)), int(address, 16)
+    for scope, last in cdb.ends:
+        first = cdb.begins.get(scope)
         if first is not None and first <= last < len(code):
             end = last + LENGTH[code[last]]
-            yield Function("_" + name, first, end, declared.get(first))
+            yield Function("_" + scope[1], first, end, declared.get(first))
 
 
 def _name(path: str) -> str:
@@ -171,7 +147,7 @@ def _name(path: str) -> str:
 
 def _listings(image: Path, link_map: str) -> Iterator[Path]:
     """The relinked listings of the image's modules: beside the image, or where the linker found the modules."""
-    for module in dict.fromkeys([*_MAP_MODULE.findall(link_map), image.stem]):
+    for module in dict.fromkeys([*map_modules(link_map), image.stem]):
         places = (
             image.parent / f"{_name(module)}.rst",
             image.parent / f"{module}.rst",
@@ -187,17 +163,14 @@ def _read_listing(path: Path, image: Image) -> Iterator[tuple[int, int, SourceLi
 
     Only instructions have a number of clocks. Raises ImageError where a byte is not the image's.
     """
-    line = None
-    for number, text in enumerate(_text(path).splitlines(), start=1):
-        if named := _RST_LINE.match(text):
-            line = SourceLine(named[1], int(named[2]))
-        elif code := _RST_CODE.match(text):
-            address, data = int(code[1], 16), bytes.fromhex(code[2])
-            if image.code[address : address + len(data)] != data:
-                reason = f"is the listing of another image: {address:#06x} holds something else"
-                raise ImageError(path, number, reason, "build both again, or remove the listing")
-            if not code[3]:
-                yield address, address + len(data), None
-            elif line is not None:
-                yield address, address + len(data), line
-                line = None
+    last = None
+    for code in parse_listing(read_text(path)):
+        end = code.address + len(code.data)
+        if image.code[code.address : end] != code.data:
+            reason = f"is the listing of another image: {code.address:#06x} holds something else"
+            raise ImageError(path, code.number, reason, "build both again, or remove the listing")
+        if not code.timed:
+            yield code.address, end, None
+        elif code.line is not None and code.line is not last:
+            yield code.address, end, code.line
+            last = code.line

@@ -1,6 +1,6 @@
 """Whether the `.map` and `.cdb` beside an image were written with it, or belong to another one.
 
-What belongs here: evidence, and how much of it is enough. Reading names out of these files is `symbols.py`'s.
+What belongs here: evidence, and how much of it is enough. What does not: reading these files (`symbol_files`).
 
 A file that is only unusual must pass: images are filled up, merged with a boot loader, cut apart; symbols are
 absolute, mark the end of an area, or name data that has no bytes. So a file is refused on contradictions alone:
@@ -17,19 +17,19 @@ What moved nothing but a last function or two shows in the listing only (`debug_
 
 from __future__ import annotations
 
-import re
+from collections.abc import Sequence
+from functools import lru_cache
 
 import msgspec
 
+from miro_robot.image.symbol_files import CdbFile, CodePlace, MapFile
 from miro_robot.mcs51.opcodes import LENGTH, goes_on, target
 
-_AREA = re.compile(r"^(\S[\S .]*?)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) = .*bytes \(([A-Z,]+)\)")
-_NAME = re.compile(r"^(?:C:)?\s+([0-9A-F]{8})\s+(_\w+)\s")
-_INSTRUCTION = re.compile(r"^(?:L:A\$[^:]*:|C:\s+(?=[0-9A-F]{8}\s+A\$))([0-9A-F]{1,8})\b")
 _FEW_RECORDS, _FEW_NAMES, _FEW_STRAYS = 20, 4, 3  # fewer prove nothing
 _NO_FUNCTIONS = ("HOME", "GSINIT", "GSFINAL", "XINIT", "CONST")  # areas: start-up code in pieces, and data
 _JUMPS = (0x02, 0x12)  # LJMP, LCALL
 _SPACE = 0x10000
+_KEPT = 32  # verdicts, by image and content of the file
 
 
 class Contradiction(msgspec.Struct, frozen=True):
@@ -39,46 +39,24 @@ class Contradiction(msgspec.Struct, frozen=True):
     reason: str
 
 
-class _Place(msgspec.Struct, frozen=True):
-    area: str
-    name: str
-    address: int
-    line: int
-
-
-def check_map(text: str, code: bytes, loaded: bytes) -> Contradiction | None:
+@lru_cache(_KEPT)
+def check_map(found: MapFile, code: bytes, loaded: bytes) -> Contradiction | None:
     """A map against an image. `code`: 64 KB; `loaded`: 1 for each address that the image has a byte for."""
-    places = _code_places(text)
     return (
-        _check_start_up(places, code, loaded)
-        or _check_places(places, loaded)
-        or _check_instructions(text, code, loaded)
-        or _check_functions(places, code, loaded)
+        _check_start_up(found.places, code, loaded)
+        or _check_places(found.places, loaded)
+        or _check_instructions(found.instructions, code, loaded)
+        or _check_functions(found.places, code, loaded)
     )
 
 
-def check_cdb(text: str, code: bytes, loaded: bytes) -> Contradiction | None:
+@lru_cache(_KEPT)
+def check_cdb(found: CdbFile, code: bytes, loaded: bytes) -> Contradiction | None:
     """The same for a debug file."""
-    return _check_instructions(text, code, loaded)
+    return _check_instructions(found.instructions, code, loaded)
 
 
-def _code_places(text: str) -> list[_Place]:
-    """Names inside relocatable code areas that have a size; a name at the end of its area marks the end."""
-    places = []
-    first = end = 0
-    inside = ""
-    for number, line in enumerate(text.splitlines(), start=1):
-        if area := _AREA.match(line):
-            inside = area[1]
-            attributes = area[4].split(",")
-            first = int(area[2], 16)
-            end = first + int(area[3], 16) if "CODE" in attributes and "REL" in attributes else 0
-        elif (name := _NAME.match(line)) and first <= int(name[1], 16) < min(end, _SPACE):
-            places.append(_Place(inside, name[2], int(name[1], 16), number))
-    return places
-
-
-def _check_start_up(places: list[_Place], code: bytes, loaded: bytes) -> Contradiction | None:
+def _check_start_up(places: Sequence[CodePlace], code: bytes, loaded: bytes) -> Contradiction | None:
     by_name = {place.name: place for place in places}
     start_up, main = by_name.get("__sdcc_program_startup"), by_name.get("_main")
     if start_up is None or main is None or not all(loaded[start_up.address : start_up.address + 3]):
@@ -93,7 +71,7 @@ def _check_start_up(places: list[_Place], code: bytes, loaded: bytes) -> Contrad
     )
 
 
-def _check_places(places: list[_Place], loaded: bytes) -> Contradiction | None:
+def _check_places(places: Sequence[CodePlace], loaded: bytes) -> Contradiction | None:
     missing = [place for place in places if not loaded[place.address]]
     if len(places) < _FEW_NAMES or 2 * len(missing) <= len(places):
         return None
@@ -103,7 +81,7 @@ def _check_places(places: list[_Place], loaded: bytes) -> Contradiction | None:
     return Contradiction(first.line, f"the image has no bytes for {count}, the first is {where}")
 
 
-def _check_functions(places: list[_Place], code: bytes, loaded: bytes) -> Contradiction | None:
+def _check_functions(places: Sequence[CodePlace], code: bytes, loaded: bytes) -> Contradiction | None:
     functions = [
         place
         for place in places
@@ -145,8 +123,9 @@ def _is_reached(code: bytes, first: int, address: int) -> bool:
     return first == address
 
 
-def _check_instructions(text: str, code: bytes, loaded: bytes) -> Contradiction | None:
-    records = _instructions(text)
+def _check_instructions(
+    records: Sequence[tuple[int, int]], code: bytes, loaded: bytes
+) -> Contradiction | None:
     if len(records) < _FEW_RECORDS:
         return None
     ends = [address + LENGTH[code[address]] for address, _ in records]
@@ -166,12 +145,3 @@ def _check_instructions(text: str, code: bytes, loaded: bytes) -> Contradiction 
         line,
         f"{len(misfits)} of its {len(records)} instructions are not in the image, the first at {address:#06x}",
     )
-
-
-def _instructions(text: str) -> list[tuple[int, int]]:
-    """(address, line of the file) of every assembler line in the 64 KB space, by address, each address once."""
-    found: dict[int, int] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        if (record := _INSTRUCTION.match(line)) and int(record[1], 16) < _SPACE:
-            found.setdefault(int(record[1], 16), number)
-    return sorted(found.items())

@@ -1,7 +1,7 @@
 """The firmware image: an Intel HEX file.
 
-What belongs here: reading one, with errors a firmware author can act on. What does not: the names beside it
-(`symbols.py`), and whether the image runs, which is the CPU's matter.
+What belongs here: reading one, with errors a firmware author can act on, and finding the files of names beside it. What
+does not: what is in these (`symbol_files`), and whether the image runs, which is the CPU's matter.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_robot.image.evidence import check_cdb, check_map
+from miro_robot.image.evidence import Contradiction, check_cdb, check_map
+from miro_robot.image.symbol_files import Symbol, parse_cdb, parse_map, read_text
 from miro_robot.image.symbols import Symbols
 
 FLASH_BYTES = 8192  # of an AT89C52
@@ -31,7 +32,8 @@ class Image(msgspec.Struct, frozen=True):
     """A loaded image.
 
     `code`: 64 KB, FF where nothing was loaded; `used`: (first, end) ranges of loaded addresses, ascending;
-    `size`: bytes loaded; `sha256`: hex digest of the file.
+    `size`: bytes loaded; `sha256`: hex digest of the file; `symbols`: read from the files beside it when the first
+    one is asked for.
     """
 
     path: Path
@@ -59,6 +61,36 @@ def load_hex(path: str | Path, limit: int = FLASH_BYTES) -> Image:
 
 def parse_hex(content: bytes, path: Path, limit: int = FLASH_BYTES) -> Image:
     """The same from the file's content; `path` is for messages and symbols."""
+    known = _KNOWN.get((content, limit))
+    if known is None:
+        known = _KNOWN[content, limit] = _parsed(content, path, limit)
+        if len(_KNOWN) > _KEPT:
+            del _KNOWN[next(iter(_KNOWN))]
+    return Image(
+        path=path,
+        code=known.code,
+        used=known.used,
+        size=known.loaded.count(1),
+        sha256=known.sha256,
+        symbols=Symbols(lambda: _names_beside(path, known.code, known.loaded)),
+    )
+
+
+class _Content(msgspec.Struct, frozen=True):
+    """What a file's content alone says. `loaded`: 1 for each address that it has a byte for."""
+
+    code: bytes
+    loaded: bytes
+    used: tuple[tuple[int, int], ...]
+    sha256: str
+
+
+_KEPT = 32
+_KNOWN: dict[tuple[bytes, int], _Content] = {}
+"""Files that were read before, by content and limit: a test loads the robot's image hundreds of times."""
+
+
+def _parsed(content: bytes, path: Path, limit: int) -> _Content:
     if not content.strip():
         raise ImageError(path, 0, "is empty", _REBUILD)
     code = bytearray(b"\xff" * SPACE_BYTES)
@@ -75,26 +107,25 @@ def parse_hex(content: bytes, path: Path, limit: int = FLASH_BYTES) -> Image:
         loaded[address:end] = b"\x01" * len(data)
     if not any(loaded):
         raise ImageError(path, 0, "holds no bytes", _REBUILD)
-    _check_beside(path, bytes(code), bytes(loaded))
-    return Image(
-        path=path,
-        code=bytes(code),
-        used=_ranges(loaded),
-        size=loaded.count(1),
-        sha256=hashlib.sha256(content).hexdigest(),
-        symbols=Symbols.from_beside(path),
-    )
+    return _Content(bytes(code), bytes(loaded), _ranges(loaded), hashlib.sha256(content).hexdigest())
 
 
-def _check_beside(path: Path, code: bytes, loaded: bytes) -> None:
-    """Raises ImageError when a symbol file beside the image contradicts it."""
-    for suffix, check in ((".map", check_map), (".cdb", check_cdb)):
-        beside = path.with_suffix(suffix)
-        if beside.is_file():
-            found = check(beside.read_text(encoding="utf-8", errors="replace"), code, loaded)
-            if found is not None:
-                remedy = "it belongs to another image: rebuild both together, or take it away"
-                raise ImageError(beside, found.line, found.reason, remedy)
+def _names_beside(path: Path, code: bytes, loaded: bytes) -> dict[str, Symbol]:
+    """The names in the `.map` and `.cdb` beside an image; what is missing contributes nothing.
+
+    Raises ImageError when one of them contradicts the image.
+    """
+    map_path, cdb_path = path.with_suffix(".map"), path.with_suffix(".cdb")
+    found_map, found_cdb = parse_map(read_text(map_path)), parse_cdb(read_text(cdb_path))
+    _refuse(map_path, check_map(found_map, code, loaded))
+    _refuse(cdb_path, check_cdb(found_cdb, code, loaded))
+    return found_map.names | found_cdb.names
+
+
+def _refuse(beside: Path, found: Contradiction | None) -> None:
+    if found is not None:
+        remedy = "it belongs to another image: rebuild both together, or take it away"
+        raise ImageError(beside, found.line, found.reason, remedy)
 
 
 def _too_big(limit: int) -> str:

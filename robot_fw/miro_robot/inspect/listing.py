@@ -11,7 +11,8 @@ from collections.abc import Collection, Iterator
 import msgspec
 
 from miro_robot.image import Image
-from miro_robot.image.debug_info import DebugInfo, SourceLine, Sources
+from miro_robot.image.debug_info import DebugInfo, Sources
+from miro_robot.image.symbol_files import SourceLine
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.opcodes import CYCLES, LENGTH, disassemble
 

@@ -146,13 +146,14 @@ def take_bare(given: dict[str, Any]) -> BareRequest:
     return BareRequest(**{name: given.pop(name) for name in BareRequest.__struct_fields__})
 
 
-def load_bare_image(path: str, request: BareRequest) -> Image:
-    """Raises BadInput for an image that does not fit."""
+def load_bare_image(path: str, request: BareRequest, named: bool = True) -> Image:
+    """Raises BadInput for an image that does not fit, and, if it has to be `named`, for symbols of another one."""
     if request.code_in_xram and request.code_size is not None:
         raise BadInput(
             "", "--code-size", "program and data share 64 KB with --code-in-xram", "leave one of the two out"
         )
-    return load_image(path, SPACE_BYTES if request.code_in_xram else request.code_size or FLASH_BYTES)
+    limit = SPACE_BYTES if request.code_in_xram else request.code_size or FLASH_BYTES
+    return load_image(path, limit, named)
 
 
 def target_of(path: str, image: Image, request: BareRequest) -> int | None:
@@ -195,17 +196,18 @@ def report(machine: BareMachine, ended: Ended, request: BareRequest) -> int:
     from miro_robot.bare.machine import Ended
 
     code = DONE
-    place = f"{place_of(machine.cpu.pc, machine.image)} after {machine.cpu.cycles} machine cycles"
     for fault in machine.faults:
         complain(f"firmware fault: {fault}")
     if machine.faults_lost:
         complain(f"firmware faults: {machine.faults_lost} more are not listed")
     if ended is Ended.CYCLES:
-        complain(f"gave up at {place}")
+        complain(f"gave up at {_stopped_at(machine)}")
         code = LIMIT_REACHED
     elif ended is Ended.HALTED:
-        complain(f"the firmware ended at {place}; no interrupt can wake it")
+        complain(f"the firmware ended at {_stopped_at(machine)}; no interrupt can wake it")
         code = DONE if request.until is None else EXPECTATION_FAILED
+    if (machine.faults or ended in (Ended.CYCLES, Ended.HALTED)) and machine.image.symbols.problem:
+        complain(f"addresses have no names: {machine.image.symbols.problem}")
     waiting = machine.input.waiting_for
     if waiting:
         complain(
@@ -218,6 +220,10 @@ def report(machine: BareMachine, ended: Ended, request: BareRequest) -> int:
             f"the first at {changed[0]:#06x}"
         )
     return FIRMWARE_FAULT if machine.faults else code
+
+
+def _stopped_at(machine: BareMachine) -> str:
+    return f"{place_of(machine.cpu.pc, machine.image)} after {machine.cpu.cycles} machine cycles"
 
 
 def _ticks(time: Time | None, request: BareRequest) -> int | None:

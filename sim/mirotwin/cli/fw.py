@@ -71,7 +71,7 @@ def run_bare(image: str, terminal: bool, dump: str | None, engine: str | None, *
     if terminal:
         check_terminal(request)
     choose_engine(engine)
-    loaded = load_bare_image(image, request)
+    loaded = load_bare_image(image, request, named=False)
     target = target_of(image, loaded, request)
     out = sys.stdout.buffer
     machine = make_machine(loaded, request, out.write, live=terminal)

@@ -44,7 +44,7 @@ def info(engine: str | None, firmware: str | None) -> int:
     """Shows versions, the engine, and the firmware image with its hash."""
     active = choose_engine(engine)
     broken = _broken_modules()
-    image = load_image(firmware)
+    image = load_image(firmware, named=False)
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="bold")
     table.add_column(overflow="fold")

@@ -65,9 +65,10 @@ def choose_engine(engine: str | None) -> str:
     return engines.active()
 
 
-def load_image(path: str | Path | None, limit: int = 8192) -> Image:
-    """The firmware image at `path`, or the robot's own. Raises BadInput for what is no image or does not
-    fit.
+def load_image(path: str | Path | None, limit: int = 8192, named: bool = True) -> Image:
+    """The firmware image at `path`, or the robot's own. Raises BadInput for what is no image or does not fit.
+
+    `named`: its symbols are needed; the files beside it are read at once, and BadInput is raised for wrong ones.
     """
     from miro_robot.firmware import image_path
     from miro_robot.image import load_hex
@@ -78,7 +79,10 @@ def load_image(path: str | Path | None, limit: int = 8192) -> Image:
         check_regular(path)
         if os.path.getsize(path) > TEXT_BYTES:
             raise BadInput(path, "", f"holds more than {TEXT_BYTES >> 20} MiB", "give an .ihx or .hex file")
-    return load_hex(image_path() if path is None else Path(path), limit=limit)
+    image = load_hex(image_path() if path is None else Path(path), limit=limit)
+    if named:
+        _ = image.symbols.names
+    return image
 
 
 @contextmanager

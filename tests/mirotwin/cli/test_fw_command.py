@@ -31,16 +31,58 @@ def test_a_symbol_is_found_with_or_without_its_underscore(mirotwin: Callable[...
         assert mirotwin("fw", "run", image_path(), "--until", name, "--max-cycles", 100_000) == (0, "", "")
 
 
-def test_the_symbols_of_another_image_are_refused(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
-    image = hex_file(tmp_path / "a.ihx", LOOP)
-    for suffix in (".map", ".cdb"):
-        beside = image.with_suffix(suffix)
-        beside.write_bytes(image_path().with_suffix(suffix).read_bytes())
-        code, out, err = mirotwin("fw", "run", image)
-        assert (code, out, err.count("\n")) == (2, "", 1)
-        assert err.startswith(f"mirotwin: error: {beside}:")
-        assert err.endswith("it belongs to another image: rebuild both together, or take it away\n")
-        beside.unlink()
+def with_a_map_of_the_robot(tmp_path: Path, suffix: str = ".map", code: bytes = LOOP) -> tuple[Path, Path]:
+    """An image of `code`, and the symbol file beside it that belongs to another one."""
+    image = hex_file(tmp_path / "a.ihx", code)
+    beside = image.with_suffix(suffix)
+    beside.write_bytes(image_path().with_suffix(suffix).read_bytes())
+    return image, beside
+
+
+@pytest.mark.parametrize("suffix", [".map", ".cdb"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["fw", "run", "IMAGE", "--until", "main"],
+        ["fw", "disasm", "IMAGE"],
+        ["fw", "profile", "IMAGE"],
+        ["run", "fig6", "--firmware", "IMAGE"],
+    ],
+)
+def test_a_command_that_needs_symbols_refuses_those_of_another_image(
+    mirotwin: Callable[..., Result],
+    tmp_path: Path,
+    suffix: str,
+    command: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    image, beside = with_a_map_of_the_robot(tmp_path, suffix)
+    monkeypatch.chdir(tmp_path)
+    code, out, err = mirotwin(*(str(image) if word == "IMAGE" else word for word in command))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"mirotwin: error: {beside}:")
+    assert err.endswith("it belongs to another image: rebuild both together, or take it away\n")
+    assert sorted(tmp_path.iterdir()) == sorted([image, beside])
+
+
+def test_a_command_that_needs_no_symbols_does_not_read_them(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image, _ = with_a_map_of_the_robot(tmp_path)
+    assert mirotwin("fw", "run", image, "--until", "0x0000") == (0, "", "")
+    assert mirotwin("info", "--firmware", image)[0] == 0
+
+
+def test_a_fault_is_reported_by_address_beside_symbols_of_another_image(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image, beside = with_a_map_of_the_robot(tmp_path, code=b"\xa5")
+    code, _, err = mirotwin("fw", "run", image, "--max-cycles", 100)
+    fault, names = err.splitlines()
+    assert code == 3
+    assert fault.startswith("mirotwin: firmware fault: ")
+    assert "at 0x0000, tick" in fault
+    assert names.startswith(f"mirotwin: addresses have no names: {beside}:")
 
 
 def test_the_cycle_limit_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result]) -> None:

@@ -11,7 +11,8 @@ from tests.robot.inspect.programs import PROGRAM, build, line_of
 
 from miro_robot.firmware import image_path, source_folder
 from miro_robot.image import ImageError, load_hex
-from miro_robot.image.debug_info import DebugInfo, SourceLine, Sources
+from miro_robot.image.debug_info import DebugInfo, Sources
+from miro_robot.image.symbol_files import SourceLine
 
 
 def copied(program, folder, *suffixes):

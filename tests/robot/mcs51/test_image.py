@@ -4,7 +4,7 @@ import hashlib
 
 import pytest
 
-from miro_robot.image import ImageError, Symbol, Symbols, load_hex
+from miro_robot.image import ImageError, Symbol, load_hex
 
 END = ":00000001FF"
 
@@ -122,6 +122,6 @@ def test_symbols_come_from_the_map_and_the_debug_file_beside_the_image(tmp_path)
 
 
 def test_without_files_beside_it_an_image_has_no_symbols(tmp_path):
-    symbols = Symbols.from_beside(tmp_path / "robot.ihx")
+    symbols = load_hex(written(tmp_path, record(0, bytes(4)), END)).symbols
     assert symbols.name_at(0) == ""
     assert repr(symbols) == "Symbols(0 names, 0 in code)"

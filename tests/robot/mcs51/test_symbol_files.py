@@ -11,6 +11,7 @@ from tests import children
 from miro_robot.firmware import image_path
 from miro_robot.image import ImageError, load_hex
 from miro_robot.image.evidence import check_cdb, check_map
+from miro_robot.image.symbol_files import parse_cdb, parse_map
 
 ROBOT = image_path()
 MAP = ROBOT.with_suffix(".map").read_text()
@@ -33,7 +34,7 @@ def hex_text(code: bytes, at: int = 0) -> str:
 
 def refusal(path: Path) -> ImageError:
     with pytest.raises(ImageError) as caught:
-        load_hex(path)
+        _ = load_hex(path).symbols.names
     assert caught.value.remedy == "it belongs to another image: rebuild both together, or take it away"
     assert str(caught.value).startswith(f"{caught.value.path}:{caught.value.place}: ")
     return caught.value
@@ -65,7 +66,7 @@ def test_a_map_in_which_main_moved_is_refused(tmp_path):
 @pytest.mark.parametrize("by", [-7, -2, -1, 1, 2, 3, 30])
 def test_a_map_in_which_functions_behind_main_moved_is_refused(by):
     moved = moved_map(by)
-    found = check_map("\n".join(moved), IMAGE.code, LOADED)
+    found = check_map(parse_map("\n".join(moved)), IMAGE.code, LOADED)
     assert found is not None
     assert " instructions are not in the image, " in found.reason
     assert abs(int(moved[found.line - 1][5:13], 16) - MOVED_FROM) < 0x40
@@ -74,7 +75,7 @@ def test_a_map_in_which_functions_behind_main_moved_is_refused(by):
 @pytest.mark.parametrize("by", [-30, -11, -5, -3, -2, 1, 3, 5, 30])
 def test_the_same_without_debug_shows_by_functions_that_begin_nowhere(by):
     names_only = [line for line in moved_map(by) if "$" not in line]
-    found = check_map("\n".join(names_only), IMAGE.code, LOADED)
+    found = check_map(parse_map("\n".join(names_only)), IMAGE.code, LOADED)
     assert found is not None
     assert found.reason.startswith("no function of the image begins where ")
     assert int(names_only[found.line - 1][5:13], 16) >= MOVED_FROM + by
@@ -97,12 +98,12 @@ def test_a_table_or_two_among_functions_and_functions_that_run_into_the_next_pro
     tables = [f"C:   000000{n:02X}  _table{n}   a\n" for n in (0x11, 0x15, 0x19, 0x1D)]
     names = [f"C:   000000{n:02X}  _name{n}   a\n" for n in range(0x40, 0x4E)]
     text = area + "".join([*tables, *names])
-    assert check_map(text, bytes(code), b"\x01" * 0x10000) is None
-    assert check_map(text.replace(names[0], ""), bytes(code), b"\x01" * 0x10000) is not None
+    assert check_map(parse_map(text), bytes(code), b"\x01" * 0x10000) is None
+    assert check_map(parse_map(text.replace(names[0], "")), bytes(code), b"\x01" * 0x10000) is not None
     code[0x80:0x83] = b"\x12\x00\x15"
-    assert check_map(text.replace(names[0], ""), bytes(code), b"\x01" * 0x10000) is None
+    assert check_map(parse_map(text.replace(names[0], "")), bytes(code), b"\x01" * 0x10000) is None
     code[0x40:0x52] = b"\x04" * 18
-    assert check_map(area + "".join(names), bytes(code), b"\x01" * 0x10000) is None
+    assert check_map(parse_map(area + "".join(names)), bytes(code), b"\x01" * 0x10000) is None
 
 
 def test_a_debug_file_whose_instructions_stand_elsewhere_is_refused(tmp_path):
@@ -116,8 +117,8 @@ def test_a_debug_file_whose_instructions_stand_elsewhere_is_refused(tmp_path):
 
 
 def test_the_files_of_the_robot_belong_to_it():
-    assert check_map(MAP, IMAGE.code, LOADED) is None
-    assert check_cdb(CDB, IMAGE.code, LOADED) is None
+    assert check_map(parse_map(MAP), IMAGE.code, LOADED) is None
+    assert check_cdb(parse_cdb(CDB), IMAGE.code, LOADED) is None
 
 
 @settings(deadline=None, max_examples=25)
@@ -135,8 +136,8 @@ def test_an_image_that_was_filled_merged_or_lost_a_little_keeps_its_symbols(fill
     code[: len(boot_loader)] = boot_loader  # another reset vector
     for address in range(cut[0], cut[0] + cut[1]):
         code[address], loaded[address] = 0xFF, 0
-    assert check_map(MAP, bytes(code), bytes(loaded)) is None
-    assert check_cdb(CDB, bytes(code), bytes(loaded)) is None
+    assert check_map(parse_map(MAP), bytes(code), bytes(loaded)) is None
+    assert check_cdb(parse_cdb(CDB), bytes(code), bytes(loaded)) is None
 
 
 def map_text(area: str, first: int, size: int, attributes: str, name_at: int) -> str:
@@ -158,37 +159,37 @@ def map_text(area: str, first: int, size: int, attributes: str, name_at: int) ->
     ],
 )
 def test_absolute_empty_banked_and_data_symbols_prove_nothing(page, refused):
-    found = check_map(map_text(*page), bytes(0x10000), b"\x01" * 16 + bytes(0xFFF0))
+    found = check_map(parse_map(map_text(*page)), bytes(0x10000), b"\x01" * 16 + bytes(0xFFF0))
     assert (found is not None) == refused
 
 
 def test_files_of_somebody_elses_linker_prove_nothing():
     for text in ("", "LINK MAP OF MODULE: demo (DEMO)\n  C:0003H  SYMBOL  TIMER\n"):
-        assert check_map(text, IMAGE.code, LOADED) is None
-        assert check_cdb(text, IMAGE.code, LOADED) is None
+        assert check_map(parse_map(text), IMAGE.code, LOADED) is None
+        assert check_cdb(parse_cdb(text), IMAGE.code, LOADED) is None
 
 
 def test_start_up_code_of_ones_own_is_not_judged():
     code = bytearray(IMAGE.code)
     code[0x26:0x29] = b"\x00\x00\x00"  # runs on into main
-    assert check_map(MAP, bytes(code), LOADED) is None
+    assert check_map(parse_map(MAP), bytes(code), LOADED) is None
 
 
 def test_a_handful_of_names_or_line_records_proves_nothing():
     text = "".join(f"L:A$a$1{number}:{number}\n" for number in range(10, 29))
-    assert check_cdb(text, b"\x02" * 0x10000, b"\x01" * 0x10000) is None
-    assert check_cdb(text + "L:A$a$200:99\n", b"\x02" * 0x10000, b"\x01" * 0x10000) is not None
+    assert check_cdb(parse_cdb(text), b"\x02" * 0x10000, b"\x01" * 0x10000) is None
+    assert check_cdb(parse_cdb(text + "L:A$a$200:99\n"), b"\x02" * 0x10000, b"\x01" * 0x10000) is not None
     area = "CSEG                                00000000    00000100 =         256. bytes (REL,CON,CODE)\n"
     names = [f"C:   000000{number:02X}  _name{number}   a\n" for number in range(4)]
-    assert check_map(area + "".join(names[:3]), bytes(0x10000), bytes(0x10000)) is None
-    assert check_map(area + "".join(names), bytes(0x10000), bytes(0x10000)) is not None
+    assert check_map(parse_map(area + "".join(names[:3])), bytes(0x10000), bytes(0x10000)) is None
+    assert check_map(parse_map(area + "".join(names)), bytes(0x10000), bytes(0x10000)) is not None
 
 
 @settings(deadline=None, max_examples=100)
 @given(st.text(alphabet="L:A$CSEG_mainbytes=()RELCODE 0123456789ABCDEF\n.,", max_size=300))
 def test_no_text_whatever_breaks_the_reading(text):
-    check_map(text, IMAGE.code, LOADED)
-    check_cdb(text, IMAGE.code, LOADED)
+    check_map(parse_map(text), IMAGE.code, LOADED)
+    check_cdb(parse_cdb(text), IMAGE.code, LOADED)
 
 
 PROGRAM = """
@@ -238,3 +239,57 @@ def test_the_symbols_of_yesterday_are_refused_today(tmp_path):
         error = refusal(mixed)
         assert error.path.suffix == suffix
         assert " instructions are not in the image, the first at 0x" in error.what
+
+
+def test_an_image_is_loaded_without_a_look_at_the_files_beside_it(tmp_path):
+    path = tmp_path / "robot.ihx"
+    shutil.copy(ROBOT, path)
+    path.with_suffix(".map").mkdir()
+    image = load_hex(path)
+    path.with_suffix(".map").rmdir()
+    path.with_suffix(".map").write_text(MAP)
+    assert image.symbols.find("main").address == 0xE7
+
+
+def test_symbols_of_another_image_leave_places_without_a_name_and_say_why(tmp_path):
+    path = tmp_path / "blink.ihx"
+    path.write_text(hex_text(b"\x80\xfe"))
+    path.with_suffix(".map").write_text(MAP)
+    symbols = load_hex(path).symbols
+    assert symbols.name_at(0) == ""
+    assert symbols.problem is not None
+    assert symbols.problem.path.name == "blink.map"
+    with pytest.raises(ImageError):
+        symbols.find("main")
+    assert load_hex(ROBOT).symbols.problem is None
+
+
+def test_files_with_a_content_that_was_read_before_are_not_parsed_again(tmp_path):
+    load_hex(ROBOT).symbols.find("main")
+    parsed = [parse.cache_info().misses for parse in (parse_map, parse_cdb)]
+    for suffix in (".ihx", ".map", ".cdb"):
+        shutil.copy(ROBOT.with_suffix(suffix), tmp_path / f"copy{suffix}")
+    copy = load_hex(tmp_path / "copy.ihx")
+    assert copy.symbols.names == load_hex(ROBOT).symbols.names
+    assert copy.code is load_hex(ROBOT).code
+    assert [parse.cache_info().misses for parse in (parse_map, parse_cdb)] == parsed
+
+
+def test_a_file_that_was_changed_is_read_again(tmp_path):
+    path = tmp_path / "robot.ihx"
+    shutil.copy(ROBOT, path)
+    path.with_suffix(".map").write_text(MAP)
+    assert load_hex(path).symbols.find("renamed") is None
+    path.with_suffix(".map").write_text(MAP.replace("  _main ", "  _renamed "))
+    assert load_hex(path).symbols.find("renamed").address == 0xE7
+    path.write_text(hex_text(b"\x80\xfe"))
+    assert load_hex(path).size == 2
+
+
+def test_an_image_is_judged_by_its_own_limit_however_often_it_was_loaded(tmp_path):
+    path = tmp_path / "big.ihx"
+    path.write_text(hex_text(b"\x00" * 4, at=0x3000))
+    for _ in range(2):
+        assert load_hex(path, limit=0x10000).size == 4
+        with pytest.raises(ImageError, match="does not fit 8192 bytes"):
+            load_hex(path)

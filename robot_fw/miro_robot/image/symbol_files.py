@@ -1,0 +1,206 @@
+"""What SDCC writes beside an image: its `.map`, `.cdb` and `.rst` files, each read in one pass.
+
+What belongs here: from the text of a file to its records, as they stand in it. What does not: whether a file belongs to
+the image (`evidence`), names of addresses (`symbols`), C lines and functions (`debug_info`).
+
+What was read is kept by content: a file that is read again within the process, for another image or another world, is
+not parsed again. Lines count from 1, as `str.splitlines` has them.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from pathlib import Path
+
+import msgspec
+
+_KEPT = 32
+_SPACE = 0x10000
+_Scope = tuple[str, str]
+"""(scope, name) of a C name: scope is G, or F and the file."""
+
+
+class Symbol(msgspec.Struct, frozen=True):
+    """Where the linker put a name; `space` is code, iram, xram, sfr or bit."""
+
+    address: int
+    space: str
+
+
+class SourceLine(msgspec.Struct, frozen=True, order=True):
+    """A line of a source file, by the name the compiler was given; lines count from 1."""
+
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}"
+
+
+class CodePlace(msgspec.Struct, frozen=True):
+    """A name inside a relocatable code area that has a size, and the line of the map; one at its end marks the end."""
+
+    area: str
+    name: str
+    address: int
+    line: int
+
+
+class MapFile(msgspec.Struct, frozen=True, eq=False):
+    """A map. `instructions`: (address, line of the file) of assembler lines, by address, each address once."""
+
+    names: dict[str, Symbol]
+    places: tuple[CodePlace, ...]
+    instructions: tuple[tuple[int, int], ...]
+
+
+class CdbFile(msgspec.Struct, frozen=True, eq=False):
+    """A debug file. `lines`: (address, C line); `begins`, `ends`: first and last instruction of functions."""
+
+    names: dict[str, Symbol]
+    instructions: tuple[tuple[int, int], ...]
+    lines: tuple[tuple[int, SourceLine], ...]
+    begins: dict[_Scope, int]
+    ends: tuple[tuple[_Scope, int], ...]
+
+
+class ListedCode(msgspec.Struct, frozen=True):
+    """Bytes in a listing. `line`: the C line named above them; `timed`: an instruction,
+    which has a number of clocks.
+    """
+
+    number: int
+    address: int
+    data: bytes
+    line: SourceLine | None
+    timed: bool
+
+
+def read_text(path: Path) -> str:
+    """The text of a file beside an image, "" if there is none."""
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+
+
+_AREA = re.compile(r"^(\S[\S .]*?)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) = .*bytes \(([A-Z,]+)\)")
+_RECORD = re.compile(r"^([CDB]:)?\s+([0-9A-F]{8})\s+(?:(_\w+)\s|(A\$))")
+
+
+@lru_cache(_KEPT)
+def parse_map(text: str) -> MapFile:
+    """An SDCC (ASxxxx) map file: the area that a page is headed with tells the space of its names."""
+    names: dict[str, Symbol] = {}
+    places: list[CodePlace] = []
+    instructions: dict[int, int] = {}
+    area = space = ""
+    first = end = 0
+    for number, line in enumerate(text.splitlines(), start=1):
+        if " = " in line and (head := _AREA.match(line)):
+            area, attributes = head[1], head[4].split(",")
+            space = _map_space(area, attributes)
+            first = int(head[2], 16)
+            end = first + int(head[3], 16) if "CODE" in attributes and "REL" in attributes else 0
+        elif (line[:1].isspace() or line[1:2] == ":") and (record := _RECORD.match(line)):
+            prefix, address = record[1], int(record[2], 16)
+            if name := record[3]:
+                if space:
+                    names[name] = Symbol(address, space)
+                if prefix in (None, "C:") and first <= address < min(end, _SPACE):
+                    places.append(CodePlace(area, name, address, number))
+            elif prefix == "C:" and address < _SPACE:
+                instructions.setdefault(address, number)
+    return MapFile(names, tuple(places), tuple(sorted(instructions.items())))
+
+
+def _map_space(area: str, attributes: list[str]) -> str:
+    for attribute, space in (("CODE", "code"), ("XDATA", "xram"), ("BIT", "bit")):
+        if attribute in attributes:
+            return space
+    return "sfr" if "ABS" in area else "iram"
+
+
+_MAP_MODULE = re.compile(r"^(\S+)\.rel\s+\[", re.MULTILINE)
+_MAP_CONSTANTS = re.compile(r"^(?:CONST|XINIT)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) =", re.MULTILINE)
+
+
+def map_modules(text: str) -> list[str]:
+    """The modules that were linked, in their order, each once."""
+    return list(dict.fromkeys(_MAP_MODULE.findall(text)))
+
+
+def map_constants(text: str) -> list[tuple[int, int]]:
+    """(first, end) of the areas of constants."""
+    areas = dict.fromkeys(_MAP_CONSTANTS.findall(text))
+    return [(int(at, 16), int(at, 16) + int(size, 16)) for at, size in areas if int(size, 16)]
+
+
+_CDB_SPACES = {
+    "C": "code",
+    "D": "code",
+    "E": "iram",
+    "G": "iram",
+    "F": "xram",
+    "H": "bit",
+    "I": "sfr",
+    "J": "bit",
+}
+# Numbers have at most as many digits as SDCC writes, with some to spare: a longer one is damage, and no record.
+_CDB_SYMBOL = re.compile(r"^S:((?:G|F\w+)\$(\w+)\$\w+\$\w+)\(.*\),([A-Z]),")
+_CDB_INSTRUCTION = re.compile(r"^L:A\$[^:]*:([0-9A-F]{1,8})\b")
+_CDB_LINE = re.compile(r"^L:C\$([^$]+)\$([0-9]{1,9})\$\w+\$\w+:([0-9A-F]{1,8})$")
+_CDB_NAME = re.compile(r"^L:(X?)(G|F\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]{1,8})$")
+
+
+@lru_cache(_KEPT)
+def parse_cdb(text: str) -> CdbFile:
+    """An SDCC debug file: globals and file statics, SFRs apart from SFR bits, C lines, and where functions are."""
+    spaces: dict[_Scope, str] = {}
+    names: dict[str, Symbol] = {}
+    instructions: dict[int, int] = {}
+    lines: list[tuple[int, SourceLine]] = []
+    begins: dict[_Scope, int] = {}
+    ends: list[tuple[_Scope, int]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.startswith("S:"):
+            symbol = _CDB_SYMBOL.match(line)
+            if symbol and symbol[3] in _CDB_SPACES:
+                spaces[_scope(symbol[1])] = _CDB_SPACES[symbol[3]]
+        elif line.startswith("L:A$"):
+            if (found := _CDB_INSTRUCTION.match(line)) and (address := int(found[1], 16)) < _SPACE:
+                instructions.setdefault(address, number)
+        elif line.startswith("L:C$"):
+            if found := _CDB_LINE.match(line):
+                lines.append((int(found[3], 16), SourceLine(found[1], int(found[2]))))
+        elif line.startswith("L:") and (found := _CDB_NAME.match(line)):
+            scope, address = (found[2], found[3]), int(found[4], 16)
+            if found[1]:
+                ends.append((scope, address))
+                continue
+            begins[scope] = address
+            if scope in spaces:
+                names["_" + found[3]] = Symbol(address, spaces[scope])
+    return CdbFile(names, tuple(sorted(instructions.items())), tuple(lines), begins, tuple(ends))
+
+
+def _scope(qualified: str) -> _Scope:
+    """`G$main$0_0$0` and its link record `G$main$0$0` alike: (scope, name)."""
+    scope, name = qualified.split("$")[:2]
+    return scope, name
+
+
+_RST_LINE = re.compile(r"^\s*[0-9]+ ;\t([^\s:]+\.\w+):([0-9]{1,9}): ")
+_RST_CODE = re.compile(r"^ {6}([0-9A-F]{6})((?: [0-9A-F]{2})+) +(\[\d+\])?")
+
+
+@lru_cache(_KEPT)
+def parse_listing(text: str) -> tuple[ListedCode, ...]:
+    """A relinked listing: the bytes of each of its lines, with the C line that a comment above names."""
+    found: list[ListedCode] = []
+    line = None
+    for number, row in enumerate(text.splitlines(), start=1):
+        if named := _RST_LINE.match(row):
+            line = SourceLine(named[1], int(named[2]))
+        elif code := _RST_CODE.match(row):
+            data = bytes.fromhex(code[2])
+            found.append(ListedCode(number, int(code[1], 16), data, line, bool(code[3])))
+    return tuple(found)
