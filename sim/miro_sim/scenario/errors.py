@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_host.parts import PartError
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.parts import REGISTRIES, struct_of
 
@@ -78,7 +79,8 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
     if unknown:
         known = _keys_at(raw, path)
         place = f"{path}.{unknown[1]}" if path else unknown[1]
-        return ScenarioError(origin, place, "unknown key", remedy_for_key(unknown[1], known))
+        remedy = _other_part(raw, path, unknown[1]) or remedy_for_key(unknown[1], known)
+        return ScenarioError(origin, place, "unknown key", remedy)
     missing = re.fullmatch(r"Object missing required field `(.*)`", what)
     if missing:
         place = f"{path}.{missing[1]}" if path else missing[1]
@@ -217,6 +219,22 @@ def _keys_at(raw: Any, path: str) -> list[str]:
         if tag is None or value.get(tag, struct.tag) == struct.tag:
             return [*([tag] if tag else []), *struct.cls.__struct_encode_fields__]
     return []
+
+
+def _other_part(raw: Any, path: str, key: str) -> str:
+    """The remedy for a key that belongs to another part than the one which the table at `path` names."""
+    table = _type_at(raw, path)
+    if not isinstance(table, msgspec.inspect.CustomType):
+        return ""
+    registry = REGISTRIES[table.cls]
+    for name in registry.names():
+        try:
+            keys = registry.find(name).__struct_encode_fields__
+        except PartError:
+            continue
+        if key in keys:
+            return f'it belongs to the {registry.word} {name!r}, which {registry.key} = "{name}" chooses'
+    return ""
 
 
 def _choices_at(raw: Any, path: str) -> str:

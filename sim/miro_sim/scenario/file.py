@@ -7,27 +7,31 @@ functions, whatever the text.
 
 import math
 import tomllib
+from collections.abc import Sequence
 from difflib import get_close_matches
 from importlib import resources
 from typing import Any
 
 import msgspec
 
-from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, too_long
+from miro_protocol.toml_text import TEXT_KIB
 from miro_sim.inputs import InputError, read_input
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.parts import full_message, part_of
 from miro_sim.scenario.places import check_places
 from miro_sim.scenario.profiles import ProfileError, with_profiles
+from miro_sim.scenario.settings import blamed, make
+from miro_sim.scenario.text import check_size, written
 
 
 class ScenarioText(msgspec.Struct, frozen=True):
-    """A scenario together with the text it was read from, which is what a recording keeps."""
+    """A scenario together with its text, which a recording keeps: as it was read, or as the `settings` left it."""
 
     origin: str
     text: str
     scenario: Scenario
+    settings: tuple[str, ...] = ()
 
 
 def builtin_names() -> list[str]:
@@ -47,13 +51,21 @@ def builtin_text(name: str) -> str:
     return (resources.files("miro_sim.scenario") / "builtin" / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def load(source: str) -> ScenarioText:
+def load(source: str, settings: Sequence[str] = ()) -> ScenarioText:
     """The scenario that `source` names: a file if it ends in .toml or has a path separator, else a
-    built-in.
+    built-in. `settings` as `parse` takes them.
     """
+    text = source_text(source)
+    raw, scenario = _parsed(text, source, settings)
+    return ScenarioText(
+        source, written(raw, source, settings) if settings else text, scenario, tuple(settings)
+    )
+
+
+def source_text(source: str) -> str:
+    """The text of the scenario that `source` names, which may be wrong. Raises ScenarioError."""
     if not (source.endswith(".toml") or "/" in source or "\\" in source):
-        text = builtin_text(source)
-        return ScenarioText(source, text, parse(text, source))
+        return builtin_text(source)
     try:
         raw = read_input(source, TEXT_KIB << 10)
     except FileNotFoundError:
@@ -65,8 +77,7 @@ def load(source: str) -> ScenarioText:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise ScenarioError(source, "", f"cannot be read: {reason}") from None
-    text = decode(raw, source)
-    return ScenarioText(source, text, parse(text, source))
+    return decode(raw, source)
 
 
 def decode(raw: bytes, origin: str) -> str:
@@ -78,23 +89,41 @@ def decode(raw: bytes, origin: str) -> str:
         raise ScenarioError(origin, f"line {line}", "not UTF-8 text", "save the file as UTF-8") from None
 
 
-def parse(text: str, origin: str) -> Scenario:
-    """TOML text to a Scenario. Raises ScenarioError (and nothing else) naming `origin` and the place.
+def parse(text: str, origin: str, settings: Sequence[str] = ()) -> Scenario:
+    """TOML text to a Scenario, after the `settings` (`KEY=VALUE`, see `settings`) were made in it.
 
+    Raises ScenarioError (and nothing else) naming `origin` and the place.
     Decides the engine, if nothing has yet: where a reference leads is computed by a hot module.
     """
-    _check_size(text, origin)
+    return _parsed(text, origin, settings)[1]
+
+
+def changed(scenario: Scenario, origin: str, settings: Sequence[str]) -> Scenario:
+    """A scenario that stands in no file, with these settings. Raises ScenarioError."""
+    return _checked(_without_none(msgspec.to_builtins(scenario)), origin, settings) if settings else scenario
+
+
+def _without_none(value: Any) -> Any:
+    """Tables as a file has them: a key that is None is left out."""
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return [_without_none(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def _parsed(text: str, origin: str, settings: Sequence[str]) -> tuple[dict[str, Any], Scenario]:
+    """The tables with the settings made, and the scenario."""
+    check_size(text, origin)
     try:
-        raw = _loads(text, origin)
+        raw = _tables(text, origin)
+        return raw, _checked(raw, origin, settings)
     except RecursionError:
         raise _too_deep(origin) from None
-    return of_table(raw, origin)
 
 
-def of_table(raw: dict[str, Any], origin: str) -> Scenario:
+def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = ()) -> Scenario:
     """A Scenario from the tables that TOML text gave, which may be filled in. Raises ScenarioError as `parse` does."""
     try:
-        return _converted(raw, origin)
+        return _checked(raw, origin, settings)
     except RecursionError:
         raise _too_deep(origin) from None
 
@@ -103,18 +132,7 @@ def _too_deep(origin: str) -> ScenarioError:
     return ScenarioError(origin, "", "nested too deeply", "a scenario has tables in at most 5 levels")
 
 
-def _check_size(text: str, origin: str) -> None:
-    """Refuses what would take `tomllib` minutes."""
-    if too_long(text):
-        what = f"holds more than {TEXT_KIB} KiB"
-        raise ScenarioError(origin, "", what, "name the file that was meant")
-    line = long_key_line(text)
-    if line is not None:
-        what = f"a key of more than {KEY_PARTS} parts"
-        raise ScenarioError(origin, f"line {line}", what, "remove it; no key of a scenario has more than 6")
-
-
-def _loads(text: str, origin: str) -> dict[str, Any]:
+def _tables(text: str, origin: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -123,27 +141,37 @@ def _loads(text: str, origin: str) -> dict[str, Any]:
         raise ScenarioError(origin, "", "an integer of thousands of digits") from None
 
 
-def _converted(raw: dict[str, Any], origin: str) -> Scenario:
-    _check_finite(raw, "", origin)
-    _fill_in_profiles(raw, origin)
+def _checked(raw: dict[str, Any], origin: str, settings: Sequence[str]) -> Scenario:
+    """The scenario of these tables; makes the settings in them."""
+    made = make(raw, settings, origin)
     try:
-        scenario = msgspec.convert(raw, Scenario, dec_hook=part_of)
-    except msgspec.ValidationError as error:
-        raise value_error(origin, raw, full_message(error)) from None
-    check_places(scenario, origin)
+        _check_finite(raw, "", origin)
+        complete = _with_profiles(raw, origin)
+        try:
+            scenario = msgspec.convert(complete, Scenario, dec_hook=part_of)
+        except msgspec.ValidationError as error:
+            raise value_error(origin, complete, full_message(error)) from None
+        check_places(scenario, origin)
+    except ScenarioError as error:
+        raise blamed(error, made) from error.__cause__
     return scenario
 
 
-def _fill_in_profiles(raw: dict[str, Any], origin: str) -> None:
-    """Replaces the radio tables by themselves with their profiles; what has another shape is left alone."""
+def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:
+    """The same with the keys of profiles in the radio tables; what has another shape is left alone."""
     networks = raw.get("network")
-    for index, network in enumerate(networks if isinstance(networks, list) else []):
+    if not isinstance(networks, list):
+        return raw
+    complete = []
+    for index, network in enumerate(networks):
         if isinstance(network, dict) and isinstance(network.get("radio"), dict):
             try:
-                network["radio"] = with_profiles(network["radio"])
+                network = {**network, "radio": with_profiles(network["radio"])}
             except ProfileError as error:
                 place = f"network[{index}].radio.profile"
                 raise ScenarioError(origin, place, error.what, error.remedy) from None
+        complete.append(network)
+    return {**raw, "network": complete}
 
 
 def _syntax_error(origin: str, text: str, message: str) -> ScenarioError:

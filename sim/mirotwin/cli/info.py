@@ -24,6 +24,7 @@ PACKAGES = (
     "crcmod-plus",
     "intelhex",
     "pyvcd",
+    "tomli-w",
 )
 
 PLAIN_REMEDY = "rebuild with GCC or Clang, and with the Cython of .ci/constraints.txt"

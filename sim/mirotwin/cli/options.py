@@ -58,6 +58,10 @@ def firmware_option(text: str) -> Callable[[Command], Command]:
     return click.option("--firmware", "firmware", metavar="IMAGE.ihx", type=Place(), help=text)
 
 
+def set_option(text: str) -> Callable[[Command], Command]:
+    return click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help=text)
+
+
 def choose_engine(engine: str | None) -> str:
     """Fixes the engine of this process and returns its name. Before any simulation code is imported."""
     if engine is not None:

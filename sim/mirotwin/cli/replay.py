@@ -15,7 +15,7 @@ from mirotwin import runner
 from mirotwin.capture.frame_list import FrameLine, frame_lines
 from mirotwin.capture.recorded import transmissions_of
 from mirotwin.cli.console import show
-from mirotwin.cli.options import Place, engine_option, firmware_option, plain_parameters
+from mirotwin.cli.options import Place, engine_option, firmware_option, plain_parameters, set_option
 from mirotwin.cli.program import DIVERGENCE, DONE, complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import Job, load_job
@@ -28,10 +28,18 @@ SHOWN = 20
 @click.command(short_help="Sends recorded bytes again and compares.")
 @click.argument("file", type=Place())
 @firmware_option("Image to run instead of the recorded one (of the robot's own, for a text stream).")
+@set_option("A key to set in the recorded scenario (or the default one, for a text stream), as for `run`.")
 @engine_option
 @click.option("--all", "everything", is_flag=True, help=f"List all frames, not only the first {SHOWN}.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no list of frames.")
-def replay(file: str, firmware: str | None, engine: str | None, everything: bool, quiet: bool) -> int:
+def replay(
+    file: str,
+    firmware: str | None,
+    settings: tuple[str, ...],
+    engine: str | None,
+    everything: bool,
+    quiet: bool,
+) -> int:
     """Sends the bytes of FILE (run.mcap, or a text stream) again and compares what the robot does.
 
     Exit code 4 when it differs from the recording, also where a firmware fault comes of it: 4 goes before 3.
@@ -41,7 +49,7 @@ def replay(file: str, firmware: str | None, engine: str | None, everything: bool
 
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
-    job, image = load_job(file, firmware, engine)
+    job, image = load_job(file, firmware, engine, settings)
     from miro_sim.radio.downlink import TransmissionError
     from miro_sim.world.world import World
 

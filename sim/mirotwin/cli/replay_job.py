@@ -17,6 +17,7 @@ from miro_protocol import stream
 from miro_protocol.transmission import Transmission
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period
+from miro_sim.scenario.file import changed
 from miro_sim.scenario.file import parse as parse_scenario
 from miro_sim.scenario.keys import Scenario
 from mirotwin.capture.detect import detect
@@ -41,8 +42,13 @@ class Job(msgspec.Struct, frozen=True):
     recorded: Sequence[Period]
 
 
-def load_job(file: str, firmware: str | None, engine: str | None) -> tuple[Job, Image]:
-    """Reads `file`, fixes the engine, and loads the image that was asked for, recorded, or the robot's own."""
+def load_job(
+    file: str, firmware: str | None, engine: str | None, settings: Sequence[str] = ()
+) -> tuple[Job, Image]:
+    """Reads `file`, fixes the engine, and loads the image that was asked for, recorded, or the robot's own.
+
+    `settings`: keys to set in the recorded scenario, or in the default one.
+    """
     check_no_folder(file, RECORDING)
     data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
     choose_engine(engine)
@@ -50,14 +56,14 @@ def load_job(file: str, firmware: str | None, engine: str | None) -> tuple[Job, 
         recording = parse(data, file)
         if recording.broken_off:
             complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
-        job = _job_of_recording(recording, file)
+        job = _job_of_recording(recording, file, settings)
         return job, _recorded_image(recording, file) if firmware is None else load_image(firmware)
     _refuse_other_formats(data, file)
     given = stream.decode(data, file)
     _refuse_what_cannot_be_done(given.header, file)
     image = load_image(firmware)
     _check_firmware(given.header, image, file, firmware)
-    return _job_of_stream(given, file), image
+    return _job_of_stream(given, file, settings), image
 
 
 def _refuse_other_formats(data: bytes, path: str) -> None:
@@ -70,19 +76,19 @@ def _refuse_other_formats(data: bytes, path: str) -> None:
         raise BadInput(path, "offset 0", what, "give a run.mcap that `mirotwin run` wrote, or a stream file")
 
 
-def _job_of_recording(recording: Recording, path: str) -> Job:
+def _job_of_recording(recording: Recording, path: str, settings: Sequence[str]) -> Job:
     source = recording.source
     if not recording.periods:
         raise BadInput(path, "", "the recording holds no control period", "nothing can be replayed")
-    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml")
+    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings)
     script = script_of(recording.periods)
     check_script(script, path, len(scenario.networks))
     return Job(scenario, source.seed, script, recording.periods)
 
 
-def _job_of_stream(given: stream.Stream, path: str) -> Job:
+def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str]) -> Job:
     sent = given.transmissions()
-    scenario = scenario_of_stream(sent, path, given.header)
+    scenario = changed(scenario_of_stream(sent, path, given.header), path, settings)
     return Job(scenario, given.header.seed or 0, script_of_stream(sent), ())
 
 

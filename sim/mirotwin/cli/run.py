@@ -24,6 +24,7 @@ from mirotwin.cli.options import (
     firmware_option,
     load_image,
     plain_parameters,
+    set_option,
 )
 from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain
 from mirotwin.cli.progress import ProgressBar
@@ -43,6 +44,10 @@ if TYPE_CHECKING:
 @click.option(
     "--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Master seed of all noise."
 )
+@set_option(
+    "A key of the scenario, by its path (network.robot.controller.q1_per_s=0.3; with several, network.0.robot.1. and so"
+    " on); may be repeated. VALUE is TOML, or else text. Folder: runs/SCENARIO-SEED all the same."
+)
 @firmware_option("Image to run instead of the robot's own.")
 @engine_option
 @click.option(
@@ -58,6 +63,7 @@ def run(
     scenario: str,
     out: Path | None,
     seed: int,
+    settings: tuple[str, ...],
     firmware: str | None,
     engine: str | None,
     record: str,
@@ -72,7 +78,7 @@ def run(
     and replay read it. Files of an earlier run stay as they are until the new ones are complete.
     """
     active = choose_engine(engine)  # first: a law from another distribution may import hot modules
-    text = load(scenario)
+    text = load(scenario, settings)
     folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force)
     image = load_image(firmware)
     from miro_sim.world.world import World
@@ -81,7 +87,7 @@ def run(
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
     with plain_parameters(text.origin), held_signals() as hold, folder:
-        run_files = RunFiles(folder, source, world, active, hold)
+        run_files = RunFiles(folder, source, world, active, hold, settings)
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
     if not quiet:
@@ -120,6 +126,8 @@ def _print(summary: Summary, periods: list[Period], folder: Path) -> None:
     table.add_column(style="bold")
     table.add_column()
     table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
+    if summary.set:
+        table.add_row("set", " ".join(summary.set))
     table.add_row(
         "time",
         f"{summary.simulated_s:.2f} s in {summary.wall_s:.2f} s ({summary.realtime_factor:.1f} x real time, "

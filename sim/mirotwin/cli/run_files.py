@@ -34,12 +34,21 @@ FLUSH_S = 0.2
 class RunFiles:
     """Runs `world` and fills `folder`, which is open and in which `hold` holds signals."""
 
-    def __init__(self, folder: OutputFolder, source: Source, world: World, engine: str, hold: Hold) -> None:
+    def __init__(
+        self,
+        folder: OutputFolder,
+        source: Source,
+        world: World,
+        engine: str,
+        hold: Hold,
+        settings: tuple[str, ...] = (),
+    ) -> None:
         self.folder = folder
         self.source = source
         self.world = world
         self.engine = engine
         self.hold = hold
+        self.settings = settings
         self.periods: list[Period] = []
         self._wall_s = 0.0
         self._flushed_s = -FLUSH_S
@@ -98,6 +107,7 @@ class RunFiles:
             counters=self.world.counters(),
             firmware_sha256=self.source.firmware_sha256,
             complete=complete,
+            settings=self.settings,
         )
 
     def _leave_parts(self) -> None:

@@ -9,6 +9,7 @@ from rich.table import Table
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as radio_profiles
 from mirotwin.cli.console import show as print_result
+from mirotwin.cli.options import set_option
 
 
 @click.group(invoke_without_command=True, short_help="Lists the built-in scenarios, or shows one.")
@@ -31,9 +32,13 @@ def scenarios(context: click.Context) -> None:
 
 @scenarios.command()
 @click.argument("name")
-def show(name: str) -> None:
-    """Prints the file of the built-in scenario NAME, to read or to start one's own from."""
-    click.echo(scenario_file.builtin_text(name), nl=False)
+@set_option(
+    "A key to set in it, as for `run`; may be repeated. The file is then checked, and has lost its comments."
+)
+def show(name: str, settings: tuple[str, ...]) -> None:
+    """Prints the file of the built-in scenario NAME, to read or to start one's own from. NAME may be a file, too."""
+    text = scenario_file.load(name, settings).text if settings else scenario_file.source_text(name)
+    click.echo(text, nl=False)
 
 
 @scenarios.command()

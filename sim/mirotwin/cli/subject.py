@@ -38,6 +38,7 @@ from mirotwin.cli.options import (
     firmware_option,
     load_image,
     plain_parameters,
+    set_option,
 )
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import load_job
@@ -56,6 +57,7 @@ class Request(msgspec.Struct, frozen=True):
     subject: str
     seed: int | None
     firmware: str | None
+    settings: tuple[str, ...]
     network: int | None
     robot: int | None
     from_tick: int
@@ -75,6 +77,7 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.option("--to", "to_tick", type=Moment(), help="End there. Default: the end of the run."),
     click.option("--seed", type=Whole(0, MAX_SEED), help="Scenario: master seed of all noise. Default 0."),
     firmware_option("Scenario, recording, stream: image to run instead of its own."),
+    set_option("Scenario, recording, stream: a key to set in its scenario, as for `run`."),
     click.option("--network", type=Whole(0), help="Which network's robot. Default 0."),
     click.option("--robot", type=Whole(0, 4), help="Slot of the robot. Default: the first there is."),
     bare_options("Image: "),
@@ -158,13 +161,13 @@ def _earlier(one: int | None, other: int | None) -> int | None:
 def _refuse(request: Request, kind: str, *options: str) -> None:
     for option in options:
         value = getattr(request, option)
-        if value is not None and value is not False:
-            name = option.replace("_", "-")
+        if value not in (None, False, ()):
+            name = "set" if option == "settings" else option.replace("_", "-")
             raise BadInput(request.subject, "", f"is {kind}, --{name} does not apply to it", "leave it out")
 
 
 def _bare_run(request: Request) -> BareRun:
-    _refuse(request, "an image on the bare processor", "seed", "firmware", "network", "robot")
+    _refuse(request, "an image on the bare processor", "seed", "firmware", "settings", "network", "robot")
     choose_engine(request.engine)
     image = load_bare_image(request.subject, request.bare)
     until = target_of(request.subject, image, request.bare)
@@ -181,12 +184,12 @@ def _robot_run(request: Request) -> RobotRun:
     periods = None
     if subject in builtin_names() or subject.endswith(".toml") or not is_path:
         choose_engine(request.engine)
-        text = load(subject)
+        text = load(subject, request.settings)
         image = load_image(request.firmware)
         scenario, seed, script = text.scenario, request.seed or 0, None
     else:
         _refuse(request, "a recording or stream, which has its seed", "seed")
-        job, image = load_job(subject, request.firmware, request.engine)
+        job, image = load_job(subject, request.firmware, request.engine, request.settings)
         scenario, seed, script = job.scenario, job.seed, job.script
         periods = len(job.recorded) or None
     from miro_sim.world.world import World

@@ -93,7 +93,8 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """`summary.json`. `tracking` is the first robot's; `robots` lists all when there are several.
 
     `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is
-    written only where it is false: the run was broken off, and all figures are of the part before.
+    written only where it is false: the run was broken off, and all figures are of the part before. `set`: the keys of
+    the scenario that were set on the command line (`KEY=VALUE`), only where there were some.
     """
 
     scenario: str
@@ -108,6 +109,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     firmware: Firmware
     robots: tuple[RobotTracking, ...] = ()
     complete: bool = True
+    set: tuple[str, ...] = ()
 
 
 def wrapped(angle_rad: float) -> float:
@@ -187,6 +189,7 @@ def summarise(
     counters: Mapping[str, Mapping[str, Any]],
     firmware_sha256: str,
     complete: bool = True,
+    settings: tuple[str, ...] = (),
 ) -> Summary:
     """The summary of a run; `counters` as `World.counters()` gives them."""
     tracked = {place: tracking_of(samples) for place, samples in errors_by_robot(periods).items()}
@@ -204,6 +207,7 @@ def summarise(
         firmware=Firmware(sha256=firmware_sha256, **counters["firmware"]),
         robots=everyone if len(everyone) > 1 else (),
         complete=complete,
+        set=settings,
     )
 
 

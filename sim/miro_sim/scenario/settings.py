@@ -1,0 +1,156 @@
+"""Single keys of a scenario that are set from outside: `KEY=VALUE`, as the command line's `--set` takes them.
+
+What belongs here: reading a setting, putting it into a scenario's tables, and naming the setting in an error that it
+caused. What does not: which keys there are (`keys`), and what is wrong with a value (`errors`): a scenario is checked
+as a whole after all settings were made, in their order, as if its file had said so.
+
+KEY is the path of a key, `network.0.robot.0.controller.gamma1_per_s`. An index may be left out where a list has one
+entry: `network.robot.controller.gamma1_per_s`. VALUE is read as TOML, and as text if it is none; an inline table
+replaces a whole table.
+"""
+
+import re
+import tomllib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import msgspec
+
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.parts import REGISTRIES
+from miro_sim.scenario.profiles import ERROR_KEYS
+from miro_sim.scenario.text import check_size
+
+Table = dict[str, Any]
+_TAGS = {registry.key for registry in REGISTRIES.values()}
+"""Keys that say which other keys a table has."""
+
+
+class Setting(msgspec.Struct, frozen=True):
+    """What a setting did. `text`: KEY=VALUE as it was given; `path`: what was set, as in errors: `network[0].host`.
+
+    `table`: the table that is the setting's as a whole, because the setting made it or chose its kind; or "".
+    """
+
+    text: str
+    path: str
+    table: str = ""
+
+    @property
+    def place(self) -> str:
+        """How errors name it."""
+        return f"--set {self.text}"
+
+    def concerns(self, path: str) -> bool:
+        """Whether an error at this path may be the setting's."""
+        ours = [place for place in (self.path, self.table) if place]
+        return any(_inside(path, place) for place in ours) or _inside(self.path, path)
+
+
+def _inside(path: str, above: str) -> bool:
+    return path == above or path.startswith((f"{above}.", f"{above}["))
+
+
+class _Refused(Exception):
+    """A KEY that leads nowhere: what, remedy."""
+
+    def __init__(self, what: str, remedy: str) -> None:
+        self.what = what
+        self.remedy = remedy
+
+
+def make(raw: Table, settings: Iterable[str], origin: str) -> list[Setting]:
+    """Makes the settings in the tables of a scenario, in their order. Raises ScenarioError."""
+    return [_make(raw, text, origin) for text in settings]
+
+
+def _make(raw: Table, text: str, origin: str) -> Setting:
+    try:
+        keys, value = _read(text, origin)
+        return _Path(text).put(raw, keys, value, "")
+    except _Refused as refused:
+        raise ScenarioError(origin, f"--set {text}", refused.what, refused.remedy) from None
+    except RecursionError:
+        raise ScenarioError(origin, f"--set {text}", "nested too deeply") from None
+
+
+def _read(text: str, origin: str) -> tuple[list[str], Any]:
+    key, equals, value = text.partition("=")
+    keys = [part.strip() for part in re.sub(r"\[(\d+)\]", r".\1", key).split(".")]
+    if not equals or not all(keys):
+        raise _Refused("is no setting", "write KEY=VALUE, such as network.radio.latency_s=0.01")
+    try:
+        check_size(text, origin)
+    except ScenarioError as error:
+        raise _Refused(error.what, error.remedy) from None
+    try:
+        read = tomllib.loads(f"value = {value}")
+    except ValueError:  # no TOML, or an integer with more digits than Python converts
+        return keys, value
+    return keys, read["value"] if len(read) == 1 else value
+
+
+class _Path:
+    """Goes along the keys of one setting. `table`: the first table on the way that was not there."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.table = ""
+
+    def put(self, at: Any, keys: Sequence[str], value: Any, path: str) -> Setting:
+        """Sets the value below `at`, which is at `path`."""
+        if isinstance(at, list):
+            return self._put_in_list(at, keys, value, path)
+        if not isinstance(at, dict):
+            raise _Refused(f"{path} is a value and has no keys", f"end KEY with {path.rpartition('.')[2]}")
+        key, *rest = keys
+        place = f"{path}.{key}" if path else key
+        if rest:
+            if key not in at:
+                self.table = self.table or place
+            return self.put(at.setdefault(key, {}), rest, value, place)
+        below = at.get(key)
+        if isinstance(value, dict) and isinstance(below, list) and len(below) == 1:
+            return self._put_in_list(below, ["0"], value, place)
+        if key in ERROR_KEYS:  # either says the same: the last one holds
+            for other in ERROR_KEYS:
+                at.pop(other, None)
+        at[key] = value
+        return Setting(self.text, place, path if key in _TAGS else self.table)
+
+    def _put_in_list(self, at: list[Any], keys: Sequence[str], value: Any, path: str) -> Setting:
+        if not keys[0].isdecimal():
+            if len(at) != 1:
+                ways = f"name one of them: {path}.0 to {path}.{len(at) - 1}" if at else "give a whole list"
+                raise _Refused(f"{path} has {len(at)} entries", ways)
+            return self.put(at[0], keys, value, f"{path}[0]")
+        index, *rest = keys
+        number = int(index[:9])
+        if number >= len(at):
+            what = f"{path} has {len(at)} {'entry' if len(at) == 1 else 'entries'}, numbered from 0"
+            raise _Refused(what, "give the whole list to add one")
+        place = f"{path}[{number}]"
+        if rest:
+            return self.put(at[number], rest, value, place)
+        at[number] = value
+        return Setting(self.text, place, self.table)
+
+
+def blamed(error: ScenarioError, settings: Sequence[Setting]) -> ScenarioError:
+    """The same error, naming the setting that it concerns; all settings, where the scenario failed with them."""
+    if not settings:
+        return error
+    place = f"{error.place}"
+    concerned = [setting for setting in settings if setting.concerns(place)]
+    if not concerned:
+        made = " ".join(setting.place for setting in settings)
+        return ScenarioError(f"{error.path} with {made}", place, error.what, error.remedy)
+    setting = concerned[-1]
+    above, _, key = setting.path.rpartition(".")
+    remedy = error.remedy
+    if key in _TAGS and error.what == "unknown key":
+        remedy = f"it belongs to the {key} before; set the whole table: --set '{above}={{{key} = .., ..}}'"
+    if not remedy and error.what.startswith("expected a string"):
+        remedy = f"as text it is --set '{setting.text.partition('=')[0]}=\"..\"'"
+    what = error.what if place == setting.path else f"{place}: {error.what}"
+    return ScenarioError(f"{error.path}", setting.place, what, remedy)

@@ -1,0 +1,197 @@
+"""Single keys of a scenario, set by their path: `--set KEY=VALUE`."""
+
+import json
+import tomllib
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from tests.naive.tables import scalar_places
+
+from miro_sim.scenario.file import ScenarioError, builtin_text, changed, load, parse
+from miro_sim.scenario.text import written
+
+FIG6 = load("fig6").scenario
+TABLES = {name: tomllib.loads(builtin_text(name)) for name in ("fig6", "fig8")}
+SCALARS = [(name, *place) for name, table in TABLES.items() for place in scalar_places(table)]
+
+
+def refusal(*settings: str, source: str = "fig6") -> str:
+    with pytest.raises(ScenarioError) as caught:
+        load(source, settings)
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+@given(st.sampled_from(SCALARS), st.booleans())
+def test_a_key_set_to_its_own_value_changes_nothing(place: tuple[str, str, Any], with_indices: bool) -> None:
+    name, path, value = place
+    key = path if with_indices else path.replace(".0.", ".")
+    assert load(name, [f"{key}={json.dumps(value)}"]).scenario == load(name).scenario
+
+
+EDITS = [
+    ("duration_s = 6.0", "duration_s = 1.5", "duration_s=1.5"),
+    ("stop_on_fault = true", "stop_on_fault = false", "stop_on_fault=false"),
+    ("latency_s = 0.0", "latency_s = 0.01", "network.radio.latency_s=0.01"),
+    ('carrier = "keyed"', 'carrier = "on"', "network.0.radio.carrier=on"),
+    ("bit_error_rate = 1e-4", "eb_n0_db = 12", "network.radio.eb_n0_db=12"),
+    ("slot = 0", "slot = 2", "network[0].robot[0].slot=2"),
+    ("slot = 0", "slot = 2", "network.0.robot.slot = 2"),
+    ('# profile = "fade15"', 'profile = ["fade15"]', 'network.radio.profile=["fade15"]'),
+    ("gamma1_per_s = 1.8", "gamma1_per_s = 2", "network.robot.controller.gamma1_per_s=2"),
+    ('name = "fig6"', 'name = "fast"', "name=fast"),
+    ("[host]\ncompute_s = 0.003 ", "[host]\ncompute_s = 0.004 ", "host={compute_s = 0.004}"),
+    ('title = "Straight line, initial errors (7.09 cm, 1.72 cm, -0.38 rad)"', 'title = "a = b"', "title=a = b"),
+]  # fmt: skip
+
+
+@given(st.lists(st.sampled_from(EDITS), unique_by=lambda edit: edit[0], max_size=6))
+def test_settings_do_what_an_editor_does(edits: list[tuple[str, str, str]]) -> None:
+    text = builtin_text("fig6")
+    for old, new, _ in edits:
+        assert old in text
+        text = text.replace(old, new, 1)
+    loaded = load("fig6", [setting for _, _, setting in edits])
+    assert loaded.scenario == parse(text, "edited")
+    assert parse(loaded.text, "written") == loaded.scenario
+
+
+def test_without_settings_the_text_is_the_file() -> None:
+    assert load("fig6").text == builtin_text("fig6")
+
+
+def test_the_text_says_which_keys_were_set() -> None:
+    text = load("fig6", ["duration_s=2", "title=a\nb"]).text
+    assert text.startswith("# fig6 with these keys set:\n#   duration_s=2\n#   title=a\\nb\n\n")
+
+
+def test_of_two_settings_of_a_key_the_later_one_holds() -> None:
+    assert load("fig6", ["duration_s=2", "duration_s=3"]).scenario.duration_s == 3.0
+    host = load("fig6", ["host.compute_s=0.001", "host={}"]).scenario.host
+    assert host.compute_s == 0.003
+    radio = (
+        load("fig6", ["network.radio.eb_n0_db=12", "network.radio.bit_error_rate=0"])
+        .scenario.networks[0]
+        .radio
+    )
+    assert (radio.eb_n0_db, radio.bit_error_rate) == (None, 0.0)
+
+
+def test_a_file_that_is_wrong_without_its_settings_is_read_with_them() -> None:
+    text = builtin_text("fig6").replace("duration_s = 6.0", "duration_s = -1")
+    assert parse(text, "my.toml", ["duration_s=6"]) == FIG6
+
+
+def test_several_robots_are_told_apart_by_index() -> None:
+    robots = builtin_text("fig6") + "\n[[network.robot]]\nslot = 1\nreference.kind = 'line'\n"
+    read = parse(robots, "my.toml", ["network.robot.1.slot=2"])
+    assert [robot.slot for robot in read.networks[0].robot] == [0, 2]
+    with pytest.raises(ScenarioError, match=r"network\[0\].robot has 2 entries; name one of them: network"):
+        parse(robots, "my.toml", ["network.robot.slot=2"])
+
+
+def test_a_scenario_that_stands_in_no_file_takes_settings_too() -> None:
+    assert changed(FIG6, "x", []) is FIG6
+    assert changed(FIG6, "x", ["duration_s=2"]) == msgspec.structs.replace(FIG6, duration_s=2.0)
+    with pytest.raises(ScenarioError, match=r"x: --set duration_s=0: 0 is out of range; must be > 0"):
+        changed(FIG6, "x", ["duration_s=0"])
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("duration_s", "is no setting; write KEY=VALUE"),
+        ("=6", "is no setting; write KEY=VALUE"),
+        ("network..slot=1", "is no setting; write KEY=VALUE"),
+        ("duration=6", "unknown key; use duration_s, in seconds"),
+        ("netwrok.robot.slot=1", "netwrok: unknown key; did you mean network?"),
+        ("network.robot.controler.q1_per_s=1", "network[0].robot[0].controler: unknown key; did you mean controller?"),
+        ("network.robot.controller.q1_per_second=1", "unknown key; did you mean q1_per_s?"),
+        ("network.robot.slot=9", "9 is out of range; must be <= 4"),
+        ("network.robot.slot=4", "network[0].robot[0]: slot 4 does not exist on a network of 3 robots"),
+        ("network.robot.slot=one", "expected a whole number, got a string ('one')"),
+        ("network.robot.3.slot=0", "network[0].robot has 1 entry, numbered from 0; give the whole list"),
+        ("network.robot={slot=1}", "network[0].robot[0].reference: this key is missing; add it"),
+        ("network.robot=[]", "expected `array` of length >= 1"),
+        ("duration_s=6s", "expected a number in seconds, got a string ('6s'); write the number without"),
+        ("duration_s=nan", "nan is not a number that can be used; give a finite number"),
+        ("duration_s=" + "9" * 5000, "expected a number in seconds, got a string"),
+        ("duration_s.x=1", "duration_s is a value and has no keys; end KEY with duration_s"),
+        ("name=2", "expected a string, got a whole number (2); as text it is --set 'name=\"..\"'"),
+        ("name=1979-05-27", "expected a string, got a date; as text it is"),
+        ("network.radio.profile=fade99", "'fade99' is no profile; did you mean fade5?"),
+        ("network.radio.bursts.good_to_bad=0.1", "network[0].radio.bursts.bad_to_good: this key is missing"),
+        ("camera.kind=pixel", "'pixel' is not one of the choices; use gaussian"),
+        ("network.robot.controller.law=nolaw", "'nolaw' is not one of the choices; use yang_kim"),
+        ("network.robot.reference.curvature_per_m=1", "unknown key; it belongs to the reference 'arc', which kind"),
+        (".".join("abcdefghijklmnopqrstuvwxyz") + "=1", "a key of more than 16 parts; remove it"),
+        ("network=" + "[" * 100_000, "nested too deeply"),
+        ("title=" + "x" * (513 << 10), "holds more than 512 KiB"),
+        ("x\ny\x1b[2J=1", "unknown key"),
+    ],
+)  # fmt: skip
+def test_a_setting_that_cannot_be_is_refused_and_named(setting: str, said: str) -> None:
+    message = refusal(setting)
+    assert message.startswith(f"fig6: --set {setting[:20].encode('unicode_escape').decode()}")
+    assert said in message
+    assert len(message) < 1500
+
+
+def test_an_error_that_no_setting_made_alone_names_them_all() -> None:
+    message = refusal("duration_s=60", "stop_on_fault=false")
+    assert message.startswith(
+        "fig6 with --set duration_s=60 --set stop_on_fault=false: network[0].robot[0].reference: leaves the pitch"
+    )
+
+
+def test_of_several_settings_the_one_that_is_wrong_is_named() -> None:
+    message = refusal("duration_s=2", "network.robot.slot=9", "stop_on_fault=false")
+    assert message.startswith("fig6: --set network.robot.slot=9: 9 is out of range")
+
+
+def test_another_kind_of_table_needs_all_of_it() -> None:
+    message = refusal("network.robot.reference.kind=line", source="fig8")
+    assert message.startswith("fig8: --set network.robot.reference.kind=line: network[0].robot[0].reference.")
+    assert "unknown key; it belongs to the kind before; set the whole table: " in message
+    assert "--set 'network[0].robot[0].reference={kind = .., ..}'" in message
+    whole = "network.robot.reference={kind = 'line', drive_s = 1}"
+    assert load("fig8", [whole]).scenario.networks[0].robot[0].reference.name() == "line"
+
+
+TEXT = st.text(st.characters(codec="utf-8"), max_size=8)
+SCALAR = st.booleans() | st.integers(-(1 << 63), (1 << 63) - 1) | st.floats(allow_nan=False) | TEXT
+VALUES = st.recursive(
+    SCALAR,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXT, inner, max_size=3),
+    max_leaves=12,
+)
+
+
+@given(st.dictionaries(TEXT, VALUES, max_size=4), st.text())
+def test_what_is_written_is_read_as_it_was(tables: dict[str, Any], setting: str) -> None:
+    assert tomllib.loads(written(tables, "origin", [setting])) == tables
+
+
+@hypothesis_settings(deadline=None)
+@given(
+    st.from_regex(
+        r"(network|robot|radio|camera|\[0\]|0|1|x|\.){0,6}=[a-z0-9\[\]{}=\", .]{0,12}", fullmatch=True
+    )
+    | st.text(st.characters(codec="utf-8"), max_size=40)
+)
+def test_any_setting_is_made_or_refused_in_one_line(setting: str) -> None:
+    refused = None
+    try:
+        loaded = load("fig6", [setting])
+    except ScenarioError as error:
+        refused = f"{error}"
+    if refused is None:
+        assert parse(loaded.text, "written") == loaded.scenario
+    else:
+        assert "--set " in refused
+        assert refused.isprintable()
