@@ -132,11 +132,11 @@ def select(engine: str) -> None:
     if engine not in ENGINES:
         raise EngineError(f"unknown engine {engine!r}", f"choose one of {', '.join(ENGINES)}")
     finder = install()
+    if engine == "compiled" and finder.missing():
+        raise EngineError(f"no compiled module for {', '.join(finder.missing())}", REMEDY)
     if finder.engine not in (None, engine):
         what = f"engine {finder.engine} is already in use in this process, cannot change to {engine}"
         raise EngineError(what, "select the engine before anything else is imported")
-    if engine == "compiled" and finder.missing():
-        raise EngineError(f"no compiled module for {', '.join(finder.missing())}", REMEDY)
     finder.engine = engine
 
 

@@ -2,7 +2,7 @@
 
 What belongs here: the entry point and the list of commands. What does not: what a command does (one file
 each), and anything that could be done without a command line (`miro_sim`). A command's module is loaded when the
-command is used; simulation code is imported inside the commands, because the engine has to be chosen first.
+command is used, after `--engine` was read (`program.settle_engine`).
 """
 
 import click
@@ -22,7 +22,12 @@ COMMANDS = {
 """Name, which is the module's and the function's too, and what `--help` says of it."""
 
 
-@click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]}, commands_about=COMMANDS)
+@click.group(
+    cls=Program,
+    modules="mirotwin.cli.",
+    commands_about=COMMANDS,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.option(
     "--version",
     is_flag=True,

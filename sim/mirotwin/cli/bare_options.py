@@ -10,13 +10,17 @@ import re
 import sys
 from collections.abc import Callable
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 import msgspec
 
 from miro_exact import clock
 from miro_exact.bad_input import BadInput
+from miro_robot.bare.input import Piece
+from miro_robot.bare.machine import BareMachine, Ended
+from miro_robot.bare.pins import PinEvent, read_pins
+from miro_robot.image import Image
 from miro_sim.inputs import TEXT_BYTES, read_input
 from mirotwin.cli.code_place import FLASH_BYTES, SPACE_BYTES, address_of, place_of
 from mirotwin.cli.options import Place, Whole, load_image
@@ -27,12 +31,6 @@ from mirotwin.cli.program import (
     LIMIT_REACHED,
     complain,
 )
-
-if TYPE_CHECKING:
-    from miro_robot.bare.input import Piece
-    from miro_robot.bare.machine import BareMachine, Ended
-    from miro_robot.bare.pins import PinEvent
-    from miro_robot.image import Image
 
 STDIN = "-"
 UNITS = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 1_000_000)}
@@ -167,8 +165,7 @@ def make_machine(
     output: Callable[[bytes], object] | None = None,
     live: bool = False,
 ) -> BareMachine:
-    """The machine that was asked for; the engine is fixed already. Raises BadInput, and errors of the files read."""
-    from miro_robot.bare.machine import BareMachine
+    """The machine that was asked for. Raises BadInput, and errors of the files read."""
 
     pieces = _pieces(request)
     pins = _pins(request)
@@ -193,7 +190,6 @@ def make_machine(
 
 def report(machine: BareMachine, ended: Ended, request: BareRequest) -> int:
     """Says on stderr why a run ended that did not end as planned; returns the exit code."""
-    from miro_robot.bare.machine import Ended
 
     code = DONE
     for fault in machine.faults:
@@ -232,7 +228,6 @@ def _ticks(time: Time | None, request: BareRequest) -> int | None:
 
 def _pieces(request: BareRequest) -> tuple[Piece, ...]:
     """What --stdin and its conditions say, in order."""
-    from miro_robot.bare.input import Piece
 
     texts = [text.encode(errors="surrogateescape") for text in request.stdin_when]
     files = len(request.stdin)
@@ -276,7 +271,6 @@ def _stdin_bytes(path: str) -> bytes:
 
 
 def _pins(request: BareRequest) -> tuple[PinEvent, ...]:
-    from miro_robot.bare.pins import read_pins
 
     if request.pins is None:
         return ()

@@ -7,13 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
-
-if TYPE_CHECKING:
-    from miro_robot.image import Image
-    from miro_robot.inspect.symbol_names import SymbolNames
+from miro_robot.image import Image
+from miro_robot.inspect.symbol_names import SymbolNames
 
 FLASH_BYTES = 8192
 SPACE_BYTES = 65536

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from miro_exact.bad_input import BadInput
+from miro_robot.firmware import image_path, source_folder
+from miro_robot.image import Image, load_hex
+from miro_robot.image.debug_info import Sources
 from mirotwin.cli.options import Place
-
-if TYPE_CHECKING:
-    from miro_robot.image import Image
-    from miro_robot.image.debug_info import Sources
 
 
 def sources_option(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -31,8 +30,6 @@ def sources_option(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def sources_of(image: Image, given: Sequence[str]) -> Sources:
     """The folders to look in: those given, the image's own, and the robot's firmware's."""
-    from miro_robot.firmware import source_folder
-    from miro_robot.image.debug_info import Sources
 
     for folder in given:
         if not Path(folder).is_dir():
@@ -43,8 +40,6 @@ def sources_of(image: Image, given: Sequence[str]) -> Sources:
 
 def with_debug_files(image: Image) -> Image:
     """The image as it has debug files: one out of a recording that is the robot's own has that one's."""
-    from miro_robot.firmware import image_path
-    from miro_robot.image import load_hex
 
     if image.path.is_file():
         return image

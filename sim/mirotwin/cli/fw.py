@@ -1,87 +1,29 @@
-"""`mirotwin fw` and `fw run`: an image on the bare processor, with nothing but its serial port and pins connected."""
-
-from __future__ import annotations
-
-import sys
-from pathlib import Path
-from typing import Any
+"""`mirotwin fw`: the list of commands for firmware; each is in a module of its own, loaded when it is used."""
 
 import click
-import msgspec
 
-from mirotwin.cli.bare_options import (
-    bare_options,
-    load_bare_image,
-    make_machine,
-    report,
-    take_bare,
-    target_of,
+from mirotwin.cli.program import LazyGroup
+
+COMMANDS = {
+    "run": "Runs IMAGE.ihx on a bare AT89C52.",
+    "disasm": "Lists an image's instructions.",
+    "trace": "Writes each instruction with what it changed.",
+    "profile": "Shows where the processor's time goes.",
+    "coverage": "Shows which lines of the firmware ran.",
+    "vcd": "Writes the wires as a VCD file.",
+}
+"""Name, which is the function's too and ends that of the module, and what `fw --help` says of it."""
+
+
+@click.group(
+    cls=LazyGroup,
+    modules="mirotwin.cli.fw_",
+    commands_about=COMMANDS,
+    short_help="Firmware: run it on the bare processor, or look into it at work.",
 )
-from mirotwin.cli.fw_coverage import coverage
-from mirotwin.cli.fw_disasm import disasm
-from mirotwin.cli.fw_profile import profile
-from mirotwin.cli.fw_trace import trace
-from mirotwin.cli.fw_vcd import vcd
-from mirotwin.cli.options import Place, choose_engine, engine_option
-from mirotwin.cli.progress import ProgressBar
-from mirotwin.cli.terminal import check_terminal, run_terminal
-from mirotwin.files.outputs import check_file, check_not_input, whole_file
-
-
-@click.group(short_help="Firmware: run it on the bare processor, or look into it at work.")
 def fw() -> None:
     """Firmware: run it on the bare processor, or look into it at work.
 
     SUBJECT is what runs: an IMAGE.ihx on the bare processor, or the robot in a scenario (a built-in name or a .toml),
     in a recording (run.mcap) or on a stream file.
     """
-
-
-for command in (disasm, trace, profile, coverage, vcd):
-    fw.add_command(command)
-
-
-@fw.command("run")
-@click.argument("image", metavar="IMAGE.ihx", type=Place())
-@bare_options()
-@click.option(
-    "--terminal", is_flag=True, help="Keys go to the serial port, in the crystal's time; Ctrl-] leaves."
-)
-@click.option(
-    "--dump", type=Place(), metavar="FILE.json", help="Write registers and memories there at the end."
-)
-@engine_option
-def run_bare(image: str, terminal: bool, dump: str | None, engine: str | None, **options: Any) -> int:
-    """Runs IMAGE.ihx on a bare AT89C52; what it sends goes to stdout as it is.
-
-    Exit codes: 0 --until was reached (or, without it, the firmware ended), 1 the firmware ended before it,
-    3 firmware fault, 42 --max-cycles was reached. Ctrl-C (130) leaves on stdout what was sent until then, and
-    writes no dump.
-
-    A program that asks for input is driven by pairs of --stdin-when and --stdin, one after the other:
-
-    \b
-    mirotwin fw run monitor.ihx --baud 9600 --stdin space.bin \\
-        --stdin-when '> ' --stdin commands.txt --stdin-by-line
-    """
-    request = take_bare(options)
-    if dump is not None:
-        check_file(Path(dump), "--dump")
-        check_not_input(Path(dump), "--dump", image, *request.files)
-    if terminal:
-        check_terminal(request)
-    choose_engine(engine)
-    loaded = load_bare_image(image, request, named=False)
-    target = target_of(image, loaded, request)
-    out = sys.stdout.buffer
-    machine = make_machine(loaded, request, out.write, live=terminal)
-    if terminal:
-        ended = run_terminal(machine, target, request)
-    else:
-        with ProgressBar("running", request.max_cycles) as bar:
-            ended = machine.run(until=target, max_cycles=request.max_cycles, progress=bar.to)
-    out.flush()
-    if dump is not None:
-        with whole_file(Path(dump), "--dump") as staging:
-            staging.write_bytes(msgspec.json.format(msgspec.json.encode(machine.dump()), indent=2) + b"\n")
-    return report(machine, ended, request)

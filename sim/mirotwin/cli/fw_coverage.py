@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from miro_exact.bad_input import BadInput
+from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.coverage import counts_of
+from miro_robot.inspect.lcov import Tracefile, add
 from mirotwin.cli.console import show
 from mirotwin.cli.debug import sources_of, sources_option, with_debug_files
 from mirotwin.cli.options import Place
@@ -22,9 +24,6 @@ from mirotwin.report.firmware_coverage import (
     table,
     write,
 )
-
-if TYPE_CHECKING:
-    from miro_robot.inspect.lcov import Tracefile
 
 
 @click.command(short_help="Shows which lines of the firmware ran.")
@@ -50,9 +49,6 @@ def coverage(request: Request, out: Path | None, append: bool, force: bool, sour
         _check(out, request, append or force)
         total = read_tracefile(out) if append else {}
     run = open_run(request)
-    from miro_robot.inspect.counters import Counters
-    from miro_robot.inspect.coverage import counts_of
-    from miro_robot.inspect.lcov import add
 
     image = with_debug_files(run.image)
     if out is not None and has_listing(image):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import click
 
+from miro_robot.image.debug_info import DebugInfo
+from miro_robot.inspect.listing import text_lines
+from miro_robot.inspect.symbol_names import SymbolNames
 from mirotwin.cli.code_place import SPACE_BYTES, functions_at
 from mirotwin.cli.debug import sources_of, sources_option
 from mirotwin.cli.options import Place, choose_engine, load_image
@@ -28,9 +31,6 @@ def disasm(image: str | None, symbols: tuple[str, ...], sources: tuple[str, ...]
     """
     choose_engine(None)
     loaded = load_image(image, SPACE_BYTES)
-    from miro_robot.image.debug_info import DebugInfo
-    from miro_robot.inspect.listing import text_lines
-    from miro_robot.inspect.symbol_names import SymbolNames
 
     names = SymbolNames(loaded)
     path = image or str(loaded.path)

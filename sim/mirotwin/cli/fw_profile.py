@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 import msgspec
 from rich.table import Table
 
+from miro_robot.inspect.activity import Activity
+from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.profile import Profile
+from miro_robot.inspect.profile import profile as profile_of
 from mirotwin.cli.console import show
 from mirotwin.cli.debug import with_debug_files
 from mirotwin.cli.subject import Request, image_name, look, open_run, subject_options
-
-if TYPE_CHECKING:
-    from miro_robot.inspect.profile import Profile
 
 
 @click.command(short_help="Shows where the processor's time goes.")
@@ -27,9 +26,6 @@ def profile(request: Request, as_json: bool) -> int:
     of its routine: 3 at least.
     """
     run = open_run(request)
-    from miro_robot.inspect.activity import Activity
-    from miro_robot.inspect.counters import Counters
-    from miro_robot.inspect.profile import profile as profile_of
 
     image = with_debug_files(run.image)
     counters, activity = Counters(), Activity()

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from miro_robot.inspect.symbol_names import SymbolNames
+from miro_robot.inspect.trace import HEADING, Trace
 from mirotwin.cli.code_place import functions_at
 from mirotwin.cli.debug import with_debug_files
 from mirotwin.cli.options import Place
@@ -34,8 +36,6 @@ def trace(request: Request, symbols: tuple[str, ...], out: Path | None, force: b
         check_not_input(out, "--out", *request.files)
         check_new(out, "--out", force)
     run = open_run(request)
-    from miro_robot.inspect.symbol_names import SymbolNames
-    from miro_robot.inspect.trace import HEADING, Trace
 
     image = with_debug_files(run.image)
     names = SymbolNames(image)

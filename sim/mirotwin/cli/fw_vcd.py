@@ -8,6 +8,8 @@ import click
 
 from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import PWM_PERIOD_TICKS
+from miro_robot.inspect.gtkw import write_save_file
+from miro_robot.inspect.waveform import SETTLING_TICKS, Waveform
 from mirotwin.cli.console import show
 from mirotwin.cli.options import Place
 from mirotwin.cli.subject import Request, look, open_run, subject_options
@@ -44,8 +46,6 @@ def vcd(request: Request, out: Path, force: bool) -> int:
             "", f"--out {out}", "that is the save file's name", "give the VCD file another ending, .vcd"
         )
     run = open_run(request)
-    from miro_robot.inspect.gtkw import write_save_file
-    from miro_robot.inspect.waveform import SETTLING_TICKS, Waveform
 
     with whole_file(save, "--out") as save_staging, whole_file(out, "--out") as staging:
         with staging.open("w", encoding="ascii", newline="\n") as stream:

@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
@@ -18,10 +18,9 @@ from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput
 from miro_exact.domain import DomainError
 from miro_host.parts import PartError
+from miro_robot.firmware import image_path
+from miro_robot.image import Image, load_hex
 from miro_sim.inputs import TEXT_BYTES, check_regular
-
-if TYPE_CHECKING:
-    from miro_robot.image import Image
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -63,7 +62,7 @@ def set_option(text: str) -> Callable[[Command], Command]:
 
 
 def choose_engine(engine: str | None) -> str:
-    """Fixes the engine of this process and returns its name. Before any simulation code is imported."""
+    """Refuses an engine that is not the one of this process (`program.settle_engine`); returns its name."""
     if engine is not None:
         engines.select(engine)
     return engines.active()
@@ -74,8 +73,6 @@ def load_image(path: str | Path | None, limit: int = 8192, named: bool = True) -
 
     `named`: its symbols are needed; the files beside it are read at once, and BadInput is raised for wrong ones.
     """
-    from miro_robot.firmware import image_path
-    from miro_robot.image import load_hex
 
     if path is not None:
         if not os.path.exists(path):

@@ -12,15 +12,17 @@ import sys
 import threading
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from io import TextIOWrapper
+from itertools import pairwise
 from types import FrameType
 from typing import Any, NoReturn
 
 import click
 
 from miro_exact.bad_input import BadInput, one_line
+from miro_exact.engine import EngineError, select
 
 DONE = 0
 EXPECTATION_FAILED = 1
@@ -106,15 +108,19 @@ def _give_up_stdout() -> None:
         return
 
 
-class Program(click.Group):
-    """The group behind `mirotwin`: runs a command and turns what went wrong into a line and an exit code.
+class LazyGroup(click.Group):
+    """Commands whose modules are loaded when they are used.
 
     `commands_about`: name of a command -> what `--help` says of it. The command is the function of that name in the
-    module of that name in this package, which is loaded when the command is used.
+    module called `modules` and that name. `settle_engine` runs before, so such modules import at their heads whatever
+    they need.
     """
 
-    def __init__(self, *args: Any, commands_about: Mapping[str, str] | None = None, **named: Any) -> None:
+    def __init__(
+        self, *args: Any, modules: str = "", commands_about: Mapping[str, str] | None = None, **named: Any
+    ) -> None:
         super().__init__(*args, **named)
+        self.modules = modules
         self.commands_about = dict(commands_about or {})
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -123,7 +129,7 @@ class Program(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.commands_about:
             return super().get_command(ctx, cmd_name)
-        command = getattr(import_module(f"mirotwin.cli.{cmd_name}"), cmd_name)
+        command = getattr(import_module(self.modules + cmd_name), cmd_name)
         assert isinstance(command, click.Command)
         return command
 
@@ -133,6 +139,23 @@ class Program(click.Group):
             return
         with formatter.section("Commands"):
             formatter.write_dl(list(self.commands_about.items()))
+
+
+def settle_engine(arguments: Sequence[str]) -> None:
+    """Fixes the engine that the arguments name, before the command's module imports anything hot.
+
+    A word that is no engine, or one that cannot be had, is left to the command, which refuses it.
+    """
+    words = list(arguments)
+    named = [word.partition("=")[2] for word in words if word.startswith("--engine=")]
+    named += [after for word, after in pairwise(words) if word == "--engine"]
+    if named:
+        with suppress(EngineError):
+            select(named[-1])
+
+
+class Program(LazyGroup):
+    """The group behind `mirotwin`: runs a command and turns what went wrong into a line and an exit code."""
 
     def main(  # type: ignore[override]
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any
@@ -155,6 +178,7 @@ class Program(click.Group):
             return BAD_INPUT
         if isinstance(sys.stdout, TextIOWrapper):  # a file's name may hold what stdout cannot
             sys.stdout.reconfigure(errors="backslashreplace")
+        settle_engine(sys.argv[1:] if args is None else args)
         try:
             with terminable():
                 code = super().main(args, prog_name, **extra)

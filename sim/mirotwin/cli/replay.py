@@ -11,6 +11,8 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import seconds
 from miro_protocol.transmission import DOWN
 from miro_sim.periods import Period
+from miro_sim.radio.downlink import TransmissionError
+from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.capture.frame_list import FrameLine, frame_lines
 from mirotwin.capture.recorded import transmissions_of
@@ -50,8 +52,6 @@ def replay(
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
     job, image = load_job(file, firmware, engine, settings)
-    from miro_sim.radio.downlink import TransmissionError
-    from miro_sim.world.world import World
 
     with plain_parameters(file, "replayed"):
         world = World(job.scenario, job.seed, image, script=job.script)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_protocol import stream
 from miro_protocol.transmission import Transmission
+from miro_robot.image import Image, Symbol, Symbols, parse_hex
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period
 from miro_sim.scenario.file import changed
@@ -29,9 +29,6 @@ from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
 from mirotwin.replay.script import check_script, scenario_of_stream, script_of, script_of_stream
 
-if TYPE_CHECKING:
-    from miro_robot.image import Image
-
 
 class Job(msgspec.Struct, frozen=True):
     """What is to be replayed: a recording, or a text stream (then `recorded` is empty)."""
@@ -45,7 +42,7 @@ class Job(msgspec.Struct, frozen=True):
 def load_job(
     file: str, firmware: str | None, engine: str | None, settings: Sequence[str] = ()
 ) -> tuple[Job, Image]:
-    """Reads `file`, fixes the engine, and loads the image that was asked for, recorded, or the robot's own.
+    """Reads `file` and loads the image that was asked for, recorded, or the robot's own.
 
     `settings`: keys to set in the recorded scenario, or in the default one.
     """
@@ -112,7 +109,6 @@ def _check_firmware(header: stream.Header, image: Image, path: str, firmware: st
 
 def _recorded_image(recording: Recording, path: str) -> Image:
     """The image in the recording, with the symbols it had when it was recorded."""
-    from miro_robot.image import Symbol, Symbols, parse_hex
 
     source = recording.source
     image = parse_hex(source.firmware, Path(path) / "firmware.ihx")

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
+from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText, load
+from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.cli.console import show
 from mirotwin.cli.held_signals import held_signals
@@ -32,10 +33,6 @@ from mirotwin.cli.run_files import RunFiles
 from mirotwin.files.outputs import OutputFolder
 from mirotwin.recording.recorder import Source
 from mirotwin.report.summary import Summary, errors_by_robot, off_pitch_text, settling_text
-
-if TYPE_CHECKING:
-    from miro_robot.image import Image
-    from miro_sim.world.world import World
 
 
 @click.command(short_help="Runs a scenario and writes its files.")
@@ -77,11 +74,10 @@ def run(
     all that was recorded; one that is killed leaves run.part.mcap with all but the last half second. decode, export
     and replay read it. Files of an earlier run stay as they are until the new ones are complete.
     """
-    active = choose_engine(engine)  # first: a law from another distribution may import hot modules
+    active = choose_engine(engine)
     text = load(scenario, settings)
     folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force)
     image = load_image(firmware)
-    from miro_sim.world.world import World
 
     source = source_of(text, seed, image, record)
     with plain_parameters(text.origin):

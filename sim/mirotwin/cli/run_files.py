@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
 from miro_sim.periods import Period
+from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.cli.held_signals import Hold
 from mirotwin.cli.program import complain
@@ -21,9 +21,6 @@ from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.recording.recorder import Recorder, Source
 from mirotwin.report.summary import Summary, summarise, to_json
-
-if TYPE_CHECKING:
-    from miro_sim.world.world import World
 
 SUMMARY = "summary.json"
 FIGURE = "figure.png"

@@ -10,7 +10,7 @@ import functools
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 import msgspec
@@ -18,7 +18,10 @@ import msgspec
 from miro_exact import clock
 from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
+from miro_robot.inspect.watcher import Watcher
+from miro_sim.radio.downlink import TransmissionError
 from miro_sim.scenario.file import builtin_names, load
+from miro_sim.world.world import World
 from mirotwin.cli.bare_options import (
     BareRequest,
     Moment,
@@ -42,11 +45,8 @@ from mirotwin.cli.options import (
 )
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import load_job
-
-if TYPE_CHECKING:
-    from miro_robot.inspect.watcher import Watcher
-    from miro_sim.world.world import World
-    from mirotwin.watched import BareRun, RobotRun, Run
+from mirotwin.cli.run import report_faults
+from mirotwin.watched import BareRun, RobotRun, Run, watch
 
 IMAGE_SUFFIXES = (".ihx", ".hex", ".ihex")
 
@@ -105,7 +105,7 @@ def subject_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def open_run(request: Request) -> Run:
-    """The run that was asked for, at its first tick. Fixes the engine. Raises BadInput."""
+    """The run that was asked for, at its first tick. Raises BadInput."""
     if request.to_tick is not None and request.to_tick <= request.from_tick:
         raise BadInput(
             "",
@@ -133,8 +133,6 @@ def look(run: Run, request: Request, *watchers: Watcher, early_ticks: int = 0, l
     They look on from `early_ticks` before the window to `late_ticks` behind it, as far as the run goes.
     Raises BadInput when the run was over before there was anything to look at.
     """
-    from miro_sim.radio.downlink import TransmissionError
-    from mirotwin.watched import watch
 
     first_tick = max(0, request.from_tick - early_ticks)
     last_tick = None if request.to_tick is None else request.to_tick + late_ticks
@@ -171,7 +169,6 @@ def _bare_run(request: Request) -> BareRun:
     choose_engine(request.engine)
     image = load_bare_image(request.subject, request.bare)
     until = target_of(request.subject, image, request.bare)
-    from mirotwin.watched import BareRun
 
     return BareRun(make_machine(image, request.bare), until, request.bare.max_cycles)
 
@@ -192,8 +189,6 @@ def _robot_run(request: Request) -> RobotRun:
         job, image = load_job(subject, request.firmware, request.engine, request.settings)
         scenario, seed, script = job.scenario, job.seed, job.script
         periods = len(job.recorded) or None
-    from miro_sim.world.world import World
-    from mirotwin.watched import RobotRun
 
     with plain_parameters(subject):
         world = World(scenario, seed, image, script=script)
@@ -221,8 +216,6 @@ def _which_robot(world: World, request: Request) -> tuple[int, int]:
 
 def _verdict(run: Run, request: Request) -> int:
     """Says on stderr why a run ended that did not end as planned."""
-    from mirotwin.cli.run import report_faults
-    from mirotwin.watched import BareRun, RobotRun
 
     if isinstance(run, RobotRun):
         return report_faults(run.world)

@@ -15,15 +15,12 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
+from miro_robot.bare.machine import BareMachine, Ended
 from mirotwin.cli.bare_options import STDIN, BareRequest
 from mirotwin.cli.code_place import place_of
 from mirotwin.cli.program import complain
-
-if TYPE_CHECKING:
-    from miro_robot.bare.machine import BareMachine, Ended
 
 LEAVE = b"\x1d"  # Ctrl-]
 SLICE_S = 0.01  # of machine time between two looks at the keyboard
@@ -49,7 +46,6 @@ def check_terminal(request: BareRequest) -> None:
 
 def run_terminal(machine: BareMachine, target: int | None, request: BareRequest) -> Ended:
     """Runs `machine`, which must be live, in the time of its crystal until it ends or Ctrl-] is typed."""
-    from miro_robot.bare.machine import Ended
 
     hertz = request.crystal_hz / 12
     slice_cycles = max(1, int(hertz * SLICE_S))

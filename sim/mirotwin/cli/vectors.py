@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from miro_exact.rng import Stream
 from miro_exact.seed import MAX_SEED
+from miro_robot.mcs51.vector_draw import draw_vectors
+from miro_robot.mcs51.vectors import encode
 from mirotwin.cli.held_signals import held_signals
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import OutputFolder
-
-if TYPE_CHECKING:
-    from miro_exact.rng import Stream
 
 OPCODES = 256
 NAMES = tuple(f"{opcode:02x}.json" for opcode in range(OPCODES))
@@ -41,9 +40,6 @@ def vectors(out: Path, per_opcode: int, seed: int, force: bool, engine: str | No
     """
     folder = OutputFolder(out, force, NAMES)
     choose_engine(engine)
-    from miro_exact.rng import Stream
-    from miro_robot.mcs51.vector_draw import draw_vectors
-    from miro_robot.mcs51.vectors import encode
 
     with held_signals() as hold, folder, ProgressBar("drawing", OPCODES) as bar:
         for opcode, name in enumerate(NAMES):

@@ -8,20 +8,27 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 from rich.table import Table
 
 from miro_exact.bad_input import one_line
+from miro_robot.image import Image
+from miro_robot.image.debug_info import DebugInfo, Sources
+from miro_robot.inspect.coverage import (
+    Counts,
+    Share,
+    at_paths,
+    branch_share,
+    by_line,
+    by_listing,
+    instruction_share,
+    line_share,
+    missed,
+)
+from miro_robot.inspect.lcov import Tracefile, decode, encode
 from miro_sim.inputs import read_input
 from mirotwin.files.outputs import whole_file
-
-if TYPE_CHECKING:
-    from miro_robot.image import Image
-    from miro_robot.image.debug_info import Sources
-    from miro_robot.inspect.coverage import Counts, Share
-    from miro_robot.inspect.lcov import Tracefile
 
 
 class Report(msgspec.Struct, frozen=True):
@@ -34,7 +41,6 @@ class Report(msgspec.Struct, frozen=True):
 
 def has_listing(image: Image) -> bool:
     """Whether the lines that are counted are those of a listing: no debug file names C lines."""
-    from miro_robot.image.debug_info import DebugInfo
 
     return not DebugInfo.of(image).lines
 
@@ -46,8 +52,6 @@ def listing_path(out: Path) -> Path:
 
 def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) -> Report:
     """Coverage of `image` with paths as seen from the current folder."""
-    from miro_robot.image.debug_info import DebugInfo
-    from miro_robot.inspect.coverage import at_paths, by_line, by_listing, instruction_share
 
     debug = DebugInfo.of(image)
     share = instruction_share(image, debug, counts)
@@ -68,7 +72,6 @@ def is_of_another_image(report: Report, out: Path) -> bool:
 
 def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
     """Writes `total`, and the listing of `report` if it has one. Raises OutputError; then neither is written."""
-    from miro_robot.inspect.lcov import encode
 
     with ExitStack() as files:
         for path, text in ((listing_path(out), report.listing), (out, encode(total))):
@@ -80,7 +83,6 @@ def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
 
 def read_tracefile(path: Path) -> Tracefile:
     """What a tracefile holds, nothing if there is none yet. Raises BadInput."""
-    from miro_robot.inspect.lcov import decode
 
     if not path.exists():
         return {}
@@ -89,7 +91,6 @@ def read_tracefile(path: Path) -> Tracefile:
 
 def table(tracefile: Tracefile) -> Table:
     """A row a file and a total: lines, branches, and the lines that never ran."""
-    from miro_robot.inspect.coverage import branch_share, line_share, missed
 
     result = Table(box=None, pad_edge=False)
     for column in ("file", "lines", "branches", "never ran"):

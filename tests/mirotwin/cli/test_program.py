@@ -8,6 +8,7 @@ from tests import children
 
 from miro_sim.scenario.file import builtin_text
 from mirotwin.cli import COMMANDS
+from mirotwin.cli.fw import COMMANDS as FW_COMMANDS
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -63,3 +64,56 @@ def test_help_loads_click_and_nothing_that_is_slow() -> None:
         "mirotwin.cli",
         "mirotwin.cli.program",
     ]
+
+
+@pytest.mark.parametrize("name", FW_COMMANDS)
+def test_the_list_of_fw_says_of_a_command_what_it_says_itself(name):
+    command = getattr(import_module(f"mirotwin.cli.fw_{name}"), name)
+    assert command.get_short_help_str(limit=200) == FW_COMMANDS[name]
+    assert command.name == name
+
+
+def test_a_command_of_fw_loads_no_other():
+    script = (
+        "import sys\ntry:\n    from mirotwin.cli import main; main()\nexcept SystemExit: pass\n"
+        "print(*sorted(n for n in sys.modules if n.startswith('mirotwin.cli.fw_')))"
+    )
+    for arguments, loaded in ((["fw", "--help"], ""), (["fw", "trace", "--help"], "mirotwin.cli.fw_trace")):
+        done = children.run(
+            [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=True
+        )
+        assert done.stdout.splitlines()[-1] == loaded
+
+
+@pytest.mark.parametrize(
+    ("words", "engine"),
+    [
+        ([], None),
+        (["--engine", "python"], "python"),
+        (["--engine=python"], "python"),
+        (["--engine", "compiled", "--engine", "python"], "python"),
+        (["--engine", "numba"], None),
+        (["--engine"], None),
+    ],
+)
+def test_the_engine_is_settled_before_a_command_is_loaded(words, engine):
+    script = (
+        "import sys\nfrom miro_exact.engine import install\nfrom mirotwin.cli.program import settle_engine\n"
+        "settle_engine(['fw', 'run', 'a.ihx', *sys.argv[1:]])\nprint(install().engine)"
+    )
+    done = children.run([sys.executable, "-c", script, *words], capture_output=True, text=True, check=True)
+    assert done.stdout == f"{engine}\n"
+
+
+@pytest.mark.parametrize("name", ["miro_sim.world.world", "miro_robot.mcs51.cpu", "miro_exact.rng"])
+def test_with_the_python_engine_a_command_loads_sources_alone(name, tmp_path):
+    script = (
+        "import sys\nfrom mirotwin.cli import main\ntry:\n    main()\nexcept SystemExit: pass\n"
+        f"print(sys.modules[{name!r}].__file__)"
+    )
+    command = ["run", "fig6", "--set", "duration_s=0.001", "--engine", "python", "--no-figure", "-q"]
+    done = children.run(
+        [sys.executable, "-c", script, *command], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.endswith(".py\n")
+    assert done.stderr == ""
