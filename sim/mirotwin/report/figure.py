@@ -29,7 +29,12 @@ REFERENCE = "#222222"
 COLUMNS = 4
 MOST_INNER = 8
 """So many inner values are drawn; a recording holds them all."""
-INNER_INCHES = 1.6
+WIDTH_INCHES = 9.6
+PANEL_INCHES = 2.5
+INNER_INCHES = 1.25
+LEFT_INCHES, RIGHT_INCHES, TOP_INCHES, BOTTOM_INCHES = 0.7, 0.15, 0.85, 0.3
+GAP_INCHES = 0.7
+"""Between panels, for titles, labels and numbers. A layout that is computed from them takes as long as the drawing."""
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
@@ -59,13 +64,20 @@ def draw(periods: Sequence[Period], path: Path, *, scenario: str, seed: int, tit
 
         inner = _inner_values(periods)
         rows = -(-len(inner) // COLUMNS)
-        figure = Figure(figsize=(9.6, 6.6 + INNER_INCHES * rows), dpi=150, layout="constrained")
+        heights = [PANEL_INCHES, PANEL_INCHES, *[INNER_INCHES] * rows]
+        height = sum(heights) + GAP_INCHES * (len(heights) - 1) + TOP_INCHES + BOTTOM_INCHES
+        figure = Figure(figsize=(WIDTH_INCHES, height), dpi=150)
         canvas = FigureCanvasAgg(figure)
-        grid = figure.add_gridspec(2 + rows, COLUMNS, height_ratios=[3.0, 3.0, *[INNER_INCHES] * rows])
+        grid = figure.add_gridspec(2 + rows, COLUMNS, height_ratios=heights, **_margins(heights, height))
         half = COLUMNS // 2
         places = [(row, side) for row in (0, 1) for side in (slice(half), slice(half, None))]
         path_axes, *error_axes = [figure.add_subplot(grid[place]) for place in places]
-        figure.suptitle(_heading(scenario, seed, title, next(iter(errors.values()))), fontsize=10.5)
+        figure.suptitle(
+            _heading(scenario, seed, title, next(iter(errors.values()))),
+            fontsize=10.5,
+            y=1.0 - 0.12 / height,
+            va="top",
+        )
         _draw_path(path_axes, periods, list(errors))
         _draw_error(error_axes[0], errors, "(b)  $x_e$", "cm", SETTLED_CM, lambda one: one.x_cm)
         _draw_error(error_axes[1], errors, "(c)  $y_e$", "cm", SETTLED_CM, lambda one: one.y_cm)
@@ -73,7 +85,20 @@ def draw(periods: Sequence[Period], path: Path, *, scenario: str, seed: int, tit
         for index, (name, lines) in enumerate(inner.items()):
             axes = figure.add_subplot(grid[2 + index // COLUMNS, index % COLUMNS])
             _draw_inner(axes, name, lines, list(errors))
-        canvas.print_png(path, metadata={"Software": None})  # type: ignore[no-untyped-call]
+        canvas.print_png(path, metadata={"Software": None}, pil_kwargs={"compress_level": 3})  # type: ignore[no-untyped-call]
+
+
+def _margins(heights: Sequence[float], height: float) -> dict[str, float]:
+    """Where the panels are, in the terms of a GridSpec: gaps are parts of the mean panel."""
+    width = WIDTH_INCHES - LEFT_INCHES - RIGHT_INCHES - GAP_INCHES * (COLUMNS - 1)
+    return {
+        "left": LEFT_INCHES / WIDTH_INCHES,
+        "right": 1.0 - RIGHT_INCHES / WIDTH_INCHES,
+        "top": 1.0 - TOP_INCHES / height,
+        "bottom": BOTTOM_INCHES / height,
+        "wspace": GAP_INCHES * COLUMNS / width,
+        "hspace": GAP_INCHES * len(heights) / sum(heights),
+    }
 
 
 def _heading(scenario: str, seed: int, title: str, errors: Sequence[ErrorSample]) -> str:
