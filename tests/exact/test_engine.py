@@ -52,3 +52,12 @@ def test_a_module_is_stale_after_a_change_of_its_source_or_of_a_layout_it_builds
         changed.write("# changed\n")
     after = hot_modules.source_hashes({"house": package})
     assert {name for name in after if after[name] != before[name]} == stale
+
+
+def test_an_engine_that_was_not_built_is_refused_for_that_reason_whatever_is_in_use(monkeypatch):
+    finder = engine.EngineFinder()
+    finder.engine = "python"
+    monkeypatch.setattr(finder, "missing", lambda: ["miro_exact.rng"])
+    monkeypatch.setattr(engine, "install", lambda: finder)
+    with pytest.raises(engine.EngineError, match=r"no compiled module for miro_exact\.rng; reinstall with"):
+        engine.select("compiled")

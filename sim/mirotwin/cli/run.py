@@ -83,7 +83,7 @@ def run(
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
     with plain_parameters(text.origin), held_signals() as hold, folder:
-        run_files = RunFiles(folder, source, world, active, hold, settings)
+        run_files = RunFiles(folder, source, world, active, hold, text.settings)
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
     if not quiet:
