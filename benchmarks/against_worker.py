@@ -1,0 +1,119 @@
+"""The child of `benchmarks.against`: measures one tree's packages, in its own process, whenever it is asked.
+
+What belongs here: the tasks, and the names under which each layout of the repository has what they need. What does
+not: which tree that is (PYTHONPATH says it) and what the figures mean (`against.py`).
+
+A line on stdin is a task's name; the answer on stdout is one line: processor seconds of one execution, and what the
+result of both trees has to share.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+import time
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+SCENARIO = "fig6"
+MANY = 200
+"""Executions of a task that takes microseconds."""
+WARM_PERIODS = 30
+
+NEW = {
+    "runner": "mirotwin.runner",
+    "recording": "mirotwin.recording.recorder",
+    "scenario": "miro_sim.scenario.file",
+    "world": "miro_sim.world.world",
+}
+OLD = {
+    "runner": "miro_sim.runner",
+    "recording": "miro_sim.recording",
+    "scenario": "miro_sim.scenario_file",
+    "world": "miro_sim.world",
+}
+
+
+def without_editable_installs() -> None:
+    """Takes away the finders by which an editable install would lend this tree's packages to another one."""
+    sys.meta_path[:] = [
+        finder for finder in sys.meta_path if not getattr(finder, "__module__", "").startswith("__editable__")
+    ]
+
+
+class Tasks:
+    """What is measured. Each method returns (processor seconds of one execution, result to compare)."""
+
+    def __init__(self) -> None:
+        layout = NEW if find_spec("mirotwin") else OLD
+        self.parts: dict[str, Any] = {name: import_module(module) for name, module in layout.items()}
+        self.load_hex = import_module("miro_robot.image").load_hex
+        self.image_path = import_module("miro_robot.firmware").image_path
+        self.text = self.parts["scenario"].load(SCENARIO)
+        self.image = self.load_hex(self.image_path())
+        self.warm: Any = self.new_world()
+        for _ in range(WARM_PERIODS):
+            self.warm.step()
+
+    def new_world(self) -> Any:
+        return self.parts["world"].World(self.text.scenario, 0, self.image)
+
+    def recorded(self) -> tuple[float, str]:
+        """The loop over control periods with the default recording into memory."""
+        recording, world = self.parts["recording"], self.new_world()
+        source = recording.Source(
+            SCENARIO, self.text.text, 0, self.image.path.read_bytes(), self.image.sha256
+        )
+        with recording.Recorder(io.BytesIO(), source) as recorder:
+            return _timed(lambda: self.parts["runner"].run(world, recorder)), world.digest
+
+    def unrecorded(self) -> tuple[float, str]:
+        world = self.new_world()
+        return _timed(lambda: self.parts["runner"].run(world)), world.digest
+
+    def construction(self) -> tuple[float, str]:
+        return _timed(self.new_world), ""
+
+    def known_image(self) -> tuple[float, str]:
+        """`load_hex` of an image that this process has read before."""
+        return _timed(lambda: self.load_hex(self.image_path())), self.image.sha256
+
+    def save(self) -> tuple[float, str]:
+        return _timed(self.warm.save, MANY), ""
+
+    def load(self) -> tuple[float, str]:
+        saved = self.warm.save()
+        return _timed(lambda: self.warm.load(saved), MANY), ""
+
+    def board_snapshot(self) -> tuple[float, str]:
+        return _timed(self._board().snapshot, MANY), ""
+
+    def board_restore(self) -> tuple[float, str]:
+        board = self._board()
+        state = board.snapshot()
+        return _timed(lambda: board.restore(state), MANY), ""
+
+    def _board(self) -> Any:
+        return self.warm.networks[0].robots[0].board
+
+
+def _timed(work: Callable[[], object], times: int = 1) -> float:
+    begin = time.process_time()
+    for _ in range(times):
+        work()
+    return (time.process_time() - begin) / times
+
+
+def main() -> None:
+    without_editable_installs()
+    tasks = Tasks()
+    print("ready", flush=True)
+    for line in sys.stdin:
+        elapsed_s, result = getattr(tasks, line.strip())()
+        print(elapsed_s, result, flush=True)
+
+
+if __name__ == "__main__":
+    main()
