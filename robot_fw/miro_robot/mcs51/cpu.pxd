@@ -32,8 +32,13 @@ cdef class Cpu(Executor):
     cdef public int stop_asleep
     cdef public object inspector
 
-    @cython.locals(address=int)
     cpdef load(self, bytes image, used=*)
+    @cython.locals(address=int)
+    cdef void _erase(self) noexcept
+    @cython.locals(address=int, size=int)
+    cdef int _program(self, bytes image) except -1
+    @cython.locals(address=int)
+    cdef void _use(self, int first, int end) noexcept
     cpdef int write_code(self, int address, int value) except -1
     cpdef is_loaded(self, int address)
     cpdef int code_at(self, int address) noexcept
@@ -56,7 +61,7 @@ cdef class Cpu(Executor):
     @cython.locals(chip=Peripherals, earliest='long long', source=int)
     cdef int _attend(self, long long now) except -1
     cdef int _watch_main_loop(self, long long now) except -1
-    cdef int _taken_over(self)
+    cdef int _taken_over(self) noexcept
     cdef int _enter(self, int source) except -1
     cdef int _block(self) except -1
     @cython.locals(value=int)

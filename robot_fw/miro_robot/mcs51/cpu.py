@@ -105,9 +105,7 @@ class Cpu(Executor):
             0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes the CPU
         )
         self.inspector: Inspector | None = None
-        for address in range(0x10000):
-            self.write_code(address, 0xFF)
-            self.lines[address] = _OUTSIDE
+        self._erase()
 
     # Image
 
@@ -115,17 +113,35 @@ class Cpu(Executor):
         """Puts `image` at address 0; executing outside `used` ((first, end) ranges; default: all of it) is
         a fault.
         """
-        for address in range(0x10000):
-            self.write_code(address, image[address] if address < len(image) else 0xFF)
-            self.lines[address] = _OUTSIDE
+        self._erase()
+        self._program(image)
         self.code_limit = 0
         for first, end in ((0, len(image)),) if used is None else used:
-            for address in range(first, end):
-                self.lines[address] = self.line_at(address)
+            self._use(first, end)
             self.code_limit = max(self.code_limit, end)
         loaded = on_load.get()
         if loaded is not None:
             loaded(self)
+
+    def _erase(self) -> None:
+        """All code memory reads FFh, and none of it is loaded."""
+        for address in range(0x10002):
+            self.rom[address] = 0xFF
+        for address in range(0x10000):
+            self.lines[address] = _OUTSIDE
+
+    def _program(self, image: bytes) -> None:
+        """The bytes of `image` from address 0 on; the first two again behind the end."""
+        size = min(len(image), 0x10000)
+        for address in range(size):
+            self.rom[address] = image[address]
+        for address in range(2):
+            self.rom[0x10000 + address] = self.rom[address]
+
+    def _use(self, first: int, end: int) -> None:
+        """Executing at `first` .. `end` - 1 is legal."""
+        for address in range(first, end):
+            self.lines[address] = self.line_at(address)
 
     def write_code(self, address: int, value: int) -> None:
         """One byte of code memory, which from now on counts as loaded."""
