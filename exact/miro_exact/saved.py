@@ -9,7 +9,7 @@ divisor or the bound of a loop.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 LAST_TICK = 1 << 62
@@ -70,7 +70,7 @@ def octets(state: Mapping[str, Any], name: str, count: int) -> bytes:
     return value
 
 
-def only(state: Mapping[str, Any], names: Mapping[str, object]) -> None:
+def only(state: Mapping[str, Any], names: Collection[str]) -> None:
     """Nothing but these names, and all of them."""
     wrong = [str(name) for name in (*state, *names) if name not in state or name not in names]
     if wrong:

@@ -1,6 +1,7 @@
 cimport cython
 
 from miro_robot.event_log cimport EventLog
+from miro_robot.lm629.buffers cimport FilterBuffer, TrajectoryBuffer
 from miro_robot.lm629.encoder cimport Encoder
 from miro_robot.lm629.host_port cimport HostPort
 from miro_robot.lm629.pid cimport Pid
@@ -22,12 +23,14 @@ cdef class MotorAxis:
     cdef readonly object options
     cdef readonly long long reset_ticks, reset_pulse_ticks
     cdef readonly int rounds_down, negative, pulse_late, keeps_sign, open_clears, error_full, error_repeats
+    cdef readonly int clamps, rates_of_buffer
     cdef readonly HostPort port
     cdef readonly Encoder encoder
     cdef readonly Trajectory trajectory
     cdef readonly Pid pid
     cdef readonly Signals signals
-    cdef readonly object trajectory_buffer, filter_buffer
+    cdef readonly TrajectoryBuffer trajectory_buffer
+    cdef readonly FilterBuffer filter_buffer
     cdef readonly EventLog log
     cdef readonly int side
     cdef public list commands, encoder_edges
@@ -49,6 +52,7 @@ cdef class MotorAxis:
     cdef int _sample(self, long long now) except -1
     @cython.locals(flags=cython.int, moved=cython.longlong)
     cdef int _latch_position(self, long long now) noexcept
+    @cython.locals(profile=Trajectory, control=cython.int, acceleration=cython.longlong, velocity=cython.longlong)
     cdef int _start(self) except -1
     @cython.locals(flags=cython.int)
     cdef int _step_profile(self) noexcept

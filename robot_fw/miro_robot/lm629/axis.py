@@ -80,6 +80,8 @@ class MotorAxis:
             "open_clears",
             "error_full",
             "error_repeats",
+            "clamps",
+            "rates_of_buffer",
         ),
         *("commands", "encoder_edges", "log", "side"),
         *("hi", "writes_while_busy"),  # copies of what the parts hold
@@ -97,6 +99,8 @@ class MotorAxis:
         self.open_clears = 1 if options.open_loop_clears else 0
         self.error_full = 1 if options.error_test == "full" else 0
         self.error_repeats = 1 if options.error_flag_repeats else 0
+        self.clamps = 1 if options.out_of_range == "clamped" else 0
+        self.rates_of_buffer = 1 if options.relative_rates == "buffer" else 0
         self.port = HostPort(options.busy_clocks * TICKS_PER_CLOCK, options)
         self.encoder = Encoder(options.filter_clocks, options.double_step)
         self.trajectory = Trajectory(options.stop_keeps_fraction)

@@ -2,7 +2,7 @@
 
 A buffer has three faces: the primary registers (written word by word, kept for ever), the copy that an
 accepted STT / UDF has taken of them, and, outside this file, the working registers that get that copy at
-the next sample. Called at the host's pace only, so nothing here is hot.
+the next sample.
 """
 
 from __future__ import annotations
@@ -22,6 +22,11 @@ MASK_30 = 0x3FFFFFFF
 
 COMPLETED, OUT_OF_RANGE = 1, 2
 """What a word led to: an acceleration is complete; its parameter was out of range."""
+
+_STOPS, _MODES = STOPS, VELOCITY_MODE | FORWARD
+_ACCELERATION, _VELOCITY, _POSITION = ACCELERATION, VELOCITY, POSITION
+_MASK_30 = MASK_30
+_COMPLETED, _OUT_OF_RANGE = COMPLETED, OUT_OF_RANGE
 
 
 def clamped(value: int, low: int, high: int) -> int:
@@ -99,19 +104,24 @@ class TrajectoryBuffer:
 
     def begin(self, control: int) -> int:
         """The control word arrived. Returns how many words follow."""
-        self.control = control & (STOPS | VELOCITY_MODE | FORWARD)
+        self.control = control & (_STOPS | _MODES)
         self.relative_bits = control
-        self.due = control & (ACCELERATION | VELOCITY | POSITION)
+        self.due = control & (_ACCELERATION | _VELOCITY | _POSITION)
         self.half = -1
-        return 2 * self.due.bit_count()
+        return self.words_due()
+
+    def words_due(self) -> int:
+        """How many words are still to come: two a parameter."""
+        parameters = (self.due >> 5 & 1) + (self.due >> 3 & 1) + (self.due >> 1 & 1)
+        return 2 * parameters - (1 if self.half >= 0 else 0)
 
     def refresh(self, acceleration: int, velocity: int, target: int) -> None:
         """Parameters that the control word does not announce become these."""
-        if not self.due & ACCELERATION:
+        if not self.due & _ACCELERATION:
             self.acceleration = acceleration
-        if not self.due & VELOCITY:
+        if not self.due & _VELOCITY:
             self.velocity = velocity
-        if not self.due & POSITION:
+        if not self.due & _POSITION:
             self.position = target
             self.relative = False
 
@@ -120,27 +130,34 @@ class TrajectoryBuffer:
         if self.half < 0:
             self.half = word
             return 0
-        value = self.half << 16 | word
+        high = self.half
+        value = high << 16 | word
         self.half = -1
-        bit = next(bit for bit in (ACCELERATION, VELOCITY, POSITION) if self.due & bit)
+        bit = self._next_parameter()
         self.due &= ~bit
-        relative = bool(self.relative_bits & bit >> 1)
-        if bit == POSITION:
+        relative = self.relative_bits & bit >> 1 != 0
+        if bit == _POSITION:
             fits = signed_31(value) == signed_32(value)
             if clamp and not fits and not relative:
                 value = clamped(signed_32(value), -0x40000000, 0x3FFFFFFF)
         else:
-            fits = relative or value <= MASK_30
-            value = MASK_30 if clamp and not fits else value
-        if bit == ACCELERATION:
-            self.acceleration = (value + (acceleration if relative else 0)) & MASK_30
-        elif bit == VELOCITY:
-            self.velocity = (value + (velocity if relative else 0)) & MASK_30
+            fits = relative or value <= _MASK_30
+            value = _MASK_30 if clamp and not fits else value
+        if bit == _ACCELERATION:
+            self.acceleration = (value + (acceleration if relative else 0)) & _MASK_30
+        elif bit == _VELOCITY:
+            self.velocity = (value + (velocity if relative else 0)) & _MASK_30
         else:
             self.position = signed_31(value)
             self.relative = relative
             self.newer_position = True
-        return (COMPLETED if bit == ACCELERATION else 0) | (0 if fits else OUT_OF_RANGE)
+        return (_COMPLETED if bit == _ACCELERATION else 0) | (0 if fits else _OUT_OF_RANGE)
+
+    def _next_parameter(self) -> int:
+        """Bit of the parameter whose words come next: acceleration, velocity, position."""
+        if self.due & _ACCELERATION:
+            return _ACCELERATION
+        return _VELOCITY if self.due & _VELOCITY else _POSITION
 
     def abandon(self) -> None:
         """Another command came first: a parameter that is not complete is dropped."""
@@ -156,7 +173,7 @@ class TrajectoryBuffer:
         """STT was accepted: it will act on the registers as they are now; stop bits serve once."""
         self.taken = (self.control, self.acceleration, self.velocity, self.position, self.relative)
         if not keep_stops:
-            self.control &= ~STOPS
+            self.control &= ~_STOPS
         self.newer_position = False
 
     def resolve(self, base: int) -> int:
@@ -169,12 +186,12 @@ class TrajectoryBuffer:
         return target
 
     def snapshot(self) -> dict[str, object]:
-        return dict(vars(self))
+        return {name: getattr(self, name) for name in _Trajectory.__struct_fields__}
 
     def restore(self, state: dict[str, object]) -> None:
-        only(state, vars(self))
+        only(state, _Trajectory.__struct_fields__)
         values = convert(state, _Trajectory)
-        for name in vars(self):
+        for name in _Trajectory.__struct_fields__:
             setattr(self, name, getattr(values, name))
 
 
@@ -197,22 +214,28 @@ class FilterBuffer:
         """The control word arrived. Returns how many words follow."""
         self.ds = control >> 8
         self.due = control & 0x000F
-        return self.due.bit_count()
+        return self.words_due()
+
+    def words_due(self) -> int:
+        """How many words are still to come: one a coefficient."""
+        return (self.due >> 3 & 1) + (self.due >> 2 & 1) + (self.due >> 1 & 1) + (self.due & 1)
 
     def word(self, word: int, clamp: bool = False) -> int:
         """The next coefficient, 15 bits, in the order kp, ki, kd, il. Returns 0 or OUT_OF_RANGE."""
         value = fit_15(word, clamp)
-        bit = 1 << self.due.bit_length() - 1
-        self.due &= ~bit
-        if bit == 8:
+        if self.due & 8:
+            self.due &= ~8
             self.kp = value
-        elif bit == 4:
+        elif self.due & 4:
+            self.due &= ~4
             self.ki = value
-        elif bit == 2:
+        elif self.due & 2:
+            self.due &= ~2
             self.kd = value
         else:
+            self.due = 0
             self.il = value
-        return OUT_OF_RANGE if word > 0x7FFF else 0
+        return _OUT_OF_RANGE if word > 0x7FFF else 0
 
     def abandon(self) -> None:
         """Another command came first."""
@@ -223,10 +246,10 @@ class FilterBuffer:
         self.taken = (self.kp, self.ki, self.kd, self.il, self.ds)
 
     def snapshot(self) -> dict[str, object]:
-        return dict(vars(self))
+        return {name: getattr(self, name) for name in _Filter.__struct_fields__}
 
     def restore(self, state: dict[str, object]) -> None:
-        only(state, vars(self))
+        only(state, _Filter.__struct_fields__)
         values = convert(state, _Filter)
-        for name in vars(self):
+        for name in _Filter.__struct_fields__:
             setattr(self, name, getattr(values, name))

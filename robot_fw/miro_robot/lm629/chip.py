@@ -33,7 +33,8 @@ from miro_exact.saved import whole
 from miro_robot.event_log import COMMAND, EventLog
 from miro_robot.lm629 import buffers, host_port, signals
 from miro_robot.lm629.axis import FAR, PWM_TICKS, RANGES, SAMPLE_TICKS, MotorAxis
-from miro_robot.lm629.commands import BY_OPCODE
+from miro_robot.lm629.buffers import TrajectoryBuffer, fit_15
+from miro_robot.lm629.commands import BY_NAME, BY_OPCODE
 
 __all__ = ["FAR", "PWM_TICKS", "SAMPLE_TICKS", "Lm629"]
 
@@ -43,6 +44,26 @@ _ON_TARGET = signals.ON_TARGET
 _STOP_ON_ERROR = signals.STOP_ON_ERROR
 _UPDATE_PENDING = signals.UPDATE_PENDING
 _ACQUIRE_INDEX = signals.ACQUIRE_INDEX
+_COMMAND_ERROR = signals.COMMAND_ERROR
+_ACCELERATION_LOADED = signals.ACCELERATION_LOADED
+_OUTPUT_8_BIT = signals.OUTPUT_8_BIT
+_COMMAND_CAME, _WORD_CAME, _ANSWERED = host_port.COMMAND, host_port.WORD, host_port.ANSWERED
+_SOFTWARE_RESET = host_port.SOFTWARE_RESET
+_STOPS, _COMPLETED, _OUT_OF_RANGE = buffers.STOPS, buffers.COMPLETED, buffers.OUT_OF_RANGE
+_COMMAND = COMMAND  # kind of event
+_SEVEN_BYTES = (1 << 56) - 1
+
+_RESET, _STT, _DFH, _SIP, _UDF, _PORT8, _PORT12 = (
+    BY_NAME[name].opcode for name in ("RESET", "STT", "DFH", "SIP", "UDF", "PORT8", "PORT12")
+)
+_RDDV, _RDDP, _RDIP, _RDRP, _RDRV, _RDSIGS = (
+    BY_NAME[name].opcode for name in ("RDDV", "RDDP", "RDIP", "RDRP", "RDRV", "RDSIGS")
+)
+_LPES, _LPEI, _MSKI, _RSTI, _LFIL, _LTRJ, _SBPA, _SBPR = (
+    BY_NAME[name].opcode for name in ("LPES", "LPEI", "MSKI", "RSTI", "LFIL", "LTRJ", "SBPA", "SBPR")
+)
+_WORDS_IN = [BY_OPCODE[opcode].words_in if opcode in BY_OPCODE else 0 for opcode in range(256)]
+_WORDS_OUT = [BY_OPCODE[opcode].words_out if opcode in BY_OPCODE else 0 for opcode in range(256)]
 
 
 class Lm629(MotorAxis):
@@ -89,14 +110,14 @@ class Lm629(MotorAxis):
         return self.port.drive if self.port.reading else -1
 
     def _host(self, tick: int, outcome: int) -> None:
-        if outcome == host_port.COMMAND:
+        if outcome == _COMMAND_CAME:
             self._command(tick)
-        elif outcome == host_port.WORD:
+        elif outcome == _WORD_CAME:
             self._word(tick)
-        elif outcome == host_port.ANSWERED:
+        elif outcome == _ANSWERED:
             self._finished(tick)
         else:
-            self.signals.raise_flags(signals.COMMAND_ERROR)
+            self.signals.raise_flags(_COMMAND_ERROR)
 
     def tell(self, log: EventLog, side: int) -> None:
         """From now on completed commands are noted in `log` too, as those of `side` (0 left, 1 right)."""
@@ -104,12 +125,18 @@ class Lm629(MotorAxis):
         self.side = side
 
     def _finished(self, tick: int) -> None:
-        data = bytes(self.port.record)
-        self.commands.append((tick, self.port.command, data))
+        record = self.port.record
+        self.commands.append((tick, self.port.command, bytes(record)))
         if self.log is not None:
-            code = self.side << 8 | self.port.command
-            high, low = int.from_bytes(data[:-7], "big"), int.from_bytes(data[-7:], "big")
-            self.log.note_long(COMMAND, tick, code, len(data), high, low)
+            size = len(record)
+            high = 0
+            low = 0
+            for index in range(size):
+                if index < size - 7:
+                    high = (high << 8 | record[index]) & _SEVEN_BYTES
+                else:
+                    low = low << 8 | record[index]
+            self.log.note_long(_COMMAND, tick, self.side << 8 | self.port.command, size, high, low)
 
     def _command(self, tick: int) -> None:
         """A command byte: act on it, prepare its answer, or wait for its words."""
@@ -117,121 +144,122 @@ class Lm629(MotorAxis):
             self._complain(self.options.unfinished_flags)
             self.trajectory_buffer.abandon()
             self.filter_buffer.abandon()
-        command = BY_OPCODE.get(self.port.command)
-        if command is not None and command.words_in:
-            self.port.expect(command.words_in)
-        elif command is not None and command.words_out:
-            self.port.reply(command.words_out, self._answer(tick, command.name))
+        opcode = self.port.command
+        if _WORDS_IN[opcode]:
+            self.port.expect(_WORDS_IN[opcode])
+        elif _WORDS_OUT[opcode]:
+            self.port.reply(_WORDS_OUT[opcode], self._answer(tick, opcode))
         else:
             self._finished(tick)
-            self._execute(tick, "" if command is None else command.name)
+            self._execute(tick, opcode)
 
-    def _execute(self, tick: int, name: str) -> None:
+    def _execute(self, tick: int, opcode: int) -> None:
         """Commands without data."""
-        if name == "STT":
+        if opcode == _STT:
             self._accept_start()
-        elif name == "UDF":
+        elif opcode == _UDF:
             self.filter_buffer.take()
             self.signals.set_bits(_UPDATE_PENDING)
-        elif name == "SIP":
+        elif opcode == _SIP:
             self.signals.set_bits(_ACQUIRE_INDEX)
             self.encoder.arm(tick)
-        elif name == "DFH":
+        elif opcode == _DFH:
             if self.options.home_shifts_buffer:
                 self.trajectory_buffer.shift(self.real_position)
             self.trajectory.define_home(self.real_position)
             self.real_position = 0
-        elif name == "RESET":
+        elif opcode == _RESET:
             self.encoder.settle(tick)
-            self._enter_reset(_RESETTING, host_port.SOFTWARE_RESET, (tick + 3 & -4) + self.reset_ticks)
-        elif name == "PORT12" and self.options.port12_clears:
-            self.signals.clear_bits(signals.OUTPUT_8_BIT)
-        elif name == "PORT8":  # without O5 it never finds it cleared
-            self.signals.set_bits(signals.OUTPUT_8_BIT)
-        elif name != "PORT12":
+            self._enter_reset(_RESETTING, _SOFTWARE_RESET, (tick + 3 & -4) + self.reset_ticks)
+        elif opcode == _PORT12 and self.options.port12_clears:
+            self.signals.clear_bits(_OUTPUT_8_BIT)
+        elif opcode == _PORT8:  # without O5 it never finds it cleared
+            self.signals.set_bits(_OUTPUT_8_BIT)
+        elif opcode != _PORT12:
             self._complain(self.options.unknown_opcode_flags)
 
     def _complain(self, flags: bool) -> None:
         if flags:
-            self.signals.raise_flags(signals.COMMAND_ERROR)
+            self.signals.raise_flags(_COMMAND_ERROR)
 
     def _accept_start(self) -> None:
         """STT is refused when it would change the acceleration of a motion that goes on (T2)."""
         resting = self.signals.word & (_ON_TARGET | _MOTOR_OFF)
-        stopping = self.trajectory_buffer.control & buffers.STOPS and self.options.stop_lifts_refusal
-        if self.signals.word & signals.ACCELERATION_LOADED and not resting and not stopping:
-            self.signals.raise_flags(signals.COMMAND_ERROR)
+        stopping = self.trajectory_buffer.control & _STOPS and self.options.stop_lifts_refusal
+        if self.signals.word & _ACCELERATION_LOADED and not resting and not stopping:
+            self.signals.raise_flags(_COMMAND_ERROR)
             return
         if self.options.start_takes == "given":
             self.trajectory_buffer.take(self.options.stop_bits_stay)
-        self.signals.clear_bits(signals.ACCELERATION_LOADED)
+        self.signals.clear_bits(_ACCELERATION_LOADED)
         self.start_taken = 1
 
-    def _answer(self, tick: int, name: str) -> int:
+    def _answer(self, tick: int, opcode: int) -> int:
         """What a reading command says, as it is when the command arrives."""
-        if name == "RDSIGS":
+        if opcode == _RDSIGS:
             return self.signals.word
-        if name == "RDRP":
+        if opcode == _RDRP:
             return self.real_position if self.options.read_position == "sample" else self.live_position(tick)
-        if name == "RDRV":
+        if opcode == _RDRV:
             return self.real_velocity
-        if name == "RDDP":
-            return self.desired_position
-        if name == "RDDV":
+        if opcode == _RDDP:
+            return self.trajectory.position >> 16
+        if opcode == _RDDV:
             return self.trajectory.velocity
-        if name == "RDIP":
+        if opcode == _RDIP:
             return self.index_position
         return self.pid.integral if self.options.sum_reading == "term" else self.pid.top_of_sum()
 
     def _word(self, tick: int) -> None:
         """A data word from the host."""
-        name = BY_OPCODE[self.port.command].name
-        if name == "LTRJ":
+        opcode = self.port.command
+        if opcode == _LTRJ:
             self._trajectory_word(self.port.word)
-        elif name == "LFIL":
+        elif opcode == _LFIL:
             self._filter_word(self.port.word)
         if self.port.words_left == 0:
-            self._load(name, int.from_bytes(self.port.record, "big"))
+            self._load(opcode)
             self._finished(tick)
 
     def _trajectory_word(self, word: int) -> None:
-        buffer = self.trajectory_buffer
+        buffer: TrajectoryBuffer = self.trajectory_buffer
+        profile = self.trajectory
         if len(self.port.record) == 2:
             self.port.expect(buffer.begin(word))
             if self.options.unsent == "working":
-                profile = self.trajectory
                 buffer.refresh(profile.acceleration, profile.max_velocity, profile.target)
             return
-        bases = buffer if self.options.relative_rates == "buffer" else None
-        acceleration = bases.acceleration if bases else self.trajectory.acceleration
-        velocity = bases.velocity if bases else self.trajectory.max_velocity
-        outcome = buffer.word(word, acceleration, velocity, self.options.out_of_range == "clamped")
-        if outcome & buffers.COMPLETED:
-            self.signals.set_bits(signals.ACCELERATION_LOADED)
-        if outcome & buffers.OUT_OF_RANGE:
+        if self.rates_of_buffer:
+            outcome = buffer.word(word, buffer.acceleration, buffer.velocity, self.clamps)
+        else:
+            outcome = buffer.word(word, profile.acceleration, profile.max_velocity, self.clamps)
+        if outcome & _COMPLETED:
+            self.signals.set_bits(_ACCELERATION_LOADED)
+        if outcome & _OUT_OF_RANGE:
             self._complain(self.options.range_flags)
 
     def _filter_word(self, word: int) -> None:
         if len(self.port.record) == 2:
             self.port.expect(self.filter_buffer.begin(word))
-        elif self.filter_buffer.word(word, self.options.out_of_range == "clamped"):
+        elif self.filter_buffer.word(word, self.clamps):
             self._complain(self.options.range_flags)
 
-    def _load(self, name: str, value: int) -> None:
+    def _load(self, opcode: int) -> None:
         """Commands with one parameter of one or two words, now complete."""
-        if name == "RSTI":
-            self.signals.reset_interrupts(value)
-        elif name == "MSKI":
-            self.signals.mask_interrupts(value)
-        elif name in ("LPES", "LPEI"):
-            self.threshold = buffers.fit_15(value, self.options.out_of_range == "clamped")
-            self._complain(self.options.range_flags and value > 0x7FFF)
+        word = self.port.word
+        if opcode == _RSTI:
+            self.signals.reset_interrupts(word)
+        elif opcode == _MSKI:
+            self.signals.mask_interrupts(word)
+        elif opcode in (_LPES, _LPEI):
+            self.threshold = fit_15(word, self.clamps)
+            self._complain(self.options.range_flags and word > 0x7FFF)
             self.signals.clear_bits(_STOP_ON_ERROR)
-            if name == "LPES":
+            if opcode == _LPES:
                 self.signals.set_bits(_STOP_ON_ERROR)
-        elif name in ("SBPA", "SBPR"):
-            base = self.trajectory.target if name == "SBPR" else 0
-            self.set_breakpoint(base + value)
+        elif opcode in (_SBPA, _SBPR):
+            base = self.trajectory.target if opcode == _SBPR else 0
+            self.set_breakpoint(base + int.from_bytes(self.port.record, "big"))
 
     # ------------------------------------------------------------------------------------------ observers
 
@@ -276,9 +304,9 @@ class Lm629(MotorAxis):
         due = 0 if command is None else command.words_in
         begun = len(self.port.record) >= 2
         if command is not None and begun and command.name == "LTRJ":
-            due = 2 * self.trajectory_buffer.due.bit_count() - (1 if self.trajectory_buffer.half >= 0 else 0)
+            due = self.trajectory_buffer.words_due()
         elif command is not None and begun and command.name == "LFIL":
-            due = self.filter_buffer.due.bit_count()
+            due = self.filter_buffer.words_due()
         if waiting > due:
             raise ValueError(
                 f"{waiting} words are waited for, but command {self.port.command:02X}h has {due}"

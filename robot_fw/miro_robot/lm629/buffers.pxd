@@ -1,0 +1,48 @@
+cimport cython
+
+
+cdef int _STOPS, _MODES
+cdef int _ACCELERATION, _VELOCITY, _POSITION
+cdef long long _MASK_30
+cdef int _COMPLETED, _OUT_OF_RANGE
+
+
+cpdef long long clamped(long long value, long long low, long long high) noexcept
+cpdef long long signed_32(long long value) noexcept
+cpdef long long signed_31(long long value) noexcept
+cpdef int fit_15(int word, bint clamp) noexcept
+
+
+@cython.final
+cdef class TrajectoryBuffer:
+    cdef public int due, half, control, relative_bits
+    cdef public long long acceleration, velocity, position
+    cdef public bint relative, newer_position
+    cdef public tuple taken
+
+    cpdef void reset(self) noexcept
+    cpdef int begin(self, int control) noexcept
+    cpdef int words_due(self) noexcept
+    cpdef void refresh(self, long long acceleration, long long velocity, long long target) noexcept
+    @cython.locals(high=cython.longlong, value=cython.longlong, bit=cython.int, relative=cython.bint, fits=cython.bint)
+    cpdef int word(self, int word, long long acceleration, long long velocity, bint clamp=*) noexcept
+    cdef int _next_parameter(self) noexcept
+    cpdef void abandon(self) noexcept
+    cpdef void shift(self, long long real_position) noexcept
+    cpdef take(self, bint keep_stops=*)
+    @cython.locals(position=cython.longlong, relative=cython.bint, target=cython.longlong)
+    cpdef resolve(self, long long base)
+
+
+@cython.final
+cdef class FilterBuffer:
+    cdef public int due, kp, ki, kd, il, ds
+    cdef public tuple taken
+
+    cpdef void reset(self) noexcept
+    cpdef int begin(self, int control) noexcept
+    cpdef int words_due(self) noexcept
+    @cython.locals(value=cython.int)
+    cpdef int word(self, int word, bint clamp=*) noexcept
+    cpdef void abandon(self) noexcept
+    cpdef take(self)
