@@ -8,7 +8,7 @@ cdef long long _INDICES
 
 
 @cython.locals(p0=u64_t, p1=u64_t)
-cpdef words_t philox4x32(u64_t c0, u64_t c1, u64_t c2, u64_t c3, u64_t k0, u64_t k1)
+cpdef words_t philox4x32(u64_t c0, u64_t c1, u64_t c2, u64_t c3, u64_t k0, u64_t k1) noexcept
 
 
 cdef class Stream:
@@ -16,7 +16,7 @@ cdef class Stream:
     cdef readonly str name
     cdef u64_t k0, k1, name0, name1, block, w0, w1, w2, w3
 
-    cdef void load(self, u64_t block)
+    cdef void load(self, u64_t block) noexcept
     cpdef u64_t u32(self, long long index) except? 1
     cpdef bint below(self, long long index, u64_t threshold) except? -1
     cpdef u64_t u64(self, long long index) except? 1

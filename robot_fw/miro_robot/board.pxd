@@ -57,7 +57,7 @@ cdef class Board(Bus):
 
     @cython.locals(stopped=cython.int, horizon=cython.longlong)
     cpdef int run(self, long long until_tick) except -1
-    cdef long long _next_interrupt(self, Lm629 chip)
+    cdef long long _next_interrupt(self, Lm629 chip) noexcept
     @cython.locals(now=cython.longlong)
     cpdef int sync(self, long long tick) except -1
     cpdef byte_received(self, int value, int stop, long long tick)
@@ -70,17 +70,17 @@ cdef class Board(Bus):
     cpdef movx_write(self, int address, int value, long long tick)
     cdef int _put_address(self, int address, long long start) except -1
     cpdef fault(self, int kind, int pc, long long tick)
-    cdef void _drive_bridge(self, long long tick)
+    cdef int _drive_bridge(self, long long tick) except -1
     @cython.locals(index=cython.int, hi=cython.int, level=cython.int, port=cython.int, mask=cython.int, levels=cython.int)
-    cdef void _drive_interrupts(self, long long tick)
-    cdef int _level(self, int index)
+    cdef int _drive_interrupts(self, long long tick) except -1
+    cdef inline int _level(self, int index) noexcept
     @cython.locals(data=cython.int, from_left=cython.int, from_right=cython.int, levels=cython.int)
     cdef int _drive_chips(self, long long tick) except -1
     @cython.locals(busy_writes=cython.longlong)
     cdef int _watch_bus(self, bint both_drive, long long tick) except -1
     @cython.locals(one=BusTiming, other=BusTiming, left=cython.int, right=cython.int)
     cdef int _watch_timing(self, int data, long long tick) except -1
-    cdef bint _reset_is_short(self, Lm629 chip, int level, long long tick)
+    cdef bint _reset_is_short(self, Lm629 chip, int level, long long tick) noexcept
     @cython.locals(left=cython.int, right=cython.int)
     cdef int _watch_sample(self, long long tick) except -1
     cdef int _timing_fault(self, int limit, long long ticks, long long tick) except -1

@@ -6,6 +6,7 @@ cdef class Plant:
     cdef public Lm629 right
     cdef public long long next_tick
 
-    cpdef void attach(self, Lm629 left, Lm629 right)
-    cpdef void advance(self, long long tick)
-    cpdef void set_bridge(self, long long tick, int side, int enable, int forward)
+    # A plant may be written in Python: `object` lets it raise, and costs less than asking for an exception.
+    cpdef attach(self, Lm629 left, Lm629 right)
+    cpdef advance(self, long long tick)
+    cpdef set_bridge(self, long long tick, int side, int enable, int forward)

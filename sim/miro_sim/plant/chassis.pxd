@@ -13,8 +13,8 @@ cdef class Body:
     cdef readonly double turned_left_rad, turned_right_rad
 
     @cython.locals(half_s=double, old_left=double, old_right=double)
-    cpdef void push(self, double left_nms, double right_nms, int ticks)
+    cpdef push(self, double left_nms, double right_nms, int ticks)
     @cython.locals(left=double, right=double, left_rub=double, right_rub=double, new_left=double, new_right=double)
     cdef void _rub(self, double most) noexcept
     @cython.locals(left_m=double, right_m=double, half=double, chord_m=double, sine=double, cosine=double)
-    cdef void _roll(self)
+    cdef int _roll(self) except -1

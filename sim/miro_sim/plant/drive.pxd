@@ -17,11 +17,11 @@ cdef class DifferentialDrive(Plant):
     cdef readonly Quadrature left_encoder, right_encoder
     cdef readonly Body body
 
-    cpdef void attach(self, Lm629 left, Lm629 right)
-    cpdef void advance(self, long long tick)
-    cpdef void set_bridge(self, long long tick, int side, int enable, int forward)
+    cpdef attach(self, Lm629 left, Lm629 right)
+    cpdef advance(self, long long tick)
+    cpdef set_bridge(self, long long tick, int side, int enable, int forward)
     @cython.locals(constant=double, start_tick=cython.longlong, left_charge=double, right_charge=double)
-    cdef void _step(self, int ticks)
+    cdef int _step(self, int ticks) except -1
     @cython.locals(left_tick=cython.longlong, right_tick=cython.longlong)
-    cdef void _report(self)
-    cdef void _show_index(self, Lm629 chip, Quadrature encoder, long long tick)
+    cdef void _report(self) noexcept
+    cdef void _show_index(self, Lm629 chip, Quadrature encoder, long long tick) noexcept
