@@ -21,15 +21,16 @@ cdef class Timers:
     cpdef void clear(self, long long cycle) noexcept
     @cython.locals(part=int)
     cpdef void sync(self, long long cycle) noexcept
+    cdef inline int any_runs(self) noexcept
     @cython.locals(split=int, gated=int)
-    cdef int enabled(self, int part) noexcept
+    cdef inline int enabled(self, int part) noexcept
     cdef inline int mode(self, int timer) noexcept
-    cdef int counts_pin(self, int part) noexcept
+    cdef inline int counts_pin(self, int part) noexcept
     @cython.locals(mode=int)
-    cdef int value(self, int part) noexcept
+    cdef inline int value(self, int part) noexcept
     @cython.locals(mode=int)
-    cdef int top(self, int part) noexcept
-    cdef int reload(self, int part) noexcept
+    cdef inline int top(self, int part) noexcept
+    cdef inline int reload(self, int part) noexcept
     @cython.locals(left=int)
     cpdef long long next_overflow(self, int part) noexcept
     @cython.locals(first='long long', second='long long')
@@ -43,6 +44,6 @@ cdef class Timers:
                    overflows='long long')
     cdef void _pass(self, int part, long long cycle) noexcept
     @cython.locals(mode=int)
-    cdef void _store(self, int part, int value) noexcept
+    cdef inline void _store(self, int part, int value) noexcept
     @cython.locals(timer=int)
     cdef void _overflowed(self, int part, long long overflows, long long cycle) noexcept

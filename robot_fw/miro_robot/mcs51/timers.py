@@ -55,10 +55,15 @@ class Timers:
         """Counts through all cycles below `cycle`."""
         if cycle <= self.synced:
             return
-        for part in range(3):
-            if self.enabled(part):
-                self._pass(part, cycle)
+        if self.any_runs():
+            for part in range(3):
+                if self.enabled(part):
+                    self._pass(part, cycle)
         self.synced = cycle
+
+    def any_runs(self) -> int:
+        """0 only if no part counts: both TR are 0, and timer 0 is not split (then timer 1 needs no TR)."""
+        return 1 if self.control & 0x50 or self.tmod & 3 == 3 else 0
 
     def enabled(self, part: int) -> int:
         """Whether it counts, on cycles or on a pin."""
@@ -114,6 +119,8 @@ class Timers:
 
     def quiet_until(self) -> int:
         """The next cycle in which TF0 or TF1 goes up if nothing changes, or FAR."""
+        if not self.any_runs():
+            return _FAR
         first = self.next_flag(0)
         second = self.next_flag(1)
         return first if first < second else second
