@@ -6,6 +6,7 @@ What belongs here: the event types. What does not: finding frames (`scan.py`) an
 from __future__ import annotations
 
 from enum import IntEnum
+from functools import lru_cache
 
 import msgspec
 
@@ -44,7 +45,13 @@ class Received(msgspec.Struct, frozen=True, gc=False):
 
     def message(self, n: int) -> Message:
         """What the frame says, in a network of `n` robots; ContentError if that is nothing known."""
-        return decode_fields(self.body, n)
+        return _message(self.body, n)
+
+
+@lru_cache(maxsize=16)
+def _message(body: bytes, n: int) -> Message:
+    """What a body says; several listeners ask for the same answer."""
+    return decode_fields(body, n)
 
 
 class Damaged(msgspec.Struct, frozen=True, gc=False):

@@ -10,6 +10,7 @@ good but which no rightful sender would send are a `ContentError`.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Collection, Iterable, Mapping, Set
 from dataclasses import dataclass
 from operator import index
@@ -18,6 +19,7 @@ from typing import Any
 
 from miro_protocol.crc import crc16
 from miro_protocol.table import (
+    ROBOT_COUNTS,
     SEQ,
     SEQ_MODULUS,
     SERVICE,
@@ -34,6 +36,13 @@ from miro_protocol.table import (
     downlink,
 )
 from miro_protocol.whitening import whiten
+
+_LOW = max(field.low for field in VELOCITY)
+_HIGH = min(field.high for field in VELOCITY)
+_CODES = {1: "b", 2: "h", 4: "i"}
+_VELOCITIES = {
+    n: struct.Struct("<" + n * "".join(_CODES[field.size] for field in VELOCITY)) for n in ROBOT_COUNTS
+}
 
 
 class EncodeError(ValueError):
@@ -162,6 +171,11 @@ def encode(message: Message, n: int) -> bytes:
     Raises EncodeError naming field, value and what is allowed for whatever may not be sent.
     """
     form = format_of(message, n)
+    return seal(form, _body(message, n, form))
+
+
+def _body(message: Message, n: int, form: Format) -> bytes:
+    """HDR and payload in clear."""
     if isinstance(message, TeamFrame):
         kind, payload = _team_type(message.type), _team_payload(message, n)
     elif isinstance(message, ServiceFrame):
@@ -171,7 +185,7 @@ def encode(message: Message, n: int) -> bytes:
     else:
         raise _no_message(message)
     header = kind * SEQ_MODULUS + checked(SEQ, message.seq)
-    return seal(form, bytes([header]) + payload.ljust(form.payload_size, b"\0"))
+    return bytes([header]) + payload.ljust(form.payload_size, b"\0")
 
 
 def _no_message(value: Any) -> EncodeError:
@@ -185,7 +199,7 @@ def seal(form: Format, body: bytes) -> bytes:
 
 def crc(form: Format, body: bytes) -> int:
     """The CRC a frame of this format must carry behind `body`."""
-    return crc16(body, layout_crc(form))
+    return crc16(bytes([form.layout]) + body)
 
 
 def layout_crc(form: Format) -> int:
@@ -228,8 +242,7 @@ def describe(message: Message) -> str:
 
 def _require_sendable(message: Message, body: bytes, n: int) -> None:
     try:
-        form = format_of(message, n)
-        same = encode(message, n) == seal(form, bytes(body))
+        same = _body(message, n, format_of(message, n)) == body
     except EncodeError as error:
         raise ContentError(str(error)) from None
     if not same:
@@ -247,13 +260,26 @@ def _team_type(kind: int) -> int:
 
 def _team_payload(message: TeamFrame, n: int) -> bytes:
     pairs = _items("velocities", message.velocities, n, "pairs of (left, right), one a robot")
-    return b"".join(map(_pair, range(n), pairs))
+    numbers: list[int] = []
+    for slot, pair in enumerate(pairs):
+        numbers += pair if _is_plain(pair) else _pair(slot, pair)
+    return _VELOCITIES[n].pack(*numbers)
 
 
-def _pair(slot: int, pair: Any) -> bytes:
+def _is_plain(pair: Any) -> bool:
+    """Whether `pair` is what a station sends: a tuple of two ints within the limits."""
+    if type(pair) is not tuple or len(pair) != 2:
+        return False
+    left, right = pair
+    if type(left) is not int or type(right) is not int:
+        return False
+    return _LOW <= left <= _HIGH and _LOW <= right <= _HIGH
+
+
+def _pair(slot: int, pair: Any) -> tuple[int, int]:
     where = f"slot {slot} "
     left, right = _items(where, pair, 2, "numbers (left, right)")
-    return pack(VELOCITY[0], left, where) + pack(VELOCITY[1], right, where)
+    return checked(VELOCITY[0], left, where), checked(VELOCITY[1], right, where)
 
 
 def _service_payload(message: ServiceFrame, n: int) -> bytes:
