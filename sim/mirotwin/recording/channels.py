@@ -195,34 +195,30 @@ def messages(period: Period) -> Iterator[tuple[str, int, msgspec.Struct]]:
     """(topic, tick, message) of everything in a period, in the order of a recording."""
     tick = period.tick
     for robot in period.robots:
-        for channel, message in _robot_messages(robot, tick):
-            yield topics.robot_topic(robot.network, robot.slot, channel), tick, message
+        yield from _robot_messages(robot, topics.robot_topic(robot.network, robot.slot, ""), tick)
     for sent in period.wire:
         message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
         yield topics.wire_topic(sent.network), sent.tick, message
     yield topics.PERIOD, tick, PeriodMessage(tick, period.index, period.digest)
 
 
-def _robot_messages(robot: RobotPeriod, tick: int) -> Iterator[tuple[str, msgspec.Struct]]:
+def _robot_messages(robot: RobotPeriod, head: str, tick: int) -> Iterator[tuple[str, int, msgspec.Struct]]:
+    """The same for one robot, whose topics begin with `head`."""
     at, truth, seen, control = robot.reference, robot.truth, robot.measurement, robot.control
-    yield "reference", PostureMessage(tick, at.x_m, at.y_m, at.theta_rad)
-    yield "truth", TruthMessage(tick, truth.x_m, truth.y_m, truth.theta_rad, robot.v_m_s, robot.w_rad_s)
+    yield head + "reference", tick, PostureMessage(tick, at.x_m, at.y_m, at.theta_rad)
+    speeds = robot.v_m_s, robot.w_rad_s
+    yield head + "truth", tick, TruthMessage(tick, truth.x_m, truth.y_m, truth.theta_rad, *speeds)
     if seen is not None:
-        yield "measurement", PostureMessage(tick, seen.x_m, seen.y_m, seen.theta_rad)
+        yield head + "measurement", tick, PostureMessage(tick, seen.x_m, seen.y_m, seen.theta_rad)
     if control is not None:
-        yield "control", ControlMessage(tick, *msgspec.structs.astuple(control))
-    if robot.accepted is not None and robot.rejected is not None and robot.stale is not None:
-        yield "firmware", FirmwareMessage(tick, robot.accepted, robot.rejected, robot.stale)
+        yield head + "control", tick, ControlMessage(tick, *msgspec.structs.astuple(control))
+    accepted, rejected, stale = robot.accepted, robot.rejected, robot.stale
+    if accepted is not None and rejected is not None and stale is not None:
+        yield head + "firmware", tick, FirmwareMessage(tick, accepted, rejected, stale)
     left, right = robot.left, robot.right
-    yield "lm629", Lm629Message(tick, _registers(left), _registers(right))
-    yield (
-        "pwm",
-        PwmMessage(
-            tick,
-            DutyMessage(left.pwm_sign, left.pwm_magnitude),
-            DutyMessage(right.pwm_sign, right.pwm_magnitude),
-        ),
-    )
+    yield head + "lm629", tick, Lm629Message(tick, _registers(left), _registers(right))
+    duties = DutyMessage(left.pwm_sign, left.pwm_magnitude), DutyMessage(right.pwm_sign, right.pwm_magnitude)
+    yield head + "pwm", tick, PwmMessage(tick, *duties)
 
 
 def _registers(axis: Axis) -> RegistersMessage:

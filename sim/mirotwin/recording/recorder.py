@@ -109,8 +109,11 @@ class Recorder:
     def write(self, period: Period) -> None:
         """Adds everything in a control period."""
         with self._undisturbed:
+            period_ns = nanoseconds(period.tick)
+            add, encode, numbers = self._writer.add_message, self._encoder.encode, self._channels
             for topic, tick, message in channels.messages(period):
-                self._add(topic, tick, message)
+                channel = numbers.get(topic) or self._register(topic, message)
+                add(channel, period_ns if tick == period.tick else nanoseconds(tick), encode(message))
 
     def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
         """Adds one LM629 sample of a robot (full recordings)."""
@@ -128,9 +131,7 @@ class Recorder:
                 self._add(topic, fault.tick, message)
 
     def _add(self, topic: str, tick: int, message: msgspec.Struct) -> None:
-        channel = self._channels.get(topic)
-        if channel is None:
-            channel = self._register(topic, message)
+        channel = self._channels.get(topic) or self._register(topic, message)
         self._writer.add_message(channel, nanoseconds(tick), self._encoder.encode(message))
 
     def _register(self, topic: str, message: msgspec.Struct) -> int:

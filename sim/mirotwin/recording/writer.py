@@ -47,6 +47,7 @@ _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log ti
 _BEFORE_CONTENT = _MESSAGE.size - 9
 _INDEX = struct.Struct("<BQHI")  # opcode, length, channel, length of entries
 _ENTRY = 16  # bytes: time, offset
+_MESSAGE_OPCODE = int(Opcode.MESSAGE)
 _FOOTER = struct.Struct("<BQQQ")  # what the summary's CRC takes in of the footer
 _NEVER_NS = 1 << 64
 
@@ -124,7 +125,7 @@ class McapWriter:
         if time_ns > self._last_ns:
             self._last_ns = time_ns
         length = _BEFORE_CONTENT + len(data)
-        chunk += _MESSAGE.pack(Opcode.MESSAGE, length, channel, 0, time_ns, time_ns)
+        chunk += _MESSAGE.pack(_MESSAGE_OPCODE, length, channel, 0, time_ns, time_ns)
         chunk += data
         if len(chunk) > CHUNK_SIZE:
             self._end_chunk()
