@@ -7,8 +7,7 @@ it gets the camera's measurement and the robot's last answer by radio, and answe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS, seconds
@@ -54,10 +53,12 @@ class Robot:
         name = f"net{network}/robot{spec.slot}"
         self.spec = spec
         self.network = network
-        with self._named(0):
+        try:
             self.reference = reference_for(spec, scenario.duration_s)
             start = self.reference.at(0.0).posture
             self.pilot: Pilot = pilot_for(spec, self.reference)
+        except PartError as error:
+            raise self._named(error, 0) from error
         wheels = Stream(seed, f"{name}/wheels")
         try:
             self.drive = DifferentialDrive(
@@ -112,17 +113,15 @@ class Robot:
 
     def steer(self, measured: Posture | None, heard: Heard | None, tick: int) -> Command:
         """The PC computes this robot's wheel commands from what it measured and heard. Raises PartError."""
-        with self._named(tick):
-            return self.pilot.update(measured, seconds(tick), heard)
-
-    @contextmanager
-    def _named(self, tick: int) -> Iterator[None]:
-        """Says of which robot and when, if a part of it fails."""
         try:
-            yield
+            return self.pilot.update(measured, seconds(tick), heard)
         except PartError as error:
-            place = f"net{self.network}/robot{self.spec.slot}: tick {tick} ({seconds(tick):.6f} s)"
-            raise PartError(f"{place}: {error.what}", error.remedy) from error
+            raise self._named(error, tick) from error
+
+    def _named(self, error: PartError, tick: int) -> PartError:
+        """The same with the robot it is of, and when."""
+        place = f"net{self.network}/robot{self.spec.slot}: tick {tick} ({seconds(tick):.6f} s)"
+        return PartError(f"{place}: {error.what}", error.remedy)
 
     def counter(self, index: int) -> int | None:
         """A frame counter of the firmware (16 bit), or None when the image exports no such symbol."""
@@ -136,8 +135,10 @@ class Robot:
         """What observers see of this robot at `tick`; drains the lists of completed LM629 commands."""
         x_m, y_m, theta_rad = self.drive.pose_at(tick)
         v_m_s, w_rad_s = self.drive.velocity_at(tick)
-        with self._named(tick):
+        try:
             reference = self.reference.at(seconds(tick)).posture
+        except PartError as error:
+            raise self._named(error, tick) from error
         return RobotPeriod(
             network=self.network,
             slot=self.spec.slot,
