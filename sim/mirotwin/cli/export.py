@@ -116,7 +116,7 @@ def export(
         show(f"{out}: {exported.down} transmissions from the host and {exported.up} from robots")
     if exported.bad_stops and to == "pcapng":
         complain(
-            f"{exported.bad_stops} bad stop bits are not in {out}: a capture holds none, a stream file does"
+            f"{exported.bad_stops} bad stop bits were left out: a capture holds none, a stream file does"
         )
     if exported.failure is not None:
         complain(f"error: {exported.failure}; all before it was written")
