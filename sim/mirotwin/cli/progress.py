@@ -4,14 +4,17 @@ What belongs here: when to show it. What does not: what is counted. This is one 
 the wall clock.
 """
 
+from __future__ import annotations
+
 import sys
 import time
 from types import TracebackType
-
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import one_line
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
 
 PATIENCE_S = 1.0
 
@@ -28,7 +31,7 @@ class ProgressBar:
         self._progress: Progress | None = None
         self._task: TaskID | None = None
 
-    def __enter__(self) -> "ProgressBar":
+    def __enter__(self) -> ProgressBar:
         return self
 
     def __exit__(
@@ -44,15 +47,22 @@ class ProgressBar:
         if self._progress is None:
             if time.monotonic() - self._began_s < PATIENCE_S:
                 return
-            self._progress = Progress(
-                TextColumn("{task.description}", markup=False),
-                BarColumn(),
-                TaskProgressColumn(),
-                TimeRemainingColumn(),
-                console=Console(stderr=True),
-                transient=True,
-            )
+            self._progress = _bar()
             self._task = self._progress.add_task(self.what, total=self.total)
             self._progress.start()
         assert self._task is not None
         self._progress.update(self._task, completed=done)
+
+
+def _bar() -> Progress:
+    from rich.console import Console  # loaded when the first bar is drawn: most commands are over before
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    return Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )

@@ -6,16 +6,13 @@ import hashlib
 from pathlib import Path
 
 import click
-from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
 from miro_robot.image import Image
-from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText, load
 from miro_sim.world.world import World
 from mirotwin import runner
-from mirotwin.cli.console import show
 from mirotwin.cli.held_signals import held_signals
 from mirotwin.cli.options import (
     Place,
@@ -32,7 +29,6 @@ from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.run_files import RunFiles
 from mirotwin.files.outputs import OutputFolder
 from mirotwin.recording.recorder import Source
-from mirotwin.report.summary import Summary, errors_by_robot, off_pitch_text, settling_text
 
 
 @click.command(short_help="Runs a scenario and writes its files.")
@@ -87,7 +83,9 @@ def run(
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
     if not quiet:
-        _print(summary, run_files.periods, folder.path)
+        from mirotwin.cli.run_table import print_table  # loads rich
+
+        print_table(summary, run_files.periods, folder.path)
     return report_faults(world)
 
 
@@ -114,46 +112,3 @@ def report_faults(world: World) -> int:
         more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
         complain(f"firmware fault: net{network}/robot{slot}: {faults[0]}{more}")
     return FIRMWARE_FAULT if found else DONE
-
-
-def _print(summary: Summary, periods: list[Period], folder: Path) -> None:
-    tracking, link, firmware = summary.tracking, summary.link, summary.firmware
-    table = Table(box=None, pad_edge=False, show_header=False)
-    table.add_column(style="bold")
-    table.add_column()
-    table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
-    if summary.set:
-        table.add_row("set", " ".join(summary.set))
-    table.add_row(
-        "time",
-        f"{summary.simulated_s:.2f} s in {summary.wall_s:.2f} s ({summary.realtime_factor:.1f} x real time, "
-        f"engine {summary.engine})",
-    )
-    if tracking.rms_position_cm is not None:
-        settled = settling_text(next(iter(errors_by_robot(periods).values())))
-        table.add_row(
-            "tracking",
-            f"rms of the last second {tracking.rms_position_cm:.2f} cm "
-            f"(x {tracking.rms_x_cm:.2f}, y {tracking.rms_y_cm:.2f}), {tracking.rms_theta_deg:.2f} deg; {settled}",
-        )
-    off_pitch = off_pitch_text(summary)
-    if off_pitch:
-        table.add_row("pitch", off_pitch)
-    table.add_row(
-        "link",
-        f"{link.frames_sent} frames sent, {_known(link.frames_accepted)} accepted, "
-        f"{_known(link.frames_rejected)} rejected, {_known(link.frames_stale)} stale; {link.bit_errors} bit errors",
-    )
-    idle = 100.0 * firmware.idle_cycles / firmware.machine_cycles if firmware.machine_cycles else 0.0
-    table.add_row(
-        "firmware",
-        f"{firmware.instructions} instructions, {firmware.machine_cycles} cycles ({idle:.0f} % idle), "
-        f"{firmware.faults} faults",
-    )
-    table.add_row("digest", summary.digest)
-    table.add_row("files", str(folder))
-    show(table)
-
-
-def _known(count: int | None) -> str:
-    return "?" if count is None else str(count)

@@ -117,3 +117,15 @@ def test_with_the_python_engine_a_command_loads_sources_alone(name, tmp_path):
     )
     assert done.stdout.endswith(".py\n")
     assert done.stderr == ""
+
+
+def test_a_quiet_run_without_a_figure_loads_neither_rich_nor_matplotlib(tmp_path):
+    script = (
+        "import sys\nfrom mirotwin.cli import main\ntry:\n    main()\nexcept SystemExit: pass\n"
+        "print({'rich', 'matplotlib', 'numpy'}.intersection(sys.modules))"
+    )
+    command = ["run", "fig6", "--set", "duration_s=0.05", "--no-figure", "-q"]
+    done = children.run(
+        [sys.executable, "-c", script, *command], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert (done.stdout, done.stderr) == ("set()\n", "")

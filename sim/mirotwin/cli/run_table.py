@@ -1,0 +1,57 @@
+"""The table that `mirotwin run` prints at its end.
+
+What belongs here: its rows. What does not: the figures in it (`report.summary`).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.table import Table
+
+from miro_sim.periods import Period
+from mirotwin.cli.console import show
+from mirotwin.report.summary import Summary, errors_by_robot, off_pitch_text, settling_text
+
+
+def print_table(summary: Summary, periods: list[Period], folder: Path) -> None:
+    tracking, link, firmware = summary.tracking, summary.link, summary.firmware
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(style="bold")
+    table.add_column()
+    table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
+    if summary.set:
+        table.add_row("set", " ".join(summary.set))
+    table.add_row(
+        "time",
+        f"{summary.simulated_s:.2f} s in {summary.wall_s:.2f} s ({summary.realtime_factor:.1f} x real time, "
+        f"engine {summary.engine})",
+    )
+    if tracking.rms_position_cm is not None:
+        settled = settling_text(next(iter(errors_by_robot(periods).values())))
+        table.add_row(
+            "tracking",
+            f"rms of the last second {tracking.rms_position_cm:.2f} cm "
+            f"(x {tracking.rms_x_cm:.2f}, y {tracking.rms_y_cm:.2f}), {tracking.rms_theta_deg:.2f} deg; {settled}",
+        )
+    off_pitch = off_pitch_text(summary)
+    if off_pitch:
+        table.add_row("pitch", off_pitch)
+    table.add_row(
+        "link",
+        f"{link.frames_sent} frames sent, {_known(link.frames_accepted)} accepted, "
+        f"{_known(link.frames_rejected)} rejected, {_known(link.frames_stale)} stale; {link.bit_errors} bit errors",
+    )
+    idle = 100.0 * firmware.idle_cycles / firmware.machine_cycles if firmware.machine_cycles else 0.0
+    table.add_row(
+        "firmware",
+        f"{firmware.instructions} instructions, {firmware.machine_cycles} cycles ({idle:.0f} % idle), "
+        f"{firmware.faults} faults",
+    )
+    table.add_row("digest", summary.digest)
+    table.add_row("files", str(folder))
+    show(table)
+
+
+def _known(count: int | None) -> str:
+    return "?" if count is None else str(count)
