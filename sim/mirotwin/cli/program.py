@@ -37,8 +37,6 @@ SIGPIPE = 13
 SIGNALLED = 128
 """Plus the number of the signal: what a shell reports for a program that a signal ended."""
 
-MAX_SEED = (1 << 63) - 1
-
 
 def print_version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
     """`--version`."""
