@@ -9,7 +9,7 @@ cdef long long _STOPPED
 cdef long long _STOPPED_PERIOD
 cdef int _SERIAL
 cdef int _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI
-cdef int _ROLLOVERS
+cdef int _ROLLOVERS, _COUNTER_BITS
 cdef int _VOTE_FIRST, _VOTE_LAST, _ACTION, _LAST_ACTION
 
 @cython.final

@@ -32,6 +32,7 @@ _STOPPED_PERIOD = 1 << 40
 _SERIAL = 4  # its place in the polling order
 _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02, 0x01
 _ROLLOVERS = 16
+_COUNTER_BITS = 15  # of the divide-by-16 counter: masks instead of divisions
 _VOTE_FIRST, _VOTE_LAST, _ACTION = 7, 9, 10  # states of the receiver's counter
 _LAST_ACTION = 9 * _ROLLOVERS + _ACTION  # 16x ticks from the fall to the end of a character
 
@@ -183,7 +184,7 @@ class Uart:
         if self.tx_next < tick:
             passed = (tick - 1 - self.tx_next) // self.tx_period + 1
             self.tx_next += passed * self.tx_period
-            self.tx_phase = (self.tx_phase + passed) % _ROLLOVERS
+            self.tx_phase = (self.tx_phase + passed) & _COUNTER_BITS
 
     def _edge(self) -> None:
         """One bit appears on TXD; with the stop bit comes TI."""
@@ -243,8 +244,8 @@ class Uart:
     def _bit(self, tick: int) -> None:
         """16x ticks of one bit below `tick`: only counter states 7 to 10 do anything."""
         while self.rx_next < tick and self.rx_count:
-            state = self.rx_count % _ROLLOVERS
-            idle = (_VOTE_FIRST - state) % _ROLLOVERS if state < _VOTE_FIRST or state > _ACTION else 0
+            state = self.rx_count & _COUNTER_BITS
+            idle = (_VOTE_FIRST - state) & _COUNTER_BITS if state < _VOTE_FIRST or state > _ACTION else 0
             if idle:
                 within = (tick - 1 - self.rx_next) // self.rx_period + 1
                 if idle > within:
@@ -264,7 +265,7 @@ class Uart:
 
     def _act(self, now: int) -> None:
         """State 10 of a bit: take the vote. Bit 0 is the start bit; the last one ends the frame."""
-        number = self.rx_count // _ROLLOVERS
+        number = self.rx_count >> 4
         bit = 1 if self.rx_votes >= 2 else 0
         self.rx_votes = 0
         if number == 0:
