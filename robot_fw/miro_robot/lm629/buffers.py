@@ -42,7 +42,7 @@ def signed_31(value: int) -> int:
     return ((value + 0x40000000) & 0x7FFFFFFF) - 0x40000000
 
 
-def fit_15(word: int, clamp: bool) -> int:
+def fit_15(word: int, clamp: int) -> int:
     """A coefficient or a threshold: 15 bits."""
     return clamped(word, 0, 0x7FFF) if clamp else word & 0x7FFF
 
@@ -125,7 +125,7 @@ class TrajectoryBuffer:
             self.position = target
             self.relative = False
 
-    def word(self, word: int, acceleration: int, velocity: int, clamp: bool = False) -> int:
+    def word(self, word: int, acceleration: int, velocity: int, clamp: int = 0) -> int:
         """The next parameter word; relative ones add to the values given. Returns COMPLETED and OUT_OF_RANGE bits."""
         if self.half < 0:
             self.half = word
@@ -220,7 +220,7 @@ class FilterBuffer:
         """How many words are still to come: one a coefficient."""
         return (self.due >> 3 & 1) + (self.due >> 2 & 1) + (self.due >> 1 & 1) + (self.due & 1)
 
-    def word(self, word: int, clamp: bool = False) -> int:
+    def word(self, word: int, clamp: int = 0) -> int:
         """The next coefficient, 15 bits, in the order kp, ki, kd, il. Returns 0 or OUT_OF_RANGE."""
         value = fit_15(word, clamp)
         if self.due & 8:
