@@ -1,5 +1,5 @@
 """The ground floor, what makes the bits the same: which engine runs, `dmath`, the integer clock, random numbers,
-canonical bytes of a state. Imports nothing of ours.
+tables of state and their flat bytes. Imports nothing of ours.
 """
 
 from miro_exact import engine

@@ -1,7 +1,7 @@
 """Hot modules: which there are, the compiled file of one, and the hash that ties both together.
 
-A hot module is an `x.py` with an `x.pxd` beside it. What does not belong here: which twin an import gets (`engine`).
-`setup.py` loads this file by its path, before anything is installed: it imports nothing of ours.
+A hot module is an `x.py`, or an `x.pyx`, with an `x.pxd` beside it. What does not belong here: which twin an import
+gets (`engine`). `setup.py` loads this file by its path, before anything is installed: it imports nothing of ours.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 DISPATCH_MARK = b"mirotwin: dispatch replicated"
-"""Bytes that the build leaves in a compiled module whose interpreter loop it could reshape (`setup.py`, `threaded`)."""
+"""Bytes that the build leaves in a compiled module whose interpreter loop it could reshape (`threaded`)."""
 _CIMPORT = re.compile(r"^from (\S+) cimport ([^#\n]+)", re.MULTILINE)
 
 
@@ -21,25 +21,27 @@ def hot_sources(package_dirs: dict[str, Path]) -> dict[str, Path]:
     found = {}
     for package, folder in package_dirs.items():
         for pxd in sorted(folder.rglob("*.pxd")):
-            source = pxd.with_suffix(".py")
-            if source.exists():
-                relative = source.relative_to(folder).with_suffix("")
-                found[".".join((package, *relative.parts))] = source
+            for source in (pxd.with_suffix(".py"), pxd.with_suffix(".pyx")):
+                if source.exists():
+                    relative = source.relative_to(folder).with_suffix("")
+                    found[".".join((package, *relative.parts))] = source
     return found
 
 
 def source_hashes(package_dirs: dict[str, Path]) -> dict[str, str]:
     """Dotted name -> SHA-256 over the module's source, its `.pxd` and every `.pxd` that this one builds upon.
 
-    These files fix the C layout that a compiled module relies on.
+    These files fix the C layout that a compiled module relies on. `places.py` counts too: it adds to each of them.
     """
     sources = hot_sources(package_dirs)
     texts = {name: _text(source.with_suffix(".pxd")) for name, source in sources.items()}
     import hashlib  # slow to load
 
+    added = package_dirs.get("miro_exact", Path()) / "places.py"
+    basis = _text(added) if added.exists() else b""
     hashes = {}
     for name, source in sources.items():
-        found = hashlib.sha256()
+        found = hashlib.sha256(basis)
         for used in sorted(_layout(name, texts)):
             found.update(f"{used}\n".encode() + texts[used])
         hashes[name] = hashlib.sha256(found.digest() + _text(source)).hexdigest()

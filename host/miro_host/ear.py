@@ -10,12 +10,9 @@ robot boots at 0. This is right as long as a wheel turns by less than 32768 coun
 """
 
 from collections.abc import Sequence
-from typing import Annotated
+from typing import NamedTuple
 
-import msgspec
-from msgspec import Meta
-
-from miro_exact.saved import LAST_TICK
+from miro_exact.state import NEVER_TICK, Rows
 from miro_protocol.decoder import Received, Symbol, TelemetryDecoder
 from miro_protocol.events import Event
 from miro_protocol.frames import ContentError, TelemetryFrame
@@ -23,11 +20,11 @@ from miro_protocol.frames import ContentError, TelemetryFrame
 HALF_TURN = 1 << 15
 TURN = 1 << 16
 
-Byte = Annotated[int, Meta(ge=0, le=255)]
-Count = Annotated[int, Meta(ge=-LAST_TICK, le=LAST_TICK)]
+_COUNT = ("q", -NEVER_TICK, NEVER_TICK)
+_NOTHING_HEARD = (-1, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
-class Heard(msgspec.Struct, frozen=True):
+class Heard(NamedTuple):
     """One robot's last answer.
 
     `tick` is the start bit of the frame's first character at the PC; `flags` are those of `miro_protocol.table.Flags`;
@@ -35,21 +32,32 @@ class Heard(msgspec.Struct, frozen=True):
     firmware's frame counters modulo 256.
     """
 
-    tick: Annotated[int, Meta(ge=0, le=LAST_TICK)]
-    seq: Byte
-    flags: Byte
-    status_left: Byte
-    status_right: Byte
-    position_left: Count
-    position_right: Count
-    accepted: Byte
-    rejected: Byte
+    tick: int
+    seq: int
+    flags: int
+    status_left: int
+    status_right: int
+    position_left: int
+    position_right: int
+    accepted: int
+    rejected: int
 
 
 class Ear:
     """Receiver of one network's answers. `heard` holds the last one of each slot, None before the first."""
 
+    STATE = {
+        "decoder": TelemetryDecoder,
+        "heard": Rows(
+            *(8, ("q", -1, NEVER_TICK), "B", "B", "B", "B", _COUNT, _COUNT, "B", "B"),
+            split=lambda heard: heard or _NOTHING_HEARD,
+            make=lambda cells: None if cells[0] < 0 else Heard(*cells),
+        ),
+    }
+    NOT_STATE = ("robots",)
+
     def __init__(self, robots: int) -> None:
+        self.robots = robots
         self.decoder = TelemetryDecoder()
         self.heard: list[Heard | None] = [None] * robots
 
@@ -87,21 +95,10 @@ class Ear:
             rejected=message.rejected,
         )
 
-    def snapshot(self) -> dict[str, object]:
-        return {"decoder": self.decoder.snapshot(), "heard": msgspec.to_builtins(self.heard)}
-
-    def restore(self, state: dict[str, object]) -> None:
-        decoder = state["decoder"]
-        assert isinstance(decoder, dict)
-        self.restore_heard(state["heard"])
-        self.decoder.restore(decoder)
-
-    def restore_heard(self, rows: object) -> None:
-        """Puts back `heard` alone, from its plain values. Raises ValueError when they are of another network."""
-        heard = msgspec.convert(rows, list[Heard | None])
-        if len(heard) != len(self.heard):
-            raise ValueError(f"answers of {len(heard)} robots where {len(self.heard)} belong")
-        self.heard = heard
+    def after_load(self) -> None:
+        """Raises ValueError unless there is an answer, or none, of each robot."""
+        if len(self.heard) != self.robots:
+            raise ValueError(f"answers of {len(self.heard)} robots where {self.robots} belong")
 
 
 def unwrapped(low: int, before: int) -> int:

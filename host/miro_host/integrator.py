@@ -47,6 +47,7 @@ class Integrator:
     A law that answers velocities instead sets z_cmd by `go_to`, within the same limits.
     """
 
+    STATE = {"v_m_s": "d", "w_rad_s": "d"}
     NOT_STATE = ("limits", "period_s")
 
     def __init__(self, limits: Limits, period_s: float) -> None:
@@ -76,16 +77,11 @@ class Integrator:
             self.w_rad_s, clamp(w_rad_s, limits.max_w_rad_s), self.period_s * limits.max_w_dot_rad_s2
         )
 
-    def snapshot(self) -> dict[str, object]:
-        return {"v_m_s": self.v_m_s, "w_rad_s": self.w_rad_s}
-
-    def restore(self, state: dict[str, object]) -> None:
-        v, w = state["v_m_s"], state["w_rad_s"]
-        assert isinstance(v, float)
-        assert isinstance(w, float)
+    def after_load(self) -> None:
+        """Raises ValueError for a velocity that the limits do not allow."""
+        v, w = self.v_m_s, self.w_rad_s
         if not (abs(v) <= self.limits.max_v_m_s and abs(w) <= self.limits.max_w_rad_s):
             raise ValueError(f"velocity ({v}, {w}) is beyond the limits")
-        self.v_m_s, self.w_rad_s = v, w
 
 
 def _near(before: float, wanted: float, most: float) -> float:

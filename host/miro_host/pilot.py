@@ -9,12 +9,14 @@ left alone and the last command is repeated.
 """
 
 import math
+import sys
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
 
 from miro_exact.domain import DomainError
+from miro_exact.state import Items
 from miro_host.ear import Heard
 from miro_host.estimators.interface import Estimate, Estimator, EstimatorInput
 from miro_host.estimators.none import NoEstimator
@@ -41,8 +43,8 @@ class Command(msgspec.Struct, frozen=True):
     inner: Mapping[str, float] = NOTHING
 
 
-_Speed = Annotated[int, msgspec.Meta(ge=-0x8000, le=0x7FFF)]  # what a frame holds
-
+_LARGEST = sys.float_info.max
+_FASTEST = 0x8000  # what a frame holds
 STANDSTILL = Command(0, 0, 0.0, 0.0)
 
 
@@ -55,7 +57,13 @@ class Pilot:
     known delay without touching the law.
     """
 
-    NOT_STATE = ("reference", "reference_lead_s", "wheels")
+    STATE = {
+        "integrator": Integrator,
+        "law": Law,
+        "estimator": Estimator,
+        "numbers": Items("d", 0xFFFF, -_LARGEST, _LARGEST),
+    }
+    NOT_STATE = ("reference", "reference_lead_s", "wheels", "command")
 
     def __init__(
         self,
@@ -116,7 +124,7 @@ class Pilot:
             estimate = self.estimator.step(given)
             if estimate is not None:
                 check_estimate(estimate)
-            self.estimator.snapshot()
+            self.estimator.check_memory()
         except PartError:  # of the reference, which the part may have asked
             raise
         except Exception as error:
@@ -128,35 +136,27 @@ class Pilot:
         try:
             answer = self.law.step(given)
             check_answer(answer, self.law.INNER)
-            self.law.snapshot()
+            self.law.check_memory()
         except PartError:  # of the reference, which the part may have asked
             raise
         except Exception as error:
             raise _failure("law", self.law, error) from error
         return answer
 
-    def snapshot(self) -> dict[str, object]:
+    @property
+    def numbers(self) -> list[float]:
+        """The command: both wheels, both velocities, and the law's inner values in the order of `INNER`."""
         command = self.command
-        numbers = (command.left, command.right, command.v_m_s, command.w_rad_s, *command.inner.values())
-        state: dict[str, object] = {"integrator": self.integrator.snapshot(), "command": numbers}
-        for name, part in (("law", self.law), ("estimator", self.estimator)):
-            if part.STATE:
-                state[name] = part.snapshot()
-        return state
+        inner = [command.inner[name] for name in self.law.INNER]
+        return [float(command.left), float(command.right), command.v_m_s, command.w_rad_s, *inner]
 
-    def restore(self, state: dict[str, object]) -> None:
-        integrator, command = state["integrator"], state["command"]
-        law, estimator = state.get("law", {}), state.get("estimator", {})
-        assert isinstance(integrator, dict)
-        assert isinstance(command, tuple | list)
-        _put_back("law", self.law, law)
-        _put_back("estimator", self.estimator, estimator)
-        self.integrator.restore(integrator)
-        left, right = msgspec.convert(command[:2], tuple[_Speed, _Speed])
-        v_m_s, w_rad_s, *inner = numbers = msgspec.convert(command[2:], list[float])
-        if not all(math.isfinite(number) for number in numbers):
-            raise ValueError("the command holds a value that is not finite")
-        self.command = Command(left, right, v_m_s, w_rad_s, dict(zip(self.law.INNER, inner, strict=True)))
+    @numbers.setter
+    def numbers(self, numbers: list[float]) -> None:
+        left, right, v_m_s, w_rad_s, *inner = numbers
+        if not all(abs(wheel) <= _FASTEST and wheel == int(wheel) for wheel in (left, right)):
+            raise ValueError(f"no frame carries the command ({left}, {right})")
+        values = dict(zip(self.law.INNER, inner, strict=True))
+        self.command = Command(int(left), int(right), v_m_s, w_rad_s, values)
 
 
 def _failure(word: str, part: Law[Any] | Estimator[Any], error: Exception) -> PartError:
@@ -166,15 +166,6 @@ def _failure(word: str, part: Law[Any] | Estimator[Any], error: Exception) -> Pa
     if isinstance(error, DomainError):
         return PartError(what, "parameters far from any robot's can do this")
     return PartError(what, f"mend the {word} or its parameters")
-
-
-def _put_back(word: str, part: Law[Any] | Estimator[Any], memory: object) -> None:
-    """Restores a part. Raises ValueError, also for what another distribution's own `restore` raises."""
-    try:
-        part.restore(msgspec.convert(memory, dict[str, object]))
-    except Exception as error:
-        name = part.parameters.name()
-        raise ValueError(f"{word} {name!r} takes back no such memory: {described(error)}") from error
 
 
 def check_answer(answer: object, inner: tuple[str, ...]) -> None:

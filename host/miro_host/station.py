@@ -8,8 +8,27 @@ frame. What does not: the frame's bytes (`miro_protocol.frames`), the radio, wha
 from collections import deque
 from collections.abc import Sequence
 
+from miro_exact.state import Rows
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_EVERY, FrameType
+
+_WIDE = 8  # bytes of a value in a saved service frame
+
+
+def _split_service(frame: ServiceFrame) -> tuple[int, int, bytes]:
+    """Slot, opcode and values, as a saved state holds them; every frame gets its number when it is sent."""
+    values = b"".join(int(value).to_bytes(_WIDE, "little", signed=True) for value in frame.values)
+    return frame.slot, frame.opcode, values
+
+
+def _make_service(cells: tuple[int, int, bytes]) -> ServiceFrame:
+    slot, opcode, data = cells
+    if len(data) % _WIDE:
+        raise ValueError(f"holds a service frame with {len(data)} bytes of values")
+    pieces = [data[place : place + _WIDE] for place in range(0, len(data), _WIDE)]
+    return ServiceFrame(
+        0, slot, opcode, tuple(int.from_bytes(piece, "little", signed=True) for piece in pieces)
+    )
 
 
 class Station:
@@ -21,6 +40,11 @@ class Station:
     them at least seven team frames go out, so that velocities stay fresh. ValueError for another n.
     """
 
+    STATE = {
+        "seq": ("q", 0, SEQ_MODULUS - 1),
+        "team_frames_since_service": ("q", 0, SERVICE_EVERY - 1),
+        "services": Rows(1 << 16, "B", "B", "s", split=_split_service, make=_make_service),
+    }
     NOT_STATE = ("n", "telemetry")
 
     def __init__(self, n: int, telemetry: bool = True) -> None:
@@ -58,21 +82,7 @@ class Station:
         self.seq = (self.seq + 1) % SEQ_MODULUS
         return data
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "seq": self.seq,
-            "team_frames_since_service": self.team_frames_since_service,
-            "services": [(s.slot, s.opcode, s.values) for s in self.services],
-        }
-
-    def restore(self, state: dict[str, object]) -> None:
-        seq, since, services = state["seq"], state["team_frames_since_service"], state["services"]
-        assert isinstance(seq, int)
-        assert isinstance(since, int)
-        assert isinstance(services, list)
-        if not (0 <= seq < SEQ_MODULUS and 0 <= since < SERVICE_EVERY):
-            raise ValueError(f"seq {seq} or team_frames_since_service {since} is out of range")
-        self.seq, self.team_frames_since_service = seq, since
-        self.services.clear()
-        for slot, opcode, values in services:
-            self.request(slot, opcode, values)
+    def after_load(self) -> None:
+        """Raises ValueError for a service frame that may not be sent."""
+        for service in self.services:
+            encode(service, self.n)

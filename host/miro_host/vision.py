@@ -15,12 +15,12 @@ from collections import deque
 import msgspec
 
 from miro_exact.dmath import wrap_pi
+from miro_exact.state import Rows
 from miro_host.posture import Posture
 
 DEGREE = 0.017453292519943295
 SIGMAS = 3.0
-MOST_MEASURED = 1e6
-"""Metres and radians: far more than a camera sees, and angles that `dmath` takes."""
+_MEASURED = ("d", -1e6, 1e6)  # metres and radians: far more than a camera sees, and angles that `dmath` takes
 
 
 class VisionErrors(msgspec.Struct, frozen=True):
@@ -70,6 +70,13 @@ def measure(true: Posture, normals: tuple[float, float, float], errors: VisionEr
 class Vision:
     """Camera, grabber and tracker of one robot: an exposure in, a measurement out, `delay_frames` later."""
 
+    STATE = {
+        "under_way": Rows(
+            *(1 << 16, "?", _MEASURED, _MEASURED, _MEASURED),
+            split=lambda p: (False, 0.0, 0.0, 0.0) if p is None else (True, p.x_m, p.y_m, p.theta_rad),
+            make=lambda cells: Posture(*cells[1:]) if cells[0] else None,
+        )
+    }
     NOT_STATE = ("delay_frames", "errors")
 
     def __init__(self, errors: VisionErrors, delay_frames: int = 1) -> None:
@@ -92,14 +99,7 @@ class Vision:
         self.under_way.append(None if true is None else measure(true, normals, self.errors))
         return self.under_way.popleft()
 
-    def snapshot(self) -> dict[str, object]:
-        rows = [None if p is None else (p.x_m, p.y_m, p.theta_rad) for p in self.under_way]
-        return {"under_way": rows}
-
-    def restore(self, state: dict[str, object]) -> None:
-        rows = msgspec.convert(state["under_way"], list[tuple[float, float, float] | None])
-        if len(rows) != self.delay_frames:
-            raise ValueError(f"{len(rows)} frames under way, but the camera's delay is {self.delay_frames}")
-        if not all(abs(value) < MOST_MEASURED for row in rows for value in row or ()):
-            raise ValueError("a measurement under way is no posture")
-        self.under_way = deque(None if row is None else Posture(*row) for row in rows)
+    def after_load(self) -> None:
+        """Raises ValueError unless as many frames are under way as the delay says."""
+        if len(self.under_way) != self.delay_frames:
+            raise ValueError(f"{len(self.under_way)} frames are under way, the delay is {self.delay_frames}")

@@ -8,13 +8,23 @@ has stopped it.
 
 from __future__ import annotations
 
-from typing import cast
-
+from miro_exact.state import Row
 from miro_protocol.table import FRESH_AGAIN_TICKS, FRESH_STEPS, SEQ_MODULUS
 
 
 class Freshness:
     """Counts `accepted` (fresh) and `stale` frames; only fresh ones act and restart the failsafe."""
+
+    STATE = {
+        "accepted": "q",
+        "stale": "q",
+        "last_seq": Row(
+            ("b", -1, SEQ_MODULUS - 1),  # -1: None
+            split=lambda seq: (-1 if seq is None else seq,),
+            make=lambda cells: None if cells[0] < 0 else cells[0],
+        ),
+        "last_tick": "q",
+    }
 
     def __init__(self) -> None:
         self.accepted = 0
@@ -43,17 +53,3 @@ class Freshness:
         if tick - self.last_tick >= FRESH_AGAIN_TICKS:
             return step != 0
         return 1 <= step <= FRESH_STEPS
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "accepted": self.accepted,
-            "stale": self.stale,
-            "last_seq": self.last_seq,
-            "last_tick": self.last_tick,
-        }
-
-    def restore(self, state: dict[str, object]) -> None:
-        self.accepted = cast(int, state["accepted"])
-        self.stale = cast(int, state["stale"])
-        self.last_seq = cast("int | None", state["last_seq"])
-        self.last_tick = cast(int, state["last_tick"])

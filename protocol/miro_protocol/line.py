@@ -11,8 +11,8 @@ character; a level that changes near the middle of a bit is anybody's guess.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import cast
 
+from miro_exact.state import FLAG, TICK, Rows
 from miro_protocol.scan import Symbol
 from miro_protocol.table import BITS_PER_CHARACTER, HOST_BIT_TICKS, ROBOT_BIT_TICKS
 
@@ -44,6 +44,11 @@ def edges_of(bits: Sequence[int], start_tick: int, bit_ticks: int = HOST_BIT_TIC
 class LineReceiver:
     """A UART's receiver. Fed the edges of a line, in order, it gives the characters that are over."""
 
+    STATE = {
+        "edges": Rows(1 << 20, TICK, FLAG, ordered=True),
+        "level": FLAG,
+        "looking_from": TICK,
+    }
     NOT_STATE = ("bit_ticks",)
 
     def __init__(self, bit_ticks: int = ROBOT_BIT_TICKS) -> None:
@@ -83,15 +88,3 @@ class LineReceiver:
                 break
             level = after
         return level
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "edges": [list(edge) for edge in self.edges],
-            "level": self.level,
-            "looking_from": self.looking_from,
-        }
-
-    def restore(self, state: dict[str, object]) -> None:
-        self.edges = [(tick, level) for tick, level in cast("list[list[int]]", state["edges"])]
-        self.level = cast(int, state["level"])
-        self.looking_from = cast(int, state["looking_from"])

@@ -26,6 +26,8 @@ cdef class Scanner:
     @cython.locals(tick='long long', place=Py_ssize_t, length=Py_ssize_t, found=int, 
                    bytes_view='const unsigned char[::1]', stop_view='const unsigned char[::1]', tick_view='const long long[::1]')
     cpdef list feed_columns(self, data, bad_stop, ticks)
+    @cython.locals(place=int)
+    cpdef int after_load(self) except -1
     cdef bint _is_apart(self, long long tick) noexcept
     @cython.locals(flaws=int)
     cdef int _put_symbol(self, int byte, bint bad_stop, long long tick) noexcept

@@ -14,8 +14,8 @@ The CRC runs over the characters as received: whitening is taken off in the same
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import cast
 
+from miro_exact.state import FLAG, NEVER_TICK, TICK, Queue
 from miro_protocol import crc
 from miro_protocol.events import Damaged, Event, Reason, Received
 from miro_protocol.table import SPACING_TICKS, SPACING_TOLERANCE_TICKS, Format
@@ -46,6 +46,16 @@ class Scanner:
     `tolerance_ticks` other than the standard's is for measuring what the spacing rule is worth.
     """
 
+    STATE = {
+        "valid": TICK,
+        "rejected": TICK,
+        "_data": Queue("B", 4160, "_count"),
+        "_flaws": Queue("B", 4160, "_count", low=0, high=3),
+        "_ticks": Queue("q", 4160, "_count", low=-NEVER_TICK, high=NEVER_TICK),
+        "_reason": ("i", 0, len(REASONS) - 1),
+        "_next_tick": ("q", -NEVER_TICK, NEVER_TICK),
+        "_paused": FLAG,
+    }
     NOT_STATE = (
         *("format", "_sync", "_white", "_lead", "_table", "_start", "_intact", "_size", "_step"),
         *("_spacing", "_tolerance", "_run_limit"),
@@ -164,37 +174,19 @@ class Scanner:
         self.gap()
         return events
 
-    def snapshot(self) -> dict[str, object]:
-        """All that decides what comes next; the same however the input was cut."""
-        return {
-            "valid": self.valid,
-            "rejected": self.rejected,
-            "_data": bytes(self._data[: self._count]),
-            "_flaws": bytes(self._flaws[: self._count]),
-            "_ticks": tuple([self._ticks[place] for place in range(self._count)]),
-            "_reason": self._reason,
-            "_next_tick": self._next_tick,
-            "_paused": bool(self._paused),
-        }
-
-    def restore(self, state: dict[str, object]) -> None:
-        self.valid = cast(int, state["valid"])
-        self.rejected = cast(int, state["rejected"])
-        data, flaws = cast(bytes, state["_data"]), cast(bytes, state["_flaws"])
-        ticks = [checked_tick(tick, 0) for tick in cast("tuple[int, ...]", state["_ticks"])]
-        if not len(data) == len(flaws) == len(ticks) < self._run_limit + self._size - 1:
-            raise ValueError(f"{len(data)}, {len(flaws)} and {len(ticks)} values for the characters kept")
-        self._count = 0
+    def after_load(self) -> None:
+        """Finds the last flaws again. Raises ValueError for more characters than can be pending."""
+        if self._count > self._run_limit + self._size - 2:
+            raise ValueError(
+                f"{self._count} characters are pending, at most {self._run_limit + self._size - 2}"
+            )
         self._last_bad = -1
         self._last_apart = -1
-        for place in range(len(data)):
-            self._keep(data[place], flaws[place], ticks[place])
-        reason = cast(int, state["_reason"])
-        if not 0 <= reason < len(REASONS):
-            raise ValueError(f"_reason is {reason}, not from 0 to {len(REASONS) - 1}")
-        self._reason = reason
-        self._next_tick = checked_tick(cast(int, state["_next_tick"]), 0)
-        self._paused = cast(bool, state["_paused"])
+        for place in range(self._count):
+            if self._flaws[place] & _BAD_STOP:
+                self._last_bad = place
+            if self._flaws[place] & _APART:
+                self._last_apart = place
 
     def _is_apart(self, tick: int) -> bool:
         spacing = tick - self._next_tick + self._step

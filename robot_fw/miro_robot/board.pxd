@@ -9,7 +9,7 @@ from miro_robot.probe cimport Probe
 
 
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS
-cdef int _WR, _RD
+cdef int _WR, _RD, _BEHIND_TICKS
 cdef int _RESET_PULSE
 cdef int _FAULT, _REACHED, _RECEIVED, _SENT
 cdef long long RESET_PULSE_TICKS
@@ -55,6 +55,9 @@ cdef class Board(Bus):
     cdef int hi_inverted[8]
     cdef int hi_side[8]
 
+    @cython.locals(earliest_tick=cython.longlong)
+    cpdef int after_load(self) except -1
+    cdef int _rest(self, BusTiming timing, Lm629 chip) except -1
     @cython.locals(stopped=cython.int, horizon=cython.longlong)
     cpdef int run(self, long long until_tick) except -1
     cdef long long _next_interrupt(self, Lm629 chip) noexcept

@@ -21,9 +21,7 @@ but the CPU is advanced at its own events only, never "up to now", so who looks 
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import octets, whole
+from miro_exact.state import FLAG, TICK
 from miro_robot.event_log import FAULT, REACHED, RECEIVED, SENT, EventLog
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image, Symbols
@@ -69,8 +67,22 @@ class Board(Bus):
     see. `run(tick)` moves everything on; `cpu.rxd` must be settled beyond that tick.
     """
 
+    STATE = {
+        "cpu": Cpu,
+        "left": Lm629,
+        "right": Lm629,
+        "plant": Plant,
+        "bank": "13B",
+        "external": "4B",
+        "bus_levels": ("i", 0, 0xFF),
+        "bridge_enable": "2B",
+        "bridge_sign": "2B",
+        "fault_count": TICK,
+        "busy_writes": TICK,
+        "contention": FLAG,
+    }
     NOT_STATE = (
-        "wiring", "plant", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
+        "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_bank", "pin_bit", "pin_inverted", "hi_port", "hi_bit", "hi_inverted",
         "hi_count", "hi_side", "hi_seen", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus",
         "log", "left_timing", "right_timing",  # see there: no time of theirs outlasts an instruction
@@ -403,49 +415,24 @@ class Board(Bus):
 
     # ---- state --------------------------------------------------------------------------------------------
 
-    def snapshot(self) -> dict[str, object]:
-        """All mutable state of the board and of the chips on it."""
-        return {
-            "cpu": self.cpu.snapshot(),
-            "left": self.left.snapshot(),
-            "right": self.right.snapshot(),
-            "plant": self.plant.snapshot(),
-            "bank": bytes([self.bank[index] for index in range(CONSTANT_BANK + 1)]),
-            "external": bytes([self.external[index] for index in range(PORTS)]),
-            "bus_levels": self.bus_levels,
-            "bridge_enable": bytes([self.bridge_enable[index] for index in range(2)]),
-            "bridge_sign": bytes([self.bridge_sign[index] for index in range(2)]),
-            "fault_count": self.fault_count,
-            "busy_writes": self.busy_writes,
-            "contention": self.contention,
-        }
+    def after_load(self) -> None:
+        """What the chips last drove is seen; the bus has been at rest. Raises ValueError unless all parts stand where
+        the CPU does.
+        """
+        earliest_tick = self.cpu.cycles * CYCLE_TICKS - _BEHIND_TICKS
+        self.left.check_times(earliest_tick)
+        self.right.check_times(earliest_tick)
+        latest_tick = earliest_tick + 2 * _BEHIND_TICKS + SAMPLE_TICKS
+        next_tick = self.plant.next_tick
+        if next_tick < earliest_tick or latest_tick < next_tick < FAR:
+            raise ValueError(f"the plant's next step is at tick {next_tick}, not about {earliest_tick}")
+        self.hi_seen[0] = self.left.hi
+        self.hi_seen[1] = self.right.hi
+        self._rest(self.left_timing, self.left)
+        self._rest(self.right_timing, self.right)
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """Puts back what `snapshot` gave."""
-        self.cpu.restore(state["cpu"])
-        self.left.restore(state["left"])
-        self.right.restore(state["right"])
-        self.plant.restore(state["plant"])
-        self._check_times(self.cpu.cycles * CYCLE_TICKS)
-        self.bank = bytearray(octets(state, "bank", CONSTANT_BANK + 1))
-        self.external = bytearray(octets(state, "external", PORTS))
-        self.bus_levels = whole(state, "bus_levels", 0, 0xFF)
-        self.bridge_enable = bytearray(octets(state, "bridge_enable", 2))
-        self.bridge_sign = bytearray(octets(state, "bridge_sign", 2))
-        self.hi_seen = bytearray([self.left.hi, self.right.hi])
-        for chip, timing in ((self.left, self.left_timing), (self.right, self.right_timing)):
-            timing.rest(chip.port.writing, chip.port.reading, chip.port.ps, chip.port.data)
-        self.fault_count = whole(state, "fault_count", 0, FAR)
-        self.busy_writes = whole(state, "busy_writes", 0, FAR)
-        self.contention = whole(state, "contention", 0, 1)
-
-    def _check_times(self, now: int) -> None:
-        """Raises ValueError when a restored part is not where the CPU is: it would take for ever to catch up."""
-        for chip in (self.left, self.right):
-            chip.check_times(now - _BEHIND_TICKS)
-        latest_tick = now + _BEHIND_TICKS + SAMPLE_TICKS
-        if self.plant.next_tick < now - _BEHIND_TICKS or latest_tick < self.plant.next_tick < FAR:
-            raise ValueError(f"the drive's next step is at tick {self.plant.next_tick}, the CPU at {now}")
+    def _rest(self, timing: BusTiming, chip: Lm629) -> None:
+        timing.rest(chip.port.writing, chip.port.reading, chip.port.ps, chip.port.data)
 
     def __repr__(self) -> str:
         return (

@@ -7,9 +7,7 @@ electronics. Time is in ticks of the 24 MHz crystal.
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import tick
+from miro_exact.state import TICK
 from miro_robot.lm629.chip import Lm629
 
 FAR = 1 << 62  # "never", in ticks
@@ -27,6 +25,7 @@ class Plant:
     `right.set_encoder(tick, a, b)` for every encoder edge, in tick order, left before right on one tick.
     """
 
+    STATE: dict[str, object] = {"next_tick": TICK}
     NOT_STATE = ("left", "right", *_MORE)
 
     def __init__(self) -> None:
@@ -44,14 +43,6 @@ class Plant:
 
     def set_bridge(self, tick: int, side: int, enable: int, forward: int) -> None:
         """L298 inputs of one side (0 left, 1 right) from `tick` on: enable pin; 1 forward, 0 backward."""
-
-    def snapshot(self) -> dict[str, object]:
-        """All mutable state."""
-        return {"next_tick": self.next_tick}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Takes back what `snapshot` gave."""
-        self.next_tick = tick(state, "next_tick")
 
     def __repr__(self) -> str:
         return "Plant(motors unplugged)"

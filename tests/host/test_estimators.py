@@ -3,11 +3,11 @@
 import math
 from itertools import pairwise
 
-import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_exact.state import restore, snapshot
 from miro_host.estimators.interface import Estimate, Estimator, EstimatorInput, EstimatorParameters
 from miro_host.estimators.none import NoEstimator
 from miro_host.estimators.predict import PredictParameters, moved
@@ -87,10 +87,10 @@ def test_what_was_sent_is_remembered_over_a_save():
     whole, cut = pilot(), pilot()
     for k in range(6):
         again = pilot()
-        again.restore(msgspec.msgpack.decode(msgspec.msgpack.encode(cut.snapshot())))
+        restore(again, snapshot(cut))
         cut = again
         assert cut.update(HERE, k * PERIOD_S) == whole.update(HERE, k * PERIOD_S)
-    assert cut.snapshot() == whole.snapshot()
+    assert snapshot(cut) == snapshot(whole)
 
 
 class Odd(EstimatorParameters, frozen=True, tag="odd"):

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miro_exact.state import snapshot
 from miro_host.station import Station
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ServiceFrame, TeamFrame
@@ -80,7 +81,7 @@ def test_the_first_request_goes_out_with_the_next_frame():
 
 def test_what_may_not_be_sent_is_refused_and_uses_nothing_up():
     station = Station(3)
-    before = station.snapshot()
+    before = snapshot(station)
     with pytest.raises(ValueError, match="slot 1"):
         station.frame([REST, (-32768, 0), REST])
     with pytest.raises(ValueError, match="must be 3 pairs"):
@@ -89,6 +90,6 @@ def test_what_may_not_be_sent_is_refused_and_uses_nothing_up():
         station.request(3, Opcode.PING)
     with pytest.raises(ValueError, match="values"):
         station.request(0, Opcode.FILTER, (1, 2))
-    assert station.snapshot() == before
+    assert snapshot(station) == before
     with pytest.raises(ValueError, match="n = 4"):
         Station(4)

@@ -6,6 +6,7 @@ remembered but the list of changes. Which pin is wired to what is taken from the
 
 from __future__ import annotations
 
+from miro_exact.state import TICK
 from miro_robot.board import Board
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import CYCLES
@@ -17,6 +18,8 @@ SOURCES = ("int0", "timer0", "int1", "timer1", "serial", "timer2")
 
 class Treadmill(Plant):
     """Turns both shafts evenly, whatever the bridges do, and reports the edges of a period at its end."""
+
+    STATE = {"told": TICK}
 
     LEFT, RIGHT, PERIOD = 137, -211, 2048  # ticks a count; backward
 
@@ -40,13 +43,6 @@ class Treadmill(Plant):
                 if self.phases(at, period) != self.phases(at - 1, period):
                     chip.set_encoder(at, *self.phases(at, period))
         self.told = max(self.told, tick)
-        self.next_tick = self.told // self.PERIOD * self.PERIOD + self.PERIOD
-
-    def snapshot(self):  # type: ignore[no-untyped-def]
-        return {"told": self.told}
-
-    def restore(self, state):  # type: ignore[no-untyped-def]
-        self.told = state["told"]
         self.next_tick = self.told // self.PERIOD * self.PERIOD + self.PERIOD
 
 

@@ -14,6 +14,7 @@ import pytest
 from tests import children
 
 from miro_exact import engine, hot_modules
+from miro_exact.threaded import threaded
 
 ROOT = Path(__file__).parents[2]
 info = importlib.import_module("mirotwin.cli.info")  # the package has the command under this name
@@ -44,14 +45,6 @@ int main(void) {{
 """
 
 
-@pytest.fixture(scope="module")
-def threaded():
-    spec = importlib.util.spec_from_file_location("mirotwin_setup", ROOT / "setup.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.threaded
-
-
 def program(arms):
     lines = (
         f"      case 0x{n:02X}:\n      at = (at + {n}) % 1009;\n      sum = (sum * 5 + at) % 10007;\n      break;"
@@ -61,11 +54,11 @@ def program(arms):
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-def test_a_loop_over_many_instructions_is_threaded_and_does_the_same(threaded, tmp_path):
+def test_a_loop_over_many_instructions_is_threaded_and_does_the_same(tmp_path):
     plain = program(range(100))  # rows 100 to 127 have no arm
-    assert threaded(plain).count("goto *arm_of[") == 100
+    assert threaded(plain, hot_modules.DISPATCH_MARK).count("goto *arm_of[") == 100
     said = []
-    for name, text in (("plain", plain), ("threaded", threaded(plain))):
+    for name, text in (("plain", plain), ("threaded", threaded(plain, hot_modules.DISPATCH_MARK))):
         (tmp_path / f"{name}.c").write_text(text)
         children.run(["cc", "-o", tmp_path / name, tmp_path / f"{name}.c"], check=True)
         said.append(children.run([tmp_path / name], capture_output=True, text=True, check=True).stdout)
@@ -85,8 +78,8 @@ def test_a_loop_over_many_instructions_is_threaded_and_does_the_same(threaded, t
     ],
     ids=["few arms", "rows above a byte", "an else", "no loop", "something after the choice"],
 )
-def test_anything_else_stays_as_it_is(threaded, text):
-    assert threaded(text) == text
+def test_anything_else_stays_as_it_is(text):
+    assert threaded(text, hot_modules.DISPATCH_MARK) == text
 
 
 @pytest.mark.skipif(engine.active() != "compiled", reason="nothing is compiled")

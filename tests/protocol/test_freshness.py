@@ -3,6 +3,7 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miro_exact.state import restore, snapshot
 from miro_protocol.freshness import Freshness
 
 MS = 24_000
@@ -54,7 +55,7 @@ def test_a_restored_snapshot_judges_the_rest_alike(frames, place):
     for number, (seq, pause) in enumerate(frames):
         tick += pause
         if number == place:
-            other.restore(fresh.snapshot())
+            restore(other, snapshot(fresh))
         verdict = fresh.judge(seq, tick)
         verdicts.append(verdict)
         if number >= place:

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.naive.mcs51_uart import NaiveUart
 
+from miro_exact.state import restore, snapshot
 from miro_protocol.line import LineReceiver, bits_of, edges_of
 from miro_protocol.table import HOST_BIT_TICKS, ROBOT_BIT_TICKS
 
@@ -31,7 +32,7 @@ def test_edges_may_come_in_any_pieces(bits, cuts):
     for before, until in pairwise([0, *sorted(cuts), 10**6]):
         found += receiver.feed([edge for edge in edges if before <= edge[0] < until], until)
         other = LineReceiver()
-        other.restore(receiver.snapshot())
+        restore(other, snapshot(receiver))
         receiver = other
     assert found == whole
 

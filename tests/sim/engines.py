@@ -48,7 +48,6 @@ def parse(line: str) -> Checkpoint:
 
 def run(instructions: int, scenario: str) -> Iterator[Checkpoint]:
     """Worlds of seed 0, 1, .. in this process's engine, until so many instructions were executed."""
-    from miro_exact.canonical import encode
     from miro_robot.firmware import image_path
     from miro_robot.image import load_hex
     from miro_sim.scenario import file as scenario_file
@@ -73,7 +72,7 @@ def run(instructions: int, scenario: str) -> Iterator[Checkpoint]:
                 sent += sum(len(run.data) for run in world.last.wire if run.direction == "<")
             executed = robot.board.cpu.instructions
             accepted = robot.counter(0) or 0
-            sha256 = hashlib.sha256(encode(world.snapshot())).hexdigest()
+            sha256 = hashlib.sha256(world.state.save()).hexdigest()
             yield Checkpoint(seed, tick, done + executed, frames + accepted, commands, sent, sha256)
         done += executed
         frames += accepted

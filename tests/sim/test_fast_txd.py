@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.robot.mcs51.asm import assemble
 
-from miro_exact.canonical import encode
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.state import snapshot
 from miro_robot.image import Image, Symbols
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
@@ -57,7 +57,7 @@ def world(program, latency_s=0.003, seed=5):
 
 
 def state(world):
-    return encode(world.snapshot())
+    return snapshot(world)
 
 
 def edges_kept(world):

@@ -7,8 +7,8 @@ import msgspec
 import pytest
 from click.testing import CliRunner
 
-from miro_exact.canonical import encode
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.state import snapshot
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.radio import ChainParams
@@ -204,7 +204,7 @@ def test_a_run_with_everything_on_is_the_same_however_it_is_cut_saved_and_loaded
         cut = again
     cut.run_to(6 * CONTROL_PERIOD_TICKS)
     assert cut.digest == whole.digest
-    assert encode(cut.snapshot()) == encode(whole.snapshot())
+    assert cut.state.save() == whole.state.save()
 
 
 def accepted(world: World) -> list[int | None]:
@@ -214,7 +214,7 @@ def accepted(world: World) -> list[int | None]:
 def test_networks_side_by_side_do_not_know_of_each_other() -> None:
     """A network's robots have the same bits whether there is another one or not."""
     alone, beside = ran(world(BURSTS)), ran(world(BURSTS, ALL))
-    assert encode(beside.networks[0].snapshot()) == encode(alone.networks[0].snapshot())
+    assert snapshot(beside.networks[0]) == snapshot(alone.networks[0])
 
 
 def test_networks_on_one_channel_spoil_each_others_frames() -> None:
@@ -226,12 +226,13 @@ def test_networks_on_one_channel_spoil_each_others_frames() -> None:
 
 
 def test_what_is_off_is_not_in_the_state() -> None:
-    """Snapshots of scenarios without a disturbance are those of before there was one."""
-    downlink = world("").networks[0].downlink.snapshot()
-    assert sorted(downlink) == ["free_tick", "listeners", "settled_tick", "transmissions"]
-    assert downlink["listeners"] == [{"bit_errors": 0}]
-    everything = world(ALL + "\nchannel = 1", "channel = 1").networks[0].downlink.snapshot()
-    assert {"busy_tick", "overheard"} < set(everything)
+    """Parts that a scenario does not have are not in its state."""
+    plain = world("").state.decode(world("").state.save())
+    assert not [path for path in plain if "slicer" in path or "overheard" in path]
+    everything = world(ALL + "\nchannel = 1", "channel = 1")
+    paths = set(everything.state.decode(everything.state.save()))
+    assert "networks[0].downlink.listeners[0].slicer.mean" in paths
+    assert "networks[0].downlink.overheard[0].transmissions" in paths
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,9 @@ has a condition does not wait for polls: whoever gave the condition knows that t
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from miro_exact.state import NEVER_TICK, TICK, Octets, Rows
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.line import FAR
 
@@ -23,6 +24,7 @@ _POLLS = 32  # reads of P3 within a slice that count as listening on RXD
 _RI = 0x01  # in SCON
 _CHARACTER_BITS = 10
 _TICKS_PER_BIT = 32  # of the fastest receiver there is: mode 2 with SMOD
+_LONGEST = 1 << 30  # bytes of a saved piece
 
 
 class Piece(NamedTuple):
@@ -48,7 +50,23 @@ class SerialInput:
     Raises ValueError for a rate that the crystal does not allow.
     """
 
-    NOT_STATE = ("cpu",)
+    STATE = {
+        "pieces": Rows(
+            *(1 << 16, ("s", _LONGEST), ("s", _LONGEST), ("q", -1, NEVER_TICK)),
+            split=lambda piece: (
+                piece.data,
+                piece.when,
+                -1 if piece.delay_ticks is None else piece.delay_ticks,
+            ),
+            make=lambda cells: Piece(cells[0], cells[1], None if cells[2] < 0 else cells[2]),
+        ),
+        "fed": TICK,
+        "tail": Octets(_LONGEST),
+        "begin_tick": TICK,
+        "char_end": TICK,
+        "polls": TICK,
+    }
+    NOT_STATE = ("cpu", "baud", "crystal_hz", "gap_ticks", "live")
 
     def __init__(
         self,
@@ -145,34 +163,14 @@ class SerialInput:
             piece = self.pieces[0]
             self.begin_tick = FAR if piece.when else self.char_end + (piece.delay_ticks or 0)
 
+    def after_load(self) -> None:
+        """Raises ValueError for more characters on their way than the first piece has."""
+        left = len(self.pieces[0].data) if self.pieces else 1
+        if self.fed >= left:
+            raise ValueError(f"{self.fed} characters of {left} were sent")
+
     def _bit_offset(self, number: int) -> int:
         """Ticks from the start of a character to its bit `number`."""
         if self.baud is None:
             return number * self.cpu.chip.bit_ticks()
         return (2 * number * self.crystal_hz + self.baud) // (2 * self.baud)
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "pieces": [tuple(piece) for piece in self.pieces],
-            "baud": self.baud,
-            "crystal_hz": self.crystal_hz,
-            "gap_ticks": self.gap_ticks,
-            "live": self.live,
-            "fed": self.fed,
-            "tail": self.tail,
-            "begin_tick": self.begin_tick,
-            "char_end": self.char_end,
-            "polls": self.polls,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.pieces = [Piece(*piece) for piece in state["pieces"]]
-        self.baud = state["baud"]
-        self.crystal_hz = state["crystal_hz"]
-        self.gap_ticks = state["gap_ticks"]
-        self.live = state["live"]
-        self.fed = state["fed"]
-        self.tail = state["tail"]
-        self.begin_tick = state["begin_tick"]
-        self.char_end = state["char_end"]
-        self.polls = state["polls"]

@@ -11,9 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import StrEnum
-from typing import Any
 
-from miro_exact.saved import octets, wholes
+from miro_exact.state import NEVER_TICK, TICK, Items, Rows
 from miro_robot.bare.input import Piece, SerialInput
 from miro_robot.bare.pins import PinEvent, PinInput
 from miro_robot.faults import FaultKind, FirmwareFault
@@ -51,6 +50,23 @@ class BareMachine:
     A machine cycle is 12 periods of the crystal, a tick one. Raises ValueError for parameters out of range.
     """
 
+    STATE = {
+        "bus": XramBus,
+        "cpu": Cpu,
+        "loaded": ("65536B", 0, 1),
+        "faults": Rows(
+            *(_FAULTS_KEPT, "q", ("q", 0, NEVER_TICK), ("q", 0, 0xFFFF)),
+            split=lambda fault: (int(fault.kind), fault.tick, fault.pc),
+            make=lambda cells: FirmwareFault(FaultKind(cells[0]), cells[1], cells[2]),
+        ),
+        "faults_lost": TICK,
+        "input": SerialInput,
+        "pins": PinInput,
+        "next_feed": TICK,
+        "next_check": TICK,
+        "ends": Items("q", 0x10000, 0, 0xFFFF),
+        "dead": "?",
+    }
     NOT_STATE = ("image", "loops", "output", "stop_on_fault")
 
     def __init__(
@@ -79,6 +95,7 @@ class BareMachine:
         self.next_feed = 0  # cycle at which to look after the inputs
         self.next_check = 0  # ... and at which to set `ends` anew
         self.ends: tuple[int, ...] = ()  # jumps to themselves that may be its end
+        self.loaded = bytearray(0x10000)  # 1 where executing is legal; up to date while the state is saved
         self.dead = False  # it has ended; what it sent may still be on its way
         self.bus = XramBus(self._sent, self._faulted)
         self.cpu = Cpu(self.bus)
@@ -202,41 +219,20 @@ class BareMachine:
         if self.stop_on_fault:
             self.cpu.request_stop()
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "cpu": self.cpu.snapshot(),
-            "bus": self.bus.snapshot(),
-            "loaded": bytes(self.cpu.is_loaded(address) for address in range(0x10000)),
-            "faults": [(int(fault.kind), fault.tick, fault.pc) for fault in self.faults],
-            "faults_lost": self.faults_lost,
-            "input": self.input.snapshot(),
-            "pins": self.pins.snapshot(),
-            "next_feed": self.next_feed,
-            "next_check": self.next_check,
-            "ends": self.ends,
-            "dead": self.dead,
-        }
+    def before_save(self) -> None:
+        for address in range(0x10000):
+            self.loaded[address] = self.cpu.is_loaded(address)
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """What `snapshot` gave, of a machine with the same image and pins."""
-        self.bus.restore(state["bus"])
-        self.cpu.load(self.image.code, ())
+    def after_load(self) -> None:
+        """Code lies where it lay, in RAM if program and data share it; places of faults get their names."""
         code = self.bus.content() if self.bus.code_of is not None else self.image.code
-        for address, loaded in enumerate(octets(state, "loaded", 0x10000)):
+        self.cpu.load(self.image.code, ())
+        for address, loaded in enumerate(self.loaded):
             if loaded:
                 self.cpu.write_code(address, code[address])
-        self.cpu.restore(state["cpu"])
         names = self.image.symbols
-        self.faults = [
-            FirmwareFault(FaultKind(k), tick, pc, names.name_at(pc)) for k, tick, pc in state["faults"]
-        ]
-        self.faults_lost = state["faults_lost"]
-        self.input.restore(state["input"])
-        self.pins.restore(state["pins"])
-        self.next_feed = state["next_feed"]
-        self.next_check = state["next_check"]
-        self.ends = tuple(wholes(state, "ends", len(state["ends"]), 0, 0xFFFF))
-        self.dead = bool(state["dead"])
+        for place, fault in enumerate(self.faults):
+            self.faults[place] = FirmwareFault(fault.kind, fault.tick, fault.pc, names.name_at(fault.pc))
 
 
 def _loops(image: Image) -> tuple[int, ...]:

@@ -17,9 +17,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from miro_exact.bad_input import BadInput
+from miro_exact.state import TICK
 from miro_robot.bare.input import MARGIN_TICKS, SLICE
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.line import FAR
@@ -72,6 +73,7 @@ def read_pins(text: str, path: str) -> tuple[PinEvent, ...]:
 class PinInput:
     """Hands `events`, which are in the order of time, to `cpu`. `told(tick, port, levels)` gets each of them too."""
 
+    STATE = {"done": TICK, "levels": ("4B", 0, 0xFF)}
     NOT_STATE = ("cpu", "events", "told", "uses_rxd")
 
     def __init__(self, cpu: Cpu, events: tuple[PinEvent, ...]) -> None:
@@ -112,9 +114,7 @@ class PinInput:
             if self.told is not None:
                 self.told(tick, port, levels)
 
-    def snapshot(self) -> dict[str, object]:
-        return {"done": self.done, "levels": list(self.levels)}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.done = state["done"]
-        self.levels = list(state["levels"])
+    def after_load(self) -> None:
+        """Raises ValueError for more events than there are."""
+        if self.done > len(self.events):
+            raise ValueError(f"{self.done} of {len(self.events)} events were handed over")

@@ -52,7 +52,7 @@ cdef class MotorAxis:
     cdef int _sample(self, long long now) except -1
     @cython.locals(flags=cython.int, moved=cython.longlong)
     cdef int _latch_position(self, long long now) noexcept
-    @cython.locals(profile=Trajectory, control=cython.int, acceleration=cython.longlong, velocity=cython.longlong)
+    @cython.locals(profile=Trajectory, control=cython.int, buffer=TrajectoryBuffer)
     cdef int _start(self) except -1
     @cython.locals(flags=cython.int)
     cdef int _step_profile(self) noexcept

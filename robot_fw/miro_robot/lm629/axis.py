@@ -8,6 +8,7 @@ those of README.md in this folder.
 
 from __future__ import annotations
 
+from miro_exact.state import FLAG, TICK
 from miro_robot.event_log import EventLog
 from miro_robot.lm629 import buffers, host_port, signals
 from miro_robot.lm629.buffers import FilterBuffer, TrajectoryBuffer
@@ -23,6 +24,7 @@ PWM_TICKS = 2048
 FAR = 1 << 62
 
 _FAR = FAR
+_PLACE = ("q", -(1 << 30), (1 << 30) - 1)  # the chip's position space
 _SAMPLE_TICKS = SAMPLE_TICKS
 _PWM_TICKS = PWM_TICKS
 _HELD, _RESETTING, _RUNNING = 0, 1, 2
@@ -47,29 +49,36 @@ def _side(value: int) -> int:
     return 1 if value > 0 else -1 if value < 0 else 0
 
 
-RANGES = {
-    "mode": (0, 2),
-    **dict.fromkeys(("reset_tick", "next_tick", "sample_tick", "period_tick"), (0, FAR)),
-    "threshold": (0, 0x7FFF),
-    **dict.fromkeys(("real_position", "index_position", "breakpoint"), (-(1 << 30), (1 << 30) - 1)),
-    "real_velocity": (-(1 << 40), 1 << 40),
-    "breakpoint_side": (-1, 1),
-    "pwm_magnitude": (0, 127),
-    **dict.fromkeys(("reset_level", "breakpoint_armed", "start_taken", "pwm", "sign"), (0, 1)),
-}
-"""What the values of `STATE` may be when they come from a saved state."""
-
-
 class MotorAxis:
     """One motor's controller without its host; `Lm629` adds that."""
 
-    PARTS = ("port", "encoder", "trajectory", "pid", "signals", "trajectory_buffer", "filter_buffer")
-    STATE = (
-        *("mode", "reset_level", "reset_tick", "threshold", "next_tick", "sample_tick", "period_tick"),
-        *("real_position", "real_velocity", "index_position"),
-        *("breakpoint", "breakpoint_armed", "breakpoint_side", "start_taken"),
-        *("pwm", "pwm_magnitude", "sign"),
-    )
+    STATE = {
+        "port": HostPort,
+        "encoder": Encoder,
+        "trajectory": Trajectory,
+        "pid": Pid,
+        "signals": Signals,
+        "trajectory_buffer": TrajectoryBuffer,
+        "filter_buffer": FilterBuffer,
+        "mode": ("i", 0, 2),
+        "reset_level": FLAG,
+        "reset_tick": TICK,
+        "threshold": ("q", 0, 0x7FFF),
+        "next_tick": TICK,
+        "sample_tick": TICK,
+        "period_tick": TICK,
+        "real_position": _PLACE,
+        "real_velocity": ("q", -(1 << 40), 1 << 40),
+        "index_position": _PLACE,
+        "breakpoint": _PLACE,
+        "breakpoint_armed": FLAG,
+        "breakpoint_side": ("i", -1, 1),
+        "start_taken": FLAG,
+        "pwm": FLAG,
+        "pwm_magnitude": ("i", 0, 127),
+        "sign": FLAG,
+        "excessive": FLAG,
+    }
     NOT_STATE = (
         *("options", "reset_ticks", "reset_pulse_ticks"),
         *(
@@ -85,7 +94,6 @@ class MotorAxis:
         ),
         *("commands", "encoder_edges", "log", "side"),
         *("hi", "writes_while_busy"),  # copies of what the parts hold
-        "excessive",  # nobody asks for it, unless I2 is read the other way: then it is saved
     )
 
     def __init__(self, options: Lm629Options = DEFAULT_OPTIONS) -> None:
@@ -278,10 +286,11 @@ class MotorAxis:
         profile = self.trajectory
         if self.options.start_takes == "sample":
             self.trajectory_buffer.take(self.options.stop_bits_stay)
-        control, acceleration, velocity, _, _ = self.trajectory_buffer.taken
+        buffer = self.trajectory_buffer
+        control = buffer.taken_control
         profile.target = self.trajectory_buffer.resolve(self._relative_base())
-        profile.acceleration = acceleration
-        profile.max_velocity = velocity
+        profile.acceleration = buffer.taken_acceleration
+        profile.max_velocity = buffer.taken_velocity
         profile.velocity_mode = 1 if control & buffers.VELOCITY_MODE else 0
         profile.forward = 1 if control & buffers.FORWARD else 0
         self.start_taken = 0
@@ -304,8 +313,8 @@ class MotorAxis:
 
     def _update_filter(self) -> None:
         """The accepted UDF takes effect."""
-        kp, ki, kd, il, ds = self.filter_buffer.taken
-        self.pid.load(kp, ki, kd, il, ds)
+        buffer = self.filter_buffer
+        self.pid.load(buffer.taken_kp, buffer.taken_ki, buffer.taken_kd, buffer.taken_il, buffer.taken_ds)
         if self.options.update_clears:
             self.pid.open_loop()
 

@@ -18,7 +18,9 @@ cdef class TrajectoryBuffer:
     cdef public int due, half, control, relative_bits
     cdef public long long acceleration, velocity, position
     cdef public bint relative, newer_position
-    cdef public tuple taken
+    cdef public int taken_control
+    cdef public long long taken_acceleration, taken_velocity, taken_position
+    cdef public bint taken_relative
 
     cpdef void reset(self) noexcept
     cpdef int begin(self, int control) noexcept
@@ -29,7 +31,7 @@ cdef class TrajectoryBuffer:
     cdef int _next_parameter(self) noexcept
     cpdef void abandon(self) noexcept
     cpdef void shift(self, long long real_position) noexcept
-    cpdef take(self, bint keep_stops=*)
+    cpdef void take(self, bint keep_stops=*) noexcept
     @cython.locals(position=cython.longlong, relative=cython.bint, target=cython.longlong)
     cpdef resolve(self, long long base)
 
@@ -37,7 +39,7 @@ cdef class TrajectoryBuffer:
 @cython.final
 cdef class FilterBuffer:
     cdef public int due, kp, ki, kd, il, ds
-    cdef public tuple taken
+    cdef public int taken_kp, taken_ki, taken_kd, taken_il, taken_ds
 
     cpdef void reset(self) noexcept
     cpdef int begin(self, int control) noexcept
@@ -45,4 +47,4 @@ cdef class FilterBuffer:
     @cython.locals(value=cython.int)
     cpdef int word(self, int word, bint clamp=*) noexcept
     cpdef void abandon(self) noexcept
-    cpdef take(self)
+    cpdef void take(self) noexcept

@@ -7,17 +7,16 @@ the next sample.
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from msgspec import Meta, Struct, convert
-
-from miro_exact.saved import only
+from miro_exact.state import FLAG
 
 MOTOR_OFF, STOP_ABRUPTLY, STOP_SMOOTHLY = 0x0100, 0x0200, 0x0400
 STOPS = MOTOR_OFF | STOP_ABRUPTLY | STOP_SMOOTHLY
 VELOCITY_MODE, FORWARD = 0x0800, 0x1000
 ACCELERATION, VELOCITY, POSITION = 0x0020, 0x0008, 0x0002
 MASK_30 = 0x3FFFFFFF
+_PLACE = ("q", -(1 << 30), (1 << 30) - 1)
+_FIT_30 = ("q", 0, MASK_30)
+_FIT_15 = ("i", 0, 0x7FFF)
 
 
 COMPLETED, OUT_OF_RANGE = 1, 2
@@ -47,45 +46,29 @@ def fit_15(word: int, clamp: int) -> int:
     return clamped(word, 0, 0x7FFF) if clamp else word & 0x7FFF
 
 
-_Word = Annotated[int, Meta(ge=0, le=0xFFFF)]
-_Fit15 = Annotated[int, Meta(ge=0, le=0x7FFF)]
-_Fit30 = Annotated[int, Meta(ge=0, le=MASK_30)]
-_Place = Annotated[int, Meta(ge=-0x40000000, le=0x3FFFFFFF)]
-
-
-class _Trajectory(Struct):
-    """A saved `TrajectoryBuffer`."""
-
-    due: _Word
-    half: Annotated[int, Meta(ge=-1, le=0xFFFF)]
-    control: _Word
-    relative_bits: _Word
-    acceleration: _Fit30
-    velocity: _Fit30
-    position: _Place
-    relative: bool
-    newer_position: bool
-    taken: tuple[_Word, _Fit30, _Fit30, _Place, bool]
-
-
-class _Filter(Struct):
-    """A saved `FilterBuffer`."""
-
-    due: Annotated[int, Meta(ge=0, le=0x000F)]
-    kp: _Fit15
-    ki: _Fit15
-    kd: _Fit15
-    il: _Fit15
-    ds: Annotated[int, Meta(ge=0, le=0xFF)]
-    taken: tuple[_Fit15, _Fit15, _Fit15, _Fit15, Annotated[int, Meta(ge=0, le=0xFF)]]
-
-
 class TrajectoryBuffer:
     """LTRJ's primary registers and the copy an STT has taken.
 
     `due` holds the parameter bits of the control word that are still to come, `half` the high word of the
     next one (-1: none yet).
     """
+
+    STATE = {
+        "due": ("i", 0, 0xFFFF),
+        "half": ("i", -1, 0xFFFF),
+        "control": ("i", 0, 0xFFFF),
+        "relative_bits": ("i", 0, 0xFFFF),
+        "acceleration": _FIT_30,
+        "velocity": _FIT_30,
+        "position": _PLACE,
+        "relative": FLAG,
+        "newer_position": FLAG,
+        "taken_control": ("i", 0, 0xFFFF),
+        "taken_acceleration": _FIT_30,
+        "taken_velocity": _FIT_30,
+        "taken_position": _PLACE,
+        "taken_relative": FLAG,
+    }
 
     def __init__(self) -> None:
         self.reset()
@@ -100,7 +83,11 @@ class TrajectoryBuffer:
         self.position = 0
         self.relative = False
         self.newer_position = False
-        self.taken = (0, 0, 0, 0, False)
+        self.taken_control = 0
+        self.taken_acceleration = 0
+        self.taken_velocity = 0
+        self.taken_position = 0
+        self.taken_relative = False
 
     def begin(self, control: int) -> int:
         """The control word arrived. Returns how many words follow."""
@@ -171,32 +158,41 @@ class TrajectoryBuffer:
 
     def take(self, keep_stops: bool = False) -> None:
         """STT was accepted: it will act on the registers as they are now; stop bits serve once."""
-        self.taken = (self.control, self.acceleration, self.velocity, self.position, self.relative)
+        self.taken_control = self.control
+        self.taken_acceleration = self.acceleration
+        self.taken_velocity = self.velocity
+        self.taken_position = self.position
+        self.taken_relative = self.relative
         if not keep_stops:
             self.control &= ~_STOPS
         self.newer_position = False
 
     def resolve(self, base: int) -> int:
         """The absolute target of the STT that executes now, kept for the next one."""
-        _, _, _, position, relative = self.taken
+        position, relative = self.taken_position, self.taken_relative
         target = signed_31(base + position) if relative else position
         if not self.newer_position:
             self.position = target
             self.relative = False
         return target
 
-    def snapshot(self) -> dict[str, object]:
-        return {name: getattr(self, name) for name in _Trajectory.__struct_fields__}
-
-    def restore(self, state: dict[str, object]) -> None:
-        only(state, _Trajectory.__struct_fields__)
-        values = convert(state, _Trajectory)
-        for name in _Trajectory.__struct_fields__:
-            setattr(self, name, getattr(values, name))
-
 
 class FilterBuffer:
     """LFIL's primary registers and the copy a UDF has taken: (kp, ki, kd, il, ds)."""
+
+    STATE = {
+        "due": ("i", 0, 0x000F),
+        "kp": _FIT_15,
+        "ki": _FIT_15,
+        "kd": _FIT_15,
+        "il": _FIT_15,
+        "ds": ("i", 0, 0xFF),
+        "taken_kp": _FIT_15,
+        "taken_ki": _FIT_15,
+        "taken_kd": _FIT_15,
+        "taken_il": _FIT_15,
+        "taken_ds": ("i", 0, 0xFF),
+    }
 
     def __init__(self) -> None:
         self.reset()
@@ -208,7 +204,11 @@ class FilterBuffer:
         self.kd = 0
         self.il = 0
         self.ds = 0
-        self.taken = (0, 0, 0, 0, 0)
+        self.taken_kp = 0
+        self.taken_ki = 0
+        self.taken_kd = 0
+        self.taken_il = 0
+        self.taken_ds = 0
 
     def begin(self, control: int) -> int:
         """The control word arrived. Returns how many words follow."""
@@ -243,13 +243,8 @@ class FilterBuffer:
 
     def take(self) -> None:
         """UDF was accepted: it will act on the registers as they are now."""
-        self.taken = (self.kp, self.ki, self.kd, self.il, self.ds)
-
-    def snapshot(self) -> dict[str, object]:
-        return {name: getattr(self, name) for name in _Filter.__struct_fields__}
-
-    def restore(self, state: dict[str, object]) -> None:
-        only(state, _Filter.__struct_fields__)
-        values = convert(state, _Filter)
-        for name in _Filter.__struct_fields__:
-            setattr(self, name, getattr(values, name))
+        self.taken_kp = self.kp
+        self.taken_ki = self.ki
+        self.taken_kd = self.kd
+        self.taken_il = self.il
+        self.taken_ds = self.ds

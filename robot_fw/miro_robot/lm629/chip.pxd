@@ -25,7 +25,7 @@ cdef class Lm629(MotorAxis):
     @cython.locals(outcome=cython.int)
     cpdef int set_bus(self, long long tick, int cs, int rd, int wr, int ps, int data) except -1
     cdef int _host(self, long long tick, int outcome) except -1
-    @cython.locals(record=bytearray, size=cython.int, index=cython.int, high=cython.longlong, low=cython.longlong)
+    @cython.locals(record=bytes, size=cython.int, index=cython.int, high=cython.longlong, low=cython.longlong)
     cdef int _finished(self, long long tick) except -1
     @cython.locals(opcode=cython.int)
     cdef int _command(self, long long tick) except -1
@@ -41,4 +41,8 @@ cdef class Lm629(MotorAxis):
     @cython.locals(word=cython.int, base=cython.longlong)
     cdef int _load(self, int opcode) except -1
     cpdef int data_out(self, long long tick) noexcept
+    @cython.locals(waiting=cython.int)
+    cpdef int after_load(self) except -1
+    @cython.locals(latest_tick=cython.longlong, late=cython.bint)
+    cpdef int check_times(self, long long earliest_tick) except -1
     cpdef int status_at(self, long long tick) noexcept

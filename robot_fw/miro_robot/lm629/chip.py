@@ -27,12 +27,9 @@ data sheet SNVS781, connection diagram of the 28-pin package.
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import whole
 from miro_robot.event_log import COMMAND, EventLog
 from miro_robot.lm629 import buffers, host_port, signals
-from miro_robot.lm629.axis import FAR, PWM_TICKS, RANGES, SAMPLE_TICKS, MotorAxis
+from miro_robot.lm629.axis import FAR, PWM_TICKS, SAMPLE_TICKS, MotorAxis
 from miro_robot.lm629.buffers import TrajectoryBuffer, fit_15
 from miro_robot.lm629.commands import BY_NAME, BY_OPCODE
 
@@ -125,8 +122,8 @@ class Lm629(MotorAxis):
         self.side = side
 
     def _finished(self, tick: int) -> None:
-        record = self.port.record
-        self.commands.append((tick, self.port.command, bytes(record)))
+        record = self.port.data_bytes()
+        self.commands.append((tick, self.port.command, record))
         if self.log is not None:
             size = len(record)
             high = 0
@@ -224,7 +221,7 @@ class Lm629(MotorAxis):
     def _trajectory_word(self, word: int) -> None:
         buffer: TrajectoryBuffer = self.trajectory_buffer
         profile = self.trajectory
-        if len(self.port.record) == 2:
+        if self.port.recorded == 2:
             self.port.expect(buffer.begin(word))
             if self.options.unsent == "working":
                 buffer.refresh(profile.acceleration, profile.max_velocity, profile.target)
@@ -239,7 +236,7 @@ class Lm629(MotorAxis):
             self._complain(self.options.range_flags)
 
     def _filter_word(self, word: int) -> None:
-        if len(self.port.record) == 2:
+        if self.port.recorded == 2:
             self.port.expect(self.filter_buffer.begin(word))
         elif self.filter_buffer.word(word, self.clamps):
             self._complain(self.options.range_flags)
@@ -259,7 +256,7 @@ class Lm629(MotorAxis):
                 self.signals.set_bits(_STOP_ON_ERROR)
         elif opcode in (_SBPA, _SBPR):
             base = self.trajectory.target if opcode == _SBPR else 0
-            self.set_breakpoint(base + int.from_bytes(self.port.record, "big"))
+            self.set_breakpoint(base + int.from_bytes(self.port.data_bytes(), "big"))
 
     # ------------------------------------------------------------------------------------------ observers
 
@@ -291,26 +288,31 @@ class Lm629(MotorAxis):
 
     # ------------------------------------------------------------------------------------------ state
 
-    def snapshot(self) -> dict[str, object]:
-        """All of the state; a chip with the same options restored from it goes on with the same bits."""
-        parts = {name: getattr(self, name).snapshot() for name in self.PARTS}
-        own = {name: getattr(self, name) for name in self.STATE}
-        return {**parts, **own, **({} if self.error_repeats else {"excessive": self.excessive})}
-
-    def _check_words(self) -> None:
-        """Raises ValueError unless the words that are waited for are those of the command in progress."""
+    def after_load(self) -> None:
+        """Raises ValueError where a mode, a command or a word does not go with the rest."""
+        self.hi = self.signals.word >> 15
+        self.writes_while_busy = self.port.writes_while_busy
+        if self.reset_level == 0 and self.mode != _HELD:
+            raise ValueError("a chip whose reset pin is low is in reset")
+        if self.mode != _RUNNING and (self.sample_tick != FAR or self.pwm or self.pwm_magnitude):
+            raise ValueError("a chip in reset takes no samples and drives no motor")
         waiting = self.port.words_left if self.port.incoming else 0
-        command = BY_OPCODE.get(self.port.command)
-        due = 0 if command is None else command.words_in
-        begun = len(self.port.record) >= 2
-        if command is not None and begun and command.name == "LTRJ":
-            due = self.trajectory_buffer.words_due()
-        elif command is not None and begun and command.name == "LFIL":
-            due = self.filter_buffer.words_due()
-        if waiting > due:
+        if waiting > self._words_due():
             raise ValueError(
-                f"{waiting} words are waited for, but command {self.port.command:02X}h has {due}"
+                f"{waiting} words are waited for, but command {self.port.command:02X}h has {self._words_due()}"
             )
+
+    def _words_due(self) -> int:
+        """Words that the command in progress may still want from the host."""
+        command = BY_OPCODE.get(self.port.command)
+        if command is None:
+            return 0
+        begun = self.port.recorded >= 2
+        if begun and command.name == "LTRJ":
+            return self.trajectory_buffer.words_due()
+        if begun and command.name == "LFIL":
+            return self.filter_buffer.words_due()
+        return command.words_in
 
     def check_times(self, earliest_tick: int) -> None:
         """Raises ValueError unless a restored chip goes on at `earliest_tick` or soon after."""
@@ -319,12 +321,8 @@ class Lm629(MotorAxis):
             raise ValueError(f"next_tick is {self.next_tick}, not from {earliest_tick} to {latest_tick}")
         if self.mode == _RUNNING and not earliest_tick <= self.sample_tick <= latest_tick:
             raise ValueError(f"sample_tick is {self.sample_tick}, not from {earliest_tick} to {latest_tick}")
-        if self.mode != _RUNNING and (self.sample_tick != FAR or self.pwm or self.pwm_magnitude):
-            raise ValueError("a chip in reset takes no samples and drives no motor")
         if self.mode == _RUNNING and self.next_tick != self._due_tick():
             raise ValueError(f"next_tick is {self.next_tick}, but the pulses make it {self._due_tick()}")
-        if self.reset_level == 0 and self.mode != _HELD:
-            raise ValueError("a chip whose /RST is low is held in reset")
 
     def _due_tick(self) -> int:
         """What `next_tick` follows from while the chip runs: a sample, the end of a period or an edge of its pulse.
@@ -340,14 +338,3 @@ class Lm629(MotorAxis):
         if self.pulse_late:
             return self.period_tick + (PWM_TICKS if self.pwm else PWM_TICKS - length)
         return self.period_tick + (length if self.pwm else PWM_TICKS)
-
-    def restore(self, state: dict[str, Any]) -> None:
-        for name in self.PARTS:
-            getattr(self, name).restore(state[name])
-        for name in self.STATE:
-            setattr(self, name, whole(state, name, *RANGES[name]))
-        if not self.error_repeats:
-            self.excessive = whole(state, "excessive", 0, 1)
-        self._check_words()
-        self.hi = self.signals.word >> 15
-        self.writes_while_busy = self.port.writes_while_busy

@@ -7,12 +7,10 @@ input keeps the tick at which that will be (`due`). What is made of the counts (
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import whole
+from miro_exact.state import FLAG, TICK
 
 _FAR = 1 << 62
-_MOST_COUNTS = 1 << 40  # between two samples: far more than ticks
+_COUNTS = ("q", -(1 << 40), 1 << 40)  # between two samples: far more than ticks
 
 
 class InputFilter:
@@ -23,6 +21,14 @@ class InputFilter:
     that will change.
     """
 
+    STATE = {
+        "level": ("i", 0, 3),
+        "run_level": ("i", 0, 3),
+        "run_tick": TICK,
+        "pin": ("i", 0, 3),
+        "pin_tick": TICK,
+        "due": TICK,
+    }
     NOT_STATE = ("wait", "direct")
 
     def __init__(self, clocks: int, level: int) -> None:
@@ -64,22 +70,6 @@ class InputFilter:
         self.level = self.pin
         self.due = _FAR
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "level": self.level,
-            "run_level": self.run_level,
-            "run_tick": self.run_tick,
-            "pin": self.pin,
-            "pin_tick": self.pin_tick,
-            "due": self.due,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        for name in ("level", "run_level", "pin"):
-            setattr(self, name, whole(state, name, 0, 3))
-        for name in ("run_tick", "pin_tick", "due"):
-            setattr(self, name, whole(state, name, 0, _FAR))
-
 
 class Encoder:
     """Counts quadrature states and catches the index.
@@ -89,6 +79,15 @@ class Encoder:
     Quadrature states are held as their place in the forward order: (A,B) = 00, 10, 11, 01 -> 0, 1, 2, 3.
     """
 
+    STATE = {
+        "quadrature": InputFilter,
+        "index": InputFilter,
+        "seen": FLAG,
+        "counts": _COUNTS,
+        "armed": FLAG,
+        "caught": FLAG,
+        "caught_counts": _COUNTS,
+    }
     NOT_STATE = ("double_step",)
 
     def __init__(self, filter_clocks: int, double_step: int = 0) -> None:
@@ -164,22 +163,3 @@ class Encoder:
             self.caught = 1
             self.caught_counts = self.counts
             self.armed = 0
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "quadrature": self.quadrature.snapshot(),
-            "index": self.index.snapshot(),
-            "seen": self.seen,
-            "counts": self.counts,
-            "armed": self.armed,
-            "caught": self.caught,
-            "caught_counts": self.caught_counts,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.quadrature.restore(state["quadrature"])
-        self.index.restore(state["index"])
-        for name in ("seen", "armed", "caught"):
-            setattr(self, name, whole(state, name, 0, 1))
-        for name in ("counts", "caught_counts"):
-            setattr(self, name, whole(state, name, -_MOST_COUNTS, _MOST_COUNTS))

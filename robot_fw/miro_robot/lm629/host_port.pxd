@@ -4,6 +4,7 @@ cimport cython
 cdef int _OPEN, _SOFTWARE_RESET
 cdef int _NOTHING, _COMMAND, _WORD, _ANSWERED, _MISUSE
 cdef int _IGNORED, _ACCEPTED, _REFUSED
+cdef int _RECORD
 
 
 @cython.final
@@ -15,7 +16,8 @@ cdef class HostPort:
     cdef public long long writes_while_busy
     cdef public int buffer, lock, command, abandoned, words_left, incoming, low_next, word
     cdef public long long answer
-    cdef public bytearray record
+    cdef unsigned char record[16]
+    cdef readonly int recorded
 
     cpdef reset(self, int lock)
     cpdef bint is_busy(self, long long tick) noexcept
@@ -24,8 +26,11 @@ cdef class HostPort:
     cpdef int pins(self, long long tick, int cs, int rd, int wr, int ps, int data, int flags) except -1
     cdef void _write_begins(self, long long tick) noexcept
     cdef void _read_begins(self, long long tick, int flags) noexcept
-    cdef int _write_ends(self, long long tick) except -1
-    cdef int _read_ends(self, long long tick) except -1
+    cdef int _write_ends(self, long long tick) noexcept
+    cdef int _read_ends(self, long long tick) noexcept
+    cdef void _record(self, int byte) noexcept
+    @cython.locals(found=bytearray, index=cython.int)
+    cpdef bytes data_bytes(self)
     cdef void _word_is_over(self, long long tick) noexcept
     cpdef void expect(self, int words) noexcept
     cpdef void reply(self, int words, long long value) noexcept

@@ -8,9 +8,7 @@ wins.
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import octets, whole
+from miro_exact.state import FLAG, TICK, Queue
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 
 NOTHING, COMMAND, WORD, ANSWERED, MISUSE = 0, 1, 2, 3, 4
@@ -23,18 +21,9 @@ OPEN, HARDWARE_RESET, SOFTWARE_RESET = 0, 1, 2
 
 _OPEN, _SOFTWARE_RESET = 0, 2
 _NOTHING, _COMMAND, _WORD, _ANSWERED, _MISUSE = 0, 1, 2, 3, 4
+_RECORD = 16  # data bytes of the longest command, LTRJ with three parameters, and two more
+_BYTE = ("i", 0, 0xFF)
 _IGNORED, _ACCEPTED, _REFUSED = 0, 1, 2  # what will become of the strobe that is in progress
-
-RANGES = {
-    **dict.fromkeys(("ps", "writing", "reading", "abandoned", "incoming", "low_next"), (0, 1)),
-    **dict.fromkeys(("data", "drive", "buffer", "command"), (0, 0xFF)),
-    **dict.fromkeys(("fate", "lock"), (0, 2)),
-    **dict.fromkeys(("busy_until", "writes_while_busy"), (0, 1 << 62)),
-    "words_left": (0, 7),
-    "word": (0, 0xFFFF),
-    "answer": (0, 0xFFFFFFFF),
-}
-"""What the values of a saved state may be."""
 
 
 class HostPort:
@@ -46,6 +35,26 @@ class HostPort:
     reset.
     """
 
+    STATE = {
+        "ps": FLAG,
+        "data": _BYTE,
+        "writing": FLAG,
+        "reading": FLAG,
+        "fate": ("i", 0, 2),
+        "drive": _BYTE,
+        "busy_until": TICK,
+        "writes_while_busy": TICK,
+        "buffer": _BYTE,
+        "lock": ("i", 0, 2),
+        "command": _BYTE,
+        "abandoned": FLAG,
+        "words_left": ("i", 0, 7),
+        "incoming": FLAG,
+        "low_next": FLAG,
+        "word": ("i", 0, 0xFFFF),
+        "answer": ("q", 0, 0xFFFFFFFF),
+        "record": Queue("B", _RECORD, "recorded"),
+    }
     NOT_STATE = ("busy_ticks", "judged_at_end", "reset_status", "keeps_phase", "undue_flags", "status_flags")
 
     def __init__(self, busy_ticks: int, options: Lm629Options = DEFAULT_OPTIONS) -> None:
@@ -77,7 +86,8 @@ class HostPort:
         self.low_next = 0
         self.word = 0
         self.answer = 0
-        self.record = bytearray()
+        self.record = bytearray(_RECORD)
+        self.recorded = 0
 
     def is_busy(self, tick: int) -> bool:
         return self.lock != _OPEN or tick < self.busy_until
@@ -141,13 +151,15 @@ class HostPort:
             self.command = self.data
             self.words_left = 0
             self.low_next = self.low_next if self.keeps_phase else 0
-            self.record = bytearray([self.word >> 8]) if self.low_next else bytearray()
+            self.recorded = 0
+            if self.low_next:
+                self._record(self.word >> 8)
             self.busy_until = tick + self.busy_ticks
             return _COMMAND
         if self.words_left == 0 or not self.incoming:
             return _MISUSE if self.undue_flags or self.words_left > 0 else _NOTHING
         self.buffer = self.data
-        self.record.append(self.data)
+        self._record(self.data)
         if not self.low_next:
             self.word = self.data << 8
             self.low_next = 1
@@ -162,12 +174,25 @@ class HostPort:
         if self.fate == _IGNORED:
             return _NOTHING
         self.buffer = self.drive
-        self.record.append(self.drive)
+        self._record(self.drive)
         if not self.low_next:
             self.low_next = 1
             return _NOTHING
         self._word_is_over(tick)
         return _ANSWERED if self.words_left == 0 else _NOTHING
+
+    def _record(self, byte: int) -> None:
+        """A data byte of the command in progress. No command has more than there is room for; a loaded state may."""
+        if self.recorded < _RECORD:
+            self.record[self.recorded] = byte
+            self.recorded += 1
+
+    def data_bytes(self) -> bytes:
+        """Those of the command in progress."""
+        found = bytearray()
+        for index in range(self.recorded):
+            found.append(self.record[index])
+        return bytes(found)
 
     def _word_is_over(self, tick: int) -> None:
         self.low_next = 0
@@ -185,31 +210,7 @@ class HostPort:
         self.incoming = 0
         self.answer = value & (0xFFFFFFFF if words == 2 else 0xFFFF)
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "ps": self.ps,
-            "data": self.data,
-            "writing": self.writing,
-            "reading": self.reading,
-            "fate": self.fate,
-            "drive": self.drive,
-            "busy_until": self.busy_until,
-            "writes_while_busy": self.writes_while_busy,
-            "buffer": self.buffer,
-            "lock": self.lock,
-            "command": self.command,
-            "abandoned": self.abandoned,
-            "words_left": self.words_left,
-            "incoming": self.incoming,
-            "low_next": self.low_next,
-            "word": self.word,
-            "answer": self.answer,
-            "record": bytes(self.record),
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        for name, (low, high) in RANGES.items():
-            setattr(self, name, whole(state, name, low, high))
-        self.record = bytearray(octets(state, "record", min(len(state["record"]), 16)))
+    def after_load(self) -> None:
+        """Raises ValueError for an answer that no command gives."""
         if not self.incoming and self.words_left > 2:
             raise ValueError(f"words_left is {self.words_left}, but an answer has at most 2 words")

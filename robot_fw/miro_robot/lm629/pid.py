@@ -7,16 +7,8 @@ Equation and widths: data sheet (SNVS781), "PID Compensation Filter". Order, rou
 
 from __future__ import annotations
 
-from miro_exact.saved import whole
-
-RANGES = {
-    **dict.fromkeys(("kp", "ki", "kd", "il"), (0, 0x7FFF)),
-    "ds": (0, 0xFF),
-    "error_sum": (-0x800000, 0x7FFFFF),
-    **dict.fromkeys(("previous", "derivative", "integral"), (-0x8000, 0x7FFF)),
-    "phase": (0, 0xFF),
-}
-"""What the values of a saved state may be."""
+_FIT_15 = ("q", 0, 0x7FFF)
+_DRIVE = ("q", -0x8000, 0x7FFF)
 
 
 def _saturated(value: int) -> int:
@@ -36,6 +28,18 @@ def _bottom(value: int) -> int:
 class Pid:
     """u(n) = kp*e(n) + ki*sum(e) + kd*(e(n') - e(n'-1)), n' = every (ds+1)-th sample."""
 
+    STATE = {
+        "kp": _FIT_15,
+        "ki": _FIT_15,
+        "kd": _FIT_15,
+        "il": _FIT_15,
+        "ds": ("q", 0, 0xFF),
+        "error_sum": ("q", -0x800000, 0x7FFFFF),
+        "previous": _DRIVE,
+        "derivative": _DRIVE,
+        "integral": _DRIVE,
+        "phase": ("q", 0, 0xFF),
+    }
     NOT_STATE = ("saturates", "rounds_down")
 
     def __init__(self, saturates: bool = True, rounds_down: bool = True) -> None:
@@ -86,21 +90,3 @@ class Pid:
 
     def _limited(self, value: int) -> int:
         return max(-self.il, min(value, self.il))
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "kp": self.kp,
-            "ki": self.ki,
-            "kd": self.kd,
-            "il": self.il,
-            "ds": self.ds,
-            "error_sum": self.error_sum,
-            "previous": self.previous,
-            "derivative": self.derivative,
-            "integral": self.integral,
-            "phase": self.phase,
-        }
-
-    def restore(self, state: dict[str, object]) -> None:
-        for name, (low, high) in RANGES.items():
-            setattr(self, name, whole(state, name, low, high))

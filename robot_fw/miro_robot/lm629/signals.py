@@ -6,7 +6,6 @@ decided in `chip.py` (commands) and `axis.py` (samples).
 
 from __future__ import annotations
 
-from miro_exact.saved import whole
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 
 INTERRUPT = 0x8000
@@ -32,6 +31,7 @@ _INTERRUPTS = 0x7E
 class Signals:
     """`word`: the 16 bits as RDSIGS answers them. `mask`: 1 = the flag of that bit may raise HI."""
 
+    STATE = {"word": ("i", 0, 0xFFFF), "mask": ("i", 0, 0xFF)}
     NOT_STATE = ("level", "reset_raises")
 
     def __init__(self, options: Lm629Options = DEFAULT_OPTIONS) -> None:
@@ -84,10 +84,3 @@ class Signals:
 
     def clear_bits(self, bits: int) -> None:
         self.word &= ~bits
-
-    def snapshot(self) -> dict[str, object]:
-        return {"word": self.word, "mask": self.mask}
-
-    def restore(self, state: dict[str, object]) -> None:
-        self.word = whole(state, "word", 0, 0xFFFF)
-        self.mask = whole(state, "mask", 0, 0xFF)

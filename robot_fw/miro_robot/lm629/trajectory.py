@@ -8,21 +8,11 @@ always ends exactly on the target.
 
 from __future__ import annotations
 
-from miro_exact.saved import whole
+from miro_exact.state import FLAG
 
 _NEVER = 1 << 62
 _HALF_SPACE = 1 << 46
 _SPACE_MASK = (1 << 47) - 1
-
-
-RANGES = {
-    "position": (-_HALF_SPACE, _HALF_SPACE - 1),
-    "velocity": (-(1 << 32), 1 << 32),
-    **dict.fromkeys(("acceleration", "max_velocity"), (0, 0x3FFFFFFF)),
-    "target": (-(1 << 30), (1 << 30) - 1),
-    **dict.fromkeys(("velocity_mode", "forward", "stopping", "moving", "crossed"), (0, 1)),
-}
-"""What the values of a saved state may be."""
 
 
 def _wrapped(position: int) -> int:
@@ -46,6 +36,18 @@ class Trajectory:
     `moving` is 1 while the profile has not finished. `crossed` is 1 when the last step left the 31-bit space.
     """
 
+    STATE = {
+        "position": ("q", -_HALF_SPACE, _HALF_SPACE - 1),
+        "velocity": ("q", -(1 << 32), 1 << 32),
+        "acceleration": ("q", 0, 0x3FFFFFFF),
+        "max_velocity": ("q", 0, 0x3FFFFFFF),
+        "target": ("q", -(1 << 30), (1 << 30) - 1),
+        "velocity_mode": FLAG,
+        "forward": FLAG,
+        "stopping": FLAG,
+        "moving": FLAG,
+        "crossed": FLAG,
+    }
     NOT_STATE = ("keeps_fraction",)
 
     def __init__(self, keeps_fraction: bool = False) -> None:
@@ -166,21 +168,3 @@ class Trajectory:
         self.velocity = 0
         self.moving = 0
         self.stopping = 0
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "position": self.position,
-            "velocity": self.velocity,
-            "acceleration": self.acceleration,
-            "max_velocity": self.max_velocity,
-            "target": self.target,
-            "velocity_mode": self.velocity_mode,
-            "forward": self.forward,
-            "stopping": self.stopping,
-            "moving": self.moving,
-            "crossed": self.crossed,
-        }
-
-    def restore(self, state: dict[str, object]) -> None:
-        for name, (low, high) in RANGES.items():
-            setattr(self, name, whole(state, name, low, high))

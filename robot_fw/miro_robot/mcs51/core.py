@@ -5,9 +5,7 @@ What belongs here: state, its snapshot, and the hooks that `Cpu` fills in. Instr
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import octets, tick, whole
+from miro_exact.state import FLAG, TICK
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.opcodes import LINE
 
@@ -18,6 +16,23 @@ LAST_CYCLE = 1 << 55
 class Core:
     """What instructions work on; `cycles` counts since power-on."""
 
+    STATE: dict[str, object] = {
+        "iram": "256B",
+        "pc": ("i", 0, 0xFFFF),
+        "a": ("i", 0, 0xFF),
+        "b": ("i", 0, 0xFF),
+        "sp": ("i", 0, 0xFF),
+        "dptr": ("i", 0, 0xFFFF),
+        "cy": FLAG,
+        "ac": FLAG,
+        "ov": FLAG,
+        "user_flags": ("i", 0, 0x22),
+        "bank": ("i", 0, 0x18),
+        "cycles": ("q", 0, LAST_CYCLE),
+        "instructions": TICK,
+        "idle_cycles": TICK,
+        "faults": TICK,
+    }
     NOT_STATE: tuple[str, ...] = (
         "bus",
         "rom",  # the image: constant while it runs, unless code lies in RAM, whose owner then restores it
@@ -103,41 +118,3 @@ class Core:
         """Byte to the external data bus."""
 
     # State
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "iram": bytes(self.iram[:256]),
-            "pc": self.pc,
-            "a": self.a,
-            "b": self.b,
-            "sp": self.sp,
-            "dptr": self.dptr,
-            "cy": self.cy,
-            "ac": self.ac,
-            "ov": self.ov,
-            "user_flags": self.user_flags,
-            "bank": self.bank,
-            "cycles": self.cycles,
-            "instructions": self.instructions,
-            "idle_cycles": self.idle_cycles,
-            "faults": self.faults,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        iram = octets(state, "iram", 256)
-        for address in range(256):
-            self.iram[address] = iram[address]
-        self.pc = whole(state, "pc", 0, 0xFFFF)
-        self.a = whole(state, "a", 0, 0xFF)
-        self.b = whole(state, "b", 0, 0xFF)
-        self.sp = whole(state, "sp", 0, 0xFF)
-        self.dptr = whole(state, "dptr", 0, 0xFFFF)
-        self.cy = whole(state, "cy", 0, 1)
-        self.ac = whole(state, "ac", 0, 1)
-        self.ov = whole(state, "ov", 0, 1)
-        self.user_flags = whole(state, "user_flags", 0, 0xFF) & 0x22
-        self.bank = whole(state, "bank", 0, 0x18) & 0x18
-        self.cycles = whole(state, "cycles", 0, LAST_CYCLE)
-        self.instructions = tick(state, "instructions")
-        self.idle_cycles = tick(state, "idle_cycles")
-        self.faults = tick(state, "faults")

@@ -46,6 +46,8 @@ cdef class Cpu(Executor):
     cpdef reset(self)
     cpdef int run(self, long long until_cycle) except -1
     cpdef int step(self) except -1
+    cpdef int before_save(self) except -1
+    cpdef int after_load(self) except -1
     cpdef int run_until_pc(self, int address, long long until_cycle) except -1
     @cython.locals(address=int)
     cpdef int run_until_any(self, tuple addresses, long long until_cycle) except -1

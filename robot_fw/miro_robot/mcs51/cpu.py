@@ -30,9 +30,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextvars import ContextVar
-from typing import Any, Protocol
+from typing import Protocol
 
-from miro_exact.saved import tick, whole
+from miro_exact.state import FLAG
 from miro_robot.faults import FaultKind
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.core import LAST_CYCLE
@@ -73,6 +73,14 @@ class Cpu(Executor):
     `rxd`.
     """
 
+    STATE: dict[str, object] = {
+        "pcon": ("i", 0, 0xFF),
+        "idle": FLAG,
+        "powered_down": FLAG,
+        "blocked": ("q", -1, LAST_CYCLE),
+        "marks": ("q", 0, LAST_CYCLE),
+        "chip": Peripherals,
+    }
     NOT_STATE: tuple[str, ...] = (
         *Executor.NOT_STATE,
         "code_limit",
@@ -239,6 +247,10 @@ class Cpu(Executor):
     def peek_iram(self, address: int) -> int:
         """A byte of internal RAM (0..255)."""
         return self.iram[address & 0xFF]
+
+    def poke_iram(self, address: int, value: int) -> None:
+        """Writes internal RAM between two instructions."""
+        self.iram[address & 0xFF] = value & 0xFF
 
     def sfr(self, address: int) -> int:
         """A special function register (80h..FFh; ports: their latch) as of now, without side effects."""
@@ -447,29 +459,18 @@ class Cpu(Executor):
 
     # State
 
-    def snapshot(self) -> dict[str, object]:
-        """All state, between two runs; the image is not part of it."""
+    def before_save(self) -> None:
+        """Brings the chip up to where the core is. Marks count only while interrupts hold the CPU."""
         self.chip.sync(self.cycles)
         self.chip.settle()
-        marks = self.marks if self._taken_over() else 0  # mostly none, and then not worth a word
-        return {
-            **Executor.snapshot(self),
-            "pcon": self.pcon,
-            "idle": self.idle,
-            "powered_down": self.powered_down,
-            "blocked": self.blocked,
-            "chip": self.chip.snapshot(),
-            **({"marks": marks} if marks else {}),
-        }
+        if not self._taken_over():
+            self.marks = 0
 
-    def restore(self, state: dict[str, Any]) -> None:
-        Executor.restore(self, state)
-        self.pcon = whole(state, "pcon", 0, 0xFF)
-        self.idle = whole(state, "idle", 0, 1)
-        self.powered_down = whole(state, "powered_down", 0, 1)
-        self.blocked = tick(state, "blocked", -1)
-        self.marks = whole({"marks": state.get("marks", 0)}, "marks", 0, LAST_CYCLE)
-        self.chip.restore(state["chip"], self.cycles)
+    def after_load(self) -> None:
+        """Raises ValueError unless the parts of the chip stand where the core does."""
+        if self.bank & ~0x18 or self.user_flags & ~0x22:
+            raise ValueError(f"PSW has bank {self.bank:02X}h and flags {self.user_flags:02X}h")
+        self.chip.check_times(self.cycles)
 
     def __repr__(self) -> str:
         return (

@@ -18,9 +18,7 @@ window [since, until) of cycles whose S5P2 saw it. A cleared flag still counts i
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import whole, wholes
+from miro_exact.state import NEVER_TICK
 
 _FAR = 1 << 62
 SOURCES = 6  # in polling order: INT0, timer 0, INT1, timer 1, serial, timer 2
@@ -29,6 +27,14 @@ INT0, TIMER0, INT1, TIMER1, SERIAL, TIMER2 = range(SOURCES)
 
 class Interrupts:
     """IE, IP, the sources' windows and the two in-service flip-flops."""
+
+    STATE = {
+        "ie": ("i", 0, 0xFF),
+        "ip": ("i", 0, 0xFF),
+        "in_service": ("i", 0, 3),
+        "since": ("6q", -2, NEVER_TICK),  # a flag of timer 2 is seen a cycle early
+        "until": ("6q", -2, NEVER_TICK),
+    }
 
     def __init__(self) -> None:
         self.ie = 0
@@ -94,29 +100,11 @@ class Interrupts:
         else:
             self.in_service = 0
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "ie": self.ie,
-            "ip": self.ip,
-            "in_service": self.in_service,
-            "since": [self.since[source] for source in range(6)],
-            "until": [self.until[source] for source in range(6)],
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.ie = whole(state, "ie", 0, 0xFF)
-        self.ip = whole(state, "ip", 0, 0xFF)
-        self.in_service = whole(state, "in_service", 0, 3)
-        since = wholes(state, "since", 6, -2, _FAR)  # a flag of timer 2 is seen a cycle early
-        until = wholes(state, "until", 6, -2, _FAR)
-        for source in range(6):
-            self.since[source] = since[source]
-            self.until[source] = until[source]
-
 
 class ExternalInterrupts:
     """INT0, INT1 and their half of TCON: level mode follows the inverted pin, edge mode latches a fall."""
 
+    STATE = {"control": ("i", 0, 0x0F), "levels": ("i", 0, 3)}
     NOT_STATE = ("interrupts",)
 
     def __init__(self, interrupts: Interrupts) -> None:
@@ -163,10 +151,3 @@ class ExternalInterrupts:
         else:
             self.control |= flag
             self.interrupts.ask(2 * number, cycle)
-
-    def snapshot(self) -> dict[str, object]:
-        return {"control": self.control, "levels": self.levels}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.control = whole(state, "control", 0, 0x0F)
-        self.levels = whole(state, "levels", 0, 3)

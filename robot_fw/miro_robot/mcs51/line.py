@@ -17,9 +17,8 @@ and those of one instruction.
 from __future__ import annotations
 
 from array import array
-from typing import Any
 
-from miro_exact.saved import ascending, whole
+from miro_exact.state import FLAG, NEVER_TICK, TICK, Items
 
 FAR = 1 << 62  # "never", for everybody
 _FAR = 1 << 62  # the same as a C constant
@@ -27,6 +26,7 @@ _SIZE = 4096  # places of a new ring; always a power of two
 WAITING = 2048
 """So many edges may wait to be heard before the line is full."""
 _WAITING = 2048
+_MOST = 1 << 22  # edges of a saved line: more than the longest delay keeps
 
 
 class Line:
@@ -35,9 +35,15 @@ class Line:
     `full`: more than 2048 edges have come since `hear`. The tick of the 2048th is `full_tick`.
     """
 
+    STATE = {
+        "settled_tick": TICK,
+        "_before": FLAG,
+        "ticks": Items("q", _MOST, 0, NEVER_TICK, ordered=True),
+    }
     NOT_STATE = (
+        *("_ticks", "_mask", "_first", "_end"),  # the ring that `ticks` are kept in
         *("_cursor", "unread"),  # where the last query ended: a cache; who listens: wiring
-        *("_mask", "_heard", "full"),  # size of the ring; what was heard: the listener's restore says it
+        *("_heard", "full"),  # what was heard: the listener says it after a load
     )
 
     def __init__(self, initial: int = 1) -> None:
@@ -154,29 +160,26 @@ class Line:
             cursor -= 1
         self._cursor = cursor
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "settled_tick": self.settled_tick,
-            "before": self._before,
-            "ticks": [tick for tick, _ in self.edges()],
-        }
+    @property
+    def ticks(self) -> list[int]:
+        """Ticks of the edges kept, oldest first."""
+        return [self._ticks[serial & self._mask] for serial in range(self._first, self._end)]
 
-    def restore(self, state: dict[str, Any]) -> None:
-        """The edges count as heard below tick 0 only, until the listener says otherwise."""
-        ticks = ascending(state, "ticks")
-        self.settled_tick = whole(state, "settled_tick", 0, _FAR)
-        self._before = whole(state, "before", 0, 1)
-        self._first = 0
-        self._cursor = 0
-        self._heard = 0
-        self._end = 0
+    @ticks.setter
+    def ticks(self, ticks: list[int]) -> None:
+        """All of them count as not heard, until the listener says otherwise."""
         size = _SIZE
         while size < len(ticks):
             size *= 2
-        self._resize(size)
-        for serial, tick in enumerate(ticks):
-            self._ticks[serial] = tick
-        self._end = len(ticks)
+        if size != self._mask + 1:
+            self._resize(size)
+        self._first = 0
+        self._end = 0
+        for tick in ticks:
+            self._ticks[self._end] = tick
+            self._end += 1
+        self._cursor = 0
+        self._heard = 0
         self.hear(0)
 
     def __repr__(self) -> str:

@@ -19,9 +19,7 @@ or somebody looks at them (`settle`): in between nothing of theirs is stepped. L
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import tick, whole
+from miro_exact.state import FLAG, TICK
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.interrupts import ExternalInterrupts, Interrupts
 from miro_robot.mcs51.ports import Ports
@@ -47,6 +45,20 @@ _STOPPED = 1 << 61  # ticks from here on never come: the serial port has no cloc
 class Peripherals:
     """All special function registers but the core's; time in machine cycles."""
 
+    STATE = {
+        "interrupts": Interrupts,
+        "external": ExternalInterrupts,
+        "timers": Timers,
+        "timer2": Timer2,
+        "uart": Uart,
+        "shift": Shift,
+        "ports": Ports,
+        "smod": FLAG,
+        "p1": ("i", 0, 0xFF),
+        "p3": ("i", 0, 0xFF),
+        "frozen": FLAG,
+        "p3_reads": TICK,
+    }
     NOT_STATE = (
         "bus",
         "pulsed",
@@ -415,44 +427,19 @@ class Peripherals:
             self.timers.taken(source >> 1, cycle)
             self.timer_wait = -1
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "interrupts": self.interrupts.snapshot(),
-            "external": self.external.snapshot(),
-            "timers": self.timers.snapshot(),
-            "timer2": self.timer2.snapshot(),
-            "uart": self.uart.snapshot(),
-            "shift": self.shift.snapshot(),
-            "ports": self.ports.snapshot(),
-            "smod": self.smod,
-            "p1": self.p1,
-            "p3": self.p3,
-            "frozen": self.frozen,
-            "p3_reads": self.p3_reads,
-        }
-
-    def restore(self, state: dict[str, Any], cycle: int) -> None:
-        """`cycle`: where the core is."""
-        self.interrupts.restore(state["interrupts"])
-        self.external.restore(state["external"])
-        self.timers.restore(state["timers"])
-        self.timer2.restore(state["timer2"])
-        self.uart.restore(state["uart"])
-        self.shift.restore(state["shift"])
-        self.ports.restore(state["ports"])
-        self.smod = whole(state, "smod", 0, 1)
-        self.p1 = whole(state, "p1", 0, 0xFF)
-        self.p3 = whole(state, "p3", 0, 0xFF)
-        self.frozen = whole(state, "frozen", 0, 1)
-        self.p3_reads = tick(state, "p3_reads")
-        if self.timers.synced > cycle or self.timer2.synced > cycle:
-            raise ValueError(f"timers are ahead of cycle {cycle}")
-        if not self.frozen:
-            self.uart.check_outputs(12 * cycle)
-            self.shift.check_outputs(cycle)
+    def after_load(self) -> None:
+        """Time is where timer 0 is; whether a pin clocks the serial port follows from the modes."""
         self.now = self.timers.synced
         self.timer_wait = -1
         self.serial_wait = -1
         self.pulsed = 0
         if self.uart.mode() & 1:
             self.pulsed = self.timers.counts_pin(1) | (1 if self.timer2.counts_pin() else 0)
+
+    def check_times(self, cycle: int) -> None:
+        """Raises ValueError unless all parts stand at `cycle`."""
+        if self.timers.synced > cycle or self.timer2.synced > cycle:
+            raise ValueError(f"timers are ahead of cycle {cycle}")
+        if not self.frozen:
+            self.uart.check_times(12 * cycle)
+            self.shift.check_times(cycle)

@@ -6,9 +6,10 @@ cdef long long _FAR
 cdef class Ports:
     cdef int latches[4]
     cdef int outside[4]
-    cdef list pending
+    cdef readonly list pending
     cdef readonly long long next_cycle
 
+    cpdef int after_load(self) except -1
     cpdef int level(self, int port) noexcept
     @cython.locals(cycle='long long')
     cpdef int push(self, int port, int levels, long long tick) except -1

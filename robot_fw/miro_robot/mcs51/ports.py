@@ -9,12 +9,11 @@ before it (P1, P2). The latch changes at the end of an instruction and the pin w
 
 from __future__ import annotations
 
-from operator import itemgetter
-from typing import Annotated, Any
+from typing import Annotated
 
-from msgspec import Meta, convert
+from msgspec import Meta
 
-from miro_exact.saved import wholes
+from miro_exact.state import Rows
 
 _FAR = 1 << 62
 _Push = tuple[
@@ -27,6 +26,11 @@ _Push = tuple[
 class Ports:
     """P0 to P3."""
 
+    STATE = {
+        "latches": ("4i", 0, 0xFF),
+        "outside": ("4i", 0, 0xFF),
+        "pending": Rows(4096, ("q", 0, 1 << 55), ("B", 0, 3), "B", ordered=True),
+    }
     NOT_STATE = ("next_cycle",)
 
     def __init__(self) -> None:
@@ -53,20 +57,5 @@ class Ports:
             self.outside[port] = levels
             self.next_cycle = self.pending[0][0] if self.pending else _FAR
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "latches": [self.latches[port] for port in range(4)],
-            "outside": [self.outside[port] for port in range(4)],
-            "pending": [tuple(push) for push in self.pending],
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        latches = wholes(state, "latches", 4, 0, 0xFF)
-        outside = wholes(state, "outside", 4, 0, 0xFF)
-        for port in range(4):
-            self.latches[port] = latches[port]
-            self.outside[port] = outside[port]
-        self.pending = convert(state["pending"], list[_Push])
-        if self.pending != sorted(self.pending, key=itemgetter(0)):
-            raise ValueError("pushes of port pins are not in order")
+    def after_load(self) -> None:
         self.next_cycle = self.pending[0][0] if self.pending else _FAR

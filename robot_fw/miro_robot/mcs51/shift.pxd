@@ -17,6 +17,7 @@ cdef class Shift:
     cdef int number
     cdef long long cycle
 
+    cpdef int check_times(self, long long cycle) except -1
     cdef void abort(self) noexcept
     cdef void send(self, int value, long long cycle) noexcept
     cdef void begin_reception(self, long long cycle) noexcept

@@ -10,9 +10,7 @@ there.
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import tick, whole
+from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_robot.mcs51.uart import Uart
 
@@ -25,6 +23,13 @@ _CLOCK_FALLS, _CLOCK_RISES = 4, 10  # S3P1, S6P1
 class Shift:
     """At most one byte on its way, out or in."""
 
+    STATE = {
+        "data": Line,
+        "flag": ("i", 0, 2),
+        "value": ("i", 0, 0xFF),
+        "number": ("i", 0, 8),
+        "cycle": TICK,
+    }
     NOT_STATE = ("uart",)
 
     def __init__(self, uart: Uart) -> None:
@@ -90,23 +95,7 @@ class Shift:
         """Tick at which TI or RI goes up, FAR when idle."""
         return 12 * (self.cycle + 8 - self.number) if self.flag else _FAR
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "data": self.data.snapshot(),
-            "flag": self.flag,
-            "value": self.value,
-            "number": self.number,
-            "cycle": self.cycle,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.data.restore(state["data"])
-        self.flag = whole(state, "flag", 0, _TI)
-        self.value = whole(state, "value", 0, 0xFF)
-        self.number = whole(state, "number", 0, 8)
-        self.cycle = tick(state, "cycle")
-
-    def check_outputs(self, cycle: int) -> None:
-        """Raises ValueError unless a restored register goes on at `cycle`."""
+    def check_times(self, cycle: int) -> None:
+        """Raises ValueError unless the register goes on at `cycle`."""
         if (self.flag and not cycle <= self.cycle <= cycle + 2) or self.data.last_tick() > 12 * cycle:
             raise ValueError(f"the shift register is not at cycle {cycle}")

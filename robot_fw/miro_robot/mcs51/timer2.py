@@ -17,9 +17,7 @@ before that cycle's own count (T4), with EXF2 latched at S5P2 of that cycle (I3)
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import tick, whole
+from miro_exact.state import FLAG, NEVER_TICK, TICK
 from miro_robot.mcs51.interrupts import Interrupts
 
 _FAR = 1 << 62
@@ -34,6 +32,16 @@ _STATES = 6  # per machine cycle
 class Timer2:
     """The 16-bit counter with its reload and capture register."""
 
+    STATE = {
+        "control": ("i", 0, 0xFF),
+        "t2mod": ("i", 0, 3),
+        "count": ("i", 0, 0xFFFF),
+        "capture": ("i", 0, 0xFFFF),
+        "up": ("i", 0, 2),
+        "edge_cycle": ("q", -1, NEVER_TICK),
+        "clock_out": FLAG,
+        "synced": TICK,
+    }
     NOT_STATE = ("interrupts",)
 
     def __init__(self, interrupts: Interrupts) -> None:
@@ -199,25 +207,3 @@ class Timer2:
             self.interrupts.ask(_TIMER2, cycle)
         else:
             self.interrupts.withdraw(_TIMER2, cycle)
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "control": self.control,
-            "t2mod": self.t2mod,
-            "count": self.count,
-            "capture": self.capture,
-            "up": self.up,
-            "edge_cycle": self.edge_cycle,
-            "clock_out": self.clock_out,
-            "synced": self.synced,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.control = whole(state, "control", 0, 0xFF)
-        self.t2mod = whole(state, "t2mod", 0, 3)
-        self.count = whole(state, "count", 0, 0xFFFF)
-        self.capture = whole(state, "capture", 0, 0xFFFF)
-        self.up = whole(state, "up", 0, _FELL)
-        self.edge_cycle = tick(state, "edge_cycle", _NONE)
-        self.clock_out = whole(state, "clock_out", 0, 1)
-        self.synced = tick(state, "synced")

@@ -14,9 +14,7 @@ following cycle. TF is seen at S5P2 of the cycle that overflows.
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import tick, whole, wholes
+from miro_exact.state import NEVER_TICK, TICK
 from miro_robot.mcs51.interrupts import Interrupts
 
 _FAR = 1 << 62
@@ -26,6 +24,16 @@ _NONE = -1  # no counter edge waiting
 class Timers:
     """Timers 0 and 1. Index 0 and 1 are the timers, 2 is TH0 when mode 3 splits it off."""
 
+    STATE = {
+        "tmod": ("i", 0, 0xFF),
+        "control": ("i", 0, 0xF0),
+        "tl": "2B",
+        "th": "2B",
+        "gates": ("i", 0, 3),
+        "edge_cycle": ("2q", -1, NEVER_TICK),
+        "synced": TICK,
+        "overflows1": TICK,
+    }
     NOT_STATE = ("interrupts",)
 
     def __init__(self, interrupts: Interrupts) -> None:
@@ -195,28 +203,6 @@ class Timers:
         self.control |= 0x20 << (2 * timer)
         self.interrupts.ask(1 + 2 * timer, cycle)
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "tmod": self.tmod,
-            "control": self.control,
-            "tl": [self.tl[0], self.tl[1]],
-            "th": [self.th[0], self.th[1]],
-            "gates": self.gates,
-            "edge_cycle": [self.edge_cycle[0], self.edge_cycle[1]],
-            "synced": self.synced,
-            "overflows1": self.overflows1,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.tmod = whole(state, "tmod", 0, 0xFF)
-        self.control = whole(state, "control", 0, 0xFF) & 0xF0
-        self.gates = whole(state, "gates", 0, 3)
-        self.synced = tick(state, "synced")
-        self.overflows1 = tick(state, "overflows1")
-        low = wholes(state, "tl", 2, 0, 0xFF)
-        high = wholes(state, "th", 2, 0, 0xFF)
-        edges = wholes(state, "edge_cycle", 2, _NONE, _FAR)
-        for timer in range(2):
-            self.tl[timer] = low[timer]
-            self.th[timer] = high[timer]
-            self.edge_cycle[timer] = edges[timer]
+    def after_load(self) -> None:
+        if self.control & 0x0F:
+            raise ValueError(f"TCON.3:0 is {self.control & 0x0F}, which belongs to the external interrupts")

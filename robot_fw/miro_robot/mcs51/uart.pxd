@@ -46,6 +46,7 @@ cdef class Uart:
     cdef inline int nine_bits(self) noexcept
     cpdef void set_clock(self, long long rx_next, long long rx_period, long long tx_next, long long tx_period) noexcept
     cpdef int sync(self, long long tick) except -1
+    cpdef int check_times(self, long long tick) except -1
     cpdef int pulse(self, int rx, int tx, long long tick) except -1
     cpdef int level(self, long long tick) noexcept
     cpdef int write_scon(self, int value, long long cycle) except -1

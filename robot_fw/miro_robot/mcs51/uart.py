@@ -19,9 +19,7 @@ the Line for its next edge.
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import whole
+from miro_exact.state import FLAG, TICK
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.interrupts import Interrupts
 from miro_robot.mcs51.line import Line
@@ -40,6 +38,31 @@ _LAST_ACTION = 9 * _ROLLOVERS + _ACTION  # 16x ticks from the fall to the end of
 class Uart:
     """Serial port. `rxd` and `txd` are the wires; `latch` bits 0 and 1 are P3.0 and P3.1, which gate them."""
 
+    STATE = {
+        "rxd": Line,
+        "txd": Line,
+        "latch": ("i", 0, 3),
+        "scon": ("i", 0, 0xFF),
+        "received": ("i", 0, 0xFF),
+        "tx_next": ("q", 0, _STOPPED),
+        "tx_period": ("q", 1, _STOPPED_PERIOD),
+        "tx_phase": ("i", 0, 15),
+        "tx_bits": ("i", 0, 0x7FF),
+        "tx_left": ("i", 0, 11),
+        "tx_value": ("i", 0, 0xFF),
+        "tx_delay": ("q", 0, 12),
+        "tx_level": FLAG,
+        "tx_edge": TICK,
+        "tx_coming": FLAG,
+        "rx_next": ("q", 0, _STOPPED),
+        "rx_period": ("q", 1, _STOPPED_PERIOD),
+        "rx_count": ("i", 0, 0xFF),
+        "rx_last": FLAG,
+        "rx_votes": ("i", 0, 3),
+        "rx_bits": ("i", 0, 0x1FF),
+        "rx_done": TICK,
+        "rx_frame": ("i", 0, 0x1FF),
+    }
     NOT_STATE = ("bus", "interrupts")
 
     def __init__(self, bus: Bus, interrupts: Interrupts) -> None:
@@ -315,60 +338,8 @@ class Uart:
             fall = self.rx_next
         return fall + _LAST_ACTION * self.rx_period if fall < _STOPPED else _FAR
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "rxd": self.rxd.snapshot(),
-            "txd": self.txd.snapshot(),
-            "latch": self.latch,
-            "scon": self.scon,
-            "received": self.received,
-            "tx_next": self.tx_next,
-            "tx_period": self.tx_period,
-            "tx_phase": self.tx_phase,
-            "tx_bits": self.tx_bits,
-            "tx_left": self.tx_left,
-            "tx_value": self.tx_value,
-            "tx_delay": self.tx_delay,
-            "tx_level": self.tx_level,
-            "tx_edge": self.tx_edge,
-            "tx_coming": self.tx_coming,
-            "rx_next": self.rx_next,
-            "rx_period": self.rx_period,
-            "rx_count": self.rx_count,
-            "rx_last": self.rx_last,
-            "rx_votes": self.rx_votes,
-            "rx_bits": self.rx_bits,
-            "rx_done": self.rx_done,
-            "rx_frame": self.rx_frame,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.rxd.restore(state["rxd"])
-        self.txd.restore(state["txd"])
-        self.latch = whole(state, "latch", 0, 3)
-        self.scon = whole(state, "scon", 0, 0xFF)
-        self.received = whole(state, "received", 0, 0xFF)
-        self.tx_next = whole(state, "tx_next", 0, _STOPPED)
-        self.tx_period = whole(state, "tx_period", 1, _STOPPED_PERIOD)
-        self.tx_phase = whole(state, "tx_phase", 0, _ROLLOVERS - 1)
-        self.tx_bits = whole(state, "tx_bits", 0, 0x7FF)
-        self.tx_left = whole(state, "tx_left", 0, 11)
-        self.tx_value = whole(state, "tx_value", 0, 0xFF)
-        self.tx_delay = whole(state, "tx_delay", 0, 12)
-        self.tx_level = whole(state, "tx_level", 0, 1)
-        self.tx_edge = whole(state, "tx_edge", 0, _FAR)
-        self.tx_coming = whole(state, "tx_coming", 0, 1)
-        self.rx_next = whole(state, "rx_next", 0, _STOPPED)
-        self.rx_period = whole(state, "rx_period", 1, _STOPPED_PERIOD)
-        self.rx_count = whole(state, "rx_count", 0, 0xFF)
-        self.rx_last = whole(state, "rx_last", 0, 1)
-        self.rx_votes = whole(state, "rx_votes", 0, 3)
-        self.rx_bits = whole(state, "rx_bits", 0, 0x1FF)
-        self.rx_done = whole(state, "rx_done", 0, _FAR)
-        self.rx_frame = whole(state, "rx_frame", 0, 0x1FF)
-
-    def check_outputs(self, tick: int) -> None:
-        """Raises ValueError unless a restored port goes on at `tick`: what it sends comes after the edges on TXD."""
+    def check_times(self, tick: int) -> None:
+        """Raises ValueError unless the port goes on at `tick`: what it sends comes after the edges on TXD."""
         if self.txd.last_tick() > tick or self.tx_edge < tick or self.tx_next < tick:
             raise ValueError(f"the serial port has edges of TXD out of order at tick {tick}")
         if self.rx_next < tick:

@@ -125,10 +125,9 @@ class Bench:
         """Registers are written by instructions, ACC last; then PC is set."""
         cpu = self.cpu
         cpu.reset()
-        content = bytearray(256)
-        for address, value in state.iram:
-            content[address] = value
-        cpu.restore({**cpu.snapshot(), "iram": bytes(content)})
+        content = dict(state.iram)
+        for address in range(256):
+            cpu.poke_iram(address, content.get(address, 0))
         pins = dict(state.pins)
         for number, port in enumerate(_PORTS):
             cpu.set_external(number, pins.get(port, 0xFF), 12 * cpu.cycles)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from miro_exact.saved import octets
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
 
@@ -19,6 +18,7 @@ class XramBus(Bus):
     With `code_of` set, the RAM is also that CPU's code memory (EA low, one space for both).
     """
 
+    STATE = {"memory": "65536B"}
     NOT_STATE = ("code_of", "faulted", "sent")
 
     def __init__(self, sent: Callable[[int, int], None], faulted: Callable[[int, int, int], None]) -> None:
@@ -48,9 +48,3 @@ class XramBus(Bus):
 
     def content(self) -> bytes:
         return bytes([self.memory[address] for address in range(0x10000)])
-
-    def snapshot(self) -> dict[str, object]:
-        return {"memory": self.content()}
-
-    def restore(self, state: dict[str, bytes]) -> None:
-        self.fill(octets(state, "memory", 0x10000))

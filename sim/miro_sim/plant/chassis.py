@@ -12,23 +12,25 @@ v = (cl wl + cr wr) / 2 and turns at (cr wr - cl wl) / b; its energy is w' M w /
 
 from __future__ import annotations
 
-from typing import Any
-
 from miro_exact import dmath
-from miro_exact.saved import real
 from miro_sim.plant.params import DriveParams
 
 TICK_S = 1.0 / 24e6
 SWEEPS = 8
-# Of a saved state; far more than a robot's.
-MOST_SPEED_RAD_S = 1e6
-MOST_PLACE_M = 1e9
-MOST_HEADING_RAD = 0.5e6  # `dmath` takes a million
+_SPEED = ("d", -1e6, 1e6)  # far more than a robot's
+_PLACE = ("d", -1e9, 1e9)
 
 
 class Body:
     """Shaft speeds (rad/s) and posture (m, m, rad; the heading is not wrapped) of one robot."""
 
+    STATE = {
+        "left_rad_s": _SPEED,
+        "right_rad_s": _SPEED,
+        "x_m": _PLACE,
+        "y_m": _PLACE,
+        "theta_rad": ("d", -0.5e6, 0.5e6),  # `dmath` takes a million
+    }
     NOT_STATE = (
         "left_m_rad",
         "right_m_rad",
@@ -152,24 +154,6 @@ class Body:
         right = self.right_rad_s
         both = self.mass_ll * left * left + 2.0 * self.mass_lr * left * right + self.mass_rr * right * right
         return 0.5 * both
-
-    def snapshot(self) -> dict[str, object]:
-        """All mutable state."""
-        return {
-            "left_rad_s": self.left_rad_s,
-            "right_rad_s": self.right_rad_s,
-            "x_m": self.x_m,
-            "y_m": self.y_m,
-            "theta_rad": self.theta_rad,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Takes back what `snapshot` gave."""
-        self.left_rad_s = real(state, "left_rad_s", MOST_SPEED_RAD_S)
-        self.right_rad_s = real(state, "right_rad_s", MOST_SPEED_RAD_S)
-        self.x_m = real(state, "x_m", MOST_PLACE_M)
-        self.y_m = real(state, "y_m", MOST_PLACE_M)
-        self.theta_rad = real(state, "theta_rad", MOST_HEADING_RAD)
 
     def __repr__(self) -> str:
         v, w = self.velocity()

@@ -13,6 +13,7 @@ cdef class Winding:
     cdef double drive_decay[2049]
     cdef double diode_decay[2049]
 
+    cpdef int after_load(self) except -1
     cpdef void set_bridge(self, int enable, int forward) noexcept
     @cython.locals(start=double, positive=cython.bint, voltage=double, ohm=double, tau=double, decay=double,
                    final=double, end=double, crossing=double)

@@ -19,10 +19,7 @@ other sign: at most one change of sign in an interval. Source: L298 data sheet (
 
 from __future__ import annotations
 
-from typing import Any
-
 from miro_exact import dmath
-from miro_exact.saved import real, whole
 from miro_sim.plant.params import DriveParams
 
 MAX_TICKS = 2048  # longest interval: one PWM period
@@ -33,6 +30,7 @@ MOST_CURRENT_A = 1e6  # of a saved state; far more than a motor's
 class Winding:
     """Current (A, positive drives forward) in one motor and the state of its bridge."""
 
+    STATE = {"current_a": ("d", -1e6, 1e6), "drive": ("i", -1, 1)}
     NOT_STATE = (
         "drive_v",
         "diode_v",
@@ -111,15 +109,8 @@ class Winding:
         self.current_a = final * (1.0 - dmath.exp(-ticks / tau))
         return final * ticks - tau * self.current_a
 
-    def snapshot(self) -> dict[str, object]:
-        """All mutable state."""
-        return {"current_a": self.current_a, "drive": self.drive}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Takes back what `snapshot` gave."""
-        self.current_a = real(state, "current_a", MOST_CURRENT_A)
-        drive = whole(state, "drive", -1, 1)
-        self.set_bridge(1 if drive != 0 else 0, 1 if drive > 0 else 0)
+    def after_load(self) -> None:
+        self.set_bridge(1 if self.drive != 0 else 0, 1 if self.drive > 0 else 0)
 
     def __repr__(self) -> str:
         mode = "forward" if self.drive > 0 else "backward" if self.drive < 0 else "off"

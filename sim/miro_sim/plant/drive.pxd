@@ -18,6 +18,7 @@ cdef class DifferentialDrive(Plant):
     cdef readonly Body body
 
     cpdef attach(self, Lm629 left, Lm629 right)
+    cpdef int after_load(self) except -1
     cpdef advance(self, long long tick)
     cpdef set_bridge(self, long long tick, int side, int enable, int forward)
     @cython.locals(constant=double, start_tick=cython.longlong, left_charge=double, right_charge=double)

@@ -17,9 +17,7 @@ makes energy only to second order, (kM charge)2 / 2J: by Cauchy-Schwarz less tha
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import tick
+from miro_exact.state import TICK
 from miro_robot.lm629.chip import Lm629
 from miro_robot.plant import Plant
 from miro_sim.plant.chassis import Body
@@ -35,7 +33,15 @@ TICK_S = 1.0 / 24e6
 class DifferentialDrive(Plant):
     """A robot that stands at (x_m, y_m) with heading theta_rad at tick 0, bridges off, A = B = 0."""
 
-    NOT_STATE = ("left", "right", "params", "torque_constant_nm_a", "next_tick")
+    STATE: dict[str, object] = {
+        "tick": TICK,
+        "left_winding": Winding,
+        "right_winding": Winding,
+        "left_encoder": Quadrature,
+        "right_encoder": Quadrature,
+        "body": Body,
+    }
+    NOT_STATE = ("left", "right", "params", "torque_constant_nm_a")
 
     def __init__(
         self, params: DriveParams, x_m: float = 0.0, y_m: float = 0.0, theta_rad: float = 0.0
@@ -117,26 +123,8 @@ class DifferentialDrive(Plant):
         """(m/s forward, rad/s counter-clockwise) at `tick`, constant since the last step; pure."""
         return self.body.velocity()
 
-    def snapshot(self) -> dict[str, object]:
-        """All mutable state."""
-        return {
-            "tick": self.tick,
-            "left_winding": self.left_winding.snapshot(),
-            "right_winding": self.right_winding.snapshot(),
-            "left_encoder": self.left_encoder.snapshot(),
-            "right_encoder": self.right_encoder.snapshot(),
-            "body": self.body.snapshot(),
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Takes back what `snapshot` gave (of a drive with the same parameters)."""
-        self.tick = tick(state, "tick")
+    def after_load(self) -> None:
         self.next_tick = self.tick + LONGEST_STEP
-        self.left_winding.restore(state["left_winding"])
-        self.right_winding.restore(state["right_winding"])
-        self.left_encoder.restore(state["left_encoder"])
-        self.right_encoder.restore(state["right_encoder"])
-        self.body.restore(state["body"])
 
     def __repr__(self) -> str:
         return (

@@ -14,6 +14,7 @@ cdef class Quadrature:
 
     @cython.locals(moved=double, last=cython.longlong)
     cpdef void turn(self, double radians, long long start_tick, int ticks) noexcept
+    cpdef int after_load(self) except -1
     cpdef void show(self) noexcept
     @cython.locals(forward=cython.bint, boundary=cython.longlong, exact=double, after=cython.longlong)
     cdef void _aim(self) noexcept

@@ -9,17 +9,18 @@ Inside a step the shaft turns evenly; an edge falls on the first integer tick at
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import real, whole
-
 MOST_COUNTS = 1 << 50  # of a saved state: doubles still hold quarters of it
 _FAR = 1 << 62
+_MOST_COUNTS = 1 << 50  # doubles still hold fractions of it
 
 
 class Quadrature:
     """Position (counts, float) of one shaft and what A and B show of it."""
 
+    STATE = {
+        "position": ("d", -_MOST_COUNTS, _MOST_COUNTS),
+        "count": ("q", -_MOST_COUNTS, _MOST_COUNTS),
+    }
     NOT_STATE = (
         "counts_per_radian",
         "counts_per_turn",
@@ -96,17 +97,11 @@ class Quadrature:
         """Level of the index channel: low for one count a turn; high for good without one."""
         return 1 if self.counts_per_turn == 0 or self.count % self.counts_per_turn else 0
 
-    def snapshot(self) -> dict[str, object]:
-        """All mutable state (between steps: no edge is waiting)."""
-        return {"position": self.position, "count": self.count}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Takes back what `snapshot` gave."""
-        self.position = real(state, "position", MOST_COUNTS)
-        self.count = whole(state, "count", -MOST_COUNTS, MOST_COUNTS)
+    def after_load(self) -> None:
+        """No edge is waiting. Raises ValueError unless A and B show the position."""
+        self.edge_tick = _FAR
         if not self.count <= self.position < self.count + 1:
             raise ValueError(f"count is {self.count} at position {self.position}")
-        self.edge_tick = _FAR
 
     def __repr__(self) -> str:
         return f"Quadrature(position={self.position!r} A={self.a()} B={self.b()})"

@@ -20,7 +20,7 @@ cdef class Band:
     cdef long long latency
     cdef unsigned long long threshold, burst_threshold
     cdef bint slotted
-    cdef list transmitters
+    cdef readonly list transmitters
 
     cpdef add(self, long long robot, Line line)
     @cython.locals(transmitter=Transmitter, limit='long long')

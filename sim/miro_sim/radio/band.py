@@ -14,11 +14,9 @@ Sampling it as a UART is the business of `uplink`.
 
 from __future__ import annotations
 
-from msgspec import convert
-
 from miro_exact.clock import FAR, HOST_BIT_TICKS, HOST_CHARACTER_TICKS
 from miro_exact.rng import Stream
-from miro_exact.saved import tick
+from miro_exact.state import NEVER_TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
 from miro_sim.radio.params import RadioParams
@@ -35,6 +33,7 @@ class Transmitter:
     Its chains are called NAME/bursts and NAME/dropouts.
     """
 
+    STATE = {"last_edge": ("q", -1, NEVER_TICK)}
     NOT_STATE = ("bursts", "dropouts", "line")
 
     def __init__(self, line: Line, params: RadioParams, seed: int, name: str) -> None:
@@ -43,16 +42,11 @@ class Transmitter:
         self.dropouts = None if params.dropouts is None else Chain(params.dropouts, seed, f"{name}/dropouts")
         self.last_edge = -1
 
-    def snapshot(self) -> dict[str, object]:
-        return {"last_edge": self.last_edge}
-
-    def restore(self, state: dict[str, object]) -> None:
-        self.last_edge = tick(state, "last_edge", -1)
-
 
 class Band:
     """The mixed level. Ticks are the receiver's; queries come in ascending order, below `limit`."""
 
+    STATE = {"transmitters": [Transmitter]}
     NOT_STATE = ("burst_threshold", "errors", "latency", "name", "params", "seed", "slotted", "threshold")
 
     def __init__(self, params: RadioParams, seed: int, name: str) -> None:
@@ -131,11 +125,3 @@ class Band:
         for transmitter in self.transmitters:
             tick = min(tick, transmitter.line.full_tick())
         return tick
-
-    def snapshot(self) -> dict[str, object]:
-        return {"transmitters": [transmitter.snapshot() for transmitter in self.transmitters]}
-
-    def restore(self, state: dict[str, object]) -> None:
-        states = convert(state["transmitters"], list[dict[str, object]])
-        for transmitter, its_state in zip(self.transmitters, states, strict=True):
-            transmitter.restore(its_state)

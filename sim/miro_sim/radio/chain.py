@@ -26,6 +26,8 @@ _ONE = 1 << 32
 class Chain:
     """The chain of one stream. It has no state: slot and answer of the last call are a cache."""
 
+    NOT_STATE = ("stream", "enter", "stay", "slot", "answer")
+
     def __init__(self, params: ChainParams, seed: int, name: str) -> None:
         self.stream = Stream(seed, name)
         self.enter = params.enter

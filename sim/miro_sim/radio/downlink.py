@@ -11,11 +11,9 @@ Networks on one frequency hear each other (`overhear`); the bands up stay apart.
 
 from __future__ import annotations
 
-from msgspec import convert
-
 from miro_exact.clock import HOST_BIT_TICKS, HOST_CHARACTER_TICKS
 from miro_exact.rng import Stream
-from miro_exact.saved import tick
+from miro_exact.state import TICK
 from miro_protocol.transmission import check_bad_stop
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.listener import Listener
@@ -39,6 +37,14 @@ class Downlink:
     snapshot; it belongs to whoever owns them.
     """
 
+    STATE = {
+        "settled_tick": TICK,
+        "free_tick": TICK,
+        "busy_tick": TICK,
+        "sender": Sender,
+        "listeners": [Listener],
+        "overheard": [Sender],
+    }
     NOT_STATE = ("audience", "jitter", "name", "params", "punctual", "seed")
 
     def __init__(self, params: RadioParams, seed: int, name: str) -> None:
@@ -126,29 +132,3 @@ class Downlink:
         self.sender.forget(until_tick)
         for sender in self.overheard:
             sender.forget(until_tick - MEMORY_TICKS)
-
-    def snapshot(self) -> dict[str, object]:
-        state: dict[str, object] = {
-            "settled_tick": self.settled_tick,
-            "free_tick": self.free_tick,
-            "transmissions": self.sender.snapshot(),
-            "listeners": [listener.snapshot() for listener in self.listeners.values()],
-        }
-        if not self.punctual:
-            state["busy_tick"] = self.busy_tick
-        if self.overheard:
-            state["overheard"] = [sender.snapshot() for sender in self.overheard]
-        return state
-
-    def restore(self, state: dict[str, object]) -> None:
-        """Raises ValueError when the snapshot is of a network with another number of listeners."""
-        self.settled_tick = tick(state, "settled_tick")
-        self.free_tick = tick(state, "free_tick")
-        self.busy_tick = tick({"busy_tick": self.free_tick + self.sender.latency, **state}, "busy_tick")
-        self.sender.restore(convert(state["transmissions"], list[list[object]]))
-        heard = convert(state["listeners"], list[dict[str, object]])
-        for listener, its_state in zip(self.listeners.values(), heard, strict=True):
-            listener.restore(its_state)
-        others = convert(state.get("overheard", []), list[list[list[object]]])
-        for sender, its_transmissions in zip(self.overheard, others, strict=True):
-            sender.restore(its_transmissions)

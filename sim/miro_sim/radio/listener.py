@@ -19,11 +19,9 @@ alone, not on how often or up to where one asked.
 
 from __future__ import annotations
 
-from typing import Any
-
 from miro_exact.clock import CHARACTER_BITS, HOST_BIT_TICKS
 from miro_exact.rng import Stream
-from miro_exact.saved import tick
+from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
 from miro_sim.radio.params import RadioParams
@@ -42,6 +40,7 @@ class Listener:
     Characters that its module lost are not counted, nor what it heard of other networks.
     """
 
+    STATE = {"bit_errors": TICK, "slicer": Slicer}
     NOT_STATE = (
         "burst_threshold",
         "bursts",
@@ -224,14 +223,3 @@ class Listener:
             if sender.level(begin) == 1 - level:
                 return self.collision.bit(begin // _BIT)
         return level
-
-    def snapshot(self) -> dict[str, object]:
-        state: dict[str, object] = {"bit_errors": self.bit_errors}
-        if self.slicer is not None:
-            state["slicer"] = self.slicer.snapshot()
-        return state
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.bit_errors = tick(state, "bit_errors")
-        if self.slicer is not None:
-            self.slicer.restore(state["slicer"])

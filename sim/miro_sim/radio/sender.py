@@ -11,10 +11,8 @@ samples once does both in the middle: all of them take the stop bit for bad and 
 
 from __future__ import annotations
 
-from msgspec import convert
-
 from miro_exact.clock import CHARACTER_BITS
-from miro_exact.saved import LAST_TICK
+from miro_exact.state import NEVER_TICK, Rows
 from miro_sim.radio.params import RadioParams, bit_ticks
 
 _CHARACTER = 10
@@ -28,6 +26,14 @@ class Sender:
     for each character, which is 1 where the stop bit is bad.
     """
 
+    STATE = {
+        "transmissions": Rows(
+            *(1 << 16, ("q", 0, NEVER_TICK >> 1), "I", ("s", 1 << 21)),
+            split=lambda row: (row[0], len(row[1]), row[1] + row[2]),
+            make=lambda cells: (cells[0], cells[2][: cells[1]], cells[2][cells[1] :]),
+            ordered=True,
+        )
+    }
     NOT_STATE = ("always_on", "denominator", "keyup", "latency", "numerator")
 
     def __init__(self, params: RadioParams, crystal_offset_ppm: int) -> None:
@@ -93,18 +99,12 @@ class Sender:
         while self.transmissions and self.end(0) <= until:
             del self.transmissions[0]
 
-    def snapshot(self) -> list[list[object]]:
-        """Stops only where a stop bit is bad: a run without any has the bits that it had before there were stops."""
-        return [[start, data, stops] if stops else [start, data] for start, data, stops in self.transmissions]
-
-    def restore(self, state: list[list[object]]) -> None:
-        """Raises ValueError unless they are in order, from tick 0 on, and hold at least a byte each."""
-        rows = [convert(row if len(row) == 3 else [*row, b""], tuple[int, bytes, bytes]) for row in state]
+    def after_load(self) -> None:
+        """Raises ValueError unless each transmission holds a byte at least and none begins within another."""
         before = 0
-        for start, data, stops in rows:
-            if not before <= start <= LAST_TICK // 2 or not data:
+        for start, data, stops in self.transmissions:
+            if start < before or not data or len(stops) not in (0, len(data)):
                 raise ValueError(f"a transmission of {len(data)} bytes at tick {start}, after tick {before}")
             if len(stops) not in (0, len(data)):
                 raise ValueError(f"{len(stops)} stop bits of {len(data)} characters")
             before = start + len(data)
-        self.transmissions = rows

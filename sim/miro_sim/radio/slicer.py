@@ -15,9 +15,7 @@ decision about a bit is taken with the threshold at its beginning.
 
 from __future__ import annotations
 
-from typing import Any
-
-from miro_exact.saved import tick, whole
+from miro_exact.state import TICK
 from miro_sim.radio.params import SlicerParams
 
 _BIT = 2500
@@ -29,6 +27,7 @@ _STEP = 9  # 65536 / 128: a margin in steps of the table
 class Slicer:
     """State: `mean` is the threshold at `tick`, since when the input is `signal` (1, -1, or 0: no carrier)."""
 
+    STATE = {"tick": TICK, "signal": ("i", -1, 1), "mean": ("q", -4 * 65536, 4 * 65536)}
     NOT_STATE = ("gain", "offset", "table")
 
     def __init__(self, params: SlicerParams) -> None:
@@ -71,11 +70,3 @@ class Slicer:
         elif index >= _TABLE:
             index = _TABLE - 1
         return self.table[index]
-
-    def snapshot(self) -> dict[str, object]:
-        return {"tick": self.tick, "signal": self.signal, "mean": self.mean}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.tick = tick(state, "tick")
-        self.signal = whole(state, "signal", -1, 1)
-        self.mean = whole(state, "mean", -4 * _ONE, 4 * _ONE)

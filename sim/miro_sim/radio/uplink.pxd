@@ -12,6 +12,7 @@ cdef class Uplink:
     cdef long long numerator, denominator
     cdef int before, bit, shift
 
+    cpdef int after_load(self) except -1
     @cython.locals(until='long long')
     cpdef list receive(self, long long until_tick)
     cpdef long long full_tick(self) except? -1

@@ -9,10 +9,8 @@ How the level comes about is the business of `band`, what the symbols mean that 
 
 from __future__ import annotations
 
-from msgspec import convert
-
 from miro_exact.clock import CHARACTER_BITS
-from miro_exact.saved import tick, whole
+from miro_exact.state import FLAG, NEVER_TICK, TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.band import Band
 from miro_sim.radio.params import RadioParams
@@ -28,6 +26,15 @@ class Uplink:
     The robots' wires are this object's to forget: edges that it has come past are dropped from them.
     """
 
+    STATE = {
+        "now": TICK,
+        "before": FLAG,
+        "start_tick": ("q", -1, NEVER_TICK),
+        "bit": ("i", 0, 10),
+        "shift": ("i", 0, 0xFF),
+        "bit_errors": TICK,
+        "band": Band,
+    }
     NOT_STATE = ("denominator", "name", "numerator")
 
     def __init__(self, params: RadioParams, seed: int, name: str) -> None:
@@ -112,26 +119,10 @@ class Uplink:
             self.before = level
         self.bit += 1
 
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "now": self.now,
-            "before": self.before,
-            "start_tick": self.start_tick,
-            "bit": self.bit,
-            "shift": self.shift,
-            "bit_errors": self.bit_errors,
-            "band": self.band.snapshot(),
-        }
-
-    def restore(self, state: dict[str, object]) -> None:
-        """Raises ValueError when the snapshot is of a network with another number of robots."""
-        self.now = tick(state, "now")
-        self.before = whole(state, "before", 0, 1)
-        self.start_tick = whole(state, "start_tick", -1, self.now)
-        self.bit = whole(state, "bit", 0, _STOP + 1)
-        self.shift = whole(state, "shift", 0, 0xFF)
-        self.bit_errors = tick(state, "bit_errors")
+    def after_load(self) -> None:
+        """Raises ValueError for a character that would be over already, or has not begun."""
+        if self.start_tick > self.now:
+            raise ValueError(f"a character begins at tick {self.start_tick}, after {self.now}")
         if self.start_tick >= 0 and self.now - self.start_tick > self.numerator * 22 // self.denominator:
             raise ValueError(f"a character that began at tick {self.start_tick} is over at {self.now}")
-        self.band.restore(convert(state["band"], dict[str, object]))
         self.band.hear(self.now)

@@ -49,7 +49,7 @@ def pilot_for(robot: sc.Robot, reference: Trajectory) -> Pilot:
 
 def _remembering(part: Any) -> Any:
     """The part itself, once its memory was found to be as declared."""
-    part.snapshot()
+    part.check_memory()
     return part
 
 

@@ -7,12 +7,10 @@ itself (`radio/`), the order of networks and the clock (`world.py`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal
-
-from msgspec import Meta, convert
+from typing import Any, Literal
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, ticks
-from miro_exact.saved import LAST_TICK, whole
+from miro_exact.state import TICK, Rows
 from miro_host.ear import Ear
 from miro_host.pilot import Command
 from miro_host.station import Station
@@ -30,6 +28,10 @@ from miro_sim.world.events import Event, HostLog
 from miro_sim.world.outbox import LONGEST_BYTES, Outbox
 from miro_sim.world.robot import Robot
 
+LONGEST_TRANSMISSION_TICKS = 1 << 40
+"""Twelve hours: no saved transmission ends later than so long after now."""
+LONGEST_TRANSMISSION_TICKS = 1 << 40
+"""Twelve hours: no saved transmission ends later than so long after now."""
 SETTLE_TICKS = 120
 """How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
 
@@ -38,24 +40,23 @@ Host = Literal["controller", "script", "silent"]
 """Who sends: the PC's controller, once a control period; a script; or only who injects."""
 
 
-SavedSymbol = tuple[Annotated[int, Meta(ge=0, le=0xFF)], bool, Annotated[int, Meta(ge=0, le=LAST_TICK)]]
-
-
 class Network:
     """Station, radio and robots of one frequency. `script` replaces what the station would send."""
 
+    STATE = {
+        "robots": [Robot],
+        "station": Station,
+        "downlink": Downlink,
+        "uplink": Uplink,
+        "ear": Ear,
+        "frames_sent": TICK,
+        "outbox": Outbox,
+        "heard": Rows(1 << 20, "B", "?", TICK),
+    }
+    NOT_HASHED = ("outbox", "heard")  # they depend on when input was announced and where the world stopped
     NOT_STATE = (
-        "spec",
-        "index",
-        "compute_ticks",
-        "keyup_ticks",
-        "noisy_commands",
-        "host",
-        "sent",
-        "seen",
-        "log",  # these three: records
-        "outbox",
-        "heard",  # these two, and what the ear holds: see `pending`
+        *("spec", "index", "host", "compute_ticks", "keyup_ticks", "noisy_commands"),
+        *("sent", "seen", "log"),  # records
     )
 
     def __init__(
@@ -235,42 +236,6 @@ class Network:
             robot.board.faults[:] = faults
             robot.board.log.cut(end)
 
-    def snapshot(self) -> dict[str, object]:
-        """The hashed state; a saved world also holds what `pending` gives."""
-        return {
-            "robots": [robot.snapshot() for robot in self.robots],
-            "station": self.station.snapshot(),
-            "downlink": self.downlink.snapshot(),
-            "uplink": self.uplink.snapshot(),
-            "telemetry": self.ear.decoder.snapshot(),
-            "script_next": 0,  # no state any more; stays until the digest is defined anew
-            "frames_sent": self.frames_sent,
-        }
-
-    def pending(self) -> dict[str, object]:
-        """What is saved, but no part of the digest.
-
-        Outbox and characters heard depend on when input was announced and the world stopped; the robots' last answers
-        follow from the hashed state and what came before.
-        """
-        return {
-            "outbox": self.outbox.snapshot(),
-            "heard": [list(one) for one in self.heard],
-            "answers": self.ear.snapshot()["heard"],
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.outbox.restore(state["outbox"])
-        self.heard = convert(state["heard"], list[SavedSymbol])
-        self.ear.restore_heard(state["answers"])
-        for robot, saved in zip(self.robots, state["robots"], strict=True):
-            robot.restore(saved)
-        self.station.restore(state["station"])
-        self.downlink.restore(state["downlink"])
-        self.uplink.restore(state["uplink"])
-        self.ear.decoder.restore(state["telemetry"])
-        self.frames_sent = whole(state, "frames_sent", 0, LAST_TICK)
-
     def check_times(self, begun_tick: int, tick: int) -> None:
         """Raises ValueError unless the restored parts are at `tick`, in the period that began at `begun_tick`.
 
@@ -281,6 +246,8 @@ class Network:
             raise ValueError(f"the radio is settled up to tick {settled_tick}, at tick {tick}")
         if not begun_tick - CONTROL_PERIOD_TICKS <= self.uplink.now <= tick:
             raise ValueError(f"the PC has heard everything up to tick {self.uplink.now}, at tick {tick}")
+        if max(self.downlink.free_tick, self.downlink.busy_tick) > tick + LONGEST_TRANSMISSION_TICKS:
+            raise ValueError(f"the transmitter is busy until tick {self.downlink.free_tick}, at tick {tick}")
         if any(answer is not None and answer.tick > tick for answer in self.ear.heard):
             raise ValueError(f"a robot's last answer came after tick {tick}")
         for robot in self.robots:

@@ -10,12 +10,12 @@ is saved, but no part of the digest: a run does not depend on when it was announ
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from msgspec import convert
+import msgspec
 
-from miro_exact.saved import LAST_TICK, whole
-from miro_protocol.transmission import DOWN, Transmission, check_bad_stop
+from miro_exact.state import TICK, Rows
+from miro_protocol.transmission import DOWN, Transmission
 
 STATION, INJECTED = 0, 1
 LONGEST_BYTES = 1 << 20
@@ -29,12 +29,38 @@ class Waiting(NamedTuple):
     origin: int
 
 
+def _split(one: Waiting) -> tuple[int, int, int, bytes]:
+    """Tick, origin, number of characters; these, and behind them those whose stop bit is bad, as 1 among 0."""
+    sent = one.sent
+    stops = bytes(place in sent.bad_stop for place in range(len(sent.data))) if sent.bad_stop else b""
+    return sent.tick, one.origin, len(sent.data), sent.data + stops
+
+
+def _made(cells: tuple[int, int, int, bytes]) -> Waiting:
+    """Of network 0; the outbox puts in its own. Raises ValueError for stop bits that are not those of the data."""
+    tick, origin, count, text = cells
+    data, stops = text[:count], text[count:]
+    if len(stops) not in (0, len(data)):
+        raise ValueError(f"has {len(stops)} stop bits for {len(data)} characters")
+    bad_stop = tuple(place for place, bad in enumerate(stops) if bad)
+    return Waiting(Transmission(tick, DOWN, data, 0, bad_stop), origin)
+
+
 class Outbox:
     """Transmissions of the host of `network` that wait, in order. `lead_ticks`: key-up of the carrier.
 
     `dropped`: frames of the station that found the transmitter busy.
     """
 
+    STATE = {
+        "waiting": Rows(
+            *(1 << 20, TICK, ("B", STATION, INJECTED), "I", ("s", 2 * LONGEST_BYTES)),
+            split=_split,
+            make=_made,
+            ordered=True,
+        ),
+        "dropped": TICK,
+    }
     NOT_STATE = ("lead_ticks", "network")
 
     def __init__(self, lead_ticks: int, network: int = 0) -> None:
@@ -94,26 +120,16 @@ class Outbox:
         del self.waiting[:count]
         return taken
 
-    def snapshot(self) -> dict[str, object]:
-        waiting = [[sent.tick, sent.data, origin, list(sent.bad_stop)] for sent, origin in self.waiting]
-        return {"waiting": waiting, "dropped": self.dropped}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Raises ValueError unless the transmissions are in order and hold at least a byte each."""
-        waiting = []
+    def after_load(self) -> None:
+        """Raises ValueError unless each transmission holds a byte at least and none begins within another."""
         free_tick = 0
-        rows = convert(state["waiting"], list[tuple[int, bytes, int, tuple[int, ...]]])
-        for tick, data, origin, bad_stop in rows:
-            if not free_tick <= tick <= LAST_TICK or not 0 < len(data) <= LONGEST_BYTES:
-                raise ValueError(f"{len(data)} characters wait for tick {tick}, behind tick {free_tick}")
-            if origin not in (STATION, INJECTED):
-                raise ValueError(f"characters of an unknown origin {origin} wait")
-            check_bad_stop(bad_stop, len(data))
-            sent = Transmission(tick, DOWN, data, self.network, bad_stop)
-            waiting.append(Waiting(sent, origin))
+        for place, (sent, origin) in enumerate(self.waiting):
+            if sent.tick < free_tick or not sent.data:
+                raise ValueError(
+                    f"{len(sent.data)} characters wait for tick {sent.tick}, behind tick {free_tick}"
+                )
             free_tick = sent.end_tick
-        self.waiting = waiting
-        self.dropped = whole(state, "dropped", 0, LAST_TICK)
+            self.waiting[place] = Waiting(msgspec.structs.replace(sent, network=self.network), origin)
 
 
 def _overlap(one: Transmission, other: Transmission) -> bool:

@@ -8,12 +8,10 @@ it gets the camera's measurement and the robot's last answer by radio, and answe
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_exact.domain import DomainError
 from miro_exact.rng import Stream
-from miro_exact.saved import whole
 from miro_host.ear import Heard
 from miro_host.parts import PartError
 from miro_host.pilot import Command, Pilot
@@ -29,13 +27,13 @@ from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.scenario import keys as sc
 from miro_sim.scenario.build import drive_for, pilot_for, reference_for, vision_for
 
-MOST_FRAMES = 1 << 40
 COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
 
 
 class Robot:
     """A robot on the pitch and its pilot. `network` and `spec.slot` name it in records and noise streams."""
 
+    STATE = {"board": Board, "vision": Vision, "pilot": Pilot, "frame": ("q", 0, 1 << 40)}
     NOT_STATE = (
         "spec",
         "network",
@@ -154,20 +152,6 @@ class Robot:
             left=_axis(self.board.left),
             right=_axis(self.board.right),
         )
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "board": self.board.snapshot(),
-            "vision": self.vision.snapshot(),
-            "pilot": self.pilot.snapshot(),
-            "frame": self.frame,
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.board.restore(state["board"])
-        self.vision.restore(state["vision"])
-        self.pilot.restore(state["pilot"])
-        self.frame = whole(state, "frame", 0, MOST_FRAMES)
 
     def __repr__(self) -> str:
         return f"Robot(net{self.network}/robot{self.spec.slot}, {self.drive!r}, {self.board!r})"

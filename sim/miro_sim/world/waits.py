@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from miro_exact.clock import NEVER_TICK
+from miro_exact.state import Flat
 from miro_protocol.decoder import Decoder, Received
 from miro_sim.world.conditions import Condition
 from miro_sim.world.events import PC, Event, of_board
@@ -60,12 +61,19 @@ class Waits:
         self.backlog: list[Entry] = []
         self.read: dict[tuple[int, int], int] = {}
         self.reached: dict[tuple[int, int], int] = {}
-        self.decoders: dict[tuple[int, int], Decoder] = {}
+        self.decoders: dict[tuple[int, int], Decoder] = {}  # made by the first wait
+        self.states: dict[tuple[int, int], Flat] = {}
         for index, network in enumerate(self.world.networks):
             self.read[index, PC] = network.log.end
             for robot in network.robots:
                 self.read[index, robot.spec.slot] = robot.board.log.end
+
+    def _make_decoders(self) -> None:
+        """One for each robot, of what its receiver hears."""
+        for index, network in enumerate(self.world.networks):
+            for robot in network.robots:
                 self.decoders[index, robot.spec.slot] = Decoder(network.spec.robots)
+        self.states = {place: Flat(decoder) for place, decoder in self.decoders.items()}
 
     def until(self, conditions: Sequence[Condition], within: int | None) -> Event:
         """See `World.run_until`."""
@@ -74,6 +82,8 @@ class Waits:
             raise ValueError(f"within {within}: give a number of ticks that is not negative")
         deadline = NEVER_TICK if within is None else world.tick + within
         seen: list[Event] = []
+        if not self.decoders:
+            self._make_decoders()
         with Watch(world, conditions) as watch:
             self.backlog += watch.true_now()
             self._gather(watch)
@@ -180,8 +190,8 @@ class Waits:
     def _go_back(self, place: _Place) -> None:
         self.backlog = list(place.backlog)
         self.read = dict(place.read)
-        for key, state in place.decoders.items():
-            self.decoders[key].restore(state)
+        for key, state in place.states.items():
+            self.states[key].load(state)
 
 
 class _Place:
@@ -191,4 +201,4 @@ class _Place:
         self.next_edge = watch.next_edge
         self.backlog = list(waits.backlog)
         self.read = dict(waits.read)
-        self.decoders = {place: decoder.snapshot() for place, decoder in waits.decoders.items()}
+        self.states = {place: state.save() for place, state in waits.states.items()}

@@ -20,10 +20,9 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from miro_exact.canonical import encode
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
-from miro_exact.saved import whole
 from miro_exact.seed import MAX_SEED
+from miro_exact.state import TICK, Flat, Octets
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
@@ -34,26 +33,18 @@ from miro_sim.world.conditions import Condition
 from miro_sim.world.events import Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
+from miro_sim.world.saved import Identity, opened, sealed
 from miro_sim.world.waits import Waits
 
-SAVE_FORMAT = 5
-"""Raised whenever a saved world of before would no longer mean the same."""
 MOST_PERIODS = 1 << 34
-"""Of a saved world: ticks up to then fit into 64 bits, and so do the products that are made of them."""
-SAVE_BEGIN = b"mirotwin world\n"
-_SUM_BYTES = hashlib.sha256().digest_size
-_NOT_A_STATE = (
-    *(KeyError, IndexError, TypeError, AttributeError, OverflowError, ZeroDivisionError),
-    *(AssertionError, RecursionError, ValueError),
-)
-"""What reading a state raises when it is not one."""
+"""Ticks up to then fit into 64 bits, and so do the products that are made of them."""
 
 
 class Mark(NamedTuple):
     """A moment of a world: its state, and the records of the period under way, which are no state."""
 
     tick: int
-    state: dict[str, Any]
+    state: bytes
     records: list[Any]
     touching: list[Pair]
 
@@ -65,7 +56,26 @@ class World:
     Raises ValueError for those that do, that are of no host, or of a network that the scenario does not have.
     """
 
-    NOT_STATE = ("scenario", "seed", "image", "periods", "last", "bodies", "waits")
+    STATE = {
+        "tick": TICK,
+        "index": ("q", 0, MOST_PERIODS),
+        "in_period": "?",
+        "stopped": "?",
+        "chain": Octets(32),
+        "networks": [Network],
+    }
+    NOT_STATE = (
+        "scenario",
+        "seed",
+        "image",
+        "periods",
+        "last",
+        "bodies",
+        "waits",
+        "_state",
+        "_own",
+        "_opened",
+    )
 
     def __init__(
         self, scenario: Scenario, seed: int, image: Image, script: Sequence[Transmission] | None = None
@@ -102,10 +112,13 @@ class World:
         self.last: Period | None = None
         self.bodies = Bodies([robot for network in self.networks for robot in network.robots])
         self.waits = Waits(self)
+        self._state: Flat | None = None
+        self._own: Identity | None = None
+        self._opened: tuple[bytes, bytes] | None = None  # a saved world that is whole, and its state
 
     @property
     def digest(self) -> str:
-        """SHA-256 chain over the canonical state, one link per finished control period, in hex."""
+        """SHA-256 in hex over the state at the end of the last control period, which holds the digest before."""
         return self.chain.hex()
 
     @property
@@ -219,17 +232,17 @@ class World:
         index, begun = self.index, self.index * CONTROL_PERIOD_TICKS
         self.in_period = False
         self.index += 1
-        self.chain = hashlib.sha256(self.chain + encode(self.hashed())).digest()
+        self.chain = hashlib.sha256(self.state.hashed()).digest()
         self.last = Period(index=index, tick=begun, robots=robots, wire=wire, digest=self.digest)
 
     def mark(self) -> Mark:
         """Where the world is, to go back to within the same period."""
         records = [network.records() for network in self.networks]
-        return Mark(self.tick, self.snapshot(), records, self.bodies.touching)
+        return Mark(self.tick, self.state.save(), records, self.bodies.touching)
 
     def go_back(self, mark: Mark) -> None:
         """To where `mark` was given."""
-        self.restore(mark.state)
+        self.state.load(mark.state)
         for network, records in zip(self.networks, mark.records, strict=True):
             network.put_back(records)
         self.bodies.touching = mark.touching
@@ -254,86 +267,50 @@ class World:
             },
         }
 
-    def snapshot(self) -> dict[str, object]:
-        """Every mutable bit of the world, as nested plain values."""
-        state = self.hashed()
-        state["networks"] = [{**network.snapshot(), **network.pending()} for network in self.networks]
-        return state
-
-    def hashed(self) -> dict[str, object]:
-        """The same without what `Network.pending` adds: what the digest is made of."""
-        return {
-            "tick": self.tick,
-            "index": self.index,
-            "in_period": self.in_period,
-            "stopped": self.stopped,
-            "chain": self.chain,
-            "networks": [network.snapshot() for network in self.networks],
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Puts back what `snapshot` gave."""
-        self.index = whole(state, "index", 0, MOST_PERIODS)
-        begun = self.index * CONTROL_PERIOD_TICKS
-        self.in_period = bool(whole(state, "in_period", 0, 1))
-        self.stopped = bool(whole(state, "stopped", 0, 1))
-        self.tick = whole(state, "tick", 0 if self.stopped else begun, begun + CONTROL_PERIOD_TICKS - 1)
-        self.chain = msgspec.convert(state["chain"], bytes)
-        for network, saved in zip(self.networks, state["networks"], strict=True):
-            network.restore(saved)
-            network.check_times(begun, self.tick)
+    @property
+    def state(self) -> Flat:
+        """All that can change in a run, as flat bytes: to save, load, compare and name what differs."""
+        if self._state is None:
+            self._state = Flat(self)
+        return self._state
 
     def save(self) -> bytes:
-        """The whole state as bytes, to go on from with `load`: at any tick, also in the middle of a byte.
-
-        `SAVE_BEGIN`, the SHA-256 of the rest, and the rest: a map in msgpack.
-        """
-        return sealed(
-            msgspec.msgpack.encode({"format": SAVE_FORMAT, **self._identity(), "state": self.snapshot()})
-        )
+        """The whole state as bytes, to go on from with `load`: at any tick, also in the middle of a byte."""
+        return sealed(self.identity(), self.state.save())
 
     def load(self, saved: bytes) -> None:
         """Goes on from what `save` gave.
 
-        Raises ValueError when that was changed, or is from another scenario, seed, firmware or version; after that
-        this world may hold a part of it and is of no use.
+        Raises ValueError, and stays as it is, for anything else: a world of another scenario, seed, firmware or version
+        of this program, one that is damaged, and one whose values cannot be.
         """
-        try:
-            content = msgspec.msgpack.decode(_opened(saved))
-        except (msgspec.DecodeError, RecursionError) as error:
-            raise ValueError(f"not a saved world: {error}") from error
-        for key, own in {"format": SAVE_FORMAT, **self._identity()}.items():
-            found = content.get(key) if isinstance(content, dict) else None
-            if found != own:
-                raise ValueError(f"saved world has {key} {found!r}, this one has {own!r}")
-        try:
-            self.restore(content["state"])
-        except _NOT_A_STATE as error:
-            reason = error if isinstance(error, ValueError) else repr(error)
-            raise ValueError(f"not a saved world: {' '.join(str(reason).split())[:200]}") from error
+        if self._opened is None or self._opened[0] is not saved:
+            self._opened = (saved, opened(saved, self.identity()))
+        self.state.load(self._opened[1])
         self.waits.forget()
 
-    def _identity(self) -> dict[str, object]:
-        scenario = hashlib.sha256(msgspec.json.encode(self.scenario, order="sorted")).hexdigest()
-        return {"scenario": scenario, "seed": self.seed, "firmware": self.image.sha256}
+    def after_load(self) -> None:
+        """Raises ValueError unless all parties stand where the world does."""
+        begun = self.index * CONTROL_PERIOD_TICKS
+        first = begun - CONTROL_PERIOD_TICKS if self.stopped else begun
+        last = begun + CONTROL_PERIOD_TICKS - 1 if self.in_period or self.stopped else begun
+        if not first <= self.tick <= last:
+            raise ValueError(f"the world is at tick {self.tick}, but period {self.index} begins at {begun}")
+        if len(self.chain) != (hashlib.sha256().digest_size if self.index else 0):
+            raise ValueError(f"the digest has {len(self.chain)} bytes after {self.index} periods")
+        for network in self.networks:
+            network.check_times(begun, self.tick)
+
+    def identity(self) -> Identity:
+        """What a saved world must belong to so that this one can load it."""
+        if self._own is None:
+            scenario = hashlib.sha256(msgspec.json.encode(self.scenario, order="sorted")).hexdigest()
+            firmware = self.image.sha256 or hashlib.sha256(self.image.code).hexdigest()  # "": not from a file
+            self._own = Identity(self.state.tables(), scenario, firmware, self.seed)
+        return self._own
 
     def __repr__(self) -> str:
         return f"World({self.scenario.name}, seed={self.seed}, tick={self.tick}, digest={self.digest[:12]})"
-
-
-def sealed(content: bytes) -> bytes:
-    """`content` behind its checksum, as `World.load` expects it."""
-    return SAVE_BEGIN + hashlib.sha256(content).digest() + content
-
-
-def _opened(saved: bytes) -> bytes:
-    """What was sealed. Raises ValueError when a byte of it has changed since."""
-    if not saved.startswith(SAVE_BEGIN):
-        raise ValueError("not a saved world: it does not begin like one; save it again with this version")
-    content = saved[len(SAVE_BEGIN) + _SUM_BYTES :]
-    if sealed(content) != saved:
-        raise ValueError("not a saved world: its checksum is wrong, so it was changed or cut off")
-    return content
 
 
 def _total(values: Sequence[int | None]) -> int | None:

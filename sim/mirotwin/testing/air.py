@@ -5,14 +5,18 @@ What belongs here: changing levels. What does not: the radio itself (`miro_sim.r
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
-from msgspec import Struct, convert
+from msgspec import Struct
 
 from miro_exact.clock import HOST_BIT_TICKS
 from miro_exact.rng import Stream
+from miro_exact.state import FLAG, TICK, Rows
 from miro_protocol.line import Edge
 from miro_robot.mcs51.line import Line
+
+Kind = Literal["burst", "mark"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 class Trouble(Struct, frozen=True, array_like=True):
@@ -20,13 +24,24 @@ class Trouble(Struct, frozen=True, array_like=True):
 
     start_tick: int
     end_tick: int
-    kind: Literal["burst", "mark"]
+    kind: Kind
 
 
 class Air:
     """Takes levels from `heard`, gives them to `rxd`, but for the troubles announced; seeds as in `rng.Stream`."""
 
-    NOT_STATE = ("heard", "rxd", "noise")
+    STATE = {
+        "heard": Line,
+        "troubles": Rows(
+            *(1 << 16, TICK, TICK, ("B", 0, len(KINDS) - 1)),
+            split=lambda one: (one.start_tick, one.end_tick, KINDS.index(one.kind)),
+            make=lambda cells: Trouble(cells[0], cells[1], KINDS[cells[2]]),
+            ordered=True,
+        ),
+        "settled_tick": TICK,
+        "level": FLAG,
+    }
+    NOT_STATE = ("rxd", "noise")
 
     def __init__(self, heard: Line, rxd: Line, seed: int, name: str) -> None:
         self.heard = heard
@@ -73,17 +88,3 @@ class Air:
             if trouble.start_tick <= tick < trouble.end_tick:
                 return 1 if trouble.kind == "mark" else self.noise.bit(tick // HOST_BIT_TICKS)
         return self.heard.level_at(tick)
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "heard": self.heard.snapshot(),
-            "troubles": [[one.start_tick, one.end_tick, one.kind] for one in self.troubles],
-            "settled_tick": self.settled_tick,
-            "level": self.level,
-        }
-
-    def restore(self, state: dict[str, object]) -> None:
-        self.heard.restore(convert(state["heard"], dict[str, object]))
-        self.troubles = convert(state["troubles"], list[Trouble])
-        self.settled_tick = convert(state["settled_tick"], int)
-        self.level = convert(state["level"], int)

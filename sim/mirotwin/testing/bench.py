@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import hashlib
 from functools import cache
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import msgspec
 
-from miro_exact.canonical import encode as canonical
 from miro_exact.clock import HOST_BIT_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND
+from miro_exact.state import TICK, Rows, restore, snapshot
 from miro_protocol.decoder import Decoder, Received, Symbol, TelemetryDecoder
 from miro_protocol.frames import Message, TelemetryFrame, describe, encode
 from miro_protocol.freshness import Freshness
@@ -65,6 +65,23 @@ class Bench:
     chance nor be off the host's baud rate: frames, noise and trouble change on one grid of bits. ValueError otherwise.
     """
 
+    STATE = {
+        "now": TICK,
+        "booted_tick": TICK,
+        "possible": Rows(
+            *(1 << 20, TICK, TICK, TICK, TICK),
+            split=lambda entry: (entry[0], *entry[1]),
+            make=lambda cells: (cells[0], cells[1:]),
+        ),
+        "board": Board,
+        "downlink": Downlink,
+        "air": Air,
+        "uplink": Uplink,
+        "receiver": LineReceiver,
+        "decoder": Decoder,
+        "freshness": Freshness,
+        "telemetry": TelemetryDecoder,
+    }
     NOT_STATE = ("n", "slot", "radio", "seed", "image", "addresses", "sent", "heard", "answers")
 
     def __init__(
@@ -240,43 +257,16 @@ class Bench:
     def reloaded(self) -> Bench:
         """A new bench that goes on where this one is. LinkFailure unless its state is the same to the last bit."""
         other = Bench(self.n, self.slot, self.radio, self.seed, self.image)
-        other.restore(msgspec.msgpack.decode(msgspec.msgpack.encode(self.snapshot())))
-        if other.digest() != self.digest():
+        saved = snapshot(self)
+        restore(other, saved)
+        if snapshot(other) != saved:
             self.fail(f"tick {self.now}: the state changes when it is saved and loaded")
         other.sent, other.heard, other.answers = list(self.sent), list(self.heard), list(self.answers)
         return other
 
     def digest(self) -> str:
-        """SHA-256 of the canonical state."""
-        return hashlib.sha256(canonical(self.snapshot())).hexdigest()
-
-    def snapshot(self) -> dict[str, object]:
-        return {
-            "now": self.now,
-            "booted_tick": self.booted_tick,
-            "possible": [[tick, list(counters)] for tick, counters in self.possible],
-            "board": self.board.snapshot(),
-            "downlink": self.downlink.snapshot(),
-            "air": self.air.snapshot(),
-            "uplink": self.uplink.snapshot(),
-            "receiver": self.receiver.snapshot(),
-            "decoder": self.decoder.snapshot(),
-            "freshness": self.freshness.snapshot(),
-            "telemetry": self.telemetry.snapshot(),
-        }
-
-    def restore(self, state: dict[str, Any]) -> None:
-        self.now = state["now"]
-        self.booted_tick = state["booted_tick"]
-        self.possible = msgspec.convert(state["possible"], list[tuple[int, Counters]])
-        self.board.restore(state["board"])
-        self.downlink.restore(state["downlink"])
-        self.air.restore(state["air"])
-        self.uplink.restore(state["uplink"])
-        self.receiver.restore(state["receiver"])
-        self.decoder.restore(state["decoder"])
-        self.freshness.restore(state["freshness"])
-        self.telemetry.restore(state["telemetry"])
+        """SHA-256 of the state."""
+        return hashlib.sha256(snapshot(self)).hexdigest()
 
     def __repr__(self) -> str:
         return f"Bench(n={self.n}, slot={self.slot}, now={self.now}, counters={self.counters}, {self.radio})"

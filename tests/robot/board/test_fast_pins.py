@@ -4,6 +4,7 @@ import itertools
 
 from tests.robot.board.rig import board_with, image_of
 
+from miro_exact.state import snapshot
 from miro_robot.bare.machine import BareMachine
 from miro_robot.mcs51.cpu import REACHED, WIRE_FULL
 
@@ -60,4 +61,4 @@ def test_waiting_changes_no_bit():
             pieces.cpu.txd.hear(pieces.cpu.txd.full_tick())
         if tick >= 1_000_000:
             break
-    assert pieces.snapshot() == whole.snapshot()
+    assert snapshot(pieces) == snapshot(whole)

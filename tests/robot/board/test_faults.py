@@ -14,6 +14,7 @@ import pytest
 from tests import children
 from tests.robot.board.rig import CYCLE, MS, RESET, START, board_with, raw_movx_wiring
 
+from miro_exact.state import restore, snapshot, values
 from miro_robot.board import Board
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.plant import Plant
@@ -188,18 +189,18 @@ def test_saving_in_a_starving_interrupt_does_not_shift_the_fault():
     for ms in (0.5, 1.0, 4.5, 10.99):
         first, second = board_with(STUCK_INTERRUPT), board_with(STUCK_INTERRUPT)
         first.run(int(ms * MS))
-        second.restore(first.snapshot())
+        restore(second, snapshot(first))
         second.run(12 * MS)
         assert second.faults == whole.faults
-        assert second.snapshot() == whole.snapshot()
+        assert snapshot(second) == snapshot(whole)
 
 
-def test_marks_stand_in_a_snapshot_only_while_interrupts_hold_the_cpu():
+def test_marks_are_saved_only_while_interrupts_hold_the_cpu():
     board = board_with(STUCK_INTERRUPT)
     board.run(MS // 2)
-    assert "marks" not in board.cpu.snapshot()
+    assert values(board.cpu)["marks"] == 0
     board.run(3 * MS + 100)
-    assert board.cpu.snapshot()["marks"] == 3
+    assert values(board.cpu)["marks"] == 3
 
 
 def test_how_a_run_is_cut_does_not_shift_the_fault():

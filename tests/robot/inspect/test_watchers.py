@@ -8,6 +8,7 @@ from tests.naive import watching
 from tests.robot.mcs51.asm import assemble
 from tests.robot.mcs51.rig import RecordingBus
 
+from miro_exact.state import snapshot
 from miro_robot.inspect.activity import Activity
 from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.watcher import Watcher, attach, detach
@@ -114,9 +115,9 @@ def test_a_watched_run_ends_in_the_same_state_and_tells_each_step(code, cuts):
     attach(watched, log)
     run(plain, cuts)
     run(watched, cuts)
-    assert watched.snapshot() == plain.snapshot()
+    assert snapshot(watched) == snapshot(plain)
     taken = watching.steps(naive, plain.cycles)
-    assert naive.snapshot() == plain.snapshot()
+    assert snapshot(naive) == snapshot(plain)
     assert shown(log.steps) == shown(taken)
 
 

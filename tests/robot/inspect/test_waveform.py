@@ -13,6 +13,7 @@ from tests.naive.waveform import Sampler, Treadmill
 from tests.robot.inspect.reading import read
 from tests.robot.mcs51.asm import assemble
 
+from miro_exact.state import restore, snapshot
 from miro_protocol.frames import TeamFrame, encode
 from miro_robot import inspect
 from miro_robot.board import Board
@@ -88,13 +89,13 @@ def sampled(sampler, first_tick, end_tick):
 )
 def test_every_edge_of_every_wire_is_where_a_look_on_every_tick_finds_it(begin, length, moving):
     board = board_at(begin)
-    state = board.snapshot()
+    state, cycles = snapshot(board), board.cpu.cycles
     text = waveform_of(board, begin, begin + length, piece=7_777)
     vcd = read(text.encode())
-    assert vcd.first_tick == (12 * state["cpu"]["cycles"] + SETTLING_TICKS if begin else 0)
+    assert vcd.first_tick == (12 * cycles + SETTLING_TICKS if begin else 0)
     assert vcd.last_tick >= begin + length - PWM_TICKS - 60
     twin = board_at(0)
-    twin.restore(state)
+    restore(twin, state)
     sampler = Sampler(twin.cpu, twin)
     sampler.run(vcd.last_tick)
     expected = sampled(sampler, vcd.first_tick, vcd.last_tick)
@@ -228,7 +229,7 @@ def test_who_is_watched_does_the_same_and_is_left_alone_after():
     watched, free = board_at(0), board_at(0)
     waveform_of(watched, 0, 30 * MS)
     free.run(30 * MS)
-    assert watched.snapshot() == free.snapshot()
+    assert snapshot(watched) == snapshot(free)
     assert watched.cpu.inspector is None
     assert watched.probe is None
     assert watched.left.encoder_edges is watched.right.encoder_edges is None

@@ -3,6 +3,7 @@
 import pytest
 from tests.robot.lm629.bench import Bench
 
+from miro_exact.state import snapshot
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.options import Lm629Options
 
@@ -226,7 +227,7 @@ def test_two_chips_take_one_write():
     for bench in benches:
         bench.write(0, 0x01)
         bench.sample(3)
-    assert chips[0].snapshot() == chips[1].snapshot()
+    assert snapshot(chips[0]) == snapshot(chips[1])
     assert chips[0].desired_position == 3
     assert chips[0].commands[-1] == chips[1].commands[-1]
 

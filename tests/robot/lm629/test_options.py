@@ -9,8 +9,9 @@ import msgspec
 import pytest
 from tests.robot.lm629.bench import Bench
 
+from miro_exact.state import restore, snapshot, values
 from miro_robot.lm629.chip import Lm629
-from miro_robot.lm629.options import CHOICES, DEFAULT_OPTIONS, LENGTHS, Lm629Options
+from miro_robot.lm629.options import CHOICES, LENGTHS, Lm629Options
 
 MOTOR_OFF, BREAKPOINT, EXCESS, COMPLETE, ERROR = 0x80, 0x40, 0x20, 0x04, 0x02
 ACQUIRE_INDEX = 0x0001
@@ -434,9 +435,8 @@ def test_a_chip_with_other_readings_is_saved_with_what_they_need():
     bench.reset()
     assert excess_again(bench) == 0
     other = Lm629(options)
-    other.restore(bench.chip.snapshot())
+    restore(other, snapshot(bench.chip))
     other.advance(bench.chip.sample_tick)
     bench.sample()
-    assert other.snapshot() == bench.chip.snapshot()
-    assert "excessive" in other.snapshot()
-    assert "excessive" not in Lm629(DEFAULT_OPTIONS).snapshot()
+    assert snapshot(other) == snapshot(bench.chip)
+    assert values(other)["excessive"] == 1

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from tests.robot.mcs51.asm import assemble
 
+from miro_exact.state import restore, snapshot
 from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.faults import FaultKind
 from miro_robot.image import Image, Symbols
@@ -153,7 +154,7 @@ def test_a_run_that_is_paused_is_the_same_run(text, step):
     while (cut_ended := cut.run(max_cycles=limit, pause=pause)) == Ended.PAUSED:
         pause += step if pause < 20_000 else 100_000
     assert cut_ended == ended
-    assert cut.snapshot() == whole.snapshot()
+    assert snapshot(cut) == snapshot(whole)
 
 
 def test_a_fault_names_kind_place_and_tick():
@@ -209,11 +210,11 @@ def test_a_saved_machine_goes_on_with_the_same_bits():
     machine = BareMachine(image(ECHO), stdin=b"some words to echo")
     machine.run(max_cycles=11_111)
     other = BareMachine(image(ECHO))
-    other.restore(machine.snapshot())
-    assert other.snapshot() == machine.snapshot()
+    restore(other, snapshot(machine))
+    assert snapshot(other) == snapshot(machine)
     machine.run(max_cycles=60_000)
     other.run(max_cycles=60_000)
-    assert other.snapshot() == machine.snapshot()
+    assert snapshot(other) == snapshot(machine)
 
 
 @pytest.mark.parametrize(

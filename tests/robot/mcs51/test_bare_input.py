@@ -5,6 +5,7 @@ from itertools import pairwise
 import pytest
 from tests.robot.mcs51.test_bare import AUTOBAUD, ECHO, SERIAL, image
 
+from miro_exact.state import restore, snapshot
 from miro_robot.bare.input import Piece
 from miro_robot.bare.machine import BareMachine, Ended
 
@@ -96,7 +97,7 @@ def test_a_dialogue_that_is_cut_and_saved_is_the_same(step):
     pause = step
     while cut.run(pause=pause) == Ended.PAUSED:
         pause += step
-        other.restore(cut.snapshot())
+        restore(other, snapshot(cut))
         cut, other = other, cut
-    assert cut.snapshot() == whole.snapshot()
+    assert snapshot(cut) == snapshot(whole)
     assert bytes(whole.cpu.peek_iram(0x40 + number) for number in range(4)) == b"xyz\r"

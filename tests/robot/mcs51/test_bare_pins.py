@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from tests.robot.mcs51.test_bare import SERIAL, image
 
 from miro_exact.bad_input import BadInput
+from miro_exact.state import restore, snapshot
 from miro_robot.bare.input import Piece
 from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.bare.pins import PinEvent, read_pins
@@ -88,10 +89,10 @@ def test_pins_and_pauses_give_the_same_bits(step):
     for pause in range(step, 8_000, step):
         cut.run(max_cycles=8_000, pause=pause)
         if pause % (5 * step) == 0:
-            other.restore(cut.snapshot())
+            restore(other, snapshot(cut))
             cut, other = other, cut
     cut.run(max_cycles=8_000)
-    assert cut.snapshot() == whole.snapshot()
+    assert snapshot(cut) == snapshot(whole)
 
 
 def test_edges_on_every_tick_are_taken_in_bounded_steps():

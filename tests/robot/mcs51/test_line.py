@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miro_exact.state import restore, snapshot
 from miro_robot.mcs51.line import FAR, Line
 
 EDGES = st.lists(st.tuples(st.integers(0, 20), st.integers(0, 1)), max_size=40)
@@ -55,8 +56,8 @@ def test_a_restored_line_equals_the_one_saved(initial, steps):
     line, _ = built(initial, steps)
     line.settled_tick = 77
     other = Line()
-    other.restore(line.snapshot())
-    assert other.snapshot() == line.snapshot()
+    restore(other, snapshot(line))
+    assert snapshot(other) == snapshot(line)
     assert other.edges() == line.edges()
 
 

@@ -15,6 +15,7 @@ from tests.naive.mcs51_uart import NaiveUart
 from tests.robot.mcs51.asm import SFRS
 from tests.robot.mcs51.rig import RecordingBus, cpu_with, sfr
 
+from miro_exact.state import snapshot
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.line import FAR
 
@@ -475,4 +476,4 @@ def test_a_start_bit_around_a_change_of_clock_wakes_a_sleeper_however_the_run_is
     the first one of the new."""
     whole, cut = asleep_with_a_start_bit_at(fall, 3000), asleep_with_a_start_bit_at(fall, 10)
     assert whole.peek_iram(0x30) == cut.peek_iram(0x30)
-    assert whole.snapshot() == cut.snapshot()
+    assert snapshot(whole) == snapshot(cut)

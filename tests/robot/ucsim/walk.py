@@ -111,8 +111,7 @@ class Walker:
         p0 = cpu.sfr(P0)
         cpu.txd.forget(cpu.txd.settled_tick)  # nobody listens
         cpu.step()
-        iram = cpu.snapshot()["iram"]
-        assert isinstance(iram, bytes)
+        iram = bytes([cpu.peek_iram(address) for address in range(256)])
         registers = bytes([cpu.sfr(address) for address in COMPARED])
         changed_p0 = opcode in MOVX and p0 != 0xFF
         return Step(pc, opcode, moved, state, changed_p0, cpu.pc, cpu.cycles - begin, iram, registers)

@@ -1,5 +1,7 @@
 """What the drive's tests do with a drive: PWM as the board gives it, and a script that any engine can run."""
 
+from miro_exact.state import Flat
+
 PERIOD = 2048
 
 
@@ -28,9 +30,6 @@ def trace(make, periods):
     lines = []
     for left, right in PATTERN:
         pwm(drive, left, right, periods)
-        state = drive.snapshot()
-        for part in sorted(state):
-            value = state[part]
-            numbers = value.values() if isinstance(value, dict) else (value,)
-            lines.append(part + " " + " ".join(float(number).hex() for number in numbers))
+        state = Flat(drive)
+        lines += [f"{path} {float(number).hex()}" for path, number in state.decode(state.save()).items()]
     return lines

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.naive.plant import quadrature_edges
 
+from miro_exact.state import restore, snapshot
 from miro_sim.plant.encoder import Quadrature
 
 FAR = 1 << 62
@@ -63,7 +64,7 @@ def test_a_snapshot_keeps_position_and_count():
     encoder = Quadrature(3.0)
     edges(encoder, -7.3, 0, 100)
     other = Quadrature(3.0)
-    other.restore(encoder.snapshot())
-    assert other.snapshot() == encoder.snapshot()
+    restore(other, snapshot(encoder))
+    assert snapshot(other) == snapshot(encoder)
     assert repr(other) == repr(encoder)
     assert edges(other, 5.0, 0, 99) == edges(encoder, 5.0, 0, 99)

@@ -5,6 +5,7 @@ import hashlib
 from tests.naive.radio import wire_bits
 
 from miro_exact.rng import Stream
+from miro_exact.state import snapshot
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import ChainParams, Downlink, RadioParams, SlicerParams, Uplink
 
@@ -55,5 +56,5 @@ def exercise(seed: int, radio: RadioParams) -> str:
         for line in rxd:
             heard.update(repr(line.edges()).encode())
             line.forget(begin + PERIOD)
-        heard.update(repr([down.snapshot(), up.snapshot()]).encode())
+        heard.update(repr([snapshot(down), snapshot(up)]).encode())
     return heard.hexdigest()

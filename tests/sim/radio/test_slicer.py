@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from tests.naive import radio as naive
 from tests.sim.radio.strategies import slicers
 
+from miro_exact.state import restore, snapshot, values
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import Downlink, RadioParams, SlicerParams
 from miro_sim.radio.probability import fsk_threshold
@@ -23,7 +24,7 @@ def test_threshold_and_chances_are_those_of_the_naive_twin(params, steps):
         tick += step
         slicer.hear(tick, signal)
         twin.hear(tick, signal)
-        assert slicer.snapshot() == {"tick": twin.tick, "signal": twin.signal, "mean": twin.mean}
+        assert values(slicer) == {"tick": twin.tick, "signal": twin.signal, "mean": twin.mean}
         assert [slicer.threshold(level) for level in (0, 1)] == [twin.chance(level) for level in (0, 1)]
 
 
@@ -87,5 +88,5 @@ def test_key_up_without_enough_preamble_costs_bits():
 def test_a_state_can_be_put_back():
     slicer = fed(TYPICAL, 1, 1, -1)
     other = Slicer(TYPICAL)
-    other.restore(slicer.snapshot())
+    restore(other, snapshot(slicer))
     assert repr(other) == repr(slicer)

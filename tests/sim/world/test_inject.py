@@ -3,7 +3,8 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.sim.world.rig import PERIOD, fig6, two_networks
+from tests.sim.world.random_cuts import differing
+from tests.sim.world.rig import PERIOD, fig6, image, two_networks
 
 from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.frames import TeamFrame, encode
@@ -205,3 +206,7 @@ def test_what_waits_to_be_sent_is_saved_but_not_part_of_the_digest():
     world.run_to(5 * PERIOD)
     assert other.digest == world.digest
     assert other.networks[0].frames_sent == 1
+
+
+def test_runs_that_are_cut_anywhere_and_told_at_any_moment_have_the_digest_of_the_run_in_one_piece():
+    assert differing(250, 1, image(), lambda done: None) == []

@@ -1,0 +1,1 @@
+# C layout of miro_exact.fields: none; compiled for its calls.

@@ -1,0 +1,329 @@
+"""The kinds of fields that a table of state may name, and their flat bytes.
+
+What belongs here: one kind a class: how a value becomes bytes, how bytes become a value that may be put back, and where
+it stands in a part. What does not: tables of parts and whole states (`state.py`), memory of compiled parts
+(`memory.pyx`, which writes the same bytes).
+
+All bytes are little-endian, without padding, as Python's `struct` writes them with `<`. What comes from bytes is
+checked here: a value out of its range, a length beyond the room, NaN and an early end are a ValueError.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
+from typing import Any, Protocol
+
+Bounds = tuple[Any, Any]
+Column = str | tuple[str, int] | tuple[str, Any, Any]
+"""A `struct` code, with the least and the greatest value if not all will do; "s" is bytes, ("s", room) many."""
+
+NEVER_TICK = 1 << 62
+"""Tick of an event that will not happen; no tick lies beyond it."""
+TICK = ("q", 0, NEVER_TICK)
+"""A tick, a cycle, or a count of events."""
+FLAG = ("i", 0, 1)
+"""An int of a compiled part that is 0 or 1."""
+INFINITY = float("inf")
+_COUNT = struct.Struct("<I")
+_NONE = b"\0\0\0\0"
+_ROOM = 1 << 16
+
+
+class Kind(Protocol):
+    """What every kind of field can do. `form` says in a few letters how its bytes are to be read."""
+
+    form: str
+
+    def read(self, part: Any, name: str) -> Any: ...
+    def write(self, part: Any, name: str, value: Any) -> None: ...
+    def encode(self, value: Any) -> bytes: ...
+    def decode(self, data: bytes, at: int) -> tuple[Any, int]: ...
+
+
+def _take(layout: struct.Struct, data: bytes, at: int) -> tuple[Any, ...]:
+    if at + layout.size > len(data):
+        raise ValueError(f"ends {at + layout.size - len(data)} bytes early")
+    return layout.unpack_from(data, at)
+
+
+def out_of_range(value: Any, low: Any, high: Any) -> str:
+    """What is wrong with a value that is not from `low` to `high`."""
+    return "is NaN" if value != value else f"is {value}, not from {low} to {high}"
+
+
+def _checked(values: Iterable[Any], bounds: Bounds) -> None:
+    low, high = bounds
+    for value in values:
+        if not low <= value <= high:
+            raise ValueError(out_of_range(value, low, high))
+
+
+def _bounds(code: str, low: Any, high: Any) -> Bounds | None:
+    """None where every value of the type will do; of a real number NaN never will."""
+    if low is None:
+        return (-INFINITY, INFINITY) if code == "d" else None
+    return (low, high)
+
+
+class Number:
+    """A number, or a fixed array of them: a `struct` code such as "q", "d" or "256B"; limits include both ends."""
+
+    def __init__(self, form: str, low: Any = None, high: Any = None) -> None:
+        self.form = form
+        self.code = form[len(form) - 1]
+        self.count = int(form[: len(form) - 1]) if form[: len(form) - 1] else 0  # 0: no array
+        self.bounds = _bounds(self.code, low, high)
+        self.layout = struct.Struct(f"<{form}")
+        self.is_real = self.code == "d"
+
+    def read(self, part: Any, name: str) -> Any:
+        return getattr(part, name)
+
+    def write(self, part: Any, name: str, value: Any) -> None:
+        if self.count:
+            array = getattr(part, name)
+            for index in range(self.count):
+                array[index] = value[index]
+        else:
+            setattr(part, name, value)
+
+    def encode(self, value: Any) -> bytes:
+        values = value[: self.count] if self.count else (value,)
+        if self.is_real:
+            _checked(values, (-INFINITY, INFINITY))
+        return self.layout.pack(*values)
+
+    def decode(self, data: bytes, at: int) -> tuple[Any, int]:
+        values = _take(self.layout, data, at)
+        if self.bounds is not None:
+            _checked(values, self.bounds)
+        return values if self.count else values[0], at + self.layout.size
+
+
+class Queue:
+    """The live items of an array with room for `room` of them: their number (4 bytes), then the items in order.
+
+    `end` names the field with the serial number of the next item, `first` that of the oldest one; without `first` the
+    oldest one has number 0. Item n stands at place n modulo `room`. Queues with the same `end` are of one length.
+    """
+
+    def __init__(
+        self, code: str, room: int, end: str, first: str = "", low: Any = None, high: Any = None
+    ) -> None:
+        self.form = f"{code}[]"
+        self.code = code
+        self.room = room
+        self.end = end
+        self.first = first
+        self.bounds = _bounds(code, low, high)
+
+    def read(self, part: Any, name: str) -> list[Any]:
+        array = getattr(part, name)
+        first = getattr(part, self.first) if self.first else 0
+        return [array[serial % self.room] for serial in range(first, getattr(part, self.end))]
+
+    def write(self, part: Any, name: str, value: Sequence[Any]) -> None:
+        array = getattr(part, name)
+        for index, item in enumerate(value):
+            array[index] = item
+        setattr(part, self.end, len(value))
+        if self.first:
+            setattr(part, self.first, 0)
+
+    def encode(self, value: Sequence[Any]) -> bytes:
+        return _COUNT.pack(len(value)) + struct.pack(f"<{len(value)}{self.code}", *value)
+
+    def decode(self, data: bytes, at: int) -> tuple[list[Any], int]:
+        (count,) = _take(_COUNT, data, at)
+        if count > self.room:
+            raise ValueError(f"has {count} items, not at most {self.room}")
+        layout = struct.Struct(f"<{count}{self.code}")
+        values = _take(layout, data, at + 4)
+        if self.bounds is not None:
+            _checked(values, self.bounds)
+        return list(values), at + 4 + layout.size
+
+
+class Items:
+    """A list or a tuple of at most `room` numbers: their number (4 bytes), then they.
+
+    With `ordered` each is greater than the one before. The part takes the values by assignment: it may
+    keep them in another form, behind a property.
+    """
+
+    def __init__(
+        self, code: str, room: int, low: Any = None, high: Any = None, ordered: bool = False
+    ) -> None:
+        self.form = f"{code}[]"
+        self.code = code
+        self.room = room
+        self.bounds = _bounds(code, low, high)
+        self.ordered = ordered
+
+    def read(self, part: Any, name: str) -> Sequence[Any]:
+        values: Sequence[Any] = getattr(part, name)
+        return values
+
+    def write(self, part: Any, name: str, value: Sequence[Any]) -> None:
+        setattr(part, name, type(getattr(part, name))(value))
+
+    def encode(self, value: Sequence[Any]) -> bytes:
+        if not value:
+            return _NONE
+        if len(value) > self.room:
+            raise ValueError(f"has {len(value)} items, not at most {self.room}")
+        if self.code == "d":
+            _checked(value, (-INFINITY, INFINITY))
+        return struct.pack(f"<I{len(value)}{self.code}", len(value), *value)
+
+    def decode(self, data: bytes, at: int) -> tuple[list[Any], int]:
+        (count,) = _take(_COUNT, data, at)
+        if count > self.room:
+            raise ValueError(f"has {count} items, not at most {self.room}")
+        layout = struct.Struct(f"<{count}{self.code}")
+        values = _take(layout, data, at + 4)
+        if self.bounds is not None:
+            _checked(values, self.bounds)
+        if self.ordered and any(later <= earlier for earlier, later in pairwise(values)):
+            raise ValueError("is not in order")
+        return list(values), at + 4 + layout.size
+
+
+class Octets:
+    """Bytes of any length up to `room`: the length (4 bytes), then they. A bytearray stays the same object."""
+
+    form = "s"
+
+    def __init__(self, room: int) -> None:
+        self.room = room
+
+    def read(self, part: Any, name: str) -> bytes:
+        return bytes(getattr(part, name))
+
+    def write(self, part: Any, name: str, value: bytes) -> None:
+        if isinstance(kept := getattr(part, name), bytearray):
+            kept[:] = value
+        else:
+            setattr(part, name, value)
+
+    def encode(self, value: bytes) -> bytes:
+        return _COUNT.pack(len(value)) + value
+
+    def decode(self, data: bytes, at: int) -> tuple[bytes, int]:
+        (length,) = _take(_COUNT, data, at)
+        if length > self.room:
+            raise ValueError(f"has {length} bytes, not at most {self.room}")
+        if at + 4 + length > len(data):
+            raise ValueError(f"ends {at + 4 + length - len(data)} bytes early")
+        return data[at + 4 : at + 4 + length], at + 4 + length
+
+
+class Row:
+    """A tuple of a value a column; with `split` and `make` anything that can be taken apart into one and made of it."""
+
+    def __init__(
+        self,
+        *columns: Column,
+        split: Callable[[Any], tuple[Any, ...]] | None = None,
+        make: Callable[[tuple[Any, ...]], Any] | None = None,
+    ) -> None:
+        kinds = [column if isinstance(column, tuple) else (column,) for column in columns]
+        self.form = "".join(kind[0] for kind in kinds)
+        self.columns: list[Kind] = [
+            Octets(*(kind[1:] or (_ROOM,))) if kind[0] == "s" else Number(*kind) for kind in kinds
+        ]
+        self.split = split
+        self.make = make
+        self.layout: struct.Struct | None = None
+        self.head: struct.Struct | None = None  # of a row whose last column alone is bytes: all before these
+        if "s" not in self.form:
+            self.layout = struct.Struct(f"<{self.form}")
+        elif self.form.index("s") == len(self.form) - 1:
+            self.head = struct.Struct(f"<{self.form[: len(self.form) - 1]}I")
+        self.reals = [index for index, kind in enumerate(kinds) if kind[0] == "d"]
+        self.bounded = [
+            (index, *column.bounds)
+            for index, column in enumerate(self.columns)
+            if isinstance(column, Number) and column.bounds is not None
+        ]
+
+    def read(self, part: Any, name: str) -> Any:
+        return getattr(part, name)
+
+    def write(self, part: Any, name: str, value: Any) -> None:
+        setattr(part, name, value)
+
+    def encode(self, value: Any) -> bytes:
+        cells = value if self.split is None else self.split(value)
+        for index in self.reals:
+            if cells[index] != cells[index]:
+                raise ValueError("holds NaN")
+        if self.layout is not None:
+            return self.layout.pack(*cells)
+        if self.head is not None:
+            data: bytes = cells[len(cells) - 1]
+            return self.head.pack(*cells[: len(cells) - 1], len(data)) + data
+        return b"".join([column.encode(cell) for column, cell in zip(self.columns, cells, strict=True)])
+
+    def decode(self, data: bytes, at: int) -> tuple[Any, int]:
+        if self.layout is not None:
+            cells = _take(self.layout, data, at)
+            for index, low, high in self.bounded:
+                if not low <= cells[index] <= high:
+                    raise ValueError(out_of_range(cells[index], low, high))
+            return cells if self.make is None else self.make(cells), at + self.layout.size
+        found = []
+        for column in self.columns:
+            cell, at = column.decode(data, at)
+            found.append(cell)
+        return tuple(found) if self.make is None else self.make(tuple(found)), at
+
+    def first(self, value: Any) -> Any:
+        """The first column of a row."""
+        return (value if self.split is None else self.split(value))[0]
+
+
+class Rows:
+    """At most `room` rows: their number (4 bytes), then they. A list or deque stays the same object; or it is a tuple.
+
+    With `ordered` the first column never falls from one row to the next.
+    """
+
+    def __init__(self, room: int, *columns: Column, ordered: bool = False, **parts: Any) -> None:
+        self.room = room
+        self.row = Row(*columns, **parts)
+        self.form = f"({self.row.form})[]"
+        self.ordered = ordered
+
+    def read(self, part: Any, name: str) -> list[Any]:
+        return list(getattr(part, name))
+
+    def write(self, part: Any, name: str, value: list[Any]) -> None:
+        rows = getattr(part, name)
+        if isinstance(rows, tuple):
+            setattr(part, name, tuple(value))
+        else:
+            rows.clear()
+            rows.extend(value)
+
+    def encode(self, value: Sequence[Any]) -> bytes:
+        if not value:
+            return _NONE
+        if len(value) > self.room:
+            raise ValueError(f"has {len(value)} rows, not at most {self.room}")
+        return _COUNT.pack(len(value)) + b"".join([self.row.encode(row) for row in value])
+
+    def decode(self, data: bytes, at: int) -> tuple[list[Any], int]:
+        (count,) = _take(_COUNT, data, at)
+        if count > self.room:
+            raise ValueError(f"has {count} rows, not at most {self.room}")
+        rows = []
+        at += 4
+        for _ in range(count):
+            row, at = self.row.decode(data, at)
+            rows.append(row)
+        if self.ordered and any(self.row.first(b) < self.row.first(a) for a, b in pairwise(rows)):
+            raise ValueError("is not in order")
+        return rows, at

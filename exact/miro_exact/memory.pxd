@@ -1,0 +1,30 @@
+# C layout of miro_exact.memory.
+
+cdef struct Place:
+    char *at  # of the field inside its part
+    Py_ssize_t size  # bytes of one item
+    Py_ssize_t count  # items; of a queue: for how many it has room
+    char code  # as in Python's `struct`
+    bint bounded  # whether an item may be out of range
+    long long low
+    long long high
+    double least
+    double most
+    char *end  # of a queue: the field with the number of the next item, else NULL
+    Py_ssize_t end_size
+    char *first  # ... and of the oldest one, NULL if that is always 0
+
+
+cdef class Memory:
+    cdef Place *places
+    cdef Py_ssize_t number
+    cdef readonly tuple names
+    cdef object parts
+    cdef bytes data
+    cdef Py_ssize_t begin
+
+    cpdef bytes pack(self)
+    cpdef Py_ssize_t check(self, bytes data, Py_ssize_t begin) except -1
+    cpdef put(self)
+    cdef Py_ssize_t size(self) except -1
+    cdef int check_items(self, Place *place, Py_ssize_t index, const char *data, Py_ssize_t count) except -1

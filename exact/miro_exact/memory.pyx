@@ -1,0 +1,217 @@
+"""Copies the fields of compiled parts to flat bytes and back.
+
+What belongs here: memory. What does not: which fields there are and in what order (`state.py`), and parts that are not
+compiled, whose fields `state.py` packs itself. Used by the compiled engine only, so it has no uncompiled twin:
+tests/exact/test_state.py compares the bytes with those of `state.py`.
+
+The parts must outlive a Memory, which therefore holds them. A part's fields stay where they are as long as it lives.
+"""
+
+from cpython.bytes cimport PyBytes_AS_STRING, PyBytes_FromStringAndSize
+from cpython.mem cimport PyMem_Calloc, PyMem_Free
+from libc.string cimport memcpy
+
+import sys
+
+from miro_exact.domain import DomainError
+
+cdef bint LITTLE = sys.byteorder == "little"
+
+
+cdef void copy(char *to, const char *source, Py_ssize_t size, Py_ssize_t count) noexcept:
+    """`count` items, little-endian on one of both sides."""
+    cdef Py_ssize_t item, byte
+    if LITTLE or size == 1:
+        if count == 1 and size == 4:
+            memcpy(to, source, 4)
+        elif count == 1 and size == 8:
+            memcpy(to, source, 8)
+        else:
+            memcpy(to, source, size * count)
+        return
+    for item in range(count):
+        for byte in range(size):
+            to[item * size + byte] = source[item * size + size - 1 - byte]
+
+
+cdef long long serial(const char *at, Py_ssize_t size) noexcept:
+    """A queue's serial number, an int or a long long."""
+    cdef int small
+    cdef long long big
+    if size == 4:
+        memcpy(&small, at, 4)
+        return small
+    memcpy(&big, at, 8)
+    return big
+
+
+cdef void set_serial(char *at, Py_ssize_t size, long long value) noexcept:
+    cdef int small = <int>value
+    if size == 4:
+        memcpy(at, &small, 4)
+    else:
+        memcpy(at, &value, 8)
+
+
+cdef class Memory:
+    """Fields in their order; each is (part, name for messages, address, item size, items, code, low, high, end, first).
+
+    `low` and `high` are None where every value of the type will do; `end` and `first` are None, or (address, size).
+    """
+
+    def __cinit__(self, list fields):
+        cdef Place *place
+        self.number = len(fields)
+        self.places = <Place *>PyMem_Calloc(max(1, self.number), sizeof(Place))
+        if self.places == NULL:
+            raise MemoryError
+        self.parts = [field[0] for field in fields]
+        self.names = tuple(field[1] for field in fields)
+        for index, (_, _, address, size, count, code, low, high, end, first) in enumerate(fields):
+            place = &self.places[index]
+            place.at = <char *><size_t>address
+            place.size = size
+            place.count = count
+            place.code = ord(code)
+            place.bounded = low is not None or code == "d"
+            if code == "d":
+                place.least = -float("inf") if low is None else low
+                place.most = float("inf") if high is None else high
+            elif low is not None:
+                place.low = low
+                place.high = high
+            if end is not None:
+                place.end = <char *><size_t>end[0]
+                place.end_size = end[1]
+            if first is not None:
+                place.first = <char *><size_t>first[0]
+
+    def __dealloc__(self):
+        PyMem_Free(self.places)
+
+    cdef Py_ssize_t size(self) except -1:
+        cdef Py_ssize_t index, total = 0
+        cdef long long count
+        cdef Place *place
+        for index in range(self.number):
+            place = &self.places[index]
+            if place.end == NULL:
+                total += place.size * place.count
+                continue
+            count = serial(place.end, place.end_size)
+            if place.first != NULL:
+                count -= serial(place.first, 8)
+            if count < 0 or count > place.count:
+                raise ValueError(f"{self.names[index]}: {count} items, room for {place.count}")
+            total += 4 + place.size * count
+        return total
+
+    cpdef bytes pack(self):
+        """The fields as flat bytes. Raises DomainError for NaN, with the name of the field."""
+        cdef bytes data = PyBytes_FromStringAndSize(NULL, self.size())
+        cdef char *to = PyBytes_AS_STRING(data)
+        cdef Py_ssize_t index, item
+        cdef long long count, first
+        cdef unsigned int written
+        cdef double real
+        cdef Place *place
+        for index in range(self.number):
+            place = &self.places[index]
+            if place.end == NULL:
+                copy(to, place.at, place.size, place.count)
+                if place.code == c"d":
+                    for item in range(place.count):
+                        memcpy(&real, place.at + 8 * item, 8)
+                        if real != real:
+                            raise DomainError(f"{self.names[index]} is NaN")
+                to += place.size * place.count
+                continue
+            first = serial(place.first, 8) if place.first != NULL else 0
+            count = serial(place.end, place.end_size) - first
+            written = <unsigned int>count
+            copy(to, <char *>&written, 4, 1)
+            to += 4
+            first %= place.count
+            item = min(count, place.count - first)
+            copy(to, place.at + first * place.size, place.size, item)
+            copy(to + item * place.size, place.at, place.size, count - item)
+            to += place.size * count
+        return data
+
+    cpdef Py_ssize_t check(self, bytes data, Py_ssize_t begin) except -1:
+        """Where what `pack` gave ends in `data`. Raises ValueError for bytes that cannot be put, and puts nothing."""
+        cdef const char *source = PyBytes_AS_STRING(data)
+        cdef Py_ssize_t at = begin, left, count, shared = 0
+        cdef Py_ssize_t index
+        cdef unsigned int written
+        cdef Place *place
+        cdef char *end = NULL
+        for index in range(self.number):
+            place = &self.places[index]
+            left = len(data) - at
+            count = place.count
+            if place.end != NULL:
+                if left < 4:
+                    raise ValueError(f"the state ends in {self.names[index]}")
+                copy(<char *>&written, source + at, 4, 1)
+                if written > count:
+                    raise ValueError(f"{self.names[index]} has {written} items, not at most {count}")
+                count = written
+                if place.end == end and count != shared:
+                    raise ValueError(f"{self.names[index]} has {count} items, not {shared}")
+                end = place.end
+                shared = count
+                at += 4
+                left -= 4
+            if left < count * place.size:
+                raise ValueError(f"the state ends in {self.names[index]}")
+            if place.bounded:
+                self.check_items(place, index, source + at, count)
+            at += count * place.size
+        self.data = data
+        self.begin = begin
+        return at
+
+    cdef int check_items(self, Place *place, Py_ssize_t index, const char *data, Py_ssize_t count) except -1:
+        cdef Py_ssize_t item
+        cdef long long value
+        cdef int small
+        cdef double real
+        for item in range(count):
+            if place.code == c"d":
+                copy(<char *>&real, data + 8 * item, 8, 1)
+                if not place.least <= real <= place.most:
+                    raise ValueError(f"{self.names[index]} is {real}, not from {place.least} to {place.most}")
+                continue
+            if place.code == c"q":
+                copy(<char *>&value, data + 8 * item, 8, 1)
+            elif place.code == c"i":
+                copy(<char *>&small, data + 4 * item, 4, 1)
+                value = small
+            else:
+                value = <unsigned char>data[item]
+            if not place.low <= value <= place.high:
+                raise ValueError(f"{self.names[index]} is {value}, not from {place.low} to {place.high}")
+        return 0
+
+    cpdef put(self):
+        """Writes the fields from the bytes that were checked last. Raises ValueError if none were."""
+        cdef const char *source
+        cdef Py_ssize_t index, count
+        cdef unsigned int written
+        cdef Place *place
+        if self.data is None:
+            raise ValueError("nothing was checked")
+        source = PyBytes_AS_STRING(self.data) + self.begin
+        for index in range(self.number):
+            place = &self.places[index]
+            count = place.count
+            if place.end != NULL:
+                copy(<char *>&written, source, 4, 1)
+                source += 4
+                count = written
+                set_serial(place.end, place.end_size, count)
+                if place.first != NULL:
+                    set_serial(place.first, 8, 0)
+            copy(place.at, source, place.size, count)
+            source += place.size * count

@@ -1,0 +1,1 @@
+# C layout of miro_exact.state: none; compiled for its calls.

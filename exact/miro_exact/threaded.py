@@ -1,0 +1,46 @@
+"""The C of an interpreter's loop, given the shape that a processor predicts well. Used by the build.
+
+What belongs here: this one change of text. What does not: which modules are compiled, and how (setup.py, which loads
+this file by its path before anything is installed, so it imports nothing of ours).
+"""
+
+from __future__ import annotations
+
+import re
+
+INTERPRETER_ARMS = 64  # a loop around a choice of at least so many executes a program
+SWITCH_OF_A_LOOP = re.compile(
+    r"^(?P<indent> +)switch \((?P<value>\w+)\) {\n(?P<arms>.*?)(?P=indent)  default: break;\n(?P=indent)}\n"
+    r"(?P=indent)(?P<again>__pyx_L\w+):;\n",
+    re.M | re.S,
+)
+
+
+def threaded(c: str, mark: bytes) -> str:
+    """C in which every arm of an interpreter's loop fetches the next instruction and jumps to its arm by itself.
+
+    Processors predict an indirect jump from where it is and what was jumped before: one jump for the whole loop mixes
+    all instructions up. Compilers do not copy it, so the loop's head, from `while` to `switch`, is copied to the end of
+    each arm (labels as values: GCC and Clang); what the head asks before each instruction is taken to be rare.
+    Text that is not as Cython 3 writes it stays as it is: slower, the same bits. What was reshaped carries a mark, by
+    which `mirotwin info` says so: `mark`.
+    """
+    for switch in SWITCH_OF_A_LOOP.finditer(c):
+        indent, value, arms, again = switch["indent"], switch["value"], switch["arms"], switch["again"]
+        numbers = {int(number, 0) for number in re.findall(rf"^{indent}  case (\w+):", arms, re.M)}
+        before, loop, head = c[: switch.start()].rpartition(f"{indent[2:]}while (1) {{\n")
+        if len(numbers) < INTERPRETER_ARMS or max(numbers) > 0xFF or not loop or "\n}\n" in head:
+            continue
+        targets = (f"&&arm_{number}" if number in numbers else f"&&{again}" for number in range(0x100))
+        table = f"static void *const arm_of[0x100] = {{{', '.join(targets)}}};\n"
+        head = re.sub(r"/\*.*?\*/", "", head, flags=re.S)
+        head = re.sub(r"if \((__pyx_t_\w+)\) {", r"if (unlikely(\1)) {", head)
+        step = f"{head}if ({value} < 0 || {value} > 0xFF) goto {again};\ngoto *arm_of[{value}];\n"
+        arms = re.sub(
+            rf"^{indent}  case (\w+):", lambda case: f"{case[0]} arm_{int(case[1], 0)}:;", arms, flags=re.M
+        )
+        arms = re.sub(rf"^{indent}  break;\n", step.replace("\\", r"\\"), arms, flags=re.M)
+        first, last = switch.span("arms")
+        sign = f'static const char dispatch[] __attribute__((used)) = "{mark.decode()}";\n'
+        return before + table + loop + head + c[switch.start() : first] + arms + c[last:] + sign
+    return c

@@ -1,0 +1,59 @@
+"""The form of a saved world: what it belongs to, its state, and a checksum over both.
+
+What belongs here: writing that form and refusing everything else. What does not: the state itself, whose values the
+world's tables check (`miro_exact.state`).
+
+    magic               8 bytes
+    tables              32 bytes, SHA-256 over names and forms of all fields of the state
+    scenario, firmware  32 bytes each, SHA-256
+    seed                8 bytes
+    state               as its tables say
+    checksum            32 bytes, SHA-256 over all before
+
+All numbers are little-endian. A version of this program whose worlds have other fields writes another hash of tables:
+its worlds are refused, and so are those of before this form.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+from typing import NamedTuple
+
+MAGIC = b"mirowrld"
+_HEAD = struct.Struct("<8s32s32s32sq")
+_CHECKSUM_BYTES = 32
+
+
+class Identity(NamedTuple):
+    """What a saved world belongs to; hashes in hex."""
+
+    tables: str
+    scenario: str
+    firmware: str
+    seed: int
+
+
+def sealed(identity: Identity, state: bytes) -> bytes:
+    """A saved world."""
+    hashes = (bytes.fromhex(text) for text in identity[:3])
+    content = _HEAD.pack(MAGIC, *hashes, identity.seed) + state
+    return content + hashlib.sha256(content).digest()
+
+
+def opened(saved: bytes, own: Identity) -> bytes:
+    """The state in a saved world. Raises ValueError unless it is whole and belongs to `own`."""
+    content = saved[:-_CHECKSUM_BYTES]
+    if not saved.startswith(MAGIC) or len(content) < _HEAD.size:
+        raise ValueError("not a saved world, or one of a version of this program that wrote another form")
+    if hashlib.sha256(content).digest() != saved[-_CHECKSUM_BYTES:]:
+        raise ValueError("the saved world is damaged: its checksum is wrong")
+    _, *hashes, seed = _HEAD.unpack_from(content)
+    tables, scenario, firmware = (value.hex() for value in hashes)
+    found = Identity(tables, scenario, firmware, seed)
+    if found.tables != own.tables:
+        raise ValueError("the saved world has other fields: another version of this program saved it")
+    for key, ours, theirs in zip(Identity._fields, own, found, strict=True):
+        if ours != theirs:
+            raise ValueError(f"saved world has {key} {theirs}, this one has {ours}")
+    return content[_HEAD.size :]
