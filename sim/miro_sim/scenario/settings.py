@@ -59,6 +59,20 @@ class _Refused(Exception):
         self.remedy = remedy
 
 
+def in_text(table: Table, above: str = "") -> list[str]:
+    """The settings KEY=VALUE that a table of them says; a table inside it stands for its keys."""
+    import tomli_w  # only tables of settings need it
+
+    found: list[str] = []
+    for key, value in table.items():
+        path = f"{above}{key}"
+        if isinstance(value, dict):
+            found += in_text(value, f"{path}.")
+        else:
+            found.append(f"{path}={tomli_w.dumps({'x': value}).removeprefix('x = ').rstrip()}")
+    return found
+
+
 def make(raw: Table, settings: Iterable[str], origin: str) -> list[Setting]:
     """Makes the settings in the tables of a scenario, in their order. Raises ScenarioError."""
     return [_make(raw, text, origin) for text in settings]

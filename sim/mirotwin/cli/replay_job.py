@@ -20,6 +20,7 @@ from miro_sim.periods import Period
 from miro_sim.scenario.file import changed
 from miro_sim.scenario.file import parse as parse_scenario
 from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.settings import in_text
 from mirotwin.capture.detect import detect
 from mirotwin.capture.input import HEAD_BYTES
 from mirotwin.cli.options import choose_engine, load_image
@@ -85,15 +86,14 @@ def _job_of_recording(recording: Recording, path: str, settings: Sequence[str]) 
 
 def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str]) -> Job:
     sent = given.transmissions()
-    scenario = changed(scenario_of_stream(sent, path, given.header), path, settings)
+    header = in_text(given.header.set or {})
+    scenario = changed(scenario_of_stream(sent, path, given.header), path, [*header, *settings])
     return Job(scenario, given.header.seed or 0, script_of_stream(sent), ())
 
 
 def _refuse_what_cannot_be_done(header: stream.Header, path: str) -> None:
-    for key in ("set", "expect"):
-        if getattr(header, key) is not None:
-            what = f"{key} is not carried out by this version"
-            raise BadInput(path, "header", what, "remove it, or write the whole scenario as [scenario]")
+    if header.expect is not None:
+        raise BadInput(path, "header", "expect is not carried out by this version", "remove it")
 
 
 def _check_firmware(header: stream.Header, image: Image, path: str, firmware: str | None) -> None:

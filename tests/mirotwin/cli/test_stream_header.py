@@ -74,6 +74,18 @@ def test_a_built_in_scenario_is_taken_by_its_name(mirotwin: Callable[..., Result
     assert [row[0] for row in counters(out)] == ["0"]
 
 
+def test_settings_of_the_header_are_made_before_those_of_the_command(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    slots = "set = { network = { robot = { 0 = { slot = 2 } } }, duration_s = 0.5 }"
+    stream.write(tmp_path / "a.stream", SENT, stream_header.of_text(f"scenario = 'fig8'\n{slots}"))
+    code, out, err = mirotwin("replay", tmp_path / "a.stream")
+    assert (code, err) == (0, "")
+    assert [row[0] for row in counters(out)] == ["2"]
+    out = mirotwin("replay", tmp_path / "a.stream", "--set", "network.robot.slot=1")[1]
+    assert [row[0] for row in counters(out)] == ["1"]
+
+
 @pytest.mark.parametrize(
     ("header", "lines", "what"),
     [
@@ -82,7 +94,8 @@ def test_a_built_in_scenario_is_taken_by_its_name(mirotwin: Callable[..., Result
         (in_header(SHORT).replace("duration_s", "duration_x"), "", "duration_x"),
         (in_header(SHORT), "2000000 >@1 55", "tick 2000000: network 1, but the scenario has 1"),
         (in_header(SHORT), "4799000 > 55", "tick 4799000: ends at tick 4824000, but the scenario ends at"),
-        ("set = {a = 1}", "", "header: set is not carried out by this version"),
+        ("set = {duration_x = 1}", "", "--set duration_x=1: "),
+        ("set = {network.robot = 5}", "", "--set network.robot=5: "),
         ("[expect]\nno_fault = true", "", "header: expect is not carried out by this version"),
         (f"firmware_sha256 = '{OTHER}'", "", "header: the stream is for firmware 0123456789ab.., this is"),
         ("", "2000000 *@0/1 reset 1", ":6:1: an event, which this command cannot act on; no command acts"),
