@@ -5,7 +5,7 @@
 The commit is copied and built once (`against_copy.py`). Each tree has a process of its own that stays alive
 (`against_worker.py`); they work in turn, A B B A .., so that whatever else the machine does meets both alike. Times are
 processor times, not wall times. A ratio is the other commit's time by this tree's, pair by pair: above 1 this tree is
-faster. Given are its median and quartiles. Both trees must end runs with the same digest, or the table says so.
+faster. Given are its median and quartiles. Both trees must end runs alike, or the table says so.
 """
 
 from __future__ import annotations
