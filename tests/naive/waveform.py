@@ -95,7 +95,7 @@ class Sampler:
         """RXD, TXD and all pins; slot 0, three robots."""
         cpu = self.cpu
         levels = {"rxd": cpu.rxd.level_at(tick), "txd": cpu.txd.level_at(tick)}
-        shifted = cpu.chip.shift.data.level_at(tick)
+        shifted = cpu.peripherals.shift.data.level_at(tick)
         outside = [0xFF, 0xFF, 0xFF, 0xFC | levels["rxd"] & shifted | levels["txd"] << 1]
         if self.board is not None:
             outside[0] = chips["d"]

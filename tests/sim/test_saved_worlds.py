@@ -22,11 +22,11 @@ CPU = "networks[0].robots[0].board.cpu"
         (f"{CPU}.pc", struct.pack("<i", 0x10000)),
         (f"{CPU}.sp", struct.pack("<i", 256)),
         (f"{CPU}.cycles", struct.pack("<q", 1 << 60)),
-        (f"{CPU}.chip.uart.rx_period", struct.pack("<q", 0)),
-        (f"{CPU}.chip.uart.tx_left", struct.pack("<i", 12)),
-        (f"{CPU}.chip.shift.number", struct.pack("<i", 9)),
-        (f"{CPU}.chip.ports.pending", struct.pack("<IqBB", 1, 1 << 30, 4, 0)),
-        (f"{CPU}.chip.uart.rxd.ticks", struct.pack("<I", 1 << 23) + bytes(8)),
+        (f"{CPU}.peripherals.uart.rx_period", struct.pack("<q", 0)),
+        (f"{CPU}.peripherals.uart.tx_left", struct.pack("<i", 12)),
+        (f"{CPU}.peripherals.shift.number", struct.pack("<i", 9)),
+        (f"{CPU}.peripherals.ports.pending", struct.pack("<IqBB", 1, 1 << 30, 4, 0)),
+        (f"{CPU}.peripherals.uart.rxd.ticks", struct.pack("<I", 1 << 23) + bytes(8)),
         ("networks[0].ear.decoder._data", struct.pack("<I", 4161) + bytes(4161)),
     ],
 )
@@ -46,7 +46,7 @@ def test_what_compiled_code_takes_for_an_index_or_a_divisor_is_checked_by_name(s
         ("networks[0].uplink.now", 1 << 40),
         ("networks[0].robots[1].board.left.next_tick", 1),
         ("networks[0].robots[1].board.plant.tick", 1),
-        (f"{CPU}.chip.uart.rxd.settled_tick", 1 << 61),
+        (f"{CPU}.peripherals.uart.rxd.settled_tick", 1 << 61),
     ],
 )
 def test_a_part_that_does_not_stand_where_the_world_does_is_refused_without_a_change(saved, path, tick):

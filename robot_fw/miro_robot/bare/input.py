@@ -134,10 +134,10 @@ class SerialInput:
 
     def _listening(self) -> bool:
         """Whether a character sent now would be heard: by the receiver with RI down, or by software."""
-        reads = self.cpu.chip.p3_reads
+        reads = self.cpu.peripherals.p3_reads
         polling = reads - self.polls >= _POLLS
         self.polls = reads
-        if self.cpu.chip.bit_ticks():
+        if self.cpu.peripherals.bit_ticks():
             return not self.cpu.sfr(0x98) & _RI
         told = bool(self.pieces) and self.fed == 0 and self.pieces[0].has_condition
         return self.baud is not None and (polling or told)
@@ -172,5 +172,5 @@ class SerialInput:
     def _bit_offset(self, number: int) -> int:
         """Ticks from the start of a character to its bit `number`."""
         if self.baud is None:
-            return number * self.cpu.chip.bit_ticks()
+            return number * self.cpu.peripherals.bit_ticks()
         return (2 * number * self.crystal_hz + self.baud) // (2 * self.baud)

@@ -178,8 +178,8 @@ class BareMachine:
 
     def _silent_cycle(self) -> int:
         """The cycle in which the last character has been sent; 0 if nothing is being sent."""
-        chip = self.cpu.chip
-        tick = min(chip.uart.ti_tick(), chip.shift.flag_tick())
+        peripherals = self.cpu.peripherals
+        tick = min(peripherals.uart.ti_tick(), peripherals.shift.flag_tick())
         return 0 if self.cpu.powered_down or tick >= _NEVER else tick // 12 + 1
 
     def _interruptible(self) -> bool:

@@ -57,7 +57,7 @@ class Activity(Watcher):
             self.highest_sp = cpu.sp
             self.highest_sp_tick = 12 * cpu.cycles
         self.count[source] += 1
-        asked = cpu.chip.interrupts.since[source]
+        asked = cpu.peripherals.interrupts.since[source]
         if asked < self.ended[source]:
             asked = self.ended[source] - 1
         latency = start + _CALL_CYCLES - asked - 1

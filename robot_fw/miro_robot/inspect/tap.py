@@ -203,7 +203,7 @@ class CpuTap(Watcher):
     def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
         tick = _TICKS * start
         self._see(tick, _ASLEEP, 0)
-        high = 1 if cpu.chip.interrupts.in_service & 2 and not self.levels[_IN_SERVICE + 1] else 0
+        high = 1 if cpu.peripherals.interrupts.in_service & 2 and not self.levels[_IN_SERVICE + 1] else 0
         self._see(tick, _IN_SERVICE + high, 1)
         self._see(tick, _ROUTINE + source, 1)
         self.routine[high] = source
@@ -222,13 +222,13 @@ class CpuTap(Watcher):
         self.cycles = cpu.cycles
         if self.board_tap is not None:
             self.board_tap.attach(self.begin_tick)
-        for place, line in ((_RXD, cpu.rxd), (_TXD, cpu.txd), (_SHIFT, cpu.chip.shift.data)):
+        for place, line in ((_RXD, cpu.rxd), (_TXD, cpu.txd), (_SHIFT, cpu.peripherals.shift.data)):
             self.levels[place] = line.level_at(self.begin_tick)
             self.line_ticks[place] = self.begin_tick
         for port in range(4):
-            self.levels[_LATCH + port] = cpu.chip.ports.latches[port]
+            self.levels[_LATCH + port] = cpu.peripherals.ports.latches[port]
             self.levels[_OUTSIDE + port] = 0xFF
-        in_service = cpu.chip.interrupts.in_service
+        in_service = cpu.peripherals.interrupts.in_service
         for source in range(6):
             self.levels[_ROUTINE + source] = UNKNOWN if in_service else 0
         self.levels[_IN_SERVICE] = in_service & 1
@@ -247,10 +247,10 @@ class CpuTap(Watcher):
         tick = _TICKS * cpu.cycles
         port = 0
         while port < 4:
-            self._see(tick, _LATCH + port, cpu.chip.ports.latches[port])
+            self._see(tick, _LATCH + port, cpu.peripherals.ports.latches[port])
             port += 1
         self._see(tick, _ASLEEP, 1 if cpu.idle or cpu.powered_down else 0)
-        in_service = cpu.chip.interrupts.in_service
+        in_service = cpu.peripherals.interrupts.in_service
         if in_service & 1 != self.levels[_IN_SERVICE] or in_service >> 1 != self.levels[_IN_SERVICE + 1]:
             self._leave(tick, 0, in_service & 1)
             self._leave(tick, 1, in_service >> 1)
@@ -272,7 +272,7 @@ class CpuTap(Watcher):
 
     def _take_outputs(self, cpu: Cpu) -> None:
         self._take_line(_TXD, cpu.txd, cpu.txd.settled_tick)
-        self._take_line(_SHIFT, cpu.chip.shift.data, cpu.txd.settled_tick)
+        self._take_line(_SHIFT, cpu.peripherals.shift.data, cpu.txd.settled_tick)
 
     def _take_line(self, place: int, line: Line, settled_tick: int) -> None:
         """The edges below `settled_tick` that are new."""

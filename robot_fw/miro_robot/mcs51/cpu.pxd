@@ -17,7 +17,7 @@ cdef int _FLOATING
 cdef int _MAIN_LOOP_STARVED, _MARK_CYCLES, _ONE_INSTRUCTION
 
 cdef class Cpu(Executor):
-    cdef readonly Peripherals chip
+    cdef readonly Peripherals peripherals
     cdef readonly Line rxd
     cdef readonly Line txd
     cdef readonly int pcon
@@ -60,7 +60,7 @@ cdef class Cpu(Executor):
     cdef int end_run(self) except -1
     @cython.locals(now='long long', event='long long')
     cdef int boundary(self) except -1
-    @cython.locals(chip=Peripherals, earliest='long long', source=int)
+    @cython.locals(peripherals=Peripherals, earliest='long long', source=int)
     cdef int _attend(self, long long now) except -1
     cdef int _watch_main_loop(self, long long now) except -1
     cdef int _taken_over(self) noexcept

@@ -79,7 +79,7 @@ class Cpu(Executor):
         "powered_down": FLAG,
         "blocked": ("q", -1, LAST_CYCLE),
         "marks": ("q", 0, LAST_CYCLE),
-        "chip": Peripherals,
+        "peripherals": Peripherals,
     }
     NOT_STATE: tuple[str, ...] = (
         *Executor.NOT_STATE,
@@ -97,9 +97,9 @@ class Cpu(Executor):
 
     def __init__(self, bus: Bus | None = None) -> None:
         Executor.__init__(self, Bus() if bus is None else bus)
-        self.chip = Peripherals(self.bus)
-        self.rxd = self.chip.uart.rxd
-        self.txd = self.chip.uart.txd
+        self.peripherals = Peripherals(self.bus)
+        self.rxd = self.peripherals.uart.rxd
+        self.txd = self.peripherals.uart.txd
         self.pcon = 0
         self.idle = 0
         self.powered_down = 0
@@ -181,7 +181,7 @@ class Cpu(Executor):
     def reset(self) -> None:
         """RST: registers and PC as after power-on, ports FF; RAM and time stay (C7)."""
         now = self.cycles
-        self.chip.clear(now)
+        self.peripherals.clear(now)
         self.pc = 0
         self.a = 0
         self.b = 0
@@ -194,7 +194,7 @@ class Cpu(Executor):
         self.blocked = -1
         for port in range(4):
             self.write_port(port, 0xFF)
-        self.chip.clock_serial()
+        self.peripherals.clock_serial()
 
     def step(self) -> int:
         """One instruction or interrupt entry; an idle CPU advances by a cycle."""
@@ -229,10 +229,14 @@ class Cpu(Executor):
 
     def set_external(self, port: int, levels: int, tick: int) -> None:
         """From `tick` on the outside puts `levels` on the pins of P0..P3 (1: released or high)."""
-        if self.chip.ports.next_cycle == _FAR and (port == 0 or port == 2) and tick <= 12 * self.cycles + 9:
-            self.chip.ports.outside[port] = levels
+        if (
+            self.peripherals.ports.next_cycle == _FAR
+            and (port == 0 or port == 2)
+            and tick <= 12 * self.cycles + 9
+        ):
+            self.peripherals.ports.outside[port] = levels
         else:
-            self.chip.ports.push(port, levels, tick)
+            self.peripherals.ports.push(port, levels, tick)
             self.next_event = 0
             self.limit = 0
 
@@ -242,7 +246,7 @@ class Cpu(Executor):
         """Whether only a reset or a new input can make it execute another instruction."""
         if self.powered_down:
             return True
-        return bool(self.idle) and self.chip.next_event(self.cycles) == _FAR
+        return bool(self.idle) and self.peripherals.next_event(self.cycles) == _FAR
 
     def peek_iram(self, address: int) -> int:
         """A byte of internal RAM (0..255)."""
@@ -260,14 +264,14 @@ class Cpu(Executor):
 
     def begin_run(self) -> None:
         self.next_mark = (self.cycles // _MARK_CYCLES + 1) * _MARK_CYCLES if self.main_loop_limit else _FAR
-        self.chip.serial_wait = -1  # more may have been put on RXD since the last run
+        self.peripherals.serial_wait = -1  # more may have been put on RXD since the last run
         self.next_event = 0
         self.limit = 0
 
     def end_run(self) -> None:
         """TXD is final up to now; RXD before it is no longer needed."""
-        self.chip.sync(self.cycles)
-        self.chip.settle()
+        self.peripherals.sync(self.cycles)
+        self.peripherals.settle()
         now = 12 * self.cycles
         if self.txd.settled_tick < now:
             self.txd.settled_tick = now
@@ -299,21 +303,21 @@ class Cpu(Executor):
 
     def _attend(self, now: int) -> int:
         """Everything due at the begin of cycle `now`: 1 if that was an interrupt."""
-        chip = self.chip
-        chip.apply_pushes(now)
-        chip.sample_pins(now)
-        chip.sync(now)
+        peripherals = self.peripherals
+        peripherals.apply_pushes(now)
+        peripherals.sample_pins(now)
+        peripherals.sync(now)
         if self.powered_down:
-            self.next_event = chip.ports.next_cycle
+            self.next_event = peripherals.ports.next_cycle
             return 0
         earliest = now + 1
         if self.blocked != now:
-            source = chip.interrupts.choose(now)
+            source = peripherals.interrupts.choose(now)
             if source >= 0:
                 self._enter(source)
                 return 1
             earliest = now
-        self.next_event = chip.next_event(earliest)
+        self.next_event = peripherals.next_event(earliest)
         if self.next_event <= now:  # all of now is done: nothing that is due may hold time up
             self.next_event = now + 1
         return 0
@@ -331,7 +335,11 @@ class Cpu(Executor):
         """Whether an interrupt is in service, or one just was: silicon grants main level one instruction after RETI,
         which does not count as time of its own.
         """
-        return 1 if self.chip.interrupts.in_service or self.cycles - self.blocked <= _ONE_INSTRUCTION else 0
+        return (
+            1
+            if self.peripherals.interrupts.in_service or self.cycles - self.blocked <= _ONE_INSTRUCTION
+            else 0
+        )
 
     def _enter(self, source: int) -> None:
         """The hardware LCALL: two cycles, and the end of idle mode."""
@@ -339,7 +347,7 @@ class Cpu(Executor):
             self.marks = 0
         self.idle = 0
         self.pcon &= 0xFF ^ _IDL
-        self.chip.taken(source, self.cycles)
+        self.peripherals.taken(source, self.cycles)
         self.start = self.cycles
         self.at = self.pc
         self.cycles += 2
@@ -348,7 +356,7 @@ class Cpu(Executor):
         self.limit = 0
 
     def end_of_interrupt(self) -> None:
-        self.chip.interrupts.leave()
+        self.peripherals.interrupts.leave()
         self._block()
 
     def _block(self) -> None:
@@ -370,11 +378,11 @@ class Cpu(Executor):
             return self.sp
         if address == _PCON:
             return self.pcon
-        return self.chip.read(address, cycle)
+        return self.peripherals.read(address, cycle)
 
     def read_sfr(self, address: int) -> int:
         if address & 0xCF == 0x80:
-            return self.chip.pin_levels((address - _P0) >> 4, self.start)
+            return self.peripherals.pin_levels((address - _P0) >> 4, self.start)
         return self.register(address, self.start + 1)
 
     def read_latch(self, address: int) -> int:
@@ -395,9 +403,9 @@ class Cpu(Executor):
         elif address & 0xCF == 0x80:
             self.write_port((address - _P0) >> 4, value)
         else:
-            self.chip.write(address, value, self.cycles)
+            self.peripherals.write(address, value, self.cycles)
             if address in (_IE, _IP):
-                self.marks = self.marks if self.chip.interrupts.in_service else 0
+                self.marks = self.marks if self.peripherals.interrupts.in_service else 0
                 self._block()
             self.next_event = 0
             self.limit = 0
@@ -418,12 +426,12 @@ class Cpu(Executor):
     def write_pcon(self, value: int) -> None:
         """Power-down wins over idle; the AT89C52 leaves it by reset only (data sheet 0313H)."""
         if (value ^ self.pcon) & _SMOD:
-            self.chip.write_smod(value >> 7, self.cycles)
+            self.peripherals.write_smod(value >> 7, self.cycles)
         self.pcon = value & _PCON_BITS
         if value & _PD:
-            self.chip.sync(self.cycles)
-            self.chip.settle()
-            self.chip.frozen = 1
+            self.peripherals.sync(self.cycles)
+            self.peripherals.settle()
+            self.peripherals.frozen = 1
             self.powered_down = 1
         elif value & _IDL:
             self.idle = 1
@@ -431,8 +439,8 @@ class Cpu(Executor):
         self.limit = 0
 
     def write_port(self, port: int, value: int) -> None:
-        if value != self.chip.ports.latches[port]:
-            self.chip.write_port(port, value, self.cycles)
+        if value != self.peripherals.ports.latches[port]:
+            self.peripherals.write_port(port, value, self.cycles)
             if port & 1:  # P1 and P3 carry sampled inputs
                 self.next_event = 0
                 self.limit = 0
@@ -441,36 +449,36 @@ class Cpu(Executor):
     # External bus
 
     def page(self) -> int:
-        return self.chip.ports.latches[2] << 8
+        return self.peripherals.ports.latches[2] << 8
 
     def movx_read(self, address: int) -> int:
         """Without a strobe (P3.7 latched low, X3) nothing drives the bus."""
         value = _FLOATING
-        if self.chip.ports.latches[3] & 0x80:
+        if self.peripherals.ports.latches[3] & 0x80:
             value = self.bus.movx_read(address, 12 * self.start + _READ_SAMPLE) & 0xFF
         self.write_port(0, 0xFF)
         return value
 
     def movx_write(self, address: int, value: int) -> None:
         """Without a strobe (P3.6 latched low, X3) nothing is written."""
-        if self.chip.ports.latches[3] & 0x40:
+        if self.peripherals.ports.latches[3] & 0x40:
             self.bus.movx_write(address, value, 12 * self.start + _WRITE_RISES)
         self.write_port(0, 0xFF)
 
     # State
 
     def before_save(self) -> None:
-        """Brings the chip up to where the core is. Marks count only while interrupts hold the CPU."""
-        self.chip.sync(self.cycles)
-        self.chip.settle()
+        """Brings the peripherals up to where the core is. Marks count only while interrupts hold the CPU."""
+        self.peripherals.sync(self.cycles)
+        self.peripherals.settle()
         if not self._taken_over():
             self.marks = 0
 
     def after_load(self) -> None:
-        """Raises ValueError unless the parts of the chip stand where the core does."""
+        """Raises ValueError unless the peripherals stand where the core does."""
         if self.bank & ~0x18 or self.user_flags & ~0x22:
             raise ValueError(f"PSW has bank {self.bank:02X}h and flags {self.user_flags:02X}h")
-        self.chip.check_times(self.cycles)
+        self.peripherals.check_times(self.cycles)
 
     def __repr__(self) -> str:
         return (

@@ -115,7 +115,7 @@ def test_auto_reload_has_the_period_of_its_reload_value():
         cpu.run(cycle)
         if sfr(cpu, "T2CON") & 0x80:
             flags.append(cycle)
-            cpu.chip.write(0xC8, 0x04, cycle)
+            cpu.peripherals.write(0xC8, 0x04, cycle)
     assert flags == list(range(14, 900, 100))[: len(flags)]
     assert len(flags) == 9
 
@@ -176,7 +176,7 @@ def test_clock_out_toggles_p1_0_every_65536_minus_rcap2_counts(reload):
     levels = []
     for cycle in range(12, 12 + 6 * half):
         cpu.run(cycle)
-        levels.append(cpu.chip.pin_levels(1, cycle - 1) & 1)
+        levels.append(cpu.peripherals.pin_levels(1, cycle - 1) & 1)
     first = levels[0]
     assert levels == [first ^ (n // half & 1) for n in range(6 * half)]
     assert sfr(cpu, "T2CON") == 0x04

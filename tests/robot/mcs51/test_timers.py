@@ -179,11 +179,11 @@ def test_lazy_timers_equal_those_that_step_every_cycle(setup, steps):
             pins = value
             push(cpu, pins)
         elif kind != "look":
-            cpu.chip.write(SFRS[kind], value, cpu.cycles)
+            cpu.peripherals.write(SFRS[kind], value, cpu.cycles)
             external = naive.tcon & 0x0F
             setattr(naive, kind.lower(), value & 0x03 if kind == "T2MOD" else value)
             naive.tcon = naive.tcon & 0xF0 | external
         seen = {name: sfr(cpu, name) for name in REGISTERS}
         seen["TCON"] &= 0xF0
         assert seen == {name: getattr(naive, name.lower()) for name in REGISTERS}
-        assert cpu.chip.timer2.clock_out == naive.clock_out
+        assert cpu.peripherals.timer2.clock_out == naive.clock_out

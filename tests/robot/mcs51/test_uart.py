@@ -263,7 +263,7 @@ def test_mode_0_sends_eight_bits_and_a_shift_clock():
     start = 12 * 3  # written at the end of cycle 1, one full cycle, then the bits
     assert cpu.txd.edges()[:2] == [(start + 4, 0), (start + 10, 1)]
     assert len(cpu.txd.edges()) == 16
-    levels = [cpu.chip.shift.data.level_at(start + 12 * n) for n in range(8)]
+    levels = [cpu.peripherals.shift.data.level_at(start + 12 * n) for n in range(8)]
     assert levels == [0x35 >> n & 1 for n in range(8)]
     assert cpu.bus.sent == [(0x35, start + 96)]
     assert sfr(cpu, "SCON") == 0x02
@@ -385,13 +385,13 @@ def test_the_lazy_port_equals_the_one_that_steps_every_tick(configuration, actio
         ("T2CON", configuration["t2con"]),
         ("TCON", 0x40),
     ):
-        cpu.chip.write(SFRS[name], value, 0)
+        cpu.peripherals.write(SFRS[name], value, 0)
         setattr(timers, name.lower(), value)
     cpu.load(bytes([0x75, 0x87, 0x80 * configuration["smod"]]) + bytes(0xFFF0))
     cpu.run(2)
     twin.run(2, pins)
-    cpu.chip.write(SFRS["IE"], configuration["ie"], cpu.cycles)
-    cpu.chip.write(SFRS["SCON"], configuration["scon"], cpu.cycles)
+    cpu.peripherals.write(SFRS["IE"], configuration["ie"], cpu.cycles)
+    cpu.peripherals.write(SFRS["SCON"], configuration["scon"], cpu.cycles)
     uart.write_scon(configuration["scon"], 12 * cpu.cycles)
     for advance, action, value in actions:
         before = cpu.cycles
@@ -399,16 +399,16 @@ def test_the_lazy_port_equals_the_one_that_steps_every_tick(configuration, actio
         now = cpu.cycles
         twin.run(now - before, pins)
         if action == "send":
-            cpu.chip.write(SFRS["SBUF"], value, now)
+            cpu.peripherals.write(SFRS["SBUF"], value, now)
             uart.write_sbuf(value)
         elif action == "clear":
-            cpu.chip.write(SFRS["SCON"], sfr(cpu, "SCON") & 0xFC, now)
+            cpu.peripherals.write(SFRS["SCON"], sfr(cpu, "SCON") & 0xFC, now)
             uart.write_scon(uart.scon & 0xFC, 12 * now)
         elif action == "scon":
-            cpu.chip.write(SFRS["SCON"], 0x50 | value & 0xAC, now)
+            cpu.peripherals.write(SFRS["SCON"], 0x50 | value & 0xAC, now)
             uart.write_scon(0x50 | value & 0xAC, 12 * now)
         elif action == "th1":
-            cpu.chip.write(SFRS["TH1"], value | 0xF0, now)
+            cpu.peripherals.write(SFRS["TH1"], value | 0xF0, now)
             timers.th1 = value | 0xF0
         elif action == "pins":
             pins = {**pins, "t1": value & 1, "t2": value >> 1 & 1}
