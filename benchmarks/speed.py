@@ -26,6 +26,7 @@ from benchmarks.realtime import ratio
 from tests.robot.ucsim import s51
 
 from miro_exact import engine
+from miro_exact.clock import NEVER_TICK
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
@@ -38,7 +39,6 @@ PROGRAMS = ("crc", "arithmetic", "mix")
 FOLDER = Path(__file__).with_name("programs")
 ROBOT_SECONDS = 20
 _TICKS_PER_SECOND = 24_000_000
-_FAR = 1 << 62
 _HOST_USAGE = re.compile(rb"Host usage: ([0-9.]+) sec")
 _EXECUTED = re.compile(rb"Inst= (\d+)")
 
@@ -72,7 +72,7 @@ def ours(image: Image) -> Run:
     cpu = Cpu(XramBus(lambda *_: None, lambda kind, *_: faults.append(kind)))
     cpu.load(image.code, image.used)
     wall, processor = time.perf_counter(), time.process_time()
-    reason = cpu.run_until_pc(address(image, "_finish"), _FAR)
+    reason = cpu.run_until_pc(address(image, "_finish"), NEVER_TICK)
     wall, processor = time.perf_counter() - wall, time.process_time() - processor
     if reason != BREAKPOINT or faults:
         sys.exit(f"{image.path.name}: ended with reason {reason} and faults {faults}")

@@ -15,12 +15,12 @@ from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from typing import Any, Protocol
 
+from miro_exact.clock import NEVER_TICK
+
 Bounds = tuple[Any, Any]
 Column = str | tuple[str, int] | tuple[str, Any, Any]
 """A `struct` code, with the least and the greatest value if not all will do; "s" is bytes, ("s", room) many."""
 
-NEVER_TICK = 1 << 62
-"""Tick of an event that will not happen; no tick lies beyond it."""
 TICK = ("q", 0, NEVER_TICK)
 """A tick, a cycle, or a count of events."""
 FLAG = ("i", 0, 1)

@@ -43,7 +43,6 @@ from miro_exact import engine
 from miro_exact.domain import DomainError
 from miro_exact.fields import (
     FLAG,
-    NEVER_TICK,
     TICK,
     Items,
     Kind,
@@ -57,7 +56,6 @@ from miro_exact.fields import (
 
 __all__ = [
     "FLAG",
-    "NEVER_TICK",
     "TICK",
     "Flat",
     "Items",

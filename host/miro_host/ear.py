@@ -12,7 +12,8 @@ robot boots at 0. This is right as long as a wheel turns by less than 32768 coun
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from miro_exact.state import NEVER_TICK, Rows
+from miro_exact.clock import NEVER_TICK
+from miro_exact.state import Rows
 from miro_protocol.decoder import Received, Symbol, TelemetryDecoder
 from miro_protocol.events import Event
 from miro_protocol.frames import ContentError, TelemetryFrame

@@ -15,7 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from miro_exact.state import FLAG, NEVER_TICK, TICK, Queue
+from miro_exact.clock import NEVER_TICK
+from miro_exact.state import FLAG, TICK, Queue
 from miro_protocol import crc
 from miro_protocol.events import Damaged, Event, Reason, Received
 from miro_protocol.table import SPACING_TICKS, SPACING_TOLERANCE_TICKS, Format
@@ -25,10 +26,10 @@ Symbol = tuple[int, bool, int]
 """A received character: byte 0..255, stop bit good, tick of its start bit (24 MHz)."""
 
 RUN_LIMIT = 4096  # a run of garbage is reported in pieces of so many characters, so that memory stays bounded
-TICK_LIMIT = 1 << 62  # ticks beyond +- this are refused: they are 64-bit numbers here
+TICK_LIMIT = NEVER_TICK  # ticks beyond +- this are refused: they are 64-bit numbers here
 REASONS = tuple(Reason)
 
-_LIMIT = 1 << 62  # C constants when compiled
+_LIMIT = NEVER_TICK  # C constants when compiled
 _CAPACITY = 4160  # room for a run and the window that goes on behind it
 _BAD_STOP = 1  # flaws of a character
 _APART = 2  # ... does not follow its predecessor at the right distance

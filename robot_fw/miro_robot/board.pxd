@@ -12,7 +12,7 @@ cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, 
 cdef int _WR, _RD, _BEHIND_TICKS
 cdef int _RESET_PULSE
 cdef int _FAULT, _REACHED, _RECEIVED, _SENT
-cdef long long RESET_PULSE_TICKS
+cdef long long RESET_PULSE_TICKS, _NEVER
 
 
 cdef class Board(Bus):

@@ -21,6 +21,7 @@ but the CPU is advanced at its own events only, never "up to now", so who looks 
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK
 from miro_robot.event_log import FAULT, REACHED, RECEIVED, SENT, EventLog
 from miro_robot.faults import FaultKind, FirmwareFault
@@ -35,7 +36,6 @@ from miro_robot.probe import Probe
 from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
 
 CYCLE_TICKS = 12
-FAR = 1 << 62
 MAIN_LOOP_LIMIT_CYCLES = 20_000
 """10 ms: a robot whose main loop gets no time for so long has lost a third of a camera frame."""
 FAULTS_KEPT = 1000
@@ -54,6 +54,7 @@ _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_END
 """Ticks into a MOVX: Atmel 8051 Hardware Manual (4316E), section 2.6, and the timing table of external data memory in
 the AT89S52 data sheet (1919D), section 28. Neither says when P2 goes back to its latch: rule X2."""
 _WR, _RD = 0x40, 0x80  # pins of P3
+_NEVER = NEVER_TICK
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
 _RESET_PULSE = RESET_PULSE
 _FAULT, _REACHED, _RECEIVED, _SENT = FAULT, REACHED, RECEIVED, SENT
@@ -207,7 +208,7 @@ class Board(Bus):
 
     def _next_interrupt(self, chip: Lm629) -> int:
         """The next tick at which the chip may raise HI by itself: a sample, or the end of its reset."""
-        return chip.next_tick if chip.sample_tick == FAR else chip.sample_tick
+        return chip.next_tick if chip.sample_tick == _NEVER else chip.sample_tick
 
     def sync(self, tick: int) -> None:
         """Does everything the plant and the LM629 have to do by themselves up to and including `tick`."""
@@ -424,7 +425,7 @@ class Board(Bus):
         self.right.check_times(earliest_tick)
         latest_tick = earliest_tick + 2 * _BEHIND_TICKS + SAMPLE_TICKS
         next_tick = self.plant.next_tick
-        if next_tick < earliest_tick or latest_tick < next_tick < FAR:
+        if next_tick < earliest_tick or latest_tick < next_tick < _NEVER:
             raise ValueError(f"the plant's next step is at tick {next_tick}, not about {earliest_tick}")
         self.hi_seen[0] = self.left.hi
         self.hi_seen[1] = self.right.hi

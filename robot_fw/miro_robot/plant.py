@@ -7,10 +7,10 @@ electronics. Time is in ticks of the 24 MHz crystal.
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
 from miro_robot.lm629.chip import Lm629
 
-FAR = 1 << 62  # "never", in ticks
 LEFT = 0
 RIGHT = 1
 _MORE: tuple[str, ...] = ()  # what a subclass adds
@@ -31,7 +31,7 @@ class Plant:
     def __init__(self) -> None:
         self.left: Lm629 | None = None
         self.right: Lm629 | None = None
-        self.next_tick = FAR
+        self.next_tick = NEVER_TICK
 
     def attach(self, left: Lm629, right: Lm629) -> None:
         """Wires the encoder outputs to the two LM629 and shows these the levels of now."""

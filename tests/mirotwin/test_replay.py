@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.mirotwin.synthetic import periods
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, TICKS_PER_SECOND
 from miro_host.posture import Posture
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
@@ -135,7 +135,7 @@ def test_answers_in_a_stream_are_not_sent() -> None:
             [Transmission(0, ">", b"\x01\x02"), Transmission(49_999, ">", b"\x03")],
             "tick 49999: starts before the",
         ),
-        ([Transmission(1 << 62, ">", b"\x01")], "more than a day"),
+        ([Transmission(NEVER_TICK, ">", b"\x01")], "more than a day"),
     ],
 )
 def test_a_stream_that_cannot_have_been_sent_is_refused(sent: list[Transmission], expected: str) -> None:

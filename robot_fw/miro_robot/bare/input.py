@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from miro_exact.state import NEVER_TICK, TICK, Octets, Rows
+from miro_exact.clock import NEVER_TICK
+from miro_exact.state import TICK, Octets, Rows
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.line import FAR
 
 SLICE = 1_000  # cycles between two looks at whether the program listens
 MARGIN_TICKS = 240  # the CPU may look this far beyond the end of a run
@@ -88,7 +88,7 @@ class SerialInput:
         self.live = live
         self.fed = 0  # bytes of the first piece that are on their way or received
         self.tail = b""  # of what the program sent, as long as the text waited for
-        self.begin_tick = 0  # the first piece begins; FAR until its text was seen
+        self.begin_tick = 0  # the first piece begins; NEVER_TICK until its text was seen
         self.char_end = 0  # tick at which the last character ends
         self.polls = 0  # reads of P3 seen so far
         self._arm()
@@ -109,7 +109,7 @@ class SerialInput:
     @property
     def waiting_for(self) -> bytes:
         """The text that has to be seen before anything more is sent; empty if none."""
-        return self.pieces[0].when if self.pieces and self.begin_tick == FAR else b""
+        return self.pieces[0].when if self.pieces and self.begin_tick == NEVER_TICK else b""
 
     @property
     def left(self) -> int:
@@ -129,7 +129,7 @@ class SerialInput:
         if self.live or (self.pieces and not self.waiting_for):
             self.cpu.rxd.settled_tick = 12 * end + MARGIN_TICKS
         else:
-            self.cpu.rxd.settled_tick = FAR
+            self.cpu.rxd.settled_tick = NEVER_TICK
         return end if self.live or self.pieces else now + _IDLE_SLICE
 
     def _listening(self) -> bool:
@@ -161,7 +161,7 @@ class SerialInput:
             self.pieces.pop(0)
         if self.pieces:
             piece = self.pieces[0]
-            self.begin_tick = FAR if piece.when else self.char_end + (piece.delay_ticks or 0)
+            self.begin_tick = NEVER_TICK if piece.when else self.char_end + (piece.delay_ticks or 0)
 
     def after_load(self) -> None:
         """Raises ValueError for more characters on their way than the first piece has."""

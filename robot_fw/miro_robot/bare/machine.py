@@ -12,14 +12,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import StrEnum
 
-from miro_exact.state import NEVER_TICK, TICK, Items, Rows
+from miro_exact.clock import NEVER_TICK
+from miro_exact.state import TICK, Items, Rows
 from miro_robot.bare.input import Piece, SerialInput
 from miro_robot.bare.pins import PinEvent, PinInput
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import ASLEEP, BREAKPOINT, Cpu
-from miro_robot.mcs51.line import FAR
 from miro_robot.mcs51.opcodes import jumps_to_itself
+from miro_robot.mcs51.uart import STOPPED_TICK
 from miro_robot.mcs51.xram import XramBus
 
 CRYSTAL_HZ = 24_000_000
@@ -27,7 +28,6 @@ CRYSTAL_RANGE_HZ = (32_768, 100_000_000)
 _SLICE = 200_000  # cycles after which a jump to itself that interrupts left is looked at anew
 _FAULTS_KEPT = 100
 _EA, _SOURCES = 0x80, 0x3F  # of IE
-_NEVER = 1 << 61  # tick from which on nothing is being sent: the transmitter is idle, or has no clock
 
 
 class Ended(StrEnum):
@@ -122,7 +122,7 @@ class BareMachine:
         `pause`: cycle at which to come back for the time being.
         `progress` is called with the cycle count every now and then.
         """
-        limit = FAR if max_cycles is None else max_cycles
+        limit = NEVER_TICK if max_cycles is None else max_cycles
         stop = limit if pause is None else min(limit, pause)
         faults = len(self.faults) + self.faults_lost
         while self.cpu.cycles < stop:
@@ -154,7 +154,7 @@ class BareMachine:
         if reason == BREAKPOINT:
             self._jump_to_itself()
         elif reason == ASLEEP and (
-            cpu.powered_down or self.pins.next_tick == FAR or not self._interruptible()
+            cpu.powered_down or self.pins.next_tick == NEVER_TICK or not self._interruptible()
         ):
             self.dead = True
         elif reason == ASLEEP:
@@ -180,7 +180,7 @@ class BareMachine:
         """The cycle in which the last character has been sent; 0 if nothing is being sent."""
         peripherals = self.cpu.peripherals
         tick = min(peripherals.uart.ti_tick(), peripherals.shift.flag_tick())
-        return 0 if self.cpu.powered_down or tick >= _NEVER else tick // 12 + 1
+        return 0 if self.cpu.powered_down or tick >= STOPPED_TICK else tick // 12 + 1
 
     def _interruptible(self) -> bool:
         enabled = self.cpu.sfr(0xA8)

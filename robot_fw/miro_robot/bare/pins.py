@@ -20,10 +20,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from miro_exact.bad_input import BadInput
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
 from miro_robot.bare.input import MARGIN_TICKS, SLICE
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.line import FAR
 
 RXD = (3, 0)  # P3.0, whose level also is what the receiver sees
 _LATEST_TICK = 1 << 60
@@ -86,8 +86,8 @@ class PinInput:
 
     @property
     def next_tick(self) -> int:
-        """Tick of the first event that the CPU does not know yet, FAR if it knows them all."""
-        return self.events[self.done].tick if self.done < len(self.events) else FAR
+        """Tick of the first event that the CPU does not know yet, NEVER_TICK if it knows them all."""
+        return self.events[self.done].tick if self.done < len(self.events) else NEVER_TICK
 
     def feed(self) -> int:
         """Hands over what comes soon, and says up to which cycle the CPU may run before it needs more."""

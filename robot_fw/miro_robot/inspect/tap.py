@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from miro_exact.clock import NEVER_TICK
 from miro_robot.board import Board
 from miro_robot.inspect.watcher import Watcher
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.line import Line
 from miro_robot.probe import Probe
 
-_FAR = 1 << 62
+_NEVER = NEVER_TICK
 _TICKS = 12  # per machine cycle
 
 _RXD, _TXD, _SHIFT, _LATCH, _OUTSIDE, _ASLEEP, _IN_SERVICE, _ROUTINE, _DATA, _SIDE = (
@@ -98,7 +99,7 @@ class BoardTap(Probe):
         """The tick below which the board's changes are all noted, whatever the CPU does from there on."""
         board = self.board
         tick = min(board.left.next_tick, board.right.next_tick)
-        if board.plant.next_tick == _FAR:  # it stands still: no encoder edge is on its way
+        if board.plant.next_tick == _NEVER:  # it stands still: no encoder edge is on its way
             return tick
         return min(tick, self.passed_tick)
 
@@ -277,7 +278,7 @@ class CpuTap(Watcher):
     def _take_line(self, place: int, line: Line, settled_tick: int) -> None:
         """The edges below `settled_tick` that are new."""
         tick = line.next_edge(self.line_ticks[place])
-        while tick < settled_tick and tick < _FAR:
+        while tick < settled_tick and tick < _NEVER:
             self._see(tick, place, line.level_at(tick))
             self.line_ticks[place] = tick
             tick = line.next_edge(tick)

@@ -9,7 +9,7 @@ from miro_robot.lm629.signals cimport Signals
 from miro_robot.lm629.trajectory cimport Trajectory
 
 
-cdef long long _FAR, _SAMPLE_TICKS, _PWM_TICKS
+cdef long long _NEVER, _SAMPLE_TICKS, _PWM_TICKS
 cdef int _HELD, _RESETTING, _RUNNING
 cdef int _MOTOR_OFF, _ON_TARGET, _STOP_ON_ERROR, _UPDATE_PENDING, _ACQUIRE_INDEX
 cdef int _BREAKPOINT, _EXCESSIVE_ERROR, _WRAP_AROUND, _INDEX_ACQUIRED, _TRAJECTORY_COMPLETE

@@ -8,6 +8,7 @@ those of README.md in this folder.
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK
 from miro_robot.event_log import EventLog
 from miro_robot.lm629 import buffers, host_port, signals
@@ -21,9 +22,8 @@ from miro_robot.lm629.trajectory import Trajectory
 
 SAMPLE_TICKS = 8192
 PWM_TICKS = 2048
-FAR = 1 << 62
 
-_FAR = FAR
+_NEVER = NEVER_TICK
 _PLACE = ("q", -(1 << 30), (1 << 30) - 1)  # the chip's position space
 _SAMPLE_TICKS = SAMPLE_TICKS
 _PWM_TICKS = PWM_TICKS
@@ -124,9 +124,9 @@ class MotorAxis:
         self.reset_level = 1
         self.reset_tick = 0
         self.threshold = 0x7FFF
-        self.next_tick = _FAR
+        self.next_tick = _NEVER
         self.index_position = 0
-        self._enter_reset(_HELD, host_port.HARDWARE_RESET, _FAR)
+        self._enter_reset(_HELD, host_port.HARDWARE_RESET, _NEVER)
 
     # ------------------------------------------------------------------------------------------ reset
 
@@ -141,7 +141,7 @@ class MotorAxis:
             self.reset_tick = tick
             self.threshold = 0x7FFF
             self.encoder.settle(tick)
-            self._enter_reset(_HELD, host_port.HARDWARE_RESET, _FAR)
+            self._enter_reset(_HELD, host_port.HARDWARE_RESET, _NEVER)
         elif tick - self.reset_tick >= self.reset_pulse_ticks:
             self.mode = _RESETTING
             self.next_tick = (tick + 3 & -4) + self.reset_ticks
@@ -154,7 +154,7 @@ class MotorAxis:
         clears_index = self.options.reset_clears_index
         self.mode = mode
         self.next_tick = until_tick
-        self.sample_tick = _FAR
+        self.sample_tick = _NEVER
         self.period_tick = 0
         self.port.reset(lock)
         self.encoder.clear(clears_index)

@@ -27,13 +27,14 @@ data sheet SNVS781, connection diagram of the 28-pin package.
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_robot.event_log import COMMAND, EventLog
 from miro_robot.lm629 import buffers, host_port, signals
-from miro_robot.lm629.axis import FAR, PWM_TICKS, SAMPLE_TICKS, MotorAxis
+from miro_robot.lm629.axis import PWM_TICKS, SAMPLE_TICKS, MotorAxis
 from miro_robot.lm629.buffers import TrajectoryBuffer, fit_15
 from miro_robot.lm629.commands import BY_NAME, BY_OPCODE
 
-__all__ = ["FAR", "PWM_TICKS", "SAMPLE_TICKS", "Lm629"]
+__all__ = ["PWM_TICKS", "SAMPLE_TICKS", "Lm629"]
 
 _HELD, _RESETTING, _RUNNING = 0, 1, 2
 _MOTOR_OFF = signals.MOTOR_OFF
@@ -294,7 +295,7 @@ class Lm629(MotorAxis):
         self.writes_while_busy = self.port.writes_while_busy
         if self.reset_level == 0 and self.mode != _HELD:
             raise ValueError("a chip whose reset pin is low is in reset")
-        if self.mode != _RUNNING and (self.sample_tick != FAR or self.pwm or self.pwm_magnitude):
+        if self.mode != _RUNNING and (self.sample_tick != NEVER_TICK or self.pwm or self.pwm_magnitude):
             raise ValueError("a chip in reset takes no samples and drives no motor")
         waiting = self.port.words_left if self.port.incoming else 0
         if waiting > self._words_due():

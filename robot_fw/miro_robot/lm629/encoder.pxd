@@ -1,7 +1,7 @@
 cimport cython
 
 
-cdef long long _FAR
+cdef long long _NEVER
 
 
 @cython.final

@@ -7,9 +7,10 @@ input keeps the tick at which that will be (`due`). What is made of the counts (
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK
 
-_FAR = 1 << 62
+_NEVER = NEVER_TICK
 _COUNTS = ("q", -(1 << 40), 1 << 40)  # between two samples: far more than ticks
 
 
@@ -43,13 +44,13 @@ class InputFilter:
         self.run_tick = 0
         self.pin = level
         self.pin_tick = 0
-        self.due = _FAR
+        self.due = _NEVER
 
     def set(self, tick: int, level: int) -> None:
         """The pin changes at `tick`. What was due before that must have been taken already (`accept`)."""
         if self.direct:
             self.pin = level
-            self.due = tick if level != self.level else _FAR
+            self.due = tick if level != self.level else _NEVER
             return
         clock = (tick & -4) + 4
         if clock > self.pin_tick:
@@ -59,7 +60,7 @@ class InputFilter:
             self.pin_tick = clock
         self.pin = level
         if level == self.level:
-            self.due = _FAR
+            self.due = _NEVER
         elif level == self.run_level:
             self.due = self.run_tick + self.wait
         else:
@@ -68,7 +69,7 @@ class InputFilter:
     def accept(self) -> None:
         """The level at the pin counts from now on."""
         self.level = self.pin
-        self.due = _FAR
+        self.due = _NEVER
 
 
 class Encoder:

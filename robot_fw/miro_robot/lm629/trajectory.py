@@ -8,9 +8,10 @@ always ends exactly on the target.
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG
 
-_NEVER = 1 << 62
+_NEVER = NEVER_TICK
 _HALF_SPACE = 1 << 46
 _SPACE_MASK = (1 << 47) - 1
 

@@ -32,6 +32,7 @@ from collections.abc import Callable
 from contextvars import ContextVar
 from typing import Protocol
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG
 from miro_robot.faults import FaultKind
 from miro_robot.mcs51.bus import Bus
@@ -43,7 +44,7 @@ __all__ = ["ASLEEP", "BREAKPOINT", "REACHED", "STOPPED", "WIRE_FULL", "Cpu"]
 
 ASLEEP = 4  # why a run ended, beside those of `execute.py`: with `stop_asleep`, nothing known wakes it
 
-_FAR = 1 << 62
+_NEVER = NEVER_TICK
 _OUTSIDE = 0x0800  # lines that are no opcode's, see opcodes.py; both: a mark outside
 _MARK = 0x1000
 _STOP_REQUESTED = 1
@@ -106,7 +107,7 @@ class Cpu(Executor):
         self.next_event = 0
         self.blocked = -1  # boundary at which no interrupt is taken: after RETI and writes to IE, IP (I1)
         self.main_loop_limit = 0  # cycles after which interrupts that leave it no time are a fault; 0: never
-        self.next_mark = _FAR
+        self.next_mark = _NEVER
         self.marks = 0  # marks passed since interrupts took over
         self.code_limit = 0x10000
         self.stop_asleep = (
@@ -230,7 +231,7 @@ class Cpu(Executor):
     def set_external(self, port: int, levels: int, tick: int) -> None:
         """From `tick` on the outside puts `levels` on the pins of P0..P3 (1: released or high)."""
         if (
-            self.peripherals.ports.next_cycle == _FAR
+            self.peripherals.ports.next_cycle == _NEVER
             and (port == 0 or port == 2)
             and tick <= 12 * self.cycles + 9
         ):
@@ -246,7 +247,7 @@ class Cpu(Executor):
         """Whether only a reset or a new input can make it execute another instruction."""
         if self.powered_down:
             return True
-        return bool(self.idle) and self.peripherals.next_event(self.cycles) == _FAR
+        return bool(self.idle) and self.peripherals.next_event(self.cycles) == _NEVER
 
     def peek_iram(self, address: int) -> int:
         """A byte of internal RAM (0..255)."""
@@ -263,7 +264,7 @@ class Cpu(Executor):
     # The run loop's view of time
 
     def begin_run(self) -> None:
-        self.next_mark = (self.cycles // _MARK_CYCLES + 1) * _MARK_CYCLES if self.main_loop_limit else _FAR
+        self.next_mark = (self.cycles // _MARK_CYCLES + 1) * _MARK_CYCLES if self.main_loop_limit else _NEVER
         self.peripherals.serial_wait = -1  # more may have been put on RXD since the last run
         self.next_event = 0
         self.limit = 0
@@ -293,7 +294,7 @@ class Cpu(Executor):
         if self.next_mark < event:
             event = self.next_mark
         if (self.idle or self.powered_down) and now < event:
-            if self.stop_asleep and (self.powered_down or self.next_event >= _FAR):
+            if self.stop_asleep and (self.powered_down or self.next_event >= _NEVER):
                 self.stop = ASLEEP
                 return 1
             self.idle_cycles += event - now

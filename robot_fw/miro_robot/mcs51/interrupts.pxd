@@ -1,6 +1,6 @@
 cimport cython
 
-cdef long long _FAR
+cdef long long _NEVER
 
 @cython.final
 cdef class Interrupts:

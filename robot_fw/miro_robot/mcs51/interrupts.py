@@ -18,9 +18,9 @@ window [since, until) of cycles whose S5P2 saw it. A cleared flag still counts i
 
 from __future__ import annotations
 
-from miro_exact.state import NEVER_TICK
+from miro_exact.clock import NEVER_TICK
 
-_FAR = 1 << 62
+_NEVER = NEVER_TICK
 SOURCES = 6  # in polling order: INT0, timer 0, INT1, timer 1, serial, timer 2
 INT0, TIMER0, INT1, TIMER1, SERIAL, TIMER2 = range(SOURCES)
 
@@ -54,13 +54,13 @@ class Interrupts:
 
     def ask(self, source: int, cycle: int) -> None:
         """The source's flag is first seen at S5P2 of `cycle`; nothing new if it is up already."""
-        if self.until[source] != _FAR:
+        if self.until[source] != _NEVER:
             self.since[source] = cycle
-            self.until[source] = _FAR
+            self.until[source] = _NEVER
 
     def withdraw(self, source: int, cycle: int) -> None:
         """The source's flag is no longer seen at S5P2 of `cycle`."""
-        if self.until[source] == _FAR:
+        if self.until[source] == _NEVER:
             self.until[source] = cycle
 
     def choose(self, boundary: int) -> int:
@@ -78,10 +78,10 @@ class Interrupts:
         return chosen
 
     def next_boundary(self, now: int) -> int:
-        """The first cycle >= `now` in which `choose` may find something among the flags known, or FAR."""
+        """The first cycle >= `now` in which `choose` may find something among the flags known, or NEVER_TICK."""
         if not self.ie & 0x80 or self.in_service & 2:
-            return _FAR
-        earliest = _FAR
+            return _NEVER
+        earliest = _NEVER
         for source in range(6):
             if (self.ie >> source) & 1 and (not self.in_service or (self.ip >> source) & 1):
                 boundary = max(self.since[source] + 2, now)

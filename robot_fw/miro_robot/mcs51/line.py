@@ -18,10 +18,10 @@ from __future__ import annotations
 
 from array import array
 
-from miro_exact.state import FLAG, NEVER_TICK, TICK, Items
+from miro_exact.clock import NEVER_TICK
+from miro_exact.state import FLAG, TICK, Items
 
-FAR = 1 << 62  # "never", for everybody
-_FAR = 1 << 62  # the same as a C constant
+_NEVER = NEVER_TICK
 _SIZE = 4096  # places of a new ring; always a power of two
 WAITING = 2048
 """So many edges may wait to be heard before the line is full."""
@@ -109,10 +109,10 @@ class Line:
         return self._before ^ ((self._cursor - self._first) & 1)
 
     def next_edge(self, tick: int) -> int:
-        """Tick of the first edge strictly after `tick`, FAR if none is known."""
+        """Tick of the first edge strictly after `tick`, NEVER_TICK if none is known."""
         self._seek(tick)
         if self._cursor == self._end:
-            return _FAR
+            return _NEVER
         return self._ticks[self._cursor & self._mask]
 
     def forget(self, tick: int) -> None:
@@ -130,9 +130,9 @@ class Line:
         self.full = self._end - self._heard > _WAITING and not self.unread
 
     def full_tick(self) -> int:
-        """Tick of the 2048th edge that waits to be heard, FAR if there are not so many."""
+        """Tick of the 2048th edge that waits to be heard, NEVER_TICK if there are not so many."""
         if self._end - self._heard < _WAITING:
-            return _FAR
+            return _NEVER
         return self._ticks[(self._heard + _WAITING - 1) & self._mask]
 
     def edges(self) -> list[tuple[int, int]]:

@@ -8,7 +8,7 @@ from miro_robot.mcs51.timer2 cimport Timer2
 from miro_robot.mcs51.timers cimport Timers
 from miro_robot.mcs51.uart cimport Uart
 
-cdef long long _FAR
+cdef long long _NEVER
 cdef int _UNIMPLEMENTED
 cdef int _P0, _P1, _P2, _P3
 cdef int _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1

@@ -19,6 +19,7 @@ or somebody looks at them (`settle`): in between nothing of theirs is stepped. L
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.interrupts import ExternalInterrupts, Interrupts
@@ -26,9 +27,9 @@ from miro_robot.mcs51.ports import Ports
 from miro_robot.mcs51.shift import Shift
 from miro_robot.mcs51.timer2 import Timer2
 from miro_robot.mcs51.timers import Timers
-from miro_robot.mcs51.uart import Uart
+from miro_robot.mcs51.uart import STOPPED_TICK, Uart
 
-_FAR = 1 << 62
+_NEVER = NEVER_TICK
 _UNIMPLEMENTED = 0xFF  # what an address without a register reads as (C5)
 _P0, _P1, _P2, _P3 = 0x80, 0x90, 0xA0, 0xB0
 _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1 = 0x88, 0x89, 0x8A, 0x8B, 0x8C, 0x8D
@@ -39,7 +40,7 @@ _S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows (U2)
 _SERIAL, _TIMER2 = 0x10, 0x20  # in IE
 _REN = 0x10  # in SCON
 _NO_PERIOD = 1 << 40  # of a clock that stands
-_STOPPED = 1 << 61  # ticks from here on never come: the serial port has no clock, or nothing to do
+_STOPPED = STOPPED_TICK
 
 
 class Peripherals:
@@ -134,7 +135,7 @@ class Peripherals:
 
     def _sync_pulsed(self, cycle: int) -> None:
         """The serial port gets its 16x ticks one by one from the overflows of a timer that counts a pin."""
-        pulse1 = self.timers.next_overflow(1) if self.timers.counts_pin(1) else _FAR
+        pulse1 = self.timers.next_overflow(1) if self.timers.counts_pin(1) else _NEVER
         pulse2 = self.timer2.next_pin_overflow()
         self.timers.sync(cycle)
         self.timer2.sync(cycle)
@@ -157,7 +158,7 @@ class Peripherals:
         self.uart.pulse(rx, tx, 12 * cycle + _S5P2)
 
     def next_event(self, now: int) -> int:
-        """The next cycle >= `now` at whose begin an interrupt may be due or a push takes effect, or FAR."""
+        """The next cycle >= `now` at whose begin an interrupt may be due or a push takes effect, or NEVER_TICK."""
         event = self.interrupts.next_boundary(now)
         if self.ports.next_cycle < event:
             event = self.ports.next_cycle
@@ -202,7 +203,7 @@ class Peripherals:
         mode = self.uart.mode()
         self.pulsed = 0
         if mode == 0:
-            self.uart.set_clock(_FAR, 0, _FAR, 0)
+            self.uart.set_clock(_NEVER, 0, _NEVER, 0)
             return
         next1 = 12 * self.timers.synced + 1  # mode 2: fosc/32 or fosc/64, in phase with the cycle (U8)
         period1 = 2 if self.smod else 4
@@ -226,11 +227,11 @@ class Peripherals:
     def _timer1_tick(self) -> int:
         """The next overflow of timer 1 that is a 16x tick: with SMOD = 0 every second one since reset (U1)."""
         if self.timers.counts_pin(1):
-            return _FAR
+            return _NEVER
         cycle = self.timers.next_overflow(1)
-        if cycle < _FAR and not self.smod and not self.timers.overflows1 & 1:
+        if cycle < _NEVER and not self.smod and not self.timers.overflows1 & 1:
             cycle += self.timers.top(1) - self.timers.reload(1)
-        return 12 * cycle + _S5P2 if cycle < _FAR else _FAR
+        return 12 * cycle + _S5P2 if cycle < _NEVER else _NEVER
 
     # Pins
 

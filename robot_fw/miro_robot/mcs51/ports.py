@@ -13,9 +13,10 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
 
-_FAR = 1 << 62
+_NEVER = NEVER_TICK
 _Push = tuple[
     Annotated[int, Meta(ge=0, le=1 << 55)],
     Annotated[int, Meta(ge=0, le=3)],
@@ -37,7 +38,7 @@ class Ports:
         self.latches = [0xFF] * 4
         self.outside = [0xFF] * 4
         self.pending: list[tuple[int, int, int]] = []  # (cycle, port, levels), by cycle
-        self.next_cycle = _FAR  # of the first of them
+        self.next_cycle = _NEVER  # of the first of them
 
     def level(self, port: int) -> int:
         return self.latches[port] & self.outside[port]
@@ -55,7 +56,7 @@ class Ports:
         while self.next_cycle <= cycle:
             _, port, levels = self.pending.pop(0)
             self.outside[port] = levels
-            self.next_cycle = self.pending[0][0] if self.pending else _FAR
+            self.next_cycle = self.pending[0][0] if self.pending else _NEVER
 
     def after_load(self) -> None:
-        self.next_cycle = self.pending[0][0] if self.pending else _FAR
+        self.next_cycle = self.pending[0][0] if self.pending else _NEVER

@@ -10,12 +10,13 @@ there.
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_robot.mcs51.uart import Uart
 
 _REN, _TI, _RI = 0x10, 0x02, 0x01
-_FAR = 1 << 62
+_NEVER = NEVER_TICK
 _SAMPLE = 9  # S5P2
 _CLOCK_FALLS, _CLOCK_RISES = 4, 10  # S3P1, S6P1
 
@@ -92,8 +93,8 @@ class Shift:
             self.uart.bus.byte_sent(self.value, tick)
 
     def flag_tick(self) -> int:
-        """Tick at which TI or RI goes up, FAR when idle."""
-        return 12 * (self.cycle + 8 - self.number) if self.flag else _FAR
+        """Tick at which TI or RI goes up, NEVER_TICK when idle."""
+        return 12 * (self.cycle + 8 - self.number) if self.flag else _NEVER
 
     def check_times(self, cycle: int) -> None:
         """Raises ValueError unless the register goes on at `cycle`."""

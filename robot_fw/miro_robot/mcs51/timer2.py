@@ -17,10 +17,11 @@ before that cycle's own count (T4), with EXF2 latched at S5P2 of that cycle (I3)
 
 from __future__ import annotations
 
-from miro_exact.state import FLAG, NEVER_TICK, TICK
+from miro_exact.clock import NEVER_TICK
+from miro_exact.state import FLAG, TICK
 from miro_robot.mcs51.interrupts import Interrupts
 
-_FAR = 1 << 62
+_NEVER = NEVER_TICK
 _NONE = -1
 _TIMER2 = 5  # its place in the polling order
 _TF2, _EXF2, _RCLK, _TCLK, _EXEN2, _TR2, _C_T2, _CP_RL2 = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02, 0x01
@@ -141,29 +142,29 @@ class Timer2:
         self.interrupts.ask(_TIMER2, cycle - 1)
 
     def next_flag(self) -> int:
-        """The `since` with which TF2 or EXF2 will ask if nothing changes, or FAR."""
+        """The `since` with which TF2 or EXF2 will ask if nothing changes, or NEVER_TICK."""
         if self.falls():
             return self.synced
         if self.control & _TF2 or self.silent():
-            return _FAR
+            return _NEVER
         if self.rate():
             return self.synced + self.left() - 2
         overflow = self.next_pin_overflow()
-        return overflow - 1 if overflow < _FAR else _FAR
+        return overflow - 1 if overflow < _NEVER else _NEVER
 
     def next_overflow_tick(self) -> int:
-        """Tick at which the state ends that overflows next as a baud rate generator, or FAR."""
+        """Tick at which the state ends that overflows next as a baud rate generator, or NEVER_TICK."""
         if self.rate() != _STATES:
-            return _FAR
+            return _NEVER
         return 12 * self.synced + 2 * self.left() - 1
 
     def counts_pin(self) -> int:
         return 1 if self.control & _TR2 and self.control & _C_T2 else 0
 
     def next_pin_overflow(self) -> int:
-        """Cycle in which a fall of T2 that was seen already overflows, or FAR."""
+        """Cycle in which a fall of T2 that was seen already overflows, or NEVER_TICK."""
         waiting = self.counts_pin() and self.left() == 1 and self.edge_cycle >= self.synced
-        return self.edge_cycle if waiting else _FAR
+        return self.edge_cycle if waiting else _NEVER
 
     def fall(self, cycle: int) -> None:
         """T2 was high in one sample and low in the next, that of `cycle`."""

@@ -2,7 +2,7 @@ cimport cython
 
 from miro_robot.mcs51.interrupts cimport Interrupts
 
-cdef long long _FAR
+cdef long long _NEVER
 cdef long long _NONE
 
 @cython.final

@@ -14,10 +14,11 @@ following cycle. TF is seen at S5P2 of the cycle that overflows.
 
 from __future__ import annotations
 
-from miro_exact.state import NEVER_TICK, TICK
+from miro_exact.clock import NEVER_TICK
+from miro_exact.state import TICK
 from miro_robot.mcs51.interrupts import Interrupts
 
-_FAR = 1 << 62
+_NEVER = NEVER_TICK
 _NONE = -1  # no counter edge waiting
 
 
@@ -117,26 +118,26 @@ class Timers:
         return self.th[part] if part < 2 and self.mode(part) == 2 else 0
 
     def next_overflow(self, part: int) -> int:
-        """Cycle of the next overflow if nothing changes, or FAR. A counter is known one edge ahead only."""
+        """Cycle of the next overflow if nothing changes, or NEVER_TICK. A counter is known one edge ahead only."""
         if not self.enabled(part):
-            return _FAR
+            return _NEVER
         left = self.top(part) - self.value(part)
         if self.counts_pin(part):
-            return self.edge_cycle[part] if left == 1 and self.edge_cycle[part] >= self.synced else _FAR
+            return self.edge_cycle[part] if left == 1 and self.edge_cycle[part] >= self.synced else _NEVER
         return self.synced + left - 1
 
     def quiet_until(self) -> int:
-        """The next cycle in which TF0 or TF1 goes up if nothing changes, or FAR."""
+        """The next cycle in which TF0 or TF1 goes up if nothing changes, or NEVER_TICK."""
         if not self.any_runs():
-            return _FAR
+            return _NEVER
         first = self.next_flag(0)
         second = self.next_flag(1)
         return first if first < second else second
 
     def next_flag(self, timer: int) -> int:
-        """Cycle in which TF0, TF1 will be seen set, or FAR if it is up already or not in sight."""
+        """Cycle in which TF0, TF1 will be seen set, or NEVER_TICK if it is up already or not in sight."""
         if self.control & (0x20 << (2 * timer)):
-            return _FAR
+            return _NEVER
         if timer == 1 and self.mode(0) == 3:
             return self.next_overflow(2)
         return self.next_overflow(timer)

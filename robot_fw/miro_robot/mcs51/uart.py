@@ -19,13 +19,16 @@ the Line for its next edge.
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.interrupts import Interrupts
 from miro_robot.mcs51.line import Line
 
-_FAR = 1 << 62
-_STOPPED = 1 << 61  # next tick of a clock that does not run
+_NEVER = NEVER_TICK
+STOPPED_TICK = 1 << 61
+"""Next tick of a clock that does not run. A tick computed from it lies beyond it, and never comes."""
+_STOPPED = STOPPED_TICK
 _STOPPED_PERIOD = 1 << 40
 _SERIAL = 4  # its place in the polling order
 _SM0, _SM1, _SM2, _REN, _TB8, _RB8, _TI, _RI = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02, 0x01
@@ -69,7 +72,7 @@ class Uart:
         self.bus = bus
         self.interrupts = interrupts
         self.rxd = Line()
-        self.rxd.settled_tick = _FAR  # nothing connected: mark for ever, until a producer says otherwise
+        self.rxd.settled_tick = _NEVER  # nothing connected: mark for ever, until a producer says otherwise
         self.txd = Line()
         self.txd.unread = True  # until a listener says otherwise
         self.latch = 3
@@ -84,7 +87,7 @@ class Uart:
         self.tx_value = 0
         self.tx_delay = 0  # from rollover to pin (U3); 0 before the start bit
         self.tx_level = 1  # what the transmitter puts on TXD
-        self.tx_edge = _FAR  # tick at which tx_coming replaces it
+        self.tx_edge = _NEVER  # tick at which tx_coming replaces it
         self.tx_coming = 1
         # receiver
         self.rx_next = _STOPPED
@@ -93,7 +96,7 @@ class Uart:
         self.rx_last = 1  # RXD at the last 16x tick
         self.rx_votes = 0
         self.rx_bits = 0
-        self.rx_done = _FAR  # tick at which rx_frame is delivered
+        self.rx_done = _NEVER  # tick at which rx_frame is delivered
         self.rx_frame = 0  # data, and the bit after them in bit 8
 
     def clear(self, cycle: int) -> None:
@@ -107,10 +110,10 @@ class Uart:
         """Both state machines to idle: reset, and a change of mode; with everything below `tick` done."""
         self.txd.append(tick, self.latch >> 1)
         self.tx_left = 0
-        self.tx_edge = _FAR
+        self.tx_edge = _NEVER
         self.tx_level = 1
         self.rx_count = 0
-        self.rx_done = _FAR
+        self.rx_done = _NEVER
 
     def mode(self) -> int:
         return self.scon >> 6
@@ -119,7 +122,7 @@ class Uart:
         return self.scon >> 7
 
     def set_clock(self, rx_next: int, rx_period: int, tx_next: int, tx_period: int) -> None:
-        """16x ticks from now on: the next one and their distance, for both directions. FAR stops one."""
+        """16x ticks from now on: the next one and their distance, for both directions. NEVER_TICK stops one."""
         self.rx_next = rx_next if rx_next < _STOPPED else _STOPPED
         self.rx_period = rx_period if rx_next < _STOPPED else _STOPPED_PERIOD
         self.tx_next = tx_next if tx_next < _STOPPED else _STOPPED
@@ -216,10 +219,10 @@ class Uart:
         if self.tx_left == 0:
             self.raise_flag(_TI, self.tx_edge)
             self.bus.byte_sent(self.tx_value, self.tx_edge)
-        self.tx_edge = _FAR
+        self.tx_edge = _NEVER
 
     def ti_tick(self) -> int:
-        """Tick at which TI goes up if nothing changes, FAR if nothing is being sent."""
+        """Tick at which TI goes up if nothing changes, NEVER_TICK if nothing is being sent."""
         if self.tx_left == 0:
             return self.tx_edge
         rollover = self.tx_next + (_ROLLOVERS - 1 - self.tx_phase) * self.tx_period
@@ -258,7 +261,7 @@ class Uart:
                 self.rx_next = now + self.rx_period
                 return
             self.rx_last = level
-            change = self.rxd.next_edge(now) if self.latch & 1 else _FAR
+            change = self.rxd.next_edge(now) if self.latch & 1 else _NEVER
             if change > tick:
                 change = tick
             now += ((change - now + self.rx_period - 1) // self.rx_period) * self.rx_period
@@ -307,7 +310,7 @@ class Uart:
     def _deliver(self) -> None:
         """Into SBUF and RB8, if RI is down and SM2 lets it pass; otherwise the frame is lost for good."""
         tick = self.rx_done
-        self.rx_done = _FAR
+        self.rx_done = _NEVER
         last = self.rx_frame >> 8
         if self.scon & _RI or (self.scon & _SM2 and not last):
             return
@@ -317,15 +320,15 @@ class Uart:
         self.bus.byte_received(self.received, last, tick)
 
     def ri_tick(self) -> int:
-        """A tick before which RI will not go up, FAR if no character can come."""
-        if self.rx_done != _FAR:
+        """A tick before which RI will not go up, NEVER_TICK if no character can come."""
+        if self.rx_done != _NEVER:
             return self.rx_done
         if self.rx_count > _LAST_ACTION:  # a nine-bit frame without its stop bit: no other begins before that
             return self.rx_next + (_LAST_ACTION + _ROLLOVERS - self.rx_count) * self.rx_period
         if self.rx_count:
             return self.rx_next + (_LAST_ACTION - self.rx_count) * self.rx_period
         if not self.scon & _REN or not self.latch & 1:
-            return _FAR
+            return _NEVER
         before = self.rx_next - self.rx_period
         fall = self.rxd.next_edge(before)
         if self.rx_last and not self.rxd.level_at(before):
@@ -336,7 +339,7 @@ class Uart:
             fall = self.rxd.settled_tick
         if fall < self.rx_next:
             fall = self.rx_next
-        return fall + _LAST_ACTION * self.rx_period if fall < _STOPPED else _FAR
+        return fall + _LAST_ACTION * self.rx_period if fall < _STOPPED else _NEVER
 
     def check_times(self, tick: int) -> None:
         """Raises ValueError unless the port goes on at `tick`: what it sends comes after the edges on TXD."""

@@ -6,7 +6,7 @@ from miro_sim.plant.chassis cimport Body
 from miro_sim.plant.circuit cimport Winding
 from miro_sim.plant.encoder cimport Quadrature
 
-cdef long long LONGEST_STEP, NONE_LEFT
+cdef long long LONGEST_STEP, _NEVER
 cdef double TICK_S
 
 cdef class DifferentialDrive(Plant):

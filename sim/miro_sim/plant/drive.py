@@ -17,6 +17,7 @@ makes energy only to second order, (kM charge)2 / 2J: by Cauchy-Schwarz less tha
 
 from __future__ import annotations
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
 from miro_robot.lm629.chip import Lm629
 from miro_robot.plant import Plant
@@ -26,7 +27,7 @@ from miro_sim.plant.encoder import Quadrature
 from miro_sim.plant.params import DriveParams
 
 LONGEST_STEP = 2048
-NONE_LEFT = 1 << 62
+_NEVER = NEVER_TICK
 TICK_S = 1.0 / 24e6
 
 
@@ -90,7 +91,7 @@ class DifferentialDrive(Plant):
             left_tick = self.left_encoder.edge_tick
             right_tick = self.right_encoder.edge_tick
             if left_tick <= right_tick:
-                if left_tick == NONE_LEFT:
+                if left_tick == _NEVER:
                     return
                 self.left_encoder.show()
                 if self.left is not None:

@@ -1,7 +1,7 @@
 # C layout of miro_sim.plant.encoder.
 cimport cython
 
-cdef long long _FAR
+cdef long long _NEVER
 
 @cython.final
 cdef class Quadrature:

@@ -9,8 +9,9 @@ Inside a step the shaft turns evenly; an edge falls on the first integer tick at
 
 from __future__ import annotations
 
-MOST_COUNTS = 1 << 50  # of a saved state: doubles still hold quarters of it
-_FAR = 1 << 62
+from miro_exact.clock import NEVER_TICK
+
+_NEVER = NEVER_TICK
 _MOST_COUNTS = 1 << 50  # doubles still hold fractions of it
 
 
@@ -37,7 +38,7 @@ class Quadrature:
         self.counts_per_turn = counts_per_turn  # 0: there is no index channel
         self.position = 0.5  # the rotor stands in the middle of a quarter line
         self.count = 0
-        self.edge_tick = _FAR  # of the next edge of the step being reported
+        self.edge_tick = _NEVER  # of the next edge of the step being reported
         self._start = 0.5
         self._start_tick = 0
         self._ticks = 0
@@ -54,7 +55,7 @@ class Quadrature:
             last -= 1
         self._last = last
         if last == self.count:
-            self.edge_tick = _FAR
+            self.edge_tick = _NEVER
             return
         self._start_tick = start_tick
         self._ticks = ticks
@@ -68,7 +69,7 @@ class Quadrature:
         else:
             self.count -= 1
         if self._last == self.count:
-            self.edge_tick = _FAR
+            self.edge_tick = _NEVER
         else:
             self._aim()
 
@@ -99,7 +100,7 @@ class Quadrature:
 
     def after_load(self) -> None:
         """No edge is waiting. Raises ValueError unless A and B show the position."""
-        self.edge_tick = _FAR
+        self.edge_tick = _NEVER
         if not self.count <= self.position < self.count + 1:
             raise ValueError(f"count is {self.count} at position {self.position}")
 

@@ -4,7 +4,7 @@ from miro_robot.mcs51.line cimport Line
 from miro_sim.radio.chain cimport Chain
 from miro_exact.rng cimport Stream
 
-cdef long long _FAR, _BIT, _HOLD
+cdef long long _NEVER, _BIT, _HOLD
 
 
 cdef class Transmitter:

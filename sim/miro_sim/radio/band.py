@@ -14,17 +14,16 @@ Sampling it as a UART is the business of `uplink`.
 
 from __future__ import annotations
 
-from miro_exact.clock import FAR, HOST_BIT_TICKS, HOST_CHARACTER_TICKS
+from miro_exact.clock import HOST_BIT_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK
 from miro_exact.rng import Stream
-from miro_exact.state import NEVER_TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
 from miro_sim.radio.params import RadioParams
 
-_FAR = 1 << 62
+_NEVER = NEVER_TICK
 _BIT = 2500
 _HOLD = 50_000
-assert (FAR, HOST_BIT_TICKS, 2 * HOST_CHARACTER_TICKS) == (_FAR, _BIT, _HOLD)
+assert (HOST_BIT_TICKS, 2 * HOST_CHARACTER_TICKS) == (_BIT, _HOLD)
 
 
 class Transmitter:
@@ -67,7 +66,7 @@ class Band:
 
     def limit(self) -> int:
         """The tick up to which the robots' wires, and so the level, are final."""
-        limit = _FAR
+        limit = _NEVER
         for transmitter in self.transmitters:
             limit = min(limit, transmitter.line.settled_tick + self.latency)
         return limit
@@ -99,15 +98,15 @@ class Band:
     def next_change(self, tick: int) -> int:
         """The first tick after `tick`, where the level was just asked for, at which it may be another."""
         sent = tick - self.latency
-        change = _FAR
+        change = _NEVER
         for transmitter in self.transmitters:
             change = min(change, transmitter.line.next_edge(sent))
             if transmitter.last_edge >= 0 and sent < transmitter.last_edge + _HOLD:
                 change = min(change, transmitter.last_edge + _HOLD)
                 if self.slotted:
                     change = min(change, (sent // _BIT + 1) * _BIT)
-        if change == _FAR:
-            return _FAR
+        if change == _NEVER:
+            return _NEVER
         return change + self.latency
 
     def hear(self, tick: int) -> None:
@@ -120,8 +119,8 @@ class Band:
             transmitter.line.hear(tick)
 
     def full_tick(self) -> int:
-        """The first tick at which 2048 edges of one robot wait to be heard, FAR if there is none."""
-        tick = _FAR
+        """The first tick at which 2048 edges of one robot wait to be heard, NEVER_TICK if there is none."""
+        tick = _NEVER
         for transmitter in self.transmitters:
             tick = min(tick, transmitter.line.full_tick())
         return tick

@@ -11,8 +11,8 @@ samples once does both in the middle: all of them take the stop bit for bad and 
 
 from __future__ import annotations
 
-from miro_exact.clock import CHARACTER_BITS
-from miro_exact.state import NEVER_TICK, Rows
+from miro_exact.clock import CHARACTER_BITS, NEVER_TICK
+from miro_exact.state import Rows
 from miro_sim.radio.params import RadioParams, bit_ticks
 
 _CHARACTER = 10

@@ -9,8 +9,8 @@ How the level comes about is the business of `band`, what the symbols mean that 
 
 from __future__ import annotations
 
-from miro_exact.clock import CHARACTER_BITS
-from miro_exact.state import FLAG, NEVER_TICK, TICK
+from miro_exact.clock import CHARACTER_BITS, NEVER_TICK
+from miro_exact.state import FLAG, TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.band import Band
 from miro_sim.radio.params import RadioParams
@@ -78,7 +78,7 @@ class Uplink:
         return symbols
 
     def full_tick(self) -> int:
-        """The first tick at which 2048 edges of one robot wait to be received, FAR if there is none.
+        """The first tick at which 2048 edges of one robot wait to be received, NEVER_TICK if there is none.
 
         It depends on the wires' content and on `now` alone. A robot whose wire is full stops; it goes on when this
         tick was received.

@@ -25,7 +25,6 @@ CYCLE = 12
 BIT = 2500  # host UART
 CHARACTER = 10 * BIT
 SAMPLE = 8192
-FAR = 1 << 62
 IMAGE = load_hex(image_path())
 BOOTED = 4 * MS
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from tests.robot.lm629.bench import Bench
 
-from miro_robot.lm629.chip import FAR, PWM_TICKS, SAMPLE_TICKS, Lm629
+from miro_exact.clock import NEVER_TICK
+from miro_robot.lm629.chip import PWM_TICKS, SAMPLE_TICKS, Lm629
 
 
 def holding(kp: int = 10) -> Bench:
@@ -64,7 +65,7 @@ def test_the_drive_changes_at_the_sample_only():
 def test_samples_and_periods_count_from_the_end_of_reset():
     for release in (1000, 1001, 1004):
         chip = Lm629()
-        assert chip.next_tick == FAR
+        assert chip.next_tick == NEVER_TICK
         chip.set_reset(900, 0)
         chip.set_reset(release, 1)
         end = -(-release // 4) * 4 + 6144 * 4
@@ -85,5 +86,5 @@ def test_reset_ends_a_pulse_at_once():
             assert bench.chip.next_tick > bench.tick + 2 * SAMPLE_TICKS
         else:
             bench.chip.set_reset(bench.tick, 0)
-            assert bench.chip.next_tick == FAR
+            assert bench.chip.next_tick == NEVER_TICK
         assert (bench.chip.pwm, bench.chip.sign, bench.chip.pwm_magnitude, bench.chip.hi) == (0, 0, 0, 0)

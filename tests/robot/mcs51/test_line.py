@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import restore, snapshot
-from miro_robot.mcs51.line import FAR, Line
+from miro_robot.mcs51.line import Line
 
 EDGES = st.lists(st.tuples(st.integers(0, 20), st.integers(0, 1)), max_size=40)
 
@@ -38,7 +39,7 @@ def test_levels_and_next_edges_are_those_of_a_list(initial, steps, queries):
             for tick in levels
             if tick > query and naive_level(initial, levels, tick) != naive_level(initial, levels, tick - 1)
         ]
-        assert line.next_edge(query) == min(later, default=FAR)
+        assert line.next_edge(query) == min(later, default=NEVER_TICK)
 
 
 @given(st.integers(0, 1), EDGES, st.integers(0, 400), st.lists(st.integers(0, 400), max_size=10))
@@ -93,7 +94,7 @@ def test_a_line_is_full_when_more_than_2048_edges_wait_to_be_heard():
     assert line.full_tick() == 20_470
     line.hear(20_470)  # 2047 edges come before it
     assert not line.full
-    assert line.full_tick() == FAR
+    assert line.full_tick() == NEVER_TICK
     assert len(line.edges()) == 2049  # heard is not forgotten
 
 
@@ -113,7 +114,7 @@ def test_what_waits_is_what_came_since_the_tick_last_heard(gaps, count, heard):
         line.hear(tick)
         waiting = [edge for edge in ticks if edge >= tick]
         assert line.full == (len(waiting) > 2048)
-        assert line.full_tick() == (waiting[2047] if len(waiting) >= 2048 else FAR)
+        assert line.full_tick() == (waiting[2047] if len(waiting) >= 2048 else NEVER_TICK)
 
 
 def test_a_line_that_nobody_reads_drops_its_oldest_edges():

@@ -15,9 +15,9 @@ from tests.naive.mcs51_uart import NaiveUart
 from tests.robot.mcs51.asm import SFRS
 from tests.robot.mcs51.rig import RecordingBus, cpu_with, sfr
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import snapshot
 from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.line import FAR
 
 BIT = 2496  # ticks, with timer 2 reloading 65536 - 78
 TIMER1_9600 = "MOV TMOD,#20h\nMOV TH1,#0F3h\nMOV TL1,#0F3h\nORL PCON,#80h\nSETB TR1\n"
@@ -64,7 +64,7 @@ def character(value, stop=1):
 
 def test_an_idle_wire_is_mark_for_ever():
     cpu = receiver()
-    assert cpu.rxd.settled_tick == FAR
+    assert cpu.rxd.settled_tick == NEVER_TICK
     cpu.run(50_000)
     assert received(cpu) == []
 

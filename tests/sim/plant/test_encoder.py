@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.naive.plant import quadrature_edges
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import restore, snapshot
 from miro_sim.plant.encoder import Quadrature
 
-FAR = 1 << 62
 MOVES = st.floats(-40.0, 40.0)
 TICKS = st.integers(64, 2048)
 
@@ -17,7 +17,7 @@ TICKS = st.integers(64, 2048)
 def edges(encoder, moved, start_tick, ticks):
     found = []
     encoder.turn(moved, start_tick, ticks)
-    while encoder.edge_tick != FAR:
+    while encoder.edge_tick != NEVER_TICK:
         tick = encoder.edge_tick
         encoder.show()
         found.append((tick, encoder.count, encoder.a(), encoder.b()))

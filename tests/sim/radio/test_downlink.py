@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from tests.naive import radio as naive
 from tests.sim.radio.strategies import cuts, flawed, neighbours, params, seeds
 
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import restore, snapshot
 from miro_protocol.line import LineReceiver
 from miro_protocol.transmission import Transmission
@@ -190,7 +191,7 @@ def test_a_robot_joins_once_and_before_the_start():
 
 def test_a_wire_that_was_open_is_settled_by_nobody_but_the_downlink():
     line = Line()
-    line.settled_tick = 1 << 62
+    line.settled_tick = NEVER_TICK
     Downlink(RadioParams(), 0, "net").listen(0, line)
     assert line.settled_tick == 0
 
