@@ -9,6 +9,8 @@ from miro_robot.probe cimport Probe
 
 
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS
+cdef int _LEFT_CS, _LEFT_RD, _LEFT_WR, _LEFT_PS, _LEFT_RST
+cdef int _RIGHT_CS, _RIGHT_RD, _RIGHT_WR, _RIGHT_PS, _RIGHT_RST
 cdef int _WR, _RD, _BEHIND_TICKS
 cdef int _RESET_PULSE
 cdef int _FAULT, _REACHED, _RECEIVED, _SENT
@@ -76,7 +78,7 @@ cdef class Board(Bus):
     cdef int _drive_bridge(self, long long tick) except -1
     @cython.locals(index=cython.int, hi=cython.int, level=cython.int, port=cython.int, mask=cython.int, levels=cython.int)
     cdef int _drive_interrupts(self, long long tick) except -1
-    cdef inline int _level(self, int index) noexcept
+    cdef inline int _level(self, int pin) noexcept
     @cython.locals(data=cython.int, from_left=cython.int, from_right=cython.int, levels=cython.int)
     cdef int _drive_chips(self, long long tick) except -1
     @cython.locals(busy_writes=cython.longlong)

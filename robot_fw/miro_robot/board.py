@@ -54,6 +54,8 @@ _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_END
 """Ticks into a MOVX: Atmel 8051 Hardware Manual (4316E), section 2.6, and the timing table of external data memory in
 the AT89S52 data sheet (1919D), section 28. Neither says when P2 goes back to its latch: rule X2."""
 _WR, _RD = 0x40, 0x80  # pins of P3
+_LEFT_CS, _LEFT_RD, _LEFT_WR, _LEFT_PS, _LEFT_RST = range(5)  # inputs of the two LM629: SIDES by CHIP_INPUTS
+_RIGHT_CS, _RIGHT_RD, _RIGHT_WR, _RIGHT_PS, _RIGHT_RST = range(5, 10)
 _NEVER = NEVER_TICK
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
 _RESET_PULSE = RESET_PULSE
@@ -333,17 +335,32 @@ class Board(Bus):
         self._set_pins(0, address & 0xFF, start + _ADDRESS)
         self._set_pins(0, 0xFF, start + _RELEASE)
 
-    def _level(self, index: int) -> int:
-        return (self.bank[self.pin_bank[index]] >> self.pin_bit[index] & 1) ^ self.pin_inverted[index]
+    def _level(self, pin: int) -> int:
+        """Level at an input of an LM629, `_LEFT_CS` to `_RIGHT_RST`."""
+        return (self.bank[self.pin_bank[pin]] >> self.pin_bit[pin] & 1) ^ self.pin_inverted[pin]
 
     def _drive_chips(self, tick: int) -> None:
         """Puts the present levels on both chips' pins, then what they answer on the bus."""
         data = self.bank[self.data_bank]
         self._watch_timing(data, tick)
-        self.left.set_reset(tick, self._level(4))
-        self.right.set_reset(tick, self._level(9))
-        self.left.set_bus(tick, self._level(0), self._level(1), self._level(2), self._level(3), data)
-        self.right.set_bus(tick, self._level(5), self._level(6), self._level(7), self._level(8), data)
+        self.left.set_reset(tick, self._level(_LEFT_RST))
+        self.right.set_reset(tick, self._level(_RIGHT_RST))
+        self.left.set_bus(
+            tick,
+            self._level(_LEFT_CS),
+            self._level(_LEFT_RD),
+            self._level(_LEFT_WR),
+            self._level(_LEFT_PS),
+            data,
+        )
+        self.right.set_bus(
+            tick,
+            self._level(_RIGHT_CS),
+            self._level(_RIGHT_RD),
+            self._level(_RIGHT_WR),
+            self._level(_RIGHT_PS),
+            data,
+        )
         from_left = self.left.data_out(tick)
         from_right = self.right.data_out(tick)
         levels = 0xFF
@@ -375,15 +392,29 @@ class Board(Bus):
     def _watch_timing(self, data: int, tick: int) -> None:
         """The same edge at both chips is one fault."""
         one, other = self.left_timing, self.right_timing
-        left = one.pins(tick, self._level(0), self._level(1), self._level(2), self._level(3), data)
-        right = other.pins(tick, self._level(5), self._level(6), self._level(7), self._level(8), data)
+        left = one.pins(
+            tick,
+            self._level(_LEFT_CS),
+            self._level(_LEFT_RD),
+            self._level(_LEFT_WR),
+            self._level(_LEFT_PS),
+            data,
+        )
+        right = other.pins(
+            tick,
+            self._level(_RIGHT_CS),
+            self._level(_RIGHT_RD),
+            self._level(_RIGHT_WR),
+            self._level(_RIGHT_PS),
+            data,
+        )
         if left:
             self._timing_fault(left, one.ticks, tick)
         elif right:
             self._timing_fault(right, other.ticks, tick)
-        if self._reset_is_short(self.left, self._level(4), tick):
+        if self._reset_is_short(self.left, self._level(_LEFT_RST), tick):
             self._timing_fault(_RESET_PULSE, tick - self.left.reset_tick, tick)
-        elif self._reset_is_short(self.right, self._level(9), tick):
+        elif self._reset_is_short(self.right, self._level(_RIGHT_RST), tick):
             self._timing_fault(_RESET_PULSE, tick - self.right.reset_tick, tick)
 
     def _reset_is_short(self, chip: Lm629, level: int, tick: int) -> bool:
