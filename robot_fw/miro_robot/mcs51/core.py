@@ -1,6 +1,7 @@
-"""Registers and memory of the core, and what it needs from the chip around it.
+"""Registers and memory of the core, and the hooks through which instructions reach the rest of the chip.
 
-What belongs here: state, its snapshot, and the hooks that `Cpu` fills in. Instructions are in `execute.py`.
+What belongs here: state, and the hooks that `Cpu` fills in. Instructions are in `execute.py`. README.md in this folder
+draws the three classes `Core`, `Executor`, `Cpu` and their hooks.
 """
 
 from __future__ import annotations
@@ -116,5 +117,3 @@ class Core:
 
     def movx_write(self, address: int, value: int) -> None:
         """Byte to the external data bus."""
-
-    # State

@@ -22,8 +22,9 @@
                                    instructions -> SFRs -> timers, serial port, latches -> pins
 
 What belongs here: the registers of the core (ACC, B, PSW, SP, DPTR, PCON), when interrupts are taken, idle and
-power-down, MOVX, and the public face. Instructions are in `execute.py`, the rest of the chip in `peripherals.py`. Rules
-with letters (C1, I1, ..) are those of README.md in this folder, numbers like 4316E its sources.
+power-down, MOVX, and the public face. Instructions are in `execute.py`, the rest of the chip in `peripherals.py`.
+README.md in this folder draws how `Core`, `Executor`, `Cpu` and their hooks fit together; rules with letters (C1, I1,
+..) are in it, and sources like 4316E.
 """
 
 from __future__ import annotations
