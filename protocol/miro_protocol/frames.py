@@ -6,6 +6,8 @@ from `table.py`.
 
 Who is to blame is a type: a message that may not be sent is an `EncodeError` at the caller; bytes whose CRC is
 good but which no rightful sender would send are a `ContentError`.
+
+Long because every message type stands here with its own ranges, and encoding stands beside decoding.
 """
 
 from __future__ import annotations

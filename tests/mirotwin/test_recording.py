@@ -1,4 +1,7 @@
-"""Recordings: what goes in comes out, the same run gives the same bytes, nothing else is taken for one."""
+"""Recordings: what goes in comes out, the same run gives the same bytes, nothing else is taken for one.
+
+Long because each kind of record in the file has its own damage.
+"""
 
 import io
 import json

@@ -1,6 +1,7 @@
 """A slow, obvious LM629: the rules of `miro_robot.lm629` put down a second time in another shape.
 
-Commands are generators that wait for their words; it shares nothing with the package but its options.
+Commands are generators that wait for their words; it shares nothing with the package but its options. Long because
+it is a whole chip in one class.
 """
 
 from __future__ import annotations
@@ -10,12 +11,11 @@ from collections.abc import Callable, Generator
 from fractions import Fraction
 
 from tests.naive.lm629_encoder import NaiveEncoder
-from tests.naive.lm629_parts import LSB, NaivePid, between, modular, profile_speed
+from tests.naive.lm629_parts import HIGH_WORD_READS, LSB, NaivePid, between, modular, profile_speed
 
 from miro_robot.lm629.options import Lm629Options
 
 Words = Generator[None, int, None]
-HIGH_WORD_READS = {0x07: 2, 0x08: 2, 0x09: 2, 0x0A: 2, 0x0B: 1, 0x0C: 1, 0x0D: 1}
 INTERRUPTS = range(1, 7)
 
 

@@ -9,6 +9,7 @@ import math
 from fractions import Fraction
 
 LSB = Fraction(1, 65536)
+HIGH_WORD_READS = {0x07: 2, 0x08: 2, 0x09: 2, 0x0A: 2, 0x0B: 1, 0x0C: 1, 0x0D: 1}  # opcode to words
 
 
 def modular(value: int, bits: int) -> int:

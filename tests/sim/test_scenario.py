@@ -1,4 +1,7 @@
-"""Scenario files: what is accepted, and the one line that says what is wrong."""
+"""Scenario files: what is accepted, and the one line that says what is wrong.
+
+Long because each mistake in a scenario file is listed with its message.
+"""
 
 import math
 import time

@@ -15,6 +15,8 @@ says when it has to ask again. Registers of the core itself (ACC, PSW, PCON ...)
 
 Timers and serial port are left behind until one of them could raise a flag (`timer_wait`, `serial_wait`)
 or somebody looks at them (`settle`): in between nothing of theirs is stepped. Letters are rules in README.md.
+
+Long because every register address and every pin is routed in this one class, and a compiled class is one file.
 """
 
 from __future__ import annotations

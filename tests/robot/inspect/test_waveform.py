@@ -1,4 +1,7 @@
-"""Waveforms: every edge of every wire on its tick, against a twin that looks on every tick."""
+"""Waveforms: every edge of every wire on its tick, against a twin that looks on every tick.
+
+Long because each kind of wire has its own stimulus and its own expected edges.
+"""
 
 import io
 import itertools

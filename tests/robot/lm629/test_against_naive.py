@@ -1,4 +1,7 @@
-"""Random sessions at the pins: the chip and its slow twin agree after every step, however the rules are read."""
+"""Random sessions at the pins: the chip and its slow twin agree after every step, however the rules are read.
+
+Long because one state machine has a rule for each pin and each command.
+"""
 
 from __future__ import annotations
 

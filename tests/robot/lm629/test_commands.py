@@ -1,4 +1,7 @@
-"""What the commands do: published byte sequences, double buffering, flags, and what real drivers rely on."""
+"""What the commands do: published byte sequences, double buffering, flags, and what real drivers rely on.
+
+Long because each command of the data sheet has its byte sequences.
+"""
 
 from __future__ import annotations
 

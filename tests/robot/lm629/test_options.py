@@ -1,4 +1,7 @@
-"""Every rule that was chosen can be read the other way, and then the chip does otherwise."""
+"""Every rule that was chosen can be read the other way, and then the chip does otherwise.
+
+Long because each option has a session for each of its readings.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The bare board of `fw run`: RAM, terminal, ends of a run, dumps."""
+"""The bare board of `fw run`: RAM, terminal, ends of a run, dumps.
+
+Long because each way in which a run ends has its own program.
+"""
 
 from pathlib import Path
 
