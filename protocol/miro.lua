@@ -110,7 +110,7 @@ local TELEMETRY = {
 miro.fields = fields
 
 local damaged = ProtoExpert.new("miro.damaged", "Damaged", expert.group.CHECKSUM, expert.severity.WARN)
-local unknown_content = ProtoExpert.new("miro.content", "Says nothing known", expert.group.PROTOCOL, expert.severity.WARN)
+local unknown_content = ProtoExpert.new("miro.content", "Unknown content", expert.group.PROTOCOL, expert.severity.WARN)
 miro.experts = { damaged, unknown_content }
 local PAYLOADS
 

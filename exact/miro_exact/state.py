@@ -21,8 +21,8 @@ Two methods of a part are called if it has them. `before_save` brings up to date
 the part will do. `after_load` works out anew what follows from the fields (caches, edges seen), and raises ValueError
 where fields that are each in their range contradict each other.
 
-`load` trusts nobody: it first checks all lengths and ranges and writes nothing, then writes and calls `after_load`; on
-any doubt the state is as it was before, and a ValueError says which field is wrong. The very same bytes object, loaded
+`load` takes any bytes: it first checks all lengths and ranges and writes nothing, then writes and calls `after_load`.
+Where a check fails, the state stays as it was, and a ValueError names the field. The very same bytes object, loaded
 again, is not checked again: bytes do not change. Parts are looked up once, when a `Flat` is made: a part must not be
 replaced afterwards.
 
@@ -249,7 +249,7 @@ class Flat:
         return values
 
     def tables(self) -> str:
-        """SHA-256 in hex over names and forms of all fields: whose bytes can be taken for this state."""
+        """SHA-256 in hex over names and forms of all fields. Bytes with the same layout fit this state."""
         if not self._tables:
             text = "\n".join(f"{field.path} {field.kind.form}" for field in self.fields)
             self._tables = hashlib.sha256(text.encode()).hexdigest()
@@ -366,7 +366,7 @@ def _memory_field(
 
 
 def snapshot(part: Any) -> bytes:
-    """The state of a part and of all below it. Whoever wants it often keeps a `Flat`."""
+    """The state of a part and of all below it. To take it often, keep a `Flat`."""
     return Flat(part).save()
 
 

@@ -164,7 +164,7 @@ def _failure(word: str, part: Law[Any] | Estimator[Any], error: Exception) -> Pa
     known = type(error) in (ValueError, DomainError)
     what = f"{word} {part.parameters.name()!r} failed: {error if known else described(error)}"
     if isinstance(error, DomainError):
-        return PartError(what, "parameters far from any robot's can do this")
+        return PartError(what, "the parameters are far outside those of a real robot")
     return PartError(what, f"mend the {word} or its parameters")
 
 
@@ -177,9 +177,9 @@ def check_answer(answer: object, inner: tuple[str, ...]) -> None:
         _check("v_m_s", answer.v_m_s)
         _check("w_rad_s", answer.w_rad_s)
     else:
-        raise ValueError(f"it answered {str(answer)[:40]!r}, neither Accelerations nor Velocities")
+        raise ValueError(f"`step` returned {str(answer)[:40]!r}, neither Accelerations nor Velocities")
     if tuple(answer.inner) != inner and sorted(answer.inner) != sorted(inner):
-        raise ValueError(f"its inner values are {sorted(answer.inner)}, INNER says {sorted(inner)}")
+        raise ValueError(f"its inner values are {sorted(answer.inner)}, but INNER declares {sorted(inner)}")
     for name, value in answer.inner.items():
         _check(name, value)
 
@@ -187,7 +187,7 @@ def check_answer(answer: object, inner: tuple[str, ...]) -> None:
 def check_estimate(estimate: object) -> None:
     """Raises ValueError for an estimate that is none, and for NaN and infinity."""
     if not isinstance(estimate, Estimate) or not isinstance(estimate.posture, Posture):
-        raise ValueError(f"it answered {str(estimate)[:40]!r}, which is no Estimate of a Posture")
+        raise ValueError(f"`step` returned {str(estimate)[:40]!r}, which is no Estimate of a Posture")
     posture = estimate.posture
     _check("t_s", estimate.t_s)
     _check("x_m", posture.x_m)
@@ -197,4 +197,4 @@ def check_estimate(estimate: object) -> None:
 
 def _check(name: str, value: object) -> None:
     if type(value) is not float or not math.isfinite(value):
-        raise ValueError(f"it answered {name} = {str(value)[:40]}, which is not a finite float")
+        raise ValueError(f"`step` returned {name} = {str(value)[:40]}, which is not a finite float")

@@ -94,7 +94,7 @@ class CheckedReference:
             found = self.trajectory.at(t_s)
             for value in _numbers(found):
                 if type(value) is not float or not math.isfinite(value):
-                    raise ValueError(f"it gave {found!r}, where all must be finite floats")
+                    raise ValueError(f"it returned {found!r}; all must be finite floats")
         except Exception as error:
             reason = str(error) if type(error) is ValueError else described(error)
             what = f"reference {self.name!r} failed at {t_s:.6f} s: {reason}"

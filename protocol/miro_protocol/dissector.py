@@ -146,7 +146,7 @@ def _experts() -> Iterator[str]:
         'local damaged = ProtoExpert.new("miro.damaged", "Damaged", expert.group.CHECKSUM, expert.severity.WARN)'
     )
     yield (
-        'local unknown_content = ProtoExpert.new("miro.content", "Says nothing known", '
+        'local unknown_content = ProtoExpert.new("miro.content", "Unknown content", '
         "expert.group.PROTOCOL, expert.severity.WARN)"
     )
     yield "miro.experts = { damaged, unknown_content }"

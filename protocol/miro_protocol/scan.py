@@ -3,10 +3,10 @@
 What belongs here: which characters are a frame and which are not. What does not: the interface for users
 (`decoder.py`) and what a frame says (`frames.py`).
 
-After each character the window of the last F is looked at, as the rule is read aloud (README.md,
-"Reception"). Where the last bad stop bit and the last pause stood is remembered, so those two tests are one
-comparison each; the CRC is computed only where a sync stands. Hence at most F/2 table steps a character, on
-any input. The characters since the last event are kept, at most `run_limit` + F - 1 of them.
+After each character the window of the last F characters is tested, in the order of the rule in README.md
+("Reception"). The places of the last bad stop bit and of the last pause are kept, so those two tests are one
+comparison each; the CRC is computed only for a window that begins with a sync. This takes at most F/2 table steps a
+character, on any input. The characters since the last event are kept, at most `run_limit` + F - 1 of them.
 
 The CRC runs over the characters as received: whitening is taken off in the same step.
 """
@@ -262,7 +262,7 @@ class Scanner:
         self._reason = _NO_SYNC
 
     def _lead_start(self, sync: int) -> int:
-        """Where the preamble begins: as many of its last characters as stand intact right before the sync."""
+        """Where the preamble begins: its last characters that are intact right before the sync."""
         start = sync
         expected = len(self._lead) - 1
         while start > 0 and expected >= 0:
@@ -275,7 +275,7 @@ class Scanner:
         return start
 
     def _give_out_damaged(self, length: int, events: list[Event]) -> None:
-        """The first `length` characters are no frame; what stands behind them moves up."""
+        """Drops the first `length` characters, which are no frame; the others move up."""
         events.append(Damaged(bytes(self._data[:length]), REASONS[self._reason], self._ticks[0]))
         self._reason = _NO_SYNC
         for place in range(length, self._count):

@@ -69,7 +69,7 @@ def characters(entry: Entry, source: str) -> Transmission:
     """The transmission in a line. Raises StreamError for an event, which says who can act on it."""
     if isinstance(entry.what, Transmission):
         return entry.what
-    what = "an event, which this command cannot act on"
+    what = "an event, which this command does not support"
     raise StreamError(source, entry.line, 1, what, WHO_CAN[type(entry.what)])
 
 
@@ -101,7 +101,7 @@ class Reader:
                 continue
             self._close_header()
             if entry.what.tick < last:
-                remedy = f"lines are in the order of time: {last} came before it"
+                remedy = f"put the lines in the order of their ticks; the line before has {last}"
                 raise line.error(line.first_column(), f"tick {entry.what.tick} goes backwards", remedy)
             last = entry.what.tick
             yield entry

@@ -39,8 +39,8 @@ class PinLevel(msgspec.Struct, frozen=True):
 StreamEvent = Reset | RadioState | PinLevel
 
 WHO_CAN = {
-    Reset: "no command acts on it yet; in Python `mirotwin.testing.bench.Bench.reset` resets a robot",
-    RadioState: "no command acts on it yet; in Python `mirotwin.testing.bench.Bench.trouble` disturbs a radio",
+    Reset: "no command supports it yet; in Python `mirotwin.testing.bench.Bench.reset` resets a robot",
+    RadioState: "no command supports it yet; in Python `mirotwin.testing.bench.Bench.trouble` disturbs a radio",
     PinLevel: "`mirotwin fw run --pins FILE` puts levels on the pins of a bare processor",
 }
 """For a reader that cannot act on an event: who can."""

@@ -192,7 +192,7 @@ SEQ = Field(
 
 FRAME_MEANINGS = {
     FrameType.TEAM: "velocities of all N robots",
-    FrameType.SERVICE: "setting of one robot; its wheels and everybody else's keep their velocities",
+    FrameType.SERVICE: "setting of one robot; all wheels keep their velocities",
     FrameType.TELEMETRY: "answer of one robot (robot to host only)",
     FrameType.TEAM_ASK: "velocities, and robot (seq mod N) answers",
 }

@@ -55,7 +55,7 @@
 #define SEQ_MASK                     0x3F
 #define TYPE_MASK                    0xC0
 #define TYPE_TEAM                    0x00    /* velocities of all N robots */
-#define TYPE_SERVICE                 0x40    /* setting of one robot; its wheels and everybody else's keep their velocities */
+#define TYPE_SERVICE                 0x40    /* setting of one robot; all wheels keep their velocities */
 #define TYPE_TELEMETRY               0x80    /* answer of one robot (robot to host only) */
 #define TYPE_TEAM_ASK                0xC0    /* velocities, and robot (seq mod N) answers */
 

@@ -11,12 +11,12 @@
     radio <----- P3.1 TXD                `Plant`: MAG -> EN, SIGN -> IN2 and inverted IN1 of the L298; A, B come back
 
 What belongs here: carrying levels from pin to pin, and the order in which the parts move on. What does not: what a
-part does with its pins (`mcs51/`, `lm629/`), what the motors make of the bridge (`Plant`), and how a board is
+part does with its pins (`mcs51/`, `lm629/`), how the motors answer the bridge (`Plant`), and how a board is
 described (`wiring.py`).
 
 Order on one tick: the plant moves first (its encoder edges reach the decoders), then the left LM629, the right
 LM629, the bridge inputs, the interrupt lines, and last what the CPU did to its port pins on that tick. Everything
-but the CPU is advanced at its own events only, never "up to now", so who looks when does not change a bit.
+but the CPU is advanced at its own events only, never "up to now", so reading a part at any time changes no bit.
 
 Long because all wires of the board meet in one class, and a compiled class is one file.
 """
@@ -39,7 +39,7 @@ from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
 
 CYCLE_TICKS = 12
 MAIN_LOOP_LIMIT_CYCLES = 20_000
-"""10 ms: a robot whose main loop gets no time for so long has lost a third of a camera frame."""
+"""10 ms without main loop are a fault: a third of a camera frame is lost."""
 FAULTS_KEPT = 1000
 """A firmware that faults in a loop must not fill the memory: after so many, faults are counted only."""
 
@@ -90,7 +90,9 @@ class Board(Bus):
         "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_bank", "pin_bit", "pin_inverted", "hi_port", "hi_bit", "hi_inverted",
         "hi_count", "hi_side", "hi_seen", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus",
-        "log", "left_timing", "right_timing",  # see there: no time of theirs outlasts an instruction
+        "log",
+        # the bus is at rest between two instructions: `after_load` sets both to that
+        "left_timing", "right_timing",
     )  # fmt: skip
 
     def __init__(
@@ -392,7 +394,7 @@ class Board(Bus):
         self.contention = int(both_drive)
 
     def _watch_timing(self, data: int, tick: int) -> None:
-        """The same edge at both chips is one fault."""
+        """Checks the timing of both chips; an edge that violates it at both is one fault."""
         one, other = self.left_timing, self.right_timing
         left = one.pins(
             tick,
@@ -450,9 +452,7 @@ class Board(Bus):
     # ---- state --------------------------------------------------------------------------------------------
 
     def after_load(self) -> None:
-        """What the chips last drove is seen; the bus has been at rest. Raises ValueError unless all parts stand where
-        the CPU does.
-        """
+        """Works out the HI levels seen and the bus at rest. Raises ValueError for a part at another time."""
         earliest_tick = self.cpu.cycles * CYCLE_TICKS - _BEHIND_TICKS
         self.left.check_times(earliest_tick)
         self.right.check_times(earliest_tick)

@@ -1,8 +1,8 @@
 """What happened on a robot's board, with exact ticks: the log that waits, checks and fuzzing read.
 
-What belongs here: a ring of events and its serial numbers. What does not: who notes what (the board and its parts) and
-what is made of it (`miro_sim.world.waits`). The log is no state: it changes no bit of a run, and a board that is
-restored begins a new one.
+What belongs here: a ring of events and its serial numbers. What does not: when an event is noted (the board and its
+parts) and how a wait reads it (`miro_sim.world.waits`). The log is no state: it changes no bit of a run, and a board
+that is restored begins a new one.
 
     kind        code                       value and size
     RECEIVED    stop bit good (1) or not   the character that the serial port delivered
@@ -12,7 +12,7 @@ restored begins a new one.
     REACHED     instructions so far        address of the instruction that is next
     TRUE        -                          - (a predicate of the caller's)
 
-Parts of a board run ahead of each other, so events stand in the order in which they were noticed: sort by tick.
+Parts of a board run ahead of each other, so the log is in the order of noting, not of ticks: sort it by tick.
 """
 
 from __future__ import annotations

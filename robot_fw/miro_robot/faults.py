@@ -29,10 +29,10 @@ DESCRIPTIONS = {
     FaultKind.STACK_OVERFLOW: "pushed past the end of internal RAM (SP FF to 00)",
     FaultKind.STACK_UNDERFLOW: "popped below the start of internal RAM (SP 00 to FF)",
     FaultKind.OUTSIDE_IMAGE: "executed outside the loaded image",
-    FaultKind.BUS_CONTENTION: "let two chips drive the data bus",
+    FaultKind.BUS_CONTENTION: "read two LM629 at once: both drove the data bus",
     FaultKind.LM629_BUSY: "wrote to an LM629 while it was busy",
-    FaultKind.LM629_TIMING: "broke an LM629 bus timing limit",
-    FaultKind.MAIN_LOOP_STARVED: "left its main loop no time: interrupts took all of 10 ms",
+    FaultKind.LM629_TIMING: "violated an LM629 bus timing limit",
+    FaultKind.MAIN_LOOP_STARVED: "starved its main loop: interrupts took all of 10 ms",
 }
 
 

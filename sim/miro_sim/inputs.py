@@ -57,7 +57,7 @@ def read_input(
             data += more
     if len(data) > limit:
         size = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
-        raise InputError(str(path), f"holds more than {size}", "name the file that was meant")
+        raise InputError(str(path), f"holds more than {size}", "is this the right file?")
     return bytes(data)
 
 

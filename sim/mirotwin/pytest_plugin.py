@@ -122,7 +122,7 @@ class FirmwareCoverage:
             terminalreporter.write_line(line.rstrip())
         if self._too_few():
             terminalreporter.write_line(
-                f"fewer lines ran than the {self.wanted} % that were asked for", red=True
+                f"fewer lines ran than the {self.wanted} % of --firmware-coverage-fail-under", red=True
             )
 
     @cached_property

@@ -71,10 +71,10 @@ GOOD = Line().at(1.0)
     [
         (lambda t_s: 1.0 / 0.0, "ZeroDivisionError"),
         (lambda t_s: None, "TypeError"),
-        (lambda t_s: msgspec.structs.replace(GOOD, v_m_s=math.nan), "it gave Reference.* finite"),
+        (lambda t_s: msgspec.structs.replace(GOOD, v_m_s=math.nan), "it returned Reference.* finite"),
         (
             lambda t_s: msgspec.structs.replace(GOOD, posture=msgspec.structs.replace(GOOD.posture, x_m=0)),
-            "it gave Reference.* finite",
+            "it returned Reference.* finite",
         ),
     ],
 )

@@ -195,7 +195,7 @@ def test_a_file_that_is_there_stays_unless_it_is_to_be_replaced(tmp_path: Path) 
 
 
 def test_a_whole_file_does_not_take_the_place_of_a_device() -> None:
-    refusal = "is there and is not a regular file; choose another file with --out"
+    refusal = "exists and is not a regular file; choose another file with --out"
     with pytest.raises(OutputError, match=refusal), whole_file(Path(os.devnull), "--out"):
         pass
     with pytest.raises(OutputError, match=refusal):

@@ -126,7 +126,10 @@ def test_the_time_off_the_pitch_is_counted_by_the_corners_of_the_robot() -> None
     assert 20 < len(off) < 30
     summary = summary_of(run)
     assert summary.tracking.off_pitch_s == len(off) * 800_800 / 24e6
-    assert off_pitch_text(summary) == f"off it for {summary.tracking.off_pitch_s:.2f} s; there are no walls"
+    assert (
+        off_pitch_text(summary)
+        == f"off it for {summary.tracking.off_pitch_s:.2f} s (the pitch has no walls here)"
+    )
 
 
 def test_each_robot_that_left_the_pitch_is_named_and_no_other() -> None:

@@ -244,7 +244,7 @@ def test_transmissions_out_of_order_are_not_written():
 def test_who_cannot_act_on_an_event_refuses_it_and_says_who_can(event, who):
     found = stream.parse(f"{V2}1 > 55\n5 {event}\n", "a.stream")
     with pytest.raises(
-        StreamError, match=r"a\.stream:3:1: an event, which this command cannot act on; "
+        StreamError, match=r"a\.stream:3:1: an event, which this command does not support; "
     ) as caught:
         found.transmissions()
     assert who in caught.value.remedy

@@ -87,7 +87,7 @@ def test_a_start_at_the_very_edge_is_none_of_these() -> None:
     ("reference", "duration_s", "expected"),
     [
         (LINE, 60.0, "reference: leaves the pitch after 6.07 s of 60 s: a square of 7.5 cm there takes x ="),
-        (LINE, 86_400.0, "let it stand in time, drive_s = 6.05, or slow it down"),
+        (LINE, 86_400.0, "let it stop before, drive_s = 6.05, or slow it down"),
         (f"{LINE}, heading_deg = 180.0", 6.0, "leaves the pitch after 0.57 s of 6 s"),
         (f"{LINE}, heading_deg = 90.0, drive_s = 5.0", 60.0, "takes y ="),
         (f"{LINE}, speed_m_s = 1.46, ramp_s = 1000.0", 86_400.0, "leaves the pitch after 39."),

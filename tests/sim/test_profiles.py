@@ -114,7 +114,10 @@ def test_every_profile_is_a_good_radio_that_says_what_it_does(name: str) -> None
         ),
         ("eb_n0_db = '11 dB'", ".eb_n0_db: expected a number in decibels, got a string ('11 dB')"),
         ("false_starts_hz = -1.0", ".false_starts_hz: -1.0 is out of range; must be >= 0.0 in hertz"),
-        ("slicer.offset = 0.5", ".slicer: its errors follow from Eb/N0; give eb_n0_db, not bit_error_rate"),
+        (
+            "slicer.offset = 0.5",
+            ".slicer: its bit errors follow from Eb/N0; give eb_n0_db, not bit_error_rate",
+        ),
         ("slicer.settle_ms = 4", ".slicer.settle_ms: unknown key; use settle_s, in seconds"),
         ("bursts.good_to_bad = 0.1", ".bursts.bad_to_good: this key is missing; add it"),
         (

@@ -122,7 +122,7 @@ def test_a_scenario_that_stands_in_no_file_takes_settings_too() -> None:
         ("duration_s=nan", "nan is not a number that can be used; give a finite number"),
         ("duration_s=" + "9" * 5000, "expected a number in seconds, got a string"),
         ("duration_s.x=1", "duration_s is a value and has no keys; end KEY with duration_s"),
-        ("name=2", "expected a string, got a whole number (2); as text it is --set 'name=\"..\"'"),
+        ("name=2", "expected a string, got a whole number (2); to give text, write --set 'name=\"..\"'"),
         ("name=1979-05-27", "expected a string, got a date; as text it is"),
         ("network.radio.profile=fade99", "'fade99' is no profile; did you mean fade5?"),
         ("network.radio.bursts.good_to_bad=0.1", "network[0].radio.bursts.bad_to_good: this key is missing"),

@@ -147,7 +147,7 @@ def _data_records(content: bytes, path: Path) -> Iterator[tuple[int, int, bytes]
         if not text:
             continue
         if ended:
-            raise ImageError(path, number, "goes on after its end record", _REBUILD)
+            raise ImageError(path, number, "has more records after its end record", _REBUILD)
         address, kind, data = _record(text, path, number)
         if kind == _DATA:
             yield number, base + address, data

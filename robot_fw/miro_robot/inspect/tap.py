@@ -1,10 +1,10 @@
 """Where the wires of a robot are picked up: levels with the exact ticks at which they change.
 
-What belongs here: looking at CPU, board and chips at the moments at which a level may change, and noting each change
-as (tick, place, level). What does not: putting parts together to pins, and files (`waveform.py`).
+What belongs here: reading CPU, board and chips whenever a level may change, and noting each change as (tick, place,
+level). What does not: putting parts together to pins, and files (`waveform.py`).
 
 Lines, CPU, chips and plant run ahead of each other, so changes are not noted in the order of their ticks;
-`CpuTap.known` says below which tick nothing can be missing any more.
+below the tick that `CpuTap.known` gives, all changes have been noted.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ PLACES = (
 on its pins; `low` and `high`: a routine of that priority is in service."""
 
 UNKNOWN = 2
-"""Level of a routine's place while one is in service that nobody saw begin."""
+"""Value of a routine's wire for a routine that was already running when recording began."""
 
 
 def port_pins(levels: list[int], port: int) -> int:
@@ -77,7 +77,7 @@ class BoardTap(Probe):
         self.right_edges: list[tuple[int, int, int]] = []
 
     def attach(self, tick: int) -> None:
-        """Looks on from `tick`, where `levels` begin. Raises ValueError when somebody does already."""
+        """Records from `tick` on, where `levels` begin. Raises ValueError if another tap is attached."""
         board = self.board
         if board.probe is not None:
             raise ValueError("the wires of this board are watched already; close that waveform first")
@@ -99,7 +99,7 @@ class BoardTap(Probe):
         """The tick below which the board's changes are all noted, whatever the CPU does from there on."""
         board = self.board
         tick = min(board.left.next_tick, board.right.next_tick)
-        if board.plant.next_tick == _NEVER:  # it stands still: no encoder edge is on its way
+        if board.plant.next_tick == _NEVER:  # the plant has no next step, so no encoder edge comes
             return tick
         return min(tick, self.passed_tick)
 

@@ -1,7 +1,7 @@
 """Runs a CPU step by step and tells watchers what it did.
 
-What belongs here: the second run loop, one instruction at a time, and what a watcher is told. What watchers make of it
-is in their own files. The CPU's hot loop stays free of all this: without an inspector it costs one test per run.
+What belongs here: the second run loop, one instruction at a time, and what a watcher is told. Each watcher has
+its own file. The CPU's hot loop stays free of all this: without an inspector it costs one test per run.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ _CALL_CYCLES = 2  # of the hardware's LCALL
 
 
 class Watcher:
-    """Is told what a CPU did, after it did it; the default is to ignore it.
+    """Base class of watchers. A method is called after the CPU did what its name says; here all do nothing.
 
     Cycles are machine cycles; the step began in cycle `start` and ended with `cpu.cycles`.
     """
 
     def attached(self, cpu: Cpu) -> None:
-        """It looks on from now."""
+        """The watcher was attached."""
 
     def detached(self, cpu: Cpu) -> None:
-        """It looks on no longer."""
+        """The watcher was detached."""
 
     def starting(self, cpu: Cpu) -> None:
-        """A run begins; what it will find on its lines is there, and not forgotten yet."""
+        """A run begins. The lines hold their input for the run, and all edges of the last one."""
 
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
         """The instruction at `pc` was executed."""
@@ -34,14 +34,14 @@ class Watcher:
     def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
         """The hardware called the routine of `source` (0..5: INT0, timer 0, INT1, timer 1, serial, timer 2).
 
-        `pc`: where it came in between.
+        `pc`: address of the instruction that was next when the interrupt came.
         """
 
     def slept(self, cpu: Cpu, start: int, end: int) -> None:
-        """The CPU was idle or powered down from cycle `start` to before `end`; it may have more sleep behind that."""
+        """The CPU was idle or powered down from cycle `start` to before `end`; it may go on sleeping."""
 
     def ran(self, cpu: Cpu, start: int) -> None:
-        """A run that began in cycle `start` is over; others may now look at what the CPU did to its lines."""
+        """A run that began in cycle `start` has ended. The CPU's output lines are final up to now."""
 
 
 class Inspector:

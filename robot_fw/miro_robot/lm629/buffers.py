@@ -1,8 +1,8 @@
 """Double buffering: what LTRJ and LFIL load, and what STT and UDF take from it.
 
-A buffer has three faces: the primary registers (written word by word, kept for ever), the copy that an
-accepted STT / UDF has taken of them, and, outside this file, the working registers that get that copy at
-the next sample.
+A parameter is held three times: in the primary registers (written word by word; STT and UDF leave them as they are), in
+the copy that an accepted STT or UDF takes of them, and, outside this file, in the working registers, which get that
+copy at the next sample.
 """
 
 from __future__ import annotations

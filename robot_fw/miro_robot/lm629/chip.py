@@ -296,13 +296,13 @@ class Lm629(MotorAxis):
         self.hi = self.signals.word >> 15
         self.writes_while_busy = self.port.writes_while_busy
         if self.reset_level == 0 and self.mode != _HELD:
-            raise ValueError("a chip whose reset pin is low is in reset")
+            raise ValueError("the reset pin is low, but the chip is not in reset")
         if self.mode != _RUNNING and (self.sample_tick != NEVER_TICK or self.pwm or self.pwm_magnitude):
-            raise ValueError("a chip in reset takes no samples and drives no motor")
+            raise ValueError("the chip is in reset, but has a next sample or drives a motor")
         waiting = self.port.words_left if self.port.incoming else 0
         if waiting > self._words_due():
             raise ValueError(
-                f"{waiting} words are waited for, but command {self.port.command:02X}h has {self._words_due()}"
+                f"words_left is {waiting}, but command {self.port.command:02X}h takes {self._words_due()} more"
             )
 
     def _words_due(self) -> int:
@@ -325,7 +325,9 @@ class Lm629(MotorAxis):
         if self.mode == _RUNNING and not earliest_tick <= self.sample_tick <= latest_tick:
             raise ValueError(f"sample_tick is {self.sample_tick}, not from {earliest_tick} to {latest_tick}")
         if self.mode == _RUNNING and self.next_tick != self._due_tick():
-            raise ValueError(f"next_tick is {self.next_tick}, but the pulses make it {self._due_tick()}")
+            raise ValueError(
+                f"next_tick is {self.next_tick}, but the next edge of PWM is at {self._due_tick()}"
+            )
 
     def _due_tick(self) -> int:
         """What `next_tick` follows from while the chip runs: a sample, the end of a period or an edge of its pulse.

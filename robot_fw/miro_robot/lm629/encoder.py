@@ -38,7 +38,7 @@ class InputFilter:
         self.take(level)
 
     def take(self, level: int) -> None:
-        """This level has been there for ever."""
+        """Sets the level without a change: the filter does not see an edge."""
         self.level = level
         self.run_level = level
         self.run_tick = 0

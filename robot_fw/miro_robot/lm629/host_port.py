@@ -107,7 +107,7 @@ class HostPort:
             outcome = self._write_ends(tick)
         elif self.reading and not reading:
             outcome = self._read_ends(tick)
-        # The byte that counts is the one that was there up to the edge: the data sheet asks for hold times.
+        # The byte taken is the one before the edge: the data sheet requires hold times.
         self.ps = ps
         self.data = data
         if writing and not self.writing:

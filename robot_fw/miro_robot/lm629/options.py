@@ -1,6 +1,6 @@
 """What the documents leave open, one named field per rule: the default is this twin's choice.
 
-Somebody who has the chip on the desk and finds that it does otherwise sets the other reading, in a scenario's
+If a measured chip behaves in the other way, set the other reading in a scenario's
 `[lm629]` table or as `Lm629Options(...)`. What each rule is about stands in README.md in this folder.
 """
 

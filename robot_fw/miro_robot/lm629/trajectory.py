@@ -82,7 +82,7 @@ class Trajectory:
         self.target = place
 
     def follow(self, real_position: int) -> None:
-        """Stand at the real position (motor off)."""
+        """The desired position is the real one (motor off)."""
         self.position = real_position * 65536
         self.velocity = 0
         self.moving = 0

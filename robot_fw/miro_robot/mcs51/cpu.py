@@ -58,7 +58,7 @@ _PCON_BITS = 0x8F  # the others are not implemented and read as 0 (C5)
 _READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end (X1)
 _FLOATING = 0xFF  # what an undriven external bus reads as (X4)
 _MAIN_LOOP_STARVED = int(FaultKind.MAIN_LOOP_STARVED)
-_MARK_CYCLES = 2000  # 1 ms: how often a look is taken at whether the main loop gets time
+_MARK_CYCLES = 2000  # 1 ms: how often it is checked whether the main loop gets time
 _ONE_INSTRUCTION = 4  # cycles of the longest: what the hardware lets main level do between two interrupts
 
 
@@ -282,7 +282,7 @@ class Cpu(Executor):
         self.rxd.forget(now - 24)
 
     def boundary(self) -> int:
-        """Between two instructions with something to look after; 1 ends the run."""
+        """Between two instructions, when `cycles` reached `limit`; 1 ends the run."""
         now = self.cycles
         if now >= self.next_mark:
             self._watch_main_loop(now)
@@ -327,7 +327,7 @@ class Cpu(Executor):
         return 0
 
     def _watch_main_loop(self, now: int) -> None:
-        """Once a millisecond: have interrupts held the CPU at all marks since the limit?"""
+        """Once a millisecond: a fault if interrupts held the CPU at all marks for `main_loop_limit` cycles."""
         self.next_mark = (now // _MARK_CYCLES + 1) * _MARK_CYCLES
         if self._taken_over():
             self.marks += 1

@@ -24,7 +24,7 @@ from miro_exact.state import FLAG, TICK, Items
 _NEVER = NEVER_TICK
 _SIZE = 4096  # places of a new ring; always a power of two
 WAITING = 2048
-"""So many edges may wait to be heard before the line is full."""
+"""Edges that may wait for the listener before the line is full."""
 _WAITING = 2048
 _MOST = 1 << 22  # edges of a saved line: more than the longest delay keeps
 
@@ -42,7 +42,7 @@ class Line:
     }
     NOT_STATE = (
         *("_ticks", "_mask", "_first", "_end"),  # the ring that `ticks` are kept in
-        *("_cursor", "unread"),  # where the last query ended: a cache; who listens: wiring
+        *("_cursor", "unread"),  # `_cursor`: cache of the last query; `unread`: wiring
         *("_heard", "full"),  # what was heard: the listener says it after a load
     )
 
@@ -85,7 +85,7 @@ class Line:
             self.full = not self.unread
 
     def _make_room(self) -> None:
-        """The ring is full: drops the older half if nobody reads it, else doubles it."""
+        """The ring is full: drops the older half if no listener reads the line, else doubles it."""
         if self.unread:
             self._first += (self._mask + 1) // 2  # an even number: the level before the oldest edge stays
             self._cursor = max(self._cursor, self._first)
@@ -124,7 +124,7 @@ class Line:
             self._heard = self._first
 
     def hear(self, tick: int) -> None:
-        """A listener has heard all edges below `tick`: those from there on wait."""
+        """The listener has read all edges below `tick`; later ones wait."""
         while self._heard < self._end and self._ticks[self._heard & self._mask] < tick:
             self._heard += 1
         self.full = self._end - self._heard > _WAITING and not self.unread
@@ -167,7 +167,7 @@ class Line:
 
     @ticks.setter
     def ticks(self, ticks: list[int]) -> None:
-        """All of them count as not heard, until the listener says otherwise."""
+        """All edges count as unread, until the listener calls `hear`."""
         size = _SIZE
         while size < len(ticks):
             size *= 2

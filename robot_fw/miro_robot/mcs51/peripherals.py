@@ -9,12 +9,12 @@
    P3.0 RXD -------------> serial port ----------- RI TI -----+
    P3.1 TXD <------------- (uart, shift)
 
-What belongs here: which register address is whose, which pin goes where, which timer clocks the serial
-port, and the event horizon: `sync(cycle)` does all below a cycle that the core can notice, `next_event`
-says when it has to ask again. Registers of the core itself (ACC, PSW, PCON ...) are `Cpu`'s.
+What belongs here: the part that owns each register address, the part that each pin goes to, the timer that clocks the
+serial port, and the event horizon: `sync(cycle)` does everything below `cycle` that the core can notice; `next_event`
+is the cycle of the next `sync`. Registers of the core itself (ACC, PSW, PCON ...) are in `Cpu`.
 
-Timers and serial port are left behind until one of them could raise a flag (`timer_wait`, `serial_wait`)
-or somebody looks at them (`settle`): in between nothing of theirs is stepped. Letters are rules in README.md.
+Timers and serial port are not stepped until one of them could raise a flag (`timer_wait`, `serial_wait`) or one of
+their registers is read or written (`settle`). Letters are rules in README.md.
 
 Long because every register address and every pin is routed in this one class, and a compiled class is one file.
 """

@@ -13,8 +13,8 @@ come from (timer 1, timer 2, crystal) is worked out by `Peripherals`, which call
 Timing (4316E section 2.13; letters are rules in README.md), all in crystal ticks: `sync(tick)` does everything below
 `tick`. Transmitter: the start bit begins at S1P1 after the first rollover that follows the write to SBUF, further bits
 one rollover apart, TI with the stop bit. Receiver: tests RXD on every 16x tick for a fall, samples each bit in counter
-states 7, 8, 9, acts in state 10; RI shows at the next S3P1 (U6). Between bits nothing is stepped: an idle receiver asks
-the Line for its next edge.
+states 7, 8, 9, acts in state 10; RI shows at the next S3P1 (U6). Between bits nothing is stepped: an idle
+receiver takes the next edge from the Line.
 
 Long because transmitter and receiver share SCON, SBUF and the clock, and a compiled class is one file.
 """
@@ -74,7 +74,7 @@ class Uart:
         self.bus = bus
         self.interrupts = interrupts
         self.rxd = Line()
-        self.rxd.settled_tick = _NEVER  # nothing connected: mark for ever, until a producer says otherwise
+        self.rxd.settled_tick = _NEVER  # nothing connected: mark, until a producer sets it
         self.txd = Line()
         self.txd.unread = True  # until a listener says otherwise
         self.latch = 3
@@ -310,7 +310,7 @@ class Uart:
             self.rx_count = 0
 
     def _deliver(self) -> None:
-        """Into SBUF and RB8, if RI is down and SM2 lets it pass; otherwise the frame is lost for good."""
+        """Into SBUF and RB8, if RI is 0 and SM2 lets it pass; otherwise the frame is lost."""
         tick = self.rx_done
         self.rx_done = _NEVER
         last = self.rx_frame >> 8

@@ -162,7 +162,7 @@ class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         Raises ValueError for both at once.
         """
         if bit_error_rate is not None and eb_n0_db is not None:
-            raise ValueError("bit_error_rate and eb_n0_db say the same thing twice")
+            raise ValueError("bit_error_rate and eb_n0_db set the same; give one of the two")
         errors = error_threshold(bit_error_rate or 0.0) if eb_n0_db is None else fsk_threshold(eb_n0_db)
         return cls(
             latency_ticks=clock.ticks(latency_s),

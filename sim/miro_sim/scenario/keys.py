@@ -158,6 +158,6 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     def __post_init__(self) -> None:
         if len(self.networks) > MAX_NETWORKS:
             raise ValueError(
-                f"network: {len(self.networks)} networks, each of which costs as much time as a run of its own;"
+                f"network: {len(self.networks)} networks, each of which takes as much time as a run;"
                 f" at most {MAX_NETWORKS}, make several scenarios of them"
             )

@@ -75,7 +75,7 @@ def _check(robot: Robot, duration_s: float, origin: str, place: str) -> None:
         off = _off_pitch(reference.at(t_s).posture)
         if off is not None:
             what = f"leaves the pitch after {t_s:.2f} s of {duration_s:g} s: {off[1]}"
-            remedy = f"let it stand in time, drive_s = {int(100.0 * on_s) / 100.0:g}, or slow it down"
+            remedy = f"let it stop before, drive_s = {int(100.0 * on_s) / 100.0:g}, or slow it down"
             if not hasattr(robot.reference, "drive_s"):
                 remedy = f"choose other parameters for it, or duration_s = {int(100.0 * on_s) / 100.0:g}"
             raise ScenarioError(origin, f"{place}.reference", what, remedy if on_s else "start it elsewhere")

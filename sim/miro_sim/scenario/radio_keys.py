@@ -86,11 +86,13 @@ class Radio(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     def __post_init__(self) -> None:
         if self.eb_n0_db is None:
             if self.slicer is not None:
-                raise ValueError("slicer: its errors follow from Eb/N0; give eb_n0_db, not bit_error_rate")
+                raise ValueError(
+                    "slicer: its bit errors follow from Eb/N0; give eb_n0_db, not bit_error_rate"
+                )
             if self.bit_error_rate is None:
                 msgspec.structs.force_setattr(self, "bit_error_rate", BIT_ERROR_RATE)
         elif self.bit_error_rate is not None:
-            raise ValueError("eb_n0_db: says the same as bit_error_rate; give one of the two")
+            raise ValueError("eb_n0_db: sets the same as bit_error_rate; give one of the two")
 
 
 class ControlNoise(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

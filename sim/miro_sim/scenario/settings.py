@@ -163,8 +163,8 @@ def blamed(error: ScenarioError, settings: Sequence[Setting]) -> ScenarioError:
     above, _, key = setting.path.rpartition(".")
     remedy = error.remedy
     if key in _TAGS and error.what == "unknown key":
-        remedy = f"it belongs to the {key} before; set the whole table: --set '{above}={{{key} = .., ..}}'"
+        remedy = f"it belongs to the {key} that was replaced; set the whole table: --set '{above}={{{key} = .., ..}}'"
     if not remedy and error.what.startswith("expected a string"):
-        remedy = f"as text it is --set '{setting.text.partition('=')[0]}=\"..\"'"
+        remedy = f"to give text, write --set '{setting.text.partition('=')[0]}=\"..\"'"
     what = error.what if place == setting.path else f"{place}: {error.what}"
     return ScenarioError(f"{error.path}", setting.place, what, remedy)

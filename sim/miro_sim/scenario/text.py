@@ -16,7 +16,7 @@ def check_size(text: str, origin: str) -> None:
     """Refuses what would take `tomllib` minutes."""
     if too_long(text):
         what = f"holds more than {TEXT_KIB} KiB"
-        raise ScenarioError(origin, "", what, "name the file that was meant")
+        raise ScenarioError(origin, "", what, "is this the right file?")
     line = long_key_line(text)
     if line is not None:
         what = f"a key of more than {KEY_PARTS} parts"

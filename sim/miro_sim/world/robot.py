@@ -66,7 +66,7 @@ class Robot:
                 start.theta_rad + spec.start_error_theta_rad,
             )
         except ArithmeticError as error:  # what follows from the parameters divides by zero
-            raise DomainError(f"{name}: what follows from its drive parameters is not finite") from error
+            raise DomainError(f"{name}: its drive parameters lead to a value that is not finite") from error
         self.board = Board(
             load_wiring(), self.drive, spec.slot, robots, scenario.lm629, scenario.stop_on_fault
         )

@@ -53,7 +53,7 @@ def opened(saved: bytes, own: Identity) -> bytes:
     found = Identity(tables, scenario, firmware, seed)
     if found.tables != own.tables:
         raise ValueError("the saved world has other fields: another version of this program saved it")
-    for key, ours, theirs in zip(Identity._fields, own, found, strict=True):
-        if ours != theirs:
-            raise ValueError(f"saved world has {key} {theirs}, this one has {ours}")
+    for key, here, there in zip(Identity._fields, own, found, strict=True):
+        if here != there:
+            raise ValueError(f"the saved world has {key} {there}, this world has {here}")
     return content[_HEAD.size :]

@@ -45,7 +45,7 @@ def _text(row: Row) -> str:
         text = f"{len(event.data)} bytes, {reason}: {event.data[:16].hex(' ')}"
         return text + " .." if len(event.data) > 16 else text
     if message is None:
-        return f"frame that says nothing known: {row.unknown}"
+        return f"frame with unknown content: {row.unknown}"
     text = describe(message)
     if isinstance(message, TeamFrame):
         text += "  " + " ".join(f"{left:+d}/{right:+d}" for left, right in message.velocities)

@@ -71,10 +71,10 @@ def chosen(counts: Mapping[int, int], any_data: bool, network: int) -> tuple[int
     best = max(ROBOT_COUNTS, key=lambda count: (counts[count], -count))
     others = [count for count in ROBOT_COUNTS if count != best and counts[count]]
     if any_data and not counts[best]:
-        what = f"no frame of 3 or of 5 robots at its beginning; taken for {best}"
+        what = f"no frame of 3 or 5 robots at the beginning; {best} robots assumed"
     elif others:
         found = " and ".join(f"{counts[count]} frames of {count} robots" for count in ROBOT_COUNTS)
-        what = f"{found} at its beginning; taken for {best}"
+        what = f"{found} at the beginning; {best} robots assumed"
     else:
         return best, ""
     return best, f"network {network}: {what} (--robots says otherwise)"

@@ -7,7 +7,7 @@ The JSON form, for programs:
 * first `{"event": "input", "file", "format", "timed", "units": {field: unit}}`
 * `{"event": "frame", "offset", "tick", "time_s", "direction", "network", "type", "seq", "fresh", "fields", "data"}`;
   `tick` and `time_s` are null where the input has no times, `fresh` is null for telemetry, `fields` is null and
-  `unknown` says why for a frame whose CRC is good but which says nothing known
+  `unknown` says why for a frame whose CRC is good but whose content is unknown
 * `{"event": "damage", "offset", "tick", "time_s", "direction", "network", "reason", "data"}`
 * last `{"event": "end", ...counts}`, and before it `{"event": "error", "text"}` when the input could not be read on
 """
@@ -84,14 +84,14 @@ def described(row: Row) -> str:
     event = row.event
     if isinstance(event, Damaged):
         return f"{len(event.data)} bytes, {reason(event)}"
-    return describe(row.message) if row.message is not None else f"says nothing known: {row.unknown}"
+    return describe(row.message) if row.message is not None else f"unknown content: {row.unknown}"
 
 
 def contents(row: Row) -> str:
     """The fields of a frame in one line."""
     message = row.message
     if message is None:
-        return f"says nothing known: {row.unknown}"
+        return f"unknown content: {row.unknown}"
     if isinstance(message, TeamFrame):
         return "  ".join(f"{slot}: {a:+d}/{b:+d}" for slot, (a, b) in enumerate(message.velocities))
     return " ".join(f"{name}={_shown(value)}" for name, value in _fields(message).items())

@@ -25,7 +25,7 @@ class Row(msgspec.Struct, frozen=True):
     """One frame or damaged run.
 
     `offset` counts the characters of this network and direction before it. `fresh` is None for damage and for
-    telemetry, `message` for damage and for what says nothing known (then `unknown` says why).
+    telemetry, `message` for damage and for unknown content (then `unknown` says why).
     """
 
     offset: int

@@ -13,10 +13,10 @@ COMMANDS = {
     "run": "Runs a scenario and writes its files.",
     "replay": "Sends recorded bytes again and compares.",
     "decode": "Decodes captured bytes to frames and damage.",
-    "export": "Writes a run's bytes for Wireshark, or as a stream file.",
+    "export": "Writes the bytes of a run for Wireshark, or as a stream file.",
     "scenarios": "Lists the built-in scenarios, or shows one.",
     "info": "Shows versions, engine and firmware.",
-    "fw": "Firmware: run it on the bare processor, or look into it at work.",
+    "fw": "Firmware: run it on the bare processor, disassemble, trace, profile.",
     "vectors": "Writes single-step test vectors of the processor.",
 }
 """Name, which is the module's and the function's too, and what `--help` says of it."""

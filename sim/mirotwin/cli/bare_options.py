@@ -108,18 +108,18 @@ class BareRequest(msgspec.Struct, frozen=True):
 def bare_options(prefix: str = "") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Gives a command these options; `prefix` begins their help, for commands that look into other things too."""
     words: tuple[tuple[str, dict[str, Any], str], ...] = (
-        ("--until", {"metavar": "SYMBOL|ADDRESS"}, "Stop before the instruction there (0x.. or a symbol's name)."),
-        ("--max-cycles", {"type": Whole(1), "metavar": "N"}, "Give up after N machine cycles, exit code 42."),
+        ("--until", {"metavar": "SYMBOL|ADDRESS"}, "Stop before the instruction at this address (0x..) or symbol."),
+        ("--max-cycles", {"type": Whole(1), "metavar": "N"}, "Stop after N machine cycles, with exit code 42."),
         ("--stdin", {"type": Place(), "metavar": "FILE|-", "multiple": True},
-         "Bytes for the serial port, sent as soon as the program listens; several follow each other."),
+         "File of bytes for the serial port, sent when the program listens; may be repeated, files are sent in order."),
         ("--stdin-when", {"metavar": "TEXT", "multiple": True},
-         "--stdin begins when the program has sent TEXT. Given once for each --stdin, or for each but the first."),
-        ("--stdin-by-line", {"is_flag": True}, "Each line of --stdin waits for its --stdin-when anew."),
+         "Send --stdin when the program has sent TEXT. One for each --stdin, or for each but the first."),
+        ("--stdin-by-line", {"is_flag": True}, "Send one line of --stdin each time the program has sent TEXT."),
         ("--stdin-after", {"type": Moment()},
-         "--stdin begins so long after the start, or after its TEXT: ticks, or 200ms, 1.5s."),
-        ("--stdin-gap", {"type": Moment()}, "Least pause between two characters of --stdin. Default 0."),
+         "Delay of --stdin after the start, or after its TEXT: ticks, or 200ms, 1.5s."),
+        ("--stdin-gap", {"type": Moment()}, "Shortest pause between two characters of --stdin. Default 0."),
         ("--baud", {"type": Whole(50)},
-         "Bit rate of --stdin. Default: what the receiver is set to; needed by programs that measure it."),
+         "Bit rate of --stdin. Default: that of the receiver. Needed by programs that measure the bit rate."),
         ("--pins", {"type": Place(), "metavar": "FILE"},
          "Levels for port pins: lines TICK * P1.0 0|1 in order of time; # begins a comment."),
         ("--code-size", {"type": CodeSize()},
@@ -127,8 +127,8 @@ def bare_options(prefix: str = "") -> Callable[[Callable[..., Any]], Callable[..
         ("--code-in-xram", {"is_flag": True},
          "EA low: program and data share 64 KB of RAM, so that data may overwrite the program."),
         ("--crystal", {"type": Whole(32_768, 100_000_000), "metavar": "HZ"},
-         "The crystal: a tick is one period, a machine cycle 12. Default 24000000."),
-        ("--go-on", {"is_flag": True}, "Go on after a firmware fault; all are listed at the end, exit code 3."),
+         "Crystal frequency; a tick is one period, a machine cycle 12. Default 24000000."),
+        ("--go-on", {"is_flag": True}, "Continue after firmware faults; list them at the end, with exit code 3."),
     )  # fmt: skip
 
     def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -197,10 +197,10 @@ def report(machine: BareMachine, ended: Ended, request: BareRequest) -> int:
     if machine.faults_lost:
         complain(f"firmware faults: {machine.faults_lost} more are not listed")
     if ended is Ended.CYCLES:
-        complain(f"gave up at {_stopped_at(machine)}")
+        complain(f"stopped at the limit, at {_stopped_at(machine)}")
         code = LIMIT_REACHED
     elif ended is Ended.HALTED:
-        complain(f"the firmware ended at {_stopped_at(machine)}; no interrupt can wake it")
+        complain(f"the program ended at {_stopped_at(machine)}; no interrupt can wake it")
         code = DONE if request.until is None else EXPECTATION_FAILED
     if (machine.faults or ended in (Ended.CYCLES, Ended.HALTED)) and machine.image.symbols.problem:
         complain(f"addresses have no names: {machine.image.symbols.problem}")
@@ -234,12 +234,12 @@ def _pieces(request: BareRequest) -> tuple[Piece, ...]:
     if not files:
         for name in ("--stdin-when", "--stdin-by-line", "--stdin-after", "--stdin-gap"):
             if name in request.given():
-                raise BadInput("", name, "there is no --stdin that it could apply to", "give both")
+                raise BadInput("", name, "has no effect without --stdin", "give both")
     if b"" in texts:
-        raise BadInput("", "--stdin-when", "the empty string is no text", "say what the program sends first")
+        raise BadInput("", "--stdin-when", "the text is empty", "give text that the program sends")
     if request.stdin.count(STDIN) > 1:
         raise BadInput(
-            "", "--stdin", "standard input can be read once only", "name a file instead of the second -"
+            "", "--stdin", "standard input can be read only once", "name a file instead of the second -"
         )
     if texts and len(texts) not in (files, files - 1):
         raise BadInput(
@@ -249,7 +249,7 @@ def _pieces(request: BareRequest) -> tuple[Piece, ...]:
             "give one for each --stdin, or for each but the first",
         )
     if request.stdin_by_line and not texts:
-        raise BadInput("", "--stdin-by-line", "says that lines wait for --stdin-when", "give that too")
+        raise BadInput("", "--stdin-by-line", "has no effect without --stdin-when", "give that too")
     delay = _ticks(request.stdin_after, request)
     pieces: list[Piece] = []
     for path, when in zip(request.stdin, [b""] * (files - len(texts)) + texts, strict=True):

@@ -29,7 +29,7 @@ def address_of(text: str, image: Image, path: str, option: str) -> int:
             raise BadInput("", option, f"{text} is beyond the last code address", "use 0x0000 to 0xffff")
         return address
     if not text:
-        raise BadInput("", option, "the empty string is no place", "give a symbol or an address as 0x..")
+        raise BadInput("", option, "the place is empty", "give a symbol or an address as 0x..")
     if text.isascii() and text.isdecimal() and len(text) <= 6:
         raise BadInput("", option, f"{text} is no symbol", f"write {int(text):#x} for an address")
     for name in (text, text.removeprefix("_")):

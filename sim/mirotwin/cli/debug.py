@@ -24,7 +24,7 @@ def sources_option(command: Callable[..., Any]) -> Callable[..., Any]:
         multiple=True,
         metavar="FOLDER",
         type=Place(),
-        help="Where the C files are, may be given several times. Default: beside the image.",
+        help="Folder of the C files; may be repeated. Default: the image's folder.",
     )(command)
 
 

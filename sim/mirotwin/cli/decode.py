@@ -27,19 +27,22 @@ PROGRESS_BYTES = 1 << 16
 @click.command(short_help="Decodes captured bytes to frames and damage.")
 @click.argument("file", metavar="FILE|-", type=Place())
 @click.option(
-    "--format", "format", type=click.Choice(FORMATS), help="What FILE is. Default: its beginning tells."
+    "--format",
+    "format",
+    type=click.Choice(FORMATS),
+    help="Format of FILE. Default: recognized by its first bytes.",
 )
 @click.option(
     "--robots",
     type=click.Choice([str(count) for count in ROBOT_COUNTS]),
-    help="Robots in the network. Default: what FILE says, else what makes more frames readable.",
+    help="Robots in the network. Default: as FILE says, else the number with which more frames can be decoded.",
 )
 @click.option(
     "--direction",
     type=click.Choice([*DIRECTIONS]),
-    help="Which way raw bytes and hex text went: down to the robots (default, unless they read as telemetry) or up.",
+    help="Direction of raw bytes and hex text: down to the robots (default, unless they decode as telemetry), or up.",
 )
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a line, for programs.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object per line, for programs.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar.")
 @engine_option
 def decode(

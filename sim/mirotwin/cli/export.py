@@ -56,7 +56,7 @@ class Exported:
             self.failure = error
 
 
-@click.command(short_help="Writes a run's bytes for Wireshark, or as a stream file.")
+@click.command(short_help="Writes the bytes of a run for Wireshark, or as a stream file.")
 @click.argument("file", metavar="FILE|-", type=Place())
 @click.option("--out", required=True, type=Place(), help="File to write, or - for standard output.")
 @click.option(
@@ -64,7 +64,9 @@ class Exported:
     type=click.Choice(TARGETS),
     help="What to write. Default: stream for *.stream and *.txt, else pcapng.",
 )
-@click.option("--format", type=click.Choice(TIMED), help="What FILE is. Default: its beginning tells.")
+@click.option(
+    "--format", type=click.Choice(TIMED), help="Format of FILE. Default: recognized by its first bytes."
+)
 @click.option("--network", type=Whole(0, 0xFFFF), help="Only this network. Default: all.")
 @click.option("--force", is_flag=True, help="Replace the file at --out.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no closing line.")
@@ -119,7 +121,7 @@ def export(
             f"{exported.bad_stops} bad stop bits were left out: a capture holds none, a stream file does"
         )
     if exported.failure is not None:
-        complain(f"error: {exported.failure}; all before it was written")
+        complain(f"error: {exported.failure}; everything before it was written")
         return BAD_INPUT
     return DONE
 

@@ -7,8 +7,8 @@ from mirotwin.cli.program import LazyGroup
 COMMANDS = {
     "run": "Runs IMAGE.ihx on a bare AT89C52.",
     "disasm": "Lists an image's instructions.",
-    "trace": "Writes each instruction with what it changed.",
-    "profile": "Shows where the processor's time goes.",
+    "trace": "Writes each instruction with the registers it changed.",
+    "profile": "Shows where the processor spends its time.",
     "coverage": "Shows which lines of the firmware ran.",
     "vcd": "Writes the wires as a VCD file.",
 }
@@ -19,10 +19,10 @@ COMMANDS = {
     cls=LazyGroup,
     modules="mirotwin.cli.fw_",
     commands_about=COMMANDS,
-    short_help="Firmware: run it on the bare processor, or look into it at work.",
+    short_help="Firmware: run it on the bare processor, disassemble, trace, profile.",
 )
 def fw() -> None:
-    """Firmware: run it on the bare processor, or look into it at work.
+    """Firmware: run it on the bare processor, disassemble, trace, profile.
 
     SUBJECT is what runs: an IMAGE.ihx on the bare processor, or the robot in a scenario (a built-in name or a .toml),
     in a recording (run.mcap) or on a stream file.

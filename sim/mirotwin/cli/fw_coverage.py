@@ -34,7 +34,7 @@ from mirotwin.report.firmware_coverage import (
     metavar="FILE.info",
     help="Write an lcov tracefile (genhtml, CI services).",
 )
-@click.option("--append", is_flag=True, help="Add to what --out holds already.")
+@click.option("--append", is_flag=True, help="Add the counts to the file at --out.")
 @click.option("--force", is_flag=True, help="Replace the file at --out, and its listing.")
 @sources_option
 def coverage(request: Request, out: Path | None, append: bool, force: bool, sources: tuple[str, ...]) -> int:

@@ -20,7 +20,7 @@ from mirotwin.cli.program import show_line
     "symbols",
     multiple=True,
     metavar="SYMBOL|ADDRESS",
-    help="Only the function there; several may be.",
+    help="Only the function at this symbol or address; may be repeated.",
 )
 @sources_option
 def disasm(image: str | None, symbols: tuple[str, ...], sources: tuple[str, ...]) -> None:

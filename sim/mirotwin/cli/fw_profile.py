@@ -15,7 +15,7 @@ from mirotwin.cli.debug import with_debug_files
 from mirotwin.cli.subject import Request, image_name, look, open_run, subject_options
 
 
-@click.command(short_help="Shows where the processor's time goes.")
+@click.command(short_help="Shows where the processor spends its time.")
 @subject_options
 @click.option("--json", "as_json", is_flag=True, help="As JSON, for programs.")
 def profile(request: Request, as_json: bool) -> int:

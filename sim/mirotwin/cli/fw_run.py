@@ -27,10 +27,12 @@ from mirotwin.files.outputs import check_file, check_not_input, whole_file
 @click.argument("image", metavar="IMAGE.ihx", type=Place())
 @bare_options()
 @click.option(
-    "--terminal", is_flag=True, help="Keys go to the serial port, in the crystal's time; Ctrl-] leaves."
+    "--terminal",
+    is_flag=True,
+    help="Connect the terminal to the serial port, in real time; Ctrl-] ends the run.",
 )
 @click.option(
-    "--dump", type=Place(), metavar="FILE.json", help="Write registers and memories there at the end."
+    "--dump", type=Place(), metavar="FILE.json", help="Write registers and memories to this file at the end."
 )
 @engine_option
 def run(image: str, terminal: bool, dump: str | None, engine: str | None, **options: Any) -> int:

@@ -16,16 +16,18 @@ from mirotwin.cli.subject import Request, look, open_run, subject_options
 from mirotwin.files.outputs import check_new, check_not_input, whole_file
 
 
-@click.command(short_help="Writes each instruction with what it changed.")
+@click.command(short_help="Writes each instruction with the registers it changed.")
 @subject_options
 @click.option(
     "--symbol",
     "symbols",
     multiple=True,
     metavar="SYMBOL|ADDRESS",
-    help="Only the function there; several may be.",
+    help="Only the function at this symbol or address; may be repeated.",
 )
-@click.option("--out", type=Place(path_type=Path), metavar="FILE", help="Write there instead of to stdout.")
+@click.option(
+    "--out", type=Place(path_type=Path), metavar="FILE", help="Write to this file instead of stdout."
+)
 @click.option("--force", is_flag=True, help="Replace the file at --out.")
 def trace(request: Request, symbols: tuple[str, ...], out: Path | None, force: bool) -> int:
     """Writes what the processor did in SUBJECT: tick, address, symbol, instruction, changed registers and port pins.

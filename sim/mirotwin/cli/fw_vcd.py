@@ -43,7 +43,10 @@ def vcd(request: Request, out: Path, force: bool) -> int:
         check_new(path, "--out", force)
     if save == out:
         raise BadInput(
-            "", f"--out {out}", "that is the save file's name", "give the VCD file another ending, .vcd"
+            "",
+            f"--out {out}",
+            "this is the name of the GTKWave save file",
+            "give the VCD file another ending, .vcd",
         )
     run = open_run(request)
 

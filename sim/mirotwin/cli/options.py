@@ -41,7 +41,7 @@ class Place(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == "":
-            self.fail("the empty string names no place.", param, ctx)
+            self.fail("the path is empty.", param, ctx)
         return super().convert(value, param, ctx)
 
 
@@ -49,7 +49,7 @@ def engine_option(command: Command) -> Command:
     return click.option(
         "--engine",
         type=click.Choice(engines.ENGINES),
-        help="How the hot modules run; both give the same bits. Default: compiled where it was built.",
+        help="How the hot modules run; both give the same bits. Default: compiled if they were built.",
     )(command)
 
 
@@ -95,7 +95,7 @@ def plain_parameters(label: str, done: str = "run") -> Iterator[None]:
     try:
         yield
     except DomainError as error:
-        what = f"cannot be {done}: {error}; parameters far from any robot's can do this"
+        what = f"cannot be {done}: {error}; the parameters are far outside those of a real robot"
         raise BadInput(label, "", what) from None
     except PartError as error:
         raise BadInput(label, "", f"cannot be {done}: {error.what}", error.remedy) from None

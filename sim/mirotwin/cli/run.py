@@ -39,7 +39,7 @@ from mirotwin.recording.recorder import Source
 )
 @set_option(
     "A key of the scenario, by its path (network.robot.controller.q1_per_s=0.3; with several, network.0.robot.1. and so"
-    " on); may be repeated. VALUE is TOML, or else text. Folder: runs/SCENARIO-SEED all the same."
+    " on); may be repeated. VALUE is TOML, or else text. The default folder does not change."
 )
 @firmware_option("Image to run instead of the robot's own.")
 @engine_option
@@ -47,10 +47,12 @@ from mirotwin.recording.recorder import Source
     "--record",
     type=click.Choice(["default", "full"]),
     default="default",
-    help="full: also every LM629 sample. Default: every control period and all bytes on the wire.",
+    help="full: also every LM629 sample. Default: every control period, and all bytes sent.",
 )
 @click.option("--force", is_flag=True, help="Replace the files of an earlier run in the folder.")
-@click.option("--no-figure", is_flag=True, help="Draw no figure.png, which takes most of a short run's time.")
+@click.option(
+    "--no-figure", is_flag=True, help="Do not draw figure.png, which takes most of the time of a short run."
+)
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no table.")
 def run(
     scenario: str,

@@ -33,7 +33,7 @@ def scenarios(context: click.Context) -> None:
 @scenarios.command()
 @click.argument("name")
 @set_option(
-    "A key to set in it, as for `run`; may be repeated. The file is then checked, and has lost its comments."
+    "A key to set in it, as for `run`; may be repeated. The file is then checked, and its comments are left out."
 )
 def show(name: str, settings: tuple[str, ...]) -> None:
     """Prints the file of the built-in scenario NAME, to read or to start one's own from. NAME may be a file, too."""

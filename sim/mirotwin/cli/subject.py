@@ -73,13 +73,13 @@ class Request(msgspec.Struct, frozen=True):
 
 _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.argument("subject", metavar="SUBJECT", type=Place()),
-    click.option("--from", "from_tick", type=Moment(), default="0", help="Look from then on: ticks, or 1.5s, 20ms."),
-    click.option("--to", "to_tick", type=Moment(), help="End there. Default: the end of the run."),
+    click.option("--from", "from_tick", type=Moment(), default="0", help="Start there: ticks, or 1.5s, 20ms."),
+    click.option("--to", "to_tick", type=Moment(), help="Stop there. Default: the end of the run."),
     click.option("--seed", type=Whole(0, MAX_SEED), help="Scenario: master seed of all noise. Default 0."),
     firmware_option("Scenario, recording, stream: image to run instead of its own."),
     set_option("Scenario, recording, stream: a key to set in its scenario, as for `run`."),
-    click.option("--network", type=Whole(0), help="Which network's robot. Default 0."),
-    click.option("--robot", type=Whole(0, 4), help="Slot of the robot. Default: the first there is."),
+    click.option("--network", type=Whole(0), help="Network of the robot. Default 0."),
+    click.option("--robot", type=Whole(0, 4), help="Slot of the robot. Default: the lowest slot used."),
     bare_options("Image: "),
     engine_option,
 )  # fmt: skip

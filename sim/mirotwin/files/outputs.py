@@ -128,7 +128,9 @@ def _lock(path: Path) -> int | None:
     except BlockingIOError:
         os.close(folder)
         what = "another process is writing into the folder"
-        raise OutputError(path, what, "wait until it has finished, or choose another with --out") from None
+        raise OutputError(
+            path, what, "wait until it has finished, or choose another folder with --out"
+        ) from None
     except OSError:
         os.close(folder)
         return None
@@ -164,7 +166,7 @@ def _content(present: Sequence[str], names: Sequence[str]) -> str:
     """What a folder with the entries `present` holds; what was broken off goes first."""
     known = {part_name(name) for name in names}
     if parts := [name for name in present if name in known]:
-        return f"the folder holds what is left of a command that was broken off ({_some(parts)})"
+        return f"the folder holds parts of an interrupted command ({_some(parts)})"
     return f"the folder is not empty ({_some(present)})"
 
 
@@ -174,7 +176,7 @@ def _some(names: Sequence[str]) -> str:
 
 def _ways_out(names: Sequence[str]) -> str:
     ours = ", ".join(names) if len(names) <= len(FILES) else f"{names[0]} to {names[-1]}"
-    return f"choose another with --out, or replace {ours} and parts of them with --force"
+    return f"choose another with --out, or replace {ours} and their parts with --force"
 
 
 def check_file(path: Path, option: str) -> None:
@@ -186,7 +188,7 @@ def check_file(path: Path, option: str) -> None:
         what = f"is a symbolic link to {os.readlink(path)}, which does not exist"
         raise OutputError(path, what, remedy)
     if path.exists() and not path.is_file():
-        raise OutputError(path, "is there and is not a regular file", remedy)
+        raise OutputError(path, "exists and is not a regular file", remedy)
     if path.exists() and not os.access(path, os.W_OK):
         raise OutputError(path, "the file cannot be written to", remedy)
     folder = path.resolve().parent if path.is_symlink() else path.parent

@@ -142,10 +142,10 @@ class _Container:
         if magic != MAGIC:
             if len(magic) < len(MAGIC):
                 self._cut()
-            self._damaged("the last bytes of an MCAP file should stand here")
+            self._damaged("the closing bytes of an MCAP file are missing here")
         self.place += len(magic)
         if self.source.read(1):
-            self._fail("something follows the end of the recording", "remove it")
+            self._fail("there are bytes after the end of the recording", "remove it")
 
     def _read(self, size: int) -> bytes:
         data = self.source.read(size)

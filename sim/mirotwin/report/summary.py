@@ -220,7 +220,7 @@ def off_pitch_text(summary: Summary) -> str:
         for one in everyone
         if one.tracking.off_pitch_s
     ]
-    return f"off it for {', '.join(left)}; there are no walls" if left else ""
+    return f"off it for {', '.join(left)} (the pitch has no walls here)" if left else ""
 
 
 def to_json(summary: Summary) -> bytes:

@@ -56,7 +56,9 @@ class Air:
         """Announces one, before the wire is settled there (ValueError) and after all announced before."""
         free = max([self.settled_tick, *(one.end_tick for one in self.troubles)])
         if trouble.start_tick < free:
-            raise ValueError(f"trouble at tick {trouble.start_tick}: the wire is spoken for up to {free}")
+            raise ValueError(
+                f"disturbance at tick {trouble.start_tick} overlaps another one that lasts until tick {free}"
+            )
         self.troubles.append(trouble)
 
     def settle(self) -> list[Edge]:

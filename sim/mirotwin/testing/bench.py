@@ -53,7 +53,9 @@ class LinkFailure(AssertionError):
     """Both ends disagree, or the firmware faulted. `stream` is what the robot heard, as a stream file."""
 
     def __init__(self, what: str, stream: str) -> None:
-        super().__init__(f"{what}\nwhat the robot heard, for `mirotwin replay`:\n{stream}")
+        super().__init__(
+            f"{what}\nwhat the robot received, as a stream file for `mirotwin replay`:\n{stream}"
+        )
         self.what = what
         self.stream = stream
 
@@ -164,7 +166,7 @@ class Bench:
 
     def wait(self, ticks: int) -> None:
         if ticks < 0:
-            raise ValueError(f"ticks {ticks}: time only goes forward")
+            raise ValueError(f"ticks = {ticks}: must not be negative")
         self.run_to(self.now + ticks)
 
     def reset(self) -> None:

@@ -59,7 +59,12 @@ CASES: list[tuple[str, Callable[[], object], int, str]] = [
         "mirotwin: internal error: ValueError: angle; please report this line with the command"
         " (MIROTWIN_TRACEBACK=1 shows the place)",
     ),
-    ("parameters", raising(DomainError("angle")), 2, "angle; parameters far from any robot's can do this"),
+    (
+        "parameters",
+        raising(DomainError("angle")),
+        2,
+        "angle; the parameters are far outside those of a real robot",
+    ),
     (
         "a full disk",
         raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))),
@@ -137,10 +142,7 @@ def test_the_next_run_names_the_parts_and_replaces_them_by_force(
 ) -> None:
     code, _, err = mirotwin("run", short, "--seed", 5, "--out", parts)
     assert code == 2
-    assert (
-        f"{parts}: the folder holds what is left of a command that was broken off ({', '.join(PARTS)}); "
-        in err
-    )
+    assert f"{parts}: the folder holds parts of an interrupted command ({', '.join(PARTS)}); " in err
     assert "with --force" in err
     (parts / "thesis.tex").write_text("years of work")
     assert mirotwin("run", short, "--seed", 5, "--out", parts, "-q", "--force") == (0, "", "")

@@ -122,7 +122,7 @@ def test_a_fault_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result], tm
     [
         ("maim", "no symbol maim in the code; did you mean _main?"),
         ("100", "100 is no symbol; write 0x64 for an address"),
-        ("", "the empty string is no place; give a symbol"),
+        ("", "the place is empty; give a symbol"),
         ("0x10000", "beyond the last code address"),
         ("0xyz", "not a hexadecimal number"),
     ],
@@ -167,7 +167,7 @@ def test_a_dump_takes_the_place_of_no_device_and_is_refused_before_the_firmware_
     code, out, err = mirotwin("fw", "run", image, "--max-cycles", 100, "--dump", "/dev/full")
     assert (code, out) == (2, "")
     assert err == (
-        "mirotwin: error: /dev/full: is there and is not a regular file; choose another file with --dump\n"
+        "mirotwin: error: /dev/full: exists and is not a regular file; choose another file with --dump\n"
     )
 
 
@@ -230,7 +230,7 @@ def test_a_time_is_one_of_the_crystal(mirotwin: Callable[..., Result], tmp_path:
     [
         (("--stdin-when", "x"), "--stdin-when: there is no --stdin"),
         (("--stdin-gap", "1ms"), "--stdin-gap: there is no --stdin"),
-        (("--stdin", "F", "--stdin-when", ""), "--stdin-when: the empty string is no text"),
+        (("--stdin", "F", "--stdin-when", ""), "--stdin-when: the text is empty"),
         (
             ("--stdin", "F", "--stdin-when", "a", "--stdin-when", "b"),
             "--stdin-when: 2 for 1 --stdin; give one",
@@ -240,7 +240,7 @@ def test_a_time_is_one_of_the_crystal(mirotwin: Callable[..., Result], tmp_path:
             "--stdin-when: 1 for 3 --stdin",
         ),
         (("--stdin", "F", "--stdin-by-line"), "--stdin-by-line: says that lines wait"),
-        (("--stdin", "-", "--stdin", "-"), "--stdin: standard input can be read once only"),
+        (("--stdin", "-", "--stdin", "-"), "--stdin: standard input can be read only once"),
         (("--stdin", "F", "--stdin-after", "soon"), "'soon' is no time"),
         (
             ("--stdin", "F", "--baud", "600000", "--crystal", "12000000"),

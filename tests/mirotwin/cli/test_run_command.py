@@ -123,7 +123,8 @@ def test_a_fault_of_the_board_names_limit_tick_instruction_and_symbol(
     image = hex_file(tmp_path / "bad.ihx", SHORT_RESET)
     image.with_suffix(".map").write_text(SYMBOLS)
     code, _, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out", "-q")
-    first = "firmware fault: net0/robot0: firmware broke an LM629 bus timing limit (/RST pulse 500 ns, 1333 ns needed)"
+    limit = "an LM629 bus timing limit (/RST pulse 500 ns, 1333 ns needed)"
+    first = f"firmware fault: net0/robot0: firmware violated {limit}"
     assert (code, err.splitlines()[0]) == (3, f"mirotwin: {first} at 0x0003 in _pulse, tick 36")
 
 
@@ -194,7 +195,7 @@ def test_parameters_with_which_nothing_can_be_computed_are_bad_input(
     assert (code, out) == (2, "")
     assert err == (
         "mirotwin: error: far.toml: cannot be run: net0/robot2: what follows from its drive parameters is not"
-        " finite; parameters far from any robot's can do this\n"
+        " finite; the parameters are far outside those of a real robot\n"
     )
     assert [path.name for path in tmp_path.iterdir()] == ["far.toml"]
 
@@ -210,8 +211,8 @@ def test_the_shortest_duration_is_one_control_period(mirotwin: Callable[..., Res
     ("arguments", "expected"),
     [
         (["--seed", "abc"], "Invalid value for '--seed': 'abc' is not a whole number."),
-        (["--out", ""], "Invalid value for '--out': the empty string names no place."),
-        (["--firmware", ""], "Invalid value for '--firmware': the empty string names no place."),
+        (["--out", ""], "Invalid value for '--out': the path is empty."),
+        (["--firmware", ""], "Invalid value for '--firmware': the path is empty."),
         (["--firmware", "no.ihx"], "no.ihx: there is no such file; give the path of an .ihx or .hex file"),
         (["--firmware", "/dev/null"], "/dev/null: is not a regular file; copy the content to a file first"),
     ],

@@ -98,8 +98,8 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(
         ("set = {network.robot = 5}", "", "--set network.robot=5: "),
         ("[expect]\nno_fault = true", "", "header: expect is not carried out by this version"),
         (f"firmware_sha256 = '{OTHER}'", "", "header: the stream is for firmware 0123456789ab.., this is"),
-        ("", "2000000 *@0/1 reset 1", ":6:1: an event, which this command cannot act on; no command acts"),
-        ("", "2000000 * P1.0 1", ":6:1: an event, which this command cannot act on; `mirotwin fw run"),
+        ("", "2000000 *@0/1 reset 1", ":6:1: an event, which this command does not support; no command acts"),
+        ("", "2000000 * P1.0 1", ":6:1: an event, which this command does not support; `mirotwin fw run"),
         ("", "1701700 >@31 55\n1800000 >@32 55", "tick 1800000: network 32, but the scenario has 32"),
         (
             "",
@@ -141,4 +141,4 @@ def test_decoding_and_exporting_refuse_an_event_after_what_came_before(
     path.write_text(f"{V2}5 > 55\n9 *@0 radio down\n99999 > 55\n")
     code, _, err = mirotwin(*command, path)
     assert code == 2
-    assert f"{path}:3:1: an event, which this command cannot act on" in err
+    assert f"{path}:3:1: an event, which this command does not support" in err

@@ -81,7 +81,9 @@ def test_slicer_noise_alone_is_never_taken_for_a_frame_by_the_firmware(n: int) -
 def test_trouble_that_comes_too_late_is_refused() -> None:
     air = Air(Line(), Line(), 0, "x")
     air.trouble(Trouble(5, 10, "mark"))
-    with pytest.raises(ValueError, match="trouble at tick 7: the wire is spoken for up to 10"):
+    with pytest.raises(
+        ValueError, match="disturbance at tick 7 overlaps another one that lasts until tick 10"
+    ):
         air.trouble(Trouble(7, 20, "burst"))
 
 

@@ -92,7 +92,7 @@ def test_a_fault_reads_as_a_sentence():
     board = board_with(CASES["a reset pulse of one machine cycle"][0])
     board.run(MS)
     assert str(board.faults[0]) == (
-        "firmware broke an LM629 bus timing limit (/RST pulse 500 ns, 1333 ns needed) at 0x0032 in guilty, tick 48"
+        "firmware violated an LM629 bus timing limit (/RST pulse 500 ns, 1333 ns needed) at 0x0032 in guilty, tick 48"
     )
 
 

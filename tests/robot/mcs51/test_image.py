@@ -51,7 +51,7 @@ def test_extended_address_and_start_records_are_understood(tmp_path):
         ([record(0, b"\x01", 4), END], 1, "extended address record needs 2 bytes"),
         ([record(0, b"\x01")], 0, "truncated"),
         ([END], 0, "holds no bytes"),
-        ([END, record(0, b"\x01")], 2, "goes on after its end record"),
+        ([END, record(0, b"\x01")], 2, "has more records after its end record"),
         ([record(0, b"\x01\x02"), record(1, b"\x02"), END], 2, "0x0001 is loaded a second time"),
         ([record(0x1FFF, b"\x01\x02"), END], 1, "byte at 0x2000 does not fit 8192 bytes"),
         ([record(0, b"\x00\x01", 4), record(0, b"\x01"), END], 2, "byte at 0x10000 does not fit"),
