@@ -14,15 +14,14 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_sim.periods import Control, Period
 from mirotwin.report.figure import draw
 from mirotwin.report.summary import (
-    ErrorSample,
     Summary,
     off_pitch_text,
     settling_text,
     summarise,
     to_json,
     tracking_of,
-    wrapped,
 )
+from mirotwin.report.track import ErrorSample, Tracks, error_of, wrapped
 
 COUNTERS = {
     "link": {
@@ -47,7 +46,7 @@ def summary_of(run: list[Period]) -> Summary:
         scenario="fig6",
         seed=7,
         engine="compiled",
-        periods=run,
+        tracks=Tracks(run),
         simulated_ticks=len(run) * CONTROL_PERIOD_TICKS,
         wall_s=0.5,
         counters=COUNTERS,
@@ -154,8 +153,8 @@ def test_half_a_turn_is_positive() -> None:
 
 def test_the_same_run_gives_the_same_picture(tmp_path: Path) -> None:
     run = list(periods(40, [(0, 0), (0, 1)]))
-    draw(run, tmp_path / "a.png", scenario="fig6", seed=1, title="costs $5 _ \\alpha")
-    draw(run, tmp_path / "b.png", scenario="fig6", seed=1, title="costs $5 _ \\alpha")
+    draw(Tracks(run), tmp_path / "a.png", scenario="fig6", seed=1, title="costs $5 _ \\alpha")
+    draw(Tracks(run), tmp_path / "b.png", scenario="fig6", seed=1, title="costs $5 _ \\alpha")
     picture = (tmp_path / "a.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
     assert picture == (tmp_path / "b.png").read_bytes()
@@ -181,7 +180,7 @@ def test_inner_values_have_panels_below_up_to_eight_of_them(tmp_path: Path) -> N
             )
             for period in periods(5)
         ]
-        draw(run, tmp_path / "a.png", scenario="fig6", seed=1)
+        draw(Tracks(run), tmp_path / "a.png", scenario="fig6", seed=1)
         sizes.append(size((tmp_path / "a.png").read_bytes()))
     widths, heights = zip(*sizes, strict=True)
     assert len(set(widths)) == 1
@@ -190,4 +189,28 @@ def test_inner_values_have_panels_below_up_to_eight_of_them(tmp_path: Path) -> N
 
 def test_nothing_cannot_be_drawn(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="nothing to draw"):
-        draw([], tmp_path / "a.png", scenario="fig6", seed=1)
+        draw(Tracks(), tmp_path / "a.png", scenario="fig6", seed=1)
+
+
+def test_the_columns_of_a_run_say_what_its_periods_say() -> None:
+    run = list(periods(40, [(0, 0), (1, 2)]))
+    tracks = Tracks(run)
+    assert list(tracks.robots) == [(0, 0), (1, 2)]
+    assert (tracks.count, tracks.digest) == (40, run[-1].digest)
+    for index, track in enumerate(tracks.robots.values()):
+        records = [(period.robots[index], period.tick) for period in run]
+        assert list(track.errors) == [error_of(*record) for record in records]
+        assert track.errors[-2:] == [error_of(*record) for record in records[-2:]]
+        assert list(track.truth.x_cm) == [100.0 * robot.truth.x_m for robot, _ in records]
+        assert list(track.reference.y_cm) == [100.0 * robot.reference.y_m for robot, _ in records]
+        assert list(track.seen.x_cm) == [
+            100.0 * robot.measurement.x_m for robot, _ in records if robot.measurement is not None
+        ]
+
+
+def test_inner_values_are_kept_by_name_and_robot_in_the_order_of_the_laws() -> None:
+    tracks = Tracks(periods(3, [(0, 0), (1, 2)]))
+    assert list(tracks.inner) == ["u1", "u2", "s1", "s2"]
+    line = tracks.inner["s2"][1, 2]
+    assert list(line.values) == [-2.0, -2.0]
+    assert list(line.times_s) == [800_800 / 24e6, 2 * 800_800 / 24e6]

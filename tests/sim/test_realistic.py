@@ -9,7 +9,8 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
-from mirotwin.report.summary import errors_by_robot, tracking_of
+from mirotwin.report.summary import tracking_of
+from mirotwin.report.track import Tracks
 
 SEEDS = range(10)
 
@@ -72,5 +73,5 @@ def test_the_figure_is_tracked_within_the_papers_measurement_error(name, image):
             periods.append(period)
         assert world.faults == []
         assert observer.accepted > 150
-        errors.append(tracking_of(errors_by_robot(periods)[0, 0]).rms_position_cm)
+        errors.append(tracking_of(Tracks(periods).robots[0, 0].errors).rms_position_cm)
     assert statistics.median(errors) <= 2.5, errors

@@ -87,7 +87,7 @@ def run(
     if not quiet:
         from mirotwin.cli.run_table import print_table  # loads rich
 
-        print_table(summary, run_files.periods, folder.path)
+        print_table(summary, run_files.tracks, folder.path)
     return report_faults(world)
 
 

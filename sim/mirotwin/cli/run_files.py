@@ -21,6 +21,7 @@ from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.recording.recorder import Recorder, Source
 from mirotwin.report.summary import Summary, summarise, to_json
+from mirotwin.report.track import Tracks
 
 SUMMARY = "summary.json"
 FIGURE = "figure.png"
@@ -46,7 +47,7 @@ class RunFiles:
         self.engine = engine
         self.hold = hold
         self.settings = settings
-        self.periods: list[Period] = []
+        self.tracks = Tracks()
         self._wall_s = 0.0
         self._flushed_s = -FLUSH_S
 
@@ -59,11 +60,11 @@ class RunFiles:
             self._record(bar)
             summary = self._summary(complete=True)
             self.folder.part(SUMMARY).write_bytes(to_json(summary))
-            if self.periods and title is not None:
+            if self.tracks.count and title is not None:
                 from mirotwin.report.figure import draw  # takes half a second to load
 
                 scenario, seed = self.source.scenario_name, self.source.seed
-                draw(self.periods, self.folder.part(FIGURE), scenario=scenario, seed=seed, title=title)
+                draw(self.tracks, self.folder.part(FIGURE), scenario=scenario, seed=seed, title=title)
         except BaseException:
             self._leave_parts()
             raise
@@ -83,12 +84,12 @@ class RunFiles:
 
     def _simulate(self, recorder: Recorder, bar: ProgressBar) -> None:
         def keep(period: Period) -> None:
-            self.periods.append(period)
+            self.tracks.add(period)
             now_s = time.monotonic()
             if now_s - self._flushed_s >= FLUSH_S:
                 recorder.flush()
                 self._flushed_s = now_s
-            bar.to(len(self.periods))
+            bar.to(self.tracks.count)
 
         with bar, self.hold.released():
             runner.run(self.world, recorder, self.source.record == "full", keep)
@@ -98,7 +99,7 @@ class RunFiles:
             scenario=self.source.scenario_name,
             seed=self.source.seed,
             engine=self.engine,
-            periods=self.periods,
+            tracks=self.tracks,
             simulated_ticks=self.world.tick,
             wall_s=self._wall_s,
             counters=self.world.counters(),
@@ -109,12 +110,12 @@ class RunFiles:
 
     def _leave_parts(self) -> None:
         """What is left when the run is broken off: nothing, if not even one control period was recorded."""
-        if not self.periods:
+        if not self.tracks.count:
             return
         self.folder.keep = KEPT
         with suppress(OSError):  # a full disk, which is reported as what broke the run off
             self.folder.part(SUMMARY).write_bytes(to_json(self._summary(complete=False)))
         complain(
-            f"the run broke off after {len(self.periods)} control periods;"
+            f"the run broke off after {self.tracks.count} control periods;"
             f" they are in {self.folder.path / part_name(RECORDING)}"
         )

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from rich.table import Table
 
-from miro_sim.periods import Period
 from mirotwin.cli.console import show
-from mirotwin.report.summary import Summary, errors_by_robot, off_pitch_text, settling_text
+from mirotwin.report.summary import Summary, off_pitch_text, settling_text
+from mirotwin.report.track import Tracks
 
 
-def print_table(summary: Summary, periods: list[Period], folder: Path) -> None:
+def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
     tracking, link, firmware = summary.tracking, summary.link, summary.firmware
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="bold")
@@ -28,7 +28,7 @@ def print_table(summary: Summary, periods: list[Period], folder: Path) -> None:
         f"engine {summary.engine})",
     )
     if tracking.rms_position_cm is not None:
-        settled = settling_text(next(iter(errors_by_robot(periods).values())))
+        settled = settling_text(next(iter(tracks.robots.values())).errors)
         table.add_row(
             "tracking",
             f"rms of the last second {tracking.rms_position_cm:.2f} cm "

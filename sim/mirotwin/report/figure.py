@@ -11,15 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from miro_exact.clock import seconds
-from miro_sim.periods import Period
-from mirotwin.report.summary import (
-    SETTLED_CM,
-    SETTLED_RAD,
-    ErrorSample,
-    errors_by_robot,
-    settling_text,
-    tracking_of,
-)
+from mirotwin.report.summary import settling_text, tracking_of
+from mirotwin.report.track import SETTLED_CM, SETTLED_RAD, Errors, ErrorSample, Line, Place, Track, Tracks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,9 +44,9 @@ STYLE: dict[str, Any] = {
 }
 
 
-def draw(periods: Sequence[Period], path: Path, *, scenario: str, seed: int, title: str = "") -> None:
+def draw(tracks: Tracks, path: Path, *, scenario: str, seed: int, title: str = "") -> None:
     """Writes the PNG; raises ValueError when there is no period to draw."""
-    errors = errors_by_robot(periods)
+    errors = {place: track.errors for place, track in tracks.robots.items()}
     if not errors:
         raise ValueError("nothing to draw: the run has no control period")
     import matplotlib.style  # here, because it takes longer to load than all the rest of the program
@@ -62,7 +55,7 @@ def draw(periods: Sequence[Period], path: Path, *, scenario: str, seed: int, tit
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-        inner = _inner_values(periods)
+        inner = {name: tracks.inner[name] for name in list(tracks.inner)[:MOST_INNER]}
         rows = -(-len(inner) // COLUMNS)
         heights = [PANEL_INCHES, PANEL_INCHES, *[INNER_INCHES] * rows]
         height = sum(heights) + GAP_INCHES * (len(heights) - 1) + TOP_INCHES + BOTTOM_INCHES
@@ -78,7 +71,7 @@ def draw(periods: Sequence[Period], path: Path, *, scenario: str, seed: int, tit
             y=1.0 - 0.12 / height,
             va="top",
         )
-        _draw_path(path_axes, periods, list(errors))
+        _draw_path(path_axes, tracks.robots)
         _draw_error(error_axes[0], errors, "(b)  $x_e$", "cm", SETTLED_CM, lambda one: one.x_cm)
         _draw_error(error_axes[1], errors, "(c)  $y_e$", "cm", SETTLED_CM, lambda one: one.y_cm)
         _draw_error(error_axes[2], errors, r"(d)  $\theta_e$", "rad", SETTLED_RAD, lambda one: one.theta_rad)
@@ -113,17 +106,13 @@ def _plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def _draw_path(axes: Axes, periods: Sequence[Period], places: Sequence[tuple[int, int]]) -> None:
-    for index, place in enumerate(places):
+def _draw_path(axes: Axes, robots: dict[Place, Track]) -> None:
+    for index, (place, track) in enumerate(robots.items()):
         colour = COLOURS[index % len(COLOURS)]
-        robots = [one for period in periods for one in period.robots if (one.network, one.slot) == place]
-        seen = [one.measurement for one in robots if one.measurement is not None]
-        reference = [(100.0 * one.reference.x_m, 100.0 * one.reference.y_m) for one in robots]
-        truth = [(100.0 * one.truth.x_m, 100.0 * one.truth.y_m) for one in robots]
         first = index == 0
         axes.plot(
-            [100.0 * one.x_m for one in seen],
-            [100.0 * one.y_m for one in seen],
+            track.seen.x_cm,
+            track.seen.y_cm,
             linestyle="none",
             marker=".",
             markersize=2.5,
@@ -131,9 +120,11 @@ def _draw_path(axes: Axes, periods: Sequence[Period], places: Sequence[tuple[int
             alpha=0.35,
             label="camera" if first else None,
         )
-        axes.plot(*zip(*reference, strict=True), ":", color=REFERENCE, label="reference" if first else None)
-        axes.plot(*zip(*truth, strict=True), color=colour, label=_label(place, places))
-        axes.plot(*truth[0], "o", color=colour, markersize=5, markerfacecolor="white")
+        reference, truth = track.reference, track.truth
+        label = "reference" if first else None
+        axes.plot(reference.x_cm, reference.y_cm, ":", color=REFERENCE, label=label)
+        axes.plot(truth.x_cm, truth.y_cm, color=colour, label=_label(place, list(robots)))
+        axes.plot(truth.x_cm[0], truth.y_cm[0], "o", color=colour, markersize=5, markerfacecolor="white")
     axes.set_title("(a)  x-y, from the circle")
     axes.set_xlabel("x [cm]")
     axes.set_ylabel("y [cm]")
@@ -143,7 +134,7 @@ def _draw_path(axes: Axes, periods: Sequence[Period], places: Sequence[tuple[int
 
 def _draw_error(
     axes: Axes,
-    errors: dict[tuple[int, int], list[ErrorSample]],
+    errors: dict[Place, Errors],
     title: str,
     unit: str,
     band: float,
@@ -160,32 +151,14 @@ def _draw_error(
     axes.set_ylabel(f"{title.split('  ')[1]} [{unit}]")
 
 
-Line = tuple[list[float], list[float]]
-"""Times in s and values."""
-
-
-def _inner_values(periods: Sequence[Period]) -> dict[str, dict[tuple[int, int], Line]]:
-    """Name of an inner value -> robot -> its line; names in the order of the robots and of their laws."""
-    found: dict[str, dict[tuple[int, int], Line]] = {}
-    for period in periods:
-        for robot in period.robots:
-            for name, value in robot.control.inner.items() if robot.control is not None else ():
-                times, values = found.setdefault(name, {}).setdefault((robot.network, robot.slot), ([], []))
-                times.append(seconds(period.tick))
-                values.append(value)
-    return {name: found[name] for name in list(found)[:MOST_INNER]}
-
-
-def _draw_inner(
-    axes: Axes, name: str, lines: dict[tuple[int, int], Line], places: Sequence[tuple[int, int]]
-) -> None:
-    for place, (times, values) in lines.items():
-        axes.plot(times, values, color=COLOURS[places.index(place) % len(COLOURS)], linewidth=1.0)
+def _draw_inner(axes: Axes, name: str, lines: dict[Place, Line], places: Sequence[Place]) -> None:
+    for place, line in lines.items():
+        axes.plot(line.times_s, line.values, color=COLOURS[places.index(place) % len(COLOURS)], linewidth=1.0)
     axes.margins(x=0)
     axes.set_title(_plain(name))
     axes.tick_params(labelsize=7, labelbottom=False)  # time as in the panels above
     axes.locator_params(nbins=3)  # labels are most of the time that a panel takes to draw
 
 
-def _label(place: tuple[int, int], places: Sequence[tuple[int, int]]) -> str:
+def _label(place: Place, places: Sequence[Place]) -> str:
     return "robot" if len(places) == 1 else f"robot {place[0]}/{place[1]}"

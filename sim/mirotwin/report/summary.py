@@ -1,8 +1,7 @@
 """What a run amounts to, as numbers: `summary.json` and the table on the screen.
 
-What belongs here: the figures and their definitions. What does not: pictures (`figure`) and where files go
-(`files.outputs`). Errors are truth against the reference at the same tick, e = c - r in the paper's axes, heading
-wrapped to (-pi, pi].
+What belongs here: the figures and their definitions. What does not: what is kept of a run for them (`track`), pictures
+(`figure`) and where files go (`files.outputs`).
 """
 
 import math
@@ -12,31 +11,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
-from miro_sim.periods import Period, RobotPeriod
-from miro_sim.pitch import ground as pitch
-
-TWO_PI = 6.283185307179586
-SETTLED_CM = 3.0
-SETTLED_RAD = 0.15
-
-
-class ErrorSample(msgspec.Struct, frozen=True):
-    """Tracking error of a robot at one tick, and whether a corner of it is off the pitch."""
-
-    tick: int
-    x_cm: float
-    y_cm: float
-    theta_rad: float
-    off_pitch: bool = False
-
-    @property
-    def position_cm(self) -> float:
-        return math.sqrt(self.x_cm * self.x_cm + self.y_cm * self.y_cm)
-
-    @property
-    def settled(self) -> bool:
-        """Within 3 cm and 0.15 rad."""
-        return self.position_cm <= SETTLED_CM and abs(self.theta_rad) <= SETTLED_RAD
+from mirotwin.report.track import ErrorSample, Tracks
 
 
 class Tracking(msgspec.Struct, frozen=True):
@@ -112,35 +87,6 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     set: tuple[str, ...] = ()
 
 
-def wrapped(angle_rad: float) -> float:
-    """The angle in (-pi, pi]."""
-    angle = math.fmod(angle_rad, TWO_PI)
-    if angle > math.pi:
-        return angle - TWO_PI
-    return angle + TWO_PI if angle <= -math.pi else angle
-
-
-def error_of(robot: RobotPeriod, tick: int) -> ErrorSample:
-    """The tracking error in a robot's record."""
-    truth, at = robot.truth, robot.reference
-    return ErrorSample(
-        tick,
-        100.0 * (truth.x_m - at.x_m),
-        100.0 * (truth.y_m - at.y_m),
-        wrapped(truth.theta_rad - at.theta_rad),
-        not pitch.holds(msgspec.structs.replace(truth, theta_rad=wrapped(truth.theta_rad))),
-    )
-
-
-def errors_by_robot(periods: Sequence[Period]) -> dict[tuple[int, int], list[ErrorSample]]:
-    """(network, slot) -> errors in the order of time; robots in the order of the world."""
-    found: dict[tuple[int, int], list[ErrorSample]] = {}
-    for period in periods:
-        for robot in period.robots:
-            found.setdefault((robot.network, robot.slot), []).append(error_of(robot, period.tick))
-    return found
-
-
 def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
     """The figures of one robot; None throughout when there is no sample."""
     if not samples:
@@ -183,7 +129,7 @@ def summarise(
     scenario: str,
     seed: int,
     engine: str,
-    periods: Sequence[Period],
+    tracks: Tracks,
     simulated_ticks: int,
     wall_s: float,
     counters: Mapping[str, Mapping[str, Any]],
@@ -192,13 +138,13 @@ def summarise(
     settings: tuple[str, ...] = (),
 ) -> Summary:
     """The summary of a run; `counters` as `World.counters()` gives them."""
-    tracked = {place: tracking_of(samples) for place, samples in errors_by_robot(periods).items()}
+    tracked = {place: tracking_of(track.errors) for place, track in tracks.robots.items()}
     everyone = tuple(RobotTracking(network, slot, tracking) for (network, slot), tracking in tracked.items())
     return Summary(
         scenario=scenario,
         seed=seed,
         engine=engine,
-        digest=periods[-1].digest if periods else "",
+        digest=tracks.digest,
         simulated_s=seconds(simulated_ticks),
         wall_s=wall_s,
         realtime_factor=seconds(simulated_ticks) / wall_s if wall_s > 0.0 else 0.0,
