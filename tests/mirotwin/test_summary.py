@@ -2,6 +2,7 @@
 
 import json
 import math
+import tracemalloc
 from pathlib import Path
 
 import msgspec
@@ -214,3 +215,16 @@ def test_inner_values_are_kept_by_name_and_robot_in_the_order_of_the_laws() -> N
     line = tracks.inner["s2"][1, 2]
     assert list(line.values) == [-2.0, -2.0]
     assert list(line.times_s) == [800_800 / 24e6, 2 * 800_800 / 24e6]
+
+
+def test_a_control_period_leaves_less_than_250_bytes() -> None:
+    tracks = Tracks(periods(10))
+    tracemalloc.start()
+    try:
+        for period in periods(4000):
+            tracks.add(period)
+        del period
+        used, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert used < 250 * 4000
