@@ -5,7 +5,7 @@ sees (`undetected.py` measures those).
 
 HDR..CRC of one format are a linear code: a set of wrong bits passes exactly if it is a code word, whatever
 the frame says. There are 2^(n-16) of them, too many to list, but the dual code has only 2^16, and
-MacWilliams' identity turns its weights into theirs.
+MacWilliams' identity gives the weights of the code from those of its dual.
 """
 
 from __future__ import annotations

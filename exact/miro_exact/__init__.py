@@ -1,4 +1,4 @@
-"""The ground floor, what makes the bits the same: which engine runs, `dmath`, the integer clock, random numbers,
+"""What makes the bits the same on every machine: choice of engine, `dmath`, the integer clock, random numbers,
 tables of state and their flat bytes. Imports nothing of ours.
 """
 

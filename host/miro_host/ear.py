@@ -5,8 +5,8 @@ and what a law or an estimator makes of the findings.
 
 A frame carries the low 16 bits of each encoder count. The full count is taken as the one nearest to the count before; a
 robot boots at 0. This is right as long as a wheel turns by less than 32768 counts between two answers that arrive: for
-0.17 s at 1.46 m/s, for 1.2 s at 0.2 m/s. After a longer silence the counts may be off by a multiple of 65536 for good;
-`tick` shows how long it lasted.
+0.17 s at 1.46 m/s, for 1.2 s at 0.2 m/s. After a longer silence the counts may be off by a multiple of 65536;
+`tick` shows how long the silence lasted.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Reference trajectories q_r(t): where the robot ought to be, with every derivative the law asks for.
+"""Reference trajectories q_r(t): where the robot should be, with every derivative that a law needs.
 
 What belongs here: a straight line and a circular arc out of the origin, both with a speed ramp, in
 Cartesian and in polar form. What does not: choosing a path (the scenario does) and errors against it

@@ -68,7 +68,7 @@ class Station:
     def frame(self, commands: Sequence[tuple[int, int]]) -> bytes:
         """The next frame's bytes, preamble first. `commands` are (left, right) per slot, slot 0 first.
 
-        In a period whose frame is a service frame the commands are checked and dropped; robots keep theirs.
+        In a period whose frame is a service frame the commands are checked and dropped; robots keep their velocities.
         ValueError naming slot, value and limits when a command may not be sent; nothing is used up then.
         """
         kind = FrameType.TEAM_ASK if self.telemetry else FrameType.TEAM

@@ -3,9 +3,9 @@
 What belongs here: turning `table.py` into Lua tables and fields. What does not: the code that uses them
 (`dissector_code.py`).
 
-A packet is a run of characters without a pause, as `pcapng.py` writes them, so the spacing rule holds within
-it and ends with it; stop bits are not in a capture. Which way a packet went is RTAC's event type, and N is
-whatever makes the CRC good, because the layout byte tells 3 from 5. A packet may hold several frames.
+A packet is a run of characters without a pause, as `pcapng.py` writes them, so the spacing rule holds within it and
+ends with it; stop bits are not in a capture. Which way a packet went is RTAC's event type, and N is the number of
+robots with which the CRC is good, because the layout byte differs for 3 and 5. A packet may hold several frames.
 """
 
 from __future__ import annotations

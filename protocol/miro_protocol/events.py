@@ -50,7 +50,7 @@ class Received(msgspec.Struct, frozen=True, gc=False):
 
 @lru_cache(maxsize=16)
 def _message(body: bytes, n: int) -> Message:
-    """What a body says; several listeners ask for the same answer."""
+    """The message in a body; cached, because several listeners decode the same body."""
     return decode_fields(body, n)
 
 

@@ -1,4 +1,4 @@
-"""Writes a file whole or not at all: whoever looks finds the old content or the new."""
+"""Writes a file whole or not at all: a reader finds the old content or the new."""
 
 from __future__ import annotations
 

@@ -4,8 +4,8 @@ What belongs here: the message types, `encode`, `decode_fields`. What does not: 
 received bytes (`decoder.py`) and whether it is new (`freshness.py`). Every size, range and offset comes
 from `table.py`.
 
-Who is to blame is a type: a message that may not be sent is an `EncodeError` at the caller; bytes whose CRC is
-good but which no rightful sender would send are a `ContentError`.
+Two error types: `EncodeError` for a message that must not be sent; `ContentError` for bytes whose CRC is good but
+whose content no correct sender makes.
 
 Long because every message type stands here with its own ranges, and encoding stands beside decoding.
 """

@@ -1,8 +1,8 @@
-"""Is a valid frame news? Sits above the decoder: it sees sequence numbers and ticks, never bytes.
+"""Is a valid frame fresh? Works on the sequence numbers and ticks of valid frames, never on bytes.
 
 The rule (README.md, "Freshness"): a frame is fresh if its number is 1 to 8 steps (mod 64) past the last
 fresh one. 150 ms or more after that one, any other number is fresh; before the first frame, any at all.
-Repeating one frame for ever is never fresh again, so a stuck host does not re-arm a robot whose failsafe
+A frame that is repeated is not fresh again, so a stuck host does not re-arm a robot whose failsafe
 has stopped it.
 """
 

@@ -5,7 +5,7 @@ What belongs here: 8N1 and nothing else. What does not: what the characters mean
 
 The receiver is a plain one: it waits for a fall, takes each bit in its middle, and looks for the next fall 10/16 of a
 bit after the beginning of the stop bit, as an 8051 does. Where levels hold for whole bits the two agree character by
-character; a level that changes near the middle of a bit is anybody's guess.
+character; for a level that changes near the middle of a bit they may differ.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Hypothesis strategies for frames and for what a receiver hears, drawn from the same table as the codec.
 
-Needs the extra `strategies` (`pip install mirotwin[strategies]`). What belongs here: inputs that anybody
-testing a sender or a receiver of this wire wants. What does not: assertions, the radio and the robot
+Needs the extra `strategies` (`pip install mirotwin[strategies]`). What belongs here: inputs for tests
+of any sender or receiver of this wire. What does not: assertions, the radio and the robot
 (`mirotwin.testing`).
 
 * `host_frames`, `telemetry_frames`: messages

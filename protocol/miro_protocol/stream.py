@@ -162,5 +162,5 @@ def format_stream(lines: Iterable[Entry | Happening], header: Header | None = No
 def write(
     path: str | os.PathLike[str], lines: Iterable[Entry | Happening], header: Header | None = None
 ) -> None:
-    """Writes a stream file whole or not at all: whoever looks finds the old content or the new."""
+    """Writes a stream file whole or not at all: a reader finds the old content or the new."""
     files.replace(path, format_stream(lines, header).encode())

@@ -1,4 +1,4 @@
-"""Characters that follow each other without a pause: the one word for them, from the host's station to a capture file.
+"""Characters without a pause between them: the one record for them, from the host's station to a capture file.
 
 What belongs here: the record, what makes characters one transmission, and how long a character takes. What does not:
 files of transmissions (`stream.py`, `pcapng.py`), and what the characters say (`decoder.py`).

@@ -1,6 +1,6 @@
 """The whitening string: what HDR..CRC are XORed with on the air. Knows nothing about frames.
 
-A data slicer is AC-coupled and wants about as many marks as spaces in any 4 ms. Stopped robots mean zero
+A data slicer is AC-coupled and needs about as many marks as spaces in any 4 ms. Stopped robots mean zero
 bytes; raw, 63 % of their 4 ms windows lie outside 30..70 % marks, whitened 0.01 % (README.md, "Why"). XOR
 with a fixed string is linear, so the CRC's Hamming distance is untouched.
 """

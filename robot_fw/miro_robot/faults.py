@@ -1,7 +1,7 @@
 """What firmware must not do: the kinds of fault, and the record of one.
 
-What belongs here: naming them. Finding them is the job of the chip that sees them (CPU, LM629, board);
-whether one stops the run is the scenario's.
+What belongs here: naming them. They are found by CPU, LM629 and board; the
+scenario says whether a fault stops the run.
 """
 
 from __future__ import annotations

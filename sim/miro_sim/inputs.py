@@ -1,4 +1,4 @@
-"""Reading what a user names: whole, but never a device or more than any honest file holds.
+"""Reads an input file whole; refuses devices, and files larger than any valid one.
 
 What belongs here: the checks before and while a file is read. What does not: what is in it.
 """

@@ -6,7 +6,7 @@
     world = mirotwin.World(mirotwin.load_scenario("fig6").scenario, seed=7, image=image)
     answer = world.run_until(mirotwin.conditions.Answer(), within=mirotwin.ticks(0.2))
 
-The names below are loaded when they are asked for: importing this package costs next to nothing, and the program
+The names below are loaded on first use: importing this package takes almost no time, and the program
 (`entry`) starts at once.
 """
 

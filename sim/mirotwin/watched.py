@@ -1,7 +1,7 @@
-"""A run that somebody looks into: one CPU, on a robot of a world or on the bare board, moved on in pieces.
+"""A run with watchers: one CPU, on a robot of a world or on the bare board, run in slices.
 
-What belongs here: what the two kinds of run have in common for those who watch (`miro_robot.inspect`). What does not:
-what is watched for, and which words of the command line ask for which run (`cli.subject`).
+What belongs here: what the two kinds of run have in common for watchers (`miro_robot.inspect`). What does not: the
+watchers, and which run the command line means (`cli.subject`).
 """
 
 from __future__ import annotations
@@ -106,9 +106,9 @@ def watch(
     end_tick: int | None = None,
     progress: Callable[[int], object] = lambda tick: None,
 ) -> bool:
-    """Runs to `end_tick` (None: to the end) and lets `watchers` look on from `first_tick` on.
+    """Runs to `end_tick` (None: to the end) with `watchers` attached from `first_tick` on.
 
-    Returns whether the run got to `first_tick` at all. Nobody looks at what comes before: it runs at full speed.
+    Returns whether the run reached `first_tick`. Up to there no watcher is attached, so it runs at full speed.
     """
     _move(run, first_tick, progress)
     if run.over:
@@ -122,7 +122,7 @@ def watch(
 
 
 def _move(run: Run, end_tick: int | None, progress: Callable[[int], object]) -> None:
-    """In pieces, so that somebody can be told."""
+    """Runs in slices, so that progress can be reported between them."""
     now = run.cpu.cycles * CYCLE_TICKS
     while not run.over and (end_tick is None or now < end_tick):
         next_tick = (now // PIECE_TICKS + 1) * PIECE_TICKS

@@ -45,7 +45,7 @@ class Gains(LawParameters, frozen=True, tag="yang_kim"):
 
     Guards: rho_c is taken as at least `rho_floor_m` where it is a denominator; 1/c, c = cos(phi_c - theta_c),
     becomes c (1 + d^2) / (c^2 + d^2) with d = `cosine_guard`: smooth, keeps the sign, 1 at c = 1, 0 at the
-    singularity of assumption 3. d = 0 leaves 1/c as it is; a scenario cannot ask for that.
+    singularity of assumption 3. d = 0 leaves 1/c as it is; a scenario cannot set that.
     ValueError for a parameter outside its range.
     """
 

@@ -1,12 +1,12 @@
 """What comes in on RXD of the bare machine: bytes from a file or a keyboard, as a person at a terminal would send them.
 
-What belongs here: when the next character is sent, and its edges. What does not: which options ask for what
-(`mirotwin.cli`), and other pins (`bare_pins.py`).
+What belongs here: when the next character is sent, and its edges. What does not: the options of the command
+line (`mirotwin.cli`), and other pins (`pins.py`).
 
 The order of things: a piece of input begins when its condition is met (a text seen on the program's output, a time).
 Each character then waits until the one before is over, the gap has passed and the program listens: its receiver is on
 with RI down, or it polls P3 as a program does that measures the first character. The first character of a piece that
-has a condition does not wait for polls: whoever gave the condition knows that the program listens.
+has a condition does not wait for polls: the condition says that the program listens.
 """
 
 from __future__ import annotations

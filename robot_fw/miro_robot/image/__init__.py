@@ -1,4 +1,4 @@
-"""A firmware image and what the tool chain said about it: Intel HEX, symbols, C lines."""
+"""A firmware image with its debug files: Intel HEX, symbols, C lines."""
 
 from miro_robot.image.hex import FLASH_BYTES, SPACE_BYTES, Image, ImageError, load_hex, parse_hex
 from miro_robot.image.symbol_files import Symbol

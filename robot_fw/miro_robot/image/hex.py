@@ -1,7 +1,7 @@
 """The firmware image: an Intel HEX file.
 
-What belongs here: reading one, with errors a firmware author can act on, and finding the files of names beside it. What
-does not: what is in these (`symbol_files`), and whether the image runs, which is the CPU's matter.
+What belongs here: reading one, with errors that say what to do, and finding the files of names beside it. What
+does not: what is in these (`symbol_files`), and whether the image runs (`mcs51/`).
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 What belongs here: names to addresses and back. What does not: reading the files (`symbol_files`), whether they belong
 to the image (`evidence`), and C lines and functions (`debug_info`).
 
-The files are read when the first name is asked for. Most programs that load an image ask for none.
+The files are read with the first look-up of a name. Most programs that load an image look up none.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Addresses as the firmware's author calls them: symbols of the image, registers of the chip, numbers for the rest.
+"""Addresses by name: symbols of the image, registers of the chip, numbers for the rest.
 
 What belongs here: writing operands and places with names. What does not: reading symbols (`miro_robot.image`).
 """
@@ -17,7 +17,7 @@ _VECTORS = (0, *(8 * number + 3 for number in range(len(INTERRUPTS))))
 
 
 class SymbolNames(Names):
-    """Names of one image. Code places that are no symbol's are written as symbol+offset where `offsets` asks for it."""
+    """Names of one image. Places between code symbols are written as symbol+offset if `offsets` is true."""
 
     def __init__(self, image: Image) -> None:
         symbols = image.symbols.names

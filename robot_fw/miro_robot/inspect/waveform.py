@@ -35,7 +35,7 @@ class Waveform:
     """Writes the wires of `cpu`, and of the `board` around it, to `out` while both run.
 
     Between `attach` and `close`; or give its `tap` to the CPU's inspector yourself. The file covers the ticks from
-    `first_tick` (but not from where nobody looked yet) to `end_tick`, or as far as all levels are known. `tick_hz` is
+    `first_tick`, or from `attach` if that is later, to `end_tick`, or as far as all levels are known. `tick_hz` is
     the crystal of a CPU without a board.
     """
 

@@ -1,7 +1,7 @@
 """What the documents leave open, one named field per rule: the default is this twin's choice.
 
 If a measured chip behaves in the other way, set the other reading in a scenario's
-`[lm629]` table or as `Lm629Options(...)`. What each rule is about stands in README.md in this folder.
+`[lm629]` table or as `Lm629Options(...)`. README.md in this folder explains each rule.
 """
 
 from __future__ import annotations

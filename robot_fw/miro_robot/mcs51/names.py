@@ -1,7 +1,7 @@
 """Names of the AT89C52's registers, of their bits, and how an operand is written.
 
-What belongs here: the tables, and `Names`, which writes operands as numbers. Who knows the symbols of an image writes
-them with those (`miro_robot.inspect.symbol_names`). Source: Atmel AT89C52 data sheet, SFR map; 8051 Hardware Manual,
+What belongs here: the tables, and `Names`, which writes operands as numbers. With the symbols of an image,
+`miro_robot.inspect.symbol_names` writes them. Source: Atmel AT89C52 data sheet, SFR map; 8051 Hardware Manual,
 2.1.
 """
 

@@ -1,7 +1,7 @@
-"""The band down: one transmitter, and every robot of the network listening with a receiver of its own.
+"""The band down: one transmitter, and one receiver per robot of the network.
 
-What belongs here: what is announced when, and up to where the robots' wires are final. What is on the air
-is the business of `sender`, what a robot makes of it that of `listener`.
+What belongs here: announced transmissions, and the tick up to which the robots' wires are final. What is on the air is
+in `sender`, what a robot receives of it in `listener`.
 
 A transmission handed over for tick s arrives at s + latency + jitter, or when the one before it is over.
 The jitter is drawn from `NAME/jitter` at index s // 2500: 0 .. jitter_ticks, all alike.
@@ -33,8 +33,8 @@ class Downlink:
 
     `settled_tick`: every listener's line is final below it. `free_tick`: the transmitter is busy until then.
     `busy_tick`: at the listeners the last transmission is over by then; part of the state only if there is
-    jitter or an offset, because else it follows from `free_tick`. The lines' content is not part of the
-    snapshot; it belongs to whoever owns them.
+    jitter or an offset, because else it follows from `free_tick`. The lines' content is not part of
+    this state: it belongs to the parts that own the lines.
     """
 
     STATE = {
@@ -72,7 +72,7 @@ class Downlink:
             raise ValueError(f"{self.name}: robot {robot} is connected twice, or after tick 0")
         listener = Listener(line, self.params, self.seed, f"{self.name}/robot{robot}")
         self.listeners[robot] = listener
-        line.settled_tick = 0  # an open wire is mark for ever
+        line.settled_tick = 0  # an open wire stays at mark
         return listener
 
     def overhear(self, other: Downlink) -> None:

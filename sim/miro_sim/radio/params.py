@@ -1,4 +1,4 @@
-"""What a radio band is like, in the units that the models count in: ticks and 2^-32.
+"""The parameters of a radio band, in the units of the models: ticks and 2^-32.
 
 What belongs here: the parameters, their ranges and their conversion from the units that people write. What
 does not: the keys of a scenario (`miro_sim.scenario.radio_keys`) and what a parameter does (the part it is for).
@@ -183,7 +183,7 @@ class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @classmethod
     def ideal(cls) -> RadioParams:
-        """A wire: no latency, no errors, mark when nobody sends."""
+        """An ideal link: no latency, no errors, mark level while idle."""
         return cls(keyup_ticks=0, squelch=True)
 
 

@@ -1,7 +1,7 @@
 """From the keys of a scenario to the objects that they describe.
 
-What belongs here: unit changes and names, nothing else: what a key means stands in `keys.py`, what an object
-does in its own module.
+What belongs here: conversion of units and names. What does not: the meaning of a key (`keys.py`), and what an object
+does (its own module).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What is wrong with a scenario, in one line: file, key path, what, and what to write instead.
 
-What belongs here: the words. msgspec finds the faults and says where; this file turns that into the file's
-own terms. What does not: reading files (`file`) and the rules themselves (`keys`).
+What belongs here: the messages. msgspec finds the mistakes and their places; this file turns them into the
+scenario's terms. What does not: reading files (`file`) and the rules themselves (`keys`).
 """
 
 import re

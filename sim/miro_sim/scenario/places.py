@@ -1,7 +1,7 @@
-"""Whether the robots of a scenario start on the pitch and are told to drive on it only.
+"""Checks that the robots of a scenario start on the pitch and that their references stay on it.
 
-What belongs here: the check and its words. What does not: the geometry (`pitch`), all other rules (`keys`). What a
-robot does during a run is its own matter: `summary` counts the time that it spends off the pitch.
+What belongs here: the check and its messages. What does not: the geometry (`pitch`), all other rules (`keys`). The
+time that a robot spends off the pitch during a run is counted by `summary`.
 
 Checked are the square of the robot at its start, and the same square at the reference, along the whole of its path: a
 robot that follows the reference without error has it there. Of a reference from another distribution, whose path is not

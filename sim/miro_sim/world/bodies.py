@@ -1,4 +1,4 @@
-"""The robots of a world as bodies on one pitch: when they have to be looked at together, and who touches whom.
+"""The robots of a world as bodies on one pitch: when pairs have to be checked for contact, and which robots touch.
 
 What belongs here: pairs, and the reports. What does not: the geometry (`pitch/contact.py`). A report changes nothing.
 """

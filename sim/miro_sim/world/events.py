@@ -1,6 +1,6 @@
-"""What happened in a world, for those who wait: one record an event, from the logs of the boards and of the PC.
+"""What happened in a world: one record per event, from the logs of the boards and of the PC.
 
-What belongs here: the record, the PC's log, and reading the boards' logs. What does not: what somebody waits for
+What belongs here: the record, the PC's log, and reading the boards' logs. What does not: the conditions of a wait
 (`conditions.py`) and the waiting (`waits.py`).
 
     what        at the tick at which                                          fields

@@ -239,7 +239,7 @@ class Network:
     def check_times(self, begun_tick: int, tick: int) -> None:
         """Raises ValueError unless the restored parts are at `tick`, in the period that began at `begun_tick`.
 
-        A part that is far behind would take for ever to catch up.
+        A part that is far behind would need hours to catch up.
         """
         settled_tick = self.downlink.settled_tick
         if settled_tick != tick + SETTLE_TICKS and settled_tick + tick != 0:

@@ -1,6 +1,6 @@
 """What has to be watched for the conditions of one wait: marked addresses, pins, predicates.
 
-What belongs here: turning conditions into what robots look out for, and taking it away again. What does not: moving the
+What belongs here: setting up in robots what the conditions need, and removing it again. What does not: moving the
 world and the order of events (`waits.py`).
 """
 

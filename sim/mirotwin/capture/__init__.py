@@ -1,4 +1,4 @@
-"""Characters of a radio network from whatever file holds them, and what decoders make of them.
+"""Characters of a radio network from files of several formats, decoded.
 
 What belongs here: telling formats apart (`detect`), reading them as transmissions (`hextext`, `recorded`, `source`),
 finding out how many robots a network has (`layout`), and decoding transmissions to rows (`rows`) for people and

@@ -50,7 +50,7 @@ class Input:
         return status.st_size if stat.S_ISREG(status.st_mode) else None
 
     def _readable(self, status: os.stat_result) -> bool:
-        """Whether a character device ends some time: the null device, or a terminal that somebody types at."""
+        """Whether a character device has an end: the null device, or a terminal with a keyboard."""
         terminal = self.path == STDIN and self._file.isatty()
         return terminal or os.path.samestat(status, os.stat(os.devnull))
 

@@ -29,7 +29,7 @@ def transmissions(
     """Transmissions in the order of time; `robots` is filled with the layout (3 or 5) of each network before the first.
 
     RecordingError, after all that could be read, for what is no recording of this program, and for a part of a copy.
-    `tell` is told of a recording whose run was broken off, after all its transmissions.
+    `tell` is called with a message for a recording whose run was broken off, after all its transmissions.
     """
     messages = Messages(source, source.label, (channels.WireMessage, channels.PeriodMessage))
     order = _Order()

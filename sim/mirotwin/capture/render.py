@@ -1,6 +1,6 @@
 """Rows as lines of a table and as JSON objects, one a line.
 
-What belongs here: words, columns and units. What does not: decoding (`rows`).
+What belongs here: labels, columns and units. What does not: decoding (`rows`).
 
 The JSON form, for programs:
 

@@ -1,7 +1,7 @@
 """Options of an image on the bare processor: `fw run` and the other `fw` commands have them in common.
 
-What belongs here: the options, the machine that they ask for, and the words for how its run ended. What does not: what
-the machine does with them (`miro_robot.bare`), the live terminal (`cli.terminal`), and looking on (`cli.subject`).
+What belongs here: the options, the machine that they configure, and the messages about the end of its run. What does
+not: the machine (`miro_robot.bare`), the live terminal (`cli.terminal`), and trace windows (`cli.subject`).
 """
 
 from __future__ import annotations

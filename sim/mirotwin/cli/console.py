@@ -1,6 +1,6 @@
-"""What a command shows as its result: tables and text, on a terminal or in a pipe.
+"""The output of a command: tables and text, on a terminal or in a pipe.
 
-What belongs here: the console, and what it does to the text of others. What does not: single lines and errors
+What belongs here: the console, and how it cleans text from files. What does not: single lines and errors
 (`program`), which need not wait for `rich` to be loaded.
 """
 

@@ -1,4 +1,4 @@
-"""`mirotwin decode`: what the bytes in a file say, frame by frame, and where they are damaged."""
+"""`mirotwin decode`: the frames in the bytes of a file, and the damage between them."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def decode(
 
 
 def _counted(sent: Iterable[Transmission], given: Input, bar: ProgressBar) -> Iterator[Transmission]:
-    """Moves the bar; where somebody waits for the other end of a pipe, lets them see what there is."""
+    """Moves the progress bar; for input without a size (a pipe), flushes the lines printed so far."""
     shown = 0
     for one in sent:
         yield one

@@ -1,4 +1,4 @@
-"""`mirotwin fw profile`: where the processor's time goes."""
+"""`mirotwin fw profile`: where the processor spends its time."""
 
 from __future__ import annotations
 

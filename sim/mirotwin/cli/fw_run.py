@@ -42,7 +42,7 @@ def run(image: str, terminal: bool, dump: str | None, engine: str | None, **opti
     3 firmware fault, 42 --max-cycles was reached. Ctrl-C (130) leaves on stdout what was sent until then, and
     writes no dump.
 
-    A program that asks for input is driven by pairs of --stdin-when and --stdin, one after the other:
+    A program with prompts is driven by pairs of --stdin-when and --stdin, in order:
 
     \b
     mirotwin fw run monitor.ihx --baud 9600 --stdin space.bin \\

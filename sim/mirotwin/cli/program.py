@@ -1,6 +1,6 @@
-"""How the command line fails: one line on stderr and an exit code, never a traceback for what a user can
-mend. An error that nobody has foreseen is one line too, which asks for a report; with MIROTWIN_TRACEBACK=1 in the
-environment its traceback goes before it.
+"""How the command line fails: one line on stderr and an exit code, never a traceback for bad input. An unexpected
+error is one line too, which requests a report; with MIROTWIN_TRACEBACK=1 in the environment the traceback
+comes before it.
 
 What belongs here: exit codes, the translation of errors, single lines on stdout and stderr. What does not: any command,
 tables (`console`), and imports that `mirotwin --help` does not need.
@@ -56,7 +56,7 @@ class Terminated(BaseException):
 
 
 class ReaderGone(Exception):
-    """Nobody reads our output any more (`| head`)."""
+    """The reader of our output has closed it (`| head`)."""
 
 
 def complain(message: str) -> None:
@@ -70,7 +70,7 @@ def show_line(text: str) -> None:
 
 
 def _report(error: Exception) -> None:
-    """One line that asks for a report, after the traceback if that is wanted."""
+    """One line that requests a report, after the traceback if MIROTWIN_TRACEBACK is set."""
     if os.environ.get("MIROTWIN_TRACEBACK"):
         click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     text = f"{type(error).__name__}: {error}".rstrip(": ")

@@ -1,4 +1,4 @@
-"""A progress bar for what takes more than a second, on stderr, and only where somebody looks at it.
+"""A progress bar on stderr for work of more than a second, shown only on a terminal.
 
 What belongs here: when to show it. What does not: what is counted. This is one of the few places that know
 the wall clock.

@@ -24,7 +24,7 @@ FILES = (RECORDING, "figure.png", "summary.json")
 KEPT = (RECORDING, "summary.json")
 """Of these, a run that is broken off leaves the parts."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""What a disk says that takes no more: only writing can meet it, and the error names no file."""
+"""errno values of a full disk. They occur on write only, and the OSError then names no file."""
 
 
 class OutputError(BadInput):

@@ -2,7 +2,7 @@
 
 What belongs here: the container: header, attachments, metadata, chunks with their indexes, summary, footer (MCAP
 specification, "Records"). What does not: what messages say (`recorder`), reading (`container`), and the clock:
-whoever writes says when to flush.
+the caller decides when to flush.
 
 A finished file is the bytes that `mcap.writer.Writer` gives without compression and with all checksums. That one keeps
 a chunk in memory until it has 1 MiB, minutes of a run, and a process that is killed loses it. Here `flush` brings the
@@ -61,7 +61,7 @@ class Writable(Protocol):
 
 
 class McapWriter:
-    """A file under way. `stream` is empty and seekable; whoever opened it closes it.
+    """A file under way. `stream` is empty and seekable; the caller closes it.
 
     Attachments and metadata come before the first message, or end the chunk that is open. After an OSError (a full
     disk) nothing more is written: what there is can be read.
