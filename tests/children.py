@@ -1,4 +1,4 @@
-"""Programs that tests start: each begins with the default action of every signal, whoever started the tests.
+"""Programs that tests start: each begins with the default action of every signal, whichever program started the tests.
 
 What belongs here: the ways in which a test starts another process. What does not: which program, and what it says.
 

@@ -38,7 +38,7 @@ def test_every_frame_decodes_to_what_was_commanded(n, telemetry, data):
 
 
 @pytest.mark.parametrize("n", [3, 5])
-def test_sequence_numbers_count_through_all_types_and_everybody_is_asked(n):
+def test_sequence_numbers_count_through_all_types_and_all_robots_are_asked(n):
     station = Station(n)
     station.request(0, Opcode.PING)
     messages = decoded(station, [station.frame([REST] * n) for _ in range(130)])

@@ -189,7 +189,7 @@ def test_a_file_that_is_no_recording_is_named_with_its_place(tmp_path: Path) -> 
         read(path)
 
 
-def test_somebody_elses_mcap_file_is_not_taken_for_a_recording() -> None:
+def test_an_mcap_file_of_another_program_is_not_read_as_a_recording() -> None:
     stream = io.BytesIO()
     writer = Writer(stream)
     writer.start()

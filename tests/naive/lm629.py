@@ -69,7 +69,7 @@ class NaiveLm629:
         self.drop_counts()
 
     def drop_counts(self) -> None:
-        """In a reset; whoever waits for an index may go on waiting (R6), but what was caught is lost."""
+        """In a reset; a wait for an index may go on (R6), but what was caught is lost."""
         armed = self.encoder.armed
         self.encoder.drop()
         if not self.options.reset_clears_index:

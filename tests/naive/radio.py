@@ -20,7 +20,7 @@ Sent = list[tuple[int, bytes] | tuple[int, bytes, tuple[int, ...]]]
 """(tick of the first start bit at the transmitter, bytes, indices of those with a bad stop bit, if any)."""
 Edges = list[tuple[int, int]]  # (tick, level)
 Symbol = tuple[int, bool, int]
-NOBODY: list[tuple[RadioParams, str, Sent]] = []
+NO_OTHERS: list[tuple[RadioParams, str, Sent]] = []
 
 
 def wire_bits(data: bytes) -> list[int]:
@@ -126,7 +126,7 @@ def downlink_edges(
     name: str,
     robot: str,
     sent: Sent,
-    others: list[tuple[RadioParams, str, Sent]] = NOBODY,
+    others: list[tuple[RadioParams, str, Sent]] = NO_OTHERS,
 ) -> Edges:
     """Every change of the level on a robot's RXD wire before `until`, the wire being at mark before tick 0."""
     senders = [Sender(params, params, seed, name, sent)]

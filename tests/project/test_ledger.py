@@ -68,7 +68,7 @@ def test_the_ledger_speaks_of_every_group_of_rules():
 
 
 def test_every_rule_letter_in_the_code_is_on_the_page_of_its_chip():
-    """Comments name rules as (C1) or X2; a letter that stands on no page helps nobody."""
+    """Comments name rules as (C1) or X2; a letter that no page explains helps no reader."""
     known = set(RULE.findall((CHIP / "README.md").read_text()))
     for path in sorted(CHIP.glob("*.py")):
         for rule in re.findall(r"\(([CTUIPX][0-9])[):,]", path.read_text()):

@@ -37,11 +37,11 @@ def recording(wires: list[tuple[Transmission, ...]], text: str = TEXT) -> bytes:
     return stream.getvalue()
 
 
-def somebody_elses() -> bytes:
+def foreign_mcap() -> bytes:
     stream = BytesIO()
     writer = Writer(stream)
     writer.start()
-    writer.add_metadata("somebody", {"format": "1"})
+    writer.add_metadata("foreign", {"format": "1"})
     writer.finish()  # type: ignore[no-untyped-call]
     return stream.getvalue()
 
@@ -170,7 +170,7 @@ def test_one_wrong_bit_anywhere_is_reported_after_what_could_be_read(at: int, bi
         (lambda data: data[:5], "offset 0: the file ends in the middle of a record; it was cut short"),
         (lambda data: data + b"x", "something follows the end"),
         (lambda data: data.replace(b'"direction":">"', b'"direction":"!"'), "damaged record"),
-        (lambda data: somebody_elses(), "not a recording of this program"),
+        (lambda data: foreign_mcap(), "not a recording of this program"),
     ],
 )
 def test_what_is_no_whole_recording_is_named_with_its_place(tmp_path: Path, change, message: str) -> None:  # type: ignore[no-untyped-def]

@@ -407,7 +407,7 @@ def test_a_reader_that_goes_away_ends_it_as_a_shell_reports_that(short: Path) ->
     assert done.stderr == ""
 
 
-def test_input_that_nobody_can_take_any_more_does_not_keep_a_dead_program_alive(
+def test_input_that_cannot_be_received_does_not_keep_an_ended_program_running(
     mirotwin: Callable[..., Result], tmp_path: Path
 ) -> None:
     """Receives one character by timer 1, never clears RI, and sleeps with interrupts off."""

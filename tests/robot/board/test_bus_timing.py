@@ -71,7 +71,7 @@ def test_chip_select_makes_a_strobe_as_well_as_rd_and_wr():
     assert broken_by((0, (1, 1, 0, 0, 2)), (20, WRITING), (23, (1, 1, 0, 0, 2))) == ["/WR pulse"]
     assert (
         broken_by((0, (1, 1, 0, 0, 2)), (9, (1, 1, 1, 1, 7)), (10, (1, 0, 1, 0, 5))) == []
-    )  # nobody is selected
+    )  # no chip is selected
 
 
 def test_a_reading_has_to_wait_for_the_access_time():

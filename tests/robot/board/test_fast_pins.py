@@ -19,7 +19,7 @@ def listened(program):
     return board
 
 
-def test_a_board_that_nobody_listens_to_goes_on():
+def test_a_board_without_a_listener_goes_on():
     board = board_with(TOGGLE, stop_on_fault=False)
     assert board.run(2_400_000) == REACHED
     assert board.fault_count > 1000

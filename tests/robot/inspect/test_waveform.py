@@ -185,7 +185,7 @@ def test_a_cpu_with_two_priorities_and_sleep_is_as_a_look_on_every_tick_finds_it
     assert both, "no routine was interrupted"
 
 
-def test_a_routine_that_nobody_saw_begin_is_unknown_until_none_is_in_service():
+def test_a_routine_that_began_before_the_recording_is_unknown_until_none_is_in_service():
     cpu = Cpu(Bus())
     cpu.load(assemble(TWO_PRIORITIES))
     while cpu.pc != 0x1B:

@@ -117,7 +117,7 @@ def test_what_waits_is_what_came_since_the_tick_last_heard(gaps, count, heard):
         assert line.full_tick() == (waiting[2047] if len(waiting) >= 2048 else NEVER_TICK)
 
 
-def test_a_line_that_nobody_reads_drops_its_oldest_edges():
+def test_a_line_without_a_reader_drops_its_oldest_edges():
     line = Line()
     line.unread = True
     for tick in range(10_000):

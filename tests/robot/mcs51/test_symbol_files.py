@@ -163,7 +163,7 @@ def test_absolute_empty_banked_and_data_symbols_prove_nothing(page, refused):
     assert (found is not None) == refused
 
 
-def test_files_of_somebody_elses_linker_prove_nothing():
+def test_files_of_another_linker_prove_nothing():
     for text in ("", "LINK MAP OF MODULE: demo (DEMO)\n  C:0003H  SYMBOL  TIMER\n"):
         assert check_map(parse_map(text), IMAGE.code, LOADED) is None
         assert check_cdb(parse_cdb(text), IMAGE.code, LOADED) is None

@@ -109,7 +109,7 @@ class Walker:
         opcode = cpu.code_at(pc)
         begin = cpu.cycles
         p0 = cpu.sfr(P0)
-        cpu.txd.forget(cpu.txd.settled_tick)  # nobody listens
+        cpu.txd.forget(cpu.txd.settled_tick)  # no listener
         cpu.step()
         iram = bytes([cpu.peek_iram(address) for address in range(256)])
         registers = bytes([cpu.sfr(address) for address in COMPARED])

@@ -221,7 +221,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("extra", OTHERS.values(), ids=OTHERS)
-def test_a_disturbance_that_does_not_strike_shifts_nobody_elses_draws(extra):
+def test_a_disturbance_that_does_not_strike_leaves_all_other_draws_as_they_are(extra):
     plain = {"error_threshold": 2**32 // 50, "carrier": "on", "keyup_ticks": 24_000}
     quiet = {**plain, **extra}
     if "burst_threshold" in extra:  # without an error of its own a burst only takes errors away

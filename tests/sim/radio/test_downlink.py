@@ -189,7 +189,7 @@ def test_a_robot_joins_once_and_before_the_start():
         downlink.listen(1, Line())
 
 
-def test_a_wire_that_was_open_is_settled_by_nobody_but_the_downlink():
+def test_a_wire_that_was_open_is_settled_by_the_downlink_only():
     line = Line()
     line.settled_tick = NEVER_TICK
     Downlink(RadioParams(), 0, "net").listen(0, line)

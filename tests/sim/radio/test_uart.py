@@ -45,7 +45,7 @@ def test_a_wrong_start_bit_slips_to_the_next_fall_and_the_characters_come_out_of
 
 
 def test_a_false_start_bit_on_an_idle_carrier_is_a_character_and_can_swallow_a_real_start():
-    """A space of one bit time: the UART takes it for a start bit and reads FFh out of the idle line behind."""
+    """A space of one bit time: the UART reads it as a start bit, and FFh out of the idle line behind."""
     always_idle = RadioParams(carrier="on", false_start_threshold=2**32 // 12)
     heard = pairs(hears(receiver(), always_idle, 3, [], 30 * 25_000))
     assert len(heard) > 5
