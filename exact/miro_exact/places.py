@@ -4,8 +4,7 @@ What belongs here: reading a `.pxd` and writing the text. What does not: which o
 Loaded from its file by setup.py, before anything is installed, so it imports nothing of ours.
 
 For every `cdef class` there is a function `_places_CLASS(part)`. It gives name -> (address, C type, size in bytes) of
-all fields that are plain C data. Fields that are Python objects are not in it;
-fields of a base class are in the table of that class.
+all fields that are plain C data. Fields that are Python objects are not in it; fields of base classes are in theirs.
 """
 
 from __future__ import annotations

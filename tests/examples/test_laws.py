@@ -185,7 +185,7 @@ class Broken(Law[Parameters]):
         ),
         (
             "nan",
-            "net0/robot0: tick 2402400 (0.100100 s): law 'broken' failed: it answered v_m_s = nan, which is",
+            "net0/robot0: tick 2402400 (0.100100 s): law 'broken' failed: `step` returned v_m_s = nan, which is",
         ),
     ],
 )

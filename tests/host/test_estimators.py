@@ -108,8 +108,11 @@ class Answering(Estimator[Odd]):
 @pytest.mark.parametrize(
     ("answer", "reason"),
     [
-        (Estimate(0.0, Posture(math.nan, 0.0, 0.0)), "it answered x_m = nan, which is not a finite float"),
-        (Estimate(math.inf, HERE), "it answered t_s = inf, which is not a finite float"),
+        (
+            Estimate(0.0, Posture(math.nan, 0.0, 0.0)),
+            "`step` returned x_m = nan, which is not a finite float",
+        ),
+        (Estimate(math.inf, HERE), "`step` returned t_s = inf, which is not a finite float"),
         (HERE, "which is no Estimate of a Posture"),
     ],
 )

@@ -103,12 +103,12 @@ def test_a_law_without_memory_adds_nothing_to_the_state():
 @pytest.mark.parametrize(
     ("how", "reason"),
     [
-        ("nan", "it answered v_m_s = nan, which is not a finite float"),
-        ("infinite", "it answered w_dot_rad_s2 = -inf, which is not a finite float"),
-        ("inner nan", "it answered a = nan, which is not a finite float"),
-        ("inner names", r"its inner values are \['b'\], INNER says \['a'\]"),
-        ("int", "it answered v_m_s = 1, which is not a finite float"),
-        ("nothing", "it answered 'None', neither Accelerations nor Velocities"),
+        ("nan", "`step` returned v_m_s = nan, which is not a finite float"),
+        ("infinite", "`step` returned w_dot_rad_s2 = -inf, which is not a finite float"),
+        ("inner nan", "`step` returned a = nan, which is not a finite float"),
+        ("inner names", r"its inner values are \['b'\], but INNER declares \['a'\]"),
+        ("int", "`step` returned v_m_s = 1, which is not a finite float"),
+        ("nothing", "`step` returned 'None', neither Accelerations nor Velocities"),
         ("raises", "ZeroDivisionError: division by zero"),
         ("memory nan", "attribute 'memory' is nan, not a finite float"),
         ("memory type", "attribute 'memory' is text, not a finite float"),
@@ -150,7 +150,7 @@ def test_a_saved_command_that_no_pilot_gave_is_refused(command, reason):
 
 def test_numbers_far_from_any_robots_are_not_called_a_mistake_of_the_law():
     one = pilot(Gains().law())
-    with pytest.raises(PartError, match=r"law 'yang_kim' failed: angle .*; parameters far from any robot's"):
+    with pytest.raises(PartError, match=r"law 'yang_kim' failed: angle .*; the parameters are far outside"):
         one.update(Posture(0.0, 0.0, 1e300), 1.0)
 
 

@@ -123,7 +123,7 @@ def test_a_scenario_that_stands_in_no_file_takes_settings_too() -> None:
         ("duration_s=" + "9" * 5000, "expected a number in seconds, got a string"),
         ("duration_s.x=1", "duration_s is a value and has no keys; end KEY with duration_s"),
         ("name=2", "expected a string, got a whole number (2); to give text, write --set 'name=\"..\"'"),
-        ("name=1979-05-27", "expected a string, got a date; as text it is"),
+        ("name=1979-05-27", "expected a string, got a date; to give text, write"),
         ("network.radio.profile=fade99", "'fade99' is no profile; did you mean fade5?"),
         ("network.radio.bursts.good_to_bad=0.1", "network[0].radio.bursts.bad_to_good: this key is missing"),
         ("camera.kind=pixel", "'pixel' is not one of the choices; use gaussian"),
@@ -157,7 +157,7 @@ def test_of_several_settings_the_one_that_is_wrong_is_named() -> None:
 def test_another_kind_of_table_needs_all_of_it() -> None:
     message = refusal("network.robot.reference.kind=line", source="fig8")
     assert message.startswith("fig8: --set network.robot.reference.kind=line: network[0].robot[0].reference.")
-    assert "unknown key; it belongs to the kind before; set the whole table: " in message
+    assert "unknown key; it belongs to the kind that was replaced; set the whole table: " in message
     assert "--set 'network[0].robot[0].reference={kind = .., ..}'" in message
     whole = "network.robot.reference={kind = 'line', drive_s = 1}"
     assert load("fig8", [whole]).scenario.networks[0].robot[0].reference.name() == "line"

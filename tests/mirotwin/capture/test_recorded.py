@@ -168,7 +168,7 @@ def test_one_wrong_bit_anywhere_is_reported_after_what_could_be_read(at: int, bi
     [
         (lambda data: b"hello world", "offset 0: not an MCAP file"),
         (lambda data: data[:5], "offset 0: the file ends in the middle of a record; it was cut short"),
-        (lambda data: data + b"x", "something follows the end"),
+        (lambda data: data + b"x", "there are bytes after the end"),
         (lambda data: data.replace(b'"direction":">"', b'"direction":"!"'), "damaged record"),
         (lambda data: foreign_mcap(), "not a recording of this program"),
     ],

@@ -121,9 +121,11 @@ def test_the_layout_is_that_in_which_frames_can_be_read_unless_it_is_said(n: int
 
 
 def test_a_layout_that_cannot_be_told_is_said_to_be_a_guess() -> None:
-    assert "no frame of 3 or of 5 robots at its beginning; taken for 3 (--robots" in decode(b"\0" * 50)[2]
+    assert "no frame of 3 or 5 robots at the beginning; 3 robots assumed (--robots" in decode(b"\0" * 50)[2]
     both = TEAM + encode(TeamFrame(0, 2, ((1, 2),) * 5), 5) * 2
-    assert "1 frames of 3 robots and 2 frames of 5 robots at its beginning; taken for 5" in decode(both)[2]
+    assert (
+        "1 frames of 3 robots and 2 frames of 5 robots at the beginning; 5 robots assumed" in decode(both)[2]
+    )
     assert decode(both, "--robots", "3", "--direction", "down")[2] == ""
 
 

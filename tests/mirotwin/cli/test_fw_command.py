@@ -88,7 +88,7 @@ def test_a_fault_is_reported_by_address_beside_symbols_of_another_image(
 def test_the_cycle_limit_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result]) -> None:
     code, out, err = mirotwin("fw", "run", image_path(), "--max-cycles", 5000)
     assert (code, out) == (42, "")
-    assert err.startswith("mirotwin: gave up at 0x")
+    assert err.startswith("mirotwin: stopped at the limit, at 0x")
 
 
 def test_a_program_that_ends_is_done_unless_it_should_have_got_somewhere(
@@ -104,11 +104,11 @@ def test_an_endless_loop_ends_a_program_that_has_a_cycle_limit_too(
 ) -> None:
     image = hex_file(tmp_path / "a.ihx", b"\x00" + LOOP)
     code, _, err = mirotwin("fw", "run", image, "--max-cycles", 1)
-    assert (code, err) == (42, "mirotwin: gave up at 0x0001 after 1 machine cycles\n")
+    assert (code, err) == (42, "mirotwin: stopped at the limit, at 0x0001 after 1 machine cycles\n")
     for limit in (4, 1000, 100_000):
         code, _, err = mirotwin("fw", "run", image, "--max-cycles", limit)
         assert code == 0
-        assert err.startswith("mirotwin: the firmware ended at 0x0001 after 3 machine cycles")
+        assert err.startswith("mirotwin: the program ended at 0x0001 after 3 machine cycles")
 
 
 def test_a_fault_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
@@ -209,7 +209,7 @@ def test_a_run_goes_on_after_faults_and_counts_those_that_are_not_listed(
         == 100
     )
     assert "mirotwin: firmware faults: 10 more are not listed\n" in err
-    assert err.endswith("mirotwin: gave up at 0x0000 after 330 machine cycles\n")
+    assert err.endswith("mirotwin: stopped at the limit, at 0x0000 after 330 machine cycles\n")
 
 
 def test_a_time_is_one_of_the_crystal(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
@@ -228,8 +228,8 @@ def test_a_time_is_one_of_the_crystal(mirotwin: Callable[..., Result], tmp_path:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--stdin-when", "x"), "--stdin-when: there is no --stdin"),
-        (("--stdin-gap", "1ms"), "--stdin-gap: there is no --stdin"),
+        (("--stdin-when", "x"), "--stdin-when: has no effect without --stdin"),
+        (("--stdin-gap", "1ms"), "--stdin-gap: has no effect without --stdin"),
         (("--stdin", "F", "--stdin-when", ""), "--stdin-when: the text is empty"),
         (
             ("--stdin", "F", "--stdin-when", "a", "--stdin-when", "b"),
@@ -239,7 +239,7 @@ def test_a_time_is_one_of_the_crystal(mirotwin: Callable[..., Result], tmp_path:
             ("--stdin", "F", "--stdin", "F", "--stdin", "F", "--stdin-when", "a"),
             "--stdin-when: 1 for 3 --stdin",
         ),
-        (("--stdin", "F", "--stdin-by-line"), "--stdin-by-line: says that lines wait"),
+        (("--stdin", "F", "--stdin-by-line"), "--stdin-by-line: has no effect without --stdin-when"),
         (("--stdin", "-", "--stdin", "-"), "--stdin: standard input can be read only once"),
         (("--stdin", "F", "--stdin-after", "soon"), "'soon' is no time"),
         (

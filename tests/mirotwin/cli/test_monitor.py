@@ -76,7 +76,7 @@ def test_a_monitor_that_measures_the_bit_rate_answers_a_script(
     script = ("--stdin-when", "> ", "--stdin", monitor.with_name("commands"), "--stdin-by-line")
     code, out, err = talk(monitor, *options, *script)
     assert (code, out) == (0, DIALOGUE)
-    assert err.startswith("mirotwin: the firmware ended at ")
+    assert err.startswith("mirotwin: the program ended at ")
     assert err.count("\n") == 1
 
 

@@ -194,7 +194,7 @@ def test_parameters_with_which_nothing_can_be_computed_are_bad_input(
     code, out, err = mirotwin(*words)
     assert (code, out) == (2, "")
     assert err == (
-        "mirotwin: error: far.toml: cannot be run: net0/robot2: what follows from its drive parameters is not"
+        "mirotwin: error: far.toml: cannot be run: net0/robot2: its drive parameters lead to a value that is not"
         " finite; the parameters are far outside those of a real robot\n"
     )
     assert [path.name for path in tmp_path.iterdir()] == ["far.toml"]
