@@ -57,6 +57,12 @@ def test_a_part_that_does_not_stand_where_the_world_does_is_refused_without_a_ch
     assert world.state.save() == before
 
 
+def test_characters_that_wait_for_a_busy_transmitter_are_refused(saved):
+    path, busy = "networks[0].downlink.free_tick", 1 << 40
+    with pytest.raises(ValueError, match=f"characters wait, but the transmitter is busy until tick {busy}"):
+        fresh().load(with_field(fresh(), saved, path, struct.pack("<q", busy)))
+
+
 def test_any_byte_that_changes_is_noticed(saved):
     world = fresh()
     for place in range(0, len(saved), 101):

@@ -248,6 +248,10 @@ class Network:
             raise ValueError(f"the PC has heard everything up to tick {self.uplink.now}, at tick {tick}")
         if max(self.downlink.free_tick, self.downlink.busy_tick) > tick + LONGEST_TRANSMISSION_TICKS:
             raise ValueError(f"the transmitter is busy until tick {self.downlink.free_tick}, at tick {tick}")
+        if self.outbox.waiting and self.outbox.waiting[0].sent.tick < self.downlink.free_tick:
+            raise ValueError(
+                f"characters wait, but the transmitter is busy until tick {self.downlink.free_tick}"
+            )
         if any(answer is not None and answer.tick > tick for answer in self.ear.heard):
             raise ValueError(f"a robot's last answer came after tick {tick}")
         for robot in self.robots:
