@@ -41,6 +41,7 @@ from miro_protocol.whitening import whiten
 
 _LOW = max(field.low for field in VELOCITY)
 _HIGH = min(field.high for field in VELOCITY)
+_TEAM, _TEAM_ASK = FrameType.TEAM, FrameType.TEAM_ASK
 _CODES = {1: "b", 2: "h", 4: "i"}
 _VELOCITIES = {
     n: struct.Struct("<" + n * "".join(_CODES[field.size] for field in VELOCITY)) for n in ROBOT_COUNTS
@@ -252,8 +253,10 @@ def _require_sendable(message: Message, body: bytes, n: int) -> None:
 
 
 def _team_type(kind: int) -> int:
-    allowed = (FrameType.TEAM, FrameType.TEAM_ASK)
-    what = f"{allowed[0]:d} or {allowed[1]:d}"
+    if kind is _TEAM or kind is _TEAM_ASK:
+        return int(kind)
+    allowed = (_TEAM, _TEAM_ASK)
+    what = f"{_TEAM:d} or {_TEAM_ASK:d}"
     number = _whole("type", kind, what)
     if number not in allowed:
         raise EncodeError(f"type = {_shown(kind)}: a team frame has type {what}")
