@@ -30,8 +30,6 @@ from miro_sim.world.robot import Robot
 
 LONGEST_TRANSMISSION_TICKS = 1 << 40
 """Twelve hours: no saved transmission ends later than so long after now."""
-LONGEST_TRANSMISSION_TICKS = 1 << 40
-"""Twelve hours: no saved transmission ends later than so long after now."""
 SETTLE_TICKS = 120
 """How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
 
