@@ -86,7 +86,7 @@ def test_a_world_with_other_fields_is_refused_as_one_of_another_version(saved):
 def test_what_a_saved_world_belongs_to_is_told(saved):
     world = fresh()
     other = sealed(world.identity()._replace(seed=12), opened(saved, world.identity()))
-    with pytest.raises(ValueError, match="saved world has seed 12, this one has 11"):
+    with pytest.raises(ValueError, match="saved world has seed 12, this world has 11"):
         world.load(other)
 
 

@@ -56,7 +56,7 @@ def test_times_become_chances_a_bit():
         (lambda: ChainParams(enter=-1, leave=1), "not within"),
         (lambda: SlicerParams.of(settle_s=0.0001, offset=0.0, eb_n0_db=10.0), "settle_s 0.0001 is shorter"),
         (lambda: SlicerParams.of(settle_s=0.004, offset=1.1, eb_n0_db=10.0), "slicer offset"),
-        (lambda: RadioParams.of(bit_error_rate=0.0, eb_n0_db=10.0), "the same thing twice"),
+        (lambda: RadioParams.of(bit_error_rate=0.0, eb_n0_db=10.0), "set the same"),
         (lambda: RadioParams.of(lost_character_rate=1.5), "lost_character_rate 1.5"),
     ],
 )
