@@ -86,7 +86,7 @@ def test_a_folder_takes_one_writer_at_a_time_and_is_free_after_it(tmp_path: Path
 def test_parts_of_before_are_named_and_never_taken_for_new_ones(tmp_path: Path) -> None:
     (tmp_path / "figure.part.png").write_text("old")
     with pytest.raises(
-        OutputError, match=r"holds what is left of a command that was broken off \(figure\.part\.png\)"
+        OutputError, match=r"the folder holds parts of an interrupted command \(figure\.part\.png\)"
     ):
         OutputFolder(tmp_path)
     with OutputFolder(tmp_path, force=True) as folder:

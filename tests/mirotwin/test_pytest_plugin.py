@@ -57,7 +57,7 @@ def test_a_session_fails_under_the_share_that_was_asked_for(tmp_path: Path) -> N
     failed = session(tmp_path, *wanted, "99")
     assert failed.returncode == 1
     assert "3 passed" in failed.stdout
-    assert "99.0 % that were asked for" in failed.stdout
+    assert "fewer lines ran than the 99.0 %" in failed.stdout
 
 
 BREAKS = """

@@ -100,7 +100,7 @@ def test_every_profile_is_a_good_radio_that_says_what_it_does(name: str) -> None
             "profile = 3",
             ".profile: expected a name or a list of names, got 3; see `mirotwin scenarios profiles`",
         ),
-        ("eb_n0_db = 11.0\nbit_error_rate = 0.0", ".eb_n0_db: says the same as bit_error_rate; give one of"),
+        ("eb_n0_db = 11.0\nbit_error_rate = 0.0", ".eb_n0_db: sets the same as bit_error_rate; give one of"),
         ("eb_n0 = 11.0", ".eb_n0: unknown key; use eb_n0_db, in decibels"),
         ("jitter_ms = 1", ".jitter_ms: unknown key; use jitter_s, in seconds"),
         ("baud_offset_hz = 3", ".baud_offset_hz: unknown key; use baud_offset_ppm, in parts per million"),

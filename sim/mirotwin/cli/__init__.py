@@ -16,7 +16,7 @@ COMMANDS = {
     "export": "Writes the bytes of a run for Wireshark, or as a stream file.",
     "scenarios": "Lists the built-in scenarios, or shows one.",
     "info": "Shows versions, engine and firmware.",
-    "fw": "Firmware: run it on the bare processor, disassemble, trace, profile.",
+    "fw": "Firmware: run on the bare processor, disassemble, trace, profile.",
     "vectors": "Writes single-step test vectors of the processor.",
 }
 """Name, which is the module's and the function's too, and what `--help` says of it."""

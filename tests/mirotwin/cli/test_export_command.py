@@ -126,7 +126,7 @@ def test_of_an_input_cut_short_all_that_could_be_read_is_written(
     code, _, err = mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.pcapng")
     assert code == 2
     assert "the file ends in the middle of a block" in err
-    assert "all before it was written" in err
+    assert "everything before it was written" in err
     assert (tmp_path / "b.pcapng").read_bytes() == render(PACKETS[:2])
 
 

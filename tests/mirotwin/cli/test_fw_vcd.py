@@ -214,7 +214,7 @@ def test_what_cannot_be_written_is_refused_and_nothing_is_left(
     refused(vcd(short), "Missing option '--out'")
     refused(vcd(short, "--out", tmp_path / "no" / "x.vcd"), "there is no folder")
     refused(vcd(short, "--out", tmp_path), "is a folder")
-    refused(vcd(short, "--out", tmp_path / "x.gtkw"), "save file's name")
+    refused(vcd(short, "--out", tmp_path / "x.gtkw"), "name of the GTKWave save file")
     refused(vcd(tmp_path / "no.ihx", "--out", out), "there is no such file")
     image = hex_file(tmp_path / "stops.ihx", b"\x00\x80\xfe")
     refused(vcd(image, "--from", "20s", "--out", out), "--from 480000000: the run ended .*; look earlier")

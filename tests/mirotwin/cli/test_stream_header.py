@@ -98,7 +98,11 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(
         ("set = {network.robot = 5}", "", "--set network.robot=5: "),
         ("[expect]\nno_fault = true", "", "header: expect is not carried out by this version"),
         (f"firmware_sha256 = '{OTHER}'", "", "header: the stream is for firmware 0123456789ab.., this is"),
-        ("", "2000000 *@0/1 reset 1", ":6:1: an event, which this command does not support; no command acts"),
+        (
+            "",
+            "2000000 *@0/1 reset 1",
+            ":6:1: an event, which this command does not support; no command supports",
+        ),
         ("", "2000000 * P1.0 1", ":6:1: an event, which this command does not support; `mirotwin fw run"),
         ("", "1701700 >@31 55\n1800000 >@32 55", "tick 1800000: network 32, but the scenario has 32"),
         (
