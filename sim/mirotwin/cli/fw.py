@@ -19,10 +19,10 @@ COMMANDS = {
     cls=LazyGroup,
     modules="mirotwin.cli.fw_",
     commands_about=COMMANDS,
-    short_help="Firmware: run it on the bare processor, disassemble, trace, profile.",
+    short_help="Firmware: run on the bare processor, disassemble, trace, profile.",
 )
 def fw() -> None:
-    """Firmware: run it on the bare processor, disassemble, trace, profile.
+    """Firmware: run on the bare processor, disassemble, trace, profile.
 
     SUBJECT is what runs: an IMAGE.ihx on the bare processor, or the robot in a scenario (a built-in name or a .toml),
     in a recording (run.mcap) or on a stream file.
