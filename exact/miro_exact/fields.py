@@ -104,50 +104,6 @@ class Number:
         return values if self.count else values[0], at + self.layout.size
 
 
-class Queue:
-    """The live items of an array with room for `room` of them: their number (4 bytes), then the items in order.
-
-    `end` names the field with the serial number of the next item, `first` that of the oldest one; without `first` the
-    oldest one has number 0. Item n stands at place n modulo `room`. Queues with the same `end` are of one length.
-    """
-
-    def __init__(
-        self, code: str, room: int, end: str, first: str = "", low: Any = None, high: Any = None
-    ) -> None:
-        self.form = f"{code}[]"
-        self.code = code
-        self.room = room
-        self.end = end
-        self.first = first
-        self.bounds = _bounds(code, low, high)
-
-    def read(self, part: Any, name: str) -> list[Any]:
-        array = getattr(part, name)
-        first = getattr(part, self.first) if self.first else 0
-        return [array[serial % self.room] for serial in range(first, getattr(part, self.end))]
-
-    def write(self, part: Any, name: str, value: Sequence[Any]) -> None:
-        array = getattr(part, name)
-        for index, item in enumerate(value):
-            array[index] = item
-        setattr(part, self.end, len(value))
-        if self.first:
-            setattr(part, self.first, 0)
-
-    def encode(self, value: Sequence[Any]) -> bytes:
-        return _COUNT.pack(len(value)) + struct.pack(f"<{len(value)}{self.code}", *value)
-
-    def decode(self, data: bytes, at: int) -> tuple[list[Any], int]:
-        (count,) = _take(_COUNT, data, at)
-        if count > self.room:
-            raise ValueError(f"has {count} items, not at most {self.room}")
-        layout = struct.Struct(f"<{count}{self.code}")
-        values = _take(layout, data, at + 4)
-        if self.bounds is not None:
-            _checked(values, self.bounds)
-        return list(values), at + 4 + layout.size
-
-
 class Items:
     """A list or a tuple of at most `room` numbers: their number (4 bytes), then they.
 
@@ -191,6 +147,27 @@ class Items:
         if self.ordered and any(later <= earlier for earlier, later in pairwise(values)):
             raise ValueError("is not in order")
         return list(values), at + 4 + layout.size
+
+
+class Queue(Items):
+    """The first items of an array with room for `room` of them; the field `end` says how many. Bytes as of `Items`.
+
+    Queues with the same `end` are of one length.
+    """
+
+    def __init__(self, code: str, room: int, end: str, low: Any = None, high: Any = None) -> None:
+        super().__init__(code, room, low, high)
+        self.end = end
+
+    def read(self, part: Any, name: str) -> list[Any]:
+        array = getattr(part, name)
+        return [array[index] for index in range(getattr(part, self.end))]
+
+    def write(self, part: Any, name: str, value: Sequence[Any]) -> None:
+        array = getattr(part, name)
+        for index, item in enumerate(value):
+            array[index] = item
+        setattr(part, self.end, len(value))
 
 
 class Octets:

@@ -10,9 +10,8 @@ cdef struct Place:
     long long high
     double least
     double most
-    char *end  # of a queue: the field with the number of the next item, else NULL
+    char *end  # of a queue: the field with its length, else NULL
     Py_ssize_t end_size
-    char *first  # ... and of the oldest one, NULL if that is always 0
 
 
 cdef class Memory:

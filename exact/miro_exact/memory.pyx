@@ -34,8 +34,8 @@ cdef void copy(char *to, const char *source, Py_ssize_t size, Py_ssize_t count) 
             to[item * size + byte] = source[item * size + size - 1 - byte]
 
 
-cdef long long serial(const char *at, Py_ssize_t size) noexcept:
-    """A queue's serial number, an int or a long long."""
+cdef long long length(const char *at, Py_ssize_t size) noexcept:
+    """The length of a queue, an int or a long long."""
     cdef int small
     cdef long long big
     if size == 4:
@@ -45,7 +45,7 @@ cdef long long serial(const char *at, Py_ssize_t size) noexcept:
     return big
 
 
-cdef void set_serial(char *at, Py_ssize_t size, long long value) noexcept:
+cdef void set_length(char *at, Py_ssize_t size, long long value) noexcept:
     cdef int small = <int>value
     if size == 4:
         memcpy(at, &small, 4)
@@ -54,9 +54,9 @@ cdef void set_serial(char *at, Py_ssize_t size, long long value) noexcept:
 
 
 cdef class Memory:
-    """Fields in their order; each is (part, name for messages, address, item size, items, code, low, high, end, first).
+    """Fields in their order; each is (part, name for messages, address, item size, items, code, low, high, end).
 
-    `low` and `high` are None where every value of the type will do; `end` and `first` are None, or (address, size).
+    `low` and `high` are None where every value of the type will do; `end` is None, or (address, size).
     """
 
     def __cinit__(self, list fields):
@@ -67,7 +67,7 @@ cdef class Memory:
             raise MemoryError
         self.parts = [field[0] for field in fields]
         self.names = tuple(field[1] for field in fields)
-        for index, (_, _, address, size, count, code, low, high, end, first) in enumerate(fields):
+        for index, (_, _, address, size, count, code, low, high, end) in enumerate(fields):
             place = &self.places[index]
             place.at = <char *><size_t>address
             place.size = size
@@ -83,8 +83,6 @@ cdef class Memory:
             if end is not None:
                 place.end = <char *><size_t>end[0]
                 place.end_size = end[1]
-            if first is not None:
-                place.first = <char *><size_t>first[0]
 
     def __dealloc__(self):
         PyMem_Free(self.places)
@@ -98,9 +96,7 @@ cdef class Memory:
             if place.end == NULL:
                 total += place.size * place.count
                 continue
-            count = serial(place.end, place.end_size)
-            if place.first != NULL:
-                count -= serial(place.first, 8)
+            count = length(place.end, place.end_size)
             if count < 0 or count > place.count:
                 raise ValueError(f"{self.names[index]}: {count} items, room for {place.count}")
             total += 4 + place.size * count
@@ -111,7 +107,7 @@ cdef class Memory:
         cdef bytes data = PyBytes_FromStringAndSize(NULL, self.size())
         cdef char *to = PyBytes_AS_STRING(data)
         cdef Py_ssize_t index, item
-        cdef long long count, first
+        cdef long long count
         cdef unsigned int written
         cdef double real
         cdef Place *place
@@ -126,15 +122,11 @@ cdef class Memory:
                             raise DomainError(f"{self.names[index]} is NaN")
                 to += place.size * place.count
                 continue
-            first = serial(place.first, 8) if place.first != NULL else 0
-            count = serial(place.end, place.end_size) - first
+            count = length(place.end, place.end_size)
             written = <unsigned int>count
             copy(to, <char *>&written, 4, 1)
             to += 4
-            first %= place.count
-            item = min(count, place.count - first)
-            copy(to, place.at + first * place.size, place.size, item)
-            copy(to + item * place.size, place.at, place.size, count - item)
+            copy(to, place.at, place.size, count)
             to += place.size * count
         return data
 
@@ -210,8 +202,6 @@ cdef class Memory:
                 copy(<char *>&written, source, 4, 1)
                 source += 4
                 count = written
-                set_serial(place.end, place.end_size, count)
-                if place.first != NULL:
-                    set_serial(place.first, 8, 0)
+                set_length(place.end, place.end_size, count)
             copy(place.at, source, place.size, count)
             source += place.size * count

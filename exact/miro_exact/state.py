@@ -8,7 +8,7 @@ A class declares what is its state once, in a table of names:
         "timers": Timers,                             # a part that has a table of its own (None: it is not there)
         "robots": [Robot],                            # a list or a dict of such parts
         "edges": Items("q", 4096),                    # a list of numbers, or a property that gives and takes one
-        "ticks": Queue("q", 4096, "end"),             # the live items of an array
+        "ticks": Queue("q", 4096, "end"),             # the first items of an array
         "pending": Rows(64, "q", "B", "B"),           # a list of tuples
     }
 
@@ -227,16 +227,24 @@ class Flat:
             self._put()
 
     def _first_load(self, data: bytes) -> None:
-        before = self.save()
+        before = self._before_load()
         self._accepted = None
         self._check(data)
         try:
             self._put()
         except Exception:
-            self._check(before)
-            self._put()
+            if before is not None:
+                self._check(before)
+                self._put()
             raise
         self._accepted = data
+
+    def _before_load(self) -> bytes | None:
+        """What to go back to; None for a state that holds NaN, which can only be left."""
+        try:
+            return self.save()
+        except DomainError:
+            return None
 
     def decode(self, data: bytes) -> dict[str, Any]:
         """Path -> value of every field in the bytes of a state. Raises ValueError as `load` does."""
@@ -350,19 +358,14 @@ def _memory_field(
 ) -> tuple[Any, ...]:
     """What `memory.pyx` has to know. Raises TypeError if table and C layout do not agree."""
     address, c_type, size = places[field.name]
-    is_queue = isinstance(kind, Queue)
     count = kind.room if isinstance(kind, Queue) else max(kind.count, 1)
     if CODES.get(c_type) != kind.code or size % count or (kind.bounds and kind.code not in "iqBd"):
         raise TypeError(f"{field.path}: {c_type} of {size} bytes is declared as {count} {kind.code}")
     if size // count != Number(kind.code).layout.size:
         raise TypeError(f"{field.path}: {size} bytes are declared as {count} {kind.code}")
     low, high = kind.bounds or (None, None)
-    end = first = None
-    if isinstance(kind, Queue):
-        end = (places[kind.end][0], places[kind.end][2])
-        first = (places[kind.first][0], places[kind.first][2]) if kind.first else None
-    assert is_queue == (end is not None)
-    return (field.part, field.path, address, size // count, count, kind.code, low, high, end, first)
+    end = (places[kind.end][0], places[kind.end][2]) if isinstance(kind, Queue) else None
+    return (field.part, field.path, address, size // count, count, kind.code, low, high, end)
 
 
 def snapshot(part: Any) -> bytes:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact import engine, fields, places, state
-from miro_exact.state import FLAG, TICK, Flat, Octets, Queue, Row, Rows
+from miro_exact.state import FLAG, TICK, Flat, Items, Octets, Queue, Row, Rows
 from miro_robot.mcs51.line import Line
 
 
@@ -31,12 +31,13 @@ class Cart:
         "levels": ("3B", 0, 9),
         "wheels": [Wheel],
         "spare": Wheel,
-        "ticks": Queue("q", 4, "end", "first", 0, 1000),
+        "ticks": Queue("q", 4, "end", 0, 1000),
         "bytes": Queue("B", 4, "count"),
         "flaws": Queue("B", 4, "count"),
         "waiting": Rows(3, ("q", 0, 100), "s", ordered=True),
         "pose": Row("d", "d", split=lambda pose: pose, make=lambda cells: cells),
         "text": Octets(5),
+        "edges": Items("q", 3, 0, 100, ordered=True),
     }
 
     def __init__(self) -> None:
@@ -45,14 +46,15 @@ class Cart:
         self.levels = [1, 2, 3]
         self.wheels = {"left": Wheel(), "right": Wheel()}
         self.spare: Wheel | None = None
-        self.ticks = [50, 60, 30, 40]
-        self.first, self.end = 2, 6
+        self.ticks = [30, 40, 50, 60]
+        self.end = 4
         self.bytes = bytearray(b"ab..")
         self.flaws = bytearray(4)
         self.count = 2
         self.waiting: deque[tuple[int, bytes]] = deque([(1, b"xy"), (1, b"")])
         self.pose = (1.0, -0.0)
         self.text = b"hi"
+        self.edges = [3, 5]
         self.settled = 0
         self.doubled = 14
 
@@ -73,6 +75,7 @@ LAYOUT = (
     + struct.pack("<IqI2sqI", 2, 1, 2, b"xy", 1, 0)
     + struct.pack("<dd", 1.0, -0.0)
     + struct.pack("<I2s", 2, b"hi")
+    + struct.pack("<I2q", 2, 3, 5)
 )
 
 
@@ -90,11 +93,11 @@ def test_loading_puts_every_field_back_and_works_out_the_rest():
     cart = Cart()
     flat = Flat(cart)
     changed = LAYOUT.replace(struct.pack("<q", 7), struct.pack("<q", 21), 1).replace(b"hi", b"ho")
-    cart.first, cart.end, cart.waiting = 0, 0, deque()
+    cart.end, cart.waiting = 0, deque()
     cart.wheels["right"].turns = 5
     flat.load(changed)
     assert flat.save() == changed
-    assert (cart.tick, cart.doubled, cart.text, cart.first, cart.end) == (21, 42, b"ho", 0, 4)
+    assert (cart.tick, cart.doubled, cart.text, cart.end) == (21, 42, b"ho", 4)
     assert list(cart.waiting) == [(1, b"xy"), (1, b"")]
 
 
@@ -130,6 +133,8 @@ def changed(place: int, form: str, *values: object) -> bytes:
         (changed(87, "<I", 4), "waiting has 4 rows, not at most 3"),
         (changed(91, "<q", 2), "waiting is not in order"),
         (changed(99, "<I", 1 << 30), "waiting has 1073741824 bytes"),
+        (changed(len(LAYOUT) - 8, "<q", 3), "edges is not in order"),
+        (changed(len(LAYOUT) - 20, "<I", 4), "edges has 4 items, not at most 3"),
         (changed(0, "<q", 99), "tick 99 contradicts the rest"),
     ],
 )
@@ -160,6 +165,14 @@ def test_nan_cannot_be_saved():
     cart.wheels["left"].angle = float("nan")
     with pytest.raises(ValueError, match=r"wheels\[left\].angle is NaN"):
         Flat(cart).save()
+
+
+def test_a_state_that_holds_nan_can_be_left():
+    cart = Cart()
+    flat = Flat(cart)
+    cart.wheels["left"].angle = float("nan")
+    flat.load(LAYOUT)
+    assert flat.save() == LAYOUT
 
 
 def test_a_difference_is_told_by_the_name_of_the_field_and_both_values():
