@@ -13,7 +13,7 @@ What does not: saving and hashing it (`miro_exact.state`, which reads the same t
 import math
 import re
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 LARGEST = (1 << 63) - 1
 TYPES = {"d": "a finite float", "q": "an int of 64 bits", "?": "True or False"}
@@ -22,10 +22,19 @@ LONGEST = 65536
 
 
 class Remembering:
-    """A part with a memory: `STATE` declares it, attribute to type; `NOT_STATE` names what stays as it was made."""
+    """A part with parameters and a memory. `STATE` declares the memory, attribute to type; `NOT_STATE` names what stays
+    as it was made.
+    """
 
     STATE: ClassVar[Mapping[str, str]] = {}
     NOT_STATE: ClassVar[tuple[str, ...]] = ("parameters",)
+
+    def __init__(self, parameters: Any) -> None:
+        self.parameters = parameters
+
+    def __repr__(self) -> str:
+        memory = {name: getattr(self, name) for name in self.STATE}
+        return f"{type(self).__name__}({self.parameters!r}, memory={memory!r})"
 
     def check_memory(self) -> None:
         """Raises ValueError for an attribute that is missing, declared nowhere, or not of its type."""
@@ -41,11 +50,6 @@ class Remembering:
     def after_load(self) -> None:
         """Raises ValueError for a memory that no step leaves."""
         self.check_memory()
-
-
-def memory_of(part: Remembering) -> dict[str, object]:
-    """Attribute -> value of all that a part remembers."""
-    return {name: getattr(part, name) for name in part.STATE}
 
 
 def check(name: str, code: str, value: object) -> None:

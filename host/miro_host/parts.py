@@ -7,7 +7,7 @@ A part is chosen by a frozen `msgspec` struct of its parameters whose tag is the
 its `pyproject.toml`:
 
     [project.entry-points."mirotwin.laws"]
-    samson = "samson_law:Samson"
+    samson = "samson_law:Parameters"
 
 Entry points are looked up only for a name that is not in our own table, because reading the metadata of all installed
 distributions takes tens of milliseconds. For the same reason a name in our table cannot be replaced from outside.

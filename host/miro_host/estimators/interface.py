@@ -13,7 +13,7 @@ import msgspec
 
 from miro_host.ear import Heard
 from miro_host.estimators.registry import AnyEstimator
-from miro_host.memory import Remembering, memory_of
+from miro_host.memory import Remembering
 from miro_host.posture import Posture
 
 
@@ -60,11 +60,7 @@ P = TypeVar("P", bound=EstimatorParameters, covariant=True)
 class Estimator(Remembering, Generic[P]):
     """Base of every estimator; its memory is declared as a law's is."""
 
-    def __init__(self, parameters: P) -> None:
-        self.parameters = parameters
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.parameters!r}, memory={memory_of(self)!r})"
+    parameters: P
 
     def step(self, given: EstimatorInput) -> Estimate | None:
         """One control period. None: no posture is known, and the last command is repeated."""

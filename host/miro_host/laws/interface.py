@@ -25,7 +25,7 @@ import msgspec
 from miro_host.ear import Heard
 from miro_host.integrator import Limits
 from miro_host.laws.registry import Controller
-from miro_host.memory import Remembering, memory_of
+from miro_host.memory import Remembering
 from miro_host.posture import Posture
 from miro_host.reference import Reference, Trajectory
 
@@ -101,12 +101,7 @@ class Law(Remembering, Generic[P]):
     """
 
     INNER: ClassVar[tuple[str, ...]] = ()
-
-    def __init__(self, parameters: P) -> None:
-        self.parameters = parameters
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.parameters!r}, memory={memory_of(self)!r})"
+    parameters: P
 
     def step(self, given: LawInput) -> Answer:
         """One control period. Called in the order of time; a period without a posture is left out."""

@@ -246,6 +246,6 @@ def test_stops_of_another_length_are_no_state(stops):
     saved = snapshot(downlink)
     sent = struct.pack("<I", 4) + b"ab\0\1"
     assert saved.count(sent) == 1
-    with pytest.raises(ValueError, match="transmission of 2 bytes"):
+    with pytest.raises(ValueError, match="stop bits of 2 characters"):
         restore(downlink, saved.replace(sent, struct.pack("<I", 2 + len(stops)) + b"ab" + stops))
     assert snapshot(downlink) == saved
