@@ -12,9 +12,11 @@ from __future__ import annotations
 import io
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import copy
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import cycle
 from typing import Any
 
 SCENARIO = "fig6"
@@ -87,6 +89,11 @@ class Tasks:
         saved = self.warm.save()
         return _timed(lambda: self.warm.load(saved), MANY), ""
 
+    def load_other(self) -> tuple[float, str]:
+        """Other bytes than last time, so that nothing is known of them."""
+        copies = _copies(self.warm.save())
+        return _timed(lambda: self.warm.load(next(copies)), MANY), ""
+
     def board_snapshot(self) -> tuple[float, str]:
         return _timed(self._state_of_board()[0], MANY), ""
 
@@ -94,6 +101,11 @@ class Tasks:
         save, load = self._state_of_board()
         state = save()
         return _timed(lambda: load(state), MANY), ""
+
+    def board_restore_other(self) -> tuple[float, str]:
+        save, load = self._state_of_board()
+        copies = _copies(save())
+        return _timed(lambda: load(next(copies)), MANY), ""
 
     def _state_of_board(self) -> tuple[Callable[[], Any], Callable[[Any], object]]:
         """What saves the board's state, and what puts it back: a `Flat`, before there were tables its own methods."""
@@ -104,6 +116,11 @@ class Tasks:
 
     def _board(self) -> Any:
         return self.warm.networks[0].robots[0].board
+
+
+def _copies(state: Any) -> Iterator[Any]:
+    """Two equal states in turn."""
+    return cycle((state, bytes(bytearray(state)) if isinstance(state, bytes) else copy(state)))
 
 
 def _ended(world: Any) -> str:
