@@ -35,14 +35,18 @@ class Bodies:
             soonest = min(soonest, next_look(tick, _posture(one, tick), _posture(other, tick), closing_m_s))
         return soonest
 
+    def start_at(self, tick: int) -> None:
+        """Takes those that touch at `tick` for touching already: only what begins later is reported."""
+        self.touching = [
+            (one, other) for one, other, _ in self.pairs if touch(_posture(one, tick), _posture(other, tick))
+        ]
+
     def look(self, tick: int) -> list[Pair]:
         """The pairs that have begun to touch; asked at ticks of the grid only, else there is nothing to see."""
         if tick % GRID_TICKS or not self.pairs:
             return []
         before = self.touching
-        self.touching = [
-            (one, other) for one, other, _ in self.pairs if touch(_posture(one, tick), _posture(other, tick))
-        ]
+        self.start_at(tick)
         return [pair for pair in self.touching if pair not in before]
 
 

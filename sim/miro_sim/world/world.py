@@ -289,6 +289,7 @@ class World:
         if self._opened is None or self._opened[0] is not saved:
             self._opened = (saved, opened(saved, self.identity()))
         self.state.load(self._opened[1])
+        self.bodies.start_at(self.tick)
         self.waits.forget()
 
     def after_load(self) -> None:

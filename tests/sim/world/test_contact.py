@@ -13,6 +13,7 @@ from miro_sim.pitch.ground import ROBOT_HALF_M as HALF_M
 from miro_sim.plant.params import DriveParams
 from miro_sim.scenario import file
 from miro_sim.world import conditions as wait
+from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 
 HEAD_ON = """
@@ -124,3 +125,17 @@ def test_a_report_does_not_depend_on_how_the_run_is_cut_and_changes_no_bit(cut_t
     ]
     assert reports[0] == reports[1]
     assert len(reports[0]) >= 1
+
+
+def test_after_a_load_a_contact_is_reported_when_it_begins_and_not_again():
+    world = head_on(10.0)
+    apart = world.save()
+    tick = world.run_until(wait.Touch()).tick
+    world.run_to(tick + 1)
+    met = world.save()
+    other = head_on(10.0)
+    other.load(met)
+    with pytest.raises(WaitExpired):
+        other.run_until(wait.Touch(), within=GRID_TICKS)
+    world.load(apart)
+    assert world.run_until(wait.Touch()).tick == tick
