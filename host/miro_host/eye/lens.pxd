@@ -1,0 +1,18 @@
+cimport cython
+from miro_exact cimport dmath
+
+cdef int _STEPS
+
+
+@cython.final
+cdef class Lens:
+    cdef readonly object parameters
+    cdef readonly double x_m, y_m, height_m, focal_u, focal_v, centre_u, centre_v, k1
+    cdef readonly double xa, xb, xc, ya, yb, yc, za, zb, zc, out_x, out_y
+
+    @cython.locals(right=double, up=double, drawn=double, radius=double, square=double, growth=double, fall=double)
+    cpdef slopes(self, double u, double v)
+    @cython.locals(fall_m=double)
+    cpdef (double, double) ground(self, double u, double v, double z_m)
+    @cython.locals(dx=double, dy=double, dz=double, depth=double, right=double, up=double, scale=double)
+    cpdef (double, double) pixel(self, double x_m, double y_m, double z_m)
