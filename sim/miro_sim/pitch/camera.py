@@ -1,0 +1,400 @@
+"""The camera: robots and the scene behind them, sampled into windows of a picture.
+
+What belongs here: which paints a pixel sees, and assembling a window. What does not: what stands still (`scene`), how
+paints become bytes (`sensor`), which window is looked at (whoever asks).
+
+A pixel is 4 x 4 samples for each instant of the exposure. A sample's ray falls from the height of the robots' tops to
+the floor; in a robot's axes that is a straight line from `top` on by `fall`:
+
+    top of a robot     the line begins inside its square: nothing is higher, so nothing hides it
+    side of a robot    the line enters the square on its way down
+    else               the scene without robots, unless the ball hides the side
+
+Of several sides the highest is seen; where robots stand in
+each other, the first one is. All in um and integers. `fall` is taken at the middle of the pixel.
+
+A pixel whose samples are sure to see one paint is not sampled: if its middle sees that paint, and would still do so if
+all edges were nearer by `Rays.spread_um`. So any pixel gives the same bits in any window.
+
+Long because the kinds of surface share one coordinate frame and one way of being sure.
+"""
+
+from __future__ import annotations
+
+import math
+
+from miro_exact.dmath import sincos
+from miro_exact.rng import Stream
+from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
+from miro_host.eye.patterns import IDENTITIES, PATCH_MM, TEAMS, Pattern
+from miro_sim.pitch.paints import NUMBERS, packed
+from miro_sim.pitch.picture_settings import PictureSettings
+from miro_sim.pitch.rays import Rays, rays_of
+from miro_sim.pitch.scene import Scene
+from miro_sim.pitch.sensor import Sensor
+
+MOST_ROBOTS = 10
+FIELD_S = 1001.0 / 60000.0
+_SETS = 6  # at most: two fields of three instants
+_HALF_UM = 37_500
+_TOP_UM = 75_000
+_CORNER_UM = 53_034  # from the middle of a robot's top to its corner, rounded up
+_OUT = -1
+_UNSURE = -2
+_MIXED = 255
+_UNKNOWN = 254
+_WIDTH = 320
+_HEIGHT = 240
+_CORNERS = 321
+_MIDDLE_X_UM = 550_000
+_MIDDLE_Y_UM = 350_000
+_FAR_SQUARE = 625e9  # of the corner of the pitch from its middle, in um^2
+
+
+class Camera:
+    """A camera above the pitch; also the picture that it took last, a window at a time.
+
+    Bodies are put into the scene with `robot` and `ball`, then `begin` takes a frame of them, then any windows of it
+    may be read, in any order. Nothing of it is state: a frame is a function of where things stand and its number.
+    """
+
+    NOT_STATE = (
+        *(
+            "parameters",
+            "settings",
+            "pattern",
+            "rays",
+            "scene",
+            "sensor",
+            "width",
+            "height",
+            "falloff",
+            "sets",
+            "field_sets",
+        ),
+        *(
+            "side",
+            "black",
+            "team_u",
+            "team_v",
+            "identity_u",
+            "identity_v",
+            "patch_um",
+            "robots",
+            "team_paint",
+        ),
+        *("identity_paint", "x", "y", "cos", "sin", "near", "near_count", "code", "seen", "height_um"),
+    )
+
+    def __init__(
+        self, parameters: CameraParameters, settings: PictureSettings, pattern: Pattern, stream: Stream
+    ) -> None:
+        self.parameters = parameters
+        self.settings = settings
+        self.pattern = pattern
+        self.width = WIDTH
+        self.height = HEIGHT
+        self.rays: Rays = rays_of(parameters)
+        self.scene = Scene(self.rays, packed(settings.black_floor))
+        self.sensor = Sensor(settings, stream)
+        self.falloff = math.floor(settings.light_falloff * 4096.0 * 4503599627370496.0 / _FAR_SQUARE + 0.5)
+        self.field_sets = settings.sub_exposures
+        self.sets = settings.sub_exposures * settings.fields
+        self.side = NUMBERS["side"]
+        self.black = NUMBERS["top"]
+        self.team_u, self.team_v = (1000 * part for part in pattern.team_mm)
+        self.identity_u, self.identity_v = (1000 * part for part in pattern.identity_mm)
+        self.patch_um = 500 * PATCH_MM
+        self.robots = 0
+        self.team_paint = [0] * 10
+        self.identity_paint = [0] * 10
+        self.x = [0] * 60
+        self.y = [0] * 60
+        self.cos = [0] * 60
+        self.sin = [0] * 60
+        self.near = [0] * 10
+        self.near_count = 0
+        self.code = [0] * 60
+        self.seen = [0] * 16
+        self.height_um = [0] * 16
+
+    def __repr__(self) -> str:
+        return f"Camera({self.rays!r}, {self.robots} robots, {self.sensor!r})"
+
+    def clear(self) -> None:
+        """Takes all robots and the ball off the pitch."""
+        self.robots = 0
+        self.scene.take_ball()
+
+    def ball(self, x_m: float, y_m: float) -> None:
+        """Puts the ball on the floor, its centre above this place."""
+        self.scene.put_ball(_um(x_m), _um(y_m))
+
+    def robot(
+        self,
+        team: int,
+        identity: int,
+        x_m: float,
+        y_m: float,
+        theta_rad: float,
+        v_m_s: float = 0.0,
+        w_rad_s: float = 0.0,
+    ) -> None:
+        """Puts a robot on the pitch, as it stands at the middle of the (first) exposure; it goes on as it moves there.
+
+        Raises ValueError for the eleventh, and for a team or an identity that has no colour.
+        """
+        body = self.robots
+        if body >= MOST_ROBOTS:
+            raise ValueError(f"there is room for {MOST_ROBOTS} robots on the pitch")
+        if not (0 <= team < len(TEAMS) and 0 <= identity < len(IDENTITIES)):
+            raise ValueError(f"no robot {identity} of team {team} has colours")
+        self.team_paint[body] = NUMBERS[TEAMS[team]]
+        self.identity_paint[body] = NUMBERS[IDENTITIES[identity]]
+        for at in range(self.sets):
+            field = at // self.field_sets
+            share = (at % self.field_sets * 2 + 1) / (2.0 * self.field_sets) - 0.5
+            after_s = field * FIELD_S + share * self.settings.exposure_s
+            way_m = v_m_s * after_s
+            sine, cosine = sincos(theta_rad + 0.5 * w_rad_s * after_s)
+            place = body * _SETS + at
+            self.x[place] = _um(x_m + way_m * cosine)
+            self.y[place] = _um(y_m + way_m * sine)
+            sine, cosine = sincos(theta_rad + w_rad_s * after_s)
+            self.cos[place] = math.floor(cosine * 32768.0 + 0.5)
+            self.sin[place] = math.floor(sine * 32768.0 + 0.5)
+        self.robots = body + 1
+
+    def begin(self, frame: int, tick: int) -> None:
+        """Takes frame number `frame` (below 2^24) of what stands there now; `tick`: the middle of the exposure."""
+        self.sensor.begin(frame, tick, 16 * self.field_sets)
+
+    def window(self, left: int, top: int, width: int, height: int) -> bytearray:
+        """A window's pixels: see `miro_host.eye.frame`. Raises ValueError for one that is not inside the picture."""
+        if min(left, top, width - 1, height - 1) < 0 or left + width > _WIDTH or top + height > _HEIGHT:
+            raise ValueError(
+                f"window {width} x {height} at ({left}, {top}) is not inside {_WIDTH} x {_HEIGHT}"
+            )
+        out = bytearray(3 * width * height)
+        self._draw(left, top, width, height, out)
+        return out
+
+    def _draw(self, left: int, top: int, width: int, height: int, out: bytearray) -> None:
+        first = max(0, left - self.sensor.side)
+        end = min(_WIDTH, left + width + self.sensor.side)
+        self._gather(first, top, end - first, height)
+        for row in range(top, top + height):
+            for column in range(first, end):
+                pixel = row * _WIDTH + column
+                self.sensor.put(column, self._total(pixel), self._light(pixel))
+            self.sensor.write(row, left, width, out, 3 * width * (row - top))
+
+    def _light(self, pixel: int) -> int:
+        """How much of the light falls there, times 4096: less with the square of the distance from the middle."""
+        x = self.rays.middle_x[pixel] - _MIDDLE_X_UM
+        y = self.rays.middle_y[pixel] - _MIDDLE_Y_UM
+        lost = (x * x + y * y >> 20) * self.falloff >> 32
+        return 4096 - lost if lost < 4096 else 0
+
+    def _gather(self, left: int, top: int, width: int, height: int) -> None:
+        """Which bodies may be seen in the window: neighbouring pixels are no further apart than two spreads."""
+        pixel = (top + height // 2) * _WIDTH + left + width // 2
+        reach = (width // 2 + height // 2 + 3) * 2 * self.rays.spread_um + self.rays.longest_fall_um
+        self.near_count = 0
+        x = self.rays.middle_x[pixel]
+        y = self.rays.middle_y[pixel]
+        for body in range(self.robots):
+            for at in range(self.sets):
+                place = body * _SETS + at
+                far = reach + _CORNER_UM
+                if abs(self.x[place] - x) <= far and abs(self.y[place] - y) <= far:
+                    self.near[self.near_count] = body
+                    self.near_count += 1
+                    break
+
+    def _total(self, pixel: int) -> int:
+        """The paints of all samples of a pixel, added."""
+        scene = self.scene
+        if scene.paint[pixel] == _UNKNOWN:
+            scene.look(pixel)
+        seen = False
+        for index in range(self.near_count):
+            for at in range(self.sets):
+                code = self._code(self.near[index], at, pixel)
+                self.code[index * _SETS + at] = code
+                if code != _OUT:
+                    seen = True
+        if not seen:
+            return scene.total[pixel] * self.field_sets
+        total = 0
+        for at in range(self.sets):
+            total += self._instant(pixel, at)
+        return total
+
+    def _instant(self, pixel: int, at: int) -> int:
+        """The samples of one instant: all 16, or the 8 of its field."""
+        samples = 16 if self.sets == self.field_sets else 8
+        paint = _OUT
+        for index in range(self.near_count):
+            code = self.code[index * _SETS + at]
+            if code >= 0 and code != self.side and paint == _OUT:  # a top: nothing hides it
+                return self.scene.packed[code] * samples
+            if code != _OUT:
+                paint = code if paint == _OUT else _UNSURE
+        if paint >= 0 and not self.scene.near_ball(pixel):
+            return self.scene.packed[paint] * samples
+        if paint == _OUT and samples == 16:
+            return self.scene.total[pixel]
+        return self._samples(pixel, at)
+
+    def _passes(self, pixel: int, x: int, y: int, reach: int) -> bool:
+        """Whether lines through the pixel may come as near as `reach` to (x, y), looked at along each axis alone."""
+        far = reach + self.rays.spread_um
+        top_x = self.rays.middle_x[pixel] - x
+        top_y = self.rays.middle_y[pixel] - y
+        end_x = top_x + self.rays.fall_x[pixel]
+        end_y = top_y + self.rays.fall_y[pixel]
+        if (top_x > far and end_x > far) or (top_x < 0 - far and end_x < 0 - far):
+            return False
+        return not ((top_y > far and end_y > far) or (top_y < 0 - far and end_y < 0 - far))
+
+    def _code(self, body: int, at: int, pixel: int) -> int:
+        """The one paint of a robot that all samples of a pixel see, or _OUT, or _UNSURE."""
+        place = body * _SETS + at
+        if not self._passes(pixel, self.x[place], self.y[place], _CORNER_UM):
+            return _OUT
+        x = self.rays.middle_x[pixel] - self.x[place]
+        y = self.rays.middle_y[pixel] - self.y[place]
+        u = (x * self.cos[place] + y * self.sin[place]) >> 15
+        v = (y * self.cos[place] - x * self.sin[place]) >> 15
+        spread = self.rays.spread_um
+        away = max(abs(u), abs(v))
+        if away <= _HALF_UM - spread:
+            return self._sure_top(body, u, v)
+        x = self.rays.fall_x[pixel]
+        y = self.rays.fall_y[pixel]
+        fall_u = (x * self.cos[place] + y * self.sin[place]) >> 15
+        fall_v = (y * self.cos[place] - x * self.sin[place]) >> 15
+        if not _enters(u, v, fall_u, fall_v, _HALF_UM + spread):
+            return _OUT
+        if away > _HALF_UM + spread and _enters(u, v, fall_u, fall_v, _HALF_UM - spread):
+            return self.side
+        return _UNSURE
+
+    def _sure_top(self, body: int, u: int, v: int) -> int:
+        """The one paint around a place on the top, or _UNSURE."""
+        spread = self.rays.spread_um
+        away = max(abs(u - self.team_u), abs(v - self.team_v)) - self.patch_um
+        if away <= 0 - spread:
+            return self.team_paint[body]
+        other = max(abs(u - self.identity_u), abs(v - self.identity_v)) - self.patch_um
+        if other <= 0 - spread:
+            return self.identity_paint[body]
+        return self.black if away > spread and other > spread else _UNSURE
+
+    def _top(self, body: int, u: int, v: int) -> int:
+        """The paint of a place on the top."""
+        if max(abs(u - self.team_u), abs(v - self.team_v)) <= self.patch_um:
+            return self.team_paint[body]
+        if max(abs(u - self.identity_u), abs(v - self.identity_v)) <= self.patch_um:
+            return self.identity_paint[body]
+        return self.black
+
+    def _samples(self, pixel: int, at: int) -> int:
+        """The samples of a pixel at one instant, one by one."""
+        first, end = 0, 16
+        if self.sets != self.field_sets:
+            first = 8 * (at // self.field_sets)
+            end = first + 8
+        for sample in range(first, end):
+            self.seen[sample] = _OUT
+            self.height_um[sample] = -1
+        for index in range(self.near_count):
+            if self.code[index * _SETS + at] != _OUT:
+                self._see(self.near[index], at, pixel, first, end)
+        scene = self.scene
+        behind = scene.paint[pixel]
+        near_ball = scene.near_ball(pixel)
+        total = 0
+        for sample in range(first, end):
+            paint = self.seen[sample]
+            if paint == _OUT:
+                paint = behind if behind != _MIXED else scene.sample(pixel, sample)
+            elif near_ball and self.height_um[sample] < _TOP_UM:
+                ball = scene.ball_above(pixel, sample, self.height_um[sample])
+                paint = ball if ball >= 0 else paint
+            total += scene.packed[paint]
+        return total
+
+    def _see(self, body: int, at: int, pixel: int, first: int, end: int) -> None:
+        """What samples see of one robot, where it is higher than what they have seen."""
+        rays = self.rays
+        place = body * _SETS + at
+        cosine, sine = self.cos[place], self.sin[place]
+        a = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
+        c = a + _CORNERS
+        x = self.x[place]
+        y = self.y[place]
+        # The corners of the pixel in the robot's axes: a b above, c d below.
+        u_a = ((rays.top_x[a] - x) * cosine + (rays.top_y[a] - y) * sine) >> 15
+        v_a = ((rays.top_y[a] - y) * cosine - (rays.top_x[a] - x) * sine) >> 15
+        u_b = ((rays.top_x[a + 1] - x) * cosine + (rays.top_y[a + 1] - y) * sine) >> 15
+        v_b = ((rays.top_y[a + 1] - y) * cosine - (rays.top_x[a + 1] - x) * sine) >> 15
+        u_c = ((rays.top_x[c] - x) * cosine + (rays.top_y[c] - y) * sine) >> 15
+        v_c = ((rays.top_y[c] - y) * cosine - (rays.top_x[c] - x) * sine) >> 15
+        u_d = ((rays.top_x[c + 1] - x) * cosine + (rays.top_y[c + 1] - y) * sine) >> 15
+        v_d = ((rays.top_y[c + 1] - y) * cosine - (rays.top_x[c + 1] - x) * sine) >> 15
+        fall_u = (rays.fall_x[pixel] * cosine + rays.fall_y[pixel] * sine) >> 15
+        fall_v = (rays.fall_y[pixel] * cosine - rays.fall_x[pixel] * sine) >> 15
+        sample = first
+        while sample < end:
+            if sample & 3 == 0:  # a new row: from its left end to its right end, in 1/64
+                q = (sample >> 1) + 1
+                u = (u_a * (8 - q) + u_c * q) * 8
+                v = (v_a * (8 - q) + v_c * q) * 8
+                step_u = u_b * (8 - q) + u_d * q - (u >> 3)
+                step_v = v_b * (8 - q) + v_d * q - (v >> 3)
+                u += step_u
+                v += step_v
+            self._see_at(body, sample, u >> 6, v >> 6, fall_u, fall_v)
+            u += 2 * step_u
+            v += 2 * step_v
+            sample += 1
+
+    def _see_at(self, body: int, sample: int, u: int, v: int, fall_u: int, fall_v: int) -> None:
+        """What a sample sees of a robot whose axes its line begins at (u, v) of."""
+        if self.height_um[sample] == _TOP_UM:
+            return
+        if -_HALF_UM <= u <= _HALF_UM and -_HALF_UM <= v <= _HALF_UM:
+            self.seen[sample] = self._top(body, u, v)
+            self.height_um[sample] = _TOP_UM
+        elif _enters(u, v, fall_u, fall_v, _HALF_UM):
+            height = _entry(u, v, fall_u, fall_v)
+            if height > self.height_um[sample]:
+                self.seen[sample] = self.side
+                self.height_um[sample] = height
+
+
+def _um(metres: float) -> int:
+    return math.floor(metres * 1e6 + 0.5)
+
+
+def _enters(u: int, v: int, fall_u: int, fall_v: int, half: int) -> bool:
+    """Whether the line from (u, v) on by the fall meets the square of `half` around the origin (separating axes)."""
+    middle_u = 2 * u + fall_u
+    middle_v = 2 * v + fall_v
+    long_u = abs(fall_u)
+    long_v = abs(fall_v)
+    if abs(middle_u) > 2 * half + long_u or abs(middle_v) > 2 * half + long_v:
+        return False
+    return abs(middle_u * fall_v - middle_v * fall_u) <= 2 * half * (long_u + long_v)
+
+
+def _entry(u: int, v: int, fall_u: int, fall_v: int) -> int:
+    """The height at which such a line, which begins outside the square of a robot, enters it."""
+    latest = 0
+    if abs(u) > _HALF_UM and fall_u != 0:
+        latest = (abs(u) - _HALF_UM << 16) // abs(fall_u)
+    if abs(v) > _HALF_UM and fall_v != 0:
+        latest = max(latest, (abs(v) - _HALF_UM << 16) // abs(fall_v))
+    return _TOP_UM - (_TOP_UM * latest >> 16)

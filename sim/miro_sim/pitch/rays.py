@@ -1,0 +1,122 @@
+"""Where the corners of all pixels look, in integers: the camera's geometry, worked out once.
+
+What belongs here: rays, and how far apart they are. What does not: what they hit (`scene`, `camera`).
+
+       camera                        corner (i, j) of pixel (i, j), 321 x 241 of them
+         /\\                          slope: how far a ray goes for each unit that it falls, times 2^22
+        /  \\                         top: where it passes the height of the robots' tops, in um
+    ---/----\\---  robots' tops      fall: how much further it goes from there to the floor
+      /      \\
+    -/--------\\-  floor             A pixel is sampled on a grid of 4 x 4 points between its corners (bilinear).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
+from miro_host.eye.lens import Lens
+
+TOP_UM = 75_000
+_WIDTH = 320
+_HEIGHT = 240
+_CORNERS = 321
+_TOP_UM = 75_000
+_MARGIN_SPARE_UM = 4  # what rounding adds: a bilinear mean, and a turn into a robot's axes
+
+
+class Rays:
+    """The rays of one camera. Constant. All lengths in um, in the paper's axes.
+
+    `spread_um`: no sample of a pixel is further than this from the mean of its corners, on the floor and at the top,
+    rounding included. `longest_fall_um`: of all rays, from the top to the floor.
+    """
+
+    NOT_STATE = (
+        *("slope_x", "slope_y", "top_x", "top_y", "middle_x", "middle_y", "fall_x", "fall_y"),
+        *("x_um", "y_um", "height_um", "spread_um", "longest_fall_um"),
+    )
+
+    def __init__(self, parameters: CameraParameters) -> None:
+        lens = Lens(parameters)
+        self.x_um = _um(parameters.x_m)
+        self.y_um = _um(parameters.y_m)
+        self.height_um = _um(parameters.height_m)
+        self.slope_x = [0] * 77361
+        self.slope_y = [0] * 77361
+        self.top_x = [0] * 77361
+        self.top_y = [0] * 77361
+        self.middle_x = [0] * 76800
+        self.middle_y = [0] * 76800
+        self.fall_x = [0] * 76800
+        self.fall_y = [0] * 76800
+        self._cast(lens)
+        self._gather()
+        self.spread_um = self._spread()
+        self.longest_fall_um = self._longest_fall()
+
+    def __repr__(self) -> str:
+        return f"Rays(({self.x_um}, {self.y_um}, {self.height_um}) um, spread {self.spread_um} um)"
+
+    def _cast(self, lens: Lens) -> None:
+        drop = self.height_um - _TOP_UM
+        for j in range(_HEIGHT + 1):
+            for i in range(_WIDTH + 1):
+                lens.slopes(float(i), float(j))
+                x = math.floor(lens.out_x * 4194304.0 + 0.5)
+                y = math.floor(lens.out_y * 4194304.0 + 0.5)
+                corner = j * _CORNERS + i
+                self.slope_x[corner] = x
+                self.slope_y[corner] = y
+                self.top_x[corner] = self.x_um + (drop * x >> 22)
+                self.top_y[corner] = self.y_um + (drop * y >> 22)
+
+    def _gather(self) -> None:
+        """The means of each pixel's corners."""
+        for j in range(_HEIGHT):
+            for i in range(_WIDTH):
+                a = j * _CORNERS + i
+                c = a + _CORNERS
+                pixel = j * _WIDTH + i
+                x = self.slope_x[a] + self.slope_x[a + 1] + self.slope_x[c] + self.slope_x[c + 1]
+                y = self.slope_y[a] + self.slope_y[a + 1] + self.slope_y[c] + self.slope_y[c + 1]
+                self.fall_x[pixel] = _TOP_UM * x >> 24
+                self.fall_y[pixel] = _TOP_UM * y >> 24
+                x = self.top_x[a] + self.top_x[a + 1] + self.top_x[c] + self.top_x[c + 1]
+                y = self.top_y[a] + self.top_y[a + 1] + self.top_y[c] + self.top_y[c + 1]
+                self.middle_x[pixel] = (x + 2) >> 2
+                self.middle_y[pixel] = (y + 2) >> 2
+
+    def _spread(self) -> int:
+        """The longest way from a pixel's middle to one of its corners, both on the floor."""
+        widest = 0
+        for j in range(_HEIGHT):
+            for i in range(_WIDTH):
+                pixel = j * _WIDTH + i
+                for corner in range(4):
+                    at = (j + (corner >> 1)) * _CORNERS + i + (corner & 1)
+                    x = self.top_x[at] + (_TOP_UM * self.slope_x[at] >> 22)
+                    y = self.top_y[at] + (_TOP_UM * self.slope_y[at] >> 22)
+                    x -= self.middle_x[pixel] + self.fall_x[pixel]
+                    y -= self.middle_y[pixel] + self.fall_y[pixel]
+                    if x * x + y * y > widest:
+                        widest = x * x + y * y
+        return math.isqrt(widest) + 1 + _MARGIN_SPARE_UM
+
+    def _longest_fall(self) -> int:
+        longest = 0
+        for pixel in range(_WIDTH * _HEIGHT):
+            longest = max(longest, abs(self.fall_x[pixel]), abs(self.fall_y[pixel]))
+        return longest
+
+
+def _um(metres: float) -> int:
+    return math.floor(metres * 1e6 + 0.5)
+
+
+@lru_cache(maxsize=4)
+def rays_of(parameters: CameraParameters) -> Rays:
+    """The rays of a camera. Working them out takes longer than building a world: each camera has them once."""
+    assert (WIDTH, HEIGHT) == (_WIDTH, _HEIGHT)
+    return Rays(parameters)

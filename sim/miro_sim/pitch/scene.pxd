@@ -1,0 +1,38 @@
+cimport cython
+from miro_sim.pitch cimport rays
+
+cdef int _MIXED, _UNKNOWN, _CORNERS, _WIDTH
+cdef long long _WALL_HEIGHT_UM, _WALL_UM, _GOAL_HALF_UM, _GOAL_DEPTH_UM, _CORNER_UM, _LINE_HALF_UM
+cdef long long _CIRCLE_UM, _AREA_HALF_UM, _AREA_DEPTH_UM, _BALL_UM
+
+
+@cython.final
+cdef class Scene:
+    cdef readonly rays.Rays rays
+    cdef long long packed[32]
+    cdef unsigned char paint[76800]
+    cdef long long total[76800]
+    cdef long long middle_x, middle_y, half_x, half_y, ball_x, ball_y
+    cdef int floor, line, wall_top, wall_face, outside, ball_rim
+    cdef readonly bint has_ball
+
+    @cython.locals(pixel=int)
+    cdef void _forget(self) noexcept
+    @cython.locals(rays=rays.Rays, far='long long', top='long long', end='long long')
+    cdef bint near_ball(self, int pixel) noexcept
+    @cython.locals(first=int, paint=int, sample=int, plain=bint, total='long long')
+    cdef void look(self, int pixel) noexcept
+    @cython.locals(x='long long', y='long long', ring=int)
+    cdef int sample(self, int pixel, int sample) noexcept
+    @cython.locals(ring=int)
+    cdef int ball_above(self, int pixel, int sample, long long height) noexcept
+    @cython.locals(p=int, q=int, a=int, c=int, left='long long', right='long long')
+    cdef long long _slope(self, int* slopes, int pixel, int sample) noexcept
+    @cython.locals(rays=rays.Rays, drop='long long', x='long long', y='long long', along='long long',
+                   stretch='long long', distance='long long', rim='long long')
+    cdef int _ring(self, long long slope_x, long long slope_y, long long above) noexcept
+    @cython.locals(rays=rays.Rays, drop='long long', x='long long', y='long long', on_wall=bint)
+    cdef int paint_of(self, long long slope_x, long long slope_y) noexcept
+    cdef bint _inside(self, long long x, long long y) noexcept
+    @cython.locals(square='long long', inner='long long', outer='long long', depth='long long')
+    cdef bint _on_line(self, long long x, long long y) noexcept

@@ -1,0 +1,222 @@
+"""What stands still while the camera looks: floor, lines, goals, walls and the ball.
+
+What belongs here: which paint a ray hits, and the picture of all that. What does not: robots (`camera`).
+
+        +---------[ 40 cm goal is 15 cm deep ]--+
+        |/ 7 cm              |                 \\|      walls 5 cm high, 2.5 cm wide, white inside, black on top
+     +--+         circle     |                  +--+    lines 3 mm wide
+     |            r 25 cm    |                     |
+     +--+  goal area         |                  +--+   130 x 90 cm between the walls
+        |\\ 50 x 15 cm        |                 /|
+        +--------------------+------------------+
+
+Sizes: FIRA MiroSot game rules (law 1: playground, walls, corners, lines). Chosen: the triangles in the corners are as
+high and black as the walls; no penalty areas and no marks. The camera must hang above the pitch: outer faces of walls
+are not drawn.
+
+The ball lies on the floor. It is drawn as four rings, brighter towards its middle.
+
+A pixel's 16 samples are evaluated when it is first looked at, and kept until the ball comes or goes.
+"""
+
+from __future__ import annotations
+
+from miro_sim.pitch.ground import INSET_M, LENGTH_M, WIDTH_M
+from miro_sim.pitch.paints import NUMBERS
+from miro_sim.pitch.rays import Rays
+
+MIXED = 255
+UNKNOWN = 254
+_MIXED = 255
+_UNKNOWN = 254
+_CORNERS = 321
+_WIDTH = 320
+_WALL_HEIGHT_UM = 50_000
+_WALL_UM = 25_000
+_GOAL_HALF_UM = 200_000
+_GOAL_DEPTH_UM = 150_000
+_CORNER_UM = 70_000
+_LINE_HALF_UM = 1_500
+_BALL_UM = 21_350  # radius of a golf ball of 42.7 mm
+_CIRCLE_UM = 250_000
+_AREA_HALF_UM = 250_000
+_AREA_DEPTH_UM = 150_000
+
+
+class Scene:
+    """The scene without robots. `paint` of a pixel: a number, or MIXED; `total`: its 16 samples added."""
+
+    NOT_STATE = (
+        *("rays", "packed", "paint", "total", "middle_x", "middle_y", "half_x", "half_y"),
+        *("floor", "line", "wall_top", "wall_face", "outside", "ball_rim", "has_ball", "ball_x", "ball_y"),
+    )
+
+    def __init__(self, rays: Rays, packed: list[int]) -> None:
+        self.rays = rays
+        self.packed = [0] * 32
+        for number, paint in enumerate(packed):
+            self.packed[number] = paint
+        self.paint = [0] * 76800
+        self.total = [0] * 76800
+        for pixel in range(76800):
+            self.paint[pixel] = _UNKNOWN
+        self.half_x = round(LENGTH_M * 500_000.0)
+        self.half_y = round(WIDTH_M * 500_000.0)
+        self.middle_x = self.half_x - round(INSET_M * 1e6)
+        self.middle_y = self.half_y - round(INSET_M * 1e6)
+        self.floor = NUMBERS["floor"]
+        self.line = NUMBERS["line"]
+        self.wall_top = NUMBERS["wall top"]
+        self.wall_face = NUMBERS["wall face"]
+        self.outside = NUMBERS["outside"]
+        self.ball_rim = NUMBERS["ball rim"]
+        self.has_ball = False
+        self.ball_x = 0
+        self.ball_y = 0
+
+    def __repr__(self) -> str:
+        return f"Scene({self.rays!r}, ball={(self.ball_x, self.ball_y) if self.has_ball else None})"
+
+    def put_ball(self, x: int, y: int) -> None:
+        """Puts the ball on the floor, its centre above (x, y) in um; takes it away from where it was."""
+        if self.has_ball and (x, y) == (self.ball_x, self.ball_y):
+            return
+        self.take_ball()
+        self.has_ball = True
+        self.ball_x = x
+        self.ball_y = y
+        self._forget()
+
+    def take_ball(self) -> None:
+        """Takes the ball off the pitch."""
+        if self.has_ball:
+            self._forget()
+            self.has_ball = False
+
+    def _forget(self) -> None:
+        """Where the ball may be seen, the picture has to be made again."""
+        for pixel in range(76800):
+            if self.near_ball(pixel):
+                self.paint[pixel] = _UNKNOWN
+
+    def near_ball(self, pixel: int) -> bool:
+        """Whether the ball may be seen in a pixel: looked at along each axis alone."""
+        if not self.has_ball:
+            return False
+        rays = self.rays
+        far = _BALL_UM + rays.spread_um
+        top = rays.middle_x[pixel] - self.ball_x
+        end = top + rays.fall_x[pixel]
+        if (top > far and end > far) or (top < 0 - far and end < 0 - far):
+            return False
+        top = rays.middle_y[pixel] - self.ball_y
+        end = top + rays.fall_y[pixel]
+        return not ((top > far and end > far) or (top < 0 - far and end < 0 - far))
+
+    def look(self, pixel: int) -> None:
+        """Fills `paint` and `total` of a pixel."""
+        first = -1
+        total = 0
+        plain = True
+        for sample in range(16):
+            paint = self.sample(pixel, sample)
+            if first < 0:
+                first = paint
+            elif paint != first:
+                plain = False
+            total += self.packed[paint]
+        self.total[pixel] = total
+        self.paint[pixel] = first if plain else _MIXED
+
+    def sample(self, pixel: int, sample: int) -> int:
+        """The paint that sample 0 to 15 of a pixel hits, row by row."""
+        x = self._slope(self.rays.slope_x, pixel, sample)
+        y = self._slope(self.rays.slope_y, pixel, sample)
+        if self.has_ball:
+            ring = self._ring(x, y, 0)
+            if ring >= 0:
+                return self.ball_rim + ring
+        return self.paint_of(x, y)
+
+    def ball_above(self, pixel: int, sample: int, height: int) -> int:
+        """The paint of the ball if that sample sees it at this height or above, or -1."""
+        ring = self._ring(
+            self._slope(self.rays.slope_x, pixel, sample),
+            self._slope(self.rays.slope_y, pixel, sample),
+            height,
+        )
+        return self.ball_rim + ring if ring >= 0 else -1
+
+    def _slope(self, slopes: list[int], pixel: int, sample: int) -> int:
+        """Between the corners of a pixel, at a sample."""
+        p = 2 * (sample & 3) + 1
+        q = 2 * (sample >> 2) + 1
+        a = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
+        c = a + _CORNERS
+        left = slopes[a] * (8 - q) + slopes[c] * q
+        right = slopes[a + 1] * (8 - q) + slopes[c + 1] * q
+        return (left * (8 - p) + right * p) >> 6
+
+    def _ring(self, slope_x: int, slope_y: int, above: int) -> int:
+        """The ring of the ball, 0 to 3 from the rim, that a ray sees; -1 if it misses it or passes it below `above`.
+
+        With e from the centre to the ray in the plane of the centre, and s the slopes: the ray passes the centre at the
+        distance d, d^2 (1 + s^2) = e^2 (1 + s^2) - (e s)^2; it is nearest to it e s / (1 + s^2) below that plane.
+        """
+        rays = self.rays
+        drop = rays.height_um - _BALL_UM
+        x = rays.x_um + (drop * slope_x >> 22) - self.ball_x
+        y = rays.y_um + (drop * slope_y >> 22) - self.ball_y
+        if max(abs(x), abs(y)) > 2 * _BALL_UM:
+            return -1
+        slope_x >>= 10  # 12 fraction bits
+        slope_y >>= 10
+        along = x * slope_x + y * slope_y
+        stretch = (1 << 24) + slope_x * slope_x + slope_y * slope_y
+        distance = (x * x + y * y) * stretch - along * along
+        rim = _BALL_UM * _BALL_UM * stretch
+        if distance > rim or _BALL_UM - (along << 12) // stretch < above:
+            return -1
+        return 3 - 4 * (distance - 1) // rim if distance > 0 else 3
+
+    def paint_of(self, slope_x: int, slope_y: int) -> int:
+        """The paint that the ray of these slopes hits."""
+        rays = self.rays
+        drop = rays.height_um - _WALL_HEIGHT_UM
+        x = abs(rays.x_um + (drop * slope_x >> 22) - self.middle_x)
+        y = abs(rays.y_um + (drop * slope_y >> 22) - self.middle_y)
+        if not self._inside(x, y):
+            on_wall = (x <= self.half_x + _WALL_UM and y <= self.half_y + _WALL_UM) or (
+                x <= self.half_x + _GOAL_DEPTH_UM + _WALL_UM and y <= _GOAL_HALF_UM + _WALL_UM
+            )
+            return self.wall_top if on_wall else self.outside
+        drop = rays.height_um
+        x = abs(rays.x_um + (drop * slope_x >> 22) - self.middle_x)
+        y = abs(rays.y_um + (drop * slope_y >> 22) - self.middle_y)
+        if not self._inside(x, y):
+            return self.wall_face
+        return self.line if self._on_line(x, y) else self.floor
+
+    def _inside(self, x: int, y: int) -> bool:
+        """Whether a place (distances from the middle) is between the walls or in a goal."""
+        if y <= _GOAL_HALF_UM and x <= self.half_x + _GOAL_DEPTH_UM:
+            return True
+        if x > self.half_x or y > self.half_y:
+            return False
+        return x + y <= self.half_x + self.half_y - _CORNER_UM
+
+    def _on_line(self, x: int, y: int) -> bool:
+        """Middle line, circle, goal areas and goal lines."""
+        if x <= _LINE_HALF_UM:
+            return True
+        square = x * x + y * y
+        inner = _CIRCLE_UM - _LINE_HALF_UM
+        outer = _CIRCLE_UM + _LINE_HALF_UM
+        if inner * inner <= square <= outer * outer:
+            return True
+        depth = self.half_x - x
+        if y <= _GOAL_HALF_UM and abs(depth) <= _LINE_HALF_UM:
+            return True
+        if abs(depth - _AREA_DEPTH_UM) <= _LINE_HALF_UM and y <= _AREA_HALF_UM + _LINE_HALF_UM:
+            return True
+        return abs(y - _AREA_HALF_UM) <= _LINE_HALF_UM and 0 <= depth <= _AREA_DEPTH_UM

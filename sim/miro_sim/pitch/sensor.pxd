@@ -1,0 +1,36 @@
+cimport cython
+from miro_exact cimport dmath, rng
+
+cdef long long _MASK, _FRAME_BLOCKS, _LINE_BLOCKS, _FULL
+cdef int _BITS, _WIDTH, _GREY
+
+
+@cython.final
+cdef class Sensor:
+    cdef readonly object settings
+    cdef readonly rng.Stream stream
+    cdef long long frame, scale, offset, jitter
+    cdef readonly int reach, side
+    cdef int shift, half
+    cdef int taps[9]
+    cdef int gamma[4096]
+    cdef short luma_noise[4096]
+    cdef short chroma_noise[4096]
+    cdef int y[320]
+    cdef int cb[320]
+    cdef int cr[320]
+
+    cpdef begin(self, long long frame, long long tick, int samples)
+    @cython.locals(red=int, green=int, blue=int)
+    cdef void put(self, int column, long long total, long long light) noexcept
+    @cython.locals(value='long long')
+    cdef int _shown(self, long long total, long long light) noexcept
+    @cython.locals(first='long long', column=int, part=int, word='unsigned int', last='unsigned int', y=int, cb=int, cr=int)
+    cdef void write(self, int row, int left, int width, unsigned char[::1] out, int at) noexcept
+    @cython.locals(total='long long', step=int, low=int, high=int)
+    cdef int _limited(self, int* values, int column) noexcept
+    cdef int _byte(self, int value) noexcept
+    @cython.locals(block='long long', part=int, word='unsigned long long', by='long long', first=int, last=int)
+    cdef void _shake(self, int row, int left, int width) noexcept
+    @cython.locals(column=int, after=int, before=int)
+    cdef void _move(self, int* values, int first, int last, long long by) noexcept

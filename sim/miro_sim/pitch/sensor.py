@@ -1,0 +1,204 @@
+"""From light to the grabber's bytes, a line at a time: brightness, gamma, composite video, noise, quantisation.
+
+What belongs here: what happens to a pixel after it is known which paints it sees. What does not: geometry (`rays`), and
+what is in the picture (`scene`, `camera`).
+
+    sum of paints -> falloff, flicker, gain, offset -> gamma -> Y Cb Cr -> line jitter -> chroma low-pass
+                  -> + noise of this pixel and frame -> quantised to `bits` -> Y, Cb, Cr bytes
+
+Values between gamma and bytes have four fraction bits. Y Cb Cr: ITU-R BT.601, full range (JFIF). The low-pass is a
+Gaussian whose gain at the bandwidth is -3 dB; the 320 pixels of a line take 52.66 us (the active line of NTSC).
+Noise is added after it, white, one draw of 12 bits for each of Y, Cb, Cr: any pixel can be worked out alone.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+
+from miro_exact import rng
+from miro_exact.dmath import exp, log, sincos
+from miro_exact.rng import Stream
+from miro_sim.pitch.picture_settings import PictureSettings
+
+PIXELS_PER_SECOND = 320.0 / 52.66e-6
+MOST_TAPS = 8
+"""On either side of a pixel."""
+_FULL = 4095
+_BITS = 21
+_MASK = (1 << 21) - 1
+_FRAME_BLOCKS = 1 << 15
+_LINE_BLOCKS = 107
+_TICKS = 24_000_000
+_DRAWS = 4096
+_WIDTH = 320
+_GREY = 2048  # no colour, with four fraction bits
+
+
+def _normals() -> list[int]:
+    """4096 quantiles of a standard normal, in the middle of as many equal shares, times 65536."""
+    found = []
+    for step in range(_DRAWS // 2):
+        magnitude = (2 * step + 1) << 51
+        cell = bisect_right(rng.HALF_NORMAL, magnitude) - 1
+        low, high = rng.HALF_NORMAL[cell], rng.HALF_NORMAL[cell + 1]
+        fraction = float(magnitude - low) / float(high - low)
+        middle = (float(cell) + 0.5) * 0.0625
+        place = fraction - 0.03125 * middle * fraction * (1.0 - fraction)
+        found.append(math.floor((float(cell) + place) * 4096.0 + 0.5))
+    return found + [0 - value for value in found]
+
+
+def _taps(bandwidth_hz: float) -> list[int]:
+    """The low-pass from its middle outwards, in 1/65536; both sides and the middle add up to 65536."""
+    if bandwidth_hz == 0.0:
+        return [65536]
+    share = bandwidth_hz / PIXELS_PER_SECOND
+    variance = 0.34657359027997264 / (19.739208802178716 * share * share)  # ln 2 / 2, 2 pi^2
+    reach = min(MOST_TAPS, math.floor(3.0 * math.sqrt(variance)) + 1)
+    weights = [exp(0.0 - float(step * step) / (2.0 * variance)) for step in range(reach + 1)]
+    total = weights[0]
+    for weight in weights[1:]:
+        total += 2.0 * weight
+    taps = [math.floor(65536.0 * weight / total) for weight in weights]
+    both_sides = 0
+    for tap in taps[1:]:
+        both_sides += 2 * tap
+    return [65536 - both_sides, *taps[1:]]
+
+
+class Sensor:
+    """Sensor, cable and grabber of one camera. `stream` is the source of its noise. Holds one line; no state."""
+
+    NOT_STATE = (
+        *("settings", "stream", "frame", "scale", "offset", "reach", "side", "taps", "shift", "half"),
+        *("jitter", "gamma", "luma_noise", "chroma_noise", "y", "cb", "cr"),
+    )
+
+    def __init__(self, settings: PictureSettings, stream: Stream) -> None:
+        self.settings = settings
+        self.stream = stream
+        self.frame = 0
+        self.scale = 0
+        self.offset = math.floor(settings.offset * 4095.0 + 0.5)
+        taps = _taps(settings.chroma_bandwidth_hz)
+        self.reach = len(taps) - 1
+        self.taps = [0] * 9
+        for step, tap in enumerate(taps):
+            self.taps[step] = tap
+        self.jitter = math.floor(settings.line_jitter_px * 256.0 + 0.5)
+        self.side = self.reach + (1 if self.jitter else 0)
+        self.shift = 8 - settings.bits
+        self.half = (1 << self.shift) >> 1
+        self.gamma = [0] * 4096
+        for value in range(1, 4096):
+            self.gamma[value] = math.floor(4080.0 * exp(settings.gamma * log(value / 4095.0)) + 0.5)
+        self.luma_noise = [0] * 4096
+        self.chroma_noise = [0] * 4096
+        for draw, normal in enumerate(_normals()):
+            self.luma_noise[draw] = math.floor(normal * settings.luma_noise / 4096.0 + 0.5)
+            self.chroma_noise[draw] = math.floor(normal * settings.chroma_noise / 4096.0 + 0.5)
+        self.y = [0] * 320
+        self.cb = [0] * 320
+        self.cr = [0] * 320
+
+    def __repr__(self) -> str:
+        return f"Sensor({self.settings!r}, {self.stream!r}, frame={self.frame})"
+
+    def begin(self, frame: int, tick: int, samples: int) -> None:
+        """A new frame, whose exposure has its middle at `tick`; a pixel is a sum of so many samples."""
+        self.frame = frame
+        light = self.settings.gain * self._lamps(tick) / samples
+        self.scale = math.floor(light * 16777216.0 + 0.5)
+
+    def _lamps(self, tick: int) -> float:
+        """The mean light of the lamps during the exposure; 1 on average over time."""
+        twice_hz = 2 * self.settings.mains_hz
+        turns = self.settings.exposure_s * twice_hz
+        phase = float(tick * twice_hz % _TICKS) / _TICKS
+        sine_end, _ = sincos(6.283185307179586 * (phase + 0.5 * turns))
+        sine_begin, cosine = sincos(6.283185307179586 * (phase - 0.5 * turns))
+        mean = (sine_end - sine_begin) / (6.283185307179586 * turns) if turns > 0.0 else cosine
+        return 1.0 + self.settings.flicker * mean
+
+    def put(self, column: int, total: int, light: int) -> None:
+        """A pixel of the line: its paints added (packed), and the share of light that falls there, times 4096."""
+        red = self._shown(total & _MASK, light)
+        green = self._shown(total >> _BITS & _MASK, light)
+        blue = self._shown(total >> 2 * _BITS, light)
+        self.y[column] = (77 * red + 150 * green + 29 * blue + 128) >> 8
+        self.cb[column] = _GREY + ((0 - 43 * red - 85 * green + 128 * blue + 128) >> 8)
+        self.cr[column] = _GREY + ((128 * red - 107 * green - 21 * blue + 128) >> 8)
+
+    def _shown(self, total: int, light: int) -> int:
+        value = ((total * light >> 12) * self.scale >> 24) + self.offset
+        return self.gamma[value if value < _FULL else _FULL]
+
+    def write(self, row: int, left: int, width: int, out: bytearray, at: int) -> None:
+        """The bytes of the line's pixels from `left` on into `out` from `at` on; `side` more were put on each side."""
+        if self.jitter:
+            self._shake(row, left, width)
+        first = self.frame * _FRAME_BLOCKS + row * _LINE_BLOCKS
+        for column in range(left, left + width):
+            self.stream.load(first + column // 3)
+            part = column % 3
+            word = self.stream.w0 if part == 0 else (self.stream.w1 if part == 1 else self.stream.w2)
+            last = word >> 24 | (self.stream.w3 >> 4 * part & 15) << 8
+            y = self.y[column] + self.luma_noise[word & 4095]
+            cb = self._limited(self.cb, column) + self.chroma_noise[word >> 12 & 4095]
+            cr = self._limited(self.cr, column) + self.chroma_noise[last]
+            out[at] = self._byte(y)
+            out[at + 1] = self._byte(cb)
+            out[at + 2] = self._byte(cr)
+            at += 3
+
+    def _limited(self, values: list[int], column: int) -> int:
+        """Chroma after the low-pass; beyond the picture it goes on as at its border."""
+        total = values[column] * self.taps[0]
+        if column >= self.reach and column + self.reach < _WIDTH:
+            for step in range(1, self.reach + 1):
+                total += (values[column - step] + values[column + step]) * self.taps[step]
+        else:
+            for step in range(1, self.reach + 1):
+                low = column - step if column >= step else 0
+                high = column + step if column + step < _WIDTH else _WIDTH - 1
+                total += (values[low] + values[high]) * self.taps[step]
+        return total >> 16
+
+    def _byte(self, value: int) -> int:
+        """A value with four fraction bits as the grabber's byte: rounded, limited, then the bits that it has."""
+        value = (value + 8) >> 4
+        value = 0 if value < 0 else (255 if value > 255 else value)
+        if self.shift:
+            value = (value >> self.shift << self.shift) + self.half
+        return value
+
+    def _shake(self, row: int, left: int, width: int) -> None:
+        """Moves the line by its jitter, up to a pixel either way, between neighbouring pixels linearly."""
+        block = self.frame * _FRAME_BLOCKS + 240 * _LINE_BLOCKS + row // 4
+        self.stream.load(block)
+        part = row % 4
+        word = self.stream.w0
+        if part == 1:
+            word = self.stream.w1
+        elif part == 2:
+            word = self.stream.w2
+        elif part == 3:
+            word = self.stream.w3
+        by = ((word >> 16) * (2 * self.jitter + 1) >> 16) - self.jitter
+        first = left - self.reach if left > self.reach else 0
+        last = min(left + width + self.reach, _WIDTH) - 1
+        self._move(self.y, first, last, by)
+        self._move(self.cb, first, last, by)
+        self._move(self.cr, first, last, by)
+
+    def _move(self, values: list[int], first: int, last: int, by: int) -> None:
+        """Each value becomes that `by`/256 pixels to its right; beyond the picture it is as at its border."""
+        if by >= 0:
+            for column in range(first, last + 1):
+                after = values[column + 1 if column + 1 < _WIDTH else column]
+                values[column] += (after - values[column]) * by >> 8
+        else:
+            for column in range(last, first - 1, -1):
+                before = values[column - 1 if column > 0 else column]
+                values[column] += (before - values[column]) * (0 - by) >> 8
