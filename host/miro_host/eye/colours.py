@@ -1,0 +1,170 @@
+"""Which colours the tracker knows, as the camera shows them: classes, and the table from a pixel to its class.
+
+What belongs here: mean and spread of each colour from sampled pixels, the rule that makes a pixel of a class, and the
+table of 65536 entries built from it. What does not: where the samples come from, and regions (`regions`).
+
+The classes' numbers are fixed: 1 is the first of `patterns.COLOURS`, 0 is none. A pixel belongs to the class with the
+nearest hue (direction of its chroma) if its chroma, projected on the class's mean, has at least `least_chroma` of the
+mean's length, and its Y at least `least_luma` of the mean's. Half the length is where a patch covers half a pixel.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from miro_host.eye.eye_file import EyeError, text
+from miro_host.eye.patterns import COLOURS
+from miro_host.eye.regions import TABLE_SIZE
+
+CLASS_OF = {name: number for number, name in enumerate(COLOURS, start=1)}
+"""Number of a colour's class."""
+
+SIGMAS = 2.5
+"""Two hues overlap if their border is nearer to a mean than this many times the spread of its samples."""
+LEAST_CHROMA = 10.0
+"""Levels: a mean chroma shorter than this is grey."""
+
+Level = Annotated[float, Meta(ge=0.0, le=255.0)]
+Share = Annotated[float, Meta(gt=0.0, le=1.0)]
+
+
+class ColourMean(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A colour as measured: means of Y, Cb, Cr (0 to 255, Cb and Cr 128 for grey), rms distance of chroma from them."""
+
+    y: Level
+    cb: Level
+    cr: Level
+    spread: Annotated[float, Meta(ge=0.0, le=255.0)] = 0.0
+
+    def chroma(self) -> tuple[int, int]:
+        """Cb - 128 and Cr - 128 in 1/16 level."""
+        return _sixteenths(self.cb - 128.0), _sixteenths(self.cr - 128.0)
+
+
+class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The classes of some or all of `patterns.COLOURS`, by name. Raises ValueError for colours that overlap."""
+
+    colours: dict[str, ColourMean]
+    least_chroma: Share = 0.5
+    least_luma: Share = 0.25
+
+    def __post_init__(self) -> None:
+        problem = _problem(self.colours)
+        if problem is not None:
+            raise ValueError(f"colours.{problem[0]}: {problem[1]}; {problem[2]}")
+
+    def text(self) -> str:
+        """As TOML, which `eye_file.read` takes."""
+        return text(self)
+
+    def chroma(self, name: str) -> tuple[int, int]:
+        """Mean Cb - 128 and Cr - 128 of a colour in 1/16 level. Raises EyeError for one without a class."""
+        if name not in self.colours:
+            raise EyeError("", f"colours.{name}", "no class of this colour", "sample it")
+        return self.colours[name].chroma()
+
+    def table(self) -> bytes:
+        """Class by Y >> 4, Cb >> 2, Cr >> 2, as `Regions` takes it: decided in the middle of each cell."""
+        classes = []
+        for name, mean in self.colours.items():
+            cb, cr = mean.chroma()
+            classes.append((CLASS_OF[name], float(cb), float(cr), math.sqrt(float(cb * cb + cr * cr))))
+        least_y = {CLASS_OF[name]: self.least_luma * mean.y for name, mean in self.colours.items()}
+        found = bytearray(TABLE_SIZE)
+        for cell in range(4096):
+            number = self._of_chroma(64.0 * (cell >> 6) - 2016.0, 64.0 * (cell & 63) - 2016.0, classes)
+            for luma in range(16):
+                if number and 16.0 * luma + 8.0 >= least_y[number]:
+                    found[luma << 12 | cell] = number
+        return bytes(found)
+
+    def _of_chroma(self, cb: float, cr: float, classes: Sequence[tuple[int, float, float, float]]) -> int:
+        """Class of a chroma in 1/16 level around grey, 0 for none. `classes`: number, mean Cb, Cr, their length."""
+        number, nearest = 0, 0.0
+        for candidate, mean_cb, mean_cr, length in classes:
+            along = (
+                cb * mean_cb + cr * mean_cr
+            ) / length  # cosine to the class's hue, times the pixel's chroma
+            if along > nearest:
+                number, nearest = (candidate if along >= self.least_chroma * length else 0), along
+        return number
+
+
+def classes_of(
+    samples: Mapping[str, Sequence[tuple[int, int, int]]], origin: str = "colours"
+) -> ColourClasses:
+    """Classes from sampled pixels (Y, Cb, Cr) by colour name.
+
+    Raises EyeError for an unknown colour, none or too few samples, grey samples, and colours that overlap.
+    """
+    means = {}
+    for name, pixels in samples.items():
+        if len(pixels) < 4:
+            what = f"{len(pixels)} sampled pixels"
+            raise EyeError(origin, f"colours.{name}", what, "sample at least 4, better a whole patch")
+        means[name] = _mean(pixels)
+    problem = _problem(means)
+    if problem is not None:
+        raise EyeError(origin, f"colours.{problem[0]}", problem[1], problem[2])
+    return ColourClasses(colours=means)
+
+
+def _mean(pixels: Sequence[tuple[int, int, int]]) -> ColourMean:
+    """Means to 1/16 level, from integer sums."""
+    count = len(pixels)
+    y, cb, cr, squares = 0, 0, 0, 0
+    for pixel in pixels:
+        y += pixel[0]
+        cb += pixel[1]
+        cr += pixel[2]
+        squares += pixel[1] * pixel[1] + pixel[2] * pixel[2]
+    variance = (squares * count - cb * cb - cr * cr) / (count * count)
+    means = [(32 * total + count) // (2 * count) / 16.0 for total in (y, cb, cr)]
+    spread = _sixteenths(math.sqrt(variance)) / 16.0
+    return ColourMean(y=means[0], cb=means[1], cr=means[2], spread=spread)
+
+
+def _sixteenths(x: float) -> int:
+    return math.floor(16.0 * x + 0.5)
+
+
+def _problem(means: Mapping[str, ColourMean]) -> tuple[str, str, str] | None:
+    """Name, what and remedy of the first colour that cannot be told apart."""
+    if not means:
+        return "", "there is no colour", "sample the team's colour and the identities'"
+    for name, mean in means.items():
+        if name not in CLASS_OF:
+            return name, "unknown colour", f"use {', '.join(COLOURS)}"
+        if _length(mean) < LEAST_CHROMA:
+            return name, "the samples are grey", "sample inside the patch, or use a stronger paint"
+    names = list(means)
+    for index, one in enumerate(names):
+        for other in names[:index]:
+            if _overlap(means[one], means[other]):
+                what = f"cannot be told from {other}: hues too near for the noise in the samples"
+                return (
+                    one,
+                    what,
+                    "use another paint for one of them, more light, or sample inside the patches",
+                )
+    return None
+
+
+def _overlap(one: ColourMean, other: ColourMean) -> bool:
+    """Whether noise takes samples of one across the line of equal hue distance, the bisector of both directions."""
+    first, second = _length(one), _length(other)
+    dx = (one.cb - 128.0) / first - (other.cb - 128.0) / second
+    dy = (one.cr - 128.0) / first - (other.cr - 128.0) / second
+    sine = 0.5 * math.sqrt(dx * dx + dy * dy)  # of half the angle between the hues
+    spread = max(one.spread, other.spread, 1.0)
+    return sine * min(first, second) < SIGMAS * spread / math.sqrt(2.0)
+
+
+def _length(mean: ColourMean) -> float:
+    cb, cr = mean.cb - 128.0, mean.cr - 128.0
+    return math.sqrt(cb * cb + cr * cr)

@@ -1,0 +1,44 @@
+cimport cython
+from miro_host.eye.lens cimport Lens
+from miro_host.eye.regions cimport Regions
+
+cdef int _MOST, _TEAMS, _IDENTITIES
+cdef double _FAR
+
+
+@cython.final
+cdef class Patches:
+    cdef readonly Lens lens
+    cdef readonly Regions regions
+    cdef double z_m, least_m, most_m
+    cdef readonly int least_area, most_area
+    cdef readonly int count, left, top, expected
+    cdef int index[170]
+    cdef double x_m[170]
+    cdef double y_m[170]
+    cdef double expect_x[4]
+    cdef double expect_y[4]
+    cdef readonly int out_pairs, out_team, out_identity, out_contested
+    cdef readonly double out_off_m, out_next_m, out_gap_m
+
+    @cython.locals(region=int)
+    cpdef int look(self, bytearray pixels, int left, int top, int width, int height) except -1
+    @cython.locals(u=double, v=double, x_m=double, y_m=double)
+    cdef void place(self, int region) except *
+    @cython.locals(area=int)
+    cdef bint is_patch(self, int region) noexcept
+    cpdef expect_nothing(self)
+    @cython.locals(at=int)
+    cpdef expect(self, double team_x, double team_y, double identity_x, double identity_y)
+    @cython.locals(one=int, other=int)
+    cpdef int choose(self, int team, int identity) except -1
+    @cython.locals(region=int)
+    cdef bint is_whole(self, int patch, int kind) noexcept
+    @cython.locals(dx=double, dy=double, square=double)
+    cdef bint fits(self, int one, int other) noexcept
+    @cython.locals(off=double, dx=double, dy=double)
+    cdef void take(self, int one, int other) noexcept
+    @cython.locals(least=double, at=int, tx=double, ty=double, ix=double, iy=double, off=double)
+    cdef double off_m(self, int team, int identity) noexcept
+    @cython.locals(of_team=bint, found=int, other=int)
+    cdef int partners(self, int patch) noexcept

@@ -1,0 +1,178 @@
+"""Pairs of patches in one window: which regions can be the top of a robot.
+
+What belongs here: regions of a patch's size and their place on the plane of the robots' tops, pairs of a team patch and
+an identity patch at the pattern's distance, and the pair nearest to where the robot is expected. What does not: where
+to look, what to make of an ambiguous pair, postures (`tracker`).
+
+A region is a patch if its area is between `least_area` and `most_area`. It is whole if it does not touch the border of
+the window; only whole patches make a pair. A pair is contested if one of its patches could also belong to a patch of
+another robot: any team's or identity's colour at the pattern's distance, whole or not.
+
+How far a pair is from an expected posture is the root mean square of the distances of its two patches from their
+expected places; it includes the heading. Of several expected postures the nearest counts.
+"""
+
+from __future__ import annotations
+
+import math
+
+from miro_host.eye.lens import Lens
+from miro_host.eye.regions import Regions
+
+_MOST = 170  # patches of a window: 4096 pixels, at least 24 each
+_TEAMS = 2  # classes 1 and 2 are the teams', 3 to 7 the identities'
+_IDENTITIES = 7
+_FAR = 1.0e9
+
+
+class Patches:
+    """Reads windows. `look` finds the patches, `choose` the pair; results stay in the fields `out_`.
+
+    `out_pairs`: pairs at the pattern's distance. `out_team`, `out_identity`: regions of the nearest. `out_off_m`: its
+    distance from what is expected, `out_next_m`: that of the second. `out_contested`: see above. `out_gap_m`: distance
+    of its two patches.
+    """
+
+    NOT_STATE = (
+        *("lens", "regions", "z_m", "least_m", "most_m", "least_area", "most_area"),
+        *("count", "index", "x_m", "y_m", "left", "top", "expected", "expect_x", "expect_y"),
+        *("out_pairs", "out_team", "out_identity", "out_off_m", "out_next_m", "out_contested", "out_gap_m"),
+    )
+
+    def __init__(
+        self,
+        lens: Lens,
+        regions: Regions,
+        z_m: float,
+        distances_m: tuple[float, float],
+        areas: tuple[int, int],
+    ) -> None:
+        """Patches lie `z_m` above the floor; least and most of a pair's distance in m and of a patch's area in px."""
+        self.lens = lens
+        self.regions = regions
+        self.z_m = z_m
+        self.least_m = distances_m[0]
+        self.most_m = distances_m[1]
+        self.least_area = areas[0]
+        self.most_area = areas[1]
+        self.count = self.left = self.top = self.expected = 0
+        self.index = [0] * 170
+        self.x_m = [0.0] * 170
+        self.y_m = [0.0] * 170
+        self.expect_x = [0.0] * 4
+        self.expect_y = [0.0] * 4
+        self.out_pairs = 0
+        self.out_team = self.out_identity = -1
+        self.out_off_m = self.out_next_m = self.out_gap_m = 0.0
+        self.out_contested = 0
+
+    def __repr__(self) -> str:
+        return f"Patches({self.count} in {self.regions!r} at ({self.left}, {self.top}))"
+
+    def look(self, pixels: bytearray, left: int, top: int, width: int, height: int) -> int:
+        """Finds the patches in a window of the picture; returns their number. Raises ValueError as `Regions` does."""
+        self.regions.find(pixels, width, height)
+        self.left = left
+        self.top = top
+        self.count = 0
+        for region in range(self.regions.count):
+            if self.regions.kind[region] <= _IDENTITIES and self.is_patch(region) and self.count < _MOST:
+                self.place(region)
+        return self.count
+
+    def place(self, region: int) -> None:
+        """Adds a patch, unless the lens could not draw it where it is."""
+        u = self.left + 0.5 * self.regions.sum_u[region] / self.regions.area[region]
+        v = self.top + 0.5 * self.regions.sum_v[region] / self.regions.area[region]
+        try:
+            x_m, y_m = self.lens.ground(u, v, self.z_m)
+        except ValueError:
+            return
+        self.index[self.count] = region
+        self.x_m[self.count] = x_m
+        self.y_m[self.count] = y_m
+        self.count += 1
+
+    def is_patch(self, region: int) -> bool:
+        """Whether a region has the size of a patch; half of it is enough for one that is cut off."""
+        area = self.regions.area[region]
+        if self.regions.touches[region]:
+            area += area
+        return self.least_area <= area and self.regions.area[region] <= self.most_area
+
+    def expect_nothing(self) -> None:
+        """Any pair is as good as any other."""
+        self.expected = 0
+
+    def expect(self, team_x: float, team_y: float, identity_x: float, identity_y: float) -> None:
+        """Adds a posture that is expected, by the places of its patches in m. The third and later ones are ignored."""
+        if self.expected < 2:
+            at = 2 * self.expected
+            self.expect_x[at] = team_x
+            self.expect_y[at] = team_y
+            self.expect_x[at + 1] = identity_x
+            self.expect_y[at + 1] = identity_y
+            self.expected += 1
+
+    def choose(self, team: int, identity: int) -> int:
+        """The pair of these two classes that is nearest to what is expected; returns the number of pairs."""
+        self.out_pairs = 0
+        self.out_off_m = self.out_next_m = _FAR
+        for one in range(self.count):
+            if self.is_whole(one, team):
+                for other in range(self.count):
+                    if self.is_whole(other, identity) and self.fits(one, other):
+                        self.take(one, other)
+        return self.out_pairs
+
+    def is_whole(self, patch: int, kind: int) -> bool:
+        """Whether a patch is of this class and complete."""
+        region = self.index[patch]
+        return self.regions.kind[region] == kind and not self.regions.touches[region]
+
+    def fits(self, one: int, other: int) -> bool:
+        """Whether two patches are as far from each other as those of a robot."""
+        dx = self.x_m[one] - self.x_m[other]
+        dy = self.y_m[one] - self.y_m[other]
+        square = dx * dx + dy * dy
+        return self.least_m * self.least_m <= square and square <= self.most_m * self.most_m
+
+    def take(self, one: int, other: int) -> None:
+        """A pair was found: it is the nearest so far, or it may be the second."""
+        self.out_pairs += 1
+        off = self.off_m(one, other)
+        if off >= self.out_off_m:
+            self.out_next_m = min(self.out_next_m, off)
+            return
+        self.out_next_m = self.out_off_m
+        self.out_off_m = off
+        self.out_team = self.index[one]
+        self.out_identity = self.index[other]
+        dx = self.x_m[one] - self.x_m[other]
+        dy = self.y_m[one] - self.y_m[other]
+        self.out_gap_m = math.sqrt(dx * dx + dy * dy)
+        self.out_contested = 1 if self.partners(one) > 1 or self.partners(other) > 1 else 0
+
+    def off_m(self, team: int, identity: int) -> float:
+        """Distance of a pair from what is expected; 0 if nothing is."""
+        if self.expected == 0:
+            return 0.0
+        least = _FAR
+        for at in range(0, 2 * self.expected, 2):
+            tx = self.x_m[team] - self.expect_x[at]
+            ty = self.y_m[team] - self.expect_y[at]
+            ix = self.x_m[identity] - self.expect_x[at + 1]
+            iy = self.y_m[identity] - self.expect_y[at + 1]
+            off = math.sqrt(0.5 * (tx * tx + ty * ty + ix * ix + iy * iy))
+            if off < least:
+                least = off
+        return least
+
+    def partners(self, patch: int) -> int:
+        """Number of patches that this one could make a robot with, of any team and identity."""
+        of_team = self.regions.kind[self.index[patch]] <= _TEAMS
+        found = 0
+        for other in range(self.count):
+            if (self.regions.kind[self.index[other]] <= _TEAMS) != of_team and self.fits(patch, other):
+                found += 1
+        return found

@@ -1,0 +1,39 @@
+cimport cython
+
+cdef int _TABLE, _PIXELS
+
+
+@cython.final
+cdef class Regions:
+    cdef readonly int width, height, runs, count
+    cdef unsigned char table[65536]
+    cdef int run_kind[4096]
+    cdef int run_row[4096]
+    cdef int run_start[4096]
+    cdef int run_end[4096]
+    cdef int parent[4096]
+    cdef int label[4096]
+    cdef int kind[4096]
+    cdef int area[4096]
+    cdef int left[4096]
+    cdef int top[4096]
+    cdef int right[4096]
+    cdef int bottom[4096]
+    cdef int sum_u[4096]
+    cdef int sum_v[4096]
+    cdef int touches[4096]
+
+    cpdef int find(self, bytearray pixels, int width, int height) except -1
+    cpdef object region(self, int index)
+    @cython.locals(at=int, runs=int, row=int, column=int, before=int, kind=int)
+    cdef void find_runs(self, bytearray pixels) noexcept
+    @cython.locals(above=int, run=int, row=int, other=int)
+    cdef void merge(self) noexcept
+    cdef void join(self, int one, int other) noexcept
+    cdef int root(self, int run) noexcept
+    @cython.locals(run=int, root=int)
+    cdef void collect(self) noexcept
+    @cython.locals(index=int)
+    cdef void begin(self, int run) noexcept
+    @cython.locals(start=int, end=int, row=int)
+    cdef void add(self, int index, int run) noexcept

@@ -1,0 +1,80 @@
+"""The top of a robot as a calibrated camera sees it: where its two patches are, and what two patches say.
+
+What belongs here: the pattern's distance and angle, the expected size in the picture, posture from patches and back.
+What does not: which regions are patches (`patches`), which pair is which robot (`tracker`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from miro_exact.dmath import atan2, sincos, wrap_pi
+from miro_host.eye.calibration import Calibration
+from miro_host.eye.patterns import PATCH_MM, PATTERNS, ROBOT_HEIGHT_M, PatternName
+from miro_host.posture import Posture
+
+DISTANCE_SHARE = 0.2
+"""A pair's distance may differ from the pattern's by this share."""
+LEAST_AREA_SHARE = 0.35
+MOST_AREA_SHARE = 1.5
+"""Of a patch's expected area: half covered pixels and dim light make it smaller, and two patches in one are 2."""
+
+
+class Top:
+    """A pattern under a calibration. Constant.
+
+    `angle_rad`: of the vector from identity patch to team patch in robot axes, `distance_m` its length. `z_m`: height
+    at which pixels are evaluated. `area_px`, `side_px`: of a patch under the camera.
+    """
+
+    NOT_STATE = ("pattern", "lens", "angle_rad", "distance_m", "z_m", "area_px", "side_px")
+
+    def __init__(self, pattern: PatternName, calibration: Calibration) -> None:
+        self.pattern = pattern
+        self.lens = calibration.lens()
+        team_mm, identity_mm = PATTERNS[pattern]
+        along, across = float(team_mm[0] - identity_mm[0]), float(team_mm[1] - identity_mm[1])
+        self.angle_rad = atan2(across, along)
+        self.distance_m = math.sqrt(along * along + across * across) / 1000.0
+        self.z_m = calibration.height_m(ROBOT_HEIGHT_M)
+        patch_m = PATCH_MM / 1000.0
+        fall_m = self.lens.height_m - self.z_m
+        self.area_px = self.lens.focal_u * self.lens.focal_v * patch_m * patch_m / (fall_m * fall_m)
+        self.side_px = math.sqrt(self.area_px)
+
+    def __repr__(self) -> str:
+        return f"Top({self.pattern!r}, {self.distance_m * 1000.0:.1f} mm, {self.area_px:.1f} px)"
+
+    def distances_m(self) -> tuple[float, float]:
+        """Least and most distance of two patches that are a pair."""
+        reach = DISTANCE_SHARE * self.distance_m
+        return self.distance_m - reach, self.distance_m + reach
+
+    def areas(self) -> tuple[int, int]:
+        """Least and most area of a patch in px."""
+        return math.ceil(LEAST_AREA_SHARE * self.area_px), math.floor(MOST_AREA_SHARE * self.area_px)
+
+    def places(self, posture: Posture) -> tuple[float, float, float, float]:
+        """x, y of the team patch and of the identity patch of a robot, in m."""
+        sin, cos = sincos(posture.theta_rad + self.angle_rad)
+        dx, dy = 0.5 * self.distance_m * cos, 0.5 * self.distance_m * sin
+        return posture.x_m + dx, posture.y_m + dy, posture.x_m - dx, posture.y_m - dy
+
+    def posture(self, team_x: float, team_y: float, identity_x: float, identity_y: float) -> Posture:
+        """The robot whose patches are there: its centre is in their middle."""
+        return Posture(
+            0.5 * (team_x + identity_x),
+            0.5 * (team_y + identity_y),
+            wrap_pi(atan2(team_y - identity_y, team_x - identity_x) - self.angle_rad),
+        )
+
+    def confidence(self, gap_m: float, areas: tuple[int, int]) -> float:
+        """How far a pair is from the nearest bound of what is taken for a robot: 1 in the middle, 0 on it."""
+        least = 1.0 - abs(gap_m - self.distance_m) / (DISTANCE_SHARE * self.distance_m)
+        for area in areas:
+            share = area / self.area_px
+            if share < 1.0:
+                least = min(least, (share - LEAST_AREA_SHARE) / (1.0 - LEAST_AREA_SHARE))
+            else:
+                least = min(least, (MOST_AREA_SHARE - share) / (MOST_AREA_SHARE - 1.0))
+        return max(least, 0.0)

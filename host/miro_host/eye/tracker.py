@@ -1,0 +1,277 @@
+"""From pictures to postures: follows the robots of one team by the two colour patches on their tops.
+
+What belongs here: where to look, which pair of patches is which robot, when none is, and the posture of a pair. What
+does not: pixels (`regions`, `unmixing`), pairs in a window (`patches`), memory and prediction (`track`), the truth.
+
+    prediction -> window -> patches -> pair -> centroids -> ground at the tops' height -> posture
+        not found: a larger window -> not found: every fourth row of the picture, windows where the team's colour is
+
+A pair is taken only if it is sure: within reach of the last sighting, clearly nearer to the prediction than the next
+pair, and, where its patches could also belong to other robots, near enough to it. Otherwise the robot is lost in this
+frame. A team patch is used by one robot only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+from miro_exact.state import TICK
+from miro_host.eye.calibration import Calibration
+from miro_host.eye.colours import CLASS_OF, ColourClasses
+from miro_host.eye.frame import Frame
+from miro_host.eye.patches import Patches
+from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
+from miro_host.eye.regions import Regions
+from miro_host.eye.searching import candidates
+from miro_host.eye.top import Top
+from miro_host.eye.track import MOST_SPEED_M_S, Sighting, Track
+from miro_host.eye.unmixing import Unmixing
+from miro_host.posture import Posture
+
+__all__ = ["CentroidKind", "Sighting", "Tracker"]
+
+CentroidKind = Literal["binary", "weighted"]
+
+LARGE_PX = 64
+"""Side of the second window."""
+SEARCH_PX = 56
+"""Side of a window around a team patch: its identity patch lies inside, wherever it is."""
+REACH_M = 0.010
+"""Added to what a robot can go since it was seen: errors of measurement."""
+CLEARLY_M = 0.010
+"""The second pair must be so much further from the expected posture."""
+CONTESTED_M = 0.025
+"""A pair whose patches could be others' must be so near: a wrong one of two touching robots is 53 mm off."""
+
+
+class _Pair(NamedTuple):
+    """A robot as found: its sighting, distance from what was expected, the pixel of its team patch."""
+
+    sighting: Sighting
+    off_m: float
+    u: float
+    v: float
+
+
+class Tracker:
+    """The robots of one team, as one PC follows them. `lost_frames`, `searches`: counted over all robots, and frames.
+
+    State: `tracks`, one for each robot in the order given, and the counts.
+    """
+
+    STATE = {"tracks": [Track], "lost_frames": TICK, "searches": TICK}
+    NOT_STATE = (
+        *(
+            "robots",
+            "kinds",
+            "team_kind",
+            "pattern",
+            "angle_rad",
+            "half_m",
+            "lens",
+            "z_m",
+            "side_px",
+            "weighted",
+        ),
+        *("window_px", "regions", "patches", "unmixings", "area_px", "distance_m", "team"),
+    )
+
+    def __init__(
+        self,
+        team: str,
+        robots: Sequence[int],
+        pattern: PatternName,
+        calibration: Calibration,
+        colours: ColourClasses,
+        centroid: CentroidKind = "weighted",
+        window_px: int = 32,
+    ) -> None:
+        """`team`: a colour of `patterns.TEAMS`; `robots`: numbers in `patterns.IDENTITIES`.
+
+        Raises ValueError for what is none of these, and EyeError for a colour without a class.
+        """
+        _check(team, robots, pattern, centroid, window_px)
+        self.team = team
+        self.robots = tuple(robots)
+        self.weighted = centroid == "weighted"
+        self.window_px = window_px
+        self.team_kind = CLASS_OF[team]
+        self.kinds = [CLASS_OF[IDENTITIES[robot]] for robot in robots]
+        self.top = Top(pattern, calibration)
+        self.lens = self.top.lens
+        self.z_m = self.top.z_m
+        self.regions = Regions(colours.table())
+        self.patches = Patches(self.lens, self.regions, self.z_m, self.top.distances_m(), self.top.areas())
+        chroma = colours.chroma(team)
+        self.unmixings = [Unmixing(chroma, colours.chroma(IDENTITIES[robot])) for robot in robots]
+        self.tracks = [Track() for _ in robots]
+        self.lost_frames = 0
+        self.searches = 0
+
+    def __repr__(self) -> str:
+        kind = "weighted" if self.weighted else "binary"
+        return f"Tracker({self.team!r}, {self.robots!r}, {self.top!r}, {kind}, lost={self.lost_frames})"
+
+    def track(self, frame: Frame, tick: int) -> list[Sighting | None]:
+        """Where the robots are in a picture exposed at `tick`, in their order; None: not found, or not for sure."""
+        pairs = [self._followed(frame, tick, slot) for slot in range(len(self.tracks))]
+        if None in pairs:
+            self.searches += 1
+            self._search(frame, tick, pairs)
+        self._part(pairs)
+        sightings: list[Sighting | None] = []
+        for track, pair in zip(self.tracks, pairs, strict=True):
+            if pair is None:
+                self.lost_frames += 1
+                sightings.append(None)
+            else:
+                track.remember(pair.sighting)
+                sightings.append(pair.sighting)
+        return sightings
+
+    # ---- where to look
+
+    def _followed(self, frame: Frame, tick: int, slot: int) -> _Pair | None:
+        """The robot in a window around where it is predicted, or in a larger one."""
+        track = self.tracks[slot]
+        if track.seen == 0:
+            return None
+        predicted = track.predicted(tick)
+        try:
+            u, v = self.lens.pixel(predicted.x_m, predicted.y_m, self.z_m)
+        except ValueError:
+            return None
+        pair = self._in_window(frame, tick, slot, u, v, self.window_px, predicted)
+        if pair is None and self.window_px < LARGE_PX:
+            pair = self._in_window(frame, tick, slot, u, v, LARGE_PX, predicted)
+        return pair
+
+    def _in_window(
+        self, frame: Frame, tick: int, slot: int, u: float, v: float, size: int, predicted: Posture
+    ) -> _Pair | None:
+        pixels = self._look(frame, u, v, size)
+        self._expect(slot, predicted)
+        return self._chosen(pixels, tick, slot)
+
+    def _look(self, frame: Frame, u: float, v: float, size: int) -> bytearray:
+        """Finds the patches in a window around a pixel, moved so that it lies in the picture."""
+        width, height = min(size, frame.width), min(size, frame.height)
+        left = min(max(math.floor(u) - width // 2, 0), frame.width - width)
+        top = min(max(math.floor(v) - height // 2, 0), frame.height - height)
+        pixels = frame.window(left, top, width, height)
+        self.patches.look(pixels, left, top, width, height)
+        return pixels
+
+    def _search(self, frame: Frame, tick: int, pairs: list[_Pair | None]) -> None:
+        """Looks for the robots that are None in `pairs` in the whole picture, and puts in what it finds once."""
+        missing = [slot for slot, pair in enumerate(pairs) if pair is None]
+        found: dict[int, list[_Pair]] = {slot: [] for slot in missing}
+        for u, v in candidates(frame, self.regions, self.team_kind, self.top.side_px):
+            pixels = self._look(frame, u, v, SEARCH_PX)
+            for slot in missing:
+                self._expect(slot, None)
+                pair = self._chosen(pixels, tick, slot)
+                if pair is not None and not any(_same_patch(pair, other) for other in found[slot]):
+                    found[slot].append(pair)
+        for slot in missing:
+            if len(found[slot]) == 1:
+                pairs[slot] = found[slot][0]
+
+    # ---- which pair it is
+
+    def _expect(self, slot: int, predicted: Posture | None) -> None:
+        """Tells `patches` where the robot may be: moving on as predicted, or still where it was."""
+        track = self.tracks[slot]
+        self.patches.expect_nothing()
+        if predicted is not None:
+            self.patches.expect(*self.top.places(predicted))
+        if track.seen:
+            self.patches.expect(*self.top.places(track.last()))
+
+    def _chosen(self, pixels: bytearray, tick: int, slot: int) -> _Pair | None:
+        """The robot in the window that `patches` looked at last, None if there is none for sure."""
+        patches, track = self.patches, self.tracks[slot]
+        if patches.choose(self.team_kind, self.kinds[slot]) == 0:
+            return None
+        if patches.out_next_m - patches.out_off_m < CLEARLY_M:
+            return None
+        if track.seen:
+            if patches.out_off_m > MOST_SPEED_M_S * track.unseen_s(tick) + REACH_M:
+                return None
+            if patches.out_contested and patches.out_off_m > CONTESTED_M:
+                return None
+        elif patches.out_contested:
+            return None
+        return self._pair(pixels, tick, slot)
+
+    def _part(self, pairs: list[_Pair | None]) -> None:
+        """Where two robots use one team patch, the one further from what was expected is lost."""
+        for slot, pair in enumerate(pairs):
+            for other in range(slot):
+                rival = pairs[other]
+                if pair is not None and rival is not None and _same_patch(pair, rival):
+                    worse = other if pair.off_m < rival.off_m else slot
+                    pairs[worse] = None
+                    pair = pairs[slot]
+
+    # ---- what it says
+
+    def _pair(self, pixels: bytearray, tick: int, slot: int) -> _Pair | None:
+        """The pair that `patches` chose as a sighting."""
+        patches = self.patches
+        team_u, team_v, identity_u, identity_v = self._centroids(pixels, slot)
+        try:
+            team_x, team_y = self.lens.ground(team_u, team_v, self.z_m)
+            identity_x, identity_y = self.lens.ground(identity_u, identity_v, self.z_m)
+        except ValueError:
+            return None
+        posture = self.top.posture(team_x, team_y, identity_x, identity_y)
+        team, identity = self.regions.region(patches.out_team), self.regions.region(patches.out_identity)
+        confidence = self.top.confidence(patches.out_gap_m, (team.area, identity.area))
+        sighting = Sighting(posture.x_m, posture.y_m, posture.theta_rad, tick, confidence)
+        return _Pair(sighting, patches.out_off_m, team_u, team_v)
+
+    def _centroids(self, pixels: bytearray, slot: int) -> tuple[float, float, float, float]:
+        """u, v of the team patch and of the identity patch in the picture."""
+        patches, regions = self.patches, self.regions
+        team, identity = patches.out_team, patches.out_identity
+        if not self.weighted:
+            return (*_middle(patches, regions, team), *_middle(patches, regions, identity))
+        unmixing = self.unmixings[slot]
+        unmixing.centroids(pixels, regions, team, identity, patches.least_area)
+        weights, us, vs = unmixing.out_weight, unmixing.out_u, unmixing.out_v
+        return (
+            patches.left + 0.5 * us[0] / weights[0],
+            patches.top + 0.5 * vs[0] / weights[0],
+            patches.left + 0.5 * us[1] / weights[1],
+            patches.top + 0.5 * vs[1] / weights[1],
+        )
+
+
+def _middle(patches: Patches, regions: Regions, index: int) -> tuple[float, float]:
+    """Centroid of a region's pixels, all of one weight."""
+    region = regions.region(index)
+    return (
+        patches.left + 0.5 * region.sum_u / region.area,
+        patches.top + 0.5 * region.sum_v / region.area,
+    )
+
+
+def _same_patch(one: _Pair, other: _Pair) -> bool:
+    return abs(one.u - other.u) < 2.0 and abs(one.v - other.v) < 2.0
+
+
+def _check(team: str, robots: Sequence[int], pattern: str, centroid: str, window_px: int) -> None:
+    """Raises ValueError for what a tracker cannot be made of."""
+    if team not in TEAMS:
+        raise ValueError(f"team = {team!r}: must be {' or '.join(TEAMS)}")
+    if not robots or len(set(robots)) != len(robots) or not all(0 <= n < len(IDENTITIES) for n in robots):
+        raise ValueError(f"robots = {robots!r}: must be different numbers from 0 to {len(IDENTITIES) - 1}")
+    if pattern not in PATTERNS:
+        raise ValueError(f"pattern = {pattern!r}: must be {' or '.join(PATTERNS)}")
+    if centroid not in ("binary", "weighted"):
+        raise ValueError(f"centroid = {centroid!r}: must be binary or weighted")
+    if not 16 <= window_px <= LARGE_PX:
+        raise ValueError(f"window_px = {window_px}: must be 16 to {LARGE_PX}")
