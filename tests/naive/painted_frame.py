@@ -139,9 +139,9 @@ class PaintedFrame:
 
 
 def sampled(count: int = 60, noise: bool = True) -> dict[str, list[tuple[int, int, int]]]:
-    """Pixels inside patches of each colour."""
+    """Pixels inside patches of each colour, and of the floor."""
     found = {}
-    for place, (name, rgb) in enumerate(list(PAINTS.items())[:8]):
+    for place, (name, rgb) in enumerate(list(PAINTS.items())[:9]):
         pixels = ycbcr(rgb) + (_NOISE[place, :count] if noise else np.zeros((count, 3)))
         found[name] = [tuple(int(part) for part in pixel) for pixel in np.clip(np.rint(pixels), 0, 255)]
     return found

@@ -23,11 +23,15 @@ from miro_host.eye.regions import TABLE_SIZE
 
 CLASS_OF = {name: number for number, name in enumerate(COLOURS, start=1)}
 """Number of a colour's class."""
+FLOOR = "floor"
 
 SIGMAS = 2.5
 """Two hues overlap if their border is nearer to a mean than this many times the spread of its samples."""
 LEAST_CHROMA = 10.0
 """Levels: a mean chroma shorter than this is grey."""
+
+MOST_FLOOR = 0.45
+"""Share of a colour's chroma that the floor may have."""
 
 Level = Annotated[float, Meta(ge=0.0, le=255.0)]
 Share = Annotated[float, Meta(gt=0.0, le=1.0)]
@@ -47,14 +51,18 @@ class ColourMean(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The classes of some or all of `patterns.COLOURS`, by name. Raises ValueError for colours that overlap."""
+    """The classes of some or all of `patterns.COLOURS`, by name, and what the floor looks like, if that is known.
+
+    Raises ValueError for colours that cannot be told apart.
+    """
 
     colours: dict[str, ColourMean]
+    floor: ColourMean | None = None
     least_chroma: Share = 0.5
     least_luma: Share = 0.25
 
     def __post_init__(self) -> None:
-        problem = _problem(self.colours)
+        problem = _problem(self.colours, self.floor)
         if problem is not None:
             raise ValueError(f"colours.{problem[0]}: {problem[1]}; {problem[2]}")
 
@@ -98,7 +106,7 @@ class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 def classes_of(
     samples: Mapping[str, Sequence[tuple[int, int, int]]], origin: str = "colours"
 ) -> ColourClasses:
-    """Classes from sampled pixels (Y, Cb, Cr) by colour name.
+    """Classes from sampled pixels (Y, Cb, Cr) by colour name; `FLOOR` may be among the names.
 
     Raises EyeError for an unknown colour, none or too few samples, grey samples, and colours that overlap.
     """
@@ -108,10 +116,11 @@ def classes_of(
             what = f"{len(pixels)} sampled pixels"
             raise EyeError(origin, f"colours.{name}", what, "sample at least 4, better a whole patch")
         means[name] = _mean(pixels)
-    problem = _problem(means)
+    floor = means.pop(FLOOR, None)
+    problem = _problem(means, floor)
     if problem is not None:
         raise EyeError(origin, f"colours.{problem[0]}", problem[1], problem[2])
-    return ColourClasses(colours=means)
+    return ColourClasses(colours=means, floor=floor)
 
 
 def _mean(pixels: Sequence[tuple[int, int, int]]) -> ColourMean:
@@ -133,7 +142,7 @@ def _sixteenths(x: float) -> int:
     return math.floor(16.0 * x + 0.5)
 
 
-def _problem(means: Mapping[str, ColourMean]) -> tuple[str, str, str] | None:
+def _problem(means: Mapping[str, ColourMean], floor: ColourMean | None) -> tuple[str, str, str] | None:
     """Name, what and remedy of the first colour that cannot be told apart."""
     if not means:
         return "", "there is no colour", "sample the team's colour and the identities'"
@@ -142,6 +151,8 @@ def _problem(means: Mapping[str, ColourMean]) -> tuple[str, str, str] | None:
             return name, "unknown colour", f"use {', '.join(COLOURS)}"
         if _length(mean) < LEAST_CHROMA:
             return name, "the samples are grey", "sample inside the patch, or use a stronger paint"
+        if floor is not None and _share(floor, mean) > MOST_FLOOR:
+            return name, "the floor has nearly the same colour", "use another paint, or a duller floor"
     names = list(means)
     for index, one in enumerate(names):
         for other in names[:index]:
@@ -163,6 +174,13 @@ def _overlap(one: ColourMean, other: ColourMean) -> bool:
     sine = 0.5 * math.sqrt(dx * dx + dy * dy)  # of half the angle between the hues
     spread = max(one.spread, other.spread, 1.0)
     return sine * min(first, second) < SIGMAS * spread / math.sqrt(2.0)
+
+
+def _share(floor: ColourMean, mean: ColourMean) -> float:
+    """The floor's chroma, projected on a colour's, by the length of that."""
+    along = (floor.cb - 128.0) * (mean.cb - 128.0) + (floor.cr - 128.0) * (mean.cr - 128.0)
+    length = _length(mean)
+    return along / (length * length)
 
 
 def _length(mean: ColourMean) -> float:

@@ -18,7 +18,7 @@ cdef class Patches:
     cdef double y_m[170]
     cdef double expect_x[4]
     cdef double expect_y[4]
-    cdef readonly int out_pairs, out_team, out_identity, out_contested
+    cdef readonly int out_pairs, out_team, out_identity, out_contested, out_team_area, out_identity_area
     cdef readonly double out_off_m, out_next_m, out_gap_m
 
     @cython.locals(region=int)

@@ -30,13 +30,14 @@ class Patches:
 
     `out_pairs`: pairs at the pattern's distance. `out_team`, `out_identity`: regions of the nearest. `out_off_m`: its
     distance from what is expected, `out_next_m`: that of the second. `out_contested`: see above. `out_gap_m`: distance
-    of its two patches.
+    of its two patches; `out_team_area`, `out_identity_area`: their areas in px.
     """
 
     NOT_STATE = (
         *("lens", "regions", "z_m", "least_m", "most_m", "least_area", "most_area"),
         *("count", "index", "x_m", "y_m", "left", "top", "expected", "expect_x", "expect_y"),
         *("out_pairs", "out_team", "out_identity", "out_off_m", "out_next_m", "out_contested", "out_gap_m"),
+        *("out_team_area", "out_identity_area"),
     )
 
     def __init__(
@@ -64,7 +65,7 @@ class Patches:
         self.out_pairs = 0
         self.out_team = self.out_identity = -1
         self.out_off_m = self.out_next_m = self.out_gap_m = 0.0
-        self.out_contested = 0
+        self.out_contested = self.out_team_area = self.out_identity_area = 0
 
     def __repr__(self) -> str:
         return f"Patches({self.count} in {self.regions!r} at ({self.left}, {self.top}))"
@@ -82,10 +83,9 @@ class Patches:
 
     def place(self, region: int) -> None:
         """Adds a patch, unless the lens could not draw it where it is."""
-        u = self.left + 0.5 * self.regions.sum_u[region] / self.regions.area[region]
-        v = self.top + 0.5 * self.regions.sum_v[region] / self.regions.area[region]
+        u, v = self.regions.centroid(region)
         try:
-            x_m, y_m = self.lens.ground(u, v, self.z_m)
+            x_m, y_m = self.lens.ground(self.left + u, self.top + v, self.z_m)
         except ValueError:
             return
         self.index[self.count] = region
@@ -151,6 +151,8 @@ class Patches:
         dx = self.x_m[one] - self.x_m[other]
         dy = self.y_m[one] - self.y_m[other]
         self.out_gap_m = math.sqrt(dx * dx + dy * dy)
+        self.out_team_area = self.regions.area[self.out_team]
+        self.out_identity_area = self.regions.area[self.out_identity]
         self.out_contested = 1 if self.partners(one) > 1 or self.partners(other) > 1 else 0
 
     def off_m(self, team: int, identity: int) -> float:

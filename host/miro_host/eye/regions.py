@@ -2,7 +2,7 @@
 
 What belongs here: class of each pixel by a look-up table, runs of one class in a row, runs that touch merged into
 regions, and what a region is: class, area, box, sums for its centroid. What does not: which colours the classes are
-(`colours`), finer centroids (`unmixing`), robots (`patches`). After CMVision (Bruce, Balch, Veloso, IROS 2000).
+(`colours`), finer centroids (`weighing`), robots (`patches`). After CMVision (Bruce, Balch, Veloso, IROS 2000).
 
     pixels (Y, Cb, Cr) -> table -> class -> runs -> union-find -> regions
 
@@ -115,16 +115,25 @@ class Regions:
             bool(self.touches[index]),
         )
 
+    def centroid(self, index: int) -> tuple[float, float]:
+        """(u, v) of a region's centroid in its window. IndexError for a region that is not there."""
+        if not 0 <= index < self.count:
+            raise IndexError(f"region {index} of {self.count}")
+        return 0.5 * self.sum_u[index] / self.area[index], 0.5 * self.sum_v[index] / self.area[index]
+
     # ---- the three steps of `find`
 
     def find_runs(self, pixels: bytearray) -> None:
         """Runs of one class other than 0, row by row."""
+        data = pixels
+        table = self.table
+        width = self.width
         at = 0
         runs = 0
         for row in range(self.height):
             before = 0
-            for column in range(self.width):
-                kind = self.table[(pixels[at] >> 4) << 12 | (pixels[at + 1] >> 2) << 6 | pixels[at + 2] >> 2]
+            for column in range(width):
+                kind = table[(data[at] >> 4) << 12 | (data[at + 1] >> 2) << 6 | data[at + 2] >> 2]
                 at += 3
                 if kind == before:
                     continue
@@ -138,7 +147,7 @@ class Regions:
                     runs += 1
                 before = kind
             if before != 0:
-                self.run_end[runs - 1] = self.width
+                self.run_end[runs - 1] = width
         self.runs = runs
 
     def merge(self) -> None:

@@ -1,7 +1,7 @@
 """From pictures to postures: follows the robots of one team by the two colour patches on their tops.
 
 What belongs here: where to look, which pair of patches is which robot, when none is, and the posture of a pair. What
-does not: pixels (`regions`, `unmixing`), pairs in a window (`patches`), memory and prediction (`track`), the truth.
+does not: pixels (`regions`, `weighing`), pairs in a window (`patches`), memory and prediction (`track`), the truth.
 
     prediction -> window -> patches -> pair -> centroids -> ground at the tops' height -> posture
         not found: a larger window -> not found: every fourth row of the picture, windows where the team's colour is
@@ -27,7 +27,7 @@ from miro_host.eye.regions import Regions
 from miro_host.eye.searching import candidates
 from miro_host.eye.top import Top
 from miro_host.eye.track import MOST_SPEED_M_S, Sighting, Track
-from miro_host.eye.unmixing import Unmixing
+from miro_host.eye.weighing import Weighing
 from miro_host.posture import Posture
 
 __all__ = ["CentroidKind", "Sighting", "Tracker"]
@@ -75,7 +75,7 @@ class Tracker:
             "side_px",
             "weighted",
         ),
-        *("window_px", "regions", "patches", "unmixings", "area_px", "distance_m", "team"),
+        *("window_px", "regions", "patches", "weighings", "area_px", "distance_m", "team"),
     )
 
     def __init__(
@@ -105,7 +105,8 @@ class Tracker:
         self.regions = Regions(colours.table())
         self.patches = Patches(self.lens, self.regions, self.z_m, self.top.distances_m(), self.top.areas())
         chroma = colours.chroma(team)
-        self.unmixings = [Unmixing(chroma, colours.chroma(IDENTITIES[robot])) for robot in robots]
+        floor = None if colours.floor is None else colours.floor.chroma()
+        self.weighings = [Weighing(chroma, colours.chroma(IDENTITIES[robot]), floor) for robot in robots]
         self.tracks = [Track() for _ in robots]
         self.lost_frames = 0
         self.searches = 0
@@ -221,15 +222,15 @@ class Tracker:
     def _pair(self, pixels: bytearray, tick: int, slot: int) -> _Pair | None:
         """The pair that `patches` chose as a sighting."""
         patches = self.patches
-        team_u, team_v, identity_u, identity_v = self._centroids(pixels, slot)
         try:
+            team_u, team_v, identity_u, identity_v = self._centroids(pixels, slot)
             team_x, team_y = self.lens.ground(team_u, team_v, self.z_m)
             identity_x, identity_y = self.lens.ground(identity_u, identity_v, self.z_m)
         except ValueError:
             return None
         posture = self.top.posture(team_x, team_y, identity_x, identity_y)
-        team, identity = self.regions.region(patches.out_team), self.regions.region(patches.out_identity)
-        confidence = self.top.confidence(patches.out_gap_m, (team.area, identity.area))
+        areas = (patches.out_team_area, patches.out_identity_area)
+        confidence = self.top.confidence(patches.out_gap_m, areas)
         sighting = Sighting(posture.x_m, posture.y_m, posture.theta_rad, tick, confidence)
         return _Pair(sighting, patches.out_off_m, team_u, team_v)
 
@@ -237,26 +238,14 @@ class Tracker:
         """u, v of the team patch and of the identity patch in the picture."""
         patches, regions = self.patches, self.regions
         team, identity = patches.out_team, patches.out_identity
-        if not self.weighted:
-            return (*_middle(patches, regions, team), *_middle(patches, regions, identity))
-        unmixing = self.unmixings[slot]
-        unmixing.centroids(pixels, regions, team, identity, patches.least_area)
-        weights, us, vs = unmixing.out_weight, unmixing.out_u, unmixing.out_v
-        return (
-            patches.left + 0.5 * us[0] / weights[0],
-            patches.top + 0.5 * vs[0] / weights[0],
-            patches.left + 0.5 * us[1] / weights[1],
-            patches.top + 0.5 * vs[1] / weights[1],
-        )
-
-
-def _middle(patches: Patches, regions: Regions, index: int) -> tuple[float, float]:
-    """Centroid of a region's pixels, all of one weight."""
-    region = regions.region(index)
-    return (
-        patches.left + 0.5 * region.sum_u / region.area,
-        patches.top + 0.5 * region.sum_v / region.area,
-    )
+        if self.weighted:
+            weighing = self.weighings[slot]
+            weighing.centroids(pixels, regions, team, identity, patches.least_area)
+            (team_u, team_v), (identity_u, identity_v) = weighing.centroid(0), weighing.centroid(1)
+        else:
+            (team_u, team_v), (identity_u, identity_v) = regions.centroid(team), regions.centroid(identity)
+        left, top = patches.left, patches.top
+        return left + team_u, top + team_v, left + identity_u, top + identity_v
 
 
 def _same_patch(one: _Pair, other: _Pair) -> bool:
