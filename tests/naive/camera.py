@@ -120,7 +120,8 @@ class NaiveCamera:
     def _stands(self, body: Body, field: int, instant: int) -> tuple[int, int, int, int]:
         instants = self.settings.sub_exposures
         share = (instant * 2 + 1) / (2.0 * instants) - 0.5
-        after_s = field * (1001.0 / 60000.0) + share * self.settings.exposure_s
+        field_s = (field - 0.5 * (self.settings.fields - 1)) * (1001.0 / 60000.0)
+        after_s = field_s + share * self.settings.exposure_s
         sine, cosine = sincos(body.theta_rad + 0.5 * body.w_rad_s * after_s)
         way_m = body.v_m_s * after_s
         x, y = um(body.x_m + way_m * cosine), um(body.y_m + way_m * sine)

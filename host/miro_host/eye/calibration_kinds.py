@@ -32,8 +32,8 @@ PITCH_Y_M = (-0.10, 0.80)
 """The 130 x 90 cm of the pitch in the paper's axes."""
 GRID_M = 0.10
 
-_HALVINGS = 40
-_LARGEST_FACTOR = 4.0
+_STEPS = 10
+_LARGEST_FACTOR = 8.0
 _TWO_PI = 6.283185307179586
 
 
@@ -82,30 +82,51 @@ def none(true: CameraParameters) -> Calibration:
     return Calibration(camera=camera, ignore_height=True)
 
 
-def drawn_1997(true: CameraParameters, stream: Stream) -> Calibration:
-    """A calibration that is wrong by 2.40 cm at the worst place. Takes three draws of the stream."""
-    errors = drawn_errors(stream)
-    low, high = 0.0, _LARGEST_FACTOR
+def drawn_1997(
+    true: CameraParameters,
+    stream: Stream,
+    centre_px: float = CENTRE_PX,
+    focal_share: float = FOCAL_SHARE,
+    tilt_rad: float = TILT_RAD,
+    worst_m: float = WORST_M,
+) -> Calibration:
+    """A calibration that is wrong by `worst_m` at the worst place; by what the sizes give, if that is 0.
+
+    Takes three draws of the stream: two directions and a sign.
+    """
+    errors = drawn_errors(stream, centre_px, focal_share, tilt_rad)
+    if worst_m > 0.0:
+        errors = scaled(errors, _factor(true, errors, worst_m))
+    return wrong(true, errors)
+
+
+def _factor(true: CameraParameters, errors: CalibrationErrors, worst_m: float) -> float:
+    """What errors are to be multiplied by to have this worst case: nearly proportional, so a few steps do."""
     grid = _grid(true)
-    for _ in range(_HALVINGS):
-        factor = 0.5 * (low + high)
-        if _worst_m(grid, wrong(true, scaled(errors, factor))) > WORST_M:
-            high = factor
-        else:
-            low = factor
-    return wrong(true, scaled(errors, low))
+    factor = 1.0
+    for _ in range(_STEPS):
+        found_m = _worst_m(grid, wrong(true, scaled(errors, factor)))
+        if found_m == 0.0:
+            return 1.0
+        factor = min(factor * worst_m / found_m, _LARGEST_FACTOR)
+    return factor
 
 
-def drawn_errors(stream: Stream) -> CalibrationErrors:
-    """Errors of the sizes above: two directions and a sign, uniform."""
+def drawn_errors(
+    stream: Stream,
+    centre_px: float = CENTRE_PX,
+    focal_share: float = FOCAL_SHARE,
+    tilt_rad: float = TILT_RAD,
+) -> CalibrationErrors:
+    """Errors of these sizes: two directions and a sign, uniform."""
     centre_sin, centre_cos = sincos(_TWO_PI * stream.uniform(0))
     tilt_sin, tilt_cos = sincos(_TWO_PI * stream.uniform(1))
     return CalibrationErrors(
-        centre_u_px=CENTRE_PX * centre_cos,
-        centre_v_px=CENTRE_PX * centre_sin,
-        focal_share=FOCAL_SHARE if stream.uniform(2) < 0.5 else 0.0 - FOCAL_SHARE,
-        tilt_x_rad=TILT_RAD * tilt_cos,
-        tilt_y_rad=TILT_RAD * tilt_sin,
+        centre_u_px=centre_px * centre_cos,
+        centre_v_px=centre_px * centre_sin,
+        focal_share=focal_share if stream.uniform(2) < 0.5 else 0.0 - focal_share,
+        tilt_x_rad=tilt_rad * tilt_cos,
+        tilt_y_rad=tilt_rad * tilt_sin,
     )
 
 

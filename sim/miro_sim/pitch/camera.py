@@ -123,8 +123,12 @@ class Camera:
 
     def clear(self) -> None:
         """Takes all robots and the ball off the pitch."""
-        self.robots = 0
+        self.clear_robots()
         self.scene.take_ball()
+
+    def clear_robots(self) -> None:
+        """Takes all robots off the pitch; the ball stays."""
+        self.robots = 0
 
     def ball(self, x_m: float, y_m: float) -> None:
         """Puts the ball on the floor, its centre above this place."""
@@ -140,7 +144,7 @@ class Camera:
         v_m_s: float = 0.0,
         w_rad_s: float = 0.0,
     ) -> None:
-        """Puts a robot on the pitch, as it stands at the middle of the (first) exposure; it goes on as it moves there.
+        """Puts a robot on the pitch, as it stands at the frame's tick; before and after it moves on as it does there.
 
         Raises ValueError for the eleventh, and for a team or an identity that has no colour.
         """
@@ -154,7 +158,7 @@ class Camera:
         for at in range(self.sets):
             field = at // self.field_sets
             share = (at % self.field_sets * 2 + 1) / (2.0 * self.field_sets) - 0.5
-            after_s = field * FIELD_S + share * self.settings.exposure_s
+            after_s = (field - 0.5 * (self.settings.fields - 1)) * FIELD_S + share * self.settings.exposure_s
             way_m = v_m_s * after_s
             sine, cosine = sincos(theta_rad + 0.5 * w_rad_s * after_s)
             place = body * _SETS + at

@@ -14,7 +14,8 @@ class PictureSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     """One setting for each thing that damages a picture; 0 switches most of them off.
 
     `exposure_s`: shutter, sampled at `sub_exposures` instants, its middle at the frame's tick. `fields` 2: both fields
-    of a television frame, 480 lines averaged in pairs, the second field 1/59.94 s later; 1: one field of 240 lines.
+    of a television frame, 480 lines averaged in pairs, the second 1/59.94 s after the first, the frame's tick between
+    them; 1: one field of 240 lines.
     `light_falloff`: share of the light that is missing at the corners of the pitch. `flicker`: of the lamps, as a share
     of the mean, at twice `mains_hz`. `gain`, `offset`: of the sensor, before `gamma`; the offset as a share of white.
     `chroma_bandwidth_hz`: of composite video (-3 dB, Gaussian); 0: not limited. `luma_noise`, `chroma_noise`: standard

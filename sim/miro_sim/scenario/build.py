@@ -7,22 +7,26 @@ does (its own module).
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_exact.rng import Stream
 from miro_host.estimators.interface import EstimatorParameters
+from miro_host.eye import calibration_kinds as kinds
+from miro_host.eye.calibration import Calibration
 from miro_host.laws.interface import LawParameters
 from miro_host.parts import PartError, described
 from miro_host.pilot import Pilot
 from miro_host.reference import Trajectory
 from miro_host.reference_keys import CheckedReference, ReferenceParameters
 from miro_host.reference_registry import REFERENCES
-from miro_host.vision import Vision, VisionErrors
 from miro_sim.plant.params import DriveParams
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 from miro_sim.scenario import keys as sc
+from miro_sim.scenario.camera_keys import SeeingCamera
 from miro_sim.scenario.radio_keys import Radio
 
 DEGREE = 0.017453292519943295
@@ -62,12 +66,29 @@ def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
         raise PartError(what, f"mend the {word} or its parameters") from error
 
 
-def vision_for(camera: sc.Camera) -> Vision:
-    """Camera, grabber and tracker."""
-    errors = VisionErrors(
-        camera.position_error_cm / 100.0, camera.heading_error_deg * DEGREE, camera.pixel_cm / 100.0
+@lru_cache(maxsize=16)
+def calibration_for(camera: SeeingCamera, network: int, seed: int) -> tuple[Calibration, float]:
+    """What a host believes about its camera, and by how much that is wrong at worst over the pitch, in m.
+
+    Finding the errors of 1997 takes longer than the rest of a world: a seed's calibration is kept.
+    """
+    errors = camera.calibration_errors
+    if camera.calibration == "1997":
+        found = kinds.drawn_1997(
+            camera.lens,
+            Stream(seed, f"net{network}/calibration"),
+            errors.centre_px,
+            errors.focal_share,
+            errors.tilt_deg * DEGREE,
+            errors.worst_cm / 100.0,
+        )
+    else:
+        found = kinds.none(camera.lens) if camera.calibration == "none" else kinds.exact(camera.lens)
+    ignored = kinds.CalibrationErrors(
+        ignore_height=errors.ignore_height or found.ignore_height, ignore_distortion=errors.ignore_distortion
     )
-    return Vision(errors, camera.delay_frames)
+    calibration = kinds.wrong(found.camera, ignored)
+    return calibration, kinds.worst_error_m(camera.lens, calibration)
 
 
 def drive_for(robot: sc.Robot, left: float, right: float) -> DriveParams:

@@ -1,12 +1,13 @@
 """The scenario: everything about a run that is chosen rather than drawn, as frozen structs.
 
 What belongs here: the keys a scenario file may have, with unit, default and range, and the rules between
-them; those of the radio are in `radio_keys`, those of laws and references in `miro_host`. What does not: reading
+them; those of the radio are in `radio_keys`, those of the camera in `camera_keys`, those of laws and references in
+`miro_host`. What does not: reading
 files (`file`) and reporting what is wrong in them (`errors`), and what the keys do (`miro_host`, `radio`, `plant`,
 `world`).
 
-Every key carries its unit. Defaults are the "realistic" set: the paper's measurement error (2.40 cm and
-4.83 degrees as 3 sigma), one camera frame of vision delay, 3 ms of computing, a keyed carrier and a
+Every key carries its unit. Defaults are the "realistic" set: a rendered picture, a calibration that is wrong by up to
+2.40 cm, one camera frame of vision delay, 3 ms of computing, a keyed carrier and a
 bit-error rate of 1e-4.
 """
 
@@ -22,6 +23,7 @@ from miro_host.reference_registry import AnyReference
 from miro_protocol.table import DOWNLINK
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from miro_sim.plant.params import DriveParams
+from miro_sim.scenario.camera_keys import Camera, PitchCm, PixelCamera
 from miro_sim.scenario.radio_keys import ControlNoise, Radio
 
 MAX_TORQUE_CONSTANT = 10.0  # Nm/A; beyond it a motor of this size is a mistyped unit
@@ -29,29 +31,8 @@ MAX_NETWORKS = 32  # building and simulating one takes as long as a whole run of
 MAX_COUNTS_PER_S = 4e6  # encoder edges are simulated one by one
 
 Duration = Annotated[float, Meta(gt=0.0, le=86_400.0)]
-PitchCm = Annotated[float, Meta(ge=-1_000.0, le=1_000.0)]
 TurnRad = Annotated[float, Meta(ge=-3.141592653589793, le=3.141592653589793)]
 Name = Annotated[str, Meta(pattern=r"\A[a-z0-9][a-z0-9_-]{0,63}\Z")]
-
-
-class GaussianCamera(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="gaussian"
-):
-    """The camera and what the tracker makes of it: white noise per axis, pixels, whole frames of delay.
-
-    `position_error_cm` and `heading_error_deg` are three standard deviations (paper section V-A: 2.40 cm,
-    4.83 degrees); 0 measures without error. `pixel_cm` 0 measures without quantisation; 0.4375 is a pitch of
-    140 x 105 cm on 320 x 240 pixels.
-    """
-
-    position_error_cm: Annotated[float, Meta(ge=0.0, le=100.0)] = 2.40
-    heading_error_deg: Annotated[float, Meta(ge=0.0, le=180.0)] = 4.83
-    pixel_cm: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.4375
-    delay_frames: Annotated[int, Meta(ge=0, le=30)] = 1
-
-
-Camera = GaussianCamera
-"""Every kind of camera there is; another kind is another struct with a tag."""
 
 
 class HostTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -151,7 +132,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     duration_s: Duration
     stop_on_fault: bool = True
     lm629: Lm629Options = DEFAULT_OPTIONS
-    camera: Camera = GaussianCamera()
+    camera: Camera = PixelCamera()
     host: HostTimes = HostTimes()
     networks: Annotated[tuple[Network, ...], Meta(min_length=1)] = msgspec.field(name="network")
 

@@ -20,6 +20,7 @@ from miro_host.posture import Posture
 from miro_sim.pitch import ground as pitch
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.keys import Robot, Scenario
+from miro_sim.scenario.views import check_camera, check_start
 
 if TYPE_CHECKING:
     from miro_host.reference import Trajectory
@@ -34,11 +35,12 @@ MOST_S = 3600.0
 
 def check_places(scenario: Scenario, origin: str) -> None:
     """Raises ScenarioError for a start or a reference that is not on the pitch; `origin` names the scenario."""
+    check_camera(scenario, origin)
     for number, network in enumerate(scenario.networks):
         for index, robot in enumerate(network.robot):
             place = f"network[{number}].robot[{index}]"
             try:
-                _check(robot, scenario.duration_s, origin, place)
+                _check(robot, scenario, origin, place)
             except PartError as error:
                 raise ScenarioError(origin, *_not_made(error, f"{place}.reference")) from error
             except DomainError as error:  # a heading of a million radians
@@ -54,9 +56,10 @@ def _not_made(error: PartError, place: str) -> tuple[str, str, str]:
     return place, error.what, error.remedy
 
 
-def _check(robot: Robot, duration_s: float, origin: str, place: str) -> None:
+def _check(robot: Robot, scenario: Scenario, origin: str, place: str) -> None:
     from miro_sim.scenario.build import reference_for  # needs hot modules: not before the engine was chosen
 
+    duration_s = scenario.duration_s
     reference = reference_for(robot, duration_s)
     at = reference.at(0.0).posture
     start = Posture(
@@ -70,6 +73,7 @@ def _check(robot: Robot, duration_s: float, origin: str, place: str) -> None:
         raise ScenarioError(
             origin, f"{place}.start_error_{axis}_cm", f"the robot starts off the pitch: {what}"
         )
+    check_start(scenario, start, origin, place)
     on_s = 0.0
     for t_s in _instants(reference, duration_s):
         off = _off_pitch(reference.at(t_s).posture)

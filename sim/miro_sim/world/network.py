@@ -27,6 +27,7 @@ from miro_sim.world.control_noise import NoisyCommands
 from miro_sim.world.events import Event, HostLog
 from miro_sim.world.outbox import LONGEST_BYTES, Outbox
 from miro_sim.world.robot import Robot
+from miro_sim.world.sight import PixelSight, Sight, sight_of
 
 LONGEST_TRANSMISSION_TICKS = 1 << 40
 """Twelve hours: no saved transmission ends later than so long after now."""
@@ -43,6 +44,7 @@ class Network:
 
     STATE = {
         "robots": [Robot],
+        "sight": Sight,
         "station": Station,
         "downlink": Downlink,
         "uplink": Uplink,
@@ -74,6 +76,7 @@ class Network:
             Robot(robot, scenario, index, spec.robots, seed, image)
             for robot in sorted(spec.robot, key=lambda robot: robot.slot)
         ]
+        self.sight: Sight = sight_of(scenario.camera, self.robots, seed)
         self.noisy_commands = [
             NoisyCommands(
                 spec.control_noise, robot.pilot.wheels, seed, f"net{index}/robot{robot.spec.slot}/control"
@@ -101,7 +104,7 @@ class Network:
 
     def begin_period(self, tick: int) -> None:
         """Camera, PC and station, in this order."""
-        measured = [robot.expose(tick) for robot in self.robots]
+        measured = self.sight.expose(tick)
         self.sent = []
         commands: list[Command | None] = [None] * len(self.robots)
         if self.host == "controller":
@@ -114,6 +117,11 @@ class Network:
             robot.record(tick, posture, command)
             for robot, posture, command in zip(self.robots, measured, commands, strict=True)
         ]
+
+    def show(self, bodies: Sequence[Robot]) -> None:
+        """Lets this network's camera see the robots of all networks."""
+        if isinstance(self.sight, PixelSight):
+            self.sight.everyone = bodies
 
     def share_frequency(self, other: Network) -> None:
         """Lets the robots of this network hear the other one's transmitter too."""
@@ -155,7 +163,7 @@ class Network:
         wheels = [(0, 0)] * self.spec.robots
         for robot, noise, command in zip(self.robots, self.noisy_commands, commands, strict=True):
             if command is not None:
-                wheels[robot.spec.slot] = noise.wheels_of(command, robot.frame)
+                wheels[robot.spec.slot] = noise.wheels_of(command, self.sight.frame)
         sent = Transmission(start_tick, DOWN, self.station.frame(wheels), self.index)
         self.outbox.post(sent, self.downlink.free_tick)
 

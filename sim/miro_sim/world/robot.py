@@ -16,7 +16,6 @@ from miro_host.ear import Heard
 from miro_host.parts import PartError
 from miro_host.pilot import Command, Pilot
 from miro_host.posture import Posture
-from miro_host.vision import Vision
 from miro_robot.board import Board
 from miro_robot.event_log import TRUE
 from miro_robot.image import Image
@@ -25,7 +24,7 @@ from miro_robot.wiring import load_wiring
 from miro_sim.periods import Axis, Control, RobotPeriod
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.scenario import keys as sc
-from miro_sim.scenario.build import drive_for, pilot_for, reference_for, vision_for
+from miro_sim.scenario.build import drive_for, pilot_for, reference_for
 
 COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
 
@@ -33,12 +32,12 @@ COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
 class Robot:
     """A robot on the pitch and its pilot. `network` and `spec.slot` name it in records and noise streams."""
 
-    STATE = {"board": Board, "vision": Vision, "pilot": Pilot, "frame": ("q", 0, 1 << 40)}
+    STATE = {"board": Board, "pilot": Pilot}
     NOT_STATE = (
         "spec",
         "network",
+        "slot",
         "reference",
-        "camera_noise",
         "counter_addresses",
         "drive",  # the board saves it
         "marks",
@@ -51,6 +50,7 @@ class Robot:
         name = f"net{network}/robot{spec.slot}"
         self.spec = spec
         self.network = network
+        self.slot = spec.slot
         try:
             self.reference = reference_for(spec, scenario.duration_s)
             start = self.reference.at(0.0).posture
@@ -71,9 +71,6 @@ class Robot:
             load_wiring(), self.drive, spec.slot, robots, scenario.lm629, scenario.stop_on_fault
         )
         self.board.load(image)
-        self.camera_noise = Stream(seed, f"{name}/camera")
-        self.vision: Vision = vision_for(scenario.camera)
-        self.frame = 0
         self.marks: tuple[int, ...] = ()
         self.asked: list[tuple[Callable[[Robot], object], str]] = []
         self.counter_addresses = [_iram_address(image, f"_{counter}") for counter in COUNTERS]
@@ -101,13 +98,6 @@ class Robot:
                 if (at == "instruction" or step_tick == sample_tick) and predicate(self):
                     board.log.note(TRUE, reached, 0, 0)
         return stopped
-
-    def expose(self, tick: int) -> Posture | None:
-        """The camera takes a frame at `tick`; returns the measurement that reaches the PC now, if one does."""
-        x_m, y_m, theta_rad = self.drive.pose_at(tick)
-        draws = [self.camera_noise.gauss(3 * self.frame + axis) for axis in range(3)]
-        self.frame += 1
-        return self.vision.frame(Posture(x_m, y_m, theta_rad), (draws[0], draws[1], draws[2]))
 
     def steer(self, measured: Posture | None, heard: Heard | None, tick: int) -> Command:
         """The PC computes this robot's wheel commands from what it measured and heard. Raises PartError."""

@@ -106,13 +106,16 @@ class World:
         for one, other in permutations(self.networks, 2):
             if one.spec.radio.channel is not None and one.spec.radio.channel == other.spec.radio.channel:
                 one.share_frequency(other)
+        everyone = [robot for network in self.networks for robot in network.robots]
+        for network in self.networks:
+            network.show(everyone)
         self.tick = 0
         self.index = 0
         self.in_period = False
         self.stopped = False
         self.chain = b""
         self.last: Period | None = None
-        self.bodies = Bodies([robot for network in self.networks for robot in network.robots])
+        self.bodies = Bodies(everyone)
         self.waits = Waits(self)
         self._state: Flat | None = None
         self._own: Identity | None = None

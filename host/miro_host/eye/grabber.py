@@ -1,0 +1,61 @@
+"""The grabber: pictures reach the PC whole frames late, some not at all, some twice.
+
+What belongs here: the queue of frames under way, and what a dropped or repeated one means. What does not: drawing which
+frames those are (the caller hands it in), and pixels: the tracker reads nothing but pictures, so what it makes of one
+may wait in the queue in the picture's place.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from miro_exact.state import Rows
+from miro_host.eye.track import Sighting
+
+Sightings = tuple[Sighting | None, ...]
+_NUMBER = ("d", -1e6, 1e6)
+_TICK = ("q", 0, 1 << 62)
+
+
+def _split(sighting: Sighting | None) -> tuple[bool, float, float, float, int, float]:
+    if sighting is None:
+        return (False, 0.0, 0.0, 0.0, 0, 0.0)
+    return (True, sighting.x_m, sighting.y_m, sighting.theta_rad, sighting.tick, sighting.confidence)
+
+
+class Grabber:
+    """Frames under way of one camera that follows `robots` robots, `delay_frames` of them."""
+
+    STATE = {
+        "under_way": Rows(
+            *(1 << 10, "?", _NUMBER, _NUMBER, _NUMBER, _TICK, _NUMBER),
+            split=_split,
+            make=lambda cells: Sighting(*cells[1:]) if cells[0] else None,
+        ),
+    }
+    NOT_STATE = ("robots", "delay_frames")
+
+    def __init__(self, robots: int, delay_frames: int = 1) -> None:
+        self.robots = robots
+        self.delay_frames = delay_frames
+        self.under_way: deque[Sighting | None] = deque([None] * robots * (delay_frames + 1))
+
+    def __repr__(self) -> str:
+        return f"Grabber(robots={self.robots}, delay_frames={self.delay_frames}, {list(self.under_way)!r})"
+
+    def take(self, frame: Sightings | None) -> Sightings:
+        """Takes what was seen in a new frame and gives what arrives now; None: the frame before comes once more.
+
+        The first `delay_frames` answers are frames in which no robot was found.
+        """
+        if frame is None:
+            frame = tuple(self.under_way)[-self.robots :]
+        self.under_way.extend(frame)
+        for _ in range(self.robots):
+            self.under_way.popleft()
+        return tuple(self.under_way)[: self.robots]
+
+    def after_load(self) -> None:
+        """Raises ValueError unless as many frames are under way as the delay says."""
+        if len(self.under_way) != self.robots * (self.delay_frames + 1):
+            raise ValueError(f"{len(self.under_way)} sightings are under way of {self.robots} robots")

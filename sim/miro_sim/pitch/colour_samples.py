@@ -1,0 +1,63 @@
+"""The colours as a camera shows them: what somebody would sample who holds each robot under it once.
+
+What belongs here: pictures of one robot at a time at a few places, and the pixels in the middle of its patches. What
+does not: what classes are made of the samples (`miro_host.eye.colours`).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+from miro_exact.rng import Stream
+from miro_host.eye.camera_parameters import CameraParameters
+from miro_host.eye.colours import FLOOR, ColourClasses, classes_of
+from miro_host.eye.lens import Lens
+from miro_host.eye.patterns import BALL, IDENTITIES, PATTERNS, ROBOT_HEIGHT_M, TEAMS, PatternName
+from miro_sim.pitch.camera import Camera
+from miro_sim.pitch.picture_settings import PictureSettings
+
+PLACES_M = ((0.55, 0.30), (0.15, 0.05), (0.95, 0.65), (0.15, 0.65), (0.95, 0.05))
+"""Spread over the pitch, because the light is not the same everywhere; no white line in the floor's samples."""
+BALL_RADIUS_M = 0.02135
+_HALF_PX = 1
+"""Samples are squares of 3 x 3 pixels."""
+
+Samples = dict[str, list[tuple[int, int, int]]]
+
+
+def samples_of(lens: CameraParameters, picture: PictureSettings, pattern: PatternName) -> Samples:
+    """Sampled pixels (Y, Cb, Cr) by name of the colour, the floor's among them."""
+    camera = Camera(lens, picture, PATTERNS[pattern], Stream(0, "colour samples"))
+    found: Samples = {}
+    frame = 0
+    for x_m, y_m in PLACES_M:
+        for number in range(len(IDENTITIES)):
+            team = number % len(TEAMS)
+            camera.clear()
+            camera.robot(team, number, x_m, y_m, 0.0)
+            camera.begin(frame, 0)
+            for name, place in zip((TEAMS[team], IDENTITIES[number]), PATTERNS[pattern], strict=True):
+                at = (x_m + place[0] / 1000.0, y_m + place[1] / 1000.0, ROBOT_HEIGHT_M)
+                found.setdefault(name, []).extend(_pixels(camera, at))
+            frame += 1
+        camera.clear()
+        camera.ball(x_m, y_m)
+        camera.begin(frame, 0)
+        found.setdefault(BALL, []).extend(_pixels(camera, (x_m, y_m, BALL_RADIUS_M)))
+        found.setdefault(FLOOR, []).extend(_pixels(camera, (x_m + 0.1, y_m, 0.0)))
+        frame += 1
+    return found
+
+
+def _pixels(camera: Camera, at: tuple[float, float, float]) -> list[tuple[int, int, int]]:
+    u, v = Lens(camera.parameters).pixel(*at)
+    side = 2 * _HALF_PX + 1
+    data = camera.window(math.floor(u) - _HALF_PX, math.floor(v) - _HALF_PX, side, side)
+    return [(data[at], data[at + 1], data[at + 2]) for at in range(0, len(data), 3)]
+
+
+@lru_cache(maxsize=4)
+def colours_of(lens: CameraParameters, picture: PictureSettings, pattern: PatternName) -> ColourClasses:
+    """The classes that such samples give. Raises EyeError for colours that cannot be told apart."""
+    return classes_of(samples_of(lens, picture, pattern), "camera.picture")

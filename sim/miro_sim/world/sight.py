@@ -1,0 +1,229 @@
+"""What a host is told of where its robots are: an exposure of the world in, measurements out, whole frames late.
+
+What belongs here: the kinds of camera as the world runs them, and the draws that they need. What does not: pixels and
+tracking (`pitch`, `miro_host.eye`), and what is done with a measurement (`network`).
+
+    pixels      robots of all networks -> picture -> tracker -> grabber
+    geometric   own robots -> patches through the lens, back through the calibration -> grabber
+    gaussian    own robots -> white noise (`miro_host.vision`)
+
+Robots of the first network wear yellow, those of the second blue; the slot is the number that the patches show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from miro_exact.rng import Stream
+from miro_exact.state import TICK
+from miro_host.eye.grabber import Grabber, Sightings
+from miro_host.eye.patterns import PATTERNS, TEAMS
+from miro_host.eye.track import Sighting
+from miro_host.eye.tracker import Tracker
+from miro_host.posture import Posture
+from miro_host.vision import Vision, VisionErrors
+from miro_sim.pitch.camera import Camera
+from miro_sim.pitch.colour_samples import colours_of
+from miro_sim.pitch.static_field import StaticField
+from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.scenario import camera_keys as keys
+from miro_sim.scenario.build import calibration_for
+
+_DEGREE = 0.017453292519943295
+_FRAMES = ("q", 0, 1 << 24)
+WRONG = 3.0
+"""A measurement further off than so many times the worst case of the calibration is wrong."""
+SLACK_M = 0.0035
+"""Worst case of the tracker itself, and what a robot goes while it is exposed."""
+
+
+class Body(Protocol):
+    """What a camera sees of a robot."""
+
+    network: int
+    slot: int
+    drive: DifferentialDrive
+
+
+class Sight(Protocol):
+    """A camera and all behind it up to the measurement. `frame`: exposures so far."""
+
+    frame: int
+
+    def expose(self, tick: int) -> Sequence[Posture | None]:
+        """The camera takes a frame; what reaches the PC now, for each of its robots."""
+        ...
+
+
+class GaussianSight:
+    """White noise on the posture of each robot."""
+
+    STATE = {"visions": [Vision], "frame": _FRAMES}
+    NOT_STATE = ("bodies", "streams")
+
+    def __init__(self, camera: keys.GaussianCamera, bodies: Sequence[Body], seed: int) -> None:
+        errors = VisionErrors(
+            camera.position_error_cm / 100.0, camera.heading_error_deg * _DEGREE, camera.pixel_cm / 100.0
+        )
+        self.bodies = bodies
+        self.visions = [Vision(errors, camera.delay_frames) for _ in bodies]
+        self.streams = [Stream(seed, f"net{body.network}/robot{body.slot}/camera") for body in bodies]
+        self.frame = 0
+
+    def __repr__(self) -> str:
+        return f"GaussianSight({self.visions!r}, frame={self.frame})"
+
+    def expose(self, tick: int) -> Sequence[Posture | None]:
+        """See `Sight`."""
+        found = []
+        for body, vision, stream in zip(self.bodies, self.visions, self.streams, strict=True):
+            draws = [stream.gauss(3 * self.frame + axis) for axis in range(3)]
+            true = Posture(*body.drive.pose_at(tick))
+            found.append(vision.frame(true, (draws[0], draws[1], draws[2])))
+        self.frame += 1
+        return found
+
+
+class Whole:
+    """What befalls whole frames and whole robots on the way to the PC, by chance; base of what sees.
+
+    Counts for the summary: `lost` robots in frames, `dropped` and `repeated` frames, `wrong` measurements (further off
+    than three times the worst case of the calibration) and `swapped` ones (nearer to another robot of the team).
+    """
+
+    STATE = {
+        "grabber": Grabber,
+        "frame": _FRAMES,
+        "lost": TICK,
+        "dropped": TICK,
+        "repeated": TICK,
+        "wrong": TICK,
+        "swapped": TICK,
+    }
+    NOT_STATE: tuple[str, ...] = ("camera", "bodies", "chances", "worst_m")
+
+    def __init__(self, camera: keys.SeeingCamera, bodies: Sequence[Body], seed: int, worst_m: float) -> None:
+        self.camera = camera
+        self.bodies = bodies
+        self.grabber = Grabber(len(bodies), camera.delay_frames)
+        self.chances = Stream(seed, f"net{bodies[0].network}/grabber")
+        self.worst_m = worst_m + SLACK_M
+        self.frame = 0
+        self.lost = self.dropped = self.repeated = self.wrong = self.swapped = 0
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.grabber!r}, frame={self.frame}, lost={self.lost})"
+
+    def deliver(self, tick: int, look: Callable[[], Sightings]) -> Sightings:
+        """What arrives of the frame exposed at `tick`; `look` gives what is seen in it, unless the frame is dropped."""
+        robots = len(self.bodies)
+        first = self.frame * (robots + 2)
+        self.frame += 1
+        camera = self.camera
+        if self.chances.uniform(first) < camera.dropped_frames:
+            self.dropped += 1
+            return self.grabber.take((None,) * robots)
+        if self.chances.uniform(first + 1) < camera.repeated_frames:
+            self.repeated += 1
+            return self.grabber.take(None)
+        seen = look()
+        kept = tuple(
+            None if self.chances.uniform(first + 2 + index) < camera.lost_robots else sighting
+            for index, sighting in enumerate(seen)
+        )
+        self._count(tick, kept)
+        return self.grabber.take(kept)
+
+    def _count(self, tick: int, seen: Sightings) -> None:
+        """Compares with the truth, which nobody on the PC can."""
+        for index, sighting in enumerate(seen):
+            if sighting is None:
+                self.lost += 1
+                continue
+            ways = [_distance_m(body.drive, tick, sighting) for body in self.bodies]
+            if ways[index] > WRONG * self.worst_m:
+                self.wrong += 1
+            if min(ways) < ways[index]:
+                self.swapped += 1
+
+
+class GeometricSight(Whole):
+    """The true patches, drawn by the lens, read through the calibration."""
+
+    NOT_STATE = ("field",)
+
+    def __init__(self, camera: keys.GeometricCamera, bodies: Sequence[Body], seed: int) -> None:
+        calibration, worst_m = calibration_for(camera, bodies[0].network, seed)
+        super().__init__(camera, bodies, seed, worst_m)
+        self.field = StaticField(camera.lens, calibration, camera.pattern)
+
+    def expose(self, tick: int) -> Sequence[Posture | None]:
+        """See `Sight`."""
+        return self.deliver(tick, lambda: tuple(self._see(body, tick) for body in self.bodies))
+
+    def _see(self, body: Body, tick: int) -> Sighting | None:
+        try:
+            read = self.field.read(Posture(*body.drive.pose_at(tick)))
+        except ValueError:  # it has left the view
+            return None
+        return Sighting(read.x_m, read.y_m, read.theta_rad, tick, 1.0)
+
+
+class PixelSight(Whole):
+    """The picture of all robots, and the tracker of this host's. `everyone`: bodies of all networks."""
+
+    STATE = {"tracker": Tracker}
+    NOT_STATE = ("eye", "everyone", "picture")
+
+    def __init__(self, camera: keys.PixelCamera, bodies: Sequence[Body], seed: int) -> None:
+        network = bodies[0].network
+        calibration, worst_m = calibration_for(camera, network, seed)
+        super().__init__(camera, bodies, seed, worst_m)
+        self.picture = camera.picture
+        self.everyone: Sequence[Body] = bodies
+        self.eye = Camera(
+            camera.lens, camera.picture, PATTERNS[camera.pattern], Stream(seed, f"net{network}/pixels")
+        )
+        if camera.ball is not None:
+            self.eye.ball(camera.ball.x_cm / 100.0, camera.ball.y_cm / 100.0)
+        self.tracker = Tracker(
+            TEAMS[network],
+            [body.slot for body in bodies],
+            camera.pattern,
+            calibration,
+            colours_of(camera.lens, camera.picture, camera.pattern),
+            camera.centroid,
+            camera.window_px,
+        )
+
+    def expose(self, tick: int) -> Sequence[Posture | None]:
+        """See `Sight`."""
+        frame = self.frame
+        return self.deliver(tick, lambda: tuple(self.tracker.track(self.picture_at(frame, tick), tick)))
+
+    def picture_at(self, frame: int, tick: int) -> Camera:
+        """The picture of the world as it stands at `tick`, with the noise of this frame number."""
+        self.eye.clear_robots()
+        for body in self.everyone:
+            x_m, y_m, theta_rad = body.drive.pose_at(tick)
+            v_m_s, w_rad_s = body.drive.velocity_at(tick)
+            self.eye.robot(body.network, body.slot, x_m, y_m, theta_rad, v_m_s, w_rad_s)
+        self.eye.begin(frame, tick)
+        return self.eye
+
+
+def _distance_m(drive: DifferentialDrive, tick: int, seen: Posture) -> float:
+    x_m, y_m, _ = drive.pose_at(tick)
+    dx, dy = x_m - seen.x_m, y_m - seen.y_m
+    return math.sqrt(dx * dx + dy * dy)
+
+
+def sight_of(camera: keys.Camera, bodies: Sequence[Body], seed: int) -> Sight:
+    """The camera of one host."""
+    if isinstance(camera, keys.PixelCamera):
+        return PixelSight(camera, bodies, seed)
+    if isinstance(camera, keys.GeometricCamera):
+        return GeometricSight(camera, bodies, seed)
+    return GaussianSight(camera, bodies, seed)
