@@ -20,6 +20,7 @@ TEXT = """
 name = "noisy"
 duration_s = 0.5
 [camera]
+kind = "gaussian"
 position_error_cm = 0
 heading_error_deg = 0
 [[network]]

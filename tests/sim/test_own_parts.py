@@ -112,6 +112,7 @@ name = "quiet"
 duration_s = 5
 
 [camera]
+kind = "gaussian"
 position_error_cm = 0
 heading_error_deg = 0
 pixel_cm = 0

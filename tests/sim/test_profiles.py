@@ -32,7 +32,8 @@ reference.kind = "line"
 
 
 def text(*radios: str) -> str:
-    return 'name = "air"\nduration_s = 0.5\n' + "".join(NETWORK.format(radio) for radio in radios)
+    head = 'name = "air"\nduration_s = 0.5\ncamera.kind = "gaussian"\n'
+    return head + "".join(NETWORK.format(radio) for radio in radios)
 
 
 def radio(lines: str) -> Radio:

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from miro_host.estimators.none import NoEstimator
 from miro_host.estimators.predict import PredictParameters
 from miro_host.reference_keys import ArcRef, LineRef
+from miro_sim.scenario.camera_keys import PixelCamera
 from miro_sim.scenario.file import ScenarioError, builtin_names, builtin_text, load, parse
 from miro_sim.scenario.keys import Scenario
 
@@ -68,7 +69,9 @@ def test_a_built_in_scenario_names_itself_and_names_every_key(name: str) -> None
 def test_what_is_left_out_is_the_realistic_loop() -> None:
     scenario = parse(SMALL, "small")
     camera, radio = scenario.camera, scenario.networks[0].radio
-    assert (camera.position_error_cm, camera.heading_error_deg, camera.delay_frames) == (2.40, 4.83, 1)
+    assert isinstance(camera, PixelCamera)
+    assert (camera.calibration, camera.centroid, camera.delay_frames) == ("1997", "binary", 1)
+    assert camera.calibration_errors.worst_cm == 2.40
     assert scenario.host.compute_s == 0.003
     assert (radio.carrier, radio.bit_error_rate, radio.keyup_s) == ("keyed", 1e-4, 0.001)
     assert scenario.networks[0].robot[0].wheel_radius_mismatch == 0.015
@@ -87,7 +90,7 @@ def test_a_whole_number_is_a_number() -> None:
             "heading_rad = 0.0",
             "reference.heading_rad: unknown key; use heading_deg, in degrees",
         ),
-        ("pixel_cm", "pixels_cm", "camera.pixels_cm: unknown key; did you mean pixel_cm?"),
+        ("window_px", "windows_px", "camera.windows_px: unknown key; did you mean window_px?"),
         ("[camera]", "[cammera]", "cammera: unknown key; did you mean camera?"),
         ("duration_s = 6.0", "", "duration_s: this key is missing; add it"),
         (
@@ -118,19 +121,24 @@ def test_a_whole_number_is_a_number() -> None:
         ),
         ('law = "yang_kim"', 'law = "pid"', "controller.law: 'pid' is not one of the choices; use yang_kim"),
         (
-            'kind = "gaussian"',
+            'kind = "pixels"',
             "kind = true",
-            "camera.kind: expected a string, got true or false (True); use gaussian",
+            "camera.kind: expected a string, got true or false (True); use pixels, geometric or gaussian",
         ),
         (
-            'kind = "gaussian"',
+            'kind = "pixels"',
             'kind = "pixel"',
-            "camera.kind: 'pixel' is not one of the choices; use gaussian",
+            "camera.kind: 'pixel' is not one of the choices; use pixels, geometric or gaussian",
         ),
         (
-            'kind = "gaussian"',
+            'kind = "pixels"',
             'noise = "none"',
-            "camera.noise: unknown key; keys here: kind, position_error_cm",
+            "camera.kind: this key is missing; use pixels, geometric or gaussian",
+        ),
+        (
+            'calibration = "1997"',
+            "noise = 1",
+            "camera.noise: unknown key; keys here: kind, centroid, window_px",
         ),
         ("squelch = false", "squelch = 0", "radio.squelch: expected true or false, got a whole number (0)"),
         (
@@ -227,6 +235,7 @@ def test_a_scenario_that_would_take_minutes_is_refused_at_once(text: str, expect
 
 def test_a_scenario_may_have_32_networks_and_a_comment_any_dots() -> None:
     text = "# ........................\n# www.a.b.c.example.org\nname = 'a'\nduration_s = 1\n"
+    text += "camera.kind = 'gaussian'\n"
     assert len(parse(text + MANY_NETWORKS * 32, "many").networks) == 32
 
 

@@ -126,7 +126,7 @@ def test_a_scenario_that_stands_in_no_file_takes_settings_too() -> None:
         ("name=1979-05-27", "expected a string, got a date; to give text, write"),
         ("network.radio.profile=fade99", "'fade99' is no profile; did you mean fade5?"),
         ("network.radio.bursts.good_to_bad=0.1", "network[0].radio.bursts.bad_to_good: this key is missing"),
-        ("camera.kind=pixel", "'pixel' is not one of the choices; use gaussian"),
+        ("camera.kind=pixel", "'pixel' is not one of the choices; use pixels, geometric or gaussian"),
         ("network.robot.controller.law=nolaw", "'nolaw' is not one of the choices; use yang_kim"),
         ("network.robot.reference.curvature_per_m=1", "unknown key; it belongs to the reference 'arc', which kind"),
         (".".join("abcdefghijklmnopqrstuvwxyz") + "=1", "a key of more than 16 parts; remove it"),

@@ -14,8 +14,8 @@ cdef class Sensor:
     cdef int shift, half
     cdef int taps[9]
     cdef int gamma[4096]
-    cdef short luma_noise[4096]
-    cdef short chroma_noise[4096]
+    cdef int luma_noise[4096]
+    cdef int chroma_noise[4096]
     cdef int y[320]
     cdef int cb[320]
     cdef int cr[320]

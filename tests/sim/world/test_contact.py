@@ -21,6 +21,7 @@ name = "head-on"
 duration_s = 1.0
 
 [camera]
+kind = "gaussian"
 position_error_cm = 0
 heading_error_deg = 0
 
