@@ -64,7 +64,7 @@ class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     def __post_init__(self) -> None:
         problem = _problem(self.colours, self.floor)
         if problem is not None:
-            raise ValueError(f"colours.{problem[0]}: {problem[1]}; {problem[2]}")
+            raise ValueError(f"{problem[0]}: {problem[1]}; {problem[2]}")
 
     def text(self) -> str:
         """As TOML, which `eye_file.read` takes."""
@@ -119,7 +119,7 @@ def classes_of(
     floor = means.pop(FLOOR, None)
     problem = _problem(means, floor)
     if problem is not None:
-        raise EyeError(origin, f"colours.{problem[0]}", problem[1], problem[2])
+        raise EyeError(origin, *problem)
     return ColourClasses(colours=means, floor=floor)
 
 
@@ -143,16 +143,24 @@ def _sixteenths(x: float) -> int:
 
 
 def _problem(means: Mapping[str, ColourMean], floor: ColourMean | None) -> tuple[str, str, str] | None:
-    """Name, what and remedy of the first colour that cannot be told apart."""
+    """Place, what and remedy of the first colour that cannot be told apart."""
     if not means:
-        return "", "there is no colour", "sample the team's colour and the identities'"
+        return "colours", "there is no colour", "sample the team's colour and the identities'"
     for name, mean in means.items():
         if name not in CLASS_OF:
-            return name, "unknown colour", f"use {', '.join(COLOURS)}"
+            return f"colours.{name}", "unknown colour", f"use {', '.join(COLOURS)}"
         if _length(mean) < LEAST_CHROMA:
-            return name, "the samples are grey", "sample inside the patch, or use a stronger paint"
+            return (
+                f"colours.{name}",
+                "the samples are grey",
+                "sample inside the patch, or use a stronger paint",
+            )
         if floor is not None and _share(floor, mean) > MOST_FLOOR:
-            return name, "the floor has nearly the same colour", "use another paint, or a duller floor"
+            return (
+                f"colours.{name}",
+                "the floor has nearly the same colour",
+                "use another paint, or a duller floor",
+            )
     names = list(means)
     for index, one in enumerate(names):
         for other in names[:index]:

@@ -1,0 +1,78 @@
+"""Colour classes: from samples to means, from means to the table."""
+
+import pytest
+from tests.naive.painted_frame import PAINTS, sampled, ycbcr
+
+from miro_host.eye import eye_file
+from miro_host.eye.colours import CLASS_OF, ColourClasses, ColourMean, classes_of
+from miro_host.eye.eye_file import EyeError
+from miro_host.eye.patterns import COLOURS
+
+CLASSES = classes_of(sampled())
+
+
+def of(rgb):
+    y, cb, cr = (int(part) for part in ycbcr(rgb))
+    return CLASSES.table()[y >> 4 << 12 | cb >> 2 << 6 | cr >> 2]
+
+
+@pytest.mark.parametrize("name", COLOURS)
+def test_every_paint_has_its_class_also_in_dim_light(name):
+    assert of(PAINTS[name]) == CLASS_OF[name]
+    assert of([0.65 * part for part in PAINTS[name]]) == CLASS_OF[name]
+
+
+@pytest.mark.parametrize("name", ["floor", "black"])
+def test_floor_and_black_have_none(name):
+    assert of(PAINTS[name]) == 0
+    assert of((255, 255, 255)) == 0
+
+
+def test_means_are_those_of_the_samples():
+    samples = {"yellow": [(100, 60, 140), (102, 62, 144)] * 5, "blue": [(60, 200, 110)] * 4}
+    found = classes_of(samples)
+    assert found.colours["yellow"] == ColourMean(y=101.0, cb=61.0, cr=142.0, spread=2.25)
+    assert found.floor is None
+
+
+def test_classes_read_back_from_their_text_as_they_were():
+    assert eye_file.parse(CLASSES.text(), ColourClasses, "colours.toml") == CLASSES
+
+
+@pytest.mark.parametrize(
+    ("samples", "said"),
+    [
+        ({}, "colours: there is no colour; sample"),
+        ({"pink": [(100, 160, 190)] * 9}, "colours.pink: unknown colour; use yellow"),
+        ({"yellow": [(100, 60, 140)] * 3}, "colours.yellow: 3 sampled pixels; sample at least 4"),
+        ({"yellow": [(100, 130, 131)] * 9}, "colours.yellow: the samples are grey; sample inside"),
+        (
+            {"yellow": [(100, 60, 140), (100, 60, 152)] * 9, "orange": [(100, 62, 152)] * 9},
+            "colours.orange: cannot be told from yellow: hues too near",
+        ),
+        (
+            {"green": [(100, 100, 80)] * 9, "floor": [(60, 112, 100)] * 9},
+            "colours.green: the floor has nearly the same colour; use another paint",
+        ),
+    ],
+)
+def test_samples_that_make_no_classes_are_refused_with_a_remedy(samples, said):
+    with pytest.raises(EyeError) as caught:
+        classes_of(samples, "samples.csv")
+    assert f"{caught.value}".startswith("samples.csv: ")
+    assert said in f"{caught.value}"
+
+
+def test_a_file_with_overlapping_colours_is_refused_by_name():
+    text = """
+        [colours.yellow]
+        y = 100
+        cb = 60
+        cr = 140
+        [colours.lime]
+        y = 100
+        cb = 60
+        cr = 140
+    """
+    with pytest.raises(EyeError, match=r"c\.toml: .*colours\.lime: cannot be told from yellow"):
+        eye_file.parse(text, ColourClasses, "c.toml")

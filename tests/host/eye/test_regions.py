@@ -1,0 +1,95 @@
+"""Regions: the hot module, the source it was compiled from and a flood fill agree on any window."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.example_count import examples
+from tests.naive import regions as naive
+
+from miro_host.eye import lens
+from miro_host.eye.regions import TABLE_SIZE, Regions
+
+
+def uncompiled():
+    source = Path(lens.__file__).with_name("regions.py")
+    spec = importlib.util.spec_from_file_location("regions_from_source", source)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.Regions
+
+
+TABLE = bytes(cell >> 12 & 3 for cell in range(TABLE_SIZE))  # the class is two bits of Y
+HOT, SOURCE = Regions(TABLE), uncompiled()(TABLE)
+KINDS = {".": 0, "a": 1, "b": 2, "c": 3}
+
+
+def window(*rows: str) -> tuple[bytearray, int, int]:
+    pixels = bytearray()
+    for row in rows:
+        for letter in row:
+            pixels += bytes((16 * KINDS[letter], 128, 128))
+    return pixels, len(rows[0]), len(rows)
+
+
+def found(regions, pixels, width, height):
+    return [tuple(regions.region(index)) for index in range(regions.find(pixels, width, height))]
+
+
+@st.composite
+def windows(draw):
+    width, height = draw(st.integers(1, 20)), draw(st.integers(1, 20))
+    letters = draw(st.sampled_from(["a.", "ab", "aab.", "abc."]))
+    rows = draw(st.lists(st.text(letters, min_size=width, max_size=width), min_size=height, max_size=height))
+    return window(*rows)
+
+
+@examples(300)
+@given(windows())
+def test_any_window_has_the_regions_that_a_flood_fill_finds(drawn):
+    expected = [tuple(region) for region in naive.regions(TABLE, *drawn)]
+    assert found(HOT, *drawn) == expected
+    assert found(SOURCE, *drawn) == expected
+
+
+def test_the_largest_window_of_single_pixels_fits():
+    rows = ["ab" * 32, "ba" * 32] * 32
+    assert len(found(HOT, *window(*rows))) == 4096
+
+
+def test_regions_that_touch_by_a_corner_stay_apart():
+    assert [region[1] for region in found(HOT, *window("aa..", "aa..", "..aa", "..aa"))] == [4, 4]
+
+
+def test_arms_that_meet_further_down_are_one_region():
+    [region] = found(HOT, *window("a.a.a", "a.a.a", "aaaaa"))
+    assert region == (1, 11, 0, 0, 5, 3, 55, 37, True)
+
+
+def test_centroids_are_in_pixels_whose_centre_is_a_half():
+    HOT.find(*window("....", ".aa.", "....", "...."))
+    assert HOT.centroid(0) == (2.0, 1.5)
+    assert HOT.region(0).touches is False
+
+
+@pytest.mark.parametrize(("width", "height"), [(0, 4), (65, 64), (4097, 1), (-4, -4), (1 << 20, 1 << 20)])
+def test_a_window_without_pixels_or_with_too_many_is_refused(width, height):
+    for regions in (HOT, SOURCE):
+        with pytest.raises(ValueError, match="it must have 1 to 4096"):
+            regions.find(bytearray(12), width, height)
+
+
+def test_bytes_that_are_not_the_window_and_tables_of_another_size_are_refused():
+    with pytest.raises(ValueError, match="11 bytes are not 2 x 2 pixels of 3"):
+        HOT.find(bytearray(11), 2, 2)
+    with pytest.raises(ValueError, match="has 16 entries, not 65536"):
+        Regions(bytes(16))
+
+
+def test_a_region_that_is_not_there_is_refused():
+    HOT.find(*window("a."))
+    for ask in (HOT.region, HOT.centroid):
+        with pytest.raises(IndexError, match="region 1 of 1"):
+            ask(1)
