@@ -146,31 +146,19 @@ def _problem(means: Mapping[str, ColourMean], floor: ColourMean | None) -> tuple
     """Place, what and remedy of the first colour that cannot be told apart."""
     if not means:
         return "colours", "there is no colour", "sample the team's colour and the identities'"
-    for name, mean in means.items():
-        if name not in CLASS_OF:
-            return f"colours.{name}", "unknown colour", f"use {', '.join(COLOURS)}"
-        if _length(mean) < LEAST_CHROMA:
-            return (
-                f"colours.{name}",
-                "the samples are grey",
-                "sample inside the patch, or use a stronger paint",
-            )
-        if floor is not None and _share(floor, mean) > MOST_FLOOR:
-            return (
-                f"colours.{name}",
-                "the floor has nearly the same colour",
-                "use another paint, or a duller floor",
-            )
     names = list(means)
-    for index, one in enumerate(names):
+    for index, name in enumerate(names):
+        place, mean = f"colours.{name}", means[name]
+        if name not in CLASS_OF:
+            return place, "unknown colour", f"use {', '.join(COLOURS)}"
+        if _length(mean) < LEAST_CHROMA:
+            return place, "the samples are grey", "sample inside the patch, or use a stronger paint"
+        if floor is not None and _share(floor, mean) > MOST_FLOOR:
+            return place, "the floor has nearly the same colour", "use another paint, or a duller floor"
         for other in names[:index]:
-            if _overlap(means[one], means[other]):
+            if _overlap(mean, means[other]):
                 what = f"cannot be told from {other}: hues too near for the noise in the samples"
-                return (
-                    one,
-                    what,
-                    "use another paint for one of them, more light, or sample inside the patches",
-                )
+                return place, what, "use another paint, more light, or sample inside the patches"
     return None
 
 

@@ -11,13 +11,11 @@ import math
 from miro_exact.dmath import atan2, sincos, wrap_pi
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.patterns import PATCH_MM, PATTERNS, ROBOT_HEIGHT_M, PatternName
-from miro_host.posture import Posture
 
-DISTANCE_SHARE = 0.2
-"""A pair's distance may differ from the pattern's by this share."""
-LEAST_AREA_SHARE = 0.35
-MOST_AREA_SHARE = 1.5
-"""Of a patch's expected area: half covered pixels and dim light make it smaller, and two patches in one are 2."""
+_DISTANCE = 0.2  # share by which a pair's distance may differ from the pattern's
+# Shares of a patch's expected area: half covered pixels and dim light make it smaller, two patches in one are 2.
+_LEAST = 0.35
+_MOST = 1.5
 
 
 class Top:
@@ -47,34 +45,43 @@ class Top:
 
     def distances_m(self) -> tuple[float, float]:
         """Least and most distance of two patches that are a pair."""
-        reach = DISTANCE_SHARE * self.distance_m
+        reach = _DISTANCE * self.distance_m
         return self.distance_m - reach, self.distance_m + reach
 
     def areas(self) -> tuple[int, int]:
         """Least and most area of a patch in px."""
-        return math.ceil(LEAST_AREA_SHARE * self.area_px), math.floor(MOST_AREA_SHARE * self.area_px)
+        return math.ceil(_LEAST * self.area_px), math.floor(_MOST * self.area_px)
 
-    def places(self, posture: Posture) -> tuple[float, float, float, float]:
+    def places(self, x_m: float, y_m: float, theta_rad: float) -> tuple[float, float, float, float]:
         """x, y of the team patch and of the identity patch of a robot, in m."""
-        sin, cos = sincos(posture.theta_rad + self.angle_rad)
-        dx, dy = 0.5 * self.distance_m * cos, 0.5 * self.distance_m * sin
-        return posture.x_m + dx, posture.y_m + dy, posture.x_m - dx, posture.y_m - dy
+        sin, cos = sincos(theta_rad + self.angle_rad)
+        dx = 0.5 * self.distance_m * cos
+        dy = 0.5 * self.distance_m * sin
+        return x_m + dx, y_m + dy, x_m - dx, y_m - dy
 
-    def posture(self, team_x: float, team_y: float, identity_x: float, identity_y: float) -> Posture:
-        """The robot whose patches are there: its centre is in their middle."""
-        return Posture(
+    def posture(
+        self, team_u: float, team_v: float, identity_u: float, identity_v: float
+    ) -> tuple[float, float, float]:
+        """x, y and heading of the robot with these centroids: its centre is in the middle of its patches.
+
+        Raises ValueError for a pixel that does not look at the ground.
+        """
+        team_x, team_y = self.lens.ground(team_u, team_v, self.z_m)
+        identity_x, identity_y = self.lens.ground(identity_u, identity_v, self.z_m)
+        return (
             0.5 * (team_x + identity_x),
             0.5 * (team_y + identity_y),
             wrap_pi(atan2(team_y - identity_y, team_x - identity_x) - self.angle_rad),
         )
 
-    def confidence(self, gap_m: float, areas: tuple[int, int]) -> float:
+    def confidence(self, gap_m: float, team_area: int, identity_area: int) -> float:
         """How far a pair is from the nearest bound of what is taken for a robot: 1 in the middle, 0 on it."""
-        least = 1.0 - abs(gap_m - self.distance_m) / (DISTANCE_SHARE * self.distance_m)
-        for area in areas:
-            share = area / self.area_px
-            if share < 1.0:
-                least = min(least, (share - LEAST_AREA_SHARE) / (1.0 - LEAST_AREA_SHARE))
-            else:
-                least = min(least, (MOST_AREA_SHARE - share) / (MOST_AREA_SHARE - 1.0))
-        return max(least, 0.0)
+        least = 1.0 - abs(gap_m - self.distance_m) / (_DISTANCE * self.distance_m)
+        return max(0.0, min(least, self.margin(team_area), self.margin(identity_area)))
+
+    def margin(self, area: int) -> float:
+        """The same for the area of one patch."""
+        share = area / self.area_px
+        if share < 1.0:
+            return (share - _LEAST) / (1.0 - _LEAST)
+        return (_MOST - share) / (_MOST - 1.0)

@@ -187,9 +187,9 @@ class Tracker:
         track = self.tracks[slot]
         self.patches.expect_nothing()
         if predicted is not None:
-            self.patches.expect(*self.top.places(predicted))
+            self.patches.expect(*self.top.places(predicted.x_m, predicted.y_m, predicted.theta_rad))
         if track.seen:
-            self.patches.expect(*self.top.places(track.last()))
+            self.patches.expect(*self.top.places(track.x_m, track.y_m, track.theta_rad))
 
     def _chosen(self, pixels: bytearray, tick: int, slot: int) -> _Pair | None:
         """The robot in the window that `patches` looked at last, None if there is none for sure."""
@@ -223,16 +223,13 @@ class Tracker:
         """The pair that `patches` chose as a sighting."""
         patches = self.patches
         try:
-            team_u, team_v, identity_u, identity_v = self._centroids(pixels, slot)
-            team_x, team_y = self.lens.ground(team_u, team_v, self.z_m)
-            identity_x, identity_y = self.lens.ground(identity_u, identity_v, self.z_m)
+            centroids = self._centroids(pixels, slot)
+            x_m, y_m, theta_rad = self.top.posture(*centroids)
         except ValueError:
             return None
-        posture = self.top.posture(team_x, team_y, identity_x, identity_y)
-        areas = (patches.out_team_area, patches.out_identity_area)
-        confidence = self.top.confidence(patches.out_gap_m, areas)
-        sighting = Sighting(posture.x_m, posture.y_m, posture.theta_rad, tick, confidence)
-        return _Pair(sighting, patches.out_off_m, team_u, team_v)
+        confidence = self.top.confidence(patches.out_gap_m, patches.out_team_area, patches.out_identity_area)
+        sighting = Sighting(x_m, y_m, theta_rad, tick, confidence)
+        return _Pair(sighting, patches.out_off_m, centroids[0], centroids[1])
 
     def _centroids(self, pixels: bytearray, slot: int) -> tuple[float, float, float, float]:
         """u, v of the team patch and of the identity patch in the picture."""
