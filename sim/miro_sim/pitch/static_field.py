@@ -27,11 +27,12 @@ class StaticField:
 
     def read(self, true: Posture) -> Posture:
         """The posture as it is read. Raises ValueError for one whose patches are outside the picture."""
-        team_x, team_y, identity_x, identity_y = self.top.places(true)
-        return self.top.posture(*self._read(team_x, team_y), *self._read(identity_x, identity_y))
+        team_x, team_y, identity_x, identity_y = self.top.places(true.x_m, true.y_m, true.theta_rad)
+        pixels = (*self._drawn(team_x, team_y), *self._drawn(identity_x, identity_y))
+        return Posture(*self.top.posture(*pixels))
 
-    def _read(self, x_m: float, y_m: float) -> tuple[float, float]:
+    def _drawn(self, x_m: float, y_m: float) -> tuple[float, float]:
         u, v = self.lens.pixel(x_m, y_m, ROBOT_HEIGHT_M)
         if not (0.0 <= u <= WIDTH and 0.0 <= v <= HEIGHT):
             raise ValueError(f"({x_m:.3f}, {y_m:.3f}) m is outside the picture")
-        return self.top.lens.ground(u, v, self.top.z_m)
+        return u, v
