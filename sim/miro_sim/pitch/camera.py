@@ -84,6 +84,18 @@ class Camera:
             "team_paint",
         ),
         *("identity_paint", "x", "y", "cos", "sin", "near", "near_count", "code", "seen", "height_um"),
+        *(
+            "least_x",
+            "most_x",
+            "least_y",
+            "most_y",
+            "count",
+            "corner_u",
+            "corner_v",
+            "fall_u",
+            "fall_v",
+            "seer",
+        ),
     )
 
     def __init__(
@@ -115,8 +127,18 @@ class Camera:
         self.near = [0] * 10
         self.near_count = 0
         self.code = [0] * 60
+        self.least_x = [0] * 10
+        self.most_x = [0] * 10
+        self.least_y = [0] * 10
+        self.most_y = [0] * 10
         self.seen = [0] * 16
         self.height_um = [0] * 16
+        self.corner_u = [0] * 40
+        self.corner_v = [0] * 40
+        self.fall_u = [0] * 10
+        self.fall_v = [0] * 10
+        self.seer = [0] * 10
+        self.count = 0
 
     def __repr__(self) -> str:
         return f"Camera({self.rays!r}, {self.robots} robots, {self.sensor!r})"
@@ -167,7 +189,19 @@ class Camera:
             sine, cosine = sincos(theta_rad + w_rad_s * after_s)
             self.cos[place] = math.floor(cosine * 32768.0 + 0.5)
             self.sin[place] = math.floor(sine * 32768.0 + 0.5)
+        self._bound(body)
         self.robots = body + 1
+
+    def _bound(self, body: int) -> None:
+        """The least and the largest place of a robot over all instants."""
+        first = body * _SETS
+        self.least_x[body] = self.most_x[body] = self.x[first]
+        self.least_y[body] = self.most_y[body] = self.y[first]
+        for place in range(first + 1, first + self.sets):
+            self.least_x[body] = min(self.least_x[body], self.x[place])
+            self.most_x[body] = max(self.most_x[body], self.x[place])
+            self.least_y[body] = min(self.least_y[body], self.y[place])
+            self.most_y[body] = max(self.most_y[body], self.y[place])
 
     def begin(self, frame: int, tick: int) -> None:
         """Takes frame number `frame` (below 2^24) of what stands there now; `tick`: the middle of the exposure."""
@@ -207,14 +241,12 @@ class Camera:
         self.near_count = 0
         x = self.rays.middle_x[pixel]
         y = self.rays.middle_y[pixel]
+        far = reach + _CORNER_UM
         for body in range(self.robots):
-            for at in range(self.sets):
-                place = body * _SETS + at
-                far = reach + _CORNER_UM
-                if abs(self.x[place] - x) <= far and abs(self.y[place] - y) <= far:
+            if self.least_x[body] - far <= x <= self.most_x[body] + far:
+                if self.least_y[body] - far <= y <= self.most_y[body] + far:
                     self.near[self.near_count] = body
                     self.near_count += 1
-                    break
 
     def _total(self, pixel: int) -> int:
         """The paints of all samples of a pixel, added."""
@@ -223,8 +255,10 @@ class Camera:
             scene.look(pixel)
         seen = False
         for index in range(self.near_count):
+            body = self.near[index]
+            passes = self._passes(pixel, body)
             for at in range(self.sets):
-                code = self._code(self.near[index], at, pixel)
+                code = self._code(body, at, pixel) if passes else _OUT
                 self.code[index * _SETS + at] = code
                 if code != _OUT:
                     seen = True
@@ -251,22 +285,20 @@ class Camera:
             return self.scene.total[pixel]
         return self._samples(pixel, at)
 
-    def _passes(self, pixel: int, x: int, y: int, reach: int) -> bool:
-        """Whether lines through the pixel may come as near as `reach` to (x, y), looked at along each axis alone."""
-        far = reach + self.rays.spread_um
-        top_x = self.rays.middle_x[pixel] - x
-        top_y = self.rays.middle_y[pixel] - y
-        end_x = top_x + self.rays.fall_x[pixel]
-        end_y = top_y + self.rays.fall_y[pixel]
-        if (top_x > far and end_x > far) or (top_x < 0 - far and end_x < 0 - far):
+    def _passes(self, pixel: int, body: int) -> bool:
+        """Whether lines through the pixel may meet a robot at any instant, looked at along each axis alone."""
+        far = _CORNER_UM + self.rays.spread_um
+        top = self.rays.middle_x[pixel]
+        end = top + self.rays.fall_x[pixel]
+        if max(top, end) < self.least_x[body] - far or min(top, end) > self.most_x[body] + far:
             return False
-        return not ((top_y > far and end_y > far) or (top_y < 0 - far and end_y < 0 - far))
+        top = self.rays.middle_y[pixel]
+        end = top + self.rays.fall_y[pixel]
+        return max(top, end) >= self.least_y[body] - far and min(top, end) <= self.most_y[body] + far
 
     def _code(self, body: int, at: int, pixel: int) -> int:
         """The one paint of a robot that all samples of a pixel see, or _OUT, or _UNSURE."""
         place = body * _SETS + at
-        if not self._passes(pixel, self.x[place], self.y[place], _CORNER_UM):
-            return _OUT
         x = self.rays.middle_x[pixel] - self.x[place]
         y = self.rays.middle_y[pixel] - self.y[place]
         u = (x * self.cos[place] + y * self.sin[place]) >> 15
@@ -310,15 +342,20 @@ class Camera:
         if self.sets != self.field_sets:
             first = 8 * (at // self.field_sets)
             end = first + 8
-        for sample in range(first, end):
-            self.seen[sample] = _OUT
-            self.height_um[sample] = -1
-        for index in range(self.near_count):
-            if self.code[index * _SETS + at] != _OUT:
-                self._see(self.near[index], at, pixel, first, end)
         scene = self.scene
         behind = scene.paint[pixel]
         near_ball = scene.near_ball(pixel)
+        self.count = 0
+        for index in range(self.near_count):
+            if self.code[index * _SETS + at] != _OUT:
+                self._turn(self.near[index], at, pixel)
+        if self.count == 1 and behind != _MIXED and not near_ball:
+            return self._alone(scene.packed[behind], first, end)
+        for sample in range(first, end):
+            self.seen[sample] = _OUT
+            self.height_um[sample] = -1
+        for slot in range(self.count):
+            self._see(slot, first, end)
         total = 0
         for sample in range(first, end):
             paint = self.seen[sample]
@@ -330,53 +367,89 @@ class Camera:
             total += scene.packed[paint]
         return total
 
-    def _see(self, body: int, at: int, pixel: int, first: int, end: int) -> None:
-        """What samples see of one robot, where it is higher than what they have seen."""
+    def _turn(self, body: int, at: int, pixel: int) -> None:
+        """The pixel's corners and its fall in the axes of one more robot; corners in rows: a b above, c d below."""
         rays = self.rays
         place = body * _SETS + at
         cosine, sine = self.cos[place], self.sin[place]
-        a = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
-        c = a + _CORNERS
-        x = self.x[place]
-        y = self.y[place]
-        # The corners of the pixel in the robot's axes: a b above, c d below.
-        u_a = ((rays.top_x[a] - x) * cosine + (rays.top_y[a] - y) * sine) >> 15
-        v_a = ((rays.top_y[a] - y) * cosine - (rays.top_x[a] - x) * sine) >> 15
-        u_b = ((rays.top_x[a + 1] - x) * cosine + (rays.top_y[a + 1] - y) * sine) >> 15
-        v_b = ((rays.top_y[a + 1] - y) * cosine - (rays.top_x[a + 1] - x) * sine) >> 15
-        u_c = ((rays.top_x[c] - x) * cosine + (rays.top_y[c] - y) * sine) >> 15
-        v_c = ((rays.top_y[c] - y) * cosine - (rays.top_x[c] - x) * sine) >> 15
-        u_d = ((rays.top_x[c + 1] - x) * cosine + (rays.top_y[c + 1] - y) * sine) >> 15
-        v_d = ((rays.top_y[c + 1] - y) * cosine - (rays.top_x[c + 1] - x) * sine) >> 15
-        fall_u = (rays.fall_x[pixel] * cosine + rays.fall_y[pixel] * sine) >> 15
-        fall_v = (rays.fall_y[pixel] * cosine - rays.fall_x[pixel] * sine) >> 15
-        sample = first
-        while sample < end:
-            if sample & 3 == 0:  # a new row: from its left end to its right end, in 1/64
-                q = (sample >> 1) + 1
-                u = (u_a * (8 - q) + u_c * q) * 8
-                v = (v_a * (8 - q) + v_c * q) * 8
-                step_u = u_b * (8 - q) + u_d * q - (u >> 3)
-                step_v = v_b * (8 - q) + v_d * q - (v >> 3)
-                u += step_u
-                v += step_v
-            self._see_at(body, sample, u >> 6, v >> 6, fall_u, fall_v)
-            u += 2 * step_u
-            v += 2 * step_v
-            sample += 1
+        first = pixel // _WIDTH * _CORNERS + pixel % _WIDTH
+        slot = self.count
+        for corner in range(4):
+            ray = first + (corner >> 1) * _CORNERS + (corner & 1)
+            x = rays.top_x[ray] - self.x[place]
+            y = rays.top_y[ray] - self.y[place]
+            self.corner_u[4 * slot + corner] = (x * cosine + y * sine) >> 15
+            self.corner_v[4 * slot + corner] = (y * cosine - x * sine) >> 15
+        x = rays.fall_x[pixel]
+        y = rays.fall_y[pixel]
+        self.fall_u[slot] = (x * cosine + y * sine) >> 15
+        self.fall_v[slot] = (y * cosine - x * sine) >> 15
+        self.seer[slot] = body
+        self.count = slot + 1
 
-    def _see_at(self, body: int, sample: int, u: int, v: int, fall_u: int, fall_v: int) -> None:
-        """What a sample sees of a robot whose axes its line begins at (u, v) of."""
-        if self.height_um[sample] == _TOP_UM:
-            return
-        if -_HALF_UM <= u <= _HALF_UM and -_HALF_UM <= v <= _HALF_UM:
-            self.seen[sample] = self._top(body, u, v)
-            self.height_um[sample] = _TOP_UM
-        elif _enters(u, v, fall_u, fall_v, _HALF_UM):
-            height = _entry(u, v, fall_u, fall_v)
-            if height > self.height_um[sample]:
-                self.seen[sample] = self.side
-                self.height_um[sample] = height
+    def _alone(self, behind: int, first: int, end: int) -> int:
+        """The samples where only one robot may be seen, before one paint: as `_see`, but nothing is compared."""
+        body = self.seer[0]
+        fall_u, fall_v = self.fall_u[0], self.fall_v[0]
+        top, side = self.scene.packed[self.black], self.scene.packed[self.side]
+        team = self.scene.packed[self.team_paint[body]]
+        identity = self.scene.packed[self.identity_paint[body]]
+        total = 0
+        for row in range(first >> 2, end >> 2):
+            q = 2 * row + 1
+            u = self.corner_u[0] * (8 - q) + self.corner_u[2] * q
+            v = self.corner_v[0] * (8 - q) + self.corner_v[2] * q
+            step_u = self.corner_u[1] * (8 - q) + self.corner_u[3] * q - u
+            step_v = self.corner_v[1] * (8 - q) + self.corner_v[3] * q - v
+            u = 8 * u + step_u
+            v = 8 * v + step_v
+            for _ in range(4):
+                at_u = u >> 6
+                at_v = v >> 6
+                if -_HALF_UM <= at_u <= _HALF_UM and -_HALF_UM <= at_v <= _HALF_UM:
+                    if abs(at_u - self.team_u) <= self.patch_um and abs(at_v - self.team_v) <= self.patch_um:
+                        total += team
+                    elif (
+                        abs(at_u - self.identity_u) <= self.patch_um
+                        and abs(at_v - self.identity_v) <= self.patch_um
+                    ):
+                        total += identity
+                    else:
+                        total += top
+                elif _enters(at_u, at_v, fall_u, fall_v, _HALF_UM):
+                    total += side
+                else:
+                    total += behind
+                u += 2 * step_u
+                v += 2 * step_v
+        return total
+
+    def _see(self, slot: int, first: int, end: int) -> None:
+        """What samples see of one robot, where it is higher than what they have seen."""
+        body = self.seer[slot]
+        fall_u, fall_v = self.fall_u[slot], self.fall_v[slot]
+        for sample in range(first, end):
+            if self.height_um[sample] == _TOP_UM:
+                continue
+            u = _between(self.corner_u, 4 * slot, sample)
+            v = _between(self.corner_v, 4 * slot, sample)
+            if -_HALF_UM <= u <= _HALF_UM and -_HALF_UM <= v <= _HALF_UM:
+                self.seen[sample] = self._top(body, u, v)
+                self.height_um[sample] = _TOP_UM
+            elif _enters(u, v, fall_u, fall_v, _HALF_UM):
+                height = _entry(u, v, fall_u, fall_v)
+                if height > self.height_um[sample]:
+                    self.seen[sample] = self.side
+                    self.height_um[sample] = height
+
+
+def _between(corners: list[int], first: int, sample: int) -> int:
+    """A sample between four corners, which are at `first` in two rows."""
+    p = 2 * (sample & 3) + 1
+    q = 2 * (sample >> 2) + 1
+    left = corners[first] * (8 - q) + corners[first + 2] * q
+    right = corners[first + 1] * (8 - q) + corners[first + 3] * q
+    return (left * (8 - p) + right * p) >> 6
 
 
 def _um(metres: float) -> int:
