@@ -1,0 +1,202 @@
+"""What the camera sees: the same bytes as its slow twin, however it is asked, and what each setting does."""
+
+import random
+import statistics
+import sys
+
+import pytest
+from msgspec.structs import replace
+from tests.children import run
+from tests.sim.pitch.windows import check_rig
+
+from miro_exact import engine
+from miro_exact.rng import Stream
+from miro_host.eye.camera_parameters import CameraParameters
+from miro_host.eye.lens import Lens
+from miro_host.eye.patterns import PATTERNS
+from miro_sim.pitch.camera import Camera
+from miro_sim.pitch.picture_settings import PictureSettings
+
+LENS = CameraParameters()
+QUIET = PictureSettings(
+    light_falloff=0.0, flicker=0.0, chroma_bandwidth_hz=0.0, luma_noise=0.0, chroma_noise=0.0
+)
+RUNS_COMPILED = pytest.mark.skipif(engine.active() != "compiled", reason="takes minutes uncompiled")
+
+
+def camera(picture=QUIET, lens=LENS):
+    return Camera(lens, picture, PATTERNS["diagonal"], Stream(3, "test"))
+
+
+def seen(one, x_m, y_m, z_m, side=1):
+    """The pixels (Y, Cb, Cr) around a place, a square of so many."""
+    u, v = Lens(one.parameters).pixel(x_m, y_m, z_m)
+    data = one.window(int(u) - side // 2, int(v) - side // 2, side, side)
+    return [tuple(data[at : at + 3]) for at in range(0, len(data), 3)]
+
+
+def luma(one, *place):
+    return seen(one, *place)[0][0]
+
+
+@RUNS_COMPILED
+@pytest.mark.parametrize("seed", range(12))
+def test_a_window_is_that_part_of_the_picture_and_the_slow_twins(seed):
+    assert check_rig(random.Random(seed), windows=40) == 205
+
+
+@RUNS_COMPILED
+def test_both_engines_draw_the_same_bytes():
+    command = [sys.executable, "-m", "tests.sim.pitch.picture_digest", "--engine"]
+    digests = [
+        run([*command, name], capture_output=True, text=True, check=True).stdout
+        for name in ("compiled", "python")
+    ]
+    assert len(digests[0].strip()) == 64
+    assert digests[0] == digests[1]
+
+
+def test_a_picture_does_not_depend_on_what_was_looked_at_before():
+    one, other = camera(PictureSettings()), camera(PictureSettings())
+    for each in (one, other):
+        each.robot(0, 1, 0.3, 0.2, 0.5, 1.0, 2.0)
+        each.begin(9, 12345)
+    one.window(0, 0, 50, 50)
+    assert one.window(90, 120, 40, 40) == other.window(90, 120, 40, 40)
+
+
+def test_patches_top_sides_and_floor_are_where_they_should_be():
+    one = camera()
+    one.robot(0, 0, 0.9, 0.35, 0.0)
+    one.begin(0, 0)
+    yellow = seen(one, 0.919, 0.369, 0.075)[0]
+    magenta = seen(one, 0.881, 0.331, 0.075)[0]
+    black = seen(one, 0.919, 0.331, 0.075)[0]
+    floor = seen(one, 0.9, 0.6, 0.0)[0]
+    side = seen(one, 0.8625, 0.35, 0.04)[0]  # the side that faces the middle of the pitch
+    assert yellow[0] > 180
+    assert yellow[1] < 60  # little blue
+    assert magenta[2] > 200  # much red
+    assert black[0] < 60
+    assert side[0] > 140
+    assert abs(side[1] - 128) < 8
+    assert floor[1] < 128
+    assert floor[2] < 115  # green
+
+
+def test_a_robot_hides_the_floor_and_the_ball_behind_it_and_the_ball_hides_a_side():
+    hidden, alone, before = camera(), camera(), camera()
+    hidden.robot(0, 0, 1.0, 0.35, 0.0)
+    hidden.ball(1.06, 0.35)  # outside of it: the top, which is nearer to the camera, hides half of it
+    alone.ball(1.06, 0.35)
+    before.robot(0, 0, 1.0, 0.35, 0.0)
+    before.ball(0.939, 0.35)
+    for each in (hidden, alone, before):
+        each.begin(0, 0)
+    orange = seen(alone, 1.05, 0.35, 0.02)[0]
+    assert orange[2] > 170
+    assert seen(hidden, 1.05, 0.35, 0.02)[0][2] < 150
+    assert seen(before, 0.945, 0.35, 0.025)[0][2] > 165
+
+
+def test_walls_are_white_inside_and_black_on_top_and_the_goal_is_open():
+    one = camera()
+    one.begin(0, 0)
+    assert luma(one, 0.25, -0.1, 0.025) > 150
+    assert luma(one, 0.25, -0.115, 0.05) < 60
+    assert luma(one, -0.17, 0.35, 0.0) == luma(one, 0.2, 0.2, 0.0)  # the floor of the goal
+
+
+def test_lines_are_thinner_than_a_pixel_and_lighter_than_the_floor():
+    one = camera()
+    one.begin(0, 0)
+    assert luma(one, 0.2, 0.2, 0.0) + 30 < max(pixel[0] for pixel in seen(one, 0.55, 0.2, 0.0, 3)) < 220
+
+
+def test_noise_has_its_deviation_and_is_another_in_each_frame_and_pixel():
+    one = camera(replace(QUIET, luma_noise=4.0, chroma_noise=8.0))
+    one.begin(0, 0)
+    first = one.window(60, 150, 40, 40)
+    assert statistics.stdev(first[0::3]) == pytest.approx(4.0, rel=0.1)
+    assert statistics.stdev(first[1::3]) == pytest.approx(8.0, rel=0.1)
+    assert statistics.stdev(first[2::3]) == pytest.approx(8.0, rel=0.1)
+    one.begin(1, 0)
+    again = one.window(60, 150, 40, 40)
+    different = sum(a != b for a, b in zip(first, again, strict=True))
+    assert different > 0.8 * len(first)
+    one.begin(0, 0)
+    assert one.window(60, 150, 40, 40) == first
+
+
+def test_lamps_flicker_at_twice_the_mains_unless_the_exposure_is_whole_periods():
+    def levels(**changed):
+        one = camera(replace(QUIET, flicker=0.5, **changed))
+        found = set()
+        for frame in range(0, 240, 20):
+            one.begin(frame, frame * 800_800)
+            found.add(luma(one, 0.2, 0.2, 0.0))
+        return found
+
+    assert len(levels(mains_hz=60)) == 1  # 1/60 s is two periods
+    assert len(levels(mains_hz=50)) > 1
+    assert len(levels(mains_hz=60, exposure_s=0.004)) > 1
+
+
+def test_light_falls_off_towards_the_corners():
+    one = camera(replace(QUIET, light_falloff=0.6))
+    one.begin(0, 0)
+    assert luma(one, 0.5, 0.3, 0.0) > luma(one, -0.05, 0.0, 0.0) + 5
+
+
+def test_a_moving_robot_is_blurred_and_a_second_field_shows_a_comb():
+    def picture(**changed):
+        one = camera(replace(QUIET, **changed))
+        one.robot(0, 0, 0.55, 0.35, 0.0, 1.2)
+        one.begin(0, 0)
+        u, v = Lens(LENS).pixel(0.55, 0.35, 0.075)
+        return one.window(int(u) - 20, int(v) - 16, 40, 32)
+
+    sharp, blurred = picture(exposure_s=0.0), picture()
+    assert sharp != blurred
+    assert picture(fields=2) != blurred
+    still = camera(QUIET)
+    still.robot(0, 0, 0.55, 0.35, 0.0)
+    still.begin(0, 0)
+    combed = camera(replace(QUIET, fields=2))
+    combed.robot(0, 0, 0.55, 0.35, 0.0)
+    combed.begin(0, 0)
+    assert still.window(140, 100, 40, 40) == combed.window(140, 100, 40, 40)
+
+
+def test_chroma_bleeds_sideways_and_luma_does_not():
+    def beside(bandwidth_hz):
+        one = camera(replace(QUIET, chroma_bandwidth_hz=bandwidth_hz))
+        one.robot(0, 0, 0.55, 0.35, 0.7853981633974483)
+        one.begin(0, 0)
+        return one.window(130, 100, 60, 40)
+
+    def coloured(data):
+        return sum(cr - 128 > 8 for cr in data[2::3])
+
+    sharp, soft = beside(0.0), beside(0.6e6)
+    assert sharp[0::3] == soft[0::3]
+    assert coloured(soft) > coloured(sharp) + 20
+
+
+def test_a_grabber_of_few_bits_has_few_levels():
+    one = camera(replace(PictureSettings(), bits=3))
+    one.begin(0, 0)
+    assert len(set(one.window(0, 0, 320, 240)[0::3])) <= 8
+
+
+def test_what_cannot_be_is_refused():
+    one = camera()
+    for bad in ((-1, 0, 4, 4), (0, 0, 0, 4), (300, 0, 21, 1), (0, 239, 1, 2)):
+        with pytest.raises(ValueError, match="is not inside 320 x 240"):
+            one.window(*bad)
+    with pytest.raises(ValueError, match="no robot 5 of team 0 has colours"):
+        one.robot(0, 5, 0.0, 0.0, 0.0)
+    for number in range(10):
+        one.robot(number // 5, number % 5, 0.1 * number, 0.0, 0.0)
+    with pytest.raises(ValueError, match="room for 10 robots"):
+        one.robot(0, 0, 0.0, 0.5, 0.0)
