@@ -63,19 +63,8 @@ class Tracker:
 
     STATE = {"tracks": [Track], "lost_frames": TICK, "searches": TICK}
     NOT_STATE = (
-        *(
-            "robots",
-            "kinds",
-            "team_kind",
-            "pattern",
-            "angle_rad",
-            "half_m",
-            "lens",
-            "z_m",
-            "side_px",
-            "weighted",
-        ),
-        *("window_px", "regions", "patches", "weighings", "area_px", "distance_m", "team"),
+        *("team", "robots", "weighted", "window_px", "team_kind", "kinds", "top", "lens", "z_m"),
+        *("regions", "patches", "weighings"),
     )
 
     def __init__(
