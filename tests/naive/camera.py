@@ -3,6 +3,8 @@
 What belongs here: the same picture from the definitions in `miro_sim.pitch`: each sample's ray against each robot, the
 ball, walls and floor, for each instant; then brightness, television signal and noise. Arrays hold all samples of a
 window at once: [row, column, sample row, sample column].
+
+Long because it has no part in common with the camera that it is compared with.
 """
 
 from __future__ import annotations

@@ -193,7 +193,13 @@ def _type_at(raw: Any, path: str) -> msgspec.inspect.Type | None:
 
 
 def _chosen(found: msgspec.inspect.Type, table: Any) -> msgspec.inspect.Type:
-    """The type itself; where it is any part's table, that of the part which the table names."""
+    """The type itself; where it is any part's table, or of several kinds, that which the table names."""
+    if isinstance(found, msgspec.inspect.UnionType) and isinstance(table, dict):
+        structs = [option for option in found.types if isinstance(option, msgspec.inspect.StructType)]
+        named = [
+            struct for struct in structs if not struct.tag_field or table.get(struct.tag_field) == struct.tag
+        ]
+        return named[0] if len(named) == 1 else found
     if not isinstance(found, msgspec.inspect.CustomType):
         return found
     try:

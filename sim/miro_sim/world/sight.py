@@ -56,6 +56,10 @@ class Sight(Protocol):
         """The camera takes a frame; what reaches the PC now, for each of its robots."""
         ...
 
+    def counts(self) -> dict[str, int]:
+        """For the summary, by name; empty for a camera that neither loses nor mistakes anything."""
+        ...
+
 
 class GaussianSight:
     """White noise on the posture of each robot."""
@@ -84,6 +88,10 @@ class GaussianSight:
             found.append(vision.frame(true, (draws[0], draws[1], draws[2])))
         self.frame += 1
         return found
+
+    def counts(self) -> dict[str, int]:
+        """See `Sight`."""
+        return {}
 
 
 class Whole:
@@ -115,6 +123,11 @@ class Whole:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.grabber!r}, frame={self.frame}, lost={self.lost})"
+
+    def counts(self) -> dict[str, int]:
+        """See `Sight`."""
+        names = ("lost", "dropped", "repeated", "wrong", "swapped")
+        return {"frames": self.frame, **{name: getattr(self, name) for name in names}}
 
     def deliver(self, tick: int, look: Callable[[], Sightings]) -> Sightings:
         """What arrives of the frame exposed at `tick`; `look` gives what is seen in it, unless the frame is dropped."""

@@ -253,7 +253,7 @@ class World:
         self.bodies.touching = mark.touching
 
     def counters(self) -> dict[str, dict[str, int | None]]:
-        """The `link` part of the summary, and the counted part of `firmware`, over all robots."""
+        """The `link` and `vision` parts of the summary, and the counted part of `firmware`, over all robots."""
         robots = [robot for network in self.networks for robot in network.robots]
         cpus = [robot.board.cpu for robot in robots]
         return {
@@ -264,6 +264,7 @@ class World:
                 "frames_stale": _total([robot.counter(2) for robot in robots]),
                 "bit_errors": _total([network.bit_errors for network in self.networks]),
             },
+            "vision": _added([network.sight.counts() for network in self.networks]),
             "firmware": {
                 "instructions": _total([cpu.instructions for cpu in cpus]),
                 "machine_cycles": _total([cpu.cycles for cpu in cpus]),
@@ -317,6 +318,11 @@ class World:
 
     def __repr__(self) -> str:
         return f"World({self.scenario.name}, seed={self.seed}, tick={self.tick}, digest={self.digest[:12]})"
+
+
+def _added(counts: Sequence[dict[str, int]]) -> dict[str, int | None]:
+    """Counts of several cameras of one kind."""
+    return {name: sum(count[name] for count in counts) for name in counts[0]}
 
 
 def _total(values: Sequence[int | None]) -> int | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.table import Table
 
 from mirotwin.cli.console import show
-from mirotwin.report.summary import Summary, off_pitch_text, settling_text
+from mirotwin.report.summary import Summary, off_pitch_text, settling_text, vision_text
 from mirotwin.report.track import Tracks
 
 
@@ -37,6 +37,8 @@ def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
     off_pitch = off_pitch_text(summary)
     if off_pitch:
         table.add_row("pitch", off_pitch)
+    if summary.vision is not None:
+        table.add_row("camera", vision_text(summary.vision))
     table.add_row(
         "link",
         f"{link.frames_sent} frames sent, {_known(link.frames_accepted)} accepted, "

@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
 from miro_protocol.stream import MAX_TICK
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
@@ -20,12 +21,26 @@ from mirotwin.recording import topics
 
 
 class PostureMessage(msgspec.Struct, frozen=True):
-    """`reference`, `measurement`: a posture in world axes."""
+    """`reference`: a posture in world axes."""
 
     tick: int
     x_m: float
     y_m: float
     theta_rad: float
+
+
+class MeasurementMessage(msgspec.Struct, frozen=True):
+    """`measurement`: a posture as the PC gets it at `tick`, of the picture that was exposed at `exposed_tick`.
+
+    `confidence` from 0 to 1 is the tracker's; both are null where a camera without pictures made the measurement.
+    """
+
+    tick: int
+    x_m: float
+    y_m: float
+    theta_rad: float
+    exposed_tick: int | None = None
+    confidence: float | None = None
 
 
 class TruthMessage(msgspec.Struct, frozen=True):
@@ -149,7 +164,7 @@ class PeriodMessage(msgspec.Struct, frozen=True):
 ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
     "reference": PostureMessage,
     "truth": TruthMessage,
-    "measurement": PostureMessage,
+    "measurement": MeasurementMessage,
     "control": ControlMessage,
     "firmware": FirmwareMessage,
     "lm629": Lm629Message,
@@ -209,7 +224,12 @@ def _robot_messages(robot: RobotPeriod, head: str, tick: int) -> Iterator[tuple[
     speeds = robot.v_m_s, robot.w_rad_s
     yield head + "truth", tick, TruthMessage(tick, truth.x_m, truth.y_m, truth.theta_rad, *speeds)
     if seen is not None:
-        yield head + "measurement", tick, PostureMessage(tick, seen.x_m, seen.y_m, seen.theta_rad)
+        of_picture = (seen.tick, seen.confidence) if isinstance(seen, Sighting) else (None, None)
+        yield (
+            head + "measurement",
+            tick,
+            MeasurementMessage(tick, seen.x_m, seen.y_m, seen.theta_rad, *of_picture),
+        )
     if control is not None:
         yield head + "control", tick, ControlMessage(tick, *msgspec.structs.astuple(control))
     accepted, rejected, stale = robot.accepted, robot.rejected, robot.stale
@@ -251,7 +271,7 @@ def robot_period(network: int, slot: int, found: dict[str, Any]) -> RobotPeriod:
         truth=_posture(truth),
         v_m_s=truth.v_m_s,
         w_rad_s=truth.w_rad_s,
-        measurement=None if seen is None else _posture(seen),
+        measurement=None if seen is None else _measurement(seen),
         control=None if control is None else Control(*msgspec.structs.astuple(control)[1:]),
         accepted=None if firmware is None else firmware.accepted,
         rejected=None if firmware is None else firmware.rejected,
@@ -259,6 +279,12 @@ def robot_period(network: int, slot: int, found: dict[str, Any]) -> RobotPeriod:
         left=_axis(lm629.left, pwm.left),
         right=_axis(lm629.right, pwm.right),
     )
+
+
+def _measurement(message: MeasurementMessage) -> Posture:
+    if message.exposed_tick is None or message.confidence is None:
+        return Posture(message.x_m, message.y_m, message.theta_rad)
+    return Sighting(message.x_m, message.y_m, message.theta_rad, message.exposed_tick, message.confidence)
 
 
 def _posture(message: PostureMessage | TruthMessage) -> Posture:

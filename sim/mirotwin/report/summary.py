@@ -54,6 +54,21 @@ class Link(msgspec.Struct, frozen=True):
     bit_errors: int
 
 
+class Vision(msgspec.Struct, frozen=True):
+    """What the cameras of all hosts saw: frames exposed, robots not found in them, frames dropped and repeated.
+
+    `wrong`: measurements further off than three times the worst case of the calibration, `swapped`: nearer to another
+    robot of the team than to their own; both against the truth, which no host knows.
+    """
+
+    frames: int
+    lost: int
+    dropped: int
+    repeated: int
+    wrong: int
+    swapped: int
+
+
 class Firmware(msgspec.Struct, frozen=True):
     """The image and what it executed; `machine_cycles` includes `idle_cycles`; all robots added up."""
 
@@ -82,6 +97,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     tracking: Tracking
     link: Link
     firmware: Firmware
+    vision: Vision | None = None
     robots: tuple[RobotTracking, ...] = ()
     complete: bool = True
     set: tuple[str, ...] = ()
@@ -151,6 +167,7 @@ def summarise(
         tracking=everyone[0].tracking if everyone else tracking_of([]),
         link=Link(**counters["link"]),
         firmware=Firmware(sha256=firmware_sha256, **counters["firmware"]),
+        vision=Vision(**counters["vision"]) if counters["vision"] else None,
         robots=everyone if len(everyone) > 1 else (),
         complete=complete,
         set=settings,
@@ -167,6 +184,18 @@ def off_pitch_text(summary: Summary) -> str:
         if one.tracking.off_pitch_s
     ]
     return f"off it for {', '.join(left)} (the pitch has no walls here)" if left else ""
+
+
+def vision_text(vision: Vision) -> str:
+    """What the cameras saw, for people: what did not happen is left out, but for lost robots."""
+    happened = {
+        "frames dropped": vision.dropped,
+        "frames repeated": vision.repeated,
+        "measurements WRONG": vision.wrong,
+        "robots SWAPPED": vision.swapped,
+    }
+    parts = [f"{vision.frames} frames", f"{vision.lost} robots not found"]
+    return ", ".join(parts + [f"{count} {what}" for what, count in happened.items() if count])
 
 
 def to_json(summary: Summary) -> bytes:

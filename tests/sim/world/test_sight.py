@@ -1,0 +1,229 @@
+"""Cameras in the world: what each kind tells the PC, what befalls whole frames, and what is refused."""
+
+import math
+from itertools import pairwise
+
+import pytest
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_host.eye.grabber import Grabber
+from miro_host.eye.track import Sighting
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.file import ScenarioError, parse
+from miro_sim.world.world import World
+
+IMAGE = load_hex(image_path())
+ROBOT = """
+[[network.robot]]
+slot = {slot}
+start_error_x_cm = {x_cm}
+start_error_y_cm = {y_cm}
+reference.kind = "line"
+"""
+HEAD = 'name = "eyes"\nduration_s = 1\n[camera]\n{camera}\n[[network]]\n'
+
+
+def scenario(camera, robots=((0, 0, 0),), others=()):
+    text = HEAD.format(camera=camera)
+    text += "".join(ROBOT.format(slot=slot, x_cm=x, y_cm=y) for slot, x, y in robots)
+    if others:
+        text += "[[network]]\n"
+        text += "".join(ROBOT.format(slot=slot, x_cm=x, y_cm=y) for slot, x, y in others)
+    return parse(text, "eyes.toml")
+
+
+def world(camera, *robots, others=(), seed=3):
+    return World(scenario(camera, robots or ((0, 0, 0),), others), seed, IMAGE)
+
+
+def measured(one, periods=20):
+    """(truth one frame ago, measurement) of the first robot, once there are some."""
+    found, before = [], None
+    for _ in range(periods):
+        robot = one.step().robots[0]
+        if before is not None and robot.measurement is not None:
+            found.append((before, robot.measurement))
+        before = robot.truth
+    return found
+
+
+def refusal(camera, robots=((0, 0, 0),), others=()):
+    with pytest.raises(ScenarioError) as caught:
+        scenario(camera, robots, others)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def off_cm(pair):
+    truth, seen = pair
+    return 100 * math.hypot(seen.x_m - truth.x_m, seen.y_m - truth.y_m)
+
+
+def test_a_calibrated_tracker_finds_the_robot_to_a_millimetre_or_two_one_frame_late():
+    pairs = measured(world('kind = "pixels"\ncalibration = "exact"'))
+    assert len(pairs) == 19
+    assert max(off_cm(pair) for pair in pairs) < 0.18
+    assert all(isinstance(seen, Sighting) and 0.3 < seen.confidence <= 1.0 for _, seen in pairs)
+    assert [seen.tick for _, seen in pairs] == [CONTROL_PERIOD_TICKS * k for k in range(19)]
+
+
+def test_the_geometric_camera_has_the_field_of_the_calibration_and_no_noise():
+    pixels = measured(world('kind = "pixels"'))
+    geometric = measured(world('kind = "geometric"'))
+    for (_, seen), (truth, read) in zip(pixels, geometric, strict=True):
+        assert math.hypot(seen.x_m - read.x_m, seen.y_m - read.y_m) < 0.0025
+        assert 0.1 < off_cm((truth, read)) < 2.41
+    assert measured(world('kind = "geometric"')) == geometric
+    exact = measured(world('kind = "geometric"\ncalibration = "exact"'))
+    assert max(off_cm(pair) for pair in exact) < 1e-6
+
+
+def test_the_calibration_of_1997_is_drawn_once_a_seed():
+    def first_error(seed):
+        truth, seen = measured(world('kind = "geometric"', seed=seed), 3)[0]
+        return (seen.x_m - truth.x_m, seen.y_m - truth.y_m)
+
+    assert first_error(1) == first_error(1)
+    assert len({first_error(seed) for seed in range(6)}) == 6
+
+
+@pytest.mark.parametrize(
+    ("errors", "least_cm", "most_cm"),
+    [
+        ("worst_cm = 0.5", 0.0, 0.5),
+        ("worst_cm = 0.0, centre_px = 0.0, focal_share = 0.0, tilt_deg = 0.0", 0.0, 1e-6),
+        ("worst_cm = 0.0, focal_share = 0.0, tilt_deg = 0.0", 0.3, 0.5),  # a pixel is 0.42 cm
+        (
+            "worst_cm = 0.0, centre_px = 0.0, focal_share = 0.0, tilt_deg = 0.0, ignore_height = true",
+            1.0,
+            3.2,
+        ),
+        (
+            "worst_cm = 0.0, centre_px = 0.0, focal_share = 0.0, tilt_deg = 0.0, ignore_distortion = true",
+            0.1,
+            2.7,
+        ),
+    ],
+)
+def test_each_error_of_the_calibration_is_switched_by_itself(errors, least_cm, most_cm):
+    pairs = measured(world(f'kind = "geometric"\ncalibration_errors = {{ {errors} }}'), 4)
+    assert all(least_cm <= off_cm(pair) <= most_cm for pair in pairs), [off_cm(pair) for pair in pairs]
+
+
+def test_a_dropped_frame_is_no_measurement_and_a_lost_robot_is_none_for_it_alone():
+    dropped = world('kind = "pixels"\ndropped_frames = 1.0')
+    assert measured(dropped) == []
+    assert dropped.networks[0].sight.dropped == 20
+    lost = world('kind = "geometric"\nlost_robots = 0.5', (0, 0, 0), (1, 30, 0))
+    found = [[robot.measurement is not None for robot in lost.step().robots] for _ in range(30)]
+    assert {(True, False), (False, True), (True, True)} <= {tuple(pair) for pair in found}
+    assert lost.networks[0].sight.lost == pytest.approx(30, abs=15)
+
+
+def test_a_repeated_frame_brings_the_measurement_before_once_more():
+    one = world('kind = "geometric"\nrepeated_frames = 0.5')
+    seen = [pair[1] for pair in measured(one, 29)]
+    repeats = sum(a == b for a, b in pairwise(seen))
+    assert repeats > 4
+    assert one.networks[0].sight.repeated >= repeats
+
+
+@pytest.mark.parametrize("delay", [0, 1, 3])
+def test_a_grabber_is_as_many_frames_late_as_it_says(delay):
+    grabber = Grabber(1, delay)
+    sent = [(Sighting(0.1 * k, 0.0, 0.0, k, 1.0),) for k in range(8)]
+    assert [grabber.take(frame) for frame in sent] == [(None,)] * delay + sent[: 8 - delay]
+    assert grabber.take(None) == sent[8 - delay] if delay else sent[7]
+
+
+def test_each_host_follows_its_own_robots_among_those_of_the_other():
+    one = world(
+        'kind = "pixels"\ncalibration = "exact"',
+        *((0, 0, 0), (2, 30, 20)),
+        others=((0, 12, 0), (2, 30, 32)),
+    )
+    before = None
+    for _ in range(12):
+        period = one.step()
+        if before is not None:
+            for old, robot in zip(before.robots, period.robots, strict=True):
+                assert robot.measurement is not None
+                assert off_cm((old.truth, robot.measurement)) < 0.2
+        before = period
+    assert one.counters()["vision"] == {
+        "frames": 24,
+        "lost": 0,
+        "dropped": 0,
+        "repeated": 0,
+        "wrong": 0,
+        "swapped": 0,
+    }
+
+
+@pytest.mark.parametrize("kind", ["pixels", "geometric", "gaussian"])
+def test_a_world_goes_on_from_a_saved_one_whatever_its_camera(kind):
+    camera = f'kind = "{kind}"\ndelay_frames = 2'
+    whole, cut = world(camera), world(camera)
+    for _ in range(6):
+        whole.step()
+        cut.step()
+    cut.run_to(cut.tick + 333_333)
+    again = world(camera)
+    again.load(cut.save())
+    for _ in range(6):
+        whole.step()
+        again.step()
+    assert again.digest == whole.digest
+
+
+def test_looking_at_the_picture_changes_no_bit():
+    quiet, watched = world('kind = "pixels"'), world('kind = "pixels"')
+    for _ in range(8):
+        quiet.step()
+        watched.step()
+        sight = watched.networks[0].sight
+        sight.picture_at(sight.frame, watched.tick).window(0, 0, 320, 240)
+    assert quiet.digest == watched.digest
+
+
+@pytest.mark.parametrize(
+    ("camera", "said"),
+    [
+        ("lens.height_m = 1.0", "camera.lens: does not see the pitch's corner (-10, -10) cm; hang it above"),
+        ("lens.x_m = 2.0", "camera.lens: hangs at (200, 35) cm, beside the pitch; hang it above the pitch"),
+        ("lens.tilt_y_rad = 0.4", "camera.lens: does not see the pitch's corner"),
+        (
+            "lens = { focal_px = 60.0, k1 = -0.5 }",
+            "camera.lens: pixel (0.0, 0.0) lies beyond what the lens draws",
+        ),
+        ("lens.height_m = 0.1", "camera.lens.height_m: 0.1 is out of range; must be >= 0.5 in metres"),
+        ("picture.bits = 9", "camera.picture.bits: 9 is out of range; must be <= 8"),
+        (
+            'calibration = "1998"',
+            "camera.calibration: '1998' is not one of the choices; use 1997, exact or none",
+        ),
+        ("window_px = 8", "camera.window_px: 8 is out of range; must be >= 16"),
+        ('pattern = "dots"', "camera.pattern: 'dots' is not one of the choices; use diagonal or strip"),
+    ],
+)
+def test_a_camera_that_cannot_be_is_refused_with_place_and_remedy(camera, said):
+    assert said in refusal(f'kind = "pixels"\n{camera}')
+
+
+def test_a_robot_that_starts_outside_the_view_is_refused():
+    lens = "lens = { focal_px = 470.0, x_m = 0.50 }"
+    said = refusal(f'kind = "pixels"\n{lens}', ((0, 115, 60),))
+    assert "network[0].robot[0].start_error_x_cm: the robot starts outside the camera's view" in said
+
+
+def test_colours_that_cannot_be_told_apart_are_refused():
+    with pytest.raises(ValueError, match=r"camera\.picture"):
+        world('kind = "pixels"\npicture = { chroma_noise = 60.0, gain = 0.1 }')
+
+
+def test_a_third_team_has_no_colour():
+    text = HEAD.format(camera='kind = "pixels"') + ROBOT.format(slot=0, x_cm=0, y_cm=0)
+    text += 2 * ("[[network]]\n" + ROBOT.format(slot=0, x_cm=30, y_cm=20))
+    with pytest.raises(ScenarioError, match=r"camera\.kind: 3 networks, but patches have the"):
+        parse(text, "eyes.toml")
