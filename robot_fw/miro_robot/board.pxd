@@ -11,7 +11,7 @@ from miro_robot.probe cimport Probe
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS
 cdef int _LEFT_CS, _LEFT_RD, _LEFT_WR, _LEFT_PS, _LEFT_RST
 cdef int _RIGHT_CS, _RIGHT_RD, _RIGHT_WR, _RIGHT_PS, _RIGHT_RST
-cdef int _WR, _RD, _BEHIND_TICKS
+cdef int _PINS, _WR, _RD, _BEHIND_TICKS
 cdef int _RESET_PULSE, PORTS
 cdef long long CYCLE_TICKS, FAR
 cdef int _FAULT, _REACHED, _RECEIVED, _SENT
@@ -46,6 +46,7 @@ cdef class Board(Bus):
     cdef int pin_bank[10]
     cdef int pin_bit[10]
     cdef int pin_inverted[10]
+    cdef unsigned char pins[10]
     cdef int latches
     cdef int latch_address[8]
     cdef int latch_mask[8]
@@ -61,7 +62,7 @@ cdef class Board(Bus):
     @cython.locals(earliest_tick=cython.longlong)
     cpdef int after_load(self) except -1
     cdef int _rest(self, BusTiming timing, Lm629 chip) except -1
-    @cython.locals(stopped=cython.int, horizon=cython.longlong)
+    @cython.locals(stopped=cython.int, horizon=cython.longlong, cpu=Cpu)
     cpdef int run(self, long long until_tick) except -1
     cdef long long _next_interrupt(self, Lm629 chip) noexcept
     @cython.locals(now=cython.longlong)
@@ -80,11 +81,11 @@ cdef class Board(Bus):
     @cython.locals(index=cython.int, hi=cython.int, level=cython.int, port=cython.int, mask=cython.int, levels=cython.int)
     cdef int _drive_interrupts(self, long long tick) except -1
     cdef inline int _level(self, int pin) noexcept
-    @cython.locals(data=cython.int, from_left=cython.int, from_right=cython.int, levels=cython.int)
+    @cython.locals(pin=cython.int, pins='unsigned char *', data=cython.int, from_left=cython.int, from_right=cython.int, levels=cython.int)
     cdef int _drive_chips(self, long long tick) except -1
     @cython.locals(busy_writes=cython.longlong)
     cdef int _watch_bus(self, bint both_drive, long long tick) except -1
-    @cython.locals(one=BusTiming, other=BusTiming, left=cython.int, right=cython.int)
+    @cython.locals(pins='unsigned char *', one=BusTiming, other=BusTiming, left=cython.int, right=cython.int)
     cdef int _watch_timing(self, int data, long long tick) except -1
     cdef bint _reset_is_short(self, Lm629 chip, int level, long long tick) noexcept
     @cython.locals(left=cython.int, right=cython.int)

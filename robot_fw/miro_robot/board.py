@@ -58,6 +58,7 @@ the AT89S52 data sheet (1919D), section 28. Neither says when P2 goes back to it
 _WR, _RD = 0x40, 0x80  # pins of P3
 _LEFT_CS, _LEFT_RD, _LEFT_WR, _LEFT_PS, _LEFT_RST = range(5)  # inputs of the two LM629: SIDES by CHIP_INPUTS
 _RIGHT_CS, _RIGHT_RD, _RIGHT_WR, _RIGHT_PS, _RIGHT_RST = range(5, 10)
+_PINS = 10
 _NEVER = NEVER_TICK
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
 _RESET_PULSE = RESET_PULSE
@@ -90,7 +91,7 @@ class Board(Bus):
         "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_bank", "pin_bit", "pin_inverted", "hi_port", "hi_bit", "hi_inverted",
         "hi_count", "hi_side", "hi_seen", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus",
-        "log",
+        "log", "pins",
         # the bus is at rest between two instructions: `after_load` sets both to that
         "left_timing", "right_timing",
     )  # fmt: skip
@@ -140,6 +141,7 @@ class Board(Bus):
         self.pin_bank = [0] * 10
         self.pin_bit = [0] * 10
         self.pin_inverted = [0] * 10
+        self.pins = bytearray(10)
         self.watched = bytearray(CONSTANT_BANK + 1)
         self.watched[self.data_bank] = 0xFF
         for index, (side, pin) in enumerate((side, pin) for side in SIDES for pin in CHIP_INPUTS):
@@ -188,12 +190,13 @@ class Board(Bus):
     def run(self, until_tick: int) -> int:
         """Moves the whole robot on to `until_tick`. Returns 0, or the CPU's reason for stopping early."""
         stopped = 0
-        while self.cpu.cycles * CYCLE_TICKS < until_tick:
+        cpu = self.cpu
+        cpu.begin_run()
+        while not stopped and cpu.cycles * CYCLE_TICKS < until_tick:
             horizon = min(until_tick, self._next_interrupt(self.left), self._next_interrupt(self.right))
-            stopped = self.cpu.run((horizon + CYCLE_TICKS - 1) // CYCLE_TICKS)
-            self.sync(min(horizon, self.cpu.cycles * CYCLE_TICKS) if stopped else horizon)
-            if stopped:
-                break
+            stopped = cpu.go_on((horizon + CYCLE_TICKS - 1) // CYCLE_TICKS)
+            self.sync(min(horizon, cpu.cycles * CYCLE_TICKS) if stopped else horizon)
+        cpu.end_run()
         return stopped
 
     def run_to_any(self, addresses: tuple[int, ...], until_tick: int) -> int:
@@ -346,25 +349,18 @@ class Board(Bus):
     def _drive_chips(self, tick: int) -> None:
         """Puts the present levels on both chips' pins, then what they answer on the bus."""
         data = self.bank[self.data_bank]
+        pins = self.pins
+        pin = 0
+        while pin < _PINS:
+            pins[pin] = self._level(pin)
+            pin += 1
         self._watch_timing(data, tick)
-        self.left.set_reset(tick, self._level(_LEFT_RST))
-        self.right.set_reset(tick, self._level(_RIGHT_RST))
-        self.left.set_bus(
-            tick,
-            self._level(_LEFT_CS),
-            self._level(_LEFT_RD),
-            self._level(_LEFT_WR),
-            self._level(_LEFT_PS),
-            data,
-        )
-        self.right.set_bus(
-            tick,
-            self._level(_RIGHT_CS),
-            self._level(_RIGHT_RD),
-            self._level(_RIGHT_WR),
-            self._level(_RIGHT_PS),
-            data,
-        )
+        if pins[_LEFT_RST] != self.left.reset_level:
+            self.left.set_reset(tick, pins[_LEFT_RST])
+        if pins[_RIGHT_RST] != self.right.reset_level:
+            self.right.set_reset(tick, pins[_RIGHT_RST])
+        self.left.set_bus(tick, pins[_LEFT_CS], pins[_LEFT_RD], pins[_LEFT_WR], pins[_LEFT_PS], data)
+        self.right.set_bus(tick, pins[_RIGHT_CS], pins[_RIGHT_RD], pins[_RIGHT_WR], pins[_RIGHT_PS], data)
         from_left = self.left.data_out(tick)
         from_right = self.right.data_out(tick)
         levels = 0xFF
@@ -379,7 +375,8 @@ class Board(Bus):
                 self.external[self.data_bank] = levels
                 self.cpu.set_external(self.data_bank, levels, tick)
         self._drive_bridge(tick)
-        self._drive_interrupts(tick)
+        if self.left.hi != self.hi_seen[0] or self.right.hi != self.hi_seen[1]:
+            self._drive_interrupts(tick)
         if self.probe is not None:
             self.probe.moved(tick)
 
@@ -395,30 +392,16 @@ class Board(Bus):
 
     def _watch_timing(self, data: int, tick: int) -> None:
         """Checks the timing of both chips; an edge that violates it at both is one fault."""
-        one, other = self.left_timing, self.right_timing
-        left = one.pins(
-            tick,
-            self._level(_LEFT_CS),
-            self._level(_LEFT_RD),
-            self._level(_LEFT_WR),
-            self._level(_LEFT_PS),
-            data,
-        )
-        right = other.pins(
-            tick,
-            self._level(_RIGHT_CS),
-            self._level(_RIGHT_RD),
-            self._level(_RIGHT_WR),
-            self._level(_RIGHT_PS),
-            data,
-        )
+        one, other, pins = self.left_timing, self.right_timing, self.pins
+        left = one.pins(tick, pins[_LEFT_CS], pins[_LEFT_RD], pins[_LEFT_WR], pins[_LEFT_PS], data)
+        right = other.pins(tick, pins[_RIGHT_CS], pins[_RIGHT_RD], pins[_RIGHT_WR], pins[_RIGHT_PS], data)
         if left:
             self._timing_fault(left, one.ticks, tick)
         elif right:
             self._timing_fault(right, other.ticks, tick)
-        if self._reset_is_short(self.left, self._level(_LEFT_RST), tick):
+        if self._reset_is_short(self.left, pins[_LEFT_RST], tick):
             self._timing_fault(_RESET_PULSE, tick - self.left.reset_tick, tick)
-        elif self._reset_is_short(self.right, self._level(_RIGHT_RST), tick):
+        elif self._reset_is_short(self.right, pins[_RIGHT_RST], tick):
             self._timing_fault(_RESET_PULSE, tick - self.right.reset_tick, tick)
 
     def _reset_is_short(self, chip: Lm629, level: int, tick: int) -> bool:

@@ -91,6 +91,7 @@ class Inspector:
         ended = 0
         cpu.until = until_cycle
         cpu.stop = 0
+        cpu.limit = 0
         cpu.begin_run()
         while ended == 0 and (cpu.idle or cpu.powered_down):
             ended = cpu.boundary()

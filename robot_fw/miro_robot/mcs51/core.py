@@ -80,14 +80,14 @@ class Core:
     # Hooks: what `Cpu` adds to the bare instructions
 
     def begin_run(self) -> None:
-        """Before the first instruction of a run: set `limit`."""
-        self.limit = self.until
+        """Before the first instruction of a run: what the outside may have changed meanwhile."""
 
     def end_run(self) -> None:
         """After the last instruction of a run."""
 
     def boundary(self) -> int:
-        """`cycles` reached `limit`: 1 ends the run."""
+        """`cycles` reached `limit`, which is 0 at first: 1 ends the run, else set it."""
+        self.limit = self.until
         return 1 if self.cycles >= self.until else 0
 
     def end_of_interrupt(self) -> None:

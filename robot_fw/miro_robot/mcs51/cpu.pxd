@@ -45,6 +45,7 @@ cdef class Cpu(Executor):
     @cython.locals(now='long long', port=int)
     cpdef reset(self)
     cpdef int run(self, long long until_cycle) except -1
+    cpdef int go_on(self, long long until_cycle) except -1
     cpdef int step(self) except -1
     cpdef int before_save(self) except -1
     cpdef int after_load(self) except -1

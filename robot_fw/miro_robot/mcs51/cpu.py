@@ -182,6 +182,12 @@ class Cpu(Executor):
             return Executor.run(self, until_cycle)
         return self.inspector.run(until_cycle)
 
+    def go_on(self, until_cycle: int) -> int:
+        """As `Executor.go_on`; an inspector makes runs of the pieces."""
+        if self.inspector is None:
+            return Executor.go_on(self, until_cycle)
+        return self.inspector.run(until_cycle)
+
     def reset(self) -> None:
         """RST: registers and PC as after power-on, ports FF; RAM and time stay (C7)."""
         now = self.cycles
@@ -270,7 +276,6 @@ class Cpu(Executor):
         self.next_mark = (self.cycles // _MARK_CYCLES + 1) * _MARK_CYCLES if self.main_loop_limit else _NEVER
         self.peripherals.serial_wait = -1  # more may have been put on RXD since the last run
         self.next_event = 0
-        self.limit = 0
 
     def end_run(self) -> None:
         """TXD is final up to now; RXD before it is no longer needed."""

@@ -9,9 +9,11 @@ cdef int _STACK_UNDERFLOW
 cdef int _OUTSIDE_IMAGE
 
 cdef class Executor(Core):
+    @cython.locals(stopped=int)
+    cpdef int run(self, long long until_cycle) except -1
     @cython.locals(iram='unsigned char *', rom='unsigned char *', now='long long', count='long long',
                    pc=Py_ssize_t, line='unsigned int', row=int, op=int, first=int, second=int, address=int, value=int)
-    cpdef int run(self, long long until_cycle) except -1
+    cpdef int go_on(self, long long until_cycle) except -1
 
     @cython.final
     cdef inline int read(self, int address) except -1

@@ -37,9 +37,16 @@ class Executor(Core):
         Returns REACHED, STOPPED (`request_stop`), BREAKPOINT or WIRE_FULL (more than 2048 edges of TXD wait for
         the listener that it has; it does not go on before these are heard).
         """
+        self.begin_run()
+        stopped = Executor.go_on(self, until_cycle)
+        self.end_run()
+        return stopped
+
+    def go_on(self, until_cycle: int) -> int:
+        """A piece of a run, between `begin_run` and `end_run`: what runs in many pieces looks at its lines once."""
         self.until = until_cycle
         self.stop = REACHED
-        self.begin_run()
+        self.limit = 0
         iram = self.iram
         rom = self.rom
         now = self.cycles
@@ -340,7 +347,6 @@ class Executor(Core):
                 iram[iram[self.bank + (op & 1)]] = self.a
             elif row == 0xF8:  # MOV Rn,A
                 iram[self.bank + (op & 7)] = self.a
-        self.end_run()
         return self.stop
 
     # Addressing
