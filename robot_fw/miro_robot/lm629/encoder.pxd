@@ -13,8 +13,8 @@ cdef class InputFilter:
 
     cpdef void take(self, int level) noexcept
     @cython.locals(clock=cython.longlong)
-    cpdef void set(self, long long tick, int level) noexcept
-    cpdef void accept(self) noexcept
+    cpdef inline void set(self, long long tick, int level) noexcept
+    cpdef inline void accept(self) noexcept
 
 
 @cython.final
@@ -32,5 +32,5 @@ cdef class Encoder:
     @cython.locals(now=cython.longlong)
     cpdef void settle(self, long long tick) noexcept
     @cython.locals(before=cython.int, step=cython.int)
-    cdef void _count(self) noexcept
+    cdef inline void _count(self) noexcept
     cdef void _watch(self) noexcept

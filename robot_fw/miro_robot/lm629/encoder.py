@@ -119,8 +119,10 @@ class Encoder:
             self.settle(tick)
             return
         clock = tick & -4
-        if self.quadrature.due <= clock or self.index.due <= clock:
+        if self.index.due <= clock or self.armed:
             self.settle(clock)
+        elif self.quadrature.due <= clock:
+            self._count()
         self.quadrature.set(tick, place)
 
     def set_index(self, tick: int, level: int) -> None:

@@ -23,9 +23,11 @@ cdef class DifferentialDrive(Plant):
     cpdef set_bridge(self, long long tick, int side, int enable, int forward)
     @cython.final
     @cython.locals(constant=double, start_tick=cython.longlong, left_charge=double, right_charge=double)
-    cdef int _step(self, int ticks) except -1
+    cdef inline int _step(self, int ticks) except -1
     @cython.final
-    @cython.locals(left_tick=cython.longlong, right_tick=cython.longlong)
-    cdef void _report(self) noexcept
+    @cython.locals(left=Quadrature, right=Quadrature)
+    cdef inline void _report(self) noexcept
+    @cython.final
+    cdef inline void _show(self, Quadrature encoder, Lm629 chip) noexcept
     @cython.final
     cdef void _show_index(self, Lm629 chip, Quadrature encoder, long long tick) noexcept

@@ -87,21 +87,19 @@ class DifferentialDrive(Plant):
 
     def _report(self) -> None:
         """Hands the edges of this step to the two LM629 in tick order, left first on one tick."""
-        while True:
-            left_tick = self.left_encoder.edge_tick
-            right_tick = self.right_encoder.edge_tick
-            if left_tick <= right_tick:
-                if left_tick == _NEVER:
-                    return
-                self.left_encoder.show()
-                if self.left is not None:
-                    self.left.set_encoder(left_tick, self.left_encoder.a(), self.left_encoder.b())
-                    self._show_index(self.left, self.left_encoder, left_tick)
+        left = self.left_encoder
+        right = self.right_encoder
+        while left.edge_tick != _NEVER or right.edge_tick != _NEVER:
+            if left.edge_tick <= right.edge_tick:
+                self._show(left, self.left)
             else:
-                self.right_encoder.show()
-                if self.right is not None:
-                    self.right.set_encoder(right_tick, self.right_encoder.a(), self.right_encoder.b())
-                    self._show_index(self.right, self.right_encoder, right_tick)
+                self._show(right, self.right)
+
+    def _show(self, encoder: Quadrature, chip: Lm629 | None) -> None:
+        if chip is None:
+            encoder.show()
+        else:
+            encoder.report(chip)
 
     def _show_index(self, chip: Lm629, encoder: Quadrature, tick: int) -> None:
         """The index channel changes with A and B."""
@@ -110,7 +108,8 @@ class DifferentialDrive(Plant):
 
     def set_bridge(self, tick: int, side: int, enable: int, forward: int) -> None:
         """L298 inputs of one side (0 left, 1 right) from `tick` on: enable pin; 1 forward, 0 backward."""
-        self.advance(tick)
+        if self.tick < tick:
+            self.advance(tick)
         if side == 0:
             self.left_winding.set_bridge(enable, forward)
         else:

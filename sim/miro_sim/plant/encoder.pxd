@@ -1,5 +1,6 @@
 # C layout of miro_sim.plant.encoder.
 cimport cython
+from miro_robot.lm629.chip cimport Lm629
 
 cdef long long _NEVER
 
@@ -15,9 +16,11 @@ cdef class Quadrature:
     @cython.locals(moved=double, last=cython.longlong)
     cpdef void turn(self, double radians, long long start_tick, int ticks) noexcept
     cpdef int after_load(self) except -1
-    cpdef void show(self) noexcept
+    cpdef inline void show(self) noexcept
+    @cython.locals(tick=cython.longlong)
+    cpdef void report(self, Lm629 chip) noexcept
     @cython.locals(forward=cython.bint, boundary=cython.longlong, exact=double, after=cython.longlong)
-    cdef void _aim(self) noexcept
-    cpdef int a(self) noexcept
-    cpdef int b(self) noexcept
+    cdef inline void _aim(self) noexcept
+    cpdef inline int a(self) noexcept
+    cpdef inline int b(self) noexcept
     cpdef int index(self) noexcept

@@ -10,6 +10,7 @@ Inside a step the shaft turns evenly; an edge falls on the first integer tick at
 from __future__ import annotations
 
 from miro_exact.clock import NEVER_TICK
+from miro_robot.lm629.chip import Lm629
 
 _NEVER = NEVER_TICK
 _MOST_COUNTS = 1 << 50  # doubles still hold fractions of it
@@ -72,6 +73,14 @@ class Quadrature:
             self.edge_tick = _NEVER
         else:
             self._aim()
+
+    def report(self, chip: Lm629) -> None:
+        """Lets the edge at `edge_tick` happen and tells the LM629 of it. The index channel changes with A and B."""
+        tick = self.edge_tick
+        self.show()
+        chip.set_encoder(tick, self.a(), self.b())
+        if self.counts_per_turn:
+            chip.set_index(tick, self.index())
 
     def _aim(self) -> None:
         forward = self._last > self.count
