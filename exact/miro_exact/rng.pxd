@@ -11,6 +11,7 @@ cdef long long _INDICES
 cpdef words_t philox4x32(u64_t c0, u64_t c1, u64_t c2, u64_t c3, u64_t k0, u64_t k1) noexcept
 
 
+@cython.final
 cdef class Stream:
     cdef readonly object seed
     cdef readonly str name

@@ -43,23 +43,33 @@ cdef class MotorAxis:
 
     cpdef set_reset(self, long long tick, int level)
     cpdef _enter_reset(self, int mode, int lock, long long until_tick)
+    @cython.final
     cdef _end_reset(self, long long now)
     @cython.locals(now=cython.longlong)
     cpdef int advance(self, long long tick) except -1
+    @cython.final
     cdef int _period(self, long long now) except -1
+    @cython.final
     cdef bint _late_pulse_begins(self, long long now) noexcept
+    @cython.final
     @cython.locals(flags=cython.int, drive=cython.int, error=cython.longlong)
     cdef int _sample(self, long long now) except -1
+    @cython.final
     @cython.locals(flags=cython.int, moved=cython.longlong)
     cdef int _latch_position(self, long long now) noexcept
+    @cython.final
     @cython.locals(profile=Trajectory, control=cython.int, buffer=TrajectoryBuffer)
     cdef int _start(self) except -1
+    @cython.final
     @cython.locals(flags=cython.int)
     cdef int _step_profile(self) noexcept
+    @cython.final
     @cython.locals(flags=cython.int, before=cython.int)
     cdef int _check_error(self, long long error) noexcept
+    @cython.final
     @cython.locals(top=cython.int)
     cdef void _put_out(self, int drive) noexcept
+    @cython.final
     @cython.locals(side=cython.int)
     cdef int _check_breakpoint(self) noexcept
     cpdef int set_breakpoint(self, long long place) except -1

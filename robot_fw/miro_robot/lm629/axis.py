@@ -212,7 +212,7 @@ class MotorAxis:
             elif self.pwm and not self.pulse_late:
                 self.pwm = 0
                 self.next_tick = self.period_tick + _PWM_TICKS
-            elif self._late_pulse_begins(now):
+            elif self.pulse_late and self._late_pulse_begins(now):
                 self.pwm = 1
                 self.next_tick = self.period_tick + _PWM_TICKS
             else:
@@ -235,7 +235,7 @@ class MotorAxis:
 
     def _late_pulse_begins(self, now: int) -> bool:
         """O3 read the other way: the pulse is at the end of its period."""
-        if not self.pulse_late or self.pwm or self.pwm_magnitude == 0:
+        if self.pwm or self.pwm_magnitude == 0:
             return False
         return now == self.period_tick + _PWM_TICKS - 16 * self.pwm_magnitude
 
