@@ -8,6 +8,7 @@ up to 20 wire bits because a UART sends the low bit first (README.md, "Why").
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import cast
 
 from crcmod import mkCrcFun
@@ -43,6 +44,7 @@ def byte_table() -> tuple[int, ...]:
     return _table(8)
 
 
+@cache
 def _table(bits: int) -> tuple[int, ...]:
     table = []
     for value in range(1 << bits):

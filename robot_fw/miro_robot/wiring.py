@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -108,11 +109,26 @@ class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def load_wiring(path: Path | None = None) -> Wiring:
     """Reads a board file; the MIRO board when no path is given. Raises WiringError naming file and place."""
-    origin = str(path) if path else "miro.toml"
+    if path is None:
+        miro = _miro()
+        return msgspec.structs.replace(miro, nets=dict(miro.nets))
     try:
-        text = path.read_text("utf-8") if path else _builtin("miro.toml")
+        text = path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise WiringError(str(path), "", f"{error}") from error
+    return _wiring(text, str(path))
+
+
+@cache
+def _miro() -> Wiring:
+    """The MIRO board, read once: every robot of a world has one."""
+    return _wiring(resources.files("miro_robot.boards").joinpath("miro.toml").read_text("utf-8"), "miro.toml")
+
+
+def _wiring(text: str, origin: str) -> Wiring:
+    try:
         wiring = msgspec.convert(tomllib.loads(text), Wiring)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+    except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise WiringError(origin, "", f"{error}") from error
     if len(wiring.latch) > MAX_LATCHES:
         raise WiringError(origin, "latch", f"{len(wiring.latch)} latches, at most {MAX_LATCHES} fit")
@@ -124,7 +140,3 @@ def load_wiring(path: Path | None = None) -> Wiring:
         for pin in CHIP_INPUTS:
             wiring.chip_input(side, pin)
     return wiring
-
-
-def _builtin(name: str) -> str:
-    return resources.files("miro_robot.boards").joinpath(name).read_text("utf-8")
