@@ -25,6 +25,8 @@ FORMAT = "3"
 SCENARIO_ATTACHMENT = "scenario.toml"
 FIRMWARE_ATTACHMENT = "firmware.ihx"
 SYMBOLS_ATTACHMENT = "symbols.json"
+TOGETHER = 10
+"""Control periods that are written one after the other: after a simulated one the caches hold nothing of this."""
 BROKEN_OFF = "mirotwin.broken_off"
 """Name of the metadata in a recording whose run did not come to its end."""
 
@@ -74,6 +76,7 @@ class Recorder:
         self._channels: dict[str, int] = {}
         self._schemas: dict[bytes, int] = {}
         self._named: dict[str, int] = {}
+        self._waiting: list[Period] = []
         self._writer = McapWriter(stream, profile=METADATA, library=METADATA)
         self._writer.add_metadata(
             METADATA,
@@ -97,6 +100,7 @@ class Recorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         with self._undisturbed:
+            self._write_waiting()
             if error is not None:
                 self._writer.add_metadata(BROKEN_OFF, {"by": type(error).__name__})
             self._writer.finish()
@@ -104,13 +108,21 @@ class Recorder:
     def flush(self) -> None:
         """What was added up to now is kept even if this process is killed."""
         with self._undisturbed:
+            self._write_waiting()
             self._writer.flush()
 
     def write(self, period: Period) -> None:
         """Adds everything in a control period."""
-        with self._undisturbed:
+        self._waiting.append(period)
+        if len(self._waiting) >= TOGETHER:
+            with self._undisturbed:
+                self._write_waiting()
+
+    def _write_waiting(self) -> None:
+        add, encode, numbers = self._writer.add_message, self._encoder.encode, self._channels
+        waiting, self._waiting = self._waiting, []
+        for period in waiting:
             period_ns = nanoseconds(period.tick)
-            add, encode, numbers = self._writer.add_message, self._encoder.encode, self._channels
             for topic, tick, message in channels.messages(period):
                 channel = numbers.get(topic) or self._register(topic, message)
                 add(channel, period_ns if tick == period.tick else nanoseconds(tick), encode(message))
@@ -118,12 +130,14 @@ class Recorder:
     def write_sample(self, network: int, slot: int, sample: channels.SampleMessage) -> None:
         """Adds one LM629 sample of a robot (full recordings)."""
         with self._undisturbed:
+            self._write_waiting()
             self._add(topics.robot_topic(network, slot, "samples"), sample.tick, sample)
 
     def write_faults(self, network: int, slot: int, faults: Sequence[Fault]) -> None:
         """Adds a robot's firmware faults."""
         topic = topics.robot_topic(network, slot, "fault")
         with self._undisturbed:
+            self._write_waiting()
             for fault in faults:
                 message = channels.FaultMessage(
                     fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault)
