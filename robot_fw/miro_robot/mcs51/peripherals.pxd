@@ -17,7 +17,7 @@ cdef int _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2
 cdef int _TF2, _RCLK, _TCLK
 cdef int _S5P2
 cdef int _SERIAL, _TIMER2
-cdef int _REN
+cdef int _REN, _SETTINGS
 cdef long long _NO_PERIOD
 cdef long long _STOPPED
 
@@ -70,6 +70,7 @@ cdef class Peripherals:
     cpdef int pin_levels(self, int port, long long cycle) except -1
     cpdef int read(self, int address, long long cycle) except -1
     cpdef int write(self, int address, int value, long long cycle) except -1
+    cdef int writes_flags(self, int value) noexcept
     @cython.locals(both=int)
     cdef int timer1_is_idle_clock(self) noexcept
     cdef int write_timer(self, int address, int value, long long cycle) except -1

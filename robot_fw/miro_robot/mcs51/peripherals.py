@@ -40,7 +40,7 @@ _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2 = 0xC8, 0xC9, 0xCA, 0xCB, 0xCC, 0xC
 _TF2, _RCLK, _TCLK = 0x80, 0x20, 0x10
 _S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows (U2)
 _SERIAL, _TIMER2 = 0x10, 0x20  # in IE
-_REN = 0x10  # in SCON
+_REN, _SETTINGS = 0x10, 0xF0  # in SCON
 _NO_PERIOD = 1 << 40  # of a clock that stands
 _STOPPED = STOPPED_TICK
 
@@ -120,7 +120,7 @@ class Peripherals:
                 if cycle > self.timer_wait:
                     self.timers.sync(cycle)
                     self.timer_wait = self.timers.quiet_until()
-                if not self.timer2.silent() or self.timer2.falls():
+                if not self.timer2.sleeps:
                     self.timer2.sync(cycle)
                 if 12 * cycle > self.serial_wait:
                     self.settle()
@@ -342,6 +342,8 @@ class Peripherals:
             self.interrupts.ie = value & 0xBF
         elif address == _IP:
             self.interrupts.ip = value & 0x3F
+        elif address == _SCON and self.writes_flags(value):
+            self.uart.write_scon(value, cycle)
         elif self.timer1_is_idle_clock() and self.write_timer(address, value, cycle):
             pass
         else:
@@ -349,6 +351,10 @@ class Peripherals:
             if not self.write_timer(address, value, cycle):
                 self.write_serial(address, value, cycle)
             self.clock_serial()
+
+    def writes_flags(self, value: int) -> int:
+        """SCON keeps mode, SM2 and REN: the serial port goes on as it was, and waits for what it waited for."""
+        return 1 if self.uart.mode() != 0 and (value ^ self.uart.scon) & _SETTINGS == 0 else 0
 
     def timer1_is_idle_clock(self) -> int:
         """Timer 1 clocks neither direction of the serial port, so that writing timers does not touch it."""

@@ -21,6 +21,7 @@ cdef class Timer2:
     cdef long long edge_cycle
     cdef readonly int clock_out
     cdef readonly long long synced
+    cdef readonly int sleeps
 
     cpdef void clear(self, long long cycle) noexcept
     cpdef int drives_pin(self) noexcept
@@ -46,6 +47,8 @@ cdef class Timer2:
     cpdef void fall(self, long long cycle) noexcept
     cpdef void sample_external(self, int level) noexcept
     cpdef int falls(self) noexcept
+    cdef void _note_sleep(self) noexcept
+    cpdef int after_load(self) except -1
     @cython.locals(acts=int)
     cdef void _external(self, long long cycle) noexcept
     cpdef void write_control(self, int value, long long cycle) noexcept

@@ -43,7 +43,7 @@ class Timer2:
         "clock_out": FLAG,
         "synced": TICK,
     }
-    NOT_STATE = ("interrupts",)
+    NOT_STATE = ("interrupts", "sleeps")
 
     def __init__(self, interrupts: Interrupts) -> None:
         self.interrupts = interrupts
@@ -55,6 +55,7 @@ class Timer2:
         self.edge_cycle = -1  # cycle in which a fall of T2 counts
         self.clock_out = 0  # level on T2 while T2OE
         self.synced = 0
+        self.sleeps = 0  # no flag is near: overflows set none, and no fall of T2EX waits
 
     def clear(self, cycle: int) -> None:
         """As after reset in `cycle`."""
@@ -65,6 +66,7 @@ class Timer2:
         self.edge_cycle = _NONE
         self.clock_out = 0
         self.synced = cycle
+        self._note_sleep()
         self.interrupts.withdraw(_TIMER2, cycle)
 
     def drives_pin(self) -> int:
@@ -173,6 +175,10 @@ class Timer2:
     def sample_external(self, level: int) -> None:
         """T2EX changed to `level` in the sample of the cycle before `synced`."""
         self.up = 1 if level else _FELL
+        self._note_sleep()
+
+    def _note_sleep(self) -> None:
+        self.sleeps = 1 if self.silent() and self.up != _FELL else 0
 
     def falls(self) -> int:
         """The cycle that comes acts on a fall of T2EX."""
@@ -182,6 +188,7 @@ class Timer2:
         """`cycle` begins, the one after the sample in which T2EX fell."""
         acts = self.falls()
         self.up = 0
+        self._note_sleep()
         if not acts:
             return
         if not self.silent():
@@ -195,11 +202,13 @@ class Timer2:
     def write_control(self, value: int, cycle: int) -> None:
         """T2CON is written; `cycle` is the first to see it."""
         self.control = value
+        self._note_sleep()
         self._ask_or_withdraw(cycle)
 
     def write_mode(self, value: int, cycle: int) -> None:
         """T2MOD is written: DCEN decides whether EXF2 interrupts."""
         self.t2mod = value & 0x03
+        self._note_sleep()
         self._ask_or_withdraw(cycle)
 
     def _ask_or_withdraw(self, cycle: int) -> None:
@@ -208,3 +217,6 @@ class Timer2:
             self.interrupts.ask(_TIMER2, cycle)
         else:
             self.interrupts.withdraw(_TIMER2, cycle)
+
+    def after_load(self) -> None:
+        self._note_sleep()
