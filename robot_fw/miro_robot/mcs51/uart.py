@@ -285,6 +285,16 @@ class Uart:
             now = self.rx_next
             self.rx_next = now + self.rx_period
             self.rx_last = self.level(now)
+            if (  # no edge within the three votes: all at once
+                state == _VOTE_FIRST
+                and now + 3 * self.rx_period < tick
+                and (not self.latch & 1 or self.rxd.next_edge(now) > now + 3 * self.rx_period)
+            ):
+                self.rx_votes += 3 * self.rx_last
+                self.rx_count += 4
+                self.rx_next = now + 4 * self.rx_period
+                self._act(now + 3 * self.rx_period)
+                continue
             self.rx_count += 1
             if state < _ACTION:
                 self.rx_votes += self.rx_last
