@@ -119,13 +119,16 @@ class Items:
         self.room = room
         self.bounds = _bounds(code, low, high)
         self.ordered = ordered
+        self.made: type[Any] | None = None  # list or tuple, as the part has it
 
     def read(self, part: Any, name: str) -> Sequence[Any]:
         values: Sequence[Any] = getattr(part, name)
         return values
 
     def write(self, part: Any, name: str, value: Sequence[Any]) -> None:
-        setattr(part, name, type(getattr(part, name))(value))
+        if self.made is None:  # asked once: a property may have to make a list for the answer
+            self.made = type(getattr(part, name))
+        setattr(part, name, self.made(value))
 
     def encode(self, value: Sequence[Any]) -> bytes:
         if not value:
@@ -140,6 +143,8 @@ class Items:
         (count,) = _take(_COUNT, data, at)
         if count > self.room:
             raise ValueError(f"has {count} items, not at most {self.room}")
+        if not count:
+            return [], at + 4
         layout = struct.Struct(f"<{count}{self.code}")
         values = _take(layout, data, at + 4)
         if self.bounds is not None:
