@@ -33,12 +33,14 @@ COUNTERS = {
         "bit_errors": 9,
     },
     "firmware": {"instructions": 5, "machine_cycles": 7, "idle_cycles": 2, "faults": 0},
+    "vision": {"frames": 180, "lost": 1, "dropped": 2, "repeated": 0, "wrong": 0, "swapped": 0},
 }
 KEYS = {
-    "": "scenario seed engine digest simulated_s wall_s realtime_factor tracking link firmware",
+    "": "scenario seed engine digest simulated_s wall_s realtime_factor tracking link firmware vision",
     "tracking": "rms_x_cm rms_y_cm rms_theta_deg rms_position_cm settling_s off_pitch_s",
     "link": "frames_sent frames_accepted frames_rejected frames_stale bit_errors",
     "firmware": "sha256 instructions machine_cycles idle_cycles faults",
+    "vision": "frames lost dropped repeated wrong swapped",
 }
 
 

@@ -322,7 +322,7 @@ class World:
 
 def _added(counts: Sequence[dict[str, int]]) -> dict[str, int | None]:
     """Counts of several cameras of one kind."""
-    return {name: sum(count[name] for count in counts) for name in counts[0]}
+    return {name: _total([count[name] for count in counts]) for name in counts[0]}
 
 
 def _total(values: Sequence[int | None]) -> int | None:

@@ -1,8 +1,7 @@
 """The channels of a recording: their messages, their JSON schemas, and how records become messages and back.
 
 What belongs here: one struct a channel, and the two directions of translation. What does not: MCAP
-(`recorder`, `reader`). Every message carries its tick; a period's messages are closed by its
-`/period` message.
+(`recorder`, `reader`). Every message carries its tick; a period's messages are closed by its `/period` message.
 
 Where a channel stands: `topics`.
 """
@@ -225,11 +224,8 @@ def _robot_messages(robot: RobotPeriod, head: str, tick: int) -> Iterator[tuple[
     yield head + "truth", tick, TruthMessage(tick, truth.x_m, truth.y_m, truth.theta_rad, *speeds)
     if seen is not None:
         of_picture = (seen.tick, seen.confidence) if isinstance(seen, Sighting) else (None, None)
-        yield (
-            head + "measurement",
-            tick,
-            MeasurementMessage(tick, seen.x_m, seen.y_m, seen.theta_rad, *of_picture),
-        )
+        place = seen.x_m, seen.y_m, seen.theta_rad
+        yield head + "measurement", tick, MeasurementMessage(tick, *place, *of_picture)
     if control is not None:
         yield head + "control", tick, ControlMessage(tick, *msgspec.structs.astuple(control))
     accepted, rejected, stale = robot.accepted, robot.rejected, robot.stale
