@@ -73,15 +73,15 @@ class Track:
         return Posture(self.x_m, self.y_m, self.theta_rad)
 
     def remember(self, sighting: Sighting) -> None:
-        """Takes the next sighting; one of the same tick replaces the last."""
+        """Takes the next sighting; one of the same tick replaces the last, an older one begins anew."""
         if self.seen and sighting.tick > self.tick:
             self.before_tick = self.tick
             self.before_x_m = self.x_m
             self.before_y_m = self.y_m
             self.before_theta_rad = self.theta_rad
             self.seen = 2
-        else:
-            self.seen = max(self.seen, 1)
+        elif self.seen == 0 or sighting.tick < self.tick:
+            self.seen = 1
         self.tick = sighting.tick
         self.x_m = sighting.x_m
         self.y_m = sighting.y_m

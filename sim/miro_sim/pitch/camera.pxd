@@ -66,7 +66,7 @@ cdef class Camera:
     @cython.locals(spread='long long', away='long long', other='long long')
     cdef int _sure_top(self, int body, long long u, long long v) noexcept
     cdef int _top(self, int body, long long u, long long v) noexcept
-    @cython.locals(scene=scene.Scene, first=int, end=int, sample=int, index=int, slot=int, behind=int, near_ball=bint,
+    @cython.locals(scene=scene.Scene, first=int, end=int, sample=int, index=int, slot=int, behind=int, ball_seen=bint,
                    paint=int, ball=int, total='long long')
     cdef long long _samples(self, int pixel, int at) noexcept
     @cython.locals(rays=rays.Rays, place=int, cosine='long long', sine='long long', first=int, slot=int, corner=int,

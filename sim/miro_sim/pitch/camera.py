@@ -279,7 +279,7 @@ class Camera:
                 return self.scene.packed[code] * samples
             if code != _OUT:
                 paint = code if paint == _OUT else _UNSURE
-        if paint >= 0 and not self.scene.near_ball(pixel):
+        if paint >= 0 and not self.scene.shows_ball(pixel):
             return self.scene.packed[paint] * samples
         if paint == _OUT and samples == 16:
             return self.scene.total[pixel]
@@ -344,12 +344,12 @@ class Camera:
             end = first + 8
         scene = self.scene
         behind = scene.paint[pixel]
-        near_ball = scene.near_ball(pixel)
+        ball_seen = scene.shows_ball(pixel)
         self.count = 0
         for index in range(self.near_count):
             if self.code[index * _SETS + at] != _OUT:
                 self._turn(self.near[index], at, pixel)
-        if self.count == 1 and behind != _MIXED and not near_ball:
+        if self.count == 1 and behind != _MIXED and not ball_seen:
             return self._alone(scene.packed[behind], first, end)
         for sample in range(first, end):
             self.seen[sample] = _OUT
@@ -361,7 +361,7 @@ class Camera:
             paint = self.seen[sample]
             if paint == _OUT:
                 paint = behind if behind != _MIXED else scene.sample(pixel, sample)
-            elif near_ball and self.height_um[sample] < _TOP_UM:
+            elif ball_seen and self.height_um[sample] < _TOP_UM:
                 ball = scene.ball_above(pixel, sample, self.height_um[sample])
                 paint = ball if ball >= 0 else paint
             total += scene.packed[paint]

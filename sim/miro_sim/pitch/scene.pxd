@@ -19,7 +19,9 @@ cdef class Scene:
     @cython.locals(pixel=int)
     cdef void _forget(self) noexcept
     @cython.locals(rays=rays.Rays, far='long long', top='long long', end='long long')
-    cdef bint near_ball(self, int pixel) noexcept
+    cdef bint _near_ball(self, int pixel) noexcept
+    @cython.locals(paint=int)
+    cdef bint shows_ball(self, int pixel) noexcept
     @cython.locals(first=int, paint=int, sample=int, plain=bint, total='long long')
     cdef void look(self, int pixel) noexcept
     @cython.locals(x='long long', y='long long', ring=int)

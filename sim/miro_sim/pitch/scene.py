@@ -96,13 +96,16 @@ class Scene:
     def _forget(self) -> None:
         """Where the ball may be seen, the picture has to be made again."""
         for pixel in range(76800):
-            if self.near_ball(pixel):
+            if self._near_ball(pixel):
                 self.paint[pixel] = _UNKNOWN
 
-    def near_ball(self, pixel: int) -> bool:
+    def shows_ball(self, pixel: int) -> bool:
+        """Whether one of a pixel's samples may be the ball's; `look` has been called."""
+        paint = self.paint[pixel]
+        return self.has_ball and (paint == _MIXED or paint >= self.ball_rim) and self._near_ball(pixel)
+
+    def _near_ball(self, pixel: int) -> bool:
         """Whether the ball may be seen in a pixel: looked at along each axis alone."""
-        if not self.has_ball:
-            return False
         rays = self.rays
         far = _BALL_UM + rays.spread_um
         top = rays.middle_x[pixel] - self.ball_x

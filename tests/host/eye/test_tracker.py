@@ -244,3 +244,11 @@ def test_two_sightings_far_apart_in_time_tell_no_velocity():
     track.remember(Sighting(0.0, 0.0, 0.0, 0, 1.0))
     track.remember(Sighting(0.03, 0.0, 0.1, 7 * FRAME, 1.0))
     assert track.predicted(8 * FRAME) == Posture(0.03, 0.0, 0.1)
+
+
+def test_a_sighting_older_than_the_last_one_begins_anew():
+    track = Track()
+    for tick in (800_800, 1_601_600, 100):
+        track.remember(Sighting(0.3, 0.2, 0.1, tick, 1.0))
+    assert track.seen == 1
+    assert track.predicted(800_900) == track.last()
