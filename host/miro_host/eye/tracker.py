@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from miro_exact.state import TICK
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.colours import CLASS_OF, ColourClasses
 from miro_host.eye.frame import Frame
+from miro_host.eye.notes import Notes, Pair, Window
 from miro_host.eye.patches import Patches
 from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
 from miro_host.eye.regions import Regions
@@ -46,25 +47,16 @@ CONTESTED_M = 0.025
 """A pair whose patches could be others' must be so near: a wrong one of two touching robots is 53 mm off."""
 
 
-class _Pair(NamedTuple):
-    """A robot as found: its sighting, distance from what was expected, the pixel of its team patch."""
-
-    sighting: Sighting
-    off_m: float
-    u: float
-    v: float
-
-
 class Tracker:
     """The robots of one team, as one PC follows them. `lost_frames`, `searches`: counted over all robots, and frames.
 
-    State: `tracks`, one for each robot in the order given, and the counts.
+    State: `tracks`, one for each robot in the order given, and the counts. `notes` are taken if there are any.
     """
 
     STATE = {"tracks": [Track], "lost_frames": TICK, "searches": TICK}
     NOT_STATE = (
         *("team", "robots", "weighted", "window_px", "team_kind", "kinds", "top", "lens", "z_m"),
-        *("regions", "patches", "weighings"),
+        *("regions", "patches", "weighings", "table", "notes"),
     )
 
     def __init__(
@@ -91,7 +83,8 @@ class Tracker:
         self.top = Top(pattern, calibration)
         self.lens = self.top.lens
         self.z_m = self.top.z_m
-        self.regions = Regions(colours.table())
+        self.table = colours.table()
+        self.regions = Regions(self.table)
         self.patches = Patches(self.lens, self.regions, self.z_m, self.top.distances_m(), self.top.areas())
         chroma = colours.chroma(team)
         floor = None if colours.floor is None else colours.floor.chroma()
@@ -99,6 +92,7 @@ class Tracker:
         self.tracks = [Track() for _ in robots]
         self.lost_frames = 0
         self.searches = 0
+        self.notes: Notes | None = None
 
     def __repr__(self) -> str:
         kind = "weighted" if self.weighted else "binary"
@@ -106,11 +100,15 @@ class Tracker:
 
     def track(self, frame: Frame, tick: int) -> list[Sighting | None]:
         """Where the robots are in a picture exposed at `tick`, in their order; None: not found, or not for sure."""
+        if self.notes is not None:
+            self.notes.begin(tick)
         pairs = [self._followed(frame, tick, slot) for slot in range(len(self.tracks))]
         if None in pairs:
             self.searches += 1
             self._search(frame, tick, pairs)
         self._part(pairs)
+        if self.notes is not None:
+            self.notes.pairs = list(pairs)
         sightings: list[Sighting | None] = []
         for track, pair in zip(self.tracks, pairs, strict=True):
             if pair is None:
@@ -123,7 +121,7 @@ class Tracker:
 
     # ---- where to look
 
-    def _followed(self, frame: Frame, tick: int, slot: int) -> _Pair | None:
+    def _followed(self, frame: Frame, tick: int, slot: int) -> Pair | None:
         """The robot in a window around where it is predicted, or in a larger one."""
         track = self.tracks[slot]
         if track.seen == 0:
@@ -140,26 +138,28 @@ class Tracker:
 
     def _in_window(
         self, frame: Frame, tick: int, slot: int, u: float, v: float, size: int, predicted: Posture
-    ) -> _Pair | None:
-        pixels = self._look(frame, u, v, size)
+    ) -> Pair | None:
+        pixels = self._look(frame, u, v, size, slot)
         self._expect(slot, predicted)
         return self._chosen(pixels, tick, slot)
 
-    def _look(self, frame: Frame, u: float, v: float, size: int) -> bytearray:
+    def _look(self, frame: Frame, u: float, v: float, size: int, slot: int) -> bytearray:
         """Finds the patches in a window around a pixel, moved so that it lies in the picture."""
         width, height = min(size, frame.width), min(size, frame.height)
         left = min(max(math.floor(u) - width // 2, 0), frame.width - width)
         top = min(max(math.floor(v) - height // 2, 0), frame.height - height)
+        if self.notes is not None:
+            self.notes.windows.append(Window(left, top, width, height, slot))
         pixels = frame.window(left, top, width, height)
         self.patches.look(pixels, left, top, width, height)
         return pixels
 
-    def _search(self, frame: Frame, tick: int, pairs: list[_Pair | None]) -> None:
+    def _search(self, frame: Frame, tick: int, pairs: list[Pair | None]) -> None:
         """Looks for the robots that are None in `pairs` in the whole picture, and puts in what it finds once."""
         missing = [slot for slot, pair in enumerate(pairs) if pair is None]
-        found: dict[int, list[_Pair]] = {slot: [] for slot in missing}
+        found: dict[int, list[Pair]] = {slot: [] for slot in missing}
         for u, v in candidates(frame, self.regions, self.team_kind, self.top.side_px):
-            pixels = self._look(frame, u, v, SEARCH_PX)
+            pixels = self._look(frame, u, v, SEARCH_PX, -1)
             for slot in missing:
                 self._expect(slot, None)
                 pair = self._chosen(pixels, tick, slot)
@@ -180,7 +180,7 @@ class Tracker:
         if track.seen:
             self.patches.expect(*self.top.places(track.x_m, track.y_m, track.theta_rad))
 
-    def _chosen(self, pixels: bytearray, tick: int, slot: int) -> _Pair | None:
+    def _chosen(self, pixels: bytearray, tick: int, slot: int) -> Pair | None:
         """The robot in the window that `patches` looked at last, None if there is none for sure."""
         patches, track = self.patches, self.tracks[slot]
         if patches.choose(self.team_kind, self.kinds[slot]) == 0:
@@ -196,7 +196,7 @@ class Tracker:
             return None
         return self._pair(pixels, tick, slot)
 
-    def _part(self, pairs: list[_Pair | None]) -> None:
+    def _part(self, pairs: list[Pair | None]) -> None:
         """Where two robots use one team patch, the one further from what was expected is lost."""
         for slot, pair in enumerate(pairs):
             for other in range(slot):
@@ -208,7 +208,7 @@ class Tracker:
 
     # ---- what it says
 
-    def _pair(self, pixels: bytearray, tick: int, slot: int) -> _Pair | None:
+    def _pair(self, pixels: bytearray, tick: int, slot: int) -> Pair | None:
         """The pair that `patches` chose as a sighting."""
         patches = self.patches
         try:
@@ -218,7 +218,7 @@ class Tracker:
             return None
         confidence = self.top.confidence(patches.out_gap_m, patches.out_team_area, patches.out_identity_area)
         sighting = Sighting(x_m, y_m, theta_rad, tick, confidence)
-        return _Pair(sighting, patches.out_off_m, centroids[0], centroids[1])
+        return Pair(sighting, patches.out_off_m, *centroids)
 
     def _centroids(self, pixels: bytearray, slot: int) -> tuple[float, float, float, float]:
         """u, v of the team patch and of the identity patch in the picture."""
@@ -234,7 +234,7 @@ class Tracker:
         return left + team_u, top + team_v, left + identity_u, top + identity_v
 
 
-def _same_patch(one: _Pair, other: _Pair) -> bool:
+def _same_patch(one: Pair, other: Pair) -> bool:
     return abs(one.u - other.u) < 2.0 and abs(one.v - other.v) < 2.0
 
 

@@ -185,10 +185,14 @@ class GeometricSight(Whole):
 
 
 class PixelSight(Whole):
-    """The picture of all robots, and the tracker of this host's. `everyone`: bodies of all networks."""
+    """The picture of all robots, and the tracker of this host's. `everyone`: bodies of all networks.
+
+    `watch`, if there is one, is called with frame number and tick after each exposure; it may read the picture and what
+    the tracker noted, and changes no bit of a run.
+    """
 
     STATE = {"tracker": Tracker}
-    NOT_STATE = ("eye", "everyone", "picture")
+    NOT_STATE = ("eye", "everyone", "picture", "watch")
 
     def __init__(self, camera: keys.PixelCamera, bodies: Sequence[Body], seed: int) -> None:
         network = bodies[0].network
@@ -196,6 +200,7 @@ class PixelSight(Whole):
         super().__init__(camera, bodies, seed, worst_m)
         self.picture = camera.picture
         self.everyone: Sequence[Body] = bodies
+        self.watch: Callable[[int, int], None] | None = None
         self.eye = Camera(
             camera.lens, camera.picture, PATTERNS[camera.pattern], Stream(seed, f"net{network}/pixels")
         )
@@ -214,7 +219,10 @@ class PixelSight(Whole):
     def expose(self, tick: int) -> Sequence[Posture | None]:
         """See `Sight`."""
         frame = self.frame
-        return self.deliver(tick, lambda: tuple(self.tracker.track(self.picture_at(frame, tick), tick)))
+        arrived = self.deliver(tick, lambda: tuple(self.tracker.track(self.picture_at(frame, tick), tick)))
+        if self.watch is not None:
+            self.watch(frame, tick)
+        return arrived
 
     def picture_at(self, frame: int, tick: int) -> Camera:
         """The picture of the world as it stands at `tick`, with the noise of this frame number."""

@@ -20,6 +20,7 @@ PACKAGES = (
     "rich",
     "mcap",
     "matplotlib",
+    "pillow",
     "pyserial",
     "crcmod-plus",
     "intelhex",

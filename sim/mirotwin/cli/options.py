@@ -7,6 +7,7 @@ that cannot be simulated. What does not: single commands.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,6 +24,7 @@ from miro_robot.image import Image, load_hex
 from miro_sim.inputs import TEXT_BYTES, check_regular
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+LONGEST_S = 1e9
 
 
 class Whole(click.IntRange):
@@ -43,6 +45,22 @@ class Place(click.Path):
         if value == "":
             self.fail("the path is empty.", param, ctx)
         return super().convert(value, param, ctx)
+
+
+class Moment(click.FloatRange):
+    """A time in seconds, or with its unit: 1.2, 1.2s, 350ms."""
+
+    name = "time"
+
+    def __init__(self) -> None:
+        super().__init__(0.0, LONGEST_S)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        found = re.fullmatch(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*(s|ms|)", f"{value}".strip(), re.ASCII)
+        if found is None:
+            self.fail(f"{value!r} is not a time, such as 1.2s or 350ms.", param, ctx)
+        at_s = float(found[1]) / (1000.0 if found[2] == "ms" else 1.0)
+        return super().convert(at_s, param, ctx)
 
 
 def engine_option(command: Command) -> Command:

@@ -1,0 +1,52 @@
+"""What a tracker did with one picture, for a person to look at: the windows it read, and the pair that is each robot.
+
+What belongs here: the notes. What does not: taking them (`tracker`), and drawing them. They are no state: a tracker
+that takes notes finds what one without them finds.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from miro_host.eye.track import Sighting
+
+
+class Window(NamedTuple):
+    """A window that was read, in pixels of the picture; `slot`: of the robot it is for, -1 in a search for all."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+    slot: int
+
+
+class Pair(NamedTuple):
+    """A robot as found: its sighting, distance from what was expected, the centroids of both patches in the picture."""
+
+    sighting: Sighting
+    off_m: float
+    u: float
+    v: float
+    identity_u: float
+    identity_v: float
+
+
+class Notes:
+    """Notes of the last picture. `tick`: of its exposure, -1 before the first. `pairs`: by slot, None: lost."""
+
+    NOT_STATE = ("tick", "windows", "pairs")
+
+    def __init__(self) -> None:
+        self.tick = -1
+        self.windows: list[Window] = []
+        self.pairs: list[Pair | None] = []
+
+    def __repr__(self) -> str:
+        return f"Notes(tick={self.tick}, {len(self.windows)} windows, {self.pairs!r})"
+
+    def begin(self, tick: int) -> None:
+        """A new picture."""
+        self.tick = tick
+        self.windows = []
+        self.pairs = []

@@ -1,0 +1,92 @@
+"""A whole picture of the camera: its pixels as the tracker reads them, and as a file that people can open.
+
+What belongs here: Y, Cb, Cr to red, green, blue and back (JFIF, full range, by Pillow's tables), files of pictures in
+and out. What does not: what is drawn on a picture (`overlay`), and which pictures there are (`stills`).
+
+A picture that was saved and read again differs from the first by rounding, a level or two, and where noise made a pixel
+that no red, green and blue can show, by what was cut off.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+
+from PIL import Image, UnidentifiedImageError
+
+from miro_exact.bad_input import BadInput
+from miro_host.eye.camera_parameters import HEIGHT, WIDTH
+from miro_host.eye.frame import Frame
+
+SUFFIXES = (".png", ".ppm")
+_ROWS = 12
+"""Rows that a camera is asked for at once."""
+
+
+class Picture:
+    """A picture that stays as it is. It is a `Frame`, so a tracker can look at it. `data`: three bytes a pixel."""
+
+    def __init__(self, data: bytes) -> None:
+        if len(data) != 3 * WIDTH * HEIGHT:
+            raise ValueError(f"{len(data)} bytes are not {WIDTH} x {HEIGHT} pixels of 3")
+        self.width = WIDTH
+        self.height = HEIGHT
+        self.data = data
+
+    def __repr__(self) -> str:
+        return f"Picture({self.width} x {self.height})"
+
+    def window(self, left: int, top: int, width: int, height: int) -> bytearray:
+        """See `Frame`. Raises ValueError for a window that is not inside the picture."""
+        if min(left, top, width - 1, height - 1) < 0 or left + width > WIDTH or top + height > HEIGHT:
+            raise ValueError(f"window {width} x {height} at ({left}, {top}) is not inside {WIDTH} x {HEIGHT}")
+        found = bytearray()
+        for row in range(top, top + height):
+            at = 3 * (row * WIDTH + left)
+            found += self.data[at : at + 3 * width]
+        return found
+
+    def image(self) -> Image.Image:
+        """In red, green and blue."""
+        return Image.frombytes("YCbCr", (WIDTH, HEIGHT), self.data).convert("RGB")
+
+
+def taken(frame: Frame) -> Picture:
+    """The whole picture of what may only be read by windows."""
+    return Picture(b"".join(frame.window(0, top, WIDTH, _ROWS) for top in range(0, HEIGHT, _ROWS)))
+
+
+def png(image: Image.Image) -> bytes:
+    """An image as a PNG file, without a date or any other remark."""
+    file = io.BytesIO()
+    image.save(file, "PNG", optimize=False)
+    return file.getvalue()
+
+
+def read(path: Path) -> Picture:
+    """The picture in a PNG or PPM file. Raises BadInput for another size and for what is no picture."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise BadInput(path, "", f"cannot be read: {error.strerror}", "check path and permissions") from None
+    return parse(data, f"{path}")
+
+
+def parse(data: bytes, origin: str, place: str = "") -> Picture:
+    """The same from the file's bytes; `origin` and `place` name them in errors."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a size that is refused below
+            image = Image.open(io.BytesIO(data), formats=("PNG", "PPM"))
+        if image.size != (WIDTH, HEIGHT):
+            what = f"{image.size[0]} x {image.size[1]} pixels"
+            raise BadInput(origin, place, what, f"give pictures of {WIDTH} x {HEIGHT}")
+        return Picture(image.convert("RGB").convert("YCbCr").tobytes())
+    except UnidentifiedImageError:
+        raise BadInput(origin, place, "is no PNG or PPM picture", "convert it to PNG") from None
+    except BadInput:
+        raise
+    except (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError) as error:
+        what = f"is damaged: {error}"
+        raise BadInput(origin, place, what, "write the picture again") from None
