@@ -81,11 +81,11 @@ def look(
     check_not_input(out, "--out", scenario, firmware)
     image = load_image(firmware)
 
-    from mirotwin.looking.view import View, sight_of  # loads the pictures' library
+    from mirotwin.looking.view import view_of  # loads the pictures' library
 
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
-        sight = sight_of(world.networks, network, text.origin)
+        view = view_of(world, network, text.origin)
         if frame >= world.periods:
             ends_s = seconds(world.periods * CONTROL_PERIOD_TICKS)
             raise BadInput(text.origin, f"--at {at_s:g}s", f"the run ends at {ends_s:.3f} s", "look earlier")
@@ -96,7 +96,7 @@ def look(
         if world.finished:
             return report_faults(world)
         drawn: list[bytes] = []
-        View(sight, f"{name}   seed {seed}   net{network}", lambda view: drawn.append(view.png(plain)))
+        view.shows.append(lambda view: drawn.append(view.png(plain)))
         world.begin_period()
     with whole_file(out, "--out") as staging:
         staging.write_bytes(drawn[0])

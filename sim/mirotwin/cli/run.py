@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -30,6 +31,9 @@ from mirotwin.cli.run_files import RunFiles
 from mirotwin.files.outputs import OutputFolder
 from mirotwin.recording.recorder import Source
 
+if TYPE_CHECKING:
+    from mirotwin.looking.saved_frames import SavedFrames
+
 
 @click.command(short_help="Runs a scenario and writes its files.")
 @click.argument("scenario")
@@ -49,7 +53,15 @@ from mirotwin.recording.recorder import Source
     default="default",
     help="full: also every LM629 sample. Default: every control period, and all bytes sent.",
 )
-@click.option("--force", is_flag=True, help="Replace the files of an earlier run in the folder.")
+@click.option(
+    "--frames",
+    type=Place(path_type=Path),
+    help="Folder for every camera frame as `look` draws it: frame-NNNNNN.png, or netN-frame-NNNNNN.png.",
+)
+@click.option(
+    "--plain-frames", is_flag=True, help="In --frames the pictures alone, 320 x 240, as the PC gets them."
+)
+@click.option("--force", is_flag=True, help="Replace the files of an earlier run in the folders.")
 @click.option(
     "--no-figure", is_flag=True, help="Do not draw figure.png, which takes most of the time of a short run."
 )
@@ -62,6 +74,8 @@ def run(
     firmware: str | None,
     engine: str | None,
     record: str,
+    frames: Path | None,
+    plain_frames: bool,
     force: bool,
     no_figure: bool,
     quiet: bool,
@@ -75,12 +89,17 @@ def run(
     active = choose_engine(engine)
     text = load(scenario, settings)
     folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force)
+    if plain_frames and frames is None:
+        raise click.UsageError("--plain-frames needs --frames.")
     image = load_image(firmware)
 
     source = source_of(text, seed, image, record)
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
+        saving = None if frames is None else _saving(world, frames, plain_frames, force, text.origin)
     with plain_parameters(text.origin), held_signals() as hold, folder:
+        if saving is not None:
+            saving.begin(hold)
         run_files = RunFiles(folder, source, world, active, hold, text.settings)
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
@@ -89,6 +108,15 @@ def run(
 
         print_table(summary, run_files.tracks, folder.path)
     return report_faults(world)
+
+
+def _saving(world: World, folder: Path, plain: bool, force: bool, origin: str) -> SavedFrames:
+    """What saves each frame. Raises BadInput for a folder or a camera with which that cannot be done."""
+    from mirotwin.looking.frame_folder import FrameFolder
+    from mirotwin.looking.saved_frames import SavedFrames  # loads the pictures' library
+    from mirotwin.looking.view import views_of
+
+    return SavedFrames(FrameFolder(folder, "--frames", force), views_of(world, origin), plain)
 
 
 def source_of(text: ScenarioText, seed: int, image: Image, record: str) -> Source:

@@ -88,8 +88,7 @@ def draw(picture: Picture, tracker: Tracker, notes: Notes | None, caption: str) 
         lost = [robot for robot, pair in zip(tracker.robots, notes.pairs, strict=True) if pair is None]
         brush = ImageDraw.Draw(image)
         _draw_windows(brush, notes)
-        image = _with_arrows(image, tracker, notes.pairs)
-        brush = ImageDraw.Draw(image)
+        _draw_arrows(image, tracker, notes.pairs)
         for pair in notes.pairs:
             if pair is not None:
                 _cross(brush, pair.u, pair.v)
@@ -100,12 +99,19 @@ def draw(picture: Picture, tracker: Tracker, notes: Notes | None, caption: str) 
 
 def _outlined(image: Image.Image, picture: Picture, table: bytes, windows: Sequence[Window]) -> Image.Image:
     """Lines around the pixels of each colour class, on the pixels outside of them."""
-    kinds = _classes(picture, table, windows).repeat(SCALE, axis=0).repeat(SCALE, axis=1)
+    kinds = _classes(picture, table, windows)
     pixels = np.array(image)
     for kind, name in enumerate(COLOURS, start=1):
-        inside = np.pad(kinds == kind, 1)
+        rows, columns = np.nonzero(kinds == kind)
+        if not rows.size:
+            continue
+        top, left = max(int(rows.min()) - 1, 0), max(int(columns.min()) - 1, 0)
+        part = kinds[top : int(rows.max()) + 2, left : int(columns.max()) + 2] == kind
+        own = part.repeat(SCALE, axis=0).repeat(SCALE, axis=1)
+        inside = np.pad(own, 1)
         around = inside[:-2, 1:-1] | inside[2:, 1:-1] | inside[1:-1, :-2] | inside[1:-1, 2:]
-        pixels[around & (kinds != kind)] = INK[name]
+        place = pixels[SCALE * top :, SCALE * left :][: own.shape[0], : own.shape[1]]
+        place[around & ~own] = INK[name]
     return Image.fromarray(pixels)
 
 
@@ -136,19 +142,22 @@ def _window_box(window: Window) -> Box:
     return Box(left, top, left + SCALE * window.width - 1, top + SCALE * window.height - 1)
 
 
-def _with_arrows(image: Image.Image, tracker: Tracker, pairs: Sequence[Pair | None]) -> Image.Image:
-    """Arrows with smooth edges: drawn twice as large, then made smaller."""
-    layer = Image.new("RGBA", (2 * image.width, 2 * image.height))
-    brush = ImageDraw.Draw(layer)
+def _draw_arrows(image: Image.Image, tracker: Tracker, pairs: Sequence[Pair | None]) -> None:
+    """Arrows with smooth edges: each is drawn four times as large, then made smaller."""
     for pair in pairs:
         ends = None if pair is None else _arrow(tracker, pair)
-        if ends is not None:
-            tail, tip, left, right = [(2.0 * x, 2.0 * y) for x, y in ends]
-            for colour, width in (((0, 0, 0, 200), 7), ((255, 255, 255, 255), 3)):
-                brush.line([tail, tip], fill=colour, width=width)
-                brush.line([left, tip, right], fill=colour, width=width, joint="curve")
-    layer = layer.reduce(2)
-    return Image.alpha_composite(image.convert("RGBA"), layer).convert("RGB")
+        if ends is None:
+            continue
+        left, top = (int(min(end[axis] for end in ends)) - 4 for axis in (0, 1))
+        right, bottom = (int(max(end[axis] for end in ends)) + 5 for axis in (0, 1))
+        layer = Image.new("RGBA", (4 * (right - left), 4 * (bottom - top)))
+        brush = ImageDraw.Draw(layer)
+        tail, tip, one, other = [(4.0 * (x - left), 4.0 * (y - top)) for x, y in ends]
+        for colour, width in (((0, 0, 0, 200), 14), ((255, 255, 255, 255), 6)):
+            brush.line([tail, tip], fill=colour, width=width)
+            brush.line([one, tip, other], fill=colour, width=width, joint="curve")
+        layer = layer.reduce(4)
+        image.paste(layer, (left, top), layer)
 
 
 def _arrow(tracker: Tracker, pair: Pair) -> tuple[Point, Point, Point, Point] | None:

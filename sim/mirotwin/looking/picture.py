@@ -60,7 +60,7 @@ def taken(frame: Frame) -> Picture:
 def png(image: Image.Image) -> bytes:
     """An image as a PNG file, without a date or any other remark."""
     file = io.BytesIO()
-    image.save(file, "PNG", optimize=False)
+    image.save(file, "PNG", compress_level=3)  # nearly as small as 6, in half the time
     return file.getvalue()
 
 

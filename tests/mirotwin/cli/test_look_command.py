@@ -15,7 +15,7 @@ from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.looking.picture import Picture, taken
-from mirotwin.looking.view import View
+from mirotwin.looking.view import View, views_of
 
 GAUSSIAN = ("--set", "camera.kind=gaussian")
 
@@ -55,8 +55,7 @@ def test_the_picture_with_the_overlay_is_enlarged_and_says_what_it_shows(
 def test_looking_changes_no_bit_of_a_run(short: Path, plain: bool) -> None:
     seen, unseen = world_of(short), world_of(short)
     pictures: list[bytes] = []
-    sight = seen.networks[0].sight
-    View(sight, "short", lambda view: pictures.append(view.png(plain)))
+    views_of(seen, "short")[0].shows.append(lambda view: pictures.append(view.png(plain)))
     while not unseen.finished:
         seen.step()
         unseen.step()
@@ -76,7 +75,7 @@ def test_a_frame_that_the_pc_never_got_is_shown_as_it_was_and_named(short: Path)
         view.png(plain=False)
 
     sight = seen.networks[0].sight
-    View(sight, "short", keep)
+    views_of(seen, "short")[0].shows.append(keep)
     while not seen.finished:
         seen.step()
         unseen.step()
