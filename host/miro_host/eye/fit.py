@@ -22,7 +22,7 @@ import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 
@@ -31,6 +31,9 @@ from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.eye_file import EyeError, text_of
 from miro_host.eye.least_squares import NoConvergenceError, minimised
 from miro_host.eye.lens import Lens
+
+if TYPE_CHECKING:
+    from _csv import Reader  # `csv` does not name it in every version
 
 COLUMNS = ("x_cm", "y_cm", "height_cm", "u_px", "v_px")
 IN_PLANE = ("x_m", "y_m", "focal_px", "pixel_aspect", "tilt_x_rad", "tilt_y_rad", "turn_rad", "k1")
@@ -41,6 +44,8 @@ PLANE_M = 0.02
 """Points whose heights differ by less lie in one plane."""
 LINE_M = 0.05
 """Points must spread by more than this (rms) across their main direction."""
+MOST = 1e5
+"""No cell is larger: neither cm nor px."""
 WORST_RMS_PX = 10.0
 """A worse fit is no fit: columns exchanged, or a start that is far off."""
 
@@ -63,6 +68,13 @@ def read_points(path: str | Path) -> list[ControlPoint]:
 def parse_points(text: str, origin: str) -> list[ControlPoint]:
     """The points in CSV text. Raises EyeError with the line for wrong columns and for what is no number."""
     reader = csv.reader(io.StringIO(text))
+    try:
+        return _points(reader, origin)
+    except csv.Error as error:
+        raise EyeError(origin, reader.line_num, f"is no CSV: {error}", "mend the line") from None
+
+
+def _points(reader: Reader, origin: str) -> list[ControlPoint]:
     header = [name.strip() for name in next(reader, [])]
     if sorted(header) != sorted(COLUMNS):
         raise EyeError(
@@ -84,8 +96,8 @@ def _point(cells: dict[str, str], count: int, origin: str, line: int) -> Control
             number = float(cells[name])
         except ValueError:
             raise EyeError(origin, line, f"{name}: {cells[name]!r} is no number", "write a number") from None
-        if not math.isfinite(number):
-            raise EyeError(origin, line, f"{name}: {cells[name]!r}", "write a finite number")
+        if not abs(number) <= MOST:
+            raise EyeError(origin, line, f"{name}: {cells[name]!r}", f"write a number within +-{MOST:g}")
         numbers.append(number)
     x_cm, y_cm, height_cm, u, v = numbers
     return ControlPoint(x_cm / 100.0, y_cm / 100.0, height_cm / 100.0, u, v)

@@ -12,6 +12,7 @@ from mirotwin.cli.program import Program, print_version
 COMMANDS = {
     "run": "Runs a scenario and writes its files.",
     "look": "Draws what the camera sees and what the tracker makes of it.",
+    "calibrate": "Finds a camera's parameters from control points.",
     "replay": "Sends recorded bytes again and compares.",
     "decode": "Decodes captured bytes to frames and damage.",
     "export": "Writes the bytes of a run for Wireshark, or as a stream file.",

@@ -123,7 +123,7 @@ HEADER = "x_cm,y_cm,height_cm,u_px,v_px\n"
         ("x,y\n1,2\n", "p.csv:1: the columns are x, y; they must be"),
         (HEADER + "1,2,3,4,5\n1,2,3\n", "p.csv:3: 3 cells; a line must have 5"),
         (HEADER + "1,2,3,4,here\n", "p.csv:2: v_px: 'here' is no number"),
-        (HEADER + "1,nan,3,4,5\n", "p.csv:2: y_cm: 'nan'; write a finite"),
+        (HEADER + "1,nan,3,4,5\n", "p.csv:2: y_cm: 'nan'; write a number within"),
     ],
 )
 def test_a_file_of_points_that_cannot_be_used_is_refused_by_line(text, said):
