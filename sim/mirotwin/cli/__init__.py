@@ -13,6 +13,7 @@ COMMANDS = {
     "run": "Runs a scenario and writes its files.",
     "look": "Draws what the camera sees and what the tracker makes of it.",
     "calibrate": "Finds a camera's parameters from control points.",
+    "track": "Finds robots in pictures of your own, or in recorded ones.",
     "replay": "Sends recorded bytes again and compares.",
     "decode": "Decodes captured bytes to frames and damage.",
     "export": "Writes the bytes of a run for Wireshark, or as a stream file.",

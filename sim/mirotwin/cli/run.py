@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,7 @@ from mirotwin.recording.recorder import Source
 
 if TYPE_CHECKING:
     from mirotwin.looking.saved_frames import SavedFrames
+    from mirotwin.looking.view import View
 
 
 @click.command(short_help="Runs a scenario and writes its files.")
@@ -61,6 +63,11 @@ if TYPE_CHECKING:
 @click.option(
     "--plain-frames", is_flag=True, help="In --frames the pictures alone, 320 x 240, as the PC gets them."
 )
+@click.option(
+    "--record-frames",
+    is_flag=True,
+    help="Put every frame into the recording, as --plain-frames saves it; `track` and Foxglove read them.",
+)
 @click.option("--force", is_flag=True, help="Replace the files of an earlier run in the folders.")
 @click.option(
     "--no-figure", is_flag=True, help="Do not draw figure.png, which takes most of the time of a short run."
@@ -76,6 +83,7 @@ def run(
     record: str,
     frames: Path | None,
     plain_frames: bool,
+    record_frames: bool,
     force: bool,
     no_figure: bool,
     quiet: bool,
@@ -96,11 +104,17 @@ def run(
     source = source_of(text, seed, image, record)
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
-        saving = None if frames is None else _saving(world, frames, plain_frames, force, text.origin)
+    views: list[View] = []
+    if frames is not None or record_frames:
+        from mirotwin.looking.view import views_of  # loads the pictures' library
+
+        views = views_of(world, text.origin)
+    saved = None if frames is None else _saved(frames, views, plain_frames, force)
     with plain_parameters(text.origin), held_signals() as hold, folder:
-        if saving is not None:
-            saving.begin(hold)
-        run_files = RunFiles(folder, source, world, active, hold, text.settings)
+        if saved is not None:
+            saved.begin(hold)
+        recorded = views if record_frames else []
+        run_files = RunFiles(folder, source, world, active, hold, text.settings, recorded)
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
     if not quiet:
@@ -110,13 +124,12 @@ def run(
     return report_faults(world)
 
 
-def _saving(world: World, folder: Path, plain: bool, force: bool, origin: str) -> SavedFrames:
-    """What saves each frame. Raises BadInput for a folder or a camera with which that cannot be done."""
+def _saved(folder: Path, views: Sequence[View], plain: bool, force: bool) -> SavedFrames:
+    """What saves each frame. Raises OutputError for a folder in which that cannot be done."""
     from mirotwin.looking.frame_folder import FrameFolder
-    from mirotwin.looking.saved_frames import SavedFrames  # loads the pictures' library
-    from mirotwin.looking.view import views_of
+    from mirotwin.looking.saved_frames import SavedFrames
 
-    return SavedFrames(FrameFolder(folder, "--frames", force), views_of(world, origin), plain)
+    return SavedFrames(FrameFolder(folder, "--frames", force), views, plain)
 
 
 def source_of(text: ScenarioText, seed: int, image: Image, record: str) -> Source:

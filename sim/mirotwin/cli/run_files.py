@@ -10,7 +10,9 @@ several times a second; a process that is killed loses no more.
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 from miro_sim.periods import Period
 from miro_sim.world.world import World
@@ -23,6 +25,9 @@ from mirotwin.recording.recorder import Recorder, Source
 from mirotwin.report.summary import Summary, summarise, to_json
 from mirotwin.report.track import Tracks
 
+if TYPE_CHECKING:
+    from mirotwin.looking.view import View
+
 SUMMARY = "summary.json"
 FIGURE = "figure.png"
 FLUSH_S = 0.2
@@ -30,7 +35,10 @@ FLUSH_S = 0.2
 
 
 class RunFiles:
-    """Runs `world` and fills `folder`, which is open and in which `hold` holds signals."""
+    """Runs `world` and fills `folder`, which is open and in which `hold` holds signals.
+
+    The recording gets each frame of `views`.
+    """
 
     def __init__(
         self,
@@ -40,6 +48,7 @@ class RunFiles:
         engine: str,
         hold: Hold,
         settings: tuple[str, ...] = (),
+        views: Sequence[View] = (),
     ) -> None:
         self.folder = folder
         self.source = source
@@ -47,6 +56,7 @@ class RunFiles:
         self.engine = engine
         self.hold = hold
         self.settings = settings
+        self.views = views
         self.tracks = Tracks()
         self._wall_s = 0.0
         self._flushed_s = -FLUSH_S
@@ -91,6 +101,11 @@ class RunFiles:
                 self._flushed_s = now_s
             bar.to(self.tracks.count)
 
+        def keep_frame(view: View) -> None:
+            recorder.write_image(view.network, view.tick, view.png(plain=True))
+
+        for view in self.views:
+            view.shows.append(keep_frame)
         with bar, self.hold.released():
             runner.run(self.world, recorder, self.source.record == "full", keep)
 

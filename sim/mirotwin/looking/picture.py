@@ -81,12 +81,16 @@ def parse(data: bytes, origin: str, place: str = "") -> Picture:
             image = Image.open(io.BytesIO(data), formats=("PNG", "PPM"))
         if image.size != (WIDTH, HEIGHT):
             what = f"{image.size[0]} x {image.size[1]} pixels"
-            raise BadInput(origin, place, what, f"give pictures of {WIDTH} x {HEIGHT}")
+            remedy = f"give pictures of {WIDTH} x {HEIGHT} (of a run: --plain-frames)"
+            raise BadInput(origin, place, what, remedy)
         return Picture(image.convert("RGB").convert("YCbCr").tobytes())
     except UnidentifiedImageError:
         raise BadInput(origin, place, "is no PNG or PPM picture", "convert it to PNG") from None
+    except Image.DecompressionBombError:
+        what = "far too many pixels"
+        raise BadInput(origin, place, what, f"give pictures of {WIDTH} x {HEIGHT}") from None
     except BadInput:
         raise
-    except (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError) as error:
+    except (OSError, ValueError, SyntaxError) as error:
         what = f"is damaged: {error}"
         raise BadInput(origin, place, what, "write the picture again") from None

@@ -16,7 +16,7 @@ from miro_host.posture import Posture
 from miro_protocol.stream import MAX_TICK
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
-from mirotwin.recording import topics
+from mirotwin.recording import images, topics
 
 
 class PostureMessage(msgspec.Struct, frozen=True):
@@ -173,7 +173,11 @@ ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
 }
 
 
-OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {topics.PERIOD: PeriodMessage, topics.WIRE: WireMessage}
+OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {
+    topics.PERIOD: PeriodMessage,
+    topics.WIRE: WireMessage,
+    topics.IMAGE: images.ImageMessage,
+}
 
 
 def message_type(place: topics.Place) -> type[msgspec.Struct] | None:
@@ -188,6 +192,8 @@ def schema(message: msgspec.Struct) -> dict[str, object]:
 
     The keys of a map become properties, because viewers offer nothing else to choose from.
     """
+    if isinstance(message, images.ImageMessage):
+        return images.SCHEMA
     (tree,), parts = msgspec.json.schema_components([type(message)], ref_template="{name}")
     resolved: dict[str, object] = _resolved(tree, parts)
     if isinstance(message, ControlMessage):
@@ -203,6 +209,13 @@ def _resolved(node: Any, parts: dict[str, Any]) -> Any:
             return _resolved(parts[node["$ref"]], parts)
         return {key: _resolved(value, parts) for key, value in node.items()}
     return [_resolved(item, parts) for item in node] if isinstance(node, list) else node
+
+
+def schema_name(message: msgspec.Struct) -> str:
+    """What its schema is called."""
+    if isinstance(message, images.ImageMessage):
+        return images.SCHEMA_NAME
+    return f"mirotwin.{type(message).__name__.removesuffix('Message')}"
 
 
 def messages(period: Period) -> Iterator[tuple[str, int, msgspec.Struct]]:

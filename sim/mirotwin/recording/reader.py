@@ -15,7 +15,9 @@ import msgspec
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
 from mirotwin.recording import channels
+from mirotwin.recording.channels import OTHER_CHANNELS, ROBOT_CHANNELS
 from mirotwin.recording.container import Cut, RecordingError
+from mirotwin.recording.images import ImageMessage
 from mirotwin.recording.messages import AGAIN, ATTACHMENTS, Messages, brief
 from mirotwin.recording.recorder import (
     FIRMWARE_ATTACHMENT,
@@ -24,6 +26,11 @@ from mirotwin.recording.recorder import (
     Source,
 )
 from mirotwin.recording.topics import Place
+
+KINDS = tuple(
+    kind for kind in (*ROBOT_CHANNELS.values(), *OTHER_CHANNELS.values()) if kind is not ImageMessage
+)
+"""The messages that control periods are made of."""
 
 
 class Recording(msgspec.Struct, frozen=True):
@@ -46,7 +53,7 @@ def read(path: str | Path) -> Recording:
 
 def parse(data: bytes, path: str) -> Recording:
     """A recording from its bytes; `path` names it in errors."""
-    messages = Messages(BytesIO(data), path)
+    messages = Messages(BytesIO(data), path, KINDS)
     collector = _Collector()
     cut: Cut | None = None
     try:

@@ -17,6 +17,7 @@ import msgspec
 from miro_exact.clock import nanoseconds
 from miro_sim.periods import Period
 from mirotwin.recording import channels, topics
+from mirotwin.recording.images import image_message
 from mirotwin.recording.writer import McapWriter, Writable
 
 METADATA = "mirotwin"
@@ -144,6 +145,11 @@ class Recorder:
                 )
                 self._add(topic, fault.tick, message)
 
+    def write_image(self, network: int, tick: int, png: bytes) -> None:
+        """Adds a frame of a network's camera."""
+        with self._undisturbed:
+            self._add(topics.image_topic(network), tick, image_message(network, tick, png))
+
     def _add(self, topic: str, tick: int, message: msgspec.Struct) -> None:
         channel = self._channels.get(topic) or self._register(topic, message)
         self._writer.add_message(channel, nanoseconds(tick), self._encoder.encode(message))
@@ -157,7 +163,7 @@ class Recorder:
         """The schema of a message like this one. A second law's inner values make `mirotwin.Control2`, and so on."""
         text = msgspec.json.encode(channels.schema(message))
         if text not in self._schemas:
-            name = f"mirotwin.{type(message).__name__.removesuffix('Message')}"
+            name = channels.schema_name(message)
             number = self._named[name] = self._named.get(name, 0) + 1
             name += str(number) if number > 1 else ""
             self._schemas[text] = self._writer.add_schema(name, "jsonschema", text)
