@@ -149,6 +149,7 @@ class Seeds:
         for name, content in STREAMS_2.items():
             self.kinds[name] = ("a.stream", content, [*look, ["fw", "profile", "@", "--to", "1ms"]])
         self.pieces.append(EVENTS)
+        self._add_pictures()
         raw = bytes.fromhex("5555555555ff2dd4fc") + bytes(range(40))
         self.kinds["raw"] = (
             "a.bin",
@@ -156,6 +157,25 @@ class Seeds:
             [["decode", "@"], ["decode", "@", "--format", "raw", "--json"]],
         )
         self.kinds["hex text"] = ("a.txt", raw.hex(" ").encode() + b" # end\n", [["decode", "@"]])
+
+    def _add_pictures(self) -> None:
+        """What `calibrate` and `track` read. Two pictures are enough: one is searched, in one a robot is followed."""
+        brief = ["--set", "duration_s=0.04", "--no-figure", "-q", "--frames", "frames", "--plain-frames"]
+        self._run("run", "short.toml", "--out", "seen", *brief, "--record-frames")
+        files = ["--points-out", "points.csv", "--colours-out", "colours.toml"]
+        self._run("calibrate", "--scenario", "short.toml", "--out", "camera.toml", *files)
+        track = ["--calibration", "camera.toml", "--colours", "colours.toml", "--robots", "0"]
+        calibrate = [["calibrate", "--points", "@", "--out", "new.toml", "--force"]]
+        reads = {
+            "control points": ("points.csv", calibrate),
+            "calibration": ("camera.toml", [["track", "frames", *track, "--json"]]),
+            "colours": ("colours.toml", [["track", "frames", *track]]),
+            "picture": ("frames/frame-000001.png", [["track", "frames", *track]]),
+        }
+        for kind, (name, commands) in reads.items():
+            self.kinds[kind] = (name, (self.folder / name).read_bytes(), commands)
+        recording = without_sums((self.folder / "seen" / "run.mcap").read_bytes())
+        self.kinds["recorded pictures"] = ("b.mcap", recording, [["track", "@", *track]])
 
     def _add_texts(self, image: Path) -> None:
         steps = ["--max-cycles", "300"]
