@@ -47,20 +47,19 @@ class Place(click.Path):
         return super().convert(value, param, ctx)
 
 
-class Moment(click.FloatRange):
+class Moment(click.types.FloatParamType):
     """A time in seconds, or with its unit: 1.2, 1.2s, 350ms."""
 
     name = "time"
-
-    def __init__(self) -> None:
-        super().__init__(0.0, LONGEST_S)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         found = re.fullmatch(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*(s|ms|)", f"{value}".strip(), re.ASCII)
         if found is None:
             self.fail(f"{value!r} is not a time, such as 1.2s or 350ms.", param, ctx)
         at_s = float(found[1]) / (1000.0 if found[2] == "ms" else 1.0)
-        return super().convert(at_s, param, ctx)
+        if at_s > LONGEST_S:
+            self.fail(f"{value!r} is later than any run.", param, ctx)
+        return at_s
 
 
 def engine_option(command: Command) -> Command:
