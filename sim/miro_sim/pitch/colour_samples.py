@@ -26,8 +26,10 @@ _HALF_PX = 1
 Samples = dict[str, list[tuple[int, int, int]]]
 
 
-def samples_of(lens: CameraParameters, picture: PictureSettings, pattern: PatternName) -> Samples:
-    """Sampled pixels (Y, Cb, Cr) by name of the colour, the floor's among them."""
+def samples_of(
+    lens: CameraParameters, picture: PictureSettings, pattern: PatternName, ball: bool = True
+) -> Samples:
+    """Sampled pixels (Y, Cb, Cr) by name of the colour, the floor's among them, and the ball's if there is one."""
     camera = Camera(lens, picture, PATTERNS[pattern], Stream(0, "colour samples"))
     found: Samples = {}
     frame = 0
@@ -42,9 +44,11 @@ def samples_of(lens: CameraParameters, picture: PictureSettings, pattern: Patter
                 found.setdefault(name, []).extend(_pixels(camera, at))
             frame += 1
         camera.clear()
-        camera.ball(x_m, y_m)
+        if ball:
+            camera.ball(x_m, y_m)
         camera.begin(frame, 0)
-        found.setdefault(BALL, []).extend(_pixels(camera, (x_m, y_m, BALL_RADIUS_M)))
+        if ball:
+            found.setdefault(BALL, []).extend(_pixels(camera, (x_m, y_m, BALL_RADIUS_M)))
         found.setdefault(FLOOR, []).extend(_pixels(camera, (x_m + 0.1, y_m, 0.0)))
         frame += 1
     return found
@@ -58,6 +62,8 @@ def _pixels(camera: Camera, at: tuple[float, float, float]) -> list[tuple[int, i
 
 
 @lru_cache(maxsize=4)
-def colours_of(lens: CameraParameters, picture: PictureSettings, pattern: PatternName) -> ColourClasses:
+def colours_of(
+    lens: CameraParameters, picture: PictureSettings, pattern: PatternName, ball: bool = True
+) -> ColourClasses:
     """The classes that such samples give. Raises EyeError for colours that cannot be told apart."""
-    return classes_of(samples_of(lens, picture, pattern), "camera.picture")
+    return classes_of(samples_of(lens, picture, pattern, ball), "camera.picture")

@@ -211,7 +211,7 @@ class PixelSight(Whole):
             [body.slot for body in bodies],
             camera.pattern,
             calibration,
-            colours_of(camera.lens, camera.picture, camera.pattern),
+            colours_of(camera.lens, camera.picture, camera.pattern, camera.ball is not None),
             camera.centroid,
             camera.window_px,
         )

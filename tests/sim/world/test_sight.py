@@ -222,6 +222,13 @@ def test_colours_that_cannot_be_told_apart_are_refused():
         world('kind = "pixels"\npicture = { chroma_noise = 60.0, gain = 0.1 }')
 
 
+def test_without_a_ball_its_colour_need_not_be_told_from_others():
+    dim = 'kind = "pixels"\npicture = { light_falloff = 0.9 }\n'
+    assert world(dim).finished is False
+    with pytest.raises(ValueError, match="orange"):
+        world(dim + "ball = { x_cm = 55, y_cm = 35 }")
+
+
 def test_a_third_team_has_no_colour():
     text = HEAD.format(camera='kind = "pixels"') + ROBOT.format(slot=0, x_cm=0, y_cm=0)
     text += 2 * ("[[network]]\n" + ROBOT.format(slot=0, x_cm=30, y_cm=20))
