@@ -16,7 +16,9 @@ from miro_host.eye import calibration as calibrations
 from miro_host.eye import calibration_kinds as kinds
 from miro_host.eye.calibration import Calibration
 from miro_host.eye.camera_parameters import CameraParameters
+from miro_host.eye.colours import classes_of
 from miro_host.eye.fit import ControlPoint, fit, parse_points, read_points
+from miro_host.eye.sample_file import read_samples
 from miro_sim.inputs import check_regular
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
@@ -27,7 +29,7 @@ from mirotwin.files.outputs import OutputError, check_new, check_not_input, whol
 
 SHOWN = 20
 """Points in the table; the file has them all."""
-ONLY_SCENARIO = ("seed", "noise_px", "settings", "points_out", "colours_out")
+ONLY_SCENARIO = ("seed", "noise_px", "settings", "points_out")
 
 
 class _Found(NamedTuple):
@@ -65,9 +67,14 @@ class _Found(NamedTuple):
     "--points-out", type=Place(path_type=Path), help="CSV file for the points of the scenario's camera."
 )
 @click.option(
+    "--samples",
+    type=Place(path_type=Path),
+    help="With --points: CSV file of pixels sampled from one's own pictures: colour, r, g, b (or y, cb, cr).",
+)
+@click.option(
     "--colours-out",
     type=Place(path_type=Path),
-    help="TOML file for the colour classes, sampled from pictures of the scenario's camera.",
+    help="TOML file for the colour classes of --samples, or sampled from pictures of the scenario's camera.",
 )
 @click.option("--force", is_flag=True, help="Replace files that are there.")
 @engine_option
@@ -82,6 +89,7 @@ def calibrate(
     noise_px: float,
     settings: tuple[str, ...],
     points_out: Path | None,
+    samples: Path | None,
     colours_out: Path | None,
     force: bool,
     engine: str | None,
@@ -96,6 +104,9 @@ def calibrate(
         mirotwin calibrate --scenario fig6 --out camera.toml --points-out points.csv
         mirotwin calibrate --points points.csv --out camera.toml --force
 
+    Pixels sampled from one's own pictures, at least 4 of each patch's colour, of the floor and of the ball if there is
+    one, tell the colour classes: --samples. Names: yellow, blue, magenta, cyan, green, violet, lime, orange, floor.
+
     Prints what remains between measured and drawn pixels. `track` takes the files of --out and --colours-out.
     """
     choose_engine(engine)
@@ -106,8 +117,12 @@ def calibrate(
             if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
                 option = "set" if name == "settings" else name.replace("_", "-")
                 raise click.UsageError(f"--{option} needs --scenario.")
+    if samples is not None and scenario is not None:
+        raise click.UsageError("--samples needs --points; the scenario's camera is sampled by itself.")
+    if scenario is None and (samples is None) != (colours_out is None):
+        raise click.UsageError("With --points, give both --samples and --colours-out or neither.")
     outputs = {"--out": out, "--points-out": points_out, "--colours-out": colours_out}
-    _check_outputs(outputs, force, (points, start, scenario))
+    _check_outputs(outputs, force, (points, start, scenario, samples))
     first = None if start is None else _start(start)
     if scenario is not None:
         found = _of_scenario(scenario, settings, first, noise_px, seed, colours_out is not None)
@@ -115,7 +130,8 @@ def calibrate(
         assert points is not None
         check_regular(points)
         measured = read_points(points)
-        found = _Found(measured, fit(measured, first or CameraParameters(), f"{points}"))
+        calibration = fit(measured, first or CameraParameters(), f"{points}")
+        found = _Found(measured, calibration, colours_text="" if samples is None else _classes(samples))
     texts = (found.calibration.text(), found.points_text, found.colours_text)
     for (option, path), text in zip(outputs.items(), texts, strict=True):
         if path is not None:
@@ -135,6 +151,11 @@ def _check_outputs(outputs: dict[str, Path | None], force: bool, inputs: Sequenc
         other = seen.setdefault(path.resolve(), option)
         if other != option:
             raise OutputError(path, f"is the file of {other} and of {option}", "give two files")
+
+
+def _classes(samples: Path) -> str:
+    check_regular(samples)
+    return classes_of(read_samples(samples), f"{samples}").text()
 
 
 def _start(path: Path) -> CameraParameters:
@@ -167,7 +188,7 @@ def _of_scenario(
     worst_m = kinds.worst_error_m(camera.lens, calibration)
     classes = ""
     if colours and isinstance(camera, PixelCamera):
-        classes = colours_of(camera.lens, camera.picture, camera.pattern).text()
+        classes = colours_of(camera.lens, camera.picture, camera.pattern, camera.ball is not None).text()
     return _Found(points, calibration, points_text, classes, worst_m)
 
 

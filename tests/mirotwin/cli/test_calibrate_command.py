@@ -86,8 +86,28 @@ def test_colours_are_those_that_the_scenarios_tracker_would_use(
     colours = tmp_path / "colours.toml"
     given = ("--scenario", short, "--out", tmp_path / "camera.toml", "--colours-out", colours)
     assert mirotwin("calibrate", *given)[0] == 0
-    expected = colours_of(CameraParameters(), PictureSettings(), "diagonal")
+    expected = colours_of(CameraParameters(), PictureSettings(), "diagonal", ball=False)
     assert eye_file.read(colours, ColourClasses) == expected
+
+
+def test_sampled_pixels_of_ones_own_pictures_give_colour_classes(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    points, samples, colours = (tmp_path / name for name in ("points.csv", "samples.csv", "colours.toml"))
+    made = ("--scenario", short, "--points-out", points, "--out", tmp_path / "first.toml")
+    assert mirotwin("calibrate", *made)[0] == 0
+    yellow, blue = "yellow,200,40,140\n" * 4, "blue,60,190,110\n" * 4
+    samples.write_text("colour,y,cb,cr\n" + yellow + blue)
+    given = ("--points", points, "--out", tmp_path / "camera.toml", "--samples", samples)
+    assert mirotwin("calibrate", *given, "--colours-out", colours)[0] == 0
+    assert set(eye_file.read(colours, ColourClasses).colours) == {"yellow", "blue"}
+    samples.write_text("colour,y,cb,cr\n" + yellow + yellow.replace("yellow", "lime"))
+    code, _, err = mirotwin("calibrate", *given, "--colours-out", colours, "--force")
+    assert code == 2
+    assert f"{samples}: colours.lime: cannot be told from yellow" in err.replace("\n", "")
+    code, _, err = mirotwin("calibrate", *given, "--force")
+    assert code == 2
+    assert "give both --samples and --colours-out or neither" in err
 
 
 def test_what_the_points_cannot_tell_is_taken_from_the_start(
@@ -155,7 +175,7 @@ def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
         (("--points", "p.csv", "--scenario", "fig6"), "Give either --points or --scenario."),
         (("--points", "p.csv", "--seed", 1), "--seed needs --scenario."),
         (("--points", "p.csv", "--set", "duration_s=1"), "--set needs --scenario."),
-        (("--points", "p.csv", "--colours-out", "c.toml"), "--colours-out needs --scenario."),
+        (("--points", "p.csv", "--colours-out", "c.toml"), "With --points, give both --samples and --colours-out or neither."),
         (("--points", "absent.csv"), "absent.csv: cannot be read: No such file or directory"),
         (("--points", "."), ".: is a folder"),
         (("--points", "bytes"), "bytes: not UTF-8 text; give a text file"),
