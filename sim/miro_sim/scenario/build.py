@@ -73,7 +73,7 @@ def calibration_for(camera: SeeingCamera, network: int, seed: int) -> tuple[Cali
     Finding the errors of 1997 takes longer than the rest of a world: a seed's calibration is kept.
     """
     errors = camera.calibration_errors
-    if camera.calibration == "1997":
+    if str(camera.calibration) == "1997":
         found = kinds.drawn_1997(
             camera.lens,
             Stream(seed, f"net{network}/calibration"),

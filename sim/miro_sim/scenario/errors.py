@@ -250,7 +250,7 @@ def _choices_at(raw: Any, path: str) -> str:
     if isinstance(table, msgspec.inspect.CustomType) and REGISTRIES[table.cls].key == key:
         choices = REGISTRIES[table.cls].names()
     elif isinstance(found, msgspec.inspect.LiteralType):
-        choices = [str(value) for value in found.values]
+        choices = list(dict.fromkeys(str(value) for value in found.values))
     else:
         choices = [str(struct.tag) for struct in _structs_at(raw, above) if struct.tag_field == key]
     if not choices:

@@ -175,7 +175,10 @@ def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
         (("--points", "p.csv", "--scenario", "fig6"), "Give either --points or --scenario."),
         (("--points", "p.csv", "--seed", 1), "--seed needs --scenario."),
         (("--points", "p.csv", "--set", "duration_s=1"), "--set needs --scenario."),
-        (("--points", "p.csv", "--colours-out", "c.toml"), "With --points, give both --samples and --colours-out or neither."),
+        (
+            ("--points", "p.csv", "--colours-out", "c.toml"),
+            "With --points, give both --samples and --colours-out or neither.",
+        ),
         (("--points", "absent.csv"), "absent.csv: cannot be read: No such file or directory"),
         (("--points", "."), ".: is a folder"),
         (("--points", "bytes"), "bytes: not UTF-8 text; give a text file"),

@@ -88,6 +88,13 @@ def test_the_calibration_of_1997_is_drawn_once_a_seed():
     assert len({first_error(seed) for seed in range(6)}) == 6
 
 
+def test_1997_is_a_word_or_a_number():
+    word, number = (
+        measured(world(f'kind = "geometric"\ncalibration = {name}')) for name in ('"1997"', "1997")
+    )
+    assert word == number
+
+
 @pytest.mark.parametrize(
     ("errors", "least_cm", "most_cm"),
     [
