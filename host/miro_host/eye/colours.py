@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Annotated
 
 import msgspec
@@ -50,7 +51,7 @@ class ColourMean(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         return _sixteenths(self.cb - 128.0), _sixteenths(self.cr - 128.0)
 
 
-class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, dict=True):
     """The classes of some or all of `patterns.COLOURS`, by name, and what the floor looks like, if that is known.
 
     Raises ValueError for colours that cannot be told apart.
@@ -76,6 +77,7 @@ class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
             raise EyeError("", f"colours.{name}", "no class of this colour", "sample it")
         return self.colours[name].chroma()
 
+    @cached_property
     def table(self) -> bytes:
         """Class by Y >> 4, Cb >> 2, Cr >> 2, as `Regions` takes it: decided in the middle of each cell."""
         classes = []

@@ -83,7 +83,7 @@ class Tracker:
         self.top = Top(pattern, calibration)
         self.lens = self.top.lens
         self.z_m = self.top.z_m
-        self.table = colours.table()
+        self.table = colours.table
         self.regions = Regions(self.table)
         self.patches = Patches(self.lens, self.regions, self.z_m, self.top.distances_m(), self.top.areas())
         chroma = colours.chroma(team)

@@ -27,10 +27,10 @@ from miro_exact.dmath import sincos
 from miro_exact.rng import Stream
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from miro_host.eye.patterns import IDENTITIES, PATCH_MM, TEAMS, Pattern
-from miro_sim.pitch.paints import NUMBERS, packed
+from miro_sim.pitch.paints import NUMBERS
 from miro_sim.pitch.picture_settings import PictureSettings
 from miro_sim.pitch.rays import Rays, rays_of
-from miro_sim.pitch.scene import Scene
+from miro_sim.pitch.scene import Scene, scene_of
 from miro_sim.pitch.sensor import Sensor
 
 MOST_ROBOTS = 10
@@ -107,7 +107,7 @@ class Camera:
         self.width = WIDTH
         self.height = HEIGHT
         self.rays: Rays = rays_of(parameters)
-        self.scene = Scene(self.rays, packed(settings.black_floor))
+        self.scene: Scene = scene_of(parameters, settings.black_floor, None)
         self.sensor = Sensor(settings, stream)
         self.falloff = math.floor(settings.light_falloff * 4096.0 * 4503599627370496.0 / _FAR_SQUARE + 0.5)
         self.field_sets = settings.sub_exposures
@@ -146,7 +146,7 @@ class Camera:
     def clear(self) -> None:
         """Takes all robots and the ball off the pitch."""
         self.clear_robots()
-        self.scene.take_ball()
+        self.scene = scene_of(self.parameters, self.settings.black_floor, None)
 
     def clear_robots(self) -> None:
         """Takes all robots off the pitch; the ball stays."""
@@ -154,7 +154,7 @@ class Camera:
 
     def ball(self, x_m: float, y_m: float) -> None:
         """Puts the ball on the floor, its centre above this place."""
-        self.scene.put_ball(_um(x_m), _um(y_m))
+        self.scene = scene_of(self.parameters, self.settings.black_floor, (_um(x_m), _um(y_m)))
 
     def robot(
         self,

@@ -16,8 +16,6 @@ cdef class Scene:
     cdef int floor, line, wall_top, wall_face, outside, ball_rim
     cdef readonly bint has_ball
 
-    @cython.locals(pixel=int)
-    cdef void _forget(self) noexcept
     @cython.locals(rays=rays.Rays, far='long long', top='long long', end='long long')
     cdef bint _near_ball(self, int pixel) noexcept
     @cython.locals(paint=int)

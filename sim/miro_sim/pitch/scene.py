@@ -16,14 +16,17 @@ are not drawn.
 
 The ball lies on the floor. It is drawn as four rings, brighter towards its middle.
 
-A pixel's 16 samples are evaluated when it is first looked at, and kept until the ball comes or goes.
+A pixel's 16 samples are evaluated when it is first looked at, and kept.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
+
+from miro_host.eye.camera_parameters import CameraParameters
 from miro_sim.pitch.ground import INSET_M, LENGTH_M, WIDTH_M
-from miro_sim.pitch.paints import NUMBERS
-from miro_sim.pitch.rays import Rays
+from miro_sim.pitch.paints import NUMBERS, packed
+from miro_sim.pitch.rays import Rays, rays_of
 
 MIXED = 255
 UNKNOWN = 254
@@ -44,14 +47,17 @@ _AREA_DEPTH_UM = 150_000
 
 
 class Scene:
-    """The scene without robots. `paint` of a pixel: a number, or MIXED; `total`: its 16 samples added."""
+    """The scene without robots; `ball`: above which place (um) its centre is, if there is one.
+
+    `paint` of a pixel: a number, or MIXED; `total`: its 16 samples added.
+    """
 
     NOT_STATE = (
         *("rays", "packed", "paint", "total", "middle_x", "middle_y", "half_x", "half_y"),
         *("floor", "line", "wall_top", "wall_face", "outside", "ball_rim", "has_ball", "ball_x", "ball_y"),
     )
 
-    def __init__(self, rays: Rays, packed: list[int]) -> None:
+    def __init__(self, rays: Rays, packed: list[int], ball: tuple[int, int] | None) -> None:
         self.rays = rays
         self.packed = [0] * 32
         for number, paint in enumerate(packed):
@@ -70,34 +76,11 @@ class Scene:
         self.wall_face = NUMBERS["wall face"]
         self.outside = NUMBERS["outside"]
         self.ball_rim = NUMBERS["ball rim"]
-        self.has_ball = False
-        self.ball_x = 0
-        self.ball_y = 0
+        self.has_ball = ball is not None
+        self.ball_x, self.ball_y = ball or (0, 0)
 
     def __repr__(self) -> str:
         return f"Scene({self.rays!r}, ball={(self.ball_x, self.ball_y) if self.has_ball else None})"
-
-    def put_ball(self, x: int, y: int) -> None:
-        """Puts the ball on the floor, its centre above (x, y) in um; takes it away from where it was."""
-        if self.has_ball and (x, y) == (self.ball_x, self.ball_y):
-            return
-        self.take_ball()
-        self.has_ball = True
-        self.ball_x = x
-        self.ball_y = y
-        self._forget()
-
-    def take_ball(self) -> None:
-        """Takes the ball off the pitch."""
-        if self.has_ball:
-            self._forget()
-            self.has_ball = False
-
-    def _forget(self) -> None:
-        """Where the ball may be seen, the picture has to be made again."""
-        for pixel in range(76800):
-            if self._near_ball(pixel):
-                self.paint[pixel] = _UNKNOWN
 
     def shows_ball(self, pixel: int) -> bool:
         """Whether one of a pixel's samples may be the ball's; `look` has been called."""
@@ -223,3 +206,9 @@ class Scene:
         if abs(depth - _AREA_DEPTH_UM) <= _LINE_HALF_UM and y <= _AREA_HALF_UM + _LINE_HALF_UM:
             return True
         return abs(y - _AREA_HALF_UM) <= _LINE_HALF_UM and 0 <= depth <= _AREA_DEPTH_UM
+
+
+@lru_cache(maxsize=8)
+def scene_of(lens: CameraParameters, black_floor: bool, ball: tuple[int, int] | None) -> Scene:
+    """The scene as a camera sees it; worlds with the same one share what was looked at."""
+    return Scene(rays_of(lens), packed(black_floor), ball)

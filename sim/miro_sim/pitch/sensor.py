@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from functools import lru_cache
 
 from miro_exact import rng
 from miro_exact.dmath import exp, log, sincos
@@ -67,6 +68,15 @@ def _taps(bandwidth_hz: float) -> list[int]:
     return [65536 - both_sides, *taps[1:]]
 
 
+@lru_cache(maxsize=8)
+def _tables(gamma: float, luma_noise: float, chroma_noise: float) -> tuple[list[int], list[int], list[int]]:
+    """By brightness what is shown, and by draw the noise of Y and of Cb and Cr; all with four fraction bits."""
+    shown = [0] + [math.floor(4080.0 * exp(gamma * log(value / 4095.0)) + 0.5) for value in range(1, 4096)]
+    normals = _normals()
+    luma = [math.floor(normal * luma_noise / 4096.0 + 0.5) for normal in normals]
+    return shown, luma, [math.floor(normal * chroma_noise / 4096.0 + 0.5) for normal in normals]
+
+
 class Sensor:
     """Sensor, cable and grabber of one camera. `stream` is the source of its noise. Holds one line; no state."""
 
@@ -91,13 +101,13 @@ class Sensor:
         self.shift = 8 - settings.bits
         self.half = (1 << self.shift) >> 1
         self.gamma = [0] * 4096
-        for value in range(1, 4096):
-            self.gamma[value] = math.floor(4080.0 * exp(settings.gamma * log(value / 4095.0)) + 0.5)
         self.luma_noise = [0] * 4096
         self.chroma_noise = [0] * 4096
-        for draw, normal in enumerate(_normals()):
-            self.luma_noise[draw] = math.floor(normal * settings.luma_noise / 4096.0 + 0.5)
-            self.chroma_noise[draw] = math.floor(normal * settings.chroma_noise / 4096.0 + 0.5)
+        shown, luma, chroma = _tables(settings.gamma, settings.luma_noise, settings.chroma_noise)
+        for value in range(4096):
+            self.gamma[value] = shown[value]
+            self.luma_noise[value] = luma[value]
+            self.chroma_noise[value] = chroma[value]
         self.y = [0] * 320
         self.cb = [0] * 320
         self.cr = [0] * 320

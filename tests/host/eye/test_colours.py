@@ -13,7 +13,7 @@ CLASSES = classes_of(sampled())
 
 def of(rgb):
     y, cb, cr = (int(part) for part in ycbcr(rgb))
-    return CLASSES.table()[y >> 4 << 12 | cb >> 2 << 6 | cr >> 2]
+    return CLASSES.table[y >> 4 << 12 | cb >> 2 << 6 | cr >> 2]
 
 
 @pytest.mark.parametrize("name", COLOURS)
