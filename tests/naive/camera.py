@@ -199,7 +199,7 @@ class NaiveCamera:
         phase = float(tick * 2 * settings.mains_hz % 24_000_000) / 24_000_000
         sine_end, _ = sincos(6.283185307179586 * (phase + 0.5 * turns))
         sine_begin, cosine = sincos(6.283185307179586 * (phase - 0.5 * turns))
-        mean = (sine_end - sine_begin) / (6.283185307179586 * turns) if turns > 0.0 else cosine
+        mean = (sine_end - sine_begin) / (6.283185307179586 * turns) if turns > 1e-6 else cosine
         lamps = 1.0 + settings.flicker * mean
         scale = math.floor(settings.gain * lamps / samples * 16777216.0 + 0.5)
         value = ((totals * light[:, :, None] >> 12) * scale >> 24) + math.floor(

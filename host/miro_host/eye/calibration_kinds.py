@@ -32,8 +32,8 @@ PITCH_Y_M = (-0.10, 0.80)
 """The 130 x 90 cm of the pitch in the paper's axes."""
 GRID_M = 0.10
 
-_STEPS = 10
-_LARGEST_FACTOR = 8.0
+_STEPS = 20
+_LARGEST_FACTOR = 100.0
 _TWO_PI = 6.283185307179586
 
 
@@ -108,7 +108,10 @@ def _factor(true: CameraParameters, errors: CalibrationErrors, worst_m: float) -
         found_m = _worst_m(grid, wrong(true, scaled(errors, factor)))
         if found_m == 0.0:
             return 1.0
-        factor = min(factor * worst_m / found_m, _LARGEST_FACTOR)
+        if found_m == math.inf:
+            factor *= 0.5
+        else:
+            factor = min(factor * worst_m / found_m, _LARGEST_FACTOR)
     return factor
 
 

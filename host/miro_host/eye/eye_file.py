@@ -30,7 +30,7 @@ def read(path: str | Path, kind: type[T]) -> T:
 def text_of(path: str | Path) -> str:
     """A file's text. Raises EyeError."""
     try:
-        return Path(path).read_text(encoding="utf-8")
+        return Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
         raise EyeError(path, "", f"cannot be read: {error.strerror}", "check path and permissions") from None
     except ValueError:

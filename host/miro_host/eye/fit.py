@@ -44,6 +44,8 @@ PLANE_M = 0.02
 """Points whose heights differ by less lie in one plane."""
 LINE_M = 0.05
 """Points must spread by more than this (rms) across their main direction."""
+MOST_POINTS = 5000
+"""More take minutes and tell no more."""
 MOST = 1e5
 """No cell is larger: neither cm nor px."""
 WORST_RMS_PX = 10.0
@@ -137,8 +139,11 @@ def _check_points(
     points: Sequence[ControlPoint], free: tuple[str, ...], start: CameraParameters, origin: str
 ) -> None:
     least = (len(free) + 1) // 2 + 1
-    if len(points) < least:
-        what = f"{len(points)} points for {len(free)} parameters"
+    if len(points) > MOST_POINTS:
+        raise EyeError(origin, "", f"{len(points)} points", f"give at most {MOST_POINTS}")
+    places = len({(point.x_m, point.y_m, point.z_m) for point in points})
+    if places < least:
+        what = f"{places} points for {len(free)} parameters"
         raise EyeError(origin, "", what, f"give at least {least}, better 20 all over the pitch")
     if _across_m(points) < LINE_M:
         raise EyeError(origin, "", "the points lie on one line", "add points beside it, all over the pitch")

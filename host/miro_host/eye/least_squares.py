@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 
 STEPS = 100
 """Tried steps, good ones and bad ones."""
+FLAT = 1e-12
+"""A step that gains less, as a share of the sum of squares, is the last."""
 SMALL = 1e-10
 """A step shorter than this (root mean square over parameters of size 1) is the end."""
 _DIFFERENCE = 1e-6
@@ -41,8 +43,11 @@ def minimised(residuals: Residuals, first: Sequence[float]) -> list[float]:
             squares = math.inf
         length = math.sqrt(_squares(step) / len(step))
         if squares <= best:
+            gained = best - squares
             values, off, best = tried, tried_off, squares
             damping = max(0.1 * damping, 1e-12)
+            if gained <= FLAT * best:  # a valley without a slope: further steps only walk along it
+                return values
         else:
             damping *= 10.0
         if length < SMALL:

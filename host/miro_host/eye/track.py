@@ -96,7 +96,7 @@ class Track:
         gap_s = (self.tick - self.before_tick) / TICKS_PER_SECOND
         if self.seen < 2 or gap_s > LONGEST_GAP_S:
             return self.last()
-        ahead = min(self.unseen_s(tick), LONGEST_AHEAD_S) / gap_s
+        ahead = max(0.0, min(self.unseen_s(tick), LONGEST_AHEAD_S)) / gap_s
         dx, dy = self.x_m - self.before_x_m, self.y_m - self.before_y_m
         length_m = math.sqrt(dx * dx + dy * dy)
         most_m = MOST_SPEED_M_S * gap_s

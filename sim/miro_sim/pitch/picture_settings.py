@@ -9,6 +9,9 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+LEAST_BANDWIDTH_HZ = 250_000.0
+"""A narrower filter would need more than 8 pixels on either side."""
+
 
 class PictureSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One setting for each thing that damages a picture; 0 switches most of them off.
@@ -38,3 +41,10 @@ class PictureSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     chroma_noise: Annotated[float, Meta(ge=0.0, le=64.0)] = 4.0
     line_jitter_px: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
     bits: Annotated[int, Meta(ge=3, le=8)] = 8
+
+    def __post_init__(self) -> None:
+        if 0.0 < self.chroma_bandwidth_hz < LEAST_BANDWIDTH_HZ:
+            raise ValueError(
+                f"chroma_bandwidth_hz: {self.chroma_bandwidth_hz} is out of range;"
+                f" must be 0 (not limited) or >= {LEAST_BANDWIDTH_HZ:.0f} in hertz"
+            )

@@ -2,7 +2,7 @@ cimport cython
 from miro_host.eye cimport lens
 
 cdef int _WIDTH, _HEIGHT, _CORNERS, _MARGIN_SPARE_UM
-cdef long long _TOP_UM
+cdef long long _TOP_UM, _MOST
 
 
 @cython.final

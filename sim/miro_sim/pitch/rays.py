@@ -23,6 +23,7 @@ _WIDTH = 320
 _HEIGHT = 240
 _CORNERS = 321
 _TOP_UM = 75_000
+_MOST = 8 << 22  # a slope of 8 is 83 degrees: products of slopes and lengths stay within 64 bits
 _MARGIN_SPARE_UM = 4  # what rounding adds: a bilinear mean, and a turn into a robot's axes
 
 
@@ -39,6 +40,7 @@ class Rays:
     )
 
     def __init__(self, parameters: CameraParameters) -> None:
+        """Raises ValueError for a camera that looks near to the horizon, or at what its lens cannot draw."""
         lens = Lens(parameters)
         self.x_um = _um(parameters.x_m)
         self.y_um = _um(parameters.y_m)
@@ -66,6 +68,8 @@ class Rays:
                 lens.slopes(float(i), float(j))
                 x = math.floor(lens.out_x * 4194304.0 + 0.5)
                 y = math.floor(lens.out_y * 4194304.0 + 0.5)
+                if not (-_MOST < x < _MOST and -_MOST < y < _MOST):
+                    raise ValueError(f"pixel ({i}, {j}) looks too near to the horizon")
                 corner = j * _CORNERS + i
                 self.slope_x[corner] = x
                 self.slope_y[corner] = y

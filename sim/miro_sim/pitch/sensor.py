@@ -128,7 +128,7 @@ class Sensor:
         phase = float(tick * twice_hz % _TICKS) / _TICKS
         sine_end, _ = sincos(6.283185307179586 * (phase + 0.5 * turns))
         sine_begin, cosine = sincos(6.283185307179586 * (phase - 0.5 * turns))
-        mean = (sine_end - sine_begin) / (6.283185307179586 * turns) if turns > 0.0 else cosine
+        mean = (sine_end - sine_begin) / (6.283185307179586 * turns) if turns > 1e-6 else cosine
         return 1.0 + self.settings.flicker * mean
 
     def put(self, column: int, total: int, light: int) -> None:
@@ -142,7 +142,7 @@ class Sensor:
 
     def _shown(self, total: int, light: int) -> int:
         value = ((total * light >> 12) * self.scale >> 24) + self.offset
-        return self.gamma[value if value < _FULL else _FULL]
+        return self.gamma[0 if value < 0 else (value if value < _FULL else _FULL)]
 
     def write(self, row: int, left: int, width: int, out: bytearray, at: int) -> None:
         """The bytes of the line's pixels from `left` on into `out` from `at` on; `side` more were put on each side."""

@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_exact.rng import Stream
 from miro_host.estimators.interface import EstimatorParameters
@@ -72,6 +73,15 @@ def calibration_for(camera: SeeingCamera, network: int, seed: int) -> tuple[Cali
 
     Finding the errors of 1997 takes longer than the rest of a world: a seed's calibration is kept.
     """
+    try:
+        calibration = _calibration(camera, network, seed)
+        return calibration, kinds.worst_error_m(camera.lens, calibration)
+    except ValueError as error:
+        what = f"no calibration of this camera can be so wrong: {error}"
+        raise BadInput("", "camera.calibration_errors", what, "make the errors smaller") from None
+
+
+def _calibration(camera: SeeingCamera, network: int, seed: int) -> Calibration:
     errors = camera.calibration_errors
     if str(camera.calibration) == "1997":
         found = kinds.drawn_1997(
@@ -87,8 +97,7 @@ def calibration_for(camera: SeeingCamera, network: int, seed: int) -> tuple[Cali
     ignored = kinds.CalibrationErrors(
         ignore_height=errors.ignore_height or found.ignore_height, ignore_distortion=errors.ignore_distortion
     )
-    calibration = kinds.wrong(found.camera, ignored)
-    return calibration, kinds.worst_error_m(camera.lens, calibration)
+    return kinds.wrong(found.camera, ignored)
 
 
 def drive_for(robot: sc.Robot, left: float, right: float) -> DriveParams:

@@ -6,6 +6,7 @@ the camera (`camera_keys`).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from miro_host.posture import Posture
 
 _CORNERS = [(x, y) for x in (pitch.LEFT_M, pitch.RIGHT_M) for y in (pitch.BOTTOM_M, pitch.TOP_M)]
+MOST_SLOPE = 5.0
+"""A ray further from the vertical than 79 degrees sees nothing of use."""
 _REMEDY = "hang it above the middle of the pitch, higher, or make focal_px shorter"
 
 
@@ -32,9 +35,10 @@ def check_camera(scenario: Scenario, origin: str) -> None:
 
     lens = Lens(camera.lens)
     try:
-        for u in (0.0, float(WIDTH)):
-            for v in (0.0, float(HEIGHT)):
-                lens.slopes(u, v)
+        for u, v in _edge():
+            lens.slopes(u, v)
+            if abs(lens.out_x) > MOST_SLOPE or abs(lens.out_y) > MOST_SLOPE:
+                raise ValueError(f"pixel ({u:.0f}, {v:.0f}) looks too near to the horizon")
     except ValueError as error:
         raise ScenarioError(
             origin, "camera.lens", str(error), "use a longer focal_px, or less tilt"
@@ -43,7 +47,7 @@ def check_camera(scenario: Scenario, origin: str) -> None:
         what = f"hangs at ({100.0 * lens.x_m:.0f}, {100.0 * lens.y_m:.0f}) cm, beside the pitch"
         raise ScenarioError(origin, "camera.lens", what, "hang it above the pitch, and tilt it")
     for x_m, y_m in _CORNERS:
-        if not _sees(lens, x_m, y_m, 0.0):
+        if not (_sees(lens, x_m, y_m, 0.0) and _draws(lens, x_m, y_m, ROBOT_HEIGHT_M)):
             what = f"does not see the pitch's corner ({100.0 * x_m:.0f}, {100.0 * y_m:.0f}) cm"
             raise ScenarioError(origin, "camera.lens", what, _REMEDY)
     if isinstance(camera, PixelCamera) and len(scenario.networks) > len(TEAMS):
@@ -67,6 +71,24 @@ def check_start(scenario: Scenario, start: Posture, origin: str, place: str) -> 
                 raise ScenarioError(
                     origin, f"{place}.start_error_x_cm", what, "start it elsewhere, or change camera.lens"
                 )
+
+
+def _edge() -> Iterator[tuple[float, float]]:
+    """The corners of all pixels along the border of the picture."""
+    for i in range(WIDTH + 1):
+        yield float(i), 0.0
+        yield float(i), float(HEIGHT)
+    for j in range(HEIGHT + 1):
+        yield 0.0, float(j)
+        yield float(WIDTH), float(j)
+
+
+def _draws(lens: Lens, x_m: float, y_m: float, z_m: float) -> bool:
+    try:
+        lens.pixel(x_m, y_m, z_m)
+    except ValueError:
+        return False
+    return True
 
 
 def _sees(lens: Lens, x_m: float, y_m: float, z_m: float) -> bool:

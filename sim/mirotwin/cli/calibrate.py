@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import click
 from click.core import ParameterSource
@@ -32,6 +32,16 @@ SHOWN = 20
 ONLY_SCENARIO = ("seed", "noise_px", "settings", "points_out")
 
 
+class Noise(click.FloatRange):
+    """A range that NaN, which compares with nothing, is not in."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        if number != number:
+            self.fail(f"{value} is not a number.", param, ctx)
+        return number
+
+
 class _Found(NamedTuple):
     """What came out: control points and calibration, and the further texts to write."""
 
@@ -57,7 +67,7 @@ class _Found(NamedTuple):
 @click.option("--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Of the points' noise.")
 @click.option(
     "--noise-px",
-    type=click.FloatRange(0.0, 10.0),
+    type=Noise(0.0, 10.0),
     default=0.3,
     show_default=True,
     help="Standard deviation of a point's u, and of its v: how well somebody finds a mark in the picture.",

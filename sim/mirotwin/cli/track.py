@@ -117,7 +117,7 @@ def track(
             click.echo(HEADING)
         for robot, seen in zip(robots, tracker.track(still.picture, still.tick), strict=True):
             found[robot] += seen is not None
-            line = _line(frame, still.name, still.tick, robot, seen)
+            line = _line(frame, _utf8(still.name), still.tick, robot, seen)
             show_line(msgspec.json.encode(line).decode() if as_json else _row(line))
         frames = frame + 1
     if not as_json:
@@ -142,6 +142,11 @@ def _tracker(
         return Tracker(team, robots, pattern, believed, classes, centroid)
     except EyeError as error:  # a colour that these robots need has no class
         raise EyeError(colours, error.place, error.what, error.remedy) from None
+
+
+def _utf8(name: str) -> str:
+    """A file's name in characters that JSON has: other bytes are escaped."""
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def _line(frame: int, name: str, tick: int, robot: int, seen: Sighting | None) -> Line:

@@ -15,7 +15,7 @@ from miro_sim.world.sight import PixelSight
 from miro_sim.world.world import World
 from mirotwin.looking.picture import Picture, png, taken
 
-NO_PIXELS = 'choose kind = "pixels" in [camera] (--set camera.kind=pixels)'
+NO_PIXELS = 'choose kind = "pixels" in [camera]; here: --set \'camera={kind="pixels"}\''
 
 
 class View:

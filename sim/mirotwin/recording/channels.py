@@ -1,7 +1,8 @@
-"""The channels of a recording: their messages, their JSON schemas, and how records become messages and back.
+"""The channels of a recording: their messages, and how records become messages and back.
 
-What belongs here: one struct a channel, and the two directions of translation. What does not: MCAP
-(`recorder`, `reader`). Every message carries its tick; a period's messages are closed by its `/period` message.
+What belongs here: one struct a channel, and the two directions of translation. What does not: their JSON schemas
+(`schemas`), MCAP (`recorder`, `reader`). Every message carries its tick; a period's messages are closed by its
+`/period` message.
 
 Where a channel stands: `topics`.
 """
@@ -185,37 +186,6 @@ def message_type(place: topics.Place) -> type[msgspec.Struct] | None:
     if place.slot >= 0:
         return ROBOT_CHANNELS.get(place.channel)
     return OTHER_CHANNELS.get(place.channel)
-
-
-def schema(message: msgspec.Struct) -> dict[str, object]:
-    """The JSON schema of a message, with references resolved: viewers want one plain tree.
-
-    The keys of a map become properties, because viewers offer nothing else to choose from.
-    """
-    if isinstance(message, images.ImageMessage):
-        return images.SCHEMA
-    (tree,), parts = msgspec.json.schema_components([type(message)], ref_template="{name}")
-    resolved: dict[str, object] = _resolved(tree, parts)
-    if isinstance(message, ControlMessage):
-        names = {name: {"type": "number"} for name in message.inner}
-        inner = {"type": "object", "properties": names, "required": list(names)}
-        resolved["properties"] = {**resolved["properties"], "inner": inner}  # type: ignore[dict-item]
-    return resolved
-
-
-def _resolved(node: Any, parts: dict[str, Any]) -> Any:
-    if isinstance(node, dict):
-        if "$ref" in node:
-            return _resolved(parts[node["$ref"]], parts)
-        return {key: _resolved(value, parts) for key, value in node.items()}
-    return [_resolved(item, parts) for item in node] if isinstance(node, list) else node
-
-
-def schema_name(message: msgspec.Struct) -> str:
-    """What its schema is called."""
-    if isinstance(message, images.ImageMessage):
-        return images.SCHEMA_NAME
-    return f"mirotwin.{type(message).__name__.removesuffix('Message')}"
 
 
 def messages(period: Period) -> Iterator[tuple[str, int, msgspec.Struct]]:

@@ -16,7 +16,7 @@ import msgspec
 
 from miro_exact.clock import nanoseconds
 from miro_sim.periods import Period
-from mirotwin.recording import channels, topics
+from mirotwin.recording import channels, schemas, topics
 from mirotwin.recording.images import image_message
 from mirotwin.recording.writer import McapWriter, Writable
 
@@ -161,9 +161,9 @@ class Recorder:
 
     def _schema(self, message: msgspec.Struct) -> int:
         """The schema of a message like this one. A second law's inner values make `mirotwin.Control2`, and so on."""
-        text = msgspec.json.encode(channels.schema(message))
+        text = msgspec.json.encode(schemas.schema(message))
         if text not in self._schemas:
-            name = channels.schema_name(message)
+            name = schemas.schema_name(message)
             number = self._named[name] = self._named.get(name, 0) + 1
             name += str(number) if number > 1 else ""
             self._schemas[text] = self._writer.add_schema(name, "jsonschema", text)

@@ -1,6 +1,7 @@
 """Calibrations: files, fits, and the wrong ones of experiments."""
 
 import math
+import random
 
 import msgspec
 import pytest
@@ -215,3 +216,32 @@ def test_an_error_out_of_range_is_refused():
         wrong(CAMERA, CalibrationErrors(tilt_x_rad=0.6))
     with pytest.raises(msgspec.ValidationError):
         msgspec.convert({"tilt": 1.0}, CalibrationErrors)
+
+
+def test_points_given_several_times_are_as_few_as_they_are():
+    few = [
+        ControlPoint(x, y, 0.0, 160.0 + 200.0 * x, 120.0 - 200.0 * y) for x, y in ((0, 0), (1, 0), (0, 0.8))
+    ]
+    with pytest.raises(EyeError, match="3 points for 8 parameters"):
+        fit(few * 3, CameraParameters())
+
+
+def test_a_high_camera_with_a_long_lens_is_found_too():
+    true = CameraParameters(height_m=9.0, focal_px=2000.0)
+    lens, draw = Lens(true), random.Random(4)
+    points = []
+    for z_m in (0.0, 0.075):
+        for x in range(-10, 121, 26):
+            for y in range(-10, 81, 18):
+                u, v = lens.pixel(x / 100, y / 100, z_m)
+                points.append(
+                    ControlPoint(x / 100, y / 100, z_m, u + draw.gauss(0, 0.3), v + draw.gauss(0, 0.3))
+                )
+    found = fit(points, true)
+    assert worst_error_m(true, found) < 0.01
+
+
+def test_a_byte_order_mark_before_the_columns_is_no_matter(tmp_path):
+    path = tmp_path / "points.csv"
+    path.write_bytes(b"\xef\xbb\xbfx_cm,y_cm,height_cm,u_px,v_px\n1,2,0,3,4\n")
+    assert len(read_points(path)) == 1

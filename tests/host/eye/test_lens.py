@@ -32,3 +32,10 @@ def test_the_pictures_right_is_x_and_its_top_is_y():
     assert lens.pixel(0.55, 0.35, 0.0) == (160.0, 120.0)
     assert lens.pixel(0.65, 0.35, 0.0)[0] > 160.0
     assert lens.pixel(0.55, 0.45, 0.0)[1] < 120.0
+
+
+def test_a_point_that_the_lens_would_draw_further_in_again_is_not_drawn():
+    lens = Lens(CameraParameters())
+    with pytest.raises(ValueError, match="beyond what the lens draws"):
+        lens.pixel(4.85, 0.35, 0.075)
+    assert lens.pixel(1.2, 0.8, 0.0)[0] < 320.0

@@ -237,3 +237,12 @@ def test_files_that_are_there_are_replaced_with_force_only(
     assert (code, "is there already" in err, points.read_text()) == (2, True, "before")
     assert mirotwin(*given, "--force")[0] == 0
     assert points.read_text().startswith(HEADER)
+
+
+def test_noise_that_is_no_number_is_refused(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    given = ("--scenario", short, "--noise-px", "nan", "--out", tmp_path / "camera.toml")
+    code, _, err = mirotwin("calibrate", *given)
+    assert code == 2
+    assert "nan is not a number" in err

@@ -200,3 +200,17 @@ def test_what_cannot_be_is_refused():
         one.robot(number // 5, number % 5, 0.1 * number, 0.0, 0.0)
     with pytest.raises(ValueError, match="room for 10 robots"):
         one.robot(0, 0, 0.0, 0.5, 0.0)
+
+
+def test_an_exposure_of_no_time_shows_the_lamps_as_they_are_then():
+    flickering = replace(QUIET, flicker=1.0)
+    short, none = (camera(replace(flickering, exposure_s=exposure_s)) for exposure_s in (1e-18, 0.0))
+    for tick in range(0, 800_800, 50_000):
+        short.begin(0, tick)
+        none.begin(0, tick)
+        assert short.window(100, 100, 8, 8) == none.window(100, 100, 8, 8)
+
+
+def test_a_camera_that_looks_near_to_the_horizon_is_refused():
+    with pytest.raises(ValueError, match="too near to the horizon"):
+        camera(lens=CameraParameters(focal_px=50.0, height_m=10.0, k1=0.0, tilt_x_rad=0.3))

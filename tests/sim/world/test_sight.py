@@ -5,11 +5,15 @@ from itertools import pairwise
 
 import pytest
 
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.grabber import Grabber
 from miro_host.eye.track import Sighting
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
+from miro_sim.scenario.build import calibration_for
+from miro_sim.scenario.camera_keys import CalibrationErrors, GeometricCamera
 from miro_sim.scenario.file import ScenarioError, parse
 from miro_sim.world.world import World
 
@@ -210,6 +214,12 @@ def test_looking_at_the_picture_changes_no_bit():
             'calibration = "1998"',
             "camera.calibration: '1998' is not one of the choices; use 1997, exact or none",
         ),
+        (
+            "lens = { height_m = 1.0, y_m = -0.1, focal_px = 50.0, k1 = 0.5, centre_v_px = 200.0, tilt_x_rad = 0.5 }",
+            "camera.lens: pixel (",
+        ),
+        ("lens = { k1 = -0.3, height_m = 0.5, focal_px = 400.0 }", "does not see the pitch's corner"),
+        ("picture.chroma_bandwidth_hz = 1e-160", "must be 0 (not limited) or >= 250000 in hertz"),
         ("window_px = 8", "camera.window_px: 8 is out of range; must be >= 16"),
         ('pattern = "dots"', "camera.pattern: 'dots' is not one of the choices; use diagonal or strip"),
     ],
@@ -241,3 +251,28 @@ def test_a_third_team_has_no_colour():
     text += 2 * ("[[network]]\n" + ROBOT.format(slot=0, x_cm=30, y_cm=20))
     with pytest.raises(ScenarioError, match=r"camera\.kind: 3 networks, but patches have the"):
         parse(text, "eyes.toml")
+
+
+def test_a_calibration_that_cannot_be_is_refused_with_the_key():
+    camera = GeometricCamera(lens=CameraParameters(focal_px=50.0, height_m=0.5, k1=0.0))
+    said = []
+    for seed in range(8):
+        try:
+            calibration_for(camera, 0, seed)
+        except BadInput as error:
+            said.append(str(error))
+    assert said
+    assert all("no calibration of this camera can be so wrong" in message for message in said)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_errors_under_which_the_pitch_cannot_be_seen_are_scaled_down_and_not_to_nothing(seed):
+    errors = CalibrationErrors(centre_px=20.0, focal_share=0.2, tilt_deg=10.0)
+    camera = GeometricCamera(lens=CameraParameters(focal_px=230.0, height_m=1.0), calibration_errors=errors)
+    assert calibration_for(camera, 0, seed)[1] == pytest.approx(0.0240, abs=1e-6)
+
+
+def test_a_small_error_alone_is_scaled_up_to_the_worst_case():
+    small = "calibration_errors = { centre_px = 0.2, focal_share = 0, tilt_deg = 0 }"
+    sight = world('kind = "geometric"\n' + small).networks[0].sight
+    assert sight.worst_m == pytest.approx(0.0240 + 0.0035, abs=1e-6)
