@@ -8,7 +8,7 @@ import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NoReturn
 
@@ -24,6 +24,14 @@ from mirotwin.recording import reader as recording_reader
 
 PARTS = ["run.part.mcap", "summary.part.json"]
 PROGRAM = "from mirotwin.cli import main; main()"
+
+
+@pytest.fixture(autouse=True)
+def _default_interrupt() -> Iterator[None]:
+    """A program that a shell put into the background ignores SIGINT, and so would the tests in this process."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def at_period(monkeypatch: pytest.MonkeyPatch, index: int, act: Callable[[], object]) -> None:
