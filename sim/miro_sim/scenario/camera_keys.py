@@ -22,7 +22,7 @@ from miro_sim.pitch.picture_settings import PictureSettings
 PitchCm = Annotated[float, Meta(ge=-1_000.0, le=1_000.0)]
 Frames = Annotated[int, Meta(ge=0, le=30)]
 Chance = Annotated[float, Meta(ge=0.0, le=1.0)]
-CalibrationKind = Literal["exact", "1997", 1997, "none"]
+CalibrationKind = Literal["exact", "1997", "none"] | Annotated[int, Meta(ge=1997, le=1997)]
 """1997 may be written as a number: `--set camera.calibration=1997` is one."""
 
 

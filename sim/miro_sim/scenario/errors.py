@@ -213,8 +213,11 @@ def _structs_at(raw: Any, path: str) -> list[msgspec.inspect.StructType]:
     found = _type_at(raw, path)
     if found is not None:
         found = _chosen(found, _value_at(raw, path))
-    options = found.types if isinstance(found, msgspec.inspect.UnionType) else (found,)
-    return [option for option in options if isinstance(option, msgspec.inspect.StructType)]
+    return [option for option in _options(found) if isinstance(option, msgspec.inspect.StructType)]
+
+
+def _options(found: msgspec.inspect.Type | None) -> tuple[msgspec.inspect.Type | None, ...]:
+    return found.types if isinstance(found, msgspec.inspect.UnionType) else (found,)
 
 
 def _keys_at(raw: Any, path: str) -> list[str]:
@@ -249,8 +252,8 @@ def _choices_at(raw: Any, path: str) -> str:
     found, table = _type_at(raw, path), _type_at(raw, above)
     if isinstance(table, msgspec.inspect.CustomType) and REGISTRIES[table.cls].key == key:
         choices = REGISTRIES[table.cls].names()
-    elif isinstance(found, msgspec.inspect.LiteralType):
-        choices = list(dict.fromkeys(str(value) for value in found.values))
+    elif literals := [one for one in _options(found) if isinstance(one, msgspec.inspect.LiteralType)]:
+        choices = [str(value) for literal in literals for value in literal.values]
     else:
         choices = [str(struct.tag) for struct in _structs_at(raw, above) if struct.tag_field == key]
     if not choices:
