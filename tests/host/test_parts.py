@@ -11,6 +11,7 @@ from miro_host.laws.registry import LAWS
 from miro_host.laws.yang_kim import Gains
 from miro_host.parts import PartError
 
+OWN = ["yang_kim", "body_frame", "kanayama", "dynamic_feedback"]
 GOOD = """
 from miro_host.laws.interface import Law, LawParameters, Velocities
 
@@ -45,7 +46,7 @@ def reason(name):
 
 def test_our_own_law_is_found_by_its_name():
     assert LAWS.find("yang_kim") is Gains
-    assert LAWS.names() == ["yang_kim"]
+    assert LAWS.names() == OWN
 
 
 def test_our_own_law_is_found_without_a_look_at_other_distributions(monkeypatch):
@@ -64,19 +65,20 @@ def test_naming_laws_imports_none_of_them():
 def test_a_law_of_another_distribution_is_found_by_its_entry_point(site):
     install(site, "steady-law", "1.2", {"steady": "plug_steady:Parameters"}, plug_steady=GOOD)
     assert LAWS.find("steady")(speed_m_s=0.5).law().parameters.speed_m_s == 0.5
-    assert LAWS.names() == ["yang_kim", "steady"]
+    assert LAWS.names() == [*OWN, "steady"]
 
 
 def test_our_own_name_is_not_taken_from_outside(site):
     install(site, "steady-law", "1.2", {"yang_kim": "plug_steady:Parameters"}, plug_steady=GOOD)
     assert LAWS.find("yang_kim") is Gains
-    assert LAWS.names() == ["yang_kim"]
+    assert LAWS.names() == OWN
 
 
 def test_an_unknown_name_gets_the_nearest_and_the_list(site):
     install(site, "steady-law", "1.2", {"steady": "plug_steady:Parameters"}, plug_steady=GOOD)
-    assert reason("stedy") == "'stedy' is not one of the choices; did you mean steady? use yang_kim or steady"
-    assert reason("pid") == "'pid' is not one of the choices; use yang_kim or steady"
+    choices = "use yang_kim, body_frame, kanayama, dynamic_feedback or steady"
+    assert reason("stedy") == f"'stedy' is not one of the choices; did you mean steady? {choices}"
+    assert reason("pid") == f"'pid' is not one of the choices; {choices}"
 
 
 @pytest.mark.parametrize(

@@ -119,7 +119,11 @@ def test_a_whole_number_is_a_number() -> None:
             'switching = "sing"',
             "switching: 'sing' is not one of the choices; use saturation or sign",
         ),
-        ('law = "yang_kim"', 'law = "pid"', "controller.law: 'pid' is not one of the choices; use yang_kim"),
+        (
+            'law = "yang_kim"',
+            'law = "pid"',
+            "controller.law: 'pid' is not one of the choices; use yang_kim, body_frame, kanayama or dynamic_feedback",
+        ),
         (
             'kind = "pixels"',
             "kind = true",

@@ -1,1 +1,1 @@
-"""Tracking laws: their names (`registry`), the interface (`interface`), and the paper's law (`yang_kim`)."""
+"""Tracking laws: their names (`registry`), the interface (`interface`), and the laws themselves, one in each module."""

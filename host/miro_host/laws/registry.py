@@ -22,6 +22,11 @@ LAWS: Registry[Controller] = Registry(
     word="law",
     key="law",
     base="miro_host.laws.interface:LawParameters",
-    own={"yang_kim": "miro_host.laws.yang_kim:Gains"},
+    own={
+        "yang_kim": "miro_host.laws.yang_kim:Gains",
+        "body_frame": "miro_host.laws.body_frame:BodyFrameParameters",
+        "kanayama": "miro_host.laws.kanayama:KanayamaParameters",
+        "dynamic_feedback": "miro_host.laws.dynamic_feedback:DynamicFeedbackParameters",
+    },
     default=DEFAULT_LAW,
 )
