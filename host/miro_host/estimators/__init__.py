@@ -1,1 +1,1 @@
-"""Posture estimators: names (`registry`), the interface, the paper's loop (`none`), and a predictor (`predict`)."""
+"""Posture estimators: names (`registry`), the interface, and ours: `none` (the paper's loop), `predict`, `ekf`."""

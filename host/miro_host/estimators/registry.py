@@ -24,6 +24,7 @@ ESTIMATORS: Registry[AnyEstimator] = Registry(
     base="miro_host.estimators.interface:EstimatorParameters",
     own={
         "none": "miro_host.estimators.none:NoEstimator",
+        "ekf": "miro_host.estimators.ekf:EkfParameters",
         "predict": "miro_host.estimators.predict:PredictParameters",
     },
     default=DEFAULT_ESTIMATOR,

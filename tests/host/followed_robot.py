@@ -1,0 +1,94 @@
+"""A robot with wheels of its own size, a camera one frame late, and a filter that follows it: a loop for `test_ekf`."""
+
+import math
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_host.estimators.ekf import EkfParameters
+from miro_host.estimators.interface import EstimatorInput
+from miro_host.eye.track import Sighting
+from miro_host.pilot import PERIOD_S
+from miro_host.posture import Posture
+from miro_host.wheels import Wheels
+
+TRACK_M = Wheels().track_m
+P = EkfParameters()
+DELAY_S = P.dead_s + P.lag_s
+
+
+def velocities(index):
+    """Commands with bends and steps: both wheels must be told apart."""
+    return 0.2 + 0.1 * math.sin(0.31 * index), 1.5 * math.sin(0.17 * index) + (
+        0.6 if index % 40 < 20 else -0.6
+    )
+
+
+class Robot:
+    """A robot with its own wheel radii that does what the filter supposes, in steps of 0.1 ms."""
+
+    def __init__(self, left_factor=1.0, right_factor=1.0):
+        self.factors = left_factor, right_factor
+        self.speeds = [0.0, 0.0]
+        self.posture = Posture(0.3, -0.2, 3.0)  # turns through pi soon
+        self.time_s = 0.0
+        self.sent = []
+
+    def send(self, v_m_s, w_rad_s):
+        half = 0.5 * TRACK_M * w_rad_s
+        self.sent.append((self.time_s + DELAY_S, (v_m_s - half, v_m_s + half)))
+
+    def run(self, to_s):
+        steps = round((to_s - self.time_s) / 1e-4)
+        dt = (to_s - self.time_s) / steps
+        x, y, theta = self.posture.x_m, self.posture.y_m, self.posture.theta_rad
+        for _ in range(steps):
+            self.time_s += dt
+            told = next((to for begin, to in reversed(self.sent) if begin < self.time_s), (0.0, 0.0))
+            middle = []
+            for index, to in enumerate(told):
+                change = max(-6.0 * dt, min(6.0 * dt, to - self.speeds[index]))
+                middle.append(self.factors[index] * (self.speeds[index] + 0.5 * change))
+                self.speeds[index] += change
+            turn = (middle[1] - middle[0]) / TRACK_M * dt
+            x += 0.5 * (middle[0] + middle[1]) * math.cos(theta + 0.5 * turn) * dt
+            y += 0.5 * (middle[0] + middle[1]) * math.sin(theta + 0.5 * turn) * dt
+            theta += turn
+        self.time_s = to_s
+        self.posture = Posture(x, y, theta)
+
+
+class Loop:
+    """Robot, a camera one frame late, and the filter. Each period calls `change(index, sighting)` on what is seen."""
+
+    def __init__(self, filter_, robot, change=lambda index, seen: seen):
+        self.filter, self.robot, self.change = filter_, robot, change
+        self.index = 0
+        self.seen = None
+        self.before = (0.0, 0.0)
+
+    def period(self):
+        """One period; what the filter says and where the robot really is at that time."""
+        now_s = self.index * PERIOD_S
+        given_ = EstimatorInput(now_s, PERIOD_S, self.change(self.index, self.seen), *self.before)
+        estimate = self.filter.step(given_)
+        truth = self.robot.posture
+        tick = self.index * CONTROL_PERIOD_TICKS
+        self.seen = Sighting(truth.x_m, truth.y_m, math.remainder(truth.theta_rad, math.tau), tick, 1.0)
+        self.before = velocities(self.index)
+        self.robot.send(*self.before)
+        self.index += 1
+        self.robot.run(self.index * PERIOD_S)
+        return estimate
+
+    def run(self, periods):
+        return [self.period() for _ in range(periods)]
+
+
+def truths(periods, left_factor=1.0, right_factor=1.0, after_s=DELAY_S):
+    """True postures `after_s` into each period, of a robot that is driven as in a `Loop`."""
+    robot, found = Robot(left_factor, right_factor), []
+    for index in range(periods):
+        robot.send(*velocities(index))
+        robot.run(index * PERIOD_S + after_s)
+        found.append(robot.posture)
+        robot.run((index + 1) * PERIOD_S)
+    return found
