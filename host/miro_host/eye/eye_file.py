@@ -5,7 +5,6 @@ What belongs here: from a path or a text to a frozen struct, and back. What does
 
 from __future__ import annotations
 
-import math
 import re
 import tomllib
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, not_finite, too_long, without_none
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -39,6 +39,7 @@ def text_of(path: str | Path) -> str:
 
 def parse(text: str, kind: type[T], origin: str) -> T:
     """The struct in TOML text. Raises EyeError with the key for unknown keys, wrong types and values out of range."""
+    _check_size(text, origin)
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -48,7 +49,10 @@ def parse(text: str, kind: type[T], origin: str) -> T:
 
 def of_table(table: dict[str, Any], kind: type[T], origin: str) -> T:
     """The struct in a table that TOML text gave. Raises EyeError as `parse` does."""
-    _check_finite(table, "", origin)
+    found = not_finite(table)
+    if found is not None:
+        what = f"{found[1]} is not a number that can be used"
+        raise EyeError(origin, found[0], what, "give a finite number")
     try:
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:
@@ -59,24 +63,16 @@ def text(struct: msgspec.Struct) -> str:
     """The struct as TOML text that `parse` reads back as the same struct. What is None is left out."""
     import tomli_w  # only who writes a file needs it
 
-    return tomli_w.dumps(_without_none(msgspec.to_builtins(struct)))
+    return tomli_w.dumps(without_none(msgspec.to_builtins(struct)))
 
 
-def _without_none(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_none(item) for key, item in value.items() if item is not None}
-    return value
-
-
-def _check_finite(value: Any, path: str, origin: str) -> None:
-    if isinstance(value, dict):
-        for key, item in value.items():
-            _check_finite(item, f"{path}.{key}" if path else key, origin)
-    elif isinstance(value, list):
-        for index, item in enumerate(value):
-            _check_finite(item, f"{path}[{index}]", origin)
-    elif isinstance(value, float) and not math.isfinite(value):
-        raise EyeError(origin, path, f"{value} is not a number that can be used", "give a finite number")
+def _check_size(text: str, origin: str) -> None:
+    """Refuses what would take `tomllib` minutes."""
+    if too_long(text):
+        raise EyeError(origin, "", f"holds more than {TEXT_KIB} KiB", "is this the right file?")
+    line = long_key_line(text)
+    if line is not None:
+        raise EyeError(origin, f"line {line}", f"a key of more than {KEY_PARTS} parts", "remove it")
 
 
 def _explained(message: str, kind: type[msgspec.Struct], origin: str) -> EyeError:

@@ -5,7 +5,6 @@ What belongs here: TOML text to `Scenario`, and the built-in scenarios. What doe
 functions, whatever the text.
 """
 
-import math
 import tomllib
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -14,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from miro_protocol.toml_text import TEXT_KIB
+from miro_protocol.toml_text import TEXT_KIB, not_finite, without_none
 from miro_sim.inputs import InputError, read_input
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
@@ -100,14 +99,7 @@ def parse(text: str, origin: str, settings: Sequence[str] = ()) -> Scenario:
 
 def changed(scenario: Scenario, origin: str, settings: Sequence[str]) -> Scenario:
     """A scenario that stands in no file, with these settings. Raises ScenarioError."""
-    return _checked(_without_none(msgspec.to_builtins(scenario)), origin, settings) if settings else scenario
-
-
-def _without_none(value: Any) -> Any:
-    """Tables as a file has them: a key that is None is left out."""
-    if isinstance(value, dict):
-        return {key: _without_none(item) for key, item in value.items() if item is not None}
-    return [_without_none(item) for item in value] if isinstance(value, list | tuple) else value
+    return _checked(without_none(msgspec.to_builtins(scenario)), origin, settings) if settings else scenario
 
 
 def _parsed(text: str, origin: str, settings: Sequence[str]) -> tuple[dict[str, Any], Scenario]:
@@ -145,7 +137,7 @@ def _checked(raw: dict[str, Any], origin: str, settings: Sequence[str]) -> Scena
     """The scenario of these tables; makes the settings in them."""
     made = make(raw, settings, origin)
     try:
-        _check_finite(raw, "", origin)
+        _check_finite(raw, origin)
         complete = _with_profiles(raw, origin)
         try:
             scenario = msgspec.convert(complete, Scenario, dec_hook=part_of)
@@ -182,13 +174,9 @@ def _syntax_error(origin: str, text: str, message: str) -> ScenarioError:
     return ScenarioError(origin, place, f"not TOML: {what}")
 
 
-def _check_finite(value: Any, path: str, origin: str) -> None:
+def _check_finite(raw: dict[str, Any], origin: str) -> None:
     """Refuses NaN and infinities, which TOML has and no key takes."""
-    if isinstance(value, dict):
-        for key, item in value.items():
-            _check_finite(item, f"{path}.{key}" if path else key, origin)
-    elif isinstance(value, list):
-        for index, item in enumerate(value):
-            _check_finite(item, f"{path}[{index}]", origin)
-    elif isinstance(value, float) and not math.isfinite(value):
-        raise ScenarioError(origin, path, f"{value} is not a number that can be used", "give a finite number")
+    found = not_finite(raw)
+    if found is not None:
+        what = f"{found[1]} is not a number that can be used"
+        raise ScenarioError(origin, found[0], what, "give a finite number")

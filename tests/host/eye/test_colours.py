@@ -76,3 +76,17 @@ def test_a_file_with_overlapping_colours_is_refused_by_name():
     """
     with pytest.raises(EyeError, match=r"c\.toml: colours\.lime: cannot be told from yellow"):
         eye_file.parse(text, ColourClasses, "c.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a" + ".a" * 16 + " = 1\n", "colours.toml: line 1: a key of more than 16 parts; remove it"),
+        ("# " + "x" * (513 << 10), "colours.toml: holds more than 512 KiB"),
+        ("[colours.yellow]\ny = nan\n", "colours.yellow.y: nan is not a number that can be used"),
+    ],
+)
+def test_a_text_that_would_take_minutes_or_holds_no_number_is_refused_at_once(text, said):
+    with pytest.raises(EyeError) as caught:
+        eye_file.parse(text, ColourClasses, "colours.toml")
+    assert said in str(caught.value)
