@@ -32,7 +32,7 @@ from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.pitch.picture_settings import PictureSettings
 from miro_sim.pitch.static_field import StaticField
 from miro_sim.scenario.build import calibration_for
-from miro_sim.scenario.camera_keys import CalibrationErrors, PixelCamera
+from miro_sim.scenario.camera_keys import CalibrationErrorSizes, PixelCamera
 
 QUIET = PictureSettings(
     light_falloff=0.0, flicker=0.0, chroma_bandwidth_hz=0.0, luma_noise=0.0, chroma_noise=0.0
@@ -60,7 +60,7 @@ def _picture(base: PictureSettings = FULL, **changed: Any) -> PixelCamera:
 
 def cases() -> dict[str, Case]:
     """All cases by name."""
-    wrong = CalibrationErrors()
+    wrong = CalibrationErrorSizes()
     found = {
         "pixels alone": Case(_picture(QUIET)),
         "binary": Case(EXACT),

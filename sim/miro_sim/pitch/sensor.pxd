@@ -30,7 +30,7 @@ cdef class Sensor:
     @cython.locals(total='long long', step=int, low=int, high=int)
     cdef int _limited(self, int* values, int column) noexcept
     cdef int _byte(self, int value) noexcept
-    @cython.locals(block='long long', part=int, word='unsigned long long', by='long long', first=int, last=int)
+    @cython.locals(first='long long', word='unsigned long long', by='long long', begin=int, last=int)
     cdef void _shake(self, int row, int left, int width) noexcept
     @cython.locals(column=int, after=int, before=int)
     cdef void _move(self, int* values, int first, int last, long long by) noexcept

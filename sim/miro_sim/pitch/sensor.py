@@ -185,22 +185,14 @@ class Sensor:
 
     def _shake(self, row: int, left: int, width: int) -> None:
         """Moves the line by its jitter, up to a pixel either way, between neighbouring pixels linearly."""
-        block = self.frame * _FRAME_BLOCKS + 240 * _LINE_BLOCKS + row // 4
-        self.stream.load(block)
-        part = row % 4
-        word = self.stream.w0
-        if part == 1:
-            word = self.stream.w1
-        elif part == 2:
-            word = self.stream.w2
-        elif part == 3:
-            word = self.stream.w3
+        first = self.frame * _FRAME_BLOCKS + 240 * _LINE_BLOCKS  # behind the blocks of the picture's pixels
+        word = self.stream.u32(4 * first + row)
         by = ((word >> 16) * (2 * self.jitter + 1) >> 16) - self.jitter
-        first = left - self.reach if left > self.reach else 0
+        begin = left - self.reach if left > self.reach else 0
         last = min(left + width + self.reach, _WIDTH) - 1
-        self._move(self.y, first, last, by)
-        self._move(self.cb, first, last, by)
-        self._move(self.cr, first, last, by)
+        self._move(self.y, begin, last, by)
+        self._move(self.cb, begin, last, by)
+        self._move(self.cr, begin, last, by)
 
     def _move(self, values: list[int], first: int, last: int, by: int) -> None:
         """Each value becomes that `by`/256 pixels to its right; beyond the picture it is as at its border."""

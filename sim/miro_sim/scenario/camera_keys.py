@@ -42,8 +42,8 @@ class GaussianCamera(
     delay_frames: Frames = 1
 
 
-class CalibrationErrors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How the calibration is wrong, each error by itself; only `calibration = "1997"` draws signs and directions.
+class CalibrationErrorSizes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How large the errors of a calibration are, each by itself; `calibration = "1997"` draws signs and directions.
 
     `worst_cm`: the drawn errors are scaled together to this worst case over the pitch; 0 leaves them as they are.
     `ignore_height` takes the patches to lie on the floor, `ignore_distortion` the lens to be straight.
@@ -67,7 +67,7 @@ class SeeingCamera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     lens: CameraParameters = CameraParameters()
     pattern: PatternName = "diagonal"
     calibration: CalibrationKind = "1997"
-    calibration_errors: CalibrationErrors = CalibrationErrors()
+    calibration_errors: CalibrationErrorSizes = CalibrationErrorSizes()
     delay_frames: Frames = 1
     dropped_frames: Chance = 0.0
     repeated_frames: Chance = 0.0

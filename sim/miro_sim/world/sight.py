@@ -94,8 +94,8 @@ class GaussianSight:
         return {}
 
 
-class Whole:
-    """What befalls whole frames and whole robots on the way to the PC, by chance; base of what sees.
+class SeeingSight:
+    """A camera with a lens: what befalls whole frames and whole robots on the way to the PC, by chance.
 
     Counts for the summary: `lost` robots in frames, `dropped` and `repeated` frames, `wrong` measurements (further off
     than three times the worst case of the calibration) and `swapped` ones (nearer to another robot of the team).
@@ -162,7 +162,7 @@ class Whole:
                 self.swapped += 1
 
 
-class GeometricSight(Whole):
+class GeometricSight(SeeingSight):
     """The true patches, drawn by the lens, read through the calibration."""
 
     NOT_STATE = ("field",)
@@ -184,7 +184,7 @@ class GeometricSight(Whole):
         return Sighting(read.x_m, read.y_m, read.theta_rad, tick, 1.0)
 
 
-class PixelSight(Whole):
+class PixelSight(SeeingSight):
     """The picture of all robots, and the tracker of this host's. `everyone`: bodies of all networks.
 
     `watch`, if there is one, is called with frame number and tick after each exposure; it may read the picture and what

@@ -13,7 +13,7 @@ from miro_host.eye.track import Sighting
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.build import calibration_for
-from miro_sim.scenario.camera_keys import CalibrationErrors, GeometricCamera
+from miro_sim.scenario.camera_keys import CalibrationErrorSizes, GeometricCamera
 from miro_sim.scenario.file import ScenarioError, parse
 from miro_sim.world.world import World
 
@@ -267,7 +267,7 @@ def test_a_calibration_that_cannot_be_is_refused_with_the_key():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_errors_under_which_the_pitch_cannot_be_seen_are_scaled_down_and_not_to_nothing(seed):
-    errors = CalibrationErrors(centre_px=20.0, focal_share=0.2, tilt_deg=10.0)
+    errors = CalibrationErrorSizes(centre_px=20.0, focal_share=0.2, tilt_deg=10.0)
     camera = GeometricCamera(lens=CameraParameters(focal_px=230.0, height_m=1.0), calibration_errors=errors)
     assert calibration_for(camera, 0, seed)[1] == pytest.approx(0.0240, abs=1e-6)
 
