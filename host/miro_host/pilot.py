@@ -31,9 +31,10 @@ PERIOD_S = 1001.0 / 30000.0  # one NTSC frame, 800 800 ticks
 
 
 class Command(msgspec.Struct, frozen=True):
-    """What goes to the wheels, and how it came about: z_cmd in m/s and rad/s, the law's inner values by name.
+    """What goes to the wheels, and how it came about: z_cmd in m/s and rad/s, the values that law and estimator name.
 
-    `left`, `right` in 1/256 count per LM629 sample.
+    `left`, `right` in 1/256 count per LM629 sample, for wheels whose radii are the nominal one times `left_factor` and
+    `right_factor`.
     """
 
     left: int
@@ -41,10 +42,15 @@ class Command(msgspec.Struct, frozen=True):
     v_m_s: float
     w_rad_s: float
     inner: Mapping[str, float] = NOTHING
+    left_factor: float = 1.0
+    right_factor: float = 1.0
+    estimate: Mapping[str, float] = NOTHING
 
 
 _LARGEST = sys.float_info.max
 _FASTEST = 0x8000  # what a frame holds
+LARGEST_FACTOR = 2.0
+"""A wheel's radius over the nominal one stays between this and its inverse."""
 STANDSTILL = Command(0, 0, 0.0, 0.0)
 
 
@@ -81,7 +87,10 @@ class Pilot:
         self.wheels = Wheels() if wheels is None else wheels
         self.reference_lead_s = reference_lead_s
         self.integrator = Integrator(law.parameters, period_s)
-        self.command = Command(0, 0, 0.0, 0.0, dict.fromkeys(law.INNER, 0.0))
+        self.command = Command(
+            *(0, 0, 0.0, 0.0, dict.fromkeys(law.INNER, 0.0)),
+            estimate=dict.fromkeys(self.estimator.INNER, 0.0),
+        )
 
     def __repr__(self) -> str:
         return f"Pilot({self.reference!r}, {self.law!r}, command={self.command!r})"
@@ -91,8 +100,9 @@ class Pilot:
 
         Raises PartError, and leaves integrator and command alone, when the law fails or answers what is no number.
         """
-        z = self.integrator
-        estimate = self._estimate(EstimatorInput(t_s, z.period_s, measured, z.v_m_s, z.w_rad_s, heard))
+        z, units = self.integrator, self.wheels.units_per_m_s
+        sent = self.command.left / units, self.command.right / units
+        estimate = self._estimate(EstimatorInput(t_s, z.period_s, measured, z.v_m_s, z.w_rad_s, *sent, heard))
         if estimate is None:
             return self.command
         at_s = estimate.t_s + self.reference_lead_s
@@ -114,8 +124,10 @@ class Pilot:
             z.step(answer.v_dot_m_s2, answer.w_dot_rad_s2)  # equation (15)
         else:
             z.go_to(answer.v_m_s, answer.w_rad_s)
-        left, right = self.wheels.command(z.v_m_s, z.w_rad_s)
-        self.command = Command(left, right, z.v_m_s, z.w_rad_s, inner)
+        factors = estimate.left_factor, estimate.right_factor
+        left, right = self.wheels.command(z.v_m_s, z.w_rad_s, *factors)
+        named = {name: estimate.inner[name] for name in self.estimator.INNER}
+        self.command = Command(left, right, z.v_m_s, z.w_rad_s, inner, *factors, named)
         return self.command
 
     def _estimate(self, given: EstimatorInput) -> Estimate | None:
@@ -123,7 +135,7 @@ class Pilot:
         try:
             estimate = self.estimator.step(given)
             if estimate is not None:
-                check_estimate(estimate)
+                check_estimate(estimate, self.estimator.INNER)
             self.estimator.check_memory()
         except PartError:  # of the reference, which the part may have asked
             raise
@@ -145,18 +157,25 @@ class Pilot:
 
     @property
     def numbers(self) -> list[float]:
-        """The command: both wheels, both velocities, and the law's inner values in the order of `INNER`."""
+        """The command: wheels, velocities, wheel factors, and the named values in the order of both `INNER`."""
         command = self.command
+        wheels = float(command.left), float(command.right), command.left_factor, command.right_factor
         inner = [command.inner[name] for name in self.law.INNER]
-        return [float(command.left), float(command.right), command.v_m_s, command.w_rad_s, *inner]
+        named = [command.estimate[name] for name in self.estimator.INNER]
+        return [*wheels, command.v_m_s, command.w_rad_s, *inner, *named]
 
     @numbers.setter
     def numbers(self, numbers: list[float]) -> None:
-        left, right, v_m_s, w_rad_s, *inner = numbers
+        left, right, left_factor, right_factor, v_m_s, w_rad_s, *inner = numbers
         if not all(abs(wheel) <= _FASTEST and wheel == int(wheel) for wheel in (left, right)):
             raise ValueError(f"no frame carries the command ({left}, {right})")
-        values = dict(zip(self.law.INNER, inner, strict=True))
-        self.command = Command(int(left), int(right), v_m_s, w_rad_s, values)
+        _check_factors(left_factor, right_factor)
+        count = len(self.law.INNER)
+        values = dict(zip(self.law.INNER, inner[:count], strict=True))
+        named = dict(zip(self.estimator.INNER, inner[count:], strict=True))
+        self.command = Command(
+            int(left), int(right), v_m_s, w_rad_s, values, left_factor, right_factor, named
+        )
 
 
 def _failure(word: str, part: Law[Any] | Estimator[Any], error: Exception) -> PartError:
@@ -178,14 +197,11 @@ def check_answer(answer: object, inner: tuple[str, ...]) -> None:
         _check("w_rad_s", answer.w_rad_s)
     else:
         raise ValueError(f"`step` returned {str(answer)[:40]!r}, neither Accelerations nor Velocities")
-    if tuple(answer.inner) != inner and sorted(answer.inner) != sorted(inner):
-        raise ValueError(f"its inner values are {sorted(answer.inner)}, but INNER declares {sorted(inner)}")
-    for name, value in answer.inner.items():
-        _check(name, value)
+    _check_inner(answer.inner, inner)
 
 
-def check_estimate(estimate: object) -> None:
-    """Raises ValueError for an estimate that is none, and for NaN and infinity."""
+def check_estimate(estimate: object, inner: tuple[str, ...]) -> None:
+    """Raises ValueError for an estimate that is none, one without the named values, NaN, infinity and odd wheels."""
     if not isinstance(estimate, Estimate) or not isinstance(estimate.posture, Posture):
         raise ValueError(f"`step` returned {str(estimate)[:40]!r}, which is no Estimate of a Posture")
     posture = estimate.posture
@@ -193,6 +209,22 @@ def check_estimate(estimate: object) -> None:
     _check("x_m", posture.x_m)
     _check("y_m", posture.y_m)
     _check("theta_rad", posture.theta_rad)
+    _check("left_factor", estimate.left_factor)
+    _check("right_factor", estimate.right_factor)
+    _check_factors(estimate.left_factor, estimate.right_factor)
+    _check_inner(estimate.inner, inner)
+
+
+def _check_factors(left: float, right: float) -> None:
+    if not all(1.0 / LARGEST_FACTOR <= factor <= LARGEST_FACTOR for factor in (left, right)):
+        raise ValueError(f"the wheel factors ({left}, {right}) are those of no robot")
+
+
+def _check_inner(values: Mapping[str, float], declared: tuple[str, ...]) -> None:
+    if tuple(values) != declared and sorted(values) != sorted(declared):
+        raise ValueError(f"its inner values are {sorted(values)}, but INNER declares {sorted(declared)}")
+    for name, value in values.items():
+        _check(name, value)
 
 
 def _check(name: str, value: object) -> None:

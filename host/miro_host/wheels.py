@@ -69,7 +69,13 @@ class Wheels(msgspec.Struct, frozen=True):
         """A rim speed in 1/256 count per sample, rounded half away from zero."""
         return nearest(speed_m_s * self.units_per_m_s)
 
-    def command(self, v_m_s: float, w_rad_s: float) -> tuple[int, int]:
-        """(left, right) for the team frame: split, limited, quantised."""
-        left, right = self.limit(*self.split(v_m_s, w_rad_s))
+    def command(
+        self, v_m_s: float, w_rad_s: float, left_factor: float = 1.0, right_factor: float = 1.0
+    ) -> tuple[int, int]:
+        """(left, right) for the team frame: split, corrected, limited, quantised.
+
+        A wheel whose radius is the nominal one times a factor has to turn slower by that factor.
+        """
+        left, right = self.split(v_m_s, w_rad_s)
+        left, right = self.limit(left / left_factor, right / right_factor)
         return self.counts(left), self.counts(right)

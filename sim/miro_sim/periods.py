@@ -39,7 +39,8 @@ class Control(msgspec.Struct, frozen=True):
     """What the controller made of one measurement: z_cmd after its limits, the wheel split, and the law's inner values.
 
     `left`, `right` in 1/256 count per LM629 sample, before the control noise of the scenario; `inner` by name, as the
-    law declares them (`u1` in m/s^2, `u2` in rad/s^2, `s1` in m/s, `s2` in rad/s of equations (13), (16)).
+    law declares them (`u1` in m/s^2, `u2` in rad/s^2, `s1` in m/s, `s2` in rad/s of equations (13), (16)); `estimate`
+    likewise by the estimator.
     """
 
     v_m_s: float
@@ -47,6 +48,7 @@ class Control(msgspec.Struct, frozen=True):
     left: int
     right: int
     inner: dict[str, float]
+    estimate: dict[str, float] = {}
 
 
 class RobotPeriod(msgspec.Struct, frozen=True):

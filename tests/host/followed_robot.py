@@ -22,6 +22,12 @@ def velocities(index):
     )
 
 
+def rims(v_m_s, w_rad_s):
+    """Speeds of the rims of wheels with the nominal radius."""
+    half = 0.5 * TRACK_M * w_rad_s
+    return v_m_s - half, v_m_s + half
+
+
 class Robot:
     """A robot with its own wheel radii that does what the filter supposes, in steps of 0.1 ms."""
 
@@ -33,8 +39,7 @@ class Robot:
         self.sent = []
 
     def send(self, v_m_s, w_rad_s):
-        half = 0.5 * TRACK_M * w_rad_s
-        self.sent.append((self.time_s + DELAY_S, (v_m_s - half, v_m_s + half)))
+        self.sent.append((self.time_s + DELAY_S, rims(v_m_s, w_rad_s)))
 
     def run(self, to_s):
         steps = round((to_s - self.time_s) / 1e-4)
@@ -68,7 +73,8 @@ class Loop:
     def period(self):
         """One period; what the filter says and where the robot really is at that time."""
         now_s = self.index * PERIOD_S
-        given_ = EstimatorInput(now_s, PERIOD_S, self.change(self.index, self.seen), *self.before)
+        seen = self.change(self.index, self.seen)
+        given_ = EstimatorInput(now_s, PERIOD_S, seen, *self.before, *rims(*self.before))
         estimate = self.filter.step(given_)
         truth = self.robot.posture
         tick = self.index * CONTROL_PERIOD_TICKS

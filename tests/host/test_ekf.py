@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.host.followed_robot import DELAY_S, TRACK_M, Loop, P, Robot, truths, velocities
+from tests.host.followed_robot import DELAY_S, TRACK_M, Loop, P, Robot, rims, truths, velocities
 from tests.naive import kalman
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
@@ -146,7 +146,9 @@ def test_the_covariance_stays_symmetric_and_positive(noises, parameters):
         if noise is not None:
             tick = (index - 1) * CONTROL_PERIOD_TICKS
             seen = Sighting(noise[0] * 0.02, noise[1] * 0.02, 0.1 * noise[2], tick, noise[3])
-        one.step(EstimatorInput(index * PERIOD_S, PERIOD_S, seen, *velocities(index)))
+        one.step(
+            EstimatorInput(index * PERIOD_S, PERIOD_S, seen, *velocities(index), *rims(*velocities(index)))
+        )
         covariance = matrix(one)
         assert (covariance == covariance.T).all()
         assert not one.known or np.linalg.eigvalsh(covariance).min() > 0.0
@@ -172,7 +174,7 @@ def test_one_cycle_agrees_with_the_textbook(left, right, theta, aside):
 
     end_s = 0.8 * PERIOD_S
     one.at_s = 1.0 + DELAY_S - PERIOD_S
-    given_ = EstimatorInput(1.0, PERIOD_S, None, 0.0, 0.0)
+    given_ = EstimatorInput(1.0, PERIOD_S, None, 0.0, 0.0, 0.0, 0.0)
 
     def drive(state):
         return kalman.moved(state, left, right, P.slope_m_s2, 0.0, end_s, TRACK_M, steps=300)

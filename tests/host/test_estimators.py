@@ -12,11 +12,13 @@ from miro_host.estimators.interface import Estimate, Estimator, EstimatorInput, 
 from miro_host.estimators.none import NoEstimator
 from miro_host.estimators.predict import PredictParameters, moved
 from miro_host.estimators.registry import ESTIMATORS
+from miro_host.laws.kanayama import KanayamaParameters
 from miro_host.laws.yang_kim import Gains
 from miro_host.parts import PartError
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
 from miro_host.reference import Line
+from miro_host.wheels import Wheels
 
 HERE = Posture(0.07, 0.02, -0.38)
 COMMANDS = st.lists(st.tuples(st.floats(-0.9, 0.9), st.floats(-4.0, 4.0)), min_size=20, max_size=20)
@@ -44,8 +46,8 @@ def test_our_own_estimators_have_names():
 
 def test_without_an_estimator_a_measurement_is_the_posture_at_its_arrival():
     one = NoEstimator().estimator()
-    assert one.step(EstimatorInput(0.5, PERIOD_S, HERE, 0.2, 0.0)) == Estimate(0.5, HERE)
-    assert one.step(EstimatorInput(0.5, PERIOD_S, None, 0.2, 0.0)) is None
+    assert one.step(EstimatorInput(0.5, PERIOD_S, HERE, 0.2, 0.0, 0.2, 0.2)) == Estimate(0.5, HERE)
+    assert one.step(EstimatorInput(0.5, PERIOD_S, None, 0.2, 0.0, 0.2, 0.2)) is None
 
 
 def truth_at(time_s, commands, ahead_s):
@@ -65,7 +67,7 @@ def test_a_robot_that_follows_at_once_is_where_it_was_predicted(commands, age_s,
     for index, command in enumerate(commands):
         now_s = index * PERIOD_S
         seen = truth_at(now_s - age_s, commands, ahead_s) if index % 3 else None
-        estimate = one.step(EstimatorInput(now_s, PERIOD_S, seen, *before))
+        estimate = one.step(EstimatorInput(now_s, PERIOD_S, seen, *before, 0.0, 0.0))
         before = command
         if seen is None:
             assert estimate is None
@@ -126,3 +128,50 @@ def test_an_estimator_that_fails_is_named(answer, reason):
 def test_a_delay_out_of_range_is_refused(name):
     with pytest.raises(ValueError, match=f"{name}: 0.3 is out of range"):
         PredictParameters(**{name: 0.3})
+
+
+class KnowingParameters(EstimatorParameters, frozen=True, kw_only=True, tag="knowing"):
+    left: float = 1.25
+    right: float = 0.8
+    named: str = "a"
+
+    def estimator(self):
+        return Knowing(self)
+
+
+class Knowing(Estimator[KnowingParameters]):
+    INNER = ("a",)
+
+    def step(self, given):
+        p = self.parameters
+        return Estimate(given.t_s, HERE, p.left, p.right, {p.named: 0.5})
+
+
+def steered(**parameters):
+    """A pilot whose estimator knows the wheels, after one period, and its command."""
+    one = Pilot(Line(), KanayamaParameters().law(), estimator=KnowingParameters(**parameters).estimator())
+    return one, one.update(HERE, 1.0)
+
+
+def test_the_command_is_divided_by_the_factors_that_an_estimator_knows():
+    _, corrected = steered()
+    _, plain = steered(left=1.0, right=1.0)
+    assert (corrected.v_m_s, corrected.w_rad_s) == (plain.v_m_s, plain.w_rad_s)
+    left_m_s, right_m_s = Wheels().split(plain.v_m_s, plain.w_rad_s)
+    assert corrected.left == Wheels().counts(left_m_s / 1.25)
+    assert corrected.right == Wheels().counts(right_m_s / 0.8)
+    assert corrected.left != plain.left
+
+
+def test_values_that_an_estimator_names_go_with_the_command_and_are_saved():
+    one, command = steered()
+    assert command.estimate == {"a": 0.5}
+    other, _ = steered(named="a", left=1.0)
+    restore(other, snapshot(one))
+    assert other.command == command
+
+
+@pytest.mark.parametrize("wrong", [{"left": 0.0}, {"right": 2.5}, {"left": math.nan}, {"named": "b"}])
+def test_an_estimator_with_odd_wheels_or_other_names_is_named(wrong):
+    with pytest.raises(PartError, match="estimator 'knowing' failed: "):
+        steered(**wrong)

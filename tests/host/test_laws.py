@@ -127,21 +127,23 @@ def test_a_law_that_fails_is_named_and_leaves_the_command_as_it_was(how, reason)
 @pytest.mark.parametrize(
     ("command", "reason"),
     [
-        ([0x8001, 0, 0.1, 0.0, 0.0], "no frame carries"),
-        ([0, -0x8001, 0.1, 0.0, 0.0], "no frame carries"),
-        ([0.5, 0, 0.1, 0.0, 0.0], "no frame carries"),
-        ([0, 0, math.inf, 0.0, 0.0], "numbers is inf"),
-        ([0, 0, 0.1, 0.0, math.nan], "numbers is NaN"),
-        ([0, 0, 0.1, 0.0], "shorter"),
-        ([0, 0, 0.1, 0.0, 0.0, 0.0], "longer"),
-        ([0, 0, 0.1], "not enough values"),
+        ([0x8001, 0, 1.0, 1.0, 0.1, 0.0, 0.0], "no frame carries"),
+        ([0, -0x8001, 1.0, 1.0, 0.1, 0.0, 0.0], "no frame carries"),
+        ([0.5, 0, 1.0, 1.0, 0.1, 0.0, 0.0], "no frame carries"),
+        ([0, 0, 0.4, 1.0, 0.1, 0.0, 0.0], "are those of no robot"),
+        ([0, 0, 1.0, -1.0, 0.1, 0.0, 0.0], "are those of no robot"),
+        ([0, 0, 1.0, 1.0, math.inf, 0.0, 0.0], "numbers is inf"),
+        ([0, 0, 1.0, 1.0, 0.1, 0.0, math.nan], "numbers is NaN"),
+        ([0, 0, 1.0, 1.0, 0.1, 0.0], "shorter"),
+        ([0, 0, 1.0, 1.0, 0.1, 0.0, 0.0, 0.0], "longer"),
+        ([0, 0, 1.0, 1.0, 0.1], "not enough values"),
         ([], "not enough values"),
     ],
 )
 def test_a_saved_command_that_no_pilot_gave_is_refused(command, reason):
     one = pilot(Leaky(LeakyParameters()))
     before = snapshot(one)
-    numbers = struct.pack("<I5d", 5, *one.numbers)
+    numbers = struct.pack("<I7d", 7, *one.numbers)
     assert before.endswith(numbers)
     with pytest.raises(ValueError, match=reason):
         restore(one, before[: -len(numbers)] + struct.pack(f"<I{len(command)}d", len(command), *command))

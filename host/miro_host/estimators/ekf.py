@@ -55,7 +55,7 @@ KEPT = 16
 REFUSED = 5
 """So many measurements in a row are far from the prediction before the filter gives its posture up."""
 LEAST_CONFIDENCE = 0.1
-LARGEST_FACTOR = 2.0
+LARGEST_FACTOR = 1.5
 """A factor stays between this and its inverse."""
 WHEELS = Wheels()
 
@@ -132,6 +132,7 @@ class Ekf(Estimator[EkfParameters]):
         "right_start_m_s": f"{KEPT}d",
         "right_to_m_s": f"{KEPT}d",
     }
+    INNER = ("x_m", "y_m", "theta_rad", "left_factor", "right_factor")
 
     def __init__(self, parameters: EkfParameters) -> None:
         super().__init__(parameters)
@@ -185,11 +186,14 @@ class Ekf(Estimator[EkfParameters]):
             self._predict(oldest_s, given)
         way = self._way(self.at_s, given.t_s + delay_s, given)
         state, _ = driven(self.state, way, WHEELS.track_m)
-        return Estimate(given.t_s + delay_s, Posture(state[X], state[Y], state[THETA]))
+        named = dict(zip(self.INNER, state, strict=True))
+        return Estimate(
+            given.t_s + delay_s, Posture(state[X], state[Y], state[THETA]), state[LEFT], state[RIGHT], named
+        )
 
     def _remember(self, given: EstimatorInput) -> None:
         """The command of one period ago, which takes effect when the one before it has been held for a period."""
-        left, right = WHEELS.limit(*WHEELS.split(given.v_m_s, given.w_rad_s))
+        left, right = given.left_m_s, given.right_m_s
         slope = self.parameters.slope_m_s2
         left_start = _held_to_the_end(self.left_start_m_s[0], self.left_to_m_s[0], slope, given.period_s)
         right_start = _held_to_the_end(self.right_start_m_s[0], self.right_to_m_s[0], slope, given.period_s)

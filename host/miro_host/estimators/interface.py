@@ -7,7 +7,8 @@ method makes it, and a class with `step`. It is called in every control period, 
 can count periods. It sees what the PC could have seen: no true posture.
 """
 
-from typing import Any, Generic, TypeVar
+from collections.abc import Mapping
+from typing import Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
@@ -16,12 +17,15 @@ from miro_host.estimators.registry import AnyEstimator
 from miro_host.memory import Remembering
 from miro_host.posture import Posture
 
+NOTHING: Mapping[str, float] = {}
+
 
 class EstimatorInput(msgspec.Struct, frozen=True):
     """What an estimator is given at `t_s` after the start of the reference.
 
     `measured` is what the camera's tracker hands over now, None in a frame in which the robot was not found. `v_m_s`,
-    `w_rad_s` are the velocities that were commanded one period ago. `heard` is the robot's last answer by radio.
+    `w_rad_s` are the velocities that were commanded one period ago, `left_m_s`, `right_m_s` the speeds of the rims that
+    were sent for them, for wheels of the nominal radius. `heard` is the robot's last answer by radio.
     """
 
     t_s: float
@@ -29,14 +33,23 @@ class EstimatorInput(msgspec.Struct, frozen=True):
     measured: Posture | None
     v_m_s: float
     w_rad_s: float
+    left_m_s: float
+    right_m_s: float
     heard: Heard | None = None
 
 
 class Estimate(msgspec.Struct, frozen=True):
-    """A posture and the time it is to be compared with the reference at."""
+    """A posture and the time it is to be compared with the reference at.
+
+    `left_factor`, `right_factor` are the radii of the wheels over the nominal one: the command is divided by them.
+    `inner` holds the values that the estimator names; they are recorded, and used by nobody.
+    """
 
     t_s: float
     posture: Posture
+    left_factor: float = 1.0
+    right_factor: float = 1.0
+    inner: Mapping[str, float] = NOTHING
 
 
 class EstimatorParameters(
@@ -58,7 +71,9 @@ P = TypeVar("P", bound=EstimatorParameters, covariant=True)
 
 
 class Estimator(Remembering, Generic[P]):
-    """Base of every estimator; its memory is declared as a law's is."""
+    """Base of every estimator; its memory and the values that it names are declared as a law's are."""
+
+    INNER: ClassVar[tuple[str, ...]] = ()
 
     parameters: P
 

@@ -37,7 +37,7 @@ class NoisyCommands:
             return command.left, command.right
         v_m_s = command.v_m_s + self._draw(2 * period, self.bounds.v_m_s)
         w_rad_s = command.w_rad_s + self._draw(2 * period + 1, self.bounds.w_rad_s)
-        return self.wheels.command(v_m_s, w_rad_s)
+        return self.wheels.command(v_m_s, w_rad_s, command.left_factor, command.right_factor)
 
     def _draw(self, index: int, bound: float) -> float:
         return bound * (2.0 * self.stream.uniform(index) - 1.0)

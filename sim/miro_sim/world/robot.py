@@ -155,7 +155,8 @@ def _iram_address(image: Image, name: str) -> int | None:
 def _control(command: Command | None) -> Control | None:
     if command is None:
         return None
-    return Control(command.v_m_s, command.w_rad_s, command.left, command.right, dict(command.inner))
+    inner, estimate = dict(command.inner), dict(command.estimate)
+    return Control(command.v_m_s, command.w_rad_s, command.left, command.right, inner, estimate)
 
 
 def _axis(chip: Lm629) -> Axis:

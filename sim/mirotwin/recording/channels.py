@@ -55,7 +55,10 @@ class TruthMessage(msgspec.Struct, frozen=True):
 
 
 class ControlMessage(msgspec.Struct, frozen=True):
-    """`control`: what the controller answered, see `periods.Control`; `inner` holds the values that the law names."""
+    """`control`: what the controller answered, see `periods.Control`.
+
+    `inner` holds the values that the law names, `estimate` those of the estimator.
+    """
 
     tick: int
     v_m_s: float
@@ -63,6 +66,7 @@ class ControlMessage(msgspec.Struct, frozen=True):
     left: int
     right: int
     inner: dict[str, float]
+    estimate: dict[str, float] = {}
 
 
 class FirmwareMessage(msgspec.Struct, frozen=True):
