@@ -9,6 +9,8 @@ does not: pixels (`regions`, `weighing`), pairs in a window (`patches`), memory 
 A pair is taken only if it is sure: within reach of the last sighting, clearly nearer to the prediction than the next
 pair, and, where its patches could also belong to other robots, near enough to it. Otherwise the robot is lost in this
 frame. A team patch is used by one robot only.
+
+With a `SelfCalibration` the tracker goes on to learn how its camera hangs, from the same pictures.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from miro_host.eye.patches import Patches
 from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
 from miro_host.eye.regions import Regions
 from miro_host.eye.searching import candidates
+from miro_host.eye.self_calibration import SelfCalibration
 from miro_host.eye.top import Top
 from miro_host.eye.track import MOST_SPEED_M_S, Sighting, Track
 from miro_host.eye.weighing import Weighing
@@ -50,12 +53,13 @@ CONTESTED_M = 0.025
 class Tracker:
     """The robots of one team, as one PC follows them. `lost_frames`, `searches`: counted over all robots, and frames.
 
-    State: `tracks`, one for each robot in the order given, and the counts. `notes` are taken if there are any.
+    State: `tracks`, one for each robot in the order given, the counts, and `learning`, if the camera's calibration is
+    learnt while it is in use. `notes` are taken if there are any.
     """
 
-    STATE = {"tracks": [Track], "lost_frames": TICK, "searches": TICK}
+    STATE = {"tracks": [Track], "lost_frames": TICK, "searches": TICK, "learning": SelfCalibration}
     NOT_STATE = (
-        *("team", "robots", "weighted", "window_px", "team_kind", "kinds", "top", "lens", "z_m"),
+        *("team", "robots", "pattern", "weighted", "window_px", "team_kind", "kinds", "top", "lens", "z_m"),
         *("regions", "patches", "weighings", "table", "notes"),
     )
 
@@ -68,6 +72,7 @@ class Tracker:
         colours: ColourClasses,
         centroid: CentroidKind = "weighted",
         window_px: int = 32,
+        self_calibrating: bool = False,
     ) -> None:
         """`team`: a colour of `patterns.TEAMS`; `robots`: numbers in `patterns.IDENTITIES`.
 
@@ -76,16 +81,15 @@ class Tracker:
         _check(team, robots, pattern, centroid, window_px)
         self.team = team
         self.robots = tuple(robots)
+        self.pattern: PatternName = pattern
         self.weighted = centroid == "weighted"
         self.window_px = window_px
         self.team_kind = CLASS_OF[team]
         self.kinds = [CLASS_OF[IDENTITIES[robot]] for robot in robots]
-        self.top = Top(pattern, calibration)
-        self.lens = self.top.lens
-        self.z_m = self.top.z_m
         self.table = colours.table
         self.regions = Regions(self.table)
-        self.patches = Patches(self.lens, self.regions, self.z_m, self.top.distances_m(), self.top.areas())
+        self.learning = SelfCalibration(calibration) if self_calibrating else None
+        self._believe(calibration)
         chroma = colours.chroma(team)
         floor = None if colours.floor is None else colours.floor.chroma()
         self.weighings = [Weighing(chroma, colours.chroma(IDENTITIES[robot]), floor) for robot in robots]
@@ -97,6 +101,18 @@ class Tracker:
     def __repr__(self) -> str:
         kind = "weighted" if self.weighted else "binary"
         return f"Tracker({self.team!r}, {self.robots!r}, {self.top!r}, {kind}, lost={self.lost_frames})"
+
+    def _believe(self, calibration: Calibration) -> None:
+        """Reads pixels by this calibration from now on."""
+        self.top = Top(self.pattern, calibration)
+        self.lens = self.top.lens
+        self.z_m = self.top.z_m
+        self.patches = Patches(self.lens, self.regions, self.z_m, self.top.distances_m(), self.top.areas())
+
+    def after_load(self) -> None:
+        """The calibration follows from what was learnt."""
+        if self.learning is not None:
+            self._believe(self.learning.calibration)
 
     def track(self, frame: Frame, tick: int) -> list[Sighting | None]:
         """Where the robots are in a picture exposed at `tick`, in their order; None: not found, or not for sure."""
@@ -117,6 +133,8 @@ class Tracker:
             else:
                 track.remember(pair.sighting)
                 sightings.append(pair.sighting)
+        if self.learning is not None and self.learning.look(frame, self.tracks):
+            self._believe(self.learning.calibration)
         return sightings
 
     # ---- where to look

@@ -88,11 +88,13 @@ class Ball(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 class PixelCamera(SeeingCamera, frozen=True, tag_field="kind", tag="pixels"):
     """A rendered picture and the tracker that reads it. `centroid`: of a patch, see `miro_host.eye`.
 
-    `window_px`: side of the window in which a robot is looked for.
+    `window_px`: side of the window in which a robot is looked for. `self_calibration` "lines": the calibration is
+    improved during the run, from lines and walls of the pitch.
     """
 
     centroid: Literal["binary", "weighted"] = "binary"
     window_px: Annotated[int, Meta(ge=16, le=64)] = 32
+    self_calibration: Literal["none", "lines"] = "none"
     picture: PictureSettings = PictureSettings()
     ball: Ball | None = None
 

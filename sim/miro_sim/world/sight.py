@@ -214,6 +214,7 @@ class PixelSight(SeeingSight):
             colours_of(camera.lens, camera.picture, camera.pattern, camera.ball is not None),
             camera.centroid,
             camera.window_px,
+            camera.self_calibration == "lines",
         )
 
     def expose(self, tick: int) -> Sequence[Posture | None]:

@@ -22,6 +22,7 @@ from mirotwin.cli.program import complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.report.learnt_calibration import learnt_calibrations
 from mirotwin.report.summary import Summary, summarise, to_json
 from mirotwin.report.track import Tracks
 
@@ -121,6 +122,7 @@ class RunFiles:
             firmware_sha256=self.source.firmware_sha256,
             complete=complete,
             settings=self.settings,
+            calibrations=learnt_calibrations(self.world.networks),
         )
 
     def _leave_parts(self) -> None:

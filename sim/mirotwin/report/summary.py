@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
+from mirotwin.report.learnt_calibration import LearntCalibration
 from mirotwin.report.track import ErrorSample, Tracks
 
 
@@ -84,7 +85,8 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
 
     `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is
     written only where it is false: the run was broken off, and all figures are of the part before. `set`: the keys of
-    the scenario that were set on the command line (`KEY=VALUE`), only where there were some.
+    the scenario that were set on the command line (`KEY=VALUE`), only where there were some. `calibrations`: of hosts
+    that learn how their cameras hang.
     """
 
     scenario: str
@@ -98,6 +100,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     link: Link
     firmware: Firmware
     vision: Vision | None = None
+    calibrations: tuple[LearntCalibration, ...] = ()
     robots: tuple[RobotTracking, ...] = ()
     complete: bool = True
     set: tuple[str, ...] = ()
@@ -152,6 +155,7 @@ def summarise(
     firmware_sha256: str,
     complete: bool = True,
     settings: tuple[str, ...] = (),
+    calibrations: tuple[LearntCalibration, ...] = (),
 ) -> Summary:
     """The summary of a run; `counters` as `World.counters()` gives them."""
     tracked = {place: tracking_of(track.errors) for place, track in tracks.robots.items()}
@@ -168,6 +172,7 @@ def summarise(
         link=Link(**counters["link"]),
         firmware=Firmware(sha256=firmware_sha256, **counters["firmware"]),
         vision=Vision(**counters["vision"]) if counters["vision"] else None,
+        calibrations=calibrations,
         robots=everyone if len(everyone) > 1 else (),
         complete=complete,
         set=settings,

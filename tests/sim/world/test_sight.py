@@ -188,6 +188,22 @@ def test_a_world_goes_on_from_a_saved_one_whatever_its_camera(kind):
     assert again.digest == whole.digest
 
 
+def test_a_host_that_learns_its_camera_goes_on_from_a_saved_world_and_is_nearer_to_the_truth():
+    camera = 'kind = "pixels"\nself_calibration = "lines"'
+    whole, cut = world(camera), world(camera)
+    for _ in range(22):
+        whole.step()
+        cut.step()
+    again = world(camera)
+    again.load(cut.save())
+    pairs = measured(again, 12)
+    for _ in range(12):
+        whole.step()
+    assert again.digest == whole.digest
+    told = measured(world('kind = "pixels"'), 12)
+    assert max(map(off_cm, pairs)) < 0.3 < min(map(off_cm, told))
+
+
 def test_looking_at_the_picture_changes_no_bit():
     quiet, watched = world('kind = "pixels"'), world('kind = "pixels"')
     for _ in range(8):

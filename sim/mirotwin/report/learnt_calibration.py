@@ -1,0 +1,72 @@
+"""What the hosts of a run learnt about their cameras, beside the truth.
+
+What belongs here: the figures for `summary.json` and for people. What does not: the learning
+(`miro_host.eye.self_calibration`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from miro_host.eye.calibration_kinds import worst_error_m
+from miro_host.eye.self_calibration import LEARNT
+from miro_sim.world.sight import PixelSight
+
+
+class Learnt(msgspec.Struct, frozen=True):
+    """One parameter: as it is, as the host was told, as it uses it at the end, and the filter's standard deviation."""
+
+    true: float
+    told: float
+    learnt: float
+    spread: float
+
+
+class LearntCalibration(msgspec.Struct, frozen=True):
+    """One host's camera. `worst_*_cm`: the largest position error that the calibration makes over the pitch.
+
+    `marks`: lines and walls that were used; `refused`: those too far from where they were expected.
+    """
+
+    network: int
+    worst_told_cm: float
+    worst_learnt_cm: float
+    marks: int
+    refused: int
+    parameters: Mapping[str, Learnt]
+
+
+def learnt_calibrations(networks: Sequence[Any]) -> tuple[LearntCalibration, ...]:
+    """Of each host that learns. `networks`: those of a world."""
+    found = []
+    for network in networks:
+        learning = network.sight.tracker.learning if isinstance(network.sight, PixelSight) else None
+        if learning is not None:
+            found.append(_learnt(network.index, network.sight.camera.lens, learning))
+    return tuple(found)
+
+
+def _learnt(network: int, true: Any, learning: Any) -> LearntCalibration:
+    told, learnt, spreads = learning.begun.camera, learning.calibration.camera, learning.spreads()
+    return LearntCalibration(
+        network=network,
+        worst_told_cm=100.0 * worst_error_m(true, learning.begun),
+        worst_learnt_cm=100.0 * worst_error_m(true, learning.calibration),
+        marks=learning.used,
+        refused=learning.refused,
+        parameters={
+            name: Learnt(getattr(true, name), getattr(told, name), getattr(learnt, name), spreads[name])
+            for name in LEARNT
+        },
+    )
+
+
+def calibration_text(learnt: LearntCalibration) -> str:
+    """One line for people."""
+    return (
+        f"net{learnt.network}: {learnt.worst_told_cm:.2f} cm wrong at worst,"
+        f" {learnt.worst_learnt_cm:.2f} cm at the end, after {learnt.marks} lines and walls"
+    )
