@@ -1,0 +1,63 @@
+"""Products and linear equations of small matrices of any shape, in a written order of additions.
+
+What belongs here: what equations (2) to (14) need beside `estimators.matrix`, whose matrices are symmetric or have five
+columns. What does not: anything that knows what a row means. A matrix is a list of rows.
+"""
+
+from miro_host.estimators.matrix import Matrix
+
+Vector = list[float]
+
+
+def transposed(a: Matrix) -> Matrix:
+    """a^T."""
+    return [list(column) for column in zip(*a, strict=True)]
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """a . b, added from left to right."""
+    total = 0.0
+    for x, y in zip(a, b, strict=True):
+        total += x * y
+    return total
+
+
+def times(a: Matrix, x: Vector) -> Vector:
+    """a x."""
+    return [dot(row, x) for row in a]
+
+
+def product(a: Matrix, b: Matrix) -> Matrix:
+    """a b."""
+    columns = transposed(b)
+    return [[dot(row, column) for column in columns] for row in a]
+
+
+def added(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    return [x + y for x, y in zip(a, b, strict=True)]
+
+
+def solution(a: Matrix, right: Matrix) -> Matrix:
+    """The x of a x = right by elimination, each column's largest entry first. ValueError for a singular a."""
+    size = len(a)
+    rows = [list(row) + list(more) for row, more in zip(a, right, strict=True)]
+    for column in range(size):
+        best = column
+        for row in range(column + 1, size):
+            if abs(rows[row][column]) > abs(rows[best][column]):
+                best = row
+        rows[column], rows[best] = rows[best], rows[column]
+        pivot = rows[column]
+        if pivot[column] == 0.0:
+            raise ValueError("the matrix is singular")
+        for row in range(size):
+            if row != column:
+                factor = rows[row][column] / pivot[column]
+                rows[row] = [x - factor * y for x, y in zip(rows[row], pivot, strict=True)]
+    return [[x / row[at] for x in row[size:]] for at, row in enumerate(rows)]
+
+
+def solved(a: Matrix, right: Vector) -> Vector:
+    """The x of a x = right for one column. ValueError for a singular a."""
+    return [row[0] for row in solution(a, [[value] for value in right])]

@@ -1,0 +1,233 @@
+"""Equations (11), (12), (13) and (18) to (23) as identities of numbers, and the term that the layer adds to V'."""
+
+import math
+import random
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from tests.host.theory.ideal import PRINTED
+
+from miro_host.laws.yang_kim import Gains, YangKim, saturation, sign
+from miro_host.posture import Posture
+from miro_host.reference import Arc, Line
+from miro_host.theory import stability
+from miro_host.theory.assumptions import HALF_PI, across, radius
+
+PATHS = st.sampled_from([Line(), Line(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)])
+POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))
+TIMES = st.floats(0.1, 0.4) | st.floats(0.6, 5.8)  # not on the corner of the ramp
+SPEEDS = st.floats(-0.9, 0.9)
+TURNS = st.floats(-4.0, 4.0)
+NO_GUARD = Gains(cosine_guard=1e-9, rho_floor_m=1e-9)
+F1, F2 = st.floats(-0.35, 0.35), st.floats(-1.2, 1.2)
+
+
+def switched(gains, posture_e, c):
+    """What stands for sgn in theta_e, s1 and s2."""
+    if gains.switching == "sign":
+        return sign(posture_e.theta_e_rad), (sign(c.s1), sign(c.s2))
+    side = saturation(posture_e.theta_e_rad, gains.layer_theta_rad)
+    return side, (saturation(c.s1, gains.layer_s1_m_s), saturation(c.s2, gains.layer_s2_rad_s))
+
+
+def rates(gains, path, t, posture, v, w, f):
+    """(s, s', e, proof's V') of a robot under the law with a disturbance f, all from the theory's formulas."""
+    r = path.at(t)
+    c = YangKim(gains).control(r, posture, v, w)
+    z_dot = (r.v_dot_m_s2 + c.u1 - f[0], r.w_dot_rad_s2 + c.u2 - f[1])  # (15)
+    e = stability.polar_errors(r, posture, v, w)
+    side, signs = switched(gains, e, c)
+    gammas = (gains.gamma1_per_s, gains.gamma2_per_s)
+    s = stability.surfaces(e, *gammas, side)
+    layer = gains.layer_theta_rad if gains.switching == "saturation" else 0.0
+    s_rate = stability.surface_rates(e, r, z_dot, gammas, side, layer)
+    q, p = (gains.q1_per_s, gains.q2_per_s), (gains.p1_m_s2, gains.p2_rad_s2)
+    return s, s_rate, e, stability.proof_rate(s, signs, q, p, f, e.cosine)
+
+
+def moved(path, t, posture, z, z_dot, h):
+    """Reference, posture and velocities a moment later, accelerations held."""
+    v, w = z
+    turn, length = h * (w + 0.5 * h * z_dot[1]), h * (v + 0.5 * h * z_dot[0])
+    middle = posture.theta_rad + 0.5 * turn
+    there = Posture(
+        posture.x_m + length * math.cos(middle),
+        posture.y_m + length * math.sin(middle),
+        posture.theta_rad + turn,
+    )
+    return path.at(t + h), there, v + h * z_dot[0], w + h * z_dot[1]
+
+
+def near_no_seam(e):
+    return all(abs(abs(angle) - math.pi) > 1e-3 for angle in (e.phi_e_rad, e.theta_e_rad))
+
+
+@settings(deadline=None)
+@given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, st.floats(-5.0, 5.0), st.floats(-20.0, 20.0))
+def test_the_rates_of_the_errors_and_surfaces_are_their_differences_along_the_motion(
+    path, t, posture, v, w, v_dot, w_dot
+):
+    """(9), (13) and (18) beside central differences."""
+    assume(radius(posture) > 0.05)
+    e = stability.polar_errors(path.at(t), posture, v, w)
+    assume(near_no_seam(e) and abs(e.phi_e_rad) > 1e-2 and abs(e.theta_e_rad) > 1e-2)
+    dt, gammas, side = 1e-5, (1.7, 3.0), sign(e.theta_e_rad)
+    before, after = (
+        stability.polar_errors(*moved(path, t, posture, (v, w), (v_dot, w_dot), h)) for h in (-dt, dt)
+    )
+    scale = (1.0 + abs(v) / radius(posture) + abs(w)) ** 3 * (1.0 + abs(v_dot) + abs(w_dot))
+    for name in ("rho_e_m", "phi_e_rad", "theta_e_rad"):
+        rate = getattr(e, name.rsplit("_", 1)[0] + "_rate")
+        assert (getattr(after, name) - getattr(before, name)) / (2 * dt) == pytest.approx(
+            rate, abs=1e-5 * scale
+        )
+    found = stability.surface_rates(e, path.at(t), (v_dot, w_dot), gammas, side)
+    one, two = (stability.surfaces(x, *gammas, side) for x in (before, after))
+    for i in (0, 1):
+        assert (two[i] - one[i]) / (2 * dt) == pytest.approx(found[i], abs=1e-5 * scale)
+
+
+@settings(deadline=None)
+@given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, F1, F2)
+def test_as_printed_v_falls_exactly_as_equation_23_says_wherever_theta_e_is_not_0(
+    path, t, posture, v, w, f1, f2
+):
+    """With the sign function and without guards: (18) to (22) put together. V' <= 0, because P_i >= |f_i|."""
+    assume(radius(posture) > 0.02)
+    assume(abs(math.cos(HALF_PI - across(posture))) > 0.02)
+    s, s_rate, e, by_proof = rates(PRINTED, path, t, posture, v, w, (f1, f2))
+    assume(e.theta_e_rad != 0.0 and e.phi_e_rad != 0.0 and near_no_seam(e))
+    rate = stability.lyapunov_rate(s, s_rate)
+    assert rate == pytest.approx(by_proof, rel=1e-6, abs=1e-7 * (1.0 + abs(s[0]) + abs(s[1])) * 100.0)
+    assert by_proof <= 0.0
+
+
+@given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), F1, F2, st.floats(-1.0, 1.0))
+def test_with_gains_below_f_the_proofs_rate_still_falls_outside_of_reach(s1, s2, f1, f2, cosine):
+    """So the paper's law has a bounded error even where (17) is broken: |s_i| ends within (f_i - P_i) / Q_i."""
+    q, p = (0.53, 0.72), (0.1, 0.3)
+    far = [stability.reach(p[0], q[0], abs(f1)), stability.reach(p[1], q[1], abs(f2))]
+    assume(abs(s1) >= far[0] and abs(s2) >= far[1])
+    assert stability.proof_rate((s1, s2), (sign(s1), sign(s2)), q, p, (f1, f2), cosine) <= 1e-12
+
+
+def test_reach_is_nothing_where_condition_17_holds_and_endless_without_q():
+    assert stability.reach(0.5, 0.0, 0.5) == 0.0
+    assert stability.reach(0.1, 2.0, 0.5) == pytest.approx(0.2)
+    assert stability.reach(0.1, 0.0, 0.5) == math.inf
+
+
+@given(st.floats(0.3, 0.9), st.floats(-1.2, 1.2), st.floats(-3.0, 3.0))
+def test_where_theta_e_crosses_0_v_jumps_by_the_product_that_the_proof_drops(rho, phi_e, turn):
+    assume(abs(turn) > 1e-3 and abs(phi_e) > 1e-3)
+    r, law = Line().at(3.0), YangKim(PRINTED)
+    x, y, towards = rho * math.cos(phi_e), rho * math.sin(phi_e), math.copysign(1e-10, turn)
+    before, after = (law.control(r, Posture(x, y, side), 0.2, turn) for side in (-towards, towards))
+    rise = stability.lyapunov(after.s1, after.s2) - stability.lyapunov(before.s1, before.s2)
+    assert rise == pytest.approx(stability.jump(turn, phi_e), rel=1e-5)
+
+
+# The boundary layer of remark 2.
+
+
+@settings(deadline=None)
+@given(PATHS, TIMES, POSTURES, SPEEDS, TURNS)
+def test_inside_the_layer_v_has_one_term_more_than_equation_23(path, t, posture, v, w):
+    assume(radius(posture) > 0.05)
+    assume(abs(across(posture)) > 0.8)  # far from the guard of the cosine
+    s, s_rate, e, by_proof = rates(NO_GUARD, path, t, posture, v, w, (0.0, 0.0))
+    assume(near_no_seam(e) and e.phi_e_rad != 0.0)
+    more = s[1] * stability.layer_term(e, NO_GUARD.layer_theta_rad)
+    scale = 1.0 + abs(s[0]) + abs(s[1])
+    assert stability.lyapunov_rate(s, s_rate) == pytest.approx(by_proof + more, abs=1e-6 * scale * scale)
+    assert (more == 0.0) == (abs(e.theta_e_rad) >= NO_GUARD.layer_theta_rad or e.theta_e_rate * s[1] == 0.0)
+
+
+def states(count, spread, seed=3):
+    """(path, t, posture, v, w) with theta_e within `spread`, evenly drawn."""
+    chance = random.Random(seed)
+    for _ in range(count):
+        path, t = Line(), chance.uniform(0.6, 5.8)
+        r = path.at(t).posture
+        x, y = r.x_m + chance.uniform(-0.2, 0.2), r.y_m + chance.uniform(-0.2, 0.2)
+        theta = r.theta_rad + chance.uniform(-spread, spread)
+        yield path, t, Posture(x, y, theta), chance.uniform(0.05, 0.4), chance.uniform(-2.0, 2.0)
+
+
+def rising(spread, layer_added):
+    """The share of states in which V rises though f = 0, with and without the layer's derivative in u2."""
+    rises, count = 0, 0
+    for path, t, posture, v, w in states(2000, spread):
+        if radius(posture) < 0.05 or abs(across(posture)) < 0.5:
+            continue
+        s, s_rate, e, _ = rates(NO_GUARD, path, t, posture, v, w, (0.0, 0.0))
+        rate = stability.lyapunov_rate(s, s_rate)
+        if layer_added:
+            rate -= s[1] * stability.layer_term(e, NO_GUARD.layer_theta_rad)
+        rises += rate > 1e-9
+        count += 1
+    assert count > 1000
+    return rises / count
+
+
+def test_v_rises_in_many_states_inside_the_layer_and_in_none_when_u2_has_its_derivative():
+    inside = rising(0.9 * NO_GUARD.layer_theta_rad, layer_added=False)
+    assert 0.3 < inside < 0.95
+    assert rising(0.9 * NO_GUARD.layer_theta_rad, layer_added=True) == 0
+
+
+def test_outside_of_the_layer_v_never_rises():
+    for path, t, posture, v, w in states(2000, 1.2, seed=4):
+        if radius(posture) < 0.05 or abs(across(posture)) < 0.5:
+            continue
+        s, s_rate, e, _ = rates(NO_GUARD, path, t, posture, v, w, (0.0, 0.0))
+        if abs(e.theta_e_rad) > NO_GUARD.layer_theta_rad:
+            assert stability.lyapunov_rate(s, s_rate) < 1e-9
+
+
+# Assumptions 2 and 3.
+
+
+@given(POSTURES, st.integers(-3, 3))
+def test_across_is_the_left_side_of_equation_12_with_the_sign_of_the_cosine(posture, turns):
+    assume(radius(posture) > 1e-3)
+    phi = math.atan2(posture.y_m, posture.x_m)
+    by_12 = min(abs(abs(phi - posture.theta_rad) - (2 * m + 1) * HALF_PI) for m in (0, 1))
+    unwrapped = Posture(posture.x_m, posture.y_m, posture.theta_rad + turns * 2.0 * math.pi)
+    assert abs(across(unwrapped)) == pytest.approx(by_12, abs=1e-9)
+    assume(by_12 > 1e-6)
+    assert math.copysign(1.0, across(posture)) == math.copysign(1.0, math.cos(phi - posture.theta_rad))
+
+
+@pytest.mark.parametrize("path", [Line(), Arc()])
+def test_the_references_of_the_figures_keep_assumption_2_and_stay_away_from_assumption_3(path):
+    assert path.at(0.0).rho_m == 0.0
+    for index in range(1, 600):
+        r = path.at(0.01 * index)
+        assert r.rho_m > 0.0
+        assert across(r.posture) > 0.9
+
+
+# Remark 1.
+
+
+@given(st.floats(0.02, 1.5), st.floats(0.1, 0.9))
+def test_u1_grows_like_one_over_the_sine_of_alpha(alpha, rho):
+    """A robot at rest, alpha away from assumption 3's limit: u1 + v_r' is the braces of (16) over sin(alpha)."""
+    r = Line().at(3.0)
+    law = YangKim(PRINTED)
+    u1 = law.control(r, Posture(rho, 0.0, HALF_PI - alpha), 0.0, 0.0).u1
+    e = stability.polar_errors(r, Posture(rho, 0.0, HALF_PI - alpha), 0.0, 0.0)
+    s1 = e.rho_e_rate + 1.7 * e.rho_e_m
+    braces = -0.53 * s1 - 0.35 * sign(s1) - 1.7 * e.rho_e_rate
+    assert u1 * math.sin(alpha) == pytest.approx(braces, rel=1e-6, abs=1e-9)
+
+
+@given(PATHS, TIMES, POSTURES, SPEEDS, TURNS, F1)
+def test_f1_moves_s1_by_its_part_along_the_line_of_sight_only(path, t, posture, v, w, f1):
+    """What remark 1 sets against that: near the limit f1 counts as little as u1."""
+    assume(radius(posture) > 0.02)
+    e, r = stability.polar_errors(path.at(t), posture, v, w), path.at(t)
+    calm, pushed = (stability.surface_rates(e, r, (0.3 - f, 0.0), (1.7, 3.0), 1.0)[0] for f in (0.0, f1))
+    assert calm - pushed == pytest.approx(f1 * math.sin(across(posture)), abs=1e-9)
