@@ -36,11 +36,12 @@ COUNTERS = {
     "vision": {"frames": 180, "lost": 1, "dropped": 2, "repeated": 0, "wrong": 0, "swapped": 0},
 }
 KEYS = {
-    "": "scenario seed engine digest simulated_s wall_s realtime_factor tracking link firmware vision",
+    "": "scenario seed engine digest simulated_s wall_s realtime_factor tracking link firmware vision theory",
     "tracking": "rms_x_cm rms_y_cm rms_theta_deg rms_position_cm settling_s off_pitch_s",
     "link": "frames_sent frames_accepted frames_rejected frames_stale bit_errors",
     "firmware": "sha256 instructions machine_cycles idle_cycles faults",
     "vision": "frames lost dropped repeated wrong swapped",
+    "theory": "disturbance assumption_1 assumption_2 assumption_3 reversals backward_s chattering_m_s2",
 }
 
 
@@ -72,6 +73,7 @@ def test_several_robots_are_listed_beside_the_first() -> None:
     written = json.loads(to_json(summary_of(list(periods(60, [(0, 0), (0, 2), (1, 1)])))))
     assert [(one["network"], one["slot"]) for one in written["robots"]] == [(0, 0), (0, 2), (1, 1)]
     assert written["robots"][0]["tracking"] == written["tracking"]
+    assert written["robots"][0]["theory"] == written["theory"]
 
 
 def test_times_and_factor_follow_from_the_ticks() -> None:

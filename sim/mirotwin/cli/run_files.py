@@ -24,6 +24,7 @@ from mirotwin.files.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.recording.recorder import Recorder, Source
 from mirotwin.report.learnt_calibration import learnt_calibrations
 from mirotwin.report.summary import Summary, summarise, to_json
+from mirotwin.report.theory import gains_of
 from mirotwin.report.track import Tracks
 
 if TYPE_CHECKING:
@@ -96,6 +97,9 @@ class RunFiles:
     def _simulate(self, recorder: Recorder, bar: ProgressBar) -> None:
         def keep(period: Period) -> None:
             self.tracks.add(period)
+            for (network, slot), track in self.tracks.robots.items():
+                if track.theory.now is not None:
+                    recorder.write_theory(network, slot, track.theory.now)
             now_s = time.monotonic()
             if now_s - self._flushed_s >= FLUSH_S:
                 recorder.flush()
@@ -123,6 +127,7 @@ class RunFiles:
             complete=complete,
             settings=self.settings,
             calibrations=learnt_calibrations(self.world.networks),
+            gains=gains_of(self.world.scenario),
         )
 
     def _leave_parts(self) -> None:

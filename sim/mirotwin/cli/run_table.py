@@ -12,6 +12,7 @@ from rich.table import Table
 from mirotwin.cli.console import show
 from mirotwin.report.learnt_calibration import calibration_text
 from mirotwin.report.summary import Summary, off_pitch_text, settling_text, vision_text
+from mirotwin.report.theory import theory_text
 from mirotwin.report.track import Tracks
 
 
@@ -35,6 +36,9 @@ def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
             f"rms of the last second {tracking.rms_position_cm:.2f} cm "
             f"(x {tracking.rms_x_cm:.2f}, y {tracking.rms_y_cm:.2f}), {tracking.rms_theta_deg:.2f} deg; {settled}",
         )
+    theory = theory_text(summary.theory) if summary.theory is not None else ""
+    if theory:
+        table.add_row("theory", theory)
     off_pitch = off_pitch_text(summary)
     if off_pitch:
         table.add_row("pitch", off_pitch)

@@ -69,6 +69,23 @@ class ControlMessage(msgspec.Struct, frozen=True):
     estimate: dict[str, float] = {}
 
 
+class TheoryMessage(msgspec.Struct, frozen=True):
+    """`theory`: terms of the paper's theory, which follow from the other channels; nothing reads them back.
+
+    f of equation (15) over the period that ends at `tick` (null where nothing was commanded), rho_c, the distance of
+    the heading from across (equation 12, negative where the cosine is), and which assumptions hold (`report.theory`).
+    """
+
+    tick: int
+    f1_m_s2: float | None
+    f2_rad_s2: float | None
+    rho_c_m: float
+    across_rad: float
+    holds_1: bool
+    holds_2: bool
+    holds_3: bool
+
+
 class FirmwareMessage(msgspec.Struct, frozen=True):
     """`firmware`: the robot's own frame counters, modulo 2^16; absent if its image exports none."""
 
@@ -170,12 +187,17 @@ ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
     "truth": TruthMessage,
     "measurement": MeasurementMessage,
     "control": ControlMessage,
+    "theory": TheoryMessage,
     "firmware": FirmwareMessage,
     "lm629": Lm629Message,
     "pwm": PwmMessage,
     "samples": SampleMessage,
     "fault": FaultMessage,
 }
+
+
+DERIVED = ("samples", "fault", "theory")
+"""Channels of a robot for people; control periods are made of the others."""
 
 
 OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {

@@ -88,7 +88,7 @@ class _Collector:
             self._close(message)
         elif isinstance(message, channels.WireMessage):
             self.wire.append(channels.transmission(place.network, message))
-        elif place.channel not in ("samples", "fault"):
+        elif place.channel not in channels.DERIVED:
             self.robots.setdefault((place.network, place.slot), {})[place.channel] = message
 
     def _close(self, message: channels.PeriodMessage) -> None:

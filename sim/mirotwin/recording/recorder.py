@@ -59,6 +59,10 @@ class Source(msgspec.Struct, frozen=True):
     record: str = "default"
 
 
+_Message = tuple[str, int, msgspec.Struct]
+"""Topic, tick and content of what does not come out of a control period."""
+
+
 class Recorder:
     """An open recording. Use as a context manager: an error ends the file too, and marks it as broken off.
 
@@ -77,7 +81,7 @@ class Recorder:
         self._channels: dict[str, int] = {}
         self._schemas: dict[bytes, int] = {}
         self._named: dict[str, int] = {}
-        self._waiting: list[Period] = []
+        self._waiting: list[Period | _Message] = []
         self._writer = McapWriter(stream, profile=METADATA, library=METADATA)
         self._writer.add_metadata(
             METADATA,
@@ -119,10 +123,18 @@ class Recorder:
             with self._undisturbed:
                 self._write_waiting()
 
+    def write_theory(self, network: int, slot: int, message: channels.TheoryMessage) -> None:
+        """Adds what the theory says of a robot in the control period that was written last."""
+        topic = topics.robot_topic(network, slot, "theory")
+        self._waiting.append((topic, message.tick, message))
+
     def _write_waiting(self) -> None:
         add, encode, numbers = self._writer.add_message, self._encoder.encode, self._channels
         waiting, self._waiting = self._waiting, []
         for period in waiting:
+            if isinstance(period, tuple):
+                self._add(*period)
+                continue
             period_ns = nanoseconds(period.tick)
             for topic, tick, message in channels.messages(period):
                 channel = numbers.get(topic) or self._register(topic, message)

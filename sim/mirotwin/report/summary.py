@@ -12,7 +12,8 @@ import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.report.learnt_calibration import LearntCalibration
-from mirotwin.report.track import ErrorSample, Tracks
+from mirotwin.report.theory import Gains, Theory, theory_of
+from mirotwin.report.track import ErrorSample, Place, Tracks
 
 
 class Tracking(msgspec.Struct, frozen=True):
@@ -32,12 +33,13 @@ class Tracking(msgspec.Struct, frozen=True):
     off_pitch_s: float | None
 
 
-class RobotTracking(msgspec.Struct, frozen=True):
-    """The tracking of one robot among several."""
+class RobotTracking(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The tracking of one robot among several; `theory` is left out where no host steered it."""
 
     network: int
     slot: int
     tracking: Tracking
+    theory: Theory | None = None
 
 
 class Link(msgspec.Struct, frozen=True):
@@ -81,7 +83,7 @@ class Firmware(msgspec.Struct, frozen=True):
 
 
 class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
-    """`summary.json`. `tracking` is the first robot's; `robots` lists all when there are several.
+    """`summary.json`. `tracking` and `theory` are the first robot's; `robots` lists all when there are several.
 
     `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is
     written only where it is false: the run was broken off, and all figures are of the part before. `set`: the keys of
@@ -101,6 +103,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     firmware: Firmware
     vision: Vision | None = None
     calibrations: tuple[LearntCalibration, ...] = ()
+    theory: Theory | None = None
     robots: tuple[RobotTracking, ...] = ()
     complete: bool = True
     set: tuple[str, ...] = ()
@@ -156,10 +159,13 @@ def summarise(
     complete: bool = True,
     settings: tuple[str, ...] = (),
     calibrations: tuple[LearntCalibration, ...] = (),
+    gains: Mapping[Place, Gains] = {},
 ) -> Summary:
-    """The summary of a run; `counters` as `World.counters()` gives them."""
-    tracked = {place: tracking_of(track.errors) for place, track in tracks.robots.items()}
-    everyone = tuple(RobotTracking(network, slot, tracking) for (network, slot), tracking in tracked.items())
+    """The summary of a run; `counters` as `World.counters()` gives them, `gains` as `theory.gains_of`."""
+    everyone = tuple(
+        RobotTracking(*place, tracking_of(track.errors), theory_of(track.theory, gains.get(place, Gains())))
+        for place, track in tracks.robots.items()
+    )
     return Summary(
         scenario=scenario,
         seed=seed,
@@ -173,6 +179,7 @@ def summarise(
         firmware=Firmware(sha256=firmware_sha256, **counters["firmware"]),
         vision=Vision(**counters["vision"]) if counters["vision"] else None,
         calibrations=calibrations,
+        theory=everyone[0].theory if everyone else None,
         robots=everyone if len(everyone) > 1 else (),
         complete=complete,
         set=settings,

@@ -19,6 +19,7 @@ import msgspec
 from miro_exact.clock import seconds
 from miro_sim.periods import Period, RobotPeriod
 from miro_sim.pitch import ground as pitch
+from mirotwin.report.theory_track import TheoryTrack
 
 TWO_PI = 6.283185307179586
 SETTLED_CM = 3.0
@@ -99,13 +100,14 @@ class Line:
 
 
 class Track:
-    """One robot: errors, and where it was, should have been and was seen."""
+    """One robot: errors, where it was, should have been and was seen, and what the theory says of it."""
 
     def __init__(self) -> None:
         self.errors = Errors()
         self.truth = Points()
         self.reference = Points()
         self.seen = Points()
+        self.theory = TheoryTrack()
 
     def add(self, robot: RobotPeriod, tick: int) -> None:
         self.errors.append(error_of(robot, tick))
@@ -113,6 +115,7 @@ class Track:
         self.reference.append(robot.reference.x_m, robot.reference.y_m)
         if robot.measurement is not None:
             self.seen.append(robot.measurement.x_m, robot.measurement.y_m)
+        self.theory.add(robot, tick)
 
 
 class Tracks:

@@ -1,0 +1,262 @@
+"""The paper's theory along a run: its terms beside their slow twin, in the summary and in the recording."""
+
+import io
+import json
+import math
+from itertools import pairwise
+
+import msgspec
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from tests.mirotwin.synthetic import periods, robot
+from tests.naive import theory_terms as naive
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_host.posture import Posture
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.periods import Control, RobotPeriod
+from miro_sim.scenario.file import load
+from miro_sim.world.world import World
+from mirotwin import runner
+from mirotwin.recording.reader import parse
+from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.report.theory import Gains, Theory, gains_of, theory_of, theory_text
+from mirotwin.report.theory_track import TheoryTrack
+from mirotwin.report.track import Tracks
+
+PERIOD_S = naive.PERIOD_S
+PLACES = st.builds(Posture, st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-12.0, 12.0))
+SPEEDS = st.tuples(st.floats(-0.5, 0.5), st.floats(-4.0, 4.0))
+COMMANDS = st.none() | st.builds(
+    lambda v, w, left, right: Control(v, w, left, right, {}),
+    *(st.floats(-0.5, 0.5), st.floats(-4.0, 4.0), st.integers(-9000, 9000), st.integers(-9000, 9000)),
+)
+
+
+ORIGIN, HERE = Posture(0.0, 0.0, 0.0), Posture(0.5, 0.0, 0.0)
+NO_GAINS = Gains()
+
+
+def period(
+    truth: Posture,
+    z: tuple[float, float] = (0.0, 0.0),
+    control: Control | None = None,
+    reference: Posture = HERE,
+) -> RobotPeriod:
+    changed = {"truth": truth, "v_m_s": z[0], "w_rad_s": z[1], "control": control, "reference": reference}
+    return msgspec.structs.replace(robot(0), **changed)
+
+
+STEPS = st.lists(st.builds(period, PLACES, SPEEDS, COMMANDS), min_size=2, max_size=30)
+
+
+def track_of(run: list[RobotPeriod]) -> TheoryTrack:
+    track = TheoryTrack()
+    for index, one in enumerate(run):
+        track.add(one, index * CONTROL_PERIOD_TICKS)
+    return track
+
+
+def theory(run: list[RobotPeriod], gains: Gains = NO_GAINS) -> Theory:
+    found = theory_of(track_of(run), gains)
+    assert found is not None
+    return found
+
+
+def commanded(v: float, w: float = 0.0) -> Control:
+    return Control(v, w, round(11392.75 * v), round(11392.75 * v), {})
+
+
+# f of equation (15).
+
+
+@settings(deadline=None)
+@given(STEPS)
+def test_f_is_what_was_commanded_less_what_came_of_it(run: list[RobotPeriod]) -> None:
+    track, expected = track_of(run), naive.disturbances(run)
+    assert list(track.f1_m_s2) == pytest.approx(list(expected[:, 0]), abs=1e-9)
+    assert list(track.f2_rad_s2) == pytest.approx(list(expected[:, 1]), abs=1e-9)
+
+
+def test_a_robot_that_does_at_once_what_it_is_told_has_no_disturbance() -> None:
+    speeds = [0.0, 0.1, 0.3, 0.2]
+    run = [
+        period(HERE, (v, 0.0), commanded(after)) for v, after in zip(speeds, [*speeds[1:], 0.0], strict=True)
+    ]
+    found = theory(run, Gains(0.05, 1.0)).disturbance
+    assert found is not None
+    assert found.f1_largest_m_s2 == pytest.approx(0.0, abs=1e-9)
+    assert (found.f1_above_p1, found.f2_above_p2) == (0.0, 0.0)
+
+
+def test_a_robot_that_is_a_period_late_has_the_change_of_its_command_as_disturbance() -> None:
+    """Up by 0.1 m/s in one period, which is 3 m/s2, too little; and too much in the next."""
+    told, did = [0.1, 0.1, 0.1, 0.1], [0.0, 0.0, 0.1, 0.1]
+    run = [period(HERE, (v, 0.0), commanded(given)) for given, v in zip(told, did, strict=True)]
+    track = track_of(run)
+    assert list(track.f1_m_s2) == pytest.approx([0.1 / PERIOD_S, -0.1 / PERIOD_S, 0.0], abs=1e-9)
+    found = theory_of(track, Gains(0.05, None))
+    assert found is not None
+    assert found.disturbance is not None
+    assert found.disturbance.f1_above_p1 == pytest.approx(2 / 3)
+    assert found.disturbance.f2_above_p2 is None
+
+
+def test_a_period_without_a_command_has_no_f() -> None:
+    run = [period(HERE, (0.0, 0.0), commanded(0.1)), period(HERE, (0.3, 0.0)), period(HERE, (0.3, 0.0))]
+    track = track_of(run)
+    assert len(track.f1_m_s2) == 1
+    assert track.now is not None
+    assert (track.now.f1_m_s2, track.now.f2_rad_s2) == (None, None)
+
+
+# The assumptions.
+
+
+def on_the_seam(angles: list[float]) -> bool:
+    """Whether a rounding decides on which side of pi an angle, or a change of it, is."""
+    changes = [after - before for before, after in pairwise(angles)]
+    return any(abs(abs(value) - math.pi) < 1e-9 for value in (*angles, *changes))
+
+
+@settings(deadline=None)
+@given(STEPS)
+def test_the_assumptions_are_those_of_the_slow_twin(run: list[RobotPeriod]) -> None:
+    run = [msgspec.structs.replace(run[0], control=commanded(0.0), reference=ORIGIN), *run[1:]]
+    distances = [naive.across(one.truth) for one in run]
+    rho = [math.hypot(one.truth.x_m, one.truth.y_m) for one in run]
+    headings = [math.remainder(one.truth.theta_rad, math.tau) for one in run]
+    bearings = [math.atan2(one.truth.y_m, one.truth.x_m) for one in run]
+    assume(all(abs(distance) > 1e-7 and abs(abs(distance) - 0.1) > 1e-7 for distance in distances))
+    assume(min(rho) > 1e-6)
+    assume(not on_the_seam(headings))
+    assume(not on_the_seam(bearings))
+    found = theory(run)
+    assert found.assumption_3.frames == sum(abs(distance) < 0.1 for distance in distances)
+    assert found.assumption_3.nearest_rad == pytest.approx(min(map(abs, distances)), abs=1e-7)
+    assert found.assumption_3.crossings == sum(a * b < 0 for a, b in pairwise(distances))
+    assert found.assumption_2.broken_s == pytest.approx(PERIOD_S * sum(one <= 0.024 for one in rho[1:]))
+    sides = [naive.outside(headings), naive.outside(bearings)]
+    assert found.assumption_1.seams == sides[0][1] + sides[1][1]
+    assert found.assumption_1.broken_s == pytest.approx(PERIOD_S * sum(sides[0][0] | sides[1][0]))
+
+
+def test_a_heading_that_turns_past_half_a_turn_breaks_assumption_1_until_it_comes_back() -> None:
+    angles = [3.0, 3.1, 3.2, 3.3, 3.1]
+    run = [period(Posture(0.5, 0.0, angle), control=commanded(0.0)) for angle in angles]
+    found = theory(run).assumption_1
+    assert (found.seams, found.broken_s) == (2, pytest.approx(2 * PERIOD_S))
+    assert (found.first_s, found.last_s) == (pytest.approx(2 * PERIOD_S), pytest.approx(3 * PERIOD_S))
+
+
+def test_a_robot_in_the_origin_and_a_reference_that_starts_elsewhere_break_assumption_2() -> None:
+    as_it_should = [period(HERE, control=commanded(0.0), reference=at) for at in (ORIGIN, HERE)]
+    assert theory(as_it_should).assumption_2.broken_s == 0.0
+    late = [period(HERE, control=commanded(0.0), reference=at) for at in (HERE, HERE)]
+    assert theory(late).assumption_2.first_s == 0.0
+    standing = [period(HERE, control=commanded(0.0), reference=at) for at in (ORIGIN, ORIGIN)]
+    assert theory(standing).assumption_2.first_s == pytest.approx(PERIOD_S)
+    near = [period(at, control=commanded(0.0), reference=HERE) for at in (HERE, Posture(0.02, 0.01, 0.0))]
+    found = theory(near).assumption_2
+    assert found.nearest_cm == pytest.approx(100.0 * math.hypot(0.02, 0.01))
+    assert found.last_s == pytest.approx(PERIOD_S)
+
+
+def test_a_heading_across_the_line_of_sight_breaks_assumption_3_and_passing_it_is_a_crossing() -> None:
+    run = [period(Posture(0.5, 0.0, angle), control=commanded(0.0)) for angle in (1.3, 1.5, 1.6, 2.0)]
+    found = theory(run).assumption_3
+    assert (found.frames, found.crossings) == (2, 1)
+    assert (found.first_s, found.last_s) == (pytest.approx(PERIOD_S), pytest.approx(2 * PERIOD_S))
+    assert found.nearest_rad == pytest.approx(1.6 - math.pi / 2)
+
+
+# Forward and backward.
+
+
+def test_a_change_of_direction_counts_and_trembling_at_rest_does_not() -> None:
+    speeds = [0.0, 0.001, -0.002, 0.2, 0.005, -0.005, 0.1, -0.1, -0.2, 0.3]
+    found = theory([period(HERE, (v, 0.0), commanded(0.0)) for v in speeds])
+    assert found.reversals == 2
+    assert found.backward_s == pytest.approx(2 * PERIOD_S)
+
+
+# What is said of them.
+
+
+def test_a_robot_that_nobody_steers_has_no_theory() -> None:
+    track = track_of([period(HERE), period(HERE)])
+    assert theory_of(track, Gains()) is None
+    assert track.now is None
+
+
+def test_the_line_on_the_screen_names_what_does_not_hold() -> None:
+    told, did = [0.1, 0.1, 0.1, 0.1], [0.0, -0.2, 0.1, 0.1]
+    run = [
+        period(Posture(0.5, 0.0, angle), (v, 0.0), commanded(given), reference=at)
+        for given, v, angle, at in zip(told, did, (1.3, 1.5, 1.6, 2.0), (ORIGIN, *[HERE] * 3), strict=True)
+    ]
+    assert theory_text(theory(run, Gains(0.05, 1.0))) == (
+        "assumption 3 within 0.1 rad in 2 frames, crossed 1 x; |f1| > P1 in 67 %; |f2| > P2 in 0 %;"
+        " backward for 0.03 s"
+    )
+    still = [period(HERE, (0.0, 0.0), commanded(0.0), reference=at) for at in (ORIGIN, HERE, HERE)]
+    assert theory_text(theory(still)) == ""
+
+
+def test_the_gains_are_those_of_each_robots_law() -> None:
+    scenario = load("fig6").scenario
+    assert gains_of(scenario) == {(0, 0): Gains(0.05, 5.2)}
+    other = load("fig6", ['network.robot.controller={law="kanayama"}']).scenario
+    assert gains_of(other) == {(0, 0): Gains(None, None)}
+
+
+# In the recording.
+
+SOURCE = Source("fig6", "name = 'fig6'\n", 1, b":00000001FF\r\n", "ab" * 32)
+
+
+def recorded(count: int, with_theory: bool) -> bytes:
+    stream, tracks = io.BytesIO(), Tracks()
+    with Recorder(stream, SOURCE) as recorder:
+        for one in periods(count, [(0, 0), (1, 2)]):
+            recorder.write(one)
+            tracks.add(one)
+            for (network, slot), track in tracks.robots.items():
+                if with_theory and track.theory.now is not None:
+                    recorder.write_theory(network, slot, track.theory.now)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("count", [2, 10, 23])
+def test_a_recording_has_the_terms_and_reads_the_same_with_and_without_them(count: int) -> None:
+    """So recordings of before they were written are read as they were."""
+    data = recorded(count, True)
+    assert data != recorded(count, False)
+    assert parse(data, "run.mcap") == parse(recorded(count, False), "run.mcap")
+    found = [
+        (channel.topic, json.loads(message.data))
+        for _, channel, message in make_reader(io.BytesIO(data)).iter_messages()
+        if channel.topic.endswith("/theory")
+    ]
+    assert len(found) == 2 * (count - 1)  # nothing is commanded in the first period
+    ticks = [content["tick"] for topic, content in found if topic == "/net0/robot0/theory"]
+    assert ticks == [index * CONTROL_PERIOD_TICKS for index in range(1, count)]
+
+
+def test_the_terms_of_a_whole_run_follow_from_its_recording() -> None:
+    """Fig. 6 in the whole loop: written along the run, and computed again from what was read back."""
+    text = load("fig6", ["duration_s=1.5"])
+    world, stream, tracks = World(text.scenario, 3, load_hex(image_path())), io.BytesIO(), Tracks()
+    with Recorder(stream, SOURCE) as recorder:
+        runner.run(world, recorder, on_period=tracks.add)
+    again = Tracks(parse(stream.getvalue(), "run.mcap").periods)
+    gains = gains_of(text.scenario)[0, 0]
+    one, other = (theory_of(each.robots[0, 0].theory, gains) for each in (tracks, again))
+    assert one == other
+    assert one is not None
+    assert one.disturbance is not None
+    assert 0.1 < one.disturbance.f1_largest_m_s2 < 8.0
+    assert one.assumption_3.frames == 0
