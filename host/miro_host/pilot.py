@@ -24,7 +24,7 @@ from miro_host.integrator import Integrator
 from miro_host.laws.interface import NOTHING, Accelerations, Answer, Law, LawInput, Velocities
 from miro_host.parts import PartError, described
 from miro_host.posture import Posture
-from miro_host.reference import Trajectory
+from miro_host.references.interface import Trajectory
 from miro_host.wheels import Wheels
 
 PERIOD_S = 1001.0 / 30000.0  # one NTSC frame, 800 800 ticks

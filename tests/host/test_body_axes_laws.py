@@ -1,4 +1,7 @@
-"""The laws beside the paper's: their equations, where they lead a robot from, and what they never exceed."""
+"""The laws beside the paper's: their equations, where they lead a robot from, and what they never exceed.
+
+Long because three laws share the paths and starts that they are tried on.
+"""
 
 import math
 
@@ -18,7 +21,10 @@ from miro_host.laws.kanayama import KanayamaParameters
 from miro_host.laws.registry import LAWS
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
-from miro_host.reference import Arc, Line, Ramp, Reference
+from miro_host.references.arc import Arc
+from miro_host.references.interface import Reference
+from miro_host.references.line import Line
+from miro_host.references.ramp import Ramp
 
 ALL = [BodyFrameParameters, KanayamaParameters, DynamicFeedbackParameters]
 HERE = Posture(0.0, 0.0, 0.0)

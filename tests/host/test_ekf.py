@@ -17,7 +17,7 @@ from miro_host.eye.track import Sighting
 from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
-from miro_host.reference import Line
+from miro_host.references.line import Line
 
 
 def apart_m(estimate, truth):

@@ -16,7 +16,7 @@ from miro_host.laws.yang_kim import Gains
 from miro_host.parts import PartError
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
-from miro_host.reference import Line
+from miro_host.references.line import Line
 
 HERE = Posture(0.07, 0.02, -0.38)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)

@@ -58,7 +58,7 @@ def test_naming_laws_imports_none_of_them():
     code = "import sys, miro_sim.scenario.keys; print([name for name in sys.modules if name.startswith('miro_host')])"
     done = children.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "miro_host.laws.registry" in done.stdout
-    for name in ("miro_host.laws.yang_kim", "miro_host.estimators.predict", "miro_host.reference"):
+    for name in ("miro_host.laws.yang_kim", "miro_host.estimators.predict", "miro_host.references.interface"):
         assert f"'{name}'" not in done.stdout
 
 

@@ -10,7 +10,8 @@ from miro_host.integrator import Integrator, Limits
 from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
 from miro_host.posture import Posture
-from miro_host.reference import Arc, Line
+from miro_host.references.arc import Arc
+from miro_host.references.line import Line
 from miro_host.station import Station
 from miro_host.vision import Vision, VisionErrors
 

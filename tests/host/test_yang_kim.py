@@ -9,7 +9,8 @@ from tests.naive import host_control as naive
 
 from miro_host.laws.yang_kim import Gains, YangKim, curvature_term, saturation, sign
 from miro_host.posture import Posture
-from miro_host.reference import Arc, Line
+from miro_host.references.arc import Arc
+from miro_host.references.line import Line
 
 SATURATING = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69)
 SWITCHING = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69, switching="sign", cosine_guard=0.0, rho_floor_m=1e-9)

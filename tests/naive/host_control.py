@@ -1,4 +1,4 @@
-"""Twin of `miro_host.reference` and `miro_host.laws.yang_kim`: the paper's formulas in 40-digit arithmetic.
+"""Twin of `miro_host.references` and `miro_host.laws.yang_kim`: the paper's formulas in 40-digit arithmetic.
 
 The reference comes in Cartesian form and everything polar is derived from it numerically; the law is written
 down in the order of the paper's text. Nothing is shared with the code under test.

@@ -139,8 +139,8 @@ def test_drive_s_says_when_the_reference_stands() -> None:
 FOREIGN = """
 import msgspec
 from miro_host.posture import Posture
-from miro_host.reference import Line
-from miro_host.reference_keys import ReferenceParameters
+from miro_host.references.line import Line
+from miro_host.references.interface import ReferenceParameters
 
 class Odd(ReferenceParameters, frozen=True, kw_only=True, tag="odd"):
     how: str

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from miro_host.estimators.none import NoEstimator
 from miro_host.estimators.predict import PredictParameters
-from miro_host.reference_keys import ArcRef, LineRef
+from miro_host.references.arc import ArcRef
+from miro_host.references.line import LineRef
 from miro_sim.scenario.camera_keys import PixelCamera
 from miro_sim.scenario.file import ScenarioError, builtin_names, builtin_text, load, parse
 from miro_sim.scenario.keys import Scenario

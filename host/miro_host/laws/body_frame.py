@@ -32,7 +32,7 @@ from miro_host.integrator import clamp
 from miro_host.laws.errors import errors
 from miro_host.laws.interface import Accelerations, Law, LawInput, LawParameters
 from miro_host.posture import Posture
-from miro_host.reference import Reference
+from miro_host.references.interface import Reference
 
 Gain = Annotated[float, Meta(ge=0.0, le=1e3)]
 Width = Annotated[float, Meta(ge=1e-6, le=1e3)]

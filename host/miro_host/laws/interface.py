@@ -27,7 +27,7 @@ from miro_host.integrator import Limits
 from miro_host.laws.registry import Controller
 from miro_host.memory import Remembering
 from miro_host.posture import Posture
-from miro_host.reference import Reference, Trajectory
+from miro_host.references.interface import Reference, Trajectory
 
 NOTHING: Mapping[str, float] = {}
 

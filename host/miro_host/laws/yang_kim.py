@@ -2,7 +2,7 @@
 
 What belongs here: the law as a function of reference, measured posture and velocity. What does not: the
 velocity's source (the integrator state, see `pilot`), equation (15) (`integrator`), the reference itself
-(`reference`).
+(`references`).
 
 Known limits of the law, which this module does not mend (host/README.md): it has no lateral feedback on
 the surface theta_e = 0, so the robot then runs parallel to the path; V = s's/2 jumps by 2 |theta_e'|
@@ -18,7 +18,7 @@ from msgspec import Meta
 from miro_exact.dmath import atan2, sincos, wrap_pi
 from miro_host.laws.interface import Accelerations, Law, LawInput, LawParameters
 from miro_host.posture import Posture
-from miro_host.reference import Reference
+from miro_host.references.interface import Reference
 
 POSITION_ERROR_M = 0.024  # rho_f of equation (11): the upper bound of the measurement error, section V-A
 NOT_NEGATIVE = (

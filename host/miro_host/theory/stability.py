@@ -15,7 +15,7 @@ import msgspec
 
 from miro_exact.dmath import atan2, sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.reference import Reference
+from miro_host.references.interface import Reference
 
 
 class PolarErrors(msgspec.Struct, frozen=True):

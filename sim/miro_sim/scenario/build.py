@@ -21,9 +21,9 @@ from miro_host.eye.calibration import Calibration
 from miro_host.laws.interface import LawParameters
 from miro_host.parts import PartError, described
 from miro_host.pilot import Pilot
-from miro_host.reference import Trajectory
-from miro_host.reference_keys import CheckedReference, ReferenceParameters
-from miro_host.reference_registry import REFERENCES
+from miro_host.references.checked import CheckedReference
+from miro_host.references.interface import ReferenceParameters, Trajectory
+from miro_host.references.registry import REFERENCES
 from miro_sim.plant.params import DriveParams
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 from miro_sim.scenario import keys as sc

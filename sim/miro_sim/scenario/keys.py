@@ -19,7 +19,7 @@ from msgspec import Meta
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_host.estimators.registry import DEFAULT_ESTIMATOR, ESTIMATORS, AnyEstimator
 from miro_host.laws.registry import DEFAULT_LAW, LAWS, Controller
-from miro_host.reference_registry import AnyReference
+from miro_host.references.registry import AnyReference
 from miro_protocol.table import DOWNLINK
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from miro_sim.plant.params import DriveParams

@@ -12,7 +12,7 @@ import msgspec
 from miro_host.estimators.registry import ESTIMATORS, AnyEstimator
 from miro_host.laws.registry import LAWS, Controller
 from miro_host.parts import PartError, Registry, described
-from miro_host.reference_registry import REFERENCES, AnyReference
+from miro_host.references.registry import REFERENCES, AnyReference
 
 REGISTRIES: dict[type, Registry[Any]] = {
     AnyReference: REFERENCES,

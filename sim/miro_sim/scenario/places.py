@@ -23,7 +23,7 @@ from miro_sim.scenario.keys import Robot, Scenario
 from miro_sim.scenario.views import check_camera, check_start
 
 if TYPE_CHECKING:
-    from miro_host.reference import Trajectory
+    from miro_host.references.interface import Trajectory
 
 STEP_M = 0.005
 """Distance along the path from one place that is checked to the next .."""
@@ -88,7 +88,8 @@ def _check(robot: Robot, scenario: Scenario, origin: str, place: str) -> None:
 
 def _instants(reference: Trajectory, duration_s: float) -> Iterator[float]:
     """Times from 0 on between which the reference does not go far; camera frames, if its path is not known."""
-    from miro_host.reference import Arc, Line  # hot, too
+    from miro_host.references.arc import Arc  # hot, too
+    from miro_host.references.line import Line
 
     if isinstance(reference, Line | Arc):
         moving_s = min(reference.ramp.duration_s, duration_s)

@@ -15,7 +15,7 @@ from tests.host.theory import ideal
 from tests.host.theory.ideal import PRINTED, ROBOT, STARTS, beside, paper_law
 
 from miro_host.posture import Posture
-from miro_host.reference import Line
+from miro_host.references.line import Line
 from miro_host.theory import stability
 from miro_host.theory.assumptions import HALF_PI, across
 from miro_host.theory.simulation import Simulation

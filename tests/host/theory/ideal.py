@@ -12,7 +12,8 @@ import msgspec
 from miro_host.laws.body_frame import BodyFrame, BodyFrameParameters
 from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.posture import Posture
-from miro_host.reference import Arc, Line
+from miro_host.references.arc import Arc
+from miro_host.references.line import Line
 from miro_host.theory.assumptions import across
 from miro_host.theory.matrices import times
 from miro_host.theory.simulation import Simulation

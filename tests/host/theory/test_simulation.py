@@ -10,7 +10,8 @@ from tests.naive.host_ideal_loop import drive
 from miro_host.integrator import Limits
 from miro_host.laws.yang_kim import YangKim
 from miro_host.posture import Posture
-from miro_host.reference import Arc, Line
+from miro_host.references.arc import Arc
+from miro_host.references.line import Line
 from miro_host.theory import computed_torque
 from miro_host.theory.simulation import Simulation
 from miro_host.theory.unicycle import Body, inertia

@@ -10,7 +10,8 @@ from tests.host.theory.ideal import PRINTED
 
 from miro_host.laws.yang_kim import Gains, YangKim, saturation, sign
 from miro_host.posture import Posture
-from miro_host.reference import Arc, Line
+from miro_host.references.arc import Arc
+from miro_host.references.line import Line
 from miro_host.theory import stability
 from miro_host.theory.assumptions import HALF_PI, across, radius
 

@@ -20,7 +20,8 @@ from tests.host.theory.ideal import (
 )
 
 from miro_host.posture import Posture
-from miro_host.reference import Arc, Line
+from miro_host.references.arc import Arc
+from miro_host.references.line import Line
 from miro_host.theory import stability
 from miro_host.theory.simulation import Simulation
 

@@ -8,14 +8,15 @@ import pytest
 from tests.host.distribution import install
 
 from miro_host.parts import PartError
-from miro_host.reference import Arc, Line
-from miro_host.reference_keys import ArcRef, CheckedReference, LineRef
-from miro_host.reference_registry import REFERENCES
+from miro_host.references.arc import Arc, ArcRef
+from miro_host.references.checked import CheckedReference
+from miro_host.references.line import Line, LineRef
+from miro_host.references.registry import REFERENCES
 from miro_sim.scenario.file import parse
 
 TURN = """
-from miro_host.reference import Line
-from miro_host.reference_keys import ReferenceParameters
+from miro_host.references.line import Line
+from miro_host.references.interface import ReferenceParameters
 
 class Waiting(ReferenceParameters, frozen=True, kw_only=True, tag="waiting"):
     wait_s: float = 1.0

@@ -7,7 +7,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from tests.naive import host_control as naive
 
-from miro_host.reference import Arc, Line, Ramp
+from miro_host.references.arc import Arc
+from miro_host.references.line import Line
+from miro_host.references.ramp import Ramp
 
 ANGLES = st.floats(-3.1, 3.1)
 

@@ -1,0 +1,45 @@
+"""References of other distributions: what is asked of each place that they give.
+
+What belongs here: the check of the numbers. What does not: the path as a whole (`miro_sim.scenario.places`).
+"""
+
+import math
+from collections.abc import Iterator
+
+import msgspec
+
+from miro_host.parts import PartError, described
+from miro_host.references.interface import Reference, Trajectory
+
+
+class CheckedReference:
+    """A trajectory of another distribution: what it gives is finite, and what it raises names it.
+
+    A trajectory has no memory: it is a function of time.
+    """
+
+    def __init__(self, trajectory: Trajectory, name: str) -> None:
+        self.trajectory = trajectory
+        self.name = name
+
+    def __repr__(self) -> str:
+        return f"CheckedReference({self.trajectory!r})"
+
+    def at(self, t_s: float) -> Reference:
+        """The reference at `t_s`. Raises PartError."""
+        try:
+            found = self.trajectory.at(t_s)
+            for value in _numbers(found):
+                if type(value) is not float or not math.isfinite(value):
+                    raise ValueError(f"it returned {found!r}; all must be finite floats")
+        except Exception as error:
+            reason = str(error) if type(error) is ValueError else described(error)
+            what = f"reference {self.name!r} failed at {t_s:.6f} s: {reason}"
+            raise PartError(what, "mend the reference or its parameters") from error
+        return found
+
+
+def _numbers(found: Reference) -> Iterator[object]:
+    posture, *rates = msgspec.structs.astuple(found)
+    yield from msgspec.structs.astuple(posture)
+    yield from rates

@@ -1,0 +1,66 @@
+"""What a reference trajectory gives and what its parameters must have.
+
+What belongs here: the interface. What does not: any path, how a scenario finds one by its name (`registry`), and what
+is refused of one from another distribution (`checked`).
+
+A reference is two classes, like a law: a frozen struct of parameters whose tag is the reference's name, which is the
+scenario's `reference` table, and the trajectory that it makes, a function of time without memory.
+"""
+
+from typing import Annotated, Protocol
+
+import msgspec
+from msgspec import Meta
+
+from miro_host.posture import Posture
+from miro_host.references.registry import AnyReference
+
+DEGREE = 0.017453292519943295
+
+TurnDeg = Annotated[float, Meta(ge=-180.0, le=180.0)]
+
+
+class Reference(msgspec.Struct, frozen=True):
+    """One instant of a reference trajectory.
+
+    `w_*` are turning rates in rad/s and rad/s2. `rho_m`, `phi_rad` are the polar coordinates of the posture;
+    their derivatives are those of equation (9), `rho_accel_m_s2` = v_r' cos(phi_r - theta_r) + R(q_r, z_r)
+    of equation (18). All angles lie in (-pi, pi].
+    """
+
+    posture: Posture
+    v_m_s: float
+    w_rad_s: float
+    v_dot_m_s2: float
+    w_dot_rad_s2: float
+    rho_m: float
+    phi_rad: float
+    rho_rate_m_s: float
+    phi_rate_rad_s: float
+    rho_accel_m_s2: float
+
+
+class Trajectory(Protocol):
+    """A reference over time."""
+
+    def at(self, t_s: float) -> Reference:
+        """The reference at `t_s` seconds after its start, for any time, also before 0 and after its end."""
+        ...
+
+
+class ReferenceParameters(
+    msgspec.Struct, AnyReference, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"
+):
+    """Base of every reference's parameters.
+
+    Derive with `frozen=True, kw_only=True, tag="name_of_the_reference"`, and define `trajectory`.
+    """
+
+    def trajectory(self, duration_s: float) -> Trajectory:
+        """The reference for a run of `duration_s`. It starts in the origin of the world axes, at 0 s."""
+        raise NotImplementedError(f"{type(self).__name__} has no method `trajectory`")
+
+    @classmethod
+    def name(cls) -> str:
+        """The reference's name in scenario files."""
+        return str(cls.__struct_config__.tag)

@@ -1,0 +1,65 @@
+"""The speed profile that line and arc share: a ramp, steady speed, and perhaps a ramp down.
+
+What belongs here: length, speed and acceleration along a path over time, and the keys that choose them. What does not:
+the path.
+"""
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+Speed = Annotated[float, Meta(ge=0.0, le=1.46)]
+Seconds = Annotated[float, Meta(ge=0.0, le=1e3)]
+DriveS = Annotated[float, Meta(ge=0.0, le=86_400.0)]
+
+
+class Ramp(msgspec.Struct, frozen=True):
+    """Speed profile: from rest to `speed_m_s` in `ramp_s` at constant acceleration, then steady.
+
+    Before 0 s and after `duration_s` the reference stands still. With `ramp_down` it comes to rest as it started: at
+    constant deceleration in the last `ramp_s` (in the second half, if `duration_s` is shorter than two ramps).
+    Without, there is no ramp at the end. The instants 0 and `duration_s` themselves belong to the drive.
+    """
+
+    speed_m_s: float = 0.20
+    ramp_s: float = 0.5
+    duration_s: float = 6.0
+    ramp_down: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("speed_m_s", "ramp_s", "duration_s"):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f"{name} = {getattr(self, name)!r}: must be 0 or greater")
+
+    def at(self, t_s: float) -> tuple[float, float, float]:
+        """Path length in m, speed in m/s and acceleration in m/s2 at `t_s`."""
+        if t_s < 0.0:
+            return 0.0, 0.0, 0.0
+        if t_s > self.duration_s:
+            return self._whole_length(), 0.0, 0.0
+        left_s = self.duration_s - t_s
+        if self.ramp_down and left_s < self.ramp_s and left_s < t_s:  # the start, run backwards
+            slowing = self.speed_m_s / self.ramp_s
+            return self._whole_length() - self._length(left_s), slowing * left_s, -slowing
+        if t_s < self.ramp_s:
+            return self._length(t_s), self.speed_m_s * t_s / self.ramp_s, self.speed_m_s / self.ramp_s
+        return self._length(t_s), self.speed_m_s, 0.0
+
+    def _whole_length(self) -> float:
+        if not self.ramp_down:
+            return self._length(self.duration_s)
+        half_s = 0.5 * self.duration_s
+        return 2.0 * self._length(half_s)
+
+    def _length(self, t_s: float) -> float:
+        if t_s < self.ramp_s:
+            return self.speed_m_s * t_s * t_s / (2.0 * self.ramp_s)
+        return self.speed_m_s * (t_s - 0.5 * self.ramp_s)
+
+
+def ramp_for(speed_m_s: float, ramp_s: float, drive_s: float | None, duration_s: float) -> Ramp:
+    """The profile that a scenario's keys choose for a run of `duration_s`: without `drive_s` it has no ramp down."""
+    if drive_s is None:
+        return Ramp(speed_m_s, ramp_s, max(duration_s, ramp_s))
+    return Ramp(speed_m_s, ramp_s, drive_s, ramp_down=True)

@@ -1,0 +1,25 @@
+"""The names of the references.
+
+What belongs here: the table of our own references, and the type of a scenario's `reference`. What does not: the
+interface (`interface`) and the trajectories, which are not imported before a scenario names one.
+"""
+
+from miro_host.parts import Registry
+
+
+class AnyReference:
+    """Parameters of any reference. A reference's own struct derives from `interface.ReferenceParameters`.
+
+    A plain class, because msgspec reads a struct as itself and never as one of the structs derived from it.
+    """
+
+    __slots__ = ()
+
+
+REFERENCES: Registry[AnyReference] = Registry(
+    "mirotwin.references",
+    word="reference",
+    key="kind",
+    base="miro_host.references.interface:ReferenceParameters",
+    own={"line": "miro_host.references.line:LineRef", "arc": "miro_host.references.arc:ArcRef"},
+)
