@@ -113,8 +113,16 @@ def test_a_whole_number_is_a_number() -> None:
             "network[0].robot[0]: slot 3 does not exist on a network of 3 robots; use 0 to 2",
         ),
         ("slot = 0", "slot = 5", "network[0].robot[0].slot: 5 is out of range; must be <= 4"),
-        ('kind = "line"', 'kid = "line"', "reference.kind: this key is missing; use line or arc"),
-        ('"line"', '"spiral"', "reference.kind: 'spiral' is not one of the choices; use line or arc"),
+        (
+            'kind = "line"',
+            'kid = "line"',
+            "reference.kind: this key is missing; use line, arc, sine or waypoints",
+        ),
+        (
+            '"line"',
+            '"spiral"',
+            "reference.kind: 'spiral' is not one of the choices; use line, arc, sine or waypoints",
+        ),
         (
             'switching = "saturation"',
             'switching = "sing"',

@@ -77,7 +77,12 @@ class LawParameters(
 
     Derive with `frozen=True, kw_only=True, tag="name_of_the_law"`, give each key its unit (`gain_per_s`) and its range
     (`typing.Annotated` with `msgspec.Meta`), and define `law`.
+
+    A law in polar coordinates states how near the origin of the world axes its reference may come, once it has left it,
+    as `ORIGIN_CLEARANCE_M`; scenarios with another reference are refused. 0: the law knows no origin.
     """
+
+    ORIGIN_CLEARANCE_M: ClassVar[float] = 0.0
 
     def law(self) -> "Law[Any]":
         """A new law with these parameters, as it is before its first period."""

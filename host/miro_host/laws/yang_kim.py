@@ -10,7 +10,7 @@ the surface theta_e = 0, so the robot then runs parallel to the path; V = s's/2 
 """
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
@@ -48,6 +48,8 @@ class Gains(LawParameters, frozen=True, tag="yang_kim"):
     singularity of assumption 3. d = 0 leaves 1/c as it is; a scenario cannot set that.
     ValueError for a parameter outside its range.
     """
+
+    ORIGIN_CLEARANCE_M: ClassVar[float] = POSITION_ERROR_M
 
     gamma1_per_s: Gain = 1.7
     gamma2_per_s: Gain = 3.0

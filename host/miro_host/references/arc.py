@@ -1,12 +1,14 @@
-"""A circular arc out of the origin, with a speed ramp.
+"""A circular arc with a speed ramp.
 
-What belongs here: the trajectory and its keys. What does not: the speed profile (`ramp`).
+What belongs here: the trajectory and its keys. What does not: the speed profile (`ramp`), and the polar form of
+an arc that starts elsewhere than in the origin, or comes back to it (`polar`).
 
-It starts in the origin of the world axes, as assumption 2 (equation 11) of the paper wants. There the polar form of
-equation (9) is 0/0; on an arc it has a closed form without a division by rho, which is used throughout, so that t = 0
-is a time like any other.
+Assumption 2 (equation 11) of the paper wants a path out of the origin of the world axes. There the polar form of
+equation (9) is 0/0; on such an arc it has a closed form without a division by rho, so that t = 0 is a time like any
+other.
 """
 
+import math
 from typing import Annotated
 
 import msgspec
@@ -14,30 +16,26 @@ from msgspec import Meta
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.interface import DEGREE, Reference, ReferenceParameters, TurnDeg
+from miro_host.references.interface import DEGREE, Cm, Pace, Reference, ReferenceParameters, TurnDeg
+from miro_host.references.polar import with_polar_form
 from miro_host.references.ramp import DriveS, Ramp, Seconds, Speed, ramp_for
+
+PI = 3.141592653589793
 
 
 class Arc(msgspec.Struct, frozen=True):
-    """Circular arc out of the origin: theta_r = `heading_rad` + `curvature_per_m` * s.
+    """Circular arc: theta_r = `heading_rad` + `curvature_per_m` * s.
 
-    The chord from the origin bisects the tangents, hence with h = curvature * s / 2: phi_r = heading + h,
-    rho_r = 2 sin(h) / curvature, phi_r - theta_r = -h, and from equations (9) and (18)
-    rho_r' = v cos h, phi_r' = w / 2, rho_r'' = v' cos h - v^2 (curvature / 2) sin h.
-    ValueError for an arc that would come back to the origin, against assumption 2 (equation 11).
+    The chord from its start bisects the tangents. Hence out of the origin, until the arc comes back to it, with
+    h = curvature * s / 2: phi_r = heading + h, rho_r = 2 sin(h) / curvature, phi_r - theta_r = -h, and from
+    equations (9) and (18) rho_r' = v cos h, phi_r' = w / 2, rho_r'' = v' cos h - v^2 (curvature / 2) sin h.
     """
 
     ramp: Ramp = Ramp()
     heading_rad: float = 1.0471975511965976  # 60 degrees
     curvature_per_m: float = -1.0
-
-    def __post_init__(self) -> None:
-        turn = abs(self.curvature_per_m) * self.ramp.at(self.ramp.duration_s)[0]
-        if turn >= 6.283185307179586:
-            raise ValueError(
-                f"curvature_per_m = {self.curvature_per_m!r}: the path turns by {turn:.3f} rad, back to the"
-                " origin; shorten the drive or make the arc flatter"
-            )
+    start_x_m: float = 0.0
+    start_y_m: float = 0.0
 
     def at(self, t_s: float) -> Reference:
         """The reference at `t_s`; standstill at the ends outside the ramp's time."""
@@ -48,6 +46,10 @@ class Arc(msgspec.Struct, frozen=True):
         rho = s if kappa == 0.0 else 2.0 * sin_h / kappa
         phi = wrap_pi(self.heading_rad + half_turn)
         sin_phi, cos_phi = sincos(phi)
+        if self.start_x_m != 0.0 or self.start_y_m != 0.0 or abs(half_turn) >= PI:
+            x, y = self.start_x_m + rho * cos_phi, self.start_y_m + rho * sin_phi
+            at = Posture(x, y, wrap_pi(self.heading_rad + kappa * s))
+            return with_polar_form(at, v, kappa * v, v_dot, kappa * v_dot)
         return Reference(
             posture=Posture(rho * cos_phi, rho * sin_phi, wrap_pi(self.heading_rad + kappa * s)),
             v_m_s=v,
@@ -61,10 +63,19 @@ class Arc(msgspec.Struct, frozen=True):
             rho_accel_m_s2=v_dot * cos_h - v * v * (0.5 * kappa) * sin_h,
         )
 
+    def pace(self, step_m: float, step_rad: float) -> Pace:
+        """After one whole turn the circle is closed."""
+        kappa = abs(self.curvature_per_m)
+        if kappa == 0.0:
+            return self.ramp.pace(step_m, math.inf)
+        return self.ramp.pace(min(step_m, step_rad / kappa), 2.0 * PI / kappa)
+
 
 class ArcRef(ReferenceParameters, frozen=True, kw_only=True, tag="arc"):
-    """A circular arc from the origin: heading theta_0 + kappa s, the same speed ramp and `drive_s` as the line."""
+    """A circular arc: heading theta_0 + kappa s, the same speed ramp and `drive_s` as the line."""
 
+    start_x_cm: Cm = 0.0
+    start_y_cm: Cm = 0.0
     heading_deg: TurnDeg = 60.0
     curvature_per_m: Annotated[float, Meta(ge=-100.0, le=100.0)] = -1.0
     speed_m_s: Speed = 0.20
@@ -76,4 +87,6 @@ class ArcRef(ReferenceParameters, frozen=True, kw_only=True, tag="arc"):
             ramp_for(self.speed_m_s, self.ramp_s, self.drive_s, duration_s),
             self.heading_deg * DEGREE,
             self.curvature_per_m,
+            self.start_x_cm / 100.0,
+            self.start_y_cm / 100.0,
         )

@@ -7,7 +7,7 @@ A reference is two classes, like a law: a frozen struct of parameters whose tag 
 scenario's `reference` table, and the trajectory that it makes, a function of time without memory.
 """
 
-from typing import Annotated, Protocol
+from typing import Annotated, Protocol, runtime_checkable
 
 import msgspec
 from msgspec import Meta
@@ -18,6 +18,7 @@ from miro_host.references.registry import AnyReference
 DEGREE = 0.017453292519943295
 
 TurnDeg = Annotated[float, Meta(ge=-180.0, le=180.0)]
+Cm = Annotated[float, Meta(ge=-1_000.0, le=1_000.0)]
 
 
 class Reference(msgspec.Struct, frozen=True):
@@ -48,6 +49,27 @@ class Trajectory(Protocol):
         ...
 
 
+class Pace(msgspec.Struct, frozen=True):
+    """How closely, and how long, one has to look at a trajectory to have seen all of it.
+
+    Within `step_s` it goes no further and turns no more than was asked. After `until_s` it stands, or goes only where
+    it has been. After `steady_s` its speeds and accelerations are such as they have been.
+    """
+
+    step_s: float
+    until_s: float
+    steady_s: float
+
+
+@runtime_checkable
+class Paced(Trajectory, Protocol):
+    """A trajectory that says how closely it has to be looked at. All of our own do."""
+
+    def pace(self, step_m: float, step_rad: float) -> Pace:
+        """Its pace for steps of `step_m` and `step_rad` at most."""
+        ...
+
+
 class ReferenceParameters(
     msgspec.Struct, AnyReference, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"
 ):
@@ -57,7 +79,7 @@ class ReferenceParameters(
     """
 
     def trajectory(self, duration_s: float) -> Trajectory:
-        """The reference for a run of `duration_s`. It starts in the origin of the world axes, at 0 s."""
+        """The reference for a run of `duration_s`, which begins at 0 s. ValueError if these parameters give none."""
         raise NotImplementedError(f"{type(self).__name__} has no method `trajectory`")
 
     @classmethod

@@ -1,27 +1,36 @@
-"""A straight line out of the origin, with a speed ramp.
+"""A straight line with a speed ramp.
 
-What belongs here: the trajectory and its keys. What does not: the speed profile (`ramp`).
+What belongs here: the trajectory and its keys. What does not: the speed profile (`ramp`), and the polar form of
+a line that starts elsewhere than in the origin (`polar`).
 """
+
+import math
 
 import msgspec
 
 from miro_exact.dmath import sincos, wrap_pi
 from miro_host.posture import Posture
-from miro_host.references.interface import DEGREE, Reference, ReferenceParameters, TurnDeg
+from miro_host.references.interface import DEGREE, Cm, Pace, Reference, ReferenceParameters, TurnDeg
+from miro_host.references.polar import with_polar_form
 from miro_host.references.ramp import DriveS, Ramp, Seconds, Speed, ramp_for
 
 
 class Line(msgspec.Struct, frozen=True):
-    """Straight line out of the origin at `heading_rad` against +X: theta_r = phi_r = the angle, rho_r = s."""
+    """Straight line at `heading_rad` against +X. Out of the origin theta_r = phi_r = the angle and rho_r = s."""
 
     ramp: Ramp = Ramp()
     heading_rad: float = 0.0
+    start_x_m: float = 0.0
+    start_y_m: float = 0.0
 
     def at(self, t_s: float) -> Reference:
         """The reference at `t_s`; standstill at the ends outside the ramp's time."""
         s, v, v_dot = self.ramp.at(t_s)
         angle = wrap_pi(self.heading_rad)
         sin, cos = sincos(angle)
+        if self.start_x_m != 0.0 or self.start_y_m != 0.0:
+            at = Posture(self.start_x_m + s * cos, self.start_y_m + s * sin, angle)
+            return with_polar_form(at, v, 0.0, v_dot, 0.0)
         return Reference(
             posture=Posture(s * cos, s * sin, angle),
             v_m_s=v,
@@ -35,14 +44,20 @@ class Line(msgspec.Struct, frozen=True):
             rho_accel_m_s2=v_dot,
         )
 
+    def pace(self, step_m: float, step_rad: float) -> Pace:
+        """A line that does not end in time leads on for ever."""
+        return self.ramp.pace(step_m, math.inf)
+
 
 class LineRef(ReferenceParameters, frozen=True, kw_only=True, tag="line"):
-    """A straight line from the origin, run with a speed ramp: s = v t^2 / (2 t_r), then v (t - t_r / 2).
+    """A straight line, run with a speed ramp: s = v t^2 / (2 t_r), then v (t - t_r / 2).
 
     With `drive_s` the reference comes to rest by the same ramp, after so many seconds, and stands from then on.
     Without, it moves for the whole duration.
     """
 
+    start_x_cm: Cm = 0.0
+    start_y_cm: Cm = 0.0
     heading_deg: TurnDeg = 0.0
     speed_m_s: Speed = 0.20
     ramp_s: Seconds = 0.5
@@ -50,5 +65,8 @@ class LineRef(ReferenceParameters, frozen=True, kw_only=True, tag="line"):
 
     def trajectory(self, duration_s: float) -> Line:
         return Line(
-            ramp_for(self.speed_m_s, self.ramp_s, self.drive_s, duration_s), self.heading_deg * DEGREE
+            ramp_for(self.speed_m_s, self.ramp_s, self.drive_s, duration_s),
+            self.heading_deg * DEGREE,
+            self.start_x_cm / 100.0,
+            self.start_y_cm / 100.0,
         )

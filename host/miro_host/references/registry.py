@@ -21,5 +21,10 @@ REFERENCES: Registry[AnyReference] = Registry(
     word="reference",
     key="kind",
     base="miro_host.references.interface:ReferenceParameters",
-    own={"line": "miro_host.references.line:LineRef", "arc": "miro_host.references.arc:ArcRef"},
+    own={
+        "line": "miro_host.references.line:LineRef",
+        "arc": "miro_host.references.arc:ArcRef",
+        "sine": "miro_host.references.sine:SineRef",
+        "waypoints": "miro_host.references.waypoints:WaypointsRef",
+    },
 )

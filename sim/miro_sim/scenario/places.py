@@ -1,7 +1,8 @@
-"""Checks that the robots of a scenario start on the pitch and that their references stay on it.
+"""Checks that the robots of a scenario start on the pitch, and that their references stay on it and can be driven.
 
-What belongs here: the check and its messages. What does not: the geometry (`pitch`), all other rules (`keys`). The
-time that a robot spends off the pitch during a run is counted by `summary`.
+What belongs here: the check and its messages. What does not: the geometry (`pitch`), what can be driven under which
+law (`drives`), all other rules (`keys`). The time that a robot spends off the pitch during a run is counted by
+`summary`.
 
 Checked are the square of the robot at its start, and the same square at the reference, along the whole of its path: a
 robot that follows the reference without error has it there. Of a reference from another distribution, whose path is not
@@ -42,22 +43,15 @@ def check_places(scenario: Scenario, origin: str) -> None:
             try:
                 _check(robot, scenario, origin, place)
             except PartError as error:
-                raise ScenarioError(origin, *_not_made(error, f"{place}.reference")) from error
+                raise ScenarioError(origin, f"{place}.reference", error.what, error.remedy) from error
             except DomainError as error:  # a heading of a million radians
                 raise ScenarioError(origin, f"{place}.reference", f"leaves the pitch: {error}") from error
 
 
-def _not_made(error: PartError, place: str) -> tuple[str, str, str]:
-    """Place, what and remedy for a reference that cannot be made, or fails."""
-    cause = f"{error.__cause__}"
-    if cause.startswith("curvature_per_m = "):  # an arc of a full turn
-        what = cause.partition(": ")[2].partition(";")[0]
-        return f"{place}.curvature_per_m", what, "make the arc flatter, or end it with drive_s"
-    return place, error.what, error.remedy
-
-
 def _check(robot: Robot, scenario: Scenario, origin: str, place: str) -> None:
-    from miro_sim.scenario.build import reference_for  # needs hot modules: not before the engine was chosen
+    from miro_host.laws.interface import LawParameters  # needs hot modules: not before the engine was chosen
+    from miro_sim.scenario.build import reference_for
+    from miro_sim.scenario.drives import limits_objection, origin_objection
 
     duration_s = scenario.duration_s
     reference = reference_for(robot, duration_s)
@@ -84,27 +78,40 @@ def _check(robot: Robot, scenario: Scenario, origin: str, place: str) -> None:
                 remedy = f"choose other parameters for it, or duration_s = {int(100.0 * on_s) / 100.0:g}"
             raise ScenarioError(origin, f"{place}.reference", what, remedy if on_s else "start it elsewhere")
         on_s = t_s
+    law = robot.controller
+    assert isinstance(law, LawParameters)
+    objection = origin_objection(
+        ((t_s, reference.at(t_s)) for t_s in _instants(reference, duration_s)), law
+    ) or limits_objection(((t_s, reference.at(t_s)) for t_s in _frames(reference, duration_s)), law)
+    if objection is not None:
+        raise ScenarioError(origin, f"{place}.reference", *objection)
 
 
 def _instants(reference: Trajectory, duration_s: float) -> Iterator[float]:
     """Times from 0 on between which the reference does not go far; camera frames, if its path is not known."""
-    from miro_host.references.arc import Arc  # hot, too
-    from miro_host.references.line import Line
+    from miro_host.references.interface import Paced  # hot, too
 
-    if isinstance(reference, Line | Arc):
-        moving_s = min(reference.ramp.duration_s, duration_s)
-        curvature = reference.curvature_per_m if isinstance(reference, Arc) else 0.0
-        step_m = min(STEP_M, STEP_RAD / abs(curvature)) if curvature else STEP_M
-        speed_m_s = reference.ramp.speed_m_s
-        step_s = step_m / speed_m_s if speed_m_s > 0.0 else moving_s
-    else:
-        moving_s = min(duration_s, MOST_S)
-        step_s = seconds(CONTROL_PERIOD_TICKS)
+    if not isinstance(reference, Paced):
+        yield from _frames(reference, duration_s)
+        return
+    pace = reference.pace(STEP_M, STEP_RAD)
+    yield from _every(pace.step_s, min(pace.until_s, duration_s))
+
+
+def _frames(reference: Trajectory, duration_s: float) -> Iterator[float]:
+    """Camera frames, as long as the reference moves as it has not moved before."""
+    from miro_host.references.interface import Paced
+
+    steady_s = reference.pace(STEP_M, STEP_RAD).steady_s if isinstance(reference, Paced) else MOST_S
+    yield from _every(seconds(CONTROL_PERIOD_TICKS), min(steady_s, duration_s, MOST_S))
+
+
+def _every(step_s: float, until_s: float) -> Iterator[float]:
     count = 0
-    while count * step_s < moving_s:
+    while count * step_s < until_s:
         yield count * step_s
         count += 1
-    yield moving_s
+    yield until_s
 
 
 def _off_pitch(at: Posture) -> tuple[str, str] | None:

@@ -33,8 +33,10 @@ class Late:
 """
 
 
-def test_our_own_references_are_line_and_arc():
-    assert REFERENCES.names() == ["line", "arc"]
+def test_our_own_references_are_found_by_their_names():
+    assert REFERENCES.names() == ["line", "arc", "sine", "waypoints"]
+    for name in REFERENCES.names():
+        assert REFERENCES.find(name).name() == name
     assert isinstance(LineRef(heading_deg=90.0).trajectory(2.0), Line)
     arc = ArcRef(heading_deg=90.0, curvature_per_m=0.5).trajectory(2.0)
     assert isinstance(arc, Arc)

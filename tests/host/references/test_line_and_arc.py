@@ -109,11 +109,6 @@ def test_a_path_with_a_ramp_down_is_the_same_path_without_until_it_slows_down():
     assert Ramp(duration_s=0.0, ramp_down=True).at(1.0) == (0.0, 0.0, 0.0)
 
 
-def test_an_arc_back_to_the_origin_is_refused():
-    with pytest.raises(ValueError, match=r"curvature_per_m = 6\.0"):
-        Arc(curvature_per_m=6.0)
-
-
 @pytest.mark.parametrize("name", ["speed_m_s", "ramp_s", "duration_s"])
 @pytest.mark.parametrize("value", [-0.1, math.nan])
 def test_a_ramp_names_what_is_wrong_with_it(name, value):

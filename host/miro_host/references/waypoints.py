@@ -1,0 +1,202 @@
+"""A path through waypoints, planned: from points, some with headings, to a trajectory within bounds.
+
+What belongs here: the trajectory and its keys. What does not: headings that are not given (`headings`), the shape of
+the path (`spline`), the speed along it (`speeds`), and the polar form (`polar`).
+
+    points ─► headings ─► quintic pieces ─► table of cells: length, curvature ─► speeds ─► times
+                                                                                             │
+    t ─► cell ─► way along the path in it ─► tau ─► posture, curvature ─► Reference  ◄───────┘
+
+The path begins and ends at rest. A closed one is driven round and round: from rest until its speed is that of the lap
+before, then lap after lap. Speed and heading are continuous, so is the curvature: v and w do not jump. v' is constant
+within a cell of the table.
+"""
+
+import math
+from bisect import bisect_right
+from functools import lru_cache
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from miro_exact.dmath import atan2
+from miro_host.posture import Posture
+from miro_host.references.headings import headings
+from miro_host.references.interface import DEGREE, Cm, Pace, Reference, ReferenceParameters, TurnDeg
+from miro_host.references.polar import with_polar_form
+from miro_host.references.speeds import Bounds, at_nodes, run_up, smooth, timed
+from miro_host.references.spline import Piece, spline
+
+CELLS = 64
+"""Cells of the table in each piece of the path."""
+LEAST_CM = 7.5
+"""The edge of the robot's square: points that are nearer to each other say more about heading than about place."""
+MOST_POINTS = 200
+MOST_CURVATURE_PER_M = 100.0
+LEAST_RATE = 0.05
+GAUSS = ((0.1127016653792583, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.8872983346207417, 5.0 / 18.0))
+"""Gauss and Legendre's three points in 0 to 1, and their weights."""
+
+
+class Waypoints:
+    """A trajectory through `points` in m, with `given` headings in rad or None, within `bounds`.
+
+    ValueError for a path that cannot be driven: one that turns back on itself or bends to less than 1 cm.
+    """
+
+    def __init__(
+        self,
+        points: list[tuple[float, float]],
+        given: list[float | None],
+        bounds: Bounds,
+        closed: bool = False,
+    ) -> None:
+        self.closed = closed
+        self.bounds = bounds
+        self.pieces = spline(points, headings(points, given, closed), closed)
+        self.ways_m: list[float] = []
+        curvatures: list[float] = []
+        for number, piece in enumerate(self.pieces):
+            self._tabulate(piece, number, curvatures)
+        squares = at_nodes(bounds, curvatures, closed)
+        lap = smooth(squares, self.ways_m, bounds.accel_m_s2, closed)
+        self.lap = timed(lap, self.ways_m)
+        self.start = timed(run_up(lap, self.ways_m, bounds.accel_m_s2), self.ways_m) if closed else self.lap
+        self.most_curvature_per_m = max(curvatures)
+
+    def __repr__(self) -> str:
+        kind = "closed" if self.closed else "open"
+        return f"Waypoints({len(self.pieces)} pieces, {kind}, lap of {self.lap.duration_s:.3f} s)"
+
+    def _tabulate(self, piece: Piece, number: int, curvatures: list[float]) -> None:
+        """The cells of one piece: their lengths, and a bound of their curvature.
+
+        A peak between two of the places that are looked at is higher than the higher one by an eighth of the difference
+        between them and their neighbour, if it is a parabola: half of it is added.
+        """
+        chord_rate = 0.0
+        for weight_at, weight in GAUSS:
+            chord_rate += weight * piece.rate(weight_at)
+        bends = []
+        for half in range(2 * CELLS + 1):
+            shape = piece.shape(half / (2.0 * CELLS))
+            rate = piece.rate(half / (2.0 * CELLS))
+            bend = abs(shape.curvature()[0]) if rate > LEAST_RATE * chord_rate else 2.0 * MOST_CURVATURE_PER_M
+            if bend > MOST_CURVATURE_PER_M:
+                where = f"({100.0 * shape.x_m:.1f}, {100.0 * shape.y_m:.1f}) cm"
+                raise ValueError(
+                    f"points[{number}]: behind this point, at {where}, the path bends to less than"
+                    f" {100.0 / MOST_CURVATURE_PER_M:.0f} cm; give another heading_deg, or move points apart"
+                )
+            bends.append(bend)
+        for cell in range(CELLS):
+            self.ways_m.append(_way(piece, cell / CELLS, (cell + 1) / CELLS))
+            a, b, c = bends[2 * cell : 2 * cell + 3]
+            curvatures.append(max(a, b, c) + 0.5 * max(abs(b - a), abs(c - b)))
+
+    def at(self, t_s: float) -> Reference:
+        """The reference at `t_s`; it stands before 0 s and, unless it is closed, after its end."""
+        lap, since_s = self.start, max(t_s, 0.0)
+        if t_s > lap.duration_s and self.closed:
+            since_s = (t_s - lap.duration_s) % self.lap.duration_s
+            lap = self.lap
+        moving = t_s >= 0.0 and since_s <= lap.duration_s
+        since_s = min(since_s, lap.duration_s)
+        cell = min(bisect_right(lap.times_s, since_s), len(lap.accels_m_s2)) - 1
+        in_cell_s = since_s - lap.times_s[cell]
+        accel, speed = lap.accels_m_s2[cell], lap.speeds_m_s[cell]
+        way = in_cell_s * (speed + 0.5 * accel * in_cell_s)
+        on_path = cell % len(self.ways_m)
+        piece = self.pieces[on_path // CELLS]
+        shape = piece.shape(self._tau(piece, on_path, way))
+        bend, bend_rate = shape.curvature()
+        v = max(speed + accel * in_cell_s, 0.0) if moving else 0.0
+        v_dot = accel if moving else 0.0
+        posture = Posture(shape.x_m, shape.y_m, atan2(shape.dy, shape.dx))
+        return with_polar_form(posture, v, bend * v, v_dot, bend * v_dot + bend_rate * v * v)
+
+    def _tau(self, piece: Piece, cell: int, way_m: float) -> float:
+        """The parameter `way_m` behind a cell's beginning: linearly, then two steps of Newton."""
+        first = (cell % CELLS) / CELLS
+        tau = first + min(way_m / self.ways_m[cell], 1.0) / CELLS
+        for _ in range(2):
+            tau -= (_way(piece, first, tau) - way_m) / piece.rate(tau)
+        return tau
+
+    def pace(self, step_m: float, step_rad: float) -> Pace:
+        """It has been everywhere after its end, or after the first lap at its own speed."""
+        until_s = self.start.duration_s
+        if self.closed:
+            until_s += self.lap.duration_s
+        bend = self.most_curvature_per_m
+        step_s = min(step_m, step_rad / bend if bend > 0.0 else step_m) / self.bounds.speed_m_s
+        return Pace(step_s, until_s, until_s)
+
+
+def _way(piece: Piece, first: float, last: float) -> float:
+    """Length in m of a piece from one parameter to another, by Gauss and Legendre."""
+    span = last - first
+    rate = 0.0
+    for place, weight in GAUSS:
+        rate += weight * piece.rate(first + place * span)
+    return span * rate
+
+
+class Waypoint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One point of a path; without a heading it gets that of the circle through it and its neighbours."""
+
+    x_cm: Cm
+    y_cm: Cm
+    heading_deg: TurnDeg | None = None
+
+
+class WaypointsRef(ReferenceParameters, frozen=True, kw_only=True, tag="waypoints"):
+    """A smooth path through `points`, as fast as the bounds allow, from rest to rest.
+
+    `accel_m_s2` bounds the acceleration along the path, `lateral_accel_m_s2` that across it, v w, and `turn_rad_s` the
+    turning rate w. With `closed` the last point is followed by the first, and the path is driven until the run ends.
+    """
+
+    points: tuple[Waypoint, ...]
+    closed: bool = False
+    speed_m_s: Annotated[float, Meta(ge=0.01, le=1.46)] = 0.20
+    accel_m_s2: Annotated[float, Meta(ge=0.01, le=100.0)] = 0.40
+    lateral_accel_m_s2: Annotated[float, Meta(ge=0.01, le=100.0)] = 0.40
+    turn_rad_s: Annotated[float, Meta(ge=0.01, le=100.0)] = 3.0
+
+    def __post_init__(self) -> None:
+        count = len(self.points)
+        if not 2 <= count <= MOST_POINTS:
+            raise ValueError(f"points: there are {count}; give 2 to {MOST_POINTS}")
+        for number, point in enumerate(self.points):
+            for key, value in (
+                ("x_cm", point.x_cm),
+                ("y_cm", point.y_cm),
+                ("heading_deg", point.heading_deg or 0.0),
+            ):
+                if not math.isfinite(value):
+                    raise ValueError(f"points[{number}].{key}: {value} is not a number that can be used")
+        for number in range(count if self.closed else count - 1):
+            here, there = self.points[number], self.points[(number + 1) % count]
+            x, y = there.x_cm - here.x_cm, there.y_cm - here.y_cm
+            if x * x + y * y < LEAST_CM * LEAST_CM:
+                raise ValueError(
+                    f"points[{(number + 1) % count}]: less than {LEAST_CM} cm from points[{number}], the length of the"
+                    " robot; move them apart, or leave one out"
+                )
+        self.trajectory(0.0)
+
+    def trajectory(self, duration_s: float) -> Waypoints:
+        return _planned(self)
+
+
+@lru_cache(maxsize=16)
+def _planned(keys: WaypointsRef) -> Waypoints:
+    """The plan, which is a constant: a scenario is checked with the one that it is then driven with."""
+    return Waypoints(
+        [(point.x_cm / 100.0, point.y_cm / 100.0) for point in keys.points],
+        [None if point.heading_deg is None else point.heading_deg * DEGREE for point in keys.points],
+        Bounds(keys.speed_m_s, keys.accel_m_s2, keys.lateral_accel_m_s2, keys.turn_rad_s),
+        keys.closed,
+    )
