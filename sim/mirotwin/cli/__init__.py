@@ -11,6 +11,7 @@ from mirotwin.cli.program import Program, print_version
 
 COMMANDS = {
     "run": "Runs a scenario and writes its files.",
+    "reproduce": "Runs the paper's figures again and writes one page about them.",
     "look": "Draws what the camera sees and what the tracker makes of it.",
     "calibrate": "Finds a camera's parameters from control points.",
     "track": "Finds robots in pictures of your own, or in recorded ones.",

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
-from miro_robot.image import Image
-from miro_sim.scenario.file import ScenarioText, load
+from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.cli.held_signals import held_signals
@@ -30,7 +27,7 @@ from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.run_files import RunFiles
 from mirotwin.files.outputs import OutputFolder
-from mirotwin.recording.recorder import Source
+from mirotwin.recording.source import source_of
 
 if TYPE_CHECKING:
     from mirotwin.looking.saved_frames import SavedFrames
@@ -130,22 +127,6 @@ def _saved(folder: Path, views: Sequence[View], plain: bool, force: bool) -> Sav
     from mirotwin.looking.saved_frames import SavedFrames
 
     return SavedFrames(FrameFolder(folder, "--frames", force), views, plain)
-
-
-def source_of(text: ScenarioText, seed: int, image: Image, record: str) -> Source:
-    """What a recording says that a run was made from."""
-    firmware = image.path.read_bytes()
-    if hashlib.sha256(firmware).hexdigest() != image.sha256:
-        raise BadInput(image.path, "", "changed while it was read", "start again once it is built")
-    return Source(
-        scenario_name=text.scenario.name,
-        scenario_text=text.text,
-        seed=seed,
-        firmware=firmware,
-        firmware_sha256=image.sha256,
-        symbols={name: (at.address, at.space) for name, at in image.symbols.names.items()},
-        record=record,
-    )
 
 
 def report_faults(world: World) -> int:

@@ -1,0 +1,35 @@
+"""Makes the rows of many jobs in the order of the jobs, whatever executor runs them.
+
+What belongs here: handing jobs over, and the end when somebody interrupts. What does not: one run (`job`), how
+processes begin (`processes`).
+
+A row is a function of its job, so it does not matter which process made it, or how many there were.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future
+
+from mirotwin.campaign.job import Job, Row, run
+
+
+def rows(
+    jobs: Sequence[Job], executor: Executor, ahead: int, make: Callable[[Job], Row] = run
+) -> Iterator[Row]:
+    """The rows in the order of the jobs, each as soon as it and those before it are there.
+
+    `ahead`: so many jobs are handed over before the first row is back. Whoever stops asking, or is interrupted, leaves
+    no job behind: the executor is shut down.
+    """
+    pending: deque[Future[Row]] = deque()
+    try:
+        for job in jobs:
+            pending.append(executor.submit(make, job))
+            if len(pending) >= ahead:
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)

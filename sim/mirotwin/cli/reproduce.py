@@ -1,0 +1,142 @@
+"""`mirotwin reproduce`: the paper's figures and claims, run again, as one page with pictures and recordings."""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import msgspec
+
+from mirotwin.campaign.execute import rows
+from mirotwin.campaign.job import Job, Row
+from mirotwin.campaign.processes import cores, processes
+from mirotwin.cli.held_signals import Hold, held_signals
+from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
+from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain, show_line
+from mirotwin.cli.progress import ProgressBar
+from mirotwin.files.outputs import OutputFolder, whole_file
+from mirotwin.reproduce.page import page
+from mirotwin.reproduce.pictures import course, draw
+from mirotwin.reproduce.plan import GROUPS, IMPROVED, LEARNING, PAPER, RETUNED, STARTS, Group, Start, jobs
+from mirotwin.reproduce.rows import by_label
+
+PAGE = "reproduction.md"
+FOLDER = "reproduction"
+ROWS = "rows.csv"
+MOST_SEEDS = 1000
+AHEAD = 4
+"""Jobs for each process that are handed over: enough to keep it busy, few enough to stop soon."""
+
+
+class Seeds(click.ParamType[range]):
+    """Seeds from a first one to a last one: 0-49, or one alone."""
+
+    name = "seeds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
+        if isinstance(value, range):
+            return value
+        first, _, last = str(value).partition("-")
+        if not (first.isdecimal() and (last or first).isdecimal() and len(str(value)) < 20):
+            self.fail(f"{value!r} is no range of seeds; write it like 0-49", param, ctx)
+        found = range(int(first), int(last or first) + 1)
+        if not 1 <= len(found) <= MOST_SEEDS:
+            self.fail(f"{value!r} has {len(found)} seeds; give 1 to {MOST_SEEDS}", param, ctx)
+        return found
+
+
+@click.command(short_help="Runs the paper's figures again and writes one page about them.")
+@click.option(
+    "--out",
+    type=Place(path_type=Path),
+    default=Path("."),
+    help=f"Folder for {PAGE} and {FOLDER}/. Default: here.",
+)
+@click.option("--seeds", type=Seeds(), default="0-49", show_default=True, help="First and last seed.")
+@click.option("--jobs", "count", type=Whole(1, 256), help="Processes. Default: one for each core.")
+@engine_option
+@click.option("--force", is_flag=True, help="Replace the files of an earlier reproduction.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar, no last line.")
+def reproduce(
+    out: Path, seeds: range, count: int | None, engine: str | None, force: bool, quiet: bool
+) -> int:
+    """Runs Figs. 6 to 10 of the paper, and the comparison of its controllers, over all seeds.
+
+    Writes reproduction.md (each claim beside what was measured), and in the folder reproduction: five pictures, a row
+    for each run, and the recordings of the first seed. Running it again gives the same bytes.
+    """
+    choose_engine(engine)
+    began_s = time.monotonic()
+    folder = OutputFolder(out / FOLDER, force, [*_pictures(), ROWS, *(group.recording for group in GROUPS)])
+    plan = jobs(seeds, lambda name: str(folder.part(name)))
+    with held_signals() as hold, folder, whole_file(out / PAGE, "--out") as page_path:
+        folder.keep = (ROWS,)
+        found = _run(plan, count or cores(), folder.part(ROWS), hold, quiet)
+        for start in STARTS:
+            _draw(start, folder, seeds[0])
+        text = page(by_label(found), f"{seeds[0]} to {seeds[-1]}", FOLDER)
+        page_path.write_text(text, encoding="utf-8")
+    if not quiet:
+        show_line(f"{len(found)} runs in {time.monotonic() - began_s:.0f} s: {out / PAGE}")
+    return _failures(found)
+
+
+def _pictures() -> list[str]:
+    return [f"{start.name}.png" for start in STARTS]
+
+
+def _run(plan: Sequence[Job], count: int, path: Path, hold: Hold, quiet: bool) -> list[Row]:
+    """All rows, each in the file as soon as it is there."""
+    found: list[Row] = []
+    names = [field.name for field in msgspec.structs.fields(Row)]
+    with (
+        path.open("w", newline="", encoding="utf-8") as stream,
+        ProgressBar("running", len(plan), quiet) as bar,
+    ):
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(names)
+        with hold.released():
+            for row in _rows(plan, count):
+                found.append(row)
+                writer.writerow(msgspec.structs.astuple(row))
+                stream.flush()
+                bar.to(len(found))
+    return found
+
+
+def _rows(plan: Sequence[Job], count: int) -> Iterator[Row]:
+    yield from rows(plan, processes(count), AHEAD * count)
+
+
+def _draw(start: Start, folder: OutputFolder, seed: int) -> None:
+    """The figure's own controller, the other one, and the improved chain."""
+    names = {
+        PAPER: "the paper's law",
+        RETUNED: "epsilon-tracking, retuned",
+        "epsilon, illustrative": "epsilon-tracking, illustrative",
+        IMPROVED: "body_frame with ekf",
+        LEARNING: "the same, learning the camera",
+    }
+    shown = (PAPER, LEARNING) if start.figure < 9 else ("epsilon, illustrative", RETUNED, PAPER, LEARNING)
+    courses = [
+        course(names[controller], folder.part(Group(start, controller).recording), 1) for controller in shown
+    ]
+    errors = f"{start.x_cm:.2f} cm, {start.y_cm:.2f} cm, {start.theta_rad:.2f} rad"
+    title = f"Fig. {start.figure} again: {start.path}, initial errors ({errors}), seed {seed}"
+    draw(folder.part(f"{start.name}.png"), title, courses)
+
+
+def _failures(found: Sequence[Row]) -> int:
+    failed = [row for row in found if row.error]
+    for row in failed[:5]:
+        complain(f"{row.label}, seed {row.seed}: {row.error}")
+    faults = 0
+    for row in found:
+        faults += row.faults
+    if faults:
+        complain(f"{faults} firmware faults; rows.csv says in which runs")
+    return FIRMWARE_FAULT if faults else DONE

@@ -1,0 +1,1 @@
+"""The paper's section V, run again: five figures, claims beside what was measured, and what a better chain gains."""

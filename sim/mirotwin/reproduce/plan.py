@@ -1,0 +1,138 @@
+"""Which runs reproduce the paper: starts, controllers, cameras.
+
+What belongs here: the groups of runs, as settings of built-in scenarios. What does not: what their rows say (`claims`,
+`page`), and gains (in the scenarios, and defaults of the laws).
+
+Each group is one controller from one start, over all seeds. The paper compares two controllers from different starts;
+here each of them also runs from those of the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import msgspec
+
+from mirotwin.campaign.job import Job
+
+PAPER = "paper"
+IMPROVED = "improved"
+LEARNING = "improved, learning"
+ILLUSTRATIVE = "epsilon, illustrative"
+THEORY = "epsilon, theory"
+RETUNED = "epsilon, retuned"
+EPSILONS = (ILLUSTRATIVE, THEORY, RETUNED)
+CONTROLLERS = (PAPER, *EPSILONS, IMPROVED, LEARNING)
+
+
+class Start(msgspec.Struct, frozen=True):
+    """A figure of the paper: initial errors of its caption, and its path.
+
+    `proposed`, `other`: scenarios with the gains of the proposed law, and of the other one, on this path.
+    """
+
+    figure: int
+    x_cm: float
+    y_cm: float
+    theta_rad: float
+    path: str
+    proposed: str
+    other: str
+
+    @property
+    def name(self) -> str:
+        """As scenarios and pictures are called."""
+        return f"fig{self.figure}"
+
+
+STARTS = (
+    Start(6, 7.09, 1.72, -0.38, "straight line", "fig6", "fig9"),
+    Start(7, 52.58, 16.62, -3.09, "straight line", "fig7", "fig9"),
+    Start(8, 11.20, 28.92, -1.31, "curve", "fig8", "fig10"),
+    Start(9, 2.43, 3.08, -0.96, "straight line", "fig6", "fig9"),
+    Start(10, 2.92, 1.85, 0.56, "curve", "fig8", "fig10"),
+)
+"""Captions of the paper's Figs. 6 to 10."""
+
+EPSILON_SETTINGS = {
+    ILLUSTRATIVE: (),  # those of fig9 and fig10
+    THEORY: (
+        "network.robot.controller.epsilon_rad=0.2",
+        "network.robot.controller.alpha_per_s=3.0",
+        "network.robot.controller.beta_per_s=22.0",
+        "network.robot.controller.length_m=0.10",
+        "network.robot.controller.sigma=invariant",
+        "network.robot.controller.switching=sign",
+    ),
+    RETUNED: ("network.robot.controller={law = 'epsilon_tracking'}",),  # the defaults of the law
+}
+IMPROVED_SETTINGS = (
+    "network.robot.controller={law = 'body_frame'}",
+    "network.robot.estimator={kind = 'ekf'}",
+)
+LEARN = "camera.self_calibration=lines"
+CAMERAS = {
+    "white noise": "camera={kind = 'gaussian'}",
+    "pixels, exact": "camera.calibration=exact",
+}
+"""Other cameras than that of the scenarios, which is `1997`; for Figs. 6 to 8."""
+NOISE = "network.robot.estimator={kind = 'ekf', position_noise_m = 0.0081, heading_noise_rad = 0.028}"
+"""What the filter has to know of white noise of 2.40 cm and 4.83 degrees (three standard deviations)."""
+
+
+class Group(msgspec.Struct, frozen=True):
+    """One controller from one start under one camera (empty: the scenario's)."""
+
+    start: Start
+    controller: str
+    camera: str = ""
+
+    @property
+    def label(self) -> str:
+        """As rows are labelled, and files of recordings are named: fig7-paper, fig7-improved-white-noise."""
+        parts = [self.start.name, self.controller, self.camera]
+        return "-".join(part.replace(",", "").replace(" ", "-") for part in parts if part)
+
+    @property
+    def recording(self) -> str:
+        """The file of the first seed's recording."""
+        return f"{self.label}.mcap"
+
+    def scenario(self) -> tuple[str, tuple[str, ...]]:
+        """The built-in scenario, and the settings in it."""
+        start = self.start
+        base = start.other if self.controller in EPSILONS else start.proposed
+        settings = [
+            f"network.robot.start_error_x_cm={start.x_cm}",
+            f"network.robot.start_error_y_cm={start.y_cm}",
+            f"network.robot.start_error_theta_rad={start.theta_rad}",
+        ]
+        settings += EPSILON_SETTINGS.get(self.controller, ())
+        if self.camera:
+            settings.append(CAMERAS[self.camera])
+        if self.controller in (IMPROVED, LEARNING):
+            settings += IMPROVED_SETTINGS
+        if self.controller == LEARNING:
+            settings.append(LEARN)
+        if self.controller == IMPROVED and self.camera == "white noise":
+            settings[-1] = NOISE
+        return base, tuple(settings)
+
+
+GROUPS = tuple(Group(start, controller) for start in STARTS for controller in CONTROLLERS) + tuple(
+    Group(start, controller, camera)
+    for start in STARTS[:3]
+    for controller in (PAPER, IMPROVED)
+    for camera in CAMERAS
+)
+
+
+def jobs(seeds: Sequence[int], recorded: Callable[[str], str], groups: Sequence[Group] = GROUPS) -> list[Job]:
+    """One for each group and seed. `recorded`: the file for the recording of a group's first seed, by its name."""
+    found = []
+    for group in groups:
+        scenario, settings = group.scenario()
+        for seed in seeds:
+            path = recorded(group.recording) if seed == seeds[0] else ""
+            found.append(Job(group.label, scenario, settings, seed, path))
+    return found
