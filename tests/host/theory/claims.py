@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from tests.host.theory import ideal
 from tests.host.theory.ideal import PRINTED, ROBOT, STARTS, beside, paper_law
+from tests.host.theory.layer import NO_GUARD, rising
 
 from miro_host.posture import Posture
 from miro_host.references.line import Line
@@ -68,6 +69,16 @@ def lyapunov():
             )
 
 
+def layer():
+    """V' inside the boundary layer of theta_e, with f = 0, over states near the line."""
+    width = NO_GUARD.layer_theta_rad
+    for what, added in (("as in (16)", False), ("with the layer's derivative", True)):
+        yield (
+            f"states inside the layer in which V rises, u2 {what}",
+            f"{100 * rising(0.9 * width, added):.0f} %",
+        )
+
+
 def starts(count):
     """A7."""
     for law in ideal.LAWS:
@@ -100,8 +111,8 @@ def remark_1():
         torque = max(abs(value) for row in rows for value in row.torque_nm)
         nearest = min(abs(across(row.posture)) for row in rows)
         text = f"{u1:.1f} m/s2, {1000 * torque:.0f} mNm at a wheel, {1000 * work:.1f} mJ (nearest {nearest:.3f} rad)"
-        if any(across(row.posture) * across(rows[0].posture) <= 0.0 for row in rows):
-            text = "the limit is crossed: u1 has no bound"
+        if u1 > 1000.0:
+            text = "above 1000 m/s2: the limit is reached"
         yield f"largest u1 in 0.5 s from alpha = {alpha:g}", text
 
 
@@ -112,7 +123,7 @@ def main() -> None:
     table = Table(box=None, pad_edge=False)
     table.add_column("what")
     table.add_column("measured")
-    for part in (figures(), parallel(), slopes(), lyapunov(), starts(count), remark_1()):
+    for part in (figures(), parallel(), slopes(), lyapunov(), layer(), starts(count), remark_1()):
         for what, measured in part:
             table.add_row(what, measured)
     Console(width=140).print(table)

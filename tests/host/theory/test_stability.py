@@ -1,14 +1,14 @@
 """Equations (11), (12), (13) and (18) to (23) as identities of numbers, and the term that the layer adds to V'."""
 
 import math
-import random
 
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from tests.host.theory.ideal import PRINTED
+from tests.host.theory.layer import NO_GUARD, rates, rising, states
 
-from miro_host.laws.yang_kim import Gains, YangKim, saturation, sign
+from miro_host.laws.yang_kim import YangKim, sign
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import Line
@@ -20,31 +20,7 @@ POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.flo
 TIMES = st.floats(0.1, 0.4) | st.floats(0.6, 5.8)  # not on the corner of the ramp
 SPEEDS = st.floats(-0.9, 0.9)
 TURNS = st.floats(-4.0, 4.0)
-NO_GUARD = Gains(cosine_guard=1e-9, rho_floor_m=1e-9)
 F1, F2 = st.floats(-0.35, 0.35), st.floats(-1.2, 1.2)
-
-
-def switched(gains, posture_e, c):
-    """What stands for sgn in theta_e, s1 and s2."""
-    if gains.switching == "sign":
-        return sign(posture_e.theta_e_rad), (sign(c.s1), sign(c.s2))
-    side = saturation(posture_e.theta_e_rad, gains.layer_theta_rad)
-    return side, (saturation(c.s1, gains.layer_s1_m_s), saturation(c.s2, gains.layer_s2_rad_s))
-
-
-def rates(gains, path, t, posture, v, w, f):
-    """(s, s', e, proof's V') of a robot under the law with a disturbance f, all from the theory's formulas."""
-    r = path.at(t)
-    c = YangKim(gains).control(r, posture, v, w)
-    z_dot = (r.v_dot_m_s2 + c.u1 - f[0], r.w_dot_rad_s2 + c.u2 - f[1])  # (15)
-    e = stability.polar_errors(r, posture, v, w)
-    side, signs = switched(gains, e, c)
-    gammas = (gains.gamma1_per_s, gains.gamma2_per_s)
-    s = stability.surfaces(e, *gammas, side)
-    layer = gains.layer_theta_rad if gains.switching == "saturation" else 0.0
-    s_rate = stability.surface_rates(e, r, z_dot, gammas, side, layer)
-    q, p = (gains.q1_per_s, gains.q2_per_s), (gains.p1_m_s2, gains.p2_rad_s2)
-    return s, s_rate, e, stability.proof_rate(s, signs, q, p, f, e.cosine)
 
 
 def moved(path, t, posture, z, z_dot, h):
@@ -143,33 +119,6 @@ def test_inside_the_layer_v_has_one_term_more_than_equation_23(path, t, posture,
     scale = 1.0 + abs(s[0]) + abs(s[1])
     assert stability.lyapunov_rate(s, s_rate) == pytest.approx(by_proof + more, abs=1e-6 * scale * scale)
     assert (more == 0.0) == (abs(e.theta_e_rad) >= NO_GUARD.layer_theta_rad or e.theta_e_rate * s[1] == 0.0)
-
-
-def states(count, spread, seed=3):
-    """(path, t, posture, v, w) with theta_e within `spread`, evenly drawn."""
-    chance = random.Random(seed)
-    for _ in range(count):
-        path, t = Line(), chance.uniform(0.6, 5.8)
-        r = path.at(t).posture
-        x, y = r.x_m + chance.uniform(-0.2, 0.2), r.y_m + chance.uniform(-0.2, 0.2)
-        theta = r.theta_rad + chance.uniform(-spread, spread)
-        yield path, t, Posture(x, y, theta), chance.uniform(0.05, 0.4), chance.uniform(-2.0, 2.0)
-
-
-def rising(spread, layer_added):
-    """The share of states in which V rises though f = 0, with and without the layer's derivative in u2."""
-    rises, count = 0, 0
-    for path, t, posture, v, w in states(2000, spread):
-        if radius(posture) < 0.05 or abs(across(posture)) < 0.5:
-            continue
-        s, s_rate, e, _ = rates(NO_GUARD, path, t, posture, v, w, (0.0, 0.0))
-        rate = stability.lyapunov_rate(s, s_rate)
-        if layer_added:
-            rate -= s[1] * stability.layer_term(e, NO_GUARD.layer_theta_rad)
-        rises += rate > 1e-9
-        count += 1
-    assert count > 1000
-    return rises / count
 
 
 def test_v_rises_in_many_states_inside_the_layer_and_in_none_when_u2_has_its_derivative():

@@ -1,0 +1,120 @@
+"""Prints what the paper's theory says of whole runs: f against P, the assumptions, direction, chattering.
+
+    python -m tests.sim.theory_in_the_loop [--seeds 10]
+
+What belongs here: the runs and the table. What does not: the definitions (`mirotwin.report.theory`), assertions
+(`test_theory_in_the_loop`). Medians over seeds from 0; for each |f_i| the root mean square over a run.
+"""
+
+import argparse
+import math
+import statistics
+from itertools import pairwise
+
+from rich.console import Console
+from rich.table import Table
+
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.file import load
+from miro_sim.world.world import World
+from mirotwin.report.theory import gains_of, theory_of
+from mirotwin.report.theory_track import PERIOD_S
+from mirotwin.report.track import Tracks
+
+CONTROLLER = "network.robot.controller"
+BODY = [f'{CONTROLLER}={{law="body_frame"}}', 'network.robot.estimator={kind="predict"}']
+FIG7 = [
+    "network.robot.start_error_x_cm=52.58",
+    "network.robot.start_error_y_cm=16.62",
+    "network.robot.start_error_theta_rad=-3.09",
+]
+GAINS = ["gamma1_per_s", "gamma2_per_s", "q1_per_s", "q2_per_s", "p1_m_s2", "p2_rad_s2"]
+GUARDS = ["layer_s1_m_s", "layer_s2_rad_s", "layer_theta_rad", "cosine_guard", "max_v_m_s", "max_w_rad_s"]
+
+
+def paper(*numbers):
+    """The paper's law with these gains, layers, guard and limits."""
+    keys = zip(GAINS + GUARDS, numbers, strict=True)
+    return [f"{CONTROLLER}={{" + ", ".join(f"{name}={value}" for name, value in keys) + "}"]
+
+
+SET_A = paper(2.05, 9.18, 0.414, 1.27, 0.77, 1.48, 0.4, 0.149, 0.083, 0.231, 0.462, 2.28)
+SET_B = paper(5.5, 15.0, 0.142, 0.0119, 0.415, 10.0, 0.0045, 0.287, 0.204, 0.052, 0.293, 2.14)
+RUNS = {
+    "fig6": ("fig6", []),
+    "fig6, sign functions": ("fig6", [f'{CONTROLLER}.switching="sign"']),
+    "fig8": ("fig8", []),
+    "fig6 from the start of Fig. 7, set A": ("fig6", FIG7 + SET_A),
+    "fig8, set B": ("fig8", SET_B),
+    "fig6, body_frame and predict": ("fig6", BODY),
+    "fig8, body_frame and predict": ("fig8", BODY),
+}
+
+
+def run(name, seed):
+    """The theory of a run, and the rms of f1 and f2 if commands are compared with the motion a period later."""
+    scenario, settings = RUNS[name]
+    text = load(scenario, settings)
+    world, tracks, robots = World(text.scenario, seed, load_hex(image_path())), Tracks(), []
+    while not world.finished:
+        period = world.step()
+        tracks.add(period)
+        robots.append(period.robots[0])
+    commands = [(0.0, 0.0)] + [(robot.control.v_m_s, robot.control.w_rad_s) for robot in robots]
+    speeds = [(robot.v_m_s, robot.w_rad_s) for robot in robots[1:]]
+    late = []
+    for axis in (0, 1):
+        squares = []
+        for (before, command), (first, second) in zip(pairwise(commands), pairwise(speeds), strict=False):
+            f = (command[axis] - before[axis] - second[axis] + first[axis]) / PERIOD_S
+            squares.append(f * f)
+        late.append(math.sqrt(math.fsum(squares) / len(squares)))
+    return theory_of(tracks.robots[0, 0].theory, gains_of(text.scenario)[0, 0]), late
+
+
+def row(name, seeds):
+    """The cells of the table."""
+    found = [run(name, seed) for seed in range(seeds)]
+
+    def median(value):
+        return statistics.median(value(theory, late) for theory, late in found)
+
+    def share(value):
+        return f"{100 * median(value):.0f} %"
+
+    return (
+        name,
+        f"{median(lambda t, _: t.disturbance.f1_rms_m_s2):.3f} ({median(lambda _, late: late[0]):.3f})",
+        f"{found[0][0].disturbance.p1_m_s2:g}: {share(lambda t, _: t.disturbance.f1_above_p1)}",
+        f"{median(lambda t, _: t.disturbance.f2_rms_rad_s2):.2f} ({median(lambda _, late: late[1]):.2f})",
+        f"{found[0][0].disturbance.p2_rad_s2:g}: {share(lambda t, _: t.disturbance.f2_above_p2)}",
+        f"{median(lambda t, _: t.assumption_3.frames):g} / {median(lambda t, _: t.assumption_3.crossings):g}",
+        f"{median(lambda t, _: t.reversals):g} / {median(lambda t, _: t.backward_s):.2f} s",
+        f"{median(lambda t, _: t.chattering_m_s2):.3f}",
+    )
+
+
+def main() -> None:
+    arguments = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    arguments.add_argument("--seeds", type=int, default=10)
+    seeds = arguments.parse_args().seeds
+    table = Table(box=None, pad_edge=False)
+    for column in (
+        "run",
+        "f1 m/s2 (a period later)",
+        "P1: |f1| above",
+        "f2 rad/s2 (..)",
+        "P2: |f2| above",
+        "near / across",
+        "reversals / back",
+        "chattering m/s2",
+    ):
+        table.add_column(column)
+    for name in RUNS:
+        table.add_row(*row(name, seeds))
+    Console(width=160).print(table)
+
+
+if __name__ == "__main__":
+    main()
