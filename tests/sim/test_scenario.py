@@ -44,8 +44,8 @@ def edited(old: str, new: str) -> str:
     return text.replace(old, new, 1)
 
 
-def test_the_built_in_scenarios_are_the_two_figures_of_the_paper() -> None:
-    assert builtin_names() == ["fig6", "fig8"]
+def test_the_built_in_scenarios_are_two_figures_of_the_paper_and_paths_of_our_own() -> None:
+    assert builtin_names() == ["curve", "fig6", "fig8", "line", "sine", "waypoints"]
     line, arc = (load(name).scenario.networks[0].robot[0] for name in ("fig6", "fig8"))
     assert isinstance(line.reference, LineRef)
     assert (line.start_error_x_cm, line.start_error_y_cm, line.start_error_theta_rad) == (7.09, 1.72, -0.38)

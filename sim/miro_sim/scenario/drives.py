@@ -7,6 +7,8 @@ Speeds and accelerations are compared with the limits that hold for the commands
 limits of z_cmd and of its change from one camera frame to the next. The robot starts at rest.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -49,7 +51,7 @@ def limits_objection(frames: Places, law: LawParameters) -> Objection | None:
     return None
 
 
-def _beyond(t_s: float, at: "Reference", name: str, value: str, limit: str) -> Objection:
+def _beyond(t_s: float, at: Reference, name: str, value: str, limit: str) -> Objection:
     where = f"after {t_s:.2f} s, at {_place(at)},"
     if not name:
         return f"{where} a wheel needs {value}; it reaches {limit} m/s", "drive it more slowly, or turn less"
@@ -68,21 +70,24 @@ def origin_objection(places: Places, law: LawParameters) -> Objection | None:
     if clearance_m == 0.0:
         return None
     least_m = -1.0
+    nearest: tuple[float, Reference] | None = None
     for t_s, at in places:
         if least_m < 0.0:
             least_m = 0.0 if at.rho_m <= ORIGIN_M else clearance_m
+        if nearest is not None and at.rho_m >= nearest[1].rho_m:
+            break
         if at.rho_m < least_m - ORIGIN_M:
-            what = (
-                f"passes the origin: after {t_s:.2f} s, at {_place(at)}, it is {100.0 * at.rho_m:.2f} cm away, and the"
-                f" law {law.name()!r}, which has polar coordinates, needs {100.0 * clearance_m:.1f} cm"
-            )
-            return (
-                what,
-                "lead it past the origin at a greater distance, or choose another law, such as body_frame",
-            )
+            nearest = (t_s, at)
         least_m = min(clearance_m, max(least_m, at.rho_m))
-    return None
+    if nearest is None:
+        return None
+    t_s, at = nearest
+    what = (
+        f"passes the origin: after {t_s:.2f} s, at {_place(at)}, it is {100.0 * at.rho_m:.2f} cm away, and the law"
+        f" {law.name()!r}, which has polar coordinates, needs {100.0 * clearance_m:.1f} cm"
+    )
+    return what, "lead it past the origin at a greater distance, or choose another law, such as body_frame"
 
 
-def _place(at: "Reference") -> str:
+def _place(at: Reference) -> str:
     return f"({100.0 * at.posture.x_m:.1f}, {100.0 * at.posture.y_m:.1f}) cm"

@@ -5,6 +5,7 @@ import math
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from tests.host.references.numbers import numbers
 from tests.naive import host_control as naive
 
 from miro_host.references.arc import Arc
@@ -12,13 +13,6 @@ from miro_host.references.line import Line
 from miro_host.references.ramp import Ramp
 
 ANGLES = st.floats(-3.1, 3.1)
-
-
-def numbers(r):
-    return (
-        *(r.posture.x_m, r.posture.y_m, r.posture.theta_rad, r.v_m_s, r.w_rad_s, r.v_dot_m_s2),
-        *(r.w_dot_rad_s2, r.rho_m, r.phi_rad, r.rho_rate_m_s, r.phi_rate_rad_s, r.rho_accel_m_s2),
-    )
 
 
 @settings(deadline=None, max_examples=60)

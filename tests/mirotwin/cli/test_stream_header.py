@@ -89,7 +89,11 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(
 @pytest.mark.parametrize(
     ("header", "lines", "what"),
     [
-        ("scenario = 'fig9'", "", "header: scenario: 'fig9' is no built-in scenario; give one of fig6, fig8"),
+        (
+            "scenario = 'fig9'",
+            "",
+            "header: scenario: 'fig9' is no built-in scenario; give one of curve, fig6, fig8",
+        ),
         ("[scenario]\nname = 'a'\nduration_s = 0.1\nnetwork = []", "", "header: scenario: network: "),
         (in_header(SHORT).replace("duration_s", "duration_x"), "", "duration_x"),
         (in_header(SHORT), "2000000 >@1 55", "tick 2000000: network 1, but the scenario has 1"),

@@ -1,0 +1,130 @@
+"""Paths that begin elsewhere than in the origin: the same paths, with another polar form."""
+
+import math
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from tests.host.references.numbers import numbers
+from tests.naive import host_control, host_paths
+
+from miro_host.references.arc import Arc, ArcRef
+from miro_host.references.interface import Paced
+from miro_host.references.line import Line, LineRef
+from miro_host.references.polar import with_polar_form
+from miro_host.references.ramp import Ramp
+from miro_host.references.sine import Sine, SineRef
+
+ANGLES = st.floats(-3.1, 3.1)
+PLACES = st.floats(-1.0, 1.0)
+TIMES = st.floats(0.01, 5.9)
+SHAPES = st.sampled_from([Line, Arc, Sine])
+AWAY_M = 0.01
+
+
+@given(SHAPES, TIMES, ANGLES, PLACES, PLACES)
+def test_a_path_that_begins_elsewhere_is_the_same_path_moved_there(shape, t, heading, x, y):
+    here, there = shape(heading_rad=heading), shape(heading_rad=heading, start_x_m=x, start_y_m=y)
+    a, b = here.at(t), there.at(t)
+    assert (b.posture.x_m - x, b.posture.y_m - y) == pytest.approx((a.posture.x_m, a.posture.y_m), abs=1e-15)
+    assert b.posture.theta_rad == a.posture.theta_rad
+    assert (b.v_m_s, b.w_rad_s, b.v_dot_m_s2, b.w_dot_rad_s2) == (
+        a.v_m_s,
+        a.w_rad_s,
+        a.v_dot_m_s2,
+        a.w_dot_rad_s2,
+    )
+
+
+@settings(deadline=None, max_examples=40)
+@given(TIMES, ANGLES, st.floats(-2.5, 2.5), PLACES, PLACES)
+def test_its_polar_form_is_that_of_its_points(t, heading, curvature, x, y):
+    assume(abs(t - 0.5) > 1e-3)
+    assume(abs(curvature) > 1e-3)
+    found = Arc(heading_rad=heading, curvature_per_m=curvature, start_x_m=x, start_y_m=y).at(t)
+    assume(found.rho_m > AWAY_M)
+
+    def point(time):
+        px, py, theta = host_control.arc_point(host_control.path_length(time, 0.2, 0.5), heading, curvature)
+        return px + x, py + y, theta
+
+    expected = [float(value) for value in host_paths.reference(point, t)]
+    assert numbers(found) == pytest.approx(expected, rel=1e-8, abs=1e-9)
+
+
+@given(st.floats(1e-3, 5.9), ANGLES, st.floats(-1.0, 1.0))
+def test_out_of_the_origin_the_closed_form_and_the_general_one_are_the_same(t, heading, curvature):
+    for path in (Line(heading_rad=heading), Arc(heading_rad=heading, curvature_per_m=curvature)):
+        r = path.at(t)
+        general = with_polar_form(r.posture, r.v_m_s, r.w_rad_s, r.v_dot_m_s2, r.w_dot_rad_s2)
+        assert numbers(general)[:-5] == numbers(r)[:-5]
+        apart = math.remainder(general.phi_rad - r.phi_rad, 2.0 * math.pi)
+        assert abs(apart) < 1e-9
+        assert general.rho_m == pytest.approx(r.rho_m, abs=1e-12)
+        assert numbers(general)[-3:] == pytest.approx(numbers(r)[-3:], rel=1e-7, abs=1e-9)
+
+
+def test_a_sine_leaves_the_origin_as_its_limit_says():
+    at_rest, soon = Sine().at(0.0), Sine().at(1e-4)
+    assert (at_rest.rho_m, at_rest.phi_rad) == (0.0, at_rest.posture.theta_rad)
+    assert at_rest.rho_accel_m_s2 == at_rest.v_dot_m_s2
+    assert soon.phi_rad == pytest.approx(at_rest.phi_rad, abs=1e-6)
+    assert soon.rho_accel_m_s2 == pytest.approx(at_rest.rho_accel_m_s2, abs=1e-5)
+
+
+def test_an_arc_may_go_round_and_round():
+    circle = Arc(Ramp(duration_s=60.0), 0.0, 4.0, 0.55, 0.10)
+    turn_s = 2.0 * math.pi / 4.0 / 0.2
+    for t in (1.0, 3.3, 7.0):
+        first, third = circle.at(t), circle.at(t + 2.0 * turn_s)
+        assert numbers(third) == pytest.approx(numbers(first), abs=1e-12)
+    out_of_origin = Arc(Ramp(duration_s=60.0), 0.0, 4.0)
+    assert numbers(out_of_origin.at(3.3 + turn_s)) == pytest.approx(numbers(out_of_origin.at(3.3)), abs=1e-12)
+    assert out_of_origin.at(3.3 + turn_s).rho_m > 0.0
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    *(TIMES, st.floats(0.05, 0.4), st.floats(0.1, 1.0), st.floats(-0.2, 0.2), st.floats(0.2, 1.5)),
+    *(ANGLES, PLACES, PLACES),
+)
+def test_a_sine_and_all_its_derivatives_equal_the_cartesian_path(
+    t, speed, ramp, height, length, heading, x, y
+):
+    assume(abs(t - ramp) > 1e-3)
+    found = Sine(Ramp(speed, ramp), height, length, heading, x, y).at(t)
+    assume(found.rho_m > AWAY_M)
+    expected = host_paths.reference(
+        lambda time: host_paths.sine(time, speed, ramp, height, length, heading, (x, y)), t
+    )
+    assert numbers(found) == pytest.approx([float(one) for one in expected], rel=1e-7, abs=1e-8)
+
+
+@settings(deadline=None)
+@given(
+    SHAPES, st.floats(0.05, 0.4), st.floats(0.1, 1.0), st.floats(0.001, 0.02), st.floats(0.005, 0.1), ANGLES
+)
+def test_within_one_step_of_its_pace_a_path_goes_and_turns_no_further_than_asked(
+    shape, speed, ramp, step_m, step_rad, heading
+):
+    path = shape(Ramp(speed, ramp), heading_rad=heading)
+    assert isinstance(path, Paced)
+    pace = path.pace(step_m, step_rad)
+    assert pace.steady_s <= pace.until_s <= 6.0
+    k = 0
+    while k * pace.step_s < 6.0 and k < 200:
+        a, b = path.at(k * pace.step_s).posture, path.at((k + 1) * pace.step_s).posture
+        assert math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) <= step_m * (1.0 + 1e-9)
+        assert abs(math.remainder(b.theta_rad - a.theta_rad, 2.0 * math.pi)) <= step_rad * (1.0 + 1e-9)
+        k += 1
+
+
+def test_keys_are_in_centimetres_and_degrees():
+    line = LineRef(start_x_cm=20.0, start_y_cm=-5.0).trajectory(6.0)
+    arc = ArcRef(start_x_cm=20.0, start_y_cm=-5.0).trajectory(6.0)
+    sine = SineRef(start_x_cm=20.0, start_y_cm=-5.0, amplitude_cm=12.0, wavelength_cm=80.0).trajectory(6.0)
+    for path in (line, arc, sine):
+        at = path.at(0.0).posture
+        assert (at.x_m, at.y_m) == (0.2, -0.05)
+    assert (sine.amplitude_m, sine.wavelength_m) == (0.12, 0.8)
+    assert SineRef(drive_s=2.0).trajectory(6.0).at(3.0).v_m_s == 0.0
