@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -13,6 +14,7 @@ from miro_host.references.arc import Arc
 from miro_host.references.line import Line
 
 SATURATING = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69)
+SLOPED = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69, layer_theta_rad=0.4, layer_derivative=True)
 SWITCHING = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69, switching="sign", cosine_guard=0.0, rho_floor_m=1e-9)
 PATHS = st.sampled_from([Line(), Line(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)])
 POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))
@@ -34,7 +36,8 @@ def twin(gains):
         gains.p1_m_s2,
         gains.p2_rad_s2,
     )
-    return dict(zip(names, (*paper, gains.cosine_guard, gains.rho_floor_m, *widths), strict=True))
+    values = (*paper, gains.cosine_guard, gains.rho_floor_m, *widths)
+    return {**dict(zip(names, values, strict=True)), "layer_derivative": gains.layer_derivative}
 
 
 def away_from_switches(c):
@@ -43,7 +46,9 @@ def away_from_switches(c):
     )
 
 
-@pytest.mark.parametrize("gains", [SATURATING, SWITCHING], ids=["saturation", "sign"])
+@pytest.mark.parametrize(
+    "gains", [SATURATING, SWITCHING, SLOPED], ids=["saturation", "sign", "layer derivative"]
+)
 @settings(deadline=None, max_examples=80)
 @given(PATHS, TIMES, POSTURES, SPEEDS, TURNS)
 def test_surfaces_and_inputs_equal_the_papers_formulas(gains, path, t, posture, v, w):
@@ -53,6 +58,7 @@ def test_surfaces_and_inputs_equal_the_papers_formulas(gains, path, t, posture, 
     assume(gains.cosine_guard > 0.0 or abs(math.cos(alpha)) > 0.01)
     got = YangKim(gains).control(r, posture, v, w)
     assume(away_from_switches(got))
+    assume(abs(abs(got.theta_e_rad) - gains.layer_theta_rad) > 1e-6)
     reference = (r.rho_m, r.phi_rad, r.posture.theta_rad, r.v_m_s, r.w_rad_s, r.v_dot_m_s2)
     expected = naive.law(twin(gains), reference, (posture.x_m, posture.y_m, posture.theta_rad), v, w)
     assert (got.s1, got.s2, got.u1, got.u2) == pytest.approx([float(x) for x in expected], rel=1e-9, abs=1e-9)
@@ -144,3 +150,21 @@ def test_gains_name_what_is_wrong_with_them(name, value):
     names = ("gamma1_per_s", "gamma2_per_s", "q1_per_s", "q2_per_s", "p1_m_s2", "p2_rad_s2")
     with pytest.raises(ValueError, match=name):
         Gains(**{**dict.fromkeys(names, 1.0), name: value})
+
+
+def test_a_derivative_of_the_layer_is_refused_where_there_is_no_layer():
+    with pytest.raises(ValueError, match="layer_derivative: with switching = 'sign'"):
+        Gains(switching="sign", layer_derivative=True)
+
+
+@settings(deadline=None)
+@given(PATHS, TIMES, POSTURES, SPEEDS, TURNS)
+def test_outside_the_layer_its_derivative_changes_no_bit(path, t, posture, v, w):
+    published = YangKim(msgspec.structs.replace(SLOPED, layer_derivative=False)).control(
+        path.at(t), posture, v, w
+    )
+    sloped = YangKim(SLOPED).control(path.at(t), posture, v, w)
+    if abs(sloped.theta_e_rad) >= SLOPED.layer_theta_rad or sloped.phi_e_rad == 0.0:
+        assert sloped == published
+    else:
+        assert (sloped.u1, sloped.s1, sloped.s2) == (published.u1, published.s1, published.s2)

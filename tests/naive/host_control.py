@@ -70,11 +70,13 @@ def sgn(x, width):
 def law(gains, ref, measured, v_c, w_c):
     """(s1, s2, u1, u2) of equations (13) and (16); `ref` = (rho, phi, theta, v, w, v')_r.
 
-    `gains` is a dict: g1 g2 q1 q2 p1 p2, widths w1 w2 wt (None: sign), d (guard of 1/cos), floor (of rho_c).
+    `gains` is a dict: g1 g2 q1 q2 p1 p2, widths w1 w2 wt (None: sign), d (guard of 1/cos), floor (of rho_c), and
+    layer_derivative: whether u2 knows that sat(theta_e / wt) has a slope.
     """
     rho_r, phi_r, theta_r, v_r, w_r, v_r_dot = map(mpf, ref)
     x, y, theta_c = map(mpf, measured)
     v_c, w_c = mpf(v_c), mpf(w_c)
+    slope_known = gains["layer_derivative"]
     g = {name: None if value is None else mpf(value) for name, value in gains.items()}
     rho_c, phi_c = hypot(x, y), atan2(y, x)
     rho_e, phi_e, theta_e = rho_c - rho_r, wrapped(phi_c - phi_r), wrapped(theta_c - theta_r)
@@ -110,4 +112,6 @@ def law(gains, ref, measured, v_c, w_c):
         - g["g2"] * theta_e_dot
         - sgn(theta_e, g["wt"]) * phi_e_abs_dot
     )
+    if slope_known:
+        u2 -= diff(lambda dt: sgn(theta_e + dt * theta_e_dot, g["wt"]), 0) * abs(phi_e)
     return s1, s2, u1, u2

@@ -43,6 +43,11 @@ class Gains(LawParameters, frozen=True, tag="yang_kim"):
     widths `layer_s1_m_s`, `layer_s2_rad_s`, `layer_theta_rad` for s1, s2 and theta_e. The sign of phi_e in
     d|phi_e|/dt is not a switching term and stays a sign.
 
+    Inside the layer of theta_e, d/dt [sat(theta_e / w) |phi_e|] has a term (theta_e' / w) |phi_e| that (16)
+    lacks, because sgn has no slope; V may rise there. With `layer_derivative` u2 takes it off, and
+    s2' = -Q2 s2 - P2 sat(s2 / w2) holds inside the layer as well. This is not the published law; it mends
+    the proof, not the lateral error.
+
     Guards: rho_c is taken as at least `rho_floor_m` where it is a denominator; 1/c, c = cos(phi_c - theta_c),
     becomes c (1 + d^2) / (c^2 + d^2) with d = `cosine_guard`: smooth, keeps the sign, 1 at c = 1, 0 at the
     singularity of assumption 3. d = 0 leaves 1/c as it is; a scenario cannot set that.
@@ -61,6 +66,7 @@ class Gains(LawParameters, frozen=True, tag="yang_kim"):
     layer_s1_m_s: Width = 0.022
     layer_s2_rad_s: Width = 0.19
     layer_theta_rad: Width = 0.015
+    layer_derivative: bool = False
     cosine_guard: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.086
     rho_floor_m: Width = POSITION_ERROR_M
 
@@ -74,6 +80,8 @@ class Gains(LawParameters, frozen=True, tag="yang_kim"):
         for name in positive:
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: must be greater than 0")
+        if self.layer_derivative and self.switching == "sign":
+            raise ValueError("layer_derivative: with switching = 'sign' theta_e has no layer; leave it out")
         for name in NOT_NEGATIVE:
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: must be 0 or greater")
@@ -168,6 +176,8 @@ class YangKim(Law[Gains]):
             - g.gamma2_per_s * theta_e_rate
             - side * abs_phi_e_rate
         )
+        if g.layer_derivative and abs(theta_e) < g.layer_theta_rad:
+            u2 -= theta_e_rate / g.layer_theta_rad * abs(phi_e)
         return Control(rho_e, phi_e, theta_e, s1, s2, u1, u2)
 
     def _switch(self, x: float, width: float) -> float:
