@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin import runner
@@ -77,8 +78,8 @@ class RunFiles:
 
                 scenario, seed = self.source.scenario_name, self.source.seed
                 draw(self.tracks, self.folder.part(FIGURE), scenario=scenario, seed=seed, title=title)
-        except BaseException:
-            self._leave_parts()
+        except BaseException as error:
+            self._leave_parts(str(error) if isinstance(error, BadInput) else "")
             raise
         return summary
 
@@ -114,7 +115,7 @@ class RunFiles:
         with bar, self.hold.released():
             runner.run(self.world, recorder, self.source.record == "full", keep)
 
-    def _summary(self, complete: bool) -> Summary:
+    def _summary(self, complete: bool, reason: str = "") -> Summary:
         return summarise(
             scenario=self.source.scenario_name,
             seed=self.source.seed,
@@ -125,18 +126,22 @@ class RunFiles:
             counters=self.world.counters(),
             firmware_sha256=self.source.firmware_sha256,
             complete=complete,
+            reason=reason,
             settings=self.settings,
             calibrations=learnt_calibrations(self.world.networks),
             gains=gains_of(self.world.scenario),
         )
 
-    def _leave_parts(self) -> None:
-        """What is left when the run is broken off: nothing, if not even one control period was recorded."""
+    def _leave_parts(self, reason: str) -> None:
+        """What is left when the run is broken off: nothing, if not even one control period was recorded.
+
+        `reason`: which part failed, if one did.
+        """
         if not self.tracks.count:
             return
         self.folder.keep = KEPT
         with suppress(OSError):  # a full disk, which is reported as what broke the run off
-            self.folder.part(SUMMARY).write_bytes(to_json(self._summary(complete=False)))
+            self.folder.part(SUMMARY).write_bytes(to_json(self._summary(complete=False, reason=reason)))
         complain(
             f"the run broke off after {self.tracks.count} control periods;"
             f" they are in {self.folder.path / part_name(RECORDING)}"

@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 from mcap.records import Attachment, Channel, Message, Metadata
 
+from miro_exact.bad_input import one_line, shortened
 from mirotwin.recording import channels
 from mirotwin.recording.container import Readable, RecordingError, records
 from mirotwin.recording.recorder import (
@@ -76,6 +77,8 @@ class Messages:
     def _take_metadata(self, record: Metadata) -> None:
         if record.name == BROKEN_OFF:
             self.broken_off = f"{self.path}: the run that wrote it was broken off"
+            if record.metadata.get("reason"):
+                self.broken_off += f": {one_line(shortened(record.metadata['reason']))}"
         elif record.name == METADATA:
             self.metadata = record.metadata
             found = record.metadata.get("format")

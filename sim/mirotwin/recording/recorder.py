@@ -14,6 +14,7 @@ from typing import Protocol
 
 import msgspec
 
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import nanoseconds
 from miro_sim.periods import Period
 from mirotwin.recording import channels, schemas, topics
@@ -29,7 +30,8 @@ SYMBOLS_ATTACHMENT = "symbols.json"
 TOGETHER = 10
 """Control periods that are written one after the other: after a simulated one the caches hold nothing of this."""
 BROKEN_OFF = "mirotwin.broken_off"
-"""Name of the metadata in a recording whose run did not come to its end."""
+"""Name of the metadata in a recording whose run did not come to its end. `reason`: which part of which robot failed, and
+when, if that is why."""
 
 
 class Fault(Protocol):
@@ -107,7 +109,8 @@ class Recorder:
         with self._undisturbed:
             self._write_waiting()
             if error is not None:
-                self._writer.add_metadata(BROKEN_OFF, {"by": type(error).__name__})
+                reason = {"reason": str(error)} if isinstance(error, BadInput) else {}
+                self._writer.add_metadata(BROKEN_OFF, {"by": type(error).__name__, **reason})
             self._writer.finish()
 
     def flush(self) -> None:

@@ -86,9 +86,9 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """`summary.json`. `tracking` and `theory` are the first robot's; `robots` lists all when there are several.
 
     `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is
-    written only where it is false: the run was broken off, and all figures are of the part before. `set`: the keys of
-    the scenario that were set on the command line (`KEY=VALUE`), only where there were some. `calibrations`: of hosts
-    that learn how their cameras hang.
+    written only where it is false: the run was broken off, and all figures are of the part before; `reason` says why, if
+    a part of the scenario failed (which one, of which robot, when). `set`: the keys of the scenario that were set on the
+    command line (`KEY=VALUE`), only where there were some. `calibrations`: of hosts that learn how their cameras hang.
     """
 
     scenario: str
@@ -106,6 +106,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     theory: Theory | None = None
     robots: tuple[RobotTracking, ...] = ()
     complete: bool = True
+    reason: str = ""
     set: tuple[str, ...] = ()
 
 
@@ -157,6 +158,7 @@ def summarise(
     counters: Mapping[str, Mapping[str, Any]],
     firmware_sha256: str,
     complete: bool = True,
+    reason: str = "",
     settings: tuple[str, ...] = (),
     calibrations: tuple[LearntCalibration, ...] = (),
     gains: Mapping[Place, Gains] = {},
@@ -182,6 +184,7 @@ def summarise(
         theory=everyone[0].theory if everyone else None,
         robots=everyone if len(everyone) > 1 else (),
         complete=complete,
+        reason=reason,
         set=settings,
     )
 
