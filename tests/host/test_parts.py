@@ -11,7 +11,7 @@ from miro_host.laws.registry import LAWS
 from miro_host.laws.yang_kim import Gains
 from miro_host.parts import PartError
 
-OWN = ["yang_kim", "body_frame", "kanayama", "dynamic_feedback"]
+OWN = ["yang_kim", "body_frame", "kanayama", "dynamic_feedback", "epsilon_tracking"]
 GOOD = """
 from miro_host.laws.interface import Law, LawParameters, Velocities
 
@@ -76,7 +76,7 @@ def test_our_own_name_is_not_taken_from_outside(site):
 
 def test_an_unknown_name_gets_the_nearest_and_the_list(site):
     install(site, "steady-law", "1.2", {"steady": "plug_steady:Parameters"}, plug_steady=GOOD)
-    choices = "use yang_kim, body_frame, kanayama, dynamic_feedback or steady"
+    choices = "use yang_kim, body_frame, kanayama, dynamic_feedback, epsilon_tracking or steady"
     assert reason("stedy") == f"'stedy' is not one of the choices; did you mean steady? {choices}"
     assert reason("pid") == f"'pid' is not one of the choices; {choices}"
 

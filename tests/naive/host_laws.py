@@ -5,6 +5,7 @@ taken numerically along the motion. Nothing is shared with the code under test.
 """
 
 from mpmath import cos, diff, expj, mp, mpc, mpf, sin, sqrt
+from tests.naive.host_control import sgn as switched
 from tests.naive.host_control import wrapped
 
 mp.dps = 40
@@ -52,3 +53,36 @@ def surfaces(gamma1, gamma2, a, width, robot, z, reference, z_r):
     s1 = diff(lambda dt: errors(dt)[0], 0) + gamma1 * x
     s2 = diff(lambda dt: errors(dt)[1], 0) + gamma2 * e
     return s1, s2
+
+
+def epsilon_tracking(gains, robot, reference, z_r):
+    """v and w of the epsilon-tracking law for unwrapped headings; z_r = (v_r, w_r).
+
+    `gains` is a dict: epsilon, alpha, beta, length, invariant, width (None: sign). With X = x1 + i x2 and E = X - X*
+    the law is U = U* - (pull + i beta sgn(sigma)) E; U* and v follow from X's numerical derivative along the motion.
+    """
+    g = {name: value if value is None else mpf(value) for name, value in gains.items()}
+
+    def state(posture, z, dt):
+        x, y, theta = map(mpf, posture)
+        v, w = map(mpf, z)
+        vector = mpc(x + dt * v * cos(theta), y + dt * v * sin(theta)) * expj(-theta - dt * w) / g["length"]
+        heading = theta + dt * w
+        return mpc(heading, vector.real), heading * vector.real + 2 * vector.imag
+
+    (x_c, x3_c), (x_r, x3_r) = state(robot, (0, 0), mpf(0)), state(reference, (0, 0), mpf(0))
+    u_r = (
+        diff(lambda dt: state(reference, z_r, dt)[0].real, 0),
+        diff(lambda dt: state(reference, z_r, dt)[0].imag, 0),
+    )
+    e = x_c - x_r
+    sigma = x3_c - x3_r - (x_r.conjugate() * e).imag * gains["invariant"]
+    near = (abs(e) ** 2 - g["epsilon"] ** 2) / g["epsilon"] ** 2
+    pull = g["alpha"] * max(mpf(-1), min(mpf(1), near))
+    u = mpc(*u_r) - (pull + mpc(0, 1) * g["beta"] * switched(sigma, g["width"])) * e
+
+    def rate_of_x2(v):
+        return diff(lambda dt: state(robot, (v, u.real), dt)[0].imag, 0)
+
+    v = (u.imag - rate_of_x2(0)) / (rate_of_x2(1) - rate_of_x2(0))  # x2' is linear in v
+    return v, u.real, sigma

@@ -131,7 +131,8 @@ def test_a_whole_number_is_a_number() -> None:
         (
             'law = "yang_kim"',
             'law = "pid"',
-            "controller.law: 'pid' is not one of the choices; use yang_kim, body_frame, kanayama or dynamic_feedback",
+            "controller.law: 'pid' is not one of the choices; use yang_kim, body_frame, kanayama, dynamic_feedback or"
+            " epsilon_tracking",
         ),
         (
             'kind = "pixels"',

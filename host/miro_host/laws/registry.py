@@ -27,6 +27,7 @@ LAWS: Registry[Controller] = Registry(
         "body_frame": "miro_host.laws.body_frame:BodyFrameParameters",
         "kanayama": "miro_host.laws.kanayama:KanayamaParameters",
         "dynamic_feedback": "miro_host.laws.dynamic_feedback:DynamicFeedbackParameters",
+        "epsilon_tracking": "miro_host.laws.epsilon_tracking:EpsilonTrackingParameters",
     },
     default=DEFAULT_LAW,
 )
