@@ -30,8 +30,8 @@ SYMBOLS_ATTACHMENT = "symbols.json"
 TOGETHER = 10
 """Control periods that are written one after the other: after a simulated one the caches hold nothing of this."""
 BROKEN_OFF = "mirotwin.broken_off"
-"""Name of the metadata in a recording whose run did not come to its end. `reason`: which part of which robot failed, and
-when, if that is why."""
+"""Name of the metadata in a recording whose run did not come to its end. `reason`: which part of which robot failed,
+and when, if that is why."""
 
 
 class Fault(Protocol):

@@ -86,9 +86,10 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """`summary.json`. `tracking` and `theory` are the first robot's; `robots` lists all when there are several.
 
     `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is
-    written only where it is false: the run was broken off, and all figures are of the part before; `reason` says why, if
-    a part of the scenario failed (which one, of which robot, when). `set`: the keys of the scenario that were set on the
-    command line (`KEY=VALUE`), only where there were some. `calibrations`: of hosts that learn how their cameras hang.
+    written only where it is false: the run was broken off, and all figures are of the part before; `reason` says why,
+    if a part of the scenario failed (which one, of which robot, when). `set`: the keys of the scenario that were set on
+    the command line (`KEY=VALUE`), only where there were some. `calibrations`: of hosts that learn how their cameras
+    hang.
     """
 
     scenario: str
