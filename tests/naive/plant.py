@@ -1,4 +1,7 @@
-"""The drive in tiny fixed Euler steps, straight from the equations: slow, obvious, no case is solved in closed form."""
+"""The drive in tiny fixed Euler steps, straight from the equations: slow, obvious, no case is solved in closed form.
+
+`NaiveDrive` rolls; `NaiveRoughDrive` may slip, drag its ball, stick and be pushed.
+"""
 
 import math
 
@@ -92,6 +95,78 @@ class NaiveDrive:
     def velocity(self):
         left, right = (self.roll[side] * self.speed[side] for side in (0, 1))
         return (left + right) / 2, (right - left) / self.params.chassis.track_m
+
+
+SLIP_M_S = 2e-4  # below this slip a contact is a stiff damper instead of a jump
+
+
+def smooth_sign(x, width):
+    """The sign of x, with a ramp of +-width in the middle."""
+    return max(-1.0, min(1.0, x / width))
+
+
+class NaiveRoughDrive(NaiveDrive):
+    """The same with a chassis of its own: tyres that slip, a ball that drags, shafts that stick, a force that pushes.
+
+    `force(tick)` gives (N, Nm). `velocity_m_s` is over the ground, in the axes of the pitch.
+    """
+
+    def __init__(self, params, x=0.0, y=0.0, theta=0.0, force=lambda tick: (0.0, 0.0)):
+        super().__init__(params, x, y, theta)
+        self.force = force
+        self.velocity_m_s = [0.0, 0.0]
+        self.w = 0.0
+
+    def _forward(self):
+        vx, vy = self.velocity_m_s
+        return vx * math.cos(self.theta) + vy * math.sin(self.theta)
+
+    def _leftward(self):
+        vx, vy = self.velocity_m_s
+        return vy * math.cos(self.theta) - vx * math.sin(self.theta)
+
+    def velocity(self):
+        return self._forward(), self.w
+
+    def _step(self):
+        params, body = self.params, self.params.chassis
+        weight = body.mass_kg * 9.81
+        grip = params.tyre.grip * 0.5 * (1 - params.ball.load_share) * weight
+        along, rest = [0.0, 0.0], [0.0, 0.0]
+        for side in (0, 1):
+            hub = self._forward() + (side - 0.5) * body.track_m * self.w
+            slip = hub - self.roll[side] * self.speed[side]
+            along[side] = -grip * smooth_sign(slip, SLIP_M_S)
+            rest[side] = math.sqrt(grip**2 - along[side] ** 2)
+        sideways = -(rest[0] + rest[1]) * smooth_sign(self._leftward(), SLIP_M_S)
+        ball_x, ball_y = self._forward(), self._leftward() - params.ball.behind_m * self.w
+        fast = math.hypot(ball_x, ball_y)
+        drag = params.ball.friction * params.ball.load_share * weight / max(fast, SLIP_M_S)
+        push_n, push_nm = self.force(self.tick)
+        self._turn_shafts(along)
+        forward = along[0] + along[1] - drag * ball_x + push_n
+        left = sideways - drag * ball_y
+        torque = 0.5 * body.track_m * (along[1] - along[0]) + params.ball.behind_m * drag * ball_y + push_nm
+        cosine, sine = math.cos(self.theta), math.sin(self.theta)
+        self.velocity_m_s[0] += (forward * cosine - left * sine) / body.mass_kg * STEP_S
+        self.velocity_m_s[1] += (forward * sine + left * cosine) / body.mass_kg * STEP_S
+        self.w += torque / body.yaw_inertia_kg_m2 * STEP_S
+        self.theta += self.w * STEP_S
+        self.x += self.velocity_m_s[0] * STEP_S
+        self.y += self.velocity_m_s[1] * STEP_S
+        self.tick += STEP_TICKS
+
+    def _turn_shafts(self, along):
+        constant, ratio = self.params.motor.torque_constant_nm_a, self.params.chassis.stiction_ratio
+        for side in (0, 1):
+            emf = constant * self.speed[side]
+            self.current[side] = winding_step(self.params, self.drive[side], self.current[side], emf, STEP_S)
+            standing = abs(self.speed[side]) < CREEP_RAD_S
+            most = self.params.friction_nm() * (ratio if standing else 1.0)
+            rubbing = most * smooth_sign(self.speed[side], CREEP_RAD_S)
+            torque = constant * self.current[side] - rubbing - self.roll[side] * along[side]
+            self.speed[side] += torque / self.params.motor.rotor_inertia_kg_m2 * STEP_S
+            self.angle[side] += self.speed[side] * STEP_S
 
 
 def quadrature_edges(start, moved, start_tick, ticks):

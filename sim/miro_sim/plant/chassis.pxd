@@ -5,7 +5,6 @@ from miro_exact cimport dmath
 cdef double TICK_S
 cdef int SWEEPS
 
-@cython.final
 cdef class Body:
     cdef readonly double left_m_rad, right_m_rad, track_m, friction_nm
     cdef readonly double mass_ll, mass_lr, mass_rr, inverse_ll, inverse_lr, inverse_rr
@@ -14,7 +13,9 @@ cdef class Body:
 
     @cython.locals(half_s=double, old_left=double, old_right=double)
     cpdef push(self, double left_nms, double right_nms, int ticks)
+    @cython.final
     @cython.locals(left=double, right=double, left_rub=double, right_rub=double, new_left=double, new_right=double)
     cdef void _rub(self, double most) noexcept
+    @cython.final
     @cython.locals(left_m=double, right_m=double, half=double, chord_m=double, sine=double, cosine=double)
     cdef int _roll(self) except -1

@@ -1,7 +1,8 @@
 """The rigid robot on two wheels: impulses on the motor shafts in, shaft speeds and posture out.
 
 What belongs here: the inertia that couples the two shafts, Coulomb friction, the posture. What does not:
-where the impulses come from, encoders. Wheels roll without slipping (keep below 7.8 m/s2).
+where the impulses come from, encoders, and a body whose wheels may slip (`rough`). Wheels roll without slipping (keep
+below 7.8 m/s2).
 
 With the shaft speeds w = (left, right) and c = wheel radius / gear ratio the robot goes at
 v = (cl wl + cr wr) / 2 and turns at (cr wr - cl wl) / b; its energy is w' M w / 2 with
@@ -31,7 +32,7 @@ class Body:
         "y_m": _PLACE,
         "theta_rad": ("d", -0.5e6, 0.5e6),  # `dmath` takes a million
     }
-    NOT_STATE = (
+    NOT_STATE: tuple[str, ...] = (
         "left_m_rad",
         "right_m_rad",
         "track_m",

@@ -5,6 +5,7 @@ from miro_robot.plant cimport Plant
 from miro_sim.plant.chassis cimport Body
 from miro_sim.plant.circuit cimport Winding
 from miro_sim.plant.encoder cimport Quadrature
+from miro_sim.plant.rough cimport RoughBody
 
 cdef long long LONGEST_STEP, _NEVER
 cdef double TICK_S
@@ -16,6 +17,7 @@ cdef class DifferentialDrive(Plant):
     cdef readonly Winding left_winding, right_winding
     cdef readonly Quadrature left_encoder, right_encoder
     cdef readonly Body body
+    cdef readonly RoughBody rough
 
     cpdef attach(self, Lm629 left, Lm629 right)
     cpdef int after_load(self) except -1

@@ -7,7 +7,7 @@
     A, B to the LM629 <-- quadrature <-- angle -+--> posture (x, y, heading)        once per step, left and right
 
 What belongs here: the order of a step and the reporting of edges. What does not: the physics of the parts
-(`circuit`, `chassis`, `encoder`), figures (`params`).
+(`circuit`, `chassis`, `rough`, `encoder`), figures (`params`).
 
 A step of at most one PWM period: currents with the back-EMF of its start, shaft impulses kM * charge,
 friction, mean of old and new speed into angle and posture, edges interpolated inside it. Holding the back-EMF
@@ -18,6 +18,7 @@ makes energy only to second order, (kM charge)2 / 2J: by Cauchy-Schwarz less tha
 from __future__ import annotations
 
 from miro_exact.clock import NEVER_TICK
+from miro_exact.rng import Stream
 from miro_exact.state import TICK
 from miro_robot.lm629.chip import Lm629
 from miro_robot.plant import Plant
@@ -25,6 +26,7 @@ from miro_sim.plant.chassis import Body
 from miro_sim.plant.circuit import Winding
 from miro_sim.plant.encoder import Quadrature
 from miro_sim.plant.params import DriveParams
+from miro_sim.plant.rough import RoughBody
 
 LONGEST_STEP = 2048
 _NEVER = NEVER_TICK
@@ -32,7 +34,10 @@ TICK_S = 1.0 / 24e6
 
 
 class DifferentialDrive(Plant):
-    """A robot that stands at (x_m, y_m) with heading theta_rad at tick 0, bridges off, A = B = 0."""
+    """A robot that stands at (x_m, y_m) with heading theta_rad at tick 0, bridges off, A = B = 0.
+
+    `noise`: draws of the disturbing force, if `params` have any. Its value in the middle of a step holds for all of it.
+    """
 
     STATE: dict[str, object] = {
         "tick": TICK,
@@ -42,10 +47,15 @@ class DifferentialDrive(Plant):
         "right_encoder": Quadrature,
         "body": Body,
     }
-    NOT_STATE = ("left", "right", "params", "torque_constant_nm_a")
+    NOT_STATE = ("left", "right", "params", "torque_constant_nm_a", "rough")
 
     def __init__(
-        self, params: DriveParams, x_m: float = 0.0, y_m: float = 0.0, theta_rad: float = 0.0
+        self,
+        params: DriveParams,
+        x_m: float = 0.0,
+        y_m: float = 0.0,
+        theta_rad: float = 0.0,
+        noise: Stream | None = None,
     ) -> None:
         super().__init__()
         self.params = params
@@ -57,7 +67,8 @@ class DifferentialDrive(Plant):
         counts = 4 * params.encoder.lines if params.encoder.index_pulse else 0
         self.left_encoder = Quadrature(params.counts_per_radian(), counts)
         self.right_encoder = Quadrature(params.counts_per_radian(), counts)
-        self.body = Body(params, x_m, y_m, theta_rad)
+        self.rough = RoughBody(params, x_m, y_m, theta_rad, noise) if params.is_rough() else None
+        self.body = Body(params, x_m, y_m, theta_rad) if self.rough is None else self.rough
 
     def attach(self, left: Lm629, right: Lm629) -> None:
         """Wires the encoder outputs to the two LM629 and shows these the levels of now."""
@@ -77,6 +88,8 @@ class DifferentialDrive(Plant):
     def _step(self, ticks: int) -> None:
         constant = self.torque_constant_nm_a
         start_tick = self.tick
+        if self.rough is not None:
+            self.rough.feel(start_tick + (ticks >> 1))
         left_charge = self.left_winding.step(ticks, constant * self.body.left_rad_s)
         right_charge = self.right_winding.step(ticks, constant * self.body.right_rad_s)
         self.body.push(constant * TICK_S * left_charge, constant * TICK_S * right_charge, ticks)

@@ -1,7 +1,7 @@
 """What a robot's drive is made of: the figures of the default robot, each with its source.
 
-What belongs here: frozen, checked parameter structures in SI units and what follows from them by plain
-arithmetic. What does not: equations of motion, state.
+What belongs here: frozen, checked parameter structures in SI units, the disturbances of the drive among them (all off
+by default), and what follows from them by plain arithmetic. What does not: equations of motion, state.
 
 Sources: Faulhaber 2224 006 SR catalogue figures, which close on themselves (no-load speed, stall torque and
 the 11 ms time constant follow from them); ST L298 data sheet, total saturation drop; the robot is a MiroSot
@@ -16,15 +16,35 @@ GRAVITY_M_S2 = 9.81
 
 
 MAY_BE_ZERO = ("friction_nm", "rolling_resistance", "drop_v", "drop_ohm", "diode_v")
+WITHIN = {
+    "grip": (0.01, 10.0),
+    "stiction_ratio": (1.0, 10.0),
+    "friction": (0.0, 10.0),
+    "load_share": (0.0, 0.9),
+    "behind_m": (-0.1, 0.1),
+    "period_s": (0.001, 3600.0),
+    "force_n": (-5.0, 5.0),
+    "torque_nm": (-0.1, 0.1),
+    "sine_force_n": (0.0, 5.0),
+    "sine_torque_nm": (0.0, 0.1),
+    "noise_force_n": (0.0, 5.0),
+    "noise_torque_nm": (0.0, 0.1),
+}
+"""Ranges of the disturbances. 5 N are the robot's weight."""
 
 
 class _Positive(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Numbers that must be finite and above zero (those in MAY_BE_ZERO: not below)."""
+    """Numbers that must be finite and above zero (those in MAY_BE_ZERO: not below; those in WITHIN: in a range)."""
 
     def __post_init__(self) -> None:
         for name in self.__struct_fields__:
             value = getattr(self, name)
-            if isinstance(value, msgspec.Struct | bool):
+            if value is None or isinstance(value, msgspec.Struct | bool):
+                continue
+            if name in WITHIN:
+                low, high = WITHIN[name]
+                if not low <= value <= high:
+                    raise ValueError(f"{name} must be {low:g} to {high:g}, got {value!r}")
                 continue
             zero_is_fine = name in MAY_BE_ZERO
             limit = ("0 or above" if zero_is_fine else "above 0") + " and below 1e12"
@@ -69,6 +89,7 @@ class Chassis(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
     gear_ratio: float = 8.0
     gear_efficiency: float = 0.8  # acts on the rolling resistance only
     rolling_resistance: float = 0.03  # force / weight
+    stiction_ratio: float = 1.0  # friction of a shaft that stands / of one that turns
 
 
 class Encoder(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -81,6 +102,42 @@ class Encoder(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
     index_pulse: bool = False
 
 
+class Tyre(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What a wheel has of the pitch: it slips beyond `grip` times its load. Without `grip` it never does."""
+
+    grip: float | None = None  # coefficient of friction; rubber on a painted board about 0.8
+
+
+class RollingBall(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The ball that the robot rests on beside its wheels (paper, section V-A): friction against its way on the ground.
+
+    It carries `load_share` of the weight, which the wheels then do not press with. 0.03 m and a fifth: chosen.
+    """
+
+    friction: float = 0.0  # force / load of the ball, whichever way it goes
+    load_share: float = 0.2
+    behind_m: float = 0.03  # behind the axle, on the middle line; negative: in front
+
+
+class Disturbance(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A force along the robot's axis (forward) and a yaw torque (counter-clockwise) on its body.
+
+    Added up: a constant, a sine from tick 0 on, and noise, which is drawn anew every period within +- the bound.
+    """
+
+    force_n: float = 0.0
+    torque_nm: float = 0.0
+    sine_force_n: float = 0.0
+    sine_torque_nm: float = 0.0
+    noise_force_n: float = 0.0
+    noise_torque_nm: float = 0.0
+    period_s: float = 1.0  # of the sine, and how long a draw holds
+
+    def is_on(self) -> bool:
+        """Whether there is any force or torque."""
+        return any(getattr(self, name) for name in self.__struct_fields__ if name != "period_s")
+
+
 class DriveParams(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Everything `DifferentialDrive` needs to know about a robot."""
 
@@ -89,6 +146,18 @@ class DriveParams(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     battery: Battery = Battery()
     chassis: Chassis = Chassis()
     encoder: Encoder = Encoder()
+    tyre: Tyre = Tyre()
+    ball: RollingBall = RollingBall()
+    disturbance: Disturbance = Disturbance()
+
+    def is_rough(self) -> bool:
+        """Whether anything is on that `chassis.Body` does not know: then the body is a `rough.RoughBody`."""
+        return (
+            self.tyre.grip is not None
+            or self.ball.friction > 0.0
+            or self.chassis.stiction_ratio > 1.0
+            or self.disturbance.is_on()
+        )
 
     def radius_m(self, side: int) -> float:
         """Wheel radius of side 0 (left) or 1 (right)."""

@@ -48,7 +48,8 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     The start is the start of the reference plus the errors (captions of the paper's Figs. 6 and 8). Each
     wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `reference`,
     `estimator` and `controller` hold the parameters of the reference, the estimator and the law that they name. `drive`
-    replaces single parameters of motors, bridges, battery, chassis and encoders (`plant.params`).
+    replaces single parameters of motors, bridges, battery, chassis and encoders, and turns on what disturbs the drive
+    (`plant.params`).
     """
 
     slot: Annotated[int, Meta(ge=0, le=4)] = 0

@@ -64,6 +64,7 @@ class Robot:
                 start.x_m + spec.start_error_x_cm / 100.0,
                 start.y_m + spec.start_error_y_cm / 100.0,
                 start.theta_rad + spec.start_error_theta_rad,
+                Stream(seed, f"{name}/disturbance"),
             )
         except ArithmeticError as error:  # what follows from the parameters divides by zero
             raise DomainError(f"{name}: its drive parameters lead to a value that is not finite") from error

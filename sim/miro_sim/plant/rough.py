@@ -1,0 +1,292 @@
+"""The robot where `chassis` is too kind: wheels may slip, a ball drags, standing shafts stick, a force pushes.
+
+What belongs here: the body with five velocities (two shafts; forward, sideways and turning of the chassis) and the
+friction between them. What does not: the body whose wheels only roll (`chassis`, used while all of this is off), the
+disturbing force as a function of time (`disturbance`), figures (`params`).
+
+    motor --> shaft (inertia, Coulomb friction) --c--> contact (grip times load) --> chassis <-- ball, disturbing force
+
+A step turns the velocity into the new heading, adds the impulses of motors and disturbance, and then looks for the
+friction impulses that leave the least kinetic energy (maximum dissipation), each within its bound:
+
+    shaft    friction * time, times the stiction ratio if the shaft stood when the step began
+    contact  grip * load of the wheel * time, along the wheel
+    axle     sideways, both wheels together: what the friction circle leaves beside the force along the wheel, which is
+             taken from the step before
+    ball     friction * load of the ball * time, in any direction; against its way over the ground
+
+A few sweeps over wheel, wheel, ball and axle; each part is solved exactly while the others hold still, so each lowers
+the energy: friction never drives. What ends inside its bounds ends at exactly zero. A wheel without `grip` has all the grip
+that it needs: it rolls, to rounding. Loads are those of the robot at rest: half each of what the ball does not carry.
+"""
+
+from __future__ import annotations
+
+import math
+
+from miro_exact import dmath
+from miro_exact.rng import Stream
+from miro_sim.plant.chassis import Body
+from miro_sim.plant.disturbance import DisturbingForce
+from miro_sim.plant.params import GRAVITY_M_S2, DriveParams
+
+TICK_S = 1.0 / 24e6
+SWEEPS = 12
+NEWTON_STEPS = 8
+NEAR = 1.0 - 1e-13
+ALL_GRIP_N = 1e30
+_SPEED_M_S = ("d", -1e6, 1e6)
+_FORCE_N = ("d", -1e30, 1e30)
+
+
+class RoughBody(Body):
+    """`v_m_s` forward, `u_m_s` to the left, `w_rad_s` counter-clockwise; forces are those along the two wheels."""
+
+    STATE = {
+        "v_m_s": _SPEED_M_S,
+        "u_m_s": _SPEED_M_S,
+        "w_rad_s": _SPEED_M_S,
+        "left_force_n": _FORCE_N,
+        "right_force_n": _FORCE_N,
+    }
+    NOT_STATE = (
+        *("forces", "half_track_m", "stiction_ratio", "grip_n", "ball_n", "ball_m"),
+        *("mass_kg", "yaw_kg_m2", "rotor_kg_m2", "hub_per_kg", "ball_x_per_kg", "ball_y_per_kg"),
+        *("_rub_nms", "_push_ns", "_ball_x_ns", "_ball_y_ns", "_ball_z"),
+    )
+
+    def __init__(
+        self, params: DriveParams, x_m: float, y_m: float, theta_rad: float, noise: Stream | None = None
+    ) -> None:
+        super().__init__(params, x_m, y_m, theta_rad)
+        body = params.chassis
+        weight_n = body.mass_kg * GRAVITY_M_S2
+        self.forces = DisturbingForce(
+            params.disturbance, Stream(0, "disturbance") if noise is None else noise
+        )
+        self.half_track_m = 0.5 * body.track_m
+        self.stiction_ratio = body.stiction_ratio
+        on_wheel_n = 0.5 * (1.0 - params.ball.load_share) * weight_n
+        self.grip_n = ALL_GRIP_N if params.tyre.grip is None else params.tyre.grip * on_wheel_n
+        self.ball_n = params.ball.friction * params.ball.load_share * weight_n
+        self.ball_m = -params.ball.behind_m
+        self.mass_kg = body.mass_kg
+        self.yaw_kg_m2 = body.yaw_inertia_kg_m2
+        self.rotor_kg_m2 = params.motor.rotor_inertia_kg_m2
+        self.hub_per_kg = 1.0 / self.mass_kg + self.half_track_m * self.half_track_m / self.yaw_kg_m2
+        self.ball_x_per_kg = 1.0 / self.mass_kg
+        self.ball_y_per_kg = 1.0 / self.mass_kg + self.ball_m * self.ball_m / self.yaw_kg_m2
+        self.v_m_s = 0.0
+        self.u_m_s = 0.0
+        self.w_rad_s = 0.0
+        self.left_force_n = 0.0
+        self.right_force_n = 0.0
+        self._rub_nms = 0.0
+        self._push_ns = 0.0
+        self._ball_x_ns = 0.0
+        self._ball_y_ns = 0.0
+        self._ball_z = 0.0
+
+    def feel(self, tick: int) -> None:
+        """The next push is at this tick: the disturbing force is that of then."""
+        self.forces.at(tick)
+
+    def push(self, left_nms: float, right_nms: float, ticks: int) -> None:
+        """Applies motor impulses, disturbance and friction over `ticks`; moves on at the mean of old and new speed."""
+        step_s = TICK_S * ticks
+        half_s = 0.5 * step_s
+        old_left = self.left_rad_s
+        old_right = self.right_rad_s
+        old_v = self.v_m_s
+        old_u = self.u_m_s
+        old_w = self.w_rad_s
+        most_left = step_s * self.friction_nm * (self.stiction_ratio if old_left == 0.0 else 1.0)
+        most_right = step_s * self.friction_nm * (self.stiction_ratio if old_right == 0.0 else 1.0)
+        self._turn_frame(0.5 * step_s * old_w)
+        self.left_rad_s = old_left + left_nms / self.rotor_kg_m2
+        self.right_rad_s = old_right + right_nms / self.rotor_kg_m2
+        self.v_m_s = self.v_m_s + step_s * self.forces.force_n / self.mass_kg
+        self.w_rad_s = old_w + step_s * self.forces.torque_nm / self.yaw_kg_m2
+        self._dissipate(most_left, most_right, step_s)
+        self.turned_left_rad = half_s * (old_left + self.left_rad_s)
+        self.turned_right_rad = half_s * (old_right + self.right_rad_s)
+        self._glide(
+            half_s * (old_v + self.v_m_s), half_s * (old_u + self.u_m_s), half_s * (old_w + self.w_rad_s)
+        )
+
+    def _turn_frame(self, tangent: float) -> None:
+        """The velocity over the ground as the axes see it that have turned; a rotation, so energy stays."""
+        if tangent == 0.0 or (self.v_m_s == 0.0 and self.u_m_s == 0.0):
+            return
+        squares = 1.0 + tangent * tangent
+        cosine = (1.0 - tangent * tangent) / squares
+        sine = 2.0 * tangent / squares
+        v = self.v_m_s
+        u = self.u_m_s
+        self.v_m_s = cosine * v + sine * u
+        self.u_m_s = cosine * u - sine * v
+
+    def _dissipate(self, most_left: float, most_right: float, step_s: float) -> None:
+        """Friction impulses of one step, by sweeps from one part to the next."""
+        grip = self.grip_n * step_s
+        axle = step_s * (self._grip_left_n(self.left_force_n) + self._grip_left_n(self.right_force_n))
+        left_rub = right_rub = left_push = right_push = sideways = 0.0
+        self._ball_x_ns = 0.0
+        self._ball_y_ns = 0.0
+        self._ball_z = 0.0
+        inertia = self.rotor_kg_m2
+        for _ in range(SWEEPS):
+            hub = self.v_m_s - self.half_track_m * self.w_rad_s
+            self._wheel(hub, self.left_rad_s, self.left_m_rad, left_rub, left_push, most_left, grip)
+            self._move(self._push_ns - left_push, -self.half_track_m)
+            self.left_rad_s += (
+                self._rub_nms - left_rub - self.left_m_rad * (self._push_ns - left_push)
+            ) / inertia
+            left_rub = self._rub_nms
+            left_push = self._push_ns
+            hub = self.v_m_s + self.half_track_m * self.w_rad_s
+            self._wheel(hub, self.right_rad_s, self.right_m_rad, right_rub, right_push, most_right, grip)
+            self._move(self._push_ns - right_push, self.half_track_m)
+            self.right_rad_s += (
+                self._rub_nms - right_rub - self.right_m_rad * (self._push_ns - right_push)
+            ) / inertia
+            right_rub = self._rub_nms
+            right_push = self._push_ns
+            if self.ball_n > 0.0:
+                self._drag(self.ball_n * step_s)
+            before = sideways
+            sideways = min(axle, max(-axle, before - self.mass_kg * self.u_m_s))
+            self.u_m_s = self.u_m_s + (sideways - before) / self.mass_kg
+        self.left_force_n = left_push / step_s
+        self.right_force_n = right_push / step_s
+        if -axle < sideways < axle:
+            self.u_m_s = 0.0
+        left_stands = -most_left < left_rub < most_left
+        right_stands = -most_right < right_rub < most_right
+        if left_stands:
+            self.left_rad_s = 0.0
+        if right_stands:
+            self.right_rad_s = 0.0
+        if left_stands and right_stands and -grip < left_push < grip and -grip < right_push < grip:
+            self.v_m_s = 0.0
+            self.w_rad_s = 0.0
+
+    def _grip_left_n(self, along_n: float) -> float:
+        """What the friction circle of a wheel leaves sideways."""
+        rest = (self.grip_n - along_n) * (self.grip_n + along_n)
+        return math.sqrt(rest) if rest > 0.0 else 0.0
+
+    def _move(self, push_ns: float, lever_m: float) -> None:
+        """A forward impulse on the chassis at `lever_m` to the right of the middle."""
+        self.v_m_s = self.v_m_s + push_ns / self.mass_kg
+        self.w_rad_s = self.w_rad_s + lever_m * push_ns / self.yaw_kg_m2
+
+    def _wheel(
+        self, hub: float, shaft: float, roll: float, rub: float, push: float, most: float, grip: float
+    ) -> None:
+        """Friction of a shaft (Nms) and push of its wheel (Ns, on the chassis) that leave the least energy.
+
+        `hub` (m/s) and `shaft` (rad/s) are the speeds with the impulses `rub` and `push` so far. A corner, an edge or
+        the inside of the box |rub| <= most, |push| <= grip: where the signs of what is left agree, that is it.
+        """
+        inertia = self.rotor_kg_m2
+        free_hub = hub - self.hub_per_kg * push
+        free_shaft = shaft - (rub - roll * push) / inertia
+        self._push_ns = -free_hub / self.hub_per_kg
+        self._rub_nms = roll * self._push_ns - inertia * free_shaft
+        if -grip <= self._push_ns <= grip and -most <= self._rub_nms <= most:
+            return  # both stand
+        slip_per_ns = self.hub_per_kg + roll * roll / inertia
+        self._rub_nms = -most if free_shaft >= 0.0 else most
+        for _ in range(2):
+            turning = free_shaft + self._rub_nms / inertia
+            self._push_ns = min(grip, max(-grip, (roll * turning - free_hub) / slip_per_ns))
+            if (turning - roll * self._push_ns / inertia) * self._rub_nms <= 0.0:
+                return  # the shaft turns against its friction
+            self._rub_nms = -self._rub_nms
+        self._push_ns = grip if free_hub < 0.0 else -grip
+        self._rub_nms = roll * self._push_ns - inertia * free_shaft
+        if -most <= self._rub_nms <= most:
+            return  # the shaft stands, the wheel slides
+        self._rub_nms = rub  # rounding at an edge: as it was
+        self._push_ns = push
+
+    def _drag(self, most: float) -> None:
+        """The ball's impulse (Ns) that leaves the least energy within the circle of `most`; applied.
+
+        Outside of it the answer is p / (a + z) for the z that puts it on the circle: Newton's method on 1 / length,
+        which is nearly straight (More and Sorensen 1983), from the z of the sweep before.
+        """
+        x_per_kg = self.ball_x_per_kg
+        y_per_kg = self.ball_y_per_kg
+        free_x = self.v_m_s - x_per_kg * self._ball_x_ns
+        free_y = self.u_m_s + self.ball_m * self.w_rad_s - y_per_kg * self._ball_y_ns
+        x = -free_x / x_per_kg
+        y = -free_y / y_per_kg
+        if x * x + y * y > most * most:
+            z = self._ball_z
+            x = -free_x / (x_per_kg + z)
+            y = -free_y / (y_per_kg + z)
+            length = math.sqrt(x * x + y * y)
+            for _ in range(NEWTON_STEPS):
+                if NEAR * most <= length <= most:
+                    break
+                fall = x * x / (x_per_kg + z) + y * y / (y_per_kg + z)
+                z = max(0.0, z + (length / most - 1.0) * length * length / fall)
+                x = -free_x / (x_per_kg + z)
+                y = -free_y / (y_per_kg + z)
+                length = math.sqrt(x * x + y * y)
+            if length > most:
+                x = x * (most / length)
+                y = y * (most / length)
+            self._ball_z = z
+        more_y = y - self._ball_y_ns
+        self.v_m_s = self.v_m_s + (x - self._ball_x_ns) / self.mass_kg
+        self.u_m_s = self.u_m_s + more_y / self.mass_kg
+        self.w_rad_s = self.w_rad_s + self.ball_m * more_y / self.yaw_kg_m2
+        self._ball_x_ns = x
+        self._ball_y_ns = y
+
+    def _glide(self, forward_m: float, left_m: float, turn_rad: float) -> None:
+        """Moves the posture along the arc of a way in the robot's own axes, which turn on the way."""
+        if forward_m == 0.0 and left_m == 0.0 and turn_rad == 0.0:
+            return
+        half = 0.5 * turn_rad
+        shrink = 1.0 - half * half / 6.0
+        sine, cosine = dmath.sincos(self.theta_rad + half)
+        self.x_m = self.x_m + shrink * (forward_m * cosine - left_m * sine)
+        self.y_m = self.y_m + shrink * (forward_m * sine + left_m * cosine)
+        self.theta_rad = self.theta_rad + turn_rad
+
+    def pose_after(self, ticks: int) -> tuple[float, float, float]:
+        """Posture (m, m, rad) `ticks` after the last push at the speeds of now; changes nothing."""
+        time_s = TICK_S * ticks
+        half = 0.5 * self.w_rad_s * time_s
+        way_s = time_s * (1.0 - half * half / 6.0)
+        sine, cosine = dmath.sincos(self.theta_rad + half)
+        return (
+            self.x_m + way_s * (self.v_m_s * cosine - self.u_m_s * sine),
+            self.y_m + way_s * (self.v_m_s * sine + self.u_m_s * cosine),
+            self.theta_rad + 2.0 * half,
+        )
+
+    def velocity(self) -> tuple[float, float]:
+        """(m/s forward, rad/s counter-clockwise) of the chassis, whatever the wheels do."""
+        return (self.v_m_s, self.w_rad_s)
+
+    def kinetic_energy_j(self) -> float:
+        """Energy of translation, rotation and both rotors."""
+        rotors = self.left_rad_s * self.left_rad_s + self.right_rad_s * self.right_rad_s
+        moving = self.v_m_s * self.v_m_s + self.u_m_s * self.u_m_s
+        turning = self.yaw_kg_m2 * self.w_rad_s * self.w_rad_s
+        return 0.5 * (self.rotor_kg_m2 * rotors + self.mass_kg * moving + turning)
+
+    def slips_m_s(self) -> tuple[float, float]:
+        """By how much the chassis runs ahead of its left and right wheel, along the wheel."""
+        left = self.v_m_s - self.half_track_m * self.w_rad_s - self.left_m_rad * self.left_rad_s
+        right = self.v_m_s + self.half_track_m * self.w_rad_s - self.right_m_rad * self.right_rad_s
+        return (left, right)
+
+    def __repr__(self) -> str:
+        left, right = self.slips_m_s()
+        return f"Rough{super().__repr__()[:-1]} u={self.u_m_s!r} slips=({left!r}, {right!r}))"

@@ -1,0 +1,302 @@
+"""The rough body: tyres that slip, the ball that drags, shafts that stick. Friction never drives, and off is off."""
+
+import math
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests import children
+from tests.naive.plant import NaiveRoughDrive
+from tests.sim.plant.runs import pwm, trace
+
+from miro_exact.state import restore, snapshot, values
+from miro_sim.plant.chassis import Body
+from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.plant.params import Chassis, Disturbance, DriveParams, Motor, RollingBall, Tyre
+from miro_sim.plant.rough import RoughBody
+
+BALL = RollingBall(friction=0.3)
+ALL = DriveParams(
+    tyre=Tyre(grip=0.4), ball=BALL, chassis=Chassis(stiction_ratio=1.8, left_radius_factor=0.985)
+)
+KINDS = {
+    "slip": DriveParams(tyre=Tyre(grip=0.3)),
+    "ice": DriveParams(tyre=Tyre(grip=0.02)),
+    "ball": DriveParams(ball=BALL),
+    "ball in front": DriveParams(ball=RollingBall(friction=0.5, behind_m=-0.035)),
+    "stiction": DriveParams(chassis=Chassis(stiction_ratio=2.5)),
+    "all": ALL,
+}
+ROLLING = DriveParams(tyre=Tyre(grip=10.0), ball=RollingBall(load_share=0.0))
+SPEEDS = st.floats(-400.0, 400.0)
+WAYS = st.floats(-2.0, 2.0)
+TURNS = st.floats(-40.0, 40.0)
+IMPULSES = st.floats(-2e-6, 2e-6)
+TICKS = st.integers(1, 2048)
+MAGNITUDES = ((100, 100), (0, 0), (-100, -60), (40, 128))
+
+
+def moving(params, left=0.0, right=0.0, v=0.0, u=0.0, w=0.0):
+    made = RoughBody(params, 0.0, 0.0, 0.0)
+    made.left_rad_s, made.right_rad_s = left, right
+    made.v_m_s, made.u_m_s, made.w_rad_s = v, u, w
+    return made
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(deadline=None, max_examples=100)
+@given(SPEEDS, SPEEDS, WAYS, WAYS, TURNS, TICKS)
+def test_friction_alone_never_adds_energy(kind, left, right, v, u, w, ticks):
+    one = moving(KINDS[kind], left, right, v, u, w)
+    for _ in range(3):
+        before = one.kinetic_energy_j()
+        one.push(0.0, 0.0, ticks)
+        assert one.kinetic_energy_j() <= before * (1.0 + 1e-15)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(deadline=None, max_examples=60)
+@given(SPEEDS, SPEEDS, WAYS, WAYS, TURNS, IMPULSES, IMPULSES, TICKS)
+def test_a_push_gives_no_more_energy_than_to_shafts_without_any_friction(
+    kind, left, right, v, u, w, push_left, push_right, ticks
+):
+    params = KINDS[kind]
+    one = moving(params, left, right, v, u, w)
+    inertia = params.motor.rotor_inertia_kg_m2
+    free = moving(params, left + push_left / inertia, right + push_right / inertia, v, u, w)
+    one.push(push_left, push_right, ticks)
+    assert one.kinetic_energy_j() <= free.kinetic_energy_j() * (1.0 + 1e-15)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_robot_that_stands_stays_exactly_where_it_is(kind):
+    params = KINDS[kind]
+    one = RoughBody(params, 0.3, -0.1, 1.0)
+    before = values(one)
+    most = params.friction_nm() * 2048 / 24e6
+    for push in (0.0, 0.5 * most, -0.99 * most):
+        one.push(push, -push, 2048)
+        one.push(push, push, 2048)
+    after = values(one)
+    moved = {name for name in before if after[name] != before[name]}
+    assert not moved - {"left_force_n", "right_force_n"}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_robot_left_to_itself_comes_to_rest_exactly(kind):
+    one = moving(KINDS[kind], 300.0, 250.0, 0.7, 0.1, -3.0)
+    for _ in range(150_000):
+        one.push(0.0, 0.0, 2048)
+        if one.kinetic_energy_j() == 0.0:
+            break
+    assert (one.left_rad_s, one.right_rad_s, *one.velocity(), one.u_m_s) == (0.0,) * 5
+
+
+@pytest.mark.parametrize("magnitudes", [(100, 100), (60, -60), (40, 128)])
+def test_with_all_grip_that_it_needs_it_goes_as_the_body_that_only_rolls(magnitudes):
+    drive, plain = DifferentialDrive(ROLLING), DifferentialDrive(DriveParams())
+    for stretch in (magnitudes, (0, 0), tuple(-m for m in magnitudes)):
+        pwm(drive, *stretch, 300)
+        pwm(plain, *stretch, 300)
+    assert isinstance(drive.body, RoughBody)
+    assert drive.velocity_at(drive.tick) == pytest.approx(plain.velocity_at(plain.tick), rel=1e-3, abs=1e-6)
+    assert drive.pose_at(drive.tick) == pytest.approx(plain.pose_at(plain.tick), rel=1e-3, abs=1e-6)
+    assert drive.left_encoder.position == pytest.approx(plain.left_encoder.position, rel=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["slip", "ice", "all"])
+def test_tiny_euler_steps_go_the_same_way(kind):
+    params = KINDS[kind]
+    drive, naive = DifferentialDrive(params), NaiveRoughDrive(params)
+    for stretch in MAGNITUDES:
+        pwm(drive, *stretch, 100)
+        pwm(naive, *stretch, 100)
+    counts = params.counts_per_radian()
+    assert drive.velocity_at(drive.tick)[0] == pytest.approx(naive.velocity()[0], abs=2e-3)
+    assert drive.velocity_at(drive.tick)[1] == pytest.approx(naive.velocity()[1], abs=0.05)
+    assert drive.pose_at(drive.tick) == pytest.approx((naive.x, naive.y, naive.theta), abs=2e-4)
+    for encoder, angle in zip((drive.left_encoder, drive.right_encoder), naive.angle, strict=True):
+        assert encoder.position == pytest.approx(counts * angle, abs=4.0, rel=0.01)
+
+
+def test_a_slide_sideways_is_stopped_by_grip_and_by_nothing_else():
+    """Wheels free to roll: m u' = -grip * weight."""
+    params = DriveParams(tyre=Tyre(grip=0.5), ball=RollingBall(load_share=0.0))
+    one = moving(params, u=1.0)
+    one.push(0.0, 0.0, 2048)
+    assert one.u_m_s == pytest.approx(1.0 - 0.5 * 9.81 * 2048 / 24e6, rel=1e-12)
+    one = moving(params, v=1.0, left=400.0, right=400.0)
+    before = one.u_m_s
+    one.push(0.0, 0.0, 2048)
+    assert (before, one.u_m_s) == (0.0, 0.0)
+
+
+def test_full_duty_on_ice_accelerates_with_grip_and_the_encoders_run_ahead_of_the_way():
+    params = DriveParams(tyre=Tyre(grip=0.1), ball=RollingBall(load_share=0.0))
+    drive = DifferentialDrive(params)
+    pwm(drive, 128, 128, 1200)
+    time_s = drive.tick / 24e6
+    assert drive.velocity_at(drive.tick)[0] == pytest.approx(0.1 * 9.81 * time_s, rel=0.01)
+    rolled_m = drive.left_encoder.position / params.counts_per_radian() * 0.020 / 8
+    assert rolled_m > 4.0 * drive.pose_at(drive.tick)[0] > 0.0
+
+
+def test_a_wheel_slips_beyond_its_grip_and_not_below():
+    """With grip 0.8 and the whole weight on the wheels: 7.8 m/s2, as the README says."""
+    params = DriveParams(tyre=Tyre(grip=0.8), ball=RollingBall(load_share=0.0), motor=Motor(friction_nm=0.0))
+    limit_ns = 0.8 * 0.5 * 9.81 * 0.5 * 2048 / 24e6
+    roll, rotor = 0.020 / 8, 2.7e-7
+    slips = {}
+    for share in (0.95, 1.05):
+        one = moving(params)
+        shaft_rad_s = share * 2.0 * limit_ns / 0.5 / roll  # all of the robot at this share of the limit
+        impulse = rotor * shaft_rad_s + roll * share * limit_ns + params.friction_nm() * 2048 / 24e6
+        one.push(impulse, impulse, 2048)
+        slips[share] = max(abs(slip) for slip in one.slips_m_s())
+    assert slips[0.95] < 1e-12
+    assert slips[1.05] > 1e-5
+
+
+def test_a_turn_that_needs_more_than_the_grip_drifts_outwards():
+    params = DriveParams(tyre=Tyre(grip=0.2), ball=RollingBall(load_share=0.0))
+    roll, half_m = 0.020 / 8, 0.034
+    one = moving(params, v=1.0, w=5.0, left=(1.0 - 5 * half_m) / roll, right=(1.0 + 5 * half_m) / roll)
+    one.push(0.0, 0.0, 2048)
+    assert one.u_m_s < -1e-4  # to the left is inwards
+    slow = moving(params, v=0.2, w=5.0, left=(0.2 - 5 * half_m) / roll, right=(0.2 + 5 * half_m) / roll)
+    slow.push(0.0, 0.0, 2048)
+    assert slow.u_m_s == 0.0
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.floats(0.05, 1.5), st.floats(-4.0, 4.0), st.floats(-0.04, 0.04), st.floats(0.01, 0.5))
+def test_the_ball_pulls_with_its_friction_against_its_way_over_the_ground(v, w, behind_m, friction):
+    """A force at the ball and its yaw torque; shafts without friction, wheels on ice, so that nothing else acts."""
+    ball = RollingBall(friction=friction, load_share=0.2, behind_m=behind_m)
+    params = DriveParams(
+        ball=ball, tyre=Tyre(grip=0.01), motor=Motor(friction_nm=0.0), chassis=Chassis(rolling_resistance=0.0)
+    )
+    roll, half_m = 0.020 / 8, 0.034
+    with_ball = moving(params, (v - half_m * w) / roll, (v + half_m * w) / roll, v, 0.0, w)
+    free = moving(
+        DriveParams(
+            ball=RollingBall(load_share=0.2, behind_m=behind_m),
+            tyre=Tyre(grip=10.0),
+            motor=Motor(friction_nm=0.0),
+            chassis=Chassis(rolling_resistance=0.0),
+        ),
+        *(with_ball.left_rad_s, with_ball.right_rad_s, v, 0.0, w),
+    )
+    ticks = 16
+    with_ball.push(0.0, 0.0, ticks)
+    free.push(0.0, 0.0, ticks)
+    lost_ns = 0.5 * (free.v_m_s - with_ball.v_m_s)
+    most_ns = friction * 0.2 * 0.5 * 9.81 * ticks / 24e6
+    fast = math.hypot(v, behind_m * w)
+    wheels_ns = 2 * 0.01 * 0.4 * 0.5 * 9.81 * ticks / 24e6
+    assert lost_ns == pytest.approx(most_ns * v / fast, abs=wheels_ns + 1e-9)
+
+
+def test_the_ball_brakes_a_turn_on_the_spot():
+    still, dragged = DifferentialDrive(DriveParams()), DifferentialDrive(KINDS["ball"])
+    for drive in (still, dragged):
+        pwm(drive, -30, 30, 6000)
+    assert 0.0 < dragged.velocity_at(dragged.tick)[1] < 0.98 * still.velocity_at(still.tick)[1]
+    assert abs(dragged.velocity_at(dragged.tick)[0]) < 1e-9
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(1.05, 10.0), TICKS)
+def test_a_standing_shaft_holds_more_and_a_turning_one_rubs_as_before(ratio, ticks):
+    params = DriveParams(chassis=Chassis(stiction_ratio=ratio))
+    most = params.friction_nm() * ticks / 24e6
+    held, gone = moving(params), moving(params)
+    held.push(0.98 * ratio * most, 0.98 * ratio * most, ticks)
+    gone.push(1.02 * ratio * most, 1.02 * ratio * most, ticks)
+    assert held.velocity() == (0.0, 0.0)
+    assert gone.velocity()[0] > 0.0
+    roll = 0.020 / 8
+    rough = moving(params, 200.0, 200.0, 200.0 * roll)
+    plain = Body(DriveParams(), 0.0, 0.0, 0.0)
+    plain.left_rad_s = plain.right_rad_s = 200.0
+    rough.push(0.0, 0.0, ticks)
+    plain.push(0.0, 0.0, ticks)
+    assert rough.left_rad_s == pytest.approx(plain.left_rad_s, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(deadline=None, max_examples=30)
+@given(SPEEDS, SPEEDS, WAYS, TURNS, IMPULSES, IMPULSES)
+def test_left_and_right_are_mirror_images(kind, left, right, v, w, push_left, push_right):
+    """To what the sweeps leave, which take the left wheel first: most where the ball stands."""
+    if KINDS[kind].chassis.left_radius_factor != 1.0:
+        return
+    one, other = moving(KINDS[kind], left, right, v, 0.1, w), moving(KINDS[kind], right, left, v, -0.1, -w)
+    one.push(push_left, push_right, 2048)
+    other.push(push_right, push_left, 2048)
+    assert one.left_rad_s == pytest.approx(other.right_rad_s, abs=1e-3)
+    assert (one.v_m_s, one.u_m_s, one.w_rad_s) == pytest.approx(
+        (other.v_m_s, -other.u_m_s, -other.w_rad_s), abs=1e-5
+    )
+
+
+@settings(deadline=None)
+@given(SPEEDS, SPEEDS, WAYS, WAYS, TURNS, st.integers(0, 2048))
+def test_looking_ahead_is_pure_and_goes_on_at_the_speed_of_now(left, right, v, u, w, ticks):
+    one = moving(ALL, left, right, v, u, w)
+    before = snapshot(one)
+    x, y, theta = one.pose_after(ticks)
+    assert snapshot(one) == before
+    time_s = ticks / 24e6
+    assert theta == pytest.approx(w * time_s)
+    assert math.hypot(x, y) == pytest.approx(math.hypot(u, v) * time_s, rel=1e-5, abs=1e-15)
+
+
+def test_with_every_switch_off_the_body_is_the_one_that_only_rolls():
+    drive = DifferentialDrive(
+        DriveParams(ball=RollingBall(load_share=0.5), disturbance=Disturbance(period_s=3.0))
+    )
+    assert type(drive.body) is Body
+    assert drive.rough is None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_restored_drive_goes_on_with_the_same_bits(kind):
+    drive, other = DifferentialDrive(KINDS[kind]), DifferentialDrive(KINDS[kind], 9.0, 9.0, 9.0)
+    pwm(drive, 90, 40, 70)
+    restore(other, snapshot(drive))
+    assert repr(other) == repr(drive)
+    for each in (drive, other):
+        pwm(each, -20, 128, 70)
+    assert snapshot(other) == snapshot(drive)
+
+
+SCRIPT = """
+from miro_exact import engine
+engine.select("python")
+from tests.sim.plant.test_rough import rough_trace
+print("\\n".join(rough_trace()))
+"""
+
+
+def rough_trace():
+    params = DriveParams(
+        tyre=Tyre(grip=0.25),
+        ball=BALL,
+        chassis=Chassis(stiction_ratio=1.5, left_radius_factor=0.985),
+        disturbance=Disturbance(force_n=0.1, sine_torque_nm=0.01, noise_force_n=0.2, period_s=0.05),
+    )
+    return trace(lambda: DifferentialDrive(params, 0.1, 0.2, -1.0), 60)
+
+
+def test_the_body_in_use_and_its_uncompiled_source_give_the_same_bits():
+    done = children.run(
+        [sys.executable, "-c", SCRIPT],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[3],
+    )
+    assert rough_trace() == done.stdout.splitlines()
