@@ -80,13 +80,14 @@ class Pilot:
         estimator: Estimator[Any] | None = None,
         period_s: float = PERIOD_S,
         reference_lead_s: float = 0.0,
+        integrator: Integrator | None = None,
     ) -> None:
         self.reference = reference
         self.law = law
         self.estimator: Estimator[Any] = NoEstimator().estimator() if estimator is None else estimator
         self.wheels = Wheels() if wheels is None else wheels
         self.reference_lead_s = reference_lead_s
-        self.integrator = Integrator(law.parameters, period_s)
+        self.integrator = Integrator(law.parameters, period_s) if integrator is None else integrator
         self.command = Command(
             *(0, 0, 0.0, 0.0, dict.fromkeys(law.INNER, 0.0)),
             estimate=dict.fromkeys(self.estimator.INNER, 0.0),

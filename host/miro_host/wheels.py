@@ -17,6 +17,8 @@ TICKS_PER_S = 24_000_000
 TICKS_PER_SAMPLE = 8192  # 2048 clocks of 6 MHz
 COUNTS_PER_WHEEL_TURN = 16384  # 512 lines x 4 edges x gear 8:1
 UNITS_PER_COUNT = 256
+MIN_WORD_BITS = 5
+MAX_WORD_BITS = 16
 
 
 def nearest(x: float) -> int:
@@ -33,16 +35,22 @@ def nearest(x: float) -> int:
 
 
 class Wheels(msgspec.Struct, frozen=True):
-    """What the host believes about the drive: track, nominal wheel radius, speed limit."""
+    """What the host believes about the drive: track, nominal wheel radius, speed limit; and the length of its words.
+
+    Words of fewer than 16 bits have the same full scale and coarser steps: multiples of 2^(16 - word_bits) units.
+    """
 
     track_m: float = 0.068
     radius_m: float = 0.020
     limit_m_s: float = 1.46
+    word_bits: int = MAX_WORD_BITS
 
     def __post_init__(self) -> None:
         for name in ("track_m", "radius_m", "limit_m_s"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} = {getattr(self, name)!r}: must be greater than 0")
+        if not MIN_WORD_BITS <= self.word_bits <= MAX_WORD_BITS:
+            raise ValueError(f"word_bits = {self.word_bits!r}: must be {MIN_WORD_BITS} to {MAX_WORD_BITS}")
         if self.counts(self.limit_m_s) > 32767:
             raise ValueError(f"limit_m_s = {self.limit_m_s!r}: does not fit int16 at this radius")
 
@@ -66,8 +74,16 @@ class Wheels(msgspec.Struct, frozen=True):
         return self.limit_m_s * (left_m_s / greatest), self.limit_m_s * (right_m_s / greatest)
 
     def counts(self, speed_m_s: float) -> int:
-        """A rim speed in 1/256 count per sample, rounded half away from zero."""
-        return nearest(speed_m_s * self.units_per_m_s)
+        """A rim speed in 1/256 count per sample, rounded half away from zero; in short words, to a multiple of a step.
+
+        Of a short word's steps none beyond the speed limit is taken.
+        """
+        units = speed_m_s * self.units_per_m_s
+        step = 1 << (MAX_WORD_BITS - self.word_bits)
+        if step == 1:
+            return nearest(units)
+        most = int(self.limit_m_s * self.units_per_m_s / step)
+        return step * max(-most, min(most, nearest(units / step)))
 
     def command(
         self, v_m_s: float, w_rad_s: float, left_factor: float = 1.0, right_factor: float = 1.0

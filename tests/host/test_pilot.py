@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot
-from miro_host.integrator import Integrator, Limits
+from miro_host.integrator import AdamsBashforth, Integrator, Limits, integrator_of
 from miro_host.laws.yang_kim import Gains, YangKim
 from miro_host.pilot import PERIOD_S, STANDSTILL, Pilot
 from miro_host.posture import Posture
@@ -81,6 +81,48 @@ def test_the_integrator_stays_within_its_limits_and_comes_back_at_once(inputs):
     one.step(-1.0, -1.0)  # no wind-up: the first opposite input shows
     assert one.v_m_s == limits.max_v_m_s - PERIOD_S
     assert one.w_rad_s == limits.max_w_rad_s - PERIOD_S
+
+
+def integrated(integrator, acceleration, count):
+    """Speeds over periods of PERIOD_S under an acceleration that is a function of time."""
+    return [(integrator.step(acceleration(k * PERIOD_S), 0.0), integrator.v_m_s)[1] for k in range(count)]
+
+
+WIDE = Limits(max_v_m_s=1e5, max_v_dot_m_s2=1e5)
+
+
+def test_of_a_ramp_of_acceleration_the_second_rule_has_no_error_and_eulers_half_a_step():
+    euler = integrated(Integrator(WIDE, PERIOD_S), lambda t: 6.0 * t, 30)
+    second = integrated(AdamsBashforth(WIDE, PERIOD_S), lambda t: 6.0 * t, 30)
+    for k in range(2, 30):
+        exact = 3.0 * (k * PERIOD_S) ** 2
+        assert second[k - 1] - second[0] == pytest.approx(exact - 3.0 * PERIOD_S**2, rel=1e-12)
+        assert euler[k - 1] - exact == pytest.approx(-3.0 * k * PERIOD_S**2, rel=1e-9)
+
+
+def test_under_a_constant_acceleration_both_rules_are_one():
+    euler = integrated(Integrator(WIDE, PERIOD_S), lambda t: 2.0, 20)
+    assert integrated(AdamsBashforth(WIDE, PERIOD_S), lambda t: 2.0, 20) == pytest.approx(euler, rel=1e-14)
+
+
+def test_after_velocities_the_second_rule_begins_anew():
+    one, other = AdamsBashforth(WIDE, PERIOD_S), AdamsBashforth(WIDE, PERIOD_S)
+    one.step(50.0, -3.0)
+    for each in (one, other):
+        each.go_to(0.5, 0.1)
+        each.step(1.0, 1.0)
+    assert (one.v_m_s, one.w_rad_s) == (other.v_m_s, other.w_rad_s) == (0.5 + PERIOD_S, 0.1 + PERIOD_S)
+
+
+def test_the_rule_is_chosen_by_name_and_its_memory_is_saved():
+    assert type(integrator_of("euler", Limits(), PERIOD_S)) is Integrator
+    one, other = (integrator_of("adams_bashforth", Limits(), PERIOD_S) for _ in range(2))
+    one.step(1.0, 2.0)
+    restore(other, snapshot(one))
+    for each in (one, other):
+        each.step(3.0, -2.0)
+    assert (one.v_m_s, one.w_rad_s) == (other.v_m_s, other.w_rad_s)
+    assert type(other) is AdamsBashforth
 
 
 @pytest.mark.parametrize("name", ["max_v_m_s", "max_w_rad_s", "max_v_dot_m_s2", "max_w_dot_rad_s2"])

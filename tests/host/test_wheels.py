@@ -84,3 +84,21 @@ def test_wheels_name_what_is_wrong_with_them(name):
         Wheels(**{name: 0.0})
     with pytest.raises(ValueError, match="int16"):
         Wheels(radius_m=0.010)
+
+
+@given(SPEEDS, st.integers(5, 15))
+def test_short_words_are_the_nearest_multiples_of_their_step_within_the_limit(speed, bits):
+    short, step = Wheels(word_bits=bits), 1 << (16 - bits)
+    units = short.counts(speed)
+    assert units % step == 0
+    assert abs(units) <= WHEELS.counts(WHEELS.limit_m_s)
+    if abs(speed) * WHEELS.units_per_m_s + step < WHEELS.counts(WHEELS.limit_m_s):
+        assert abs(units - speed * WHEELS.units_per_m_s) <= 0.5 * step * (1.0 + 1e-9)
+    assert short.counts(-speed) == -units
+
+
+def test_words_of_16_bits_are_those_of_the_frame_and_others_are_refused():
+    assert Wheels(word_bits=16) == WHEELS
+    for bits in (4, 17):
+        with pytest.raises(ValueError, match="word_bits"):
+            Wheels(word_bits=bits)

@@ -78,7 +78,8 @@ class Sender:
                 number = 10 * place + 9
                 bits[number] = 0
                 backs[number] = arrival + int((number + Fraction(3, 4)) * self.bit_ticks)
-            self.arrivals.append((arrival, bits, begins, backs))
+            if rng.u32(seed, f"{name}/lost_frames", start // 2500) >= params.lost_frame_threshold:
+                self.arrivals.append((arrival, bits, begins, backs))
             over = arrival + max(25_000 * len(data), int(10 * len(data) * own))
 
     def on_air(self, tick: int) -> OnAir | None:

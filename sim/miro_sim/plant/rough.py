@@ -16,8 +16,8 @@ friction impulses that leave the least kinetic energy (maximum dissipation), eac
     ball     friction * load of the ball * time, in any direction; against its way over the ground
 
 A few sweeps over wheel, wheel, ball and axle; each part is solved exactly while the others hold still, so each lowers
-the energy: friction never drives. What ends inside its bounds ends at exactly zero. A wheel without `grip` has all the grip
-that it needs: it rolls, to rounding. Loads are those of the robot at rest: half each of what the ball does not carry.
+the energy: friction never drives. What ends inside its bounds ends at exactly zero. A wheel without `grip` has all that
+it needs: it rolls, to rounding. Loads are those of the robot at rest: half each of what the ball does not carry.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ What belongs here: announced transmissions, and the tick up to which the robots'
 in `sender`, what a robot receives of it in `listener`.
 
 A transmission handed over for tick s arrives at s + latency + jitter, or when the one before it is over.
-The jitter is drawn from `NAME/jitter` at index s // 2500: 0 .. jitter_ticks, all alike.
+The jitter is drawn from `NAME/jitter` at index s // 2500: 0 .. jitter_ticks, all alike. A transmission that
+`NAME/lost_frames` loses at that index is never on the air: the PC takes it for sent, robots hear no carrier.
 
 Networks on one frequency hear each other (`overhear`); the bands up stay apart.
 """
@@ -45,13 +46,14 @@ class Downlink:
         "listeners": [Listener],
         "overheard": [Sender],
     }
-    NOT_STATE = ("audience", "jitter", "name", "params", "punctual", "seed")
+    NOT_STATE = ("audience", "jitter", "lost", "name", "params", "punctual", "seed")
 
     def __init__(self, params: RadioParams, seed: int, name: str) -> None:
         self.params = params
         self.seed = seed
         self.name = name
         self.jitter = Stream(seed, f"{name}/jitter")
+        self.lost = Stream(seed, f"{name}/lost_frames")
         self.punctual = params.jitter_ticks == 0 and params.bit_ticks == HOST_BIT_TICKS
         self.listeners: dict[int, Listener] = {}
         self.sender = Sender(params, params.crystal_offset_ppm)
@@ -118,6 +120,9 @@ class Downlink:
         air_ticks = len(data) * HOST_CHARACTER_TICKS
         self.free_tick = start_tick + air_ticks
         self.busy_tick = max(arrival + air_ticks, self.sender.end(len(self.sender.transmissions) - 1))
+        if self.lost.below(start_tick // HOST_BIT_TICKS, self.params.lost_frame_threshold):
+            for sender in (self.sender, *(sender for _, sender in self.audience)):
+                sender.transmissions.pop()
         return self.free_tick
 
     def settle(self, until_tick: int) -> None:

@@ -100,6 +100,7 @@ class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     slicer                 a slicer whose threshold follows the signal
     false_start_threshold  a bit time of idle carrier is a space
     lost_threshold         a character never gets to the robot's UART
+    lost_frame_threshold   a transmission never goes on the air
 
     Raises ValueError naming the field.
     """
@@ -118,12 +119,16 @@ class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     slicer: SlicerParams | None = None
     false_start_threshold: int = 0
     lost_threshold: int = 0
+    lost_frame_threshold: int = 0
 
     def __post_init__(self) -> None:
         for field in ("latency_ticks", "jitter_ticks", "keyup_ticks"):
             if not 0 <= getattr(self, field) < clock.TICKS_PER_SECOND:
                 raise ValueError(f"{field} {getattr(self, field)} is outside 0 .. one second")
-        for field in ("error_threshold", "burst_threshold", "false_start_threshold", "lost_threshold"):
+        for field in (
+            *("error_threshold", "burst_threshold", "false_start_threshold"),
+            *("lost_threshold", "lost_frame_threshold"),
+        ):
             if not 0 <= getattr(self, field) <= ONE:
                 raise ValueError(f"{field} {getattr(self, field)} is outside 0 .. 2^32")
         for field in ("baud_offset_ppm", "crystal_offset_ppm"):
@@ -156,6 +161,7 @@ class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         slicer: SlicerParams | None = None,
         false_starts_hz: float = 0.0,
         lost_character_rate: float = 0.0,
+        lost_frames: float = 0.0,
     ) -> RadioParams:
         """The same from seconds and probabilities; the errors from a rate (default 0) or from Eb/N0.
 
@@ -179,6 +185,7 @@ class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             slicer=slicer,
             false_start_threshold=rate_threshold(false_starts_hz),
             lost_threshold=threshold(lost_character_rate, "lost_character_rate"),
+            lost_frame_threshold=threshold(lost_frames, "lost_frames"),
         )
 
     @classmethod

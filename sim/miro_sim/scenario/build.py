@@ -18,12 +18,14 @@ from miro_exact.rng import Stream
 from miro_host.estimators.interface import EstimatorParameters
 from miro_host.eye import calibration_kinds as kinds
 from miro_host.eye.calibration import Calibration
+from miro_host.integrator import integrator_of
 from miro_host.laws.interface import LawParameters
 from miro_host.parts import PartError, described
 from miro_host.pilot import Pilot
 from miro_host.references.checked import CheckedReference
 from miro_host.references.interface import ReferenceParameters, Trajectory
 from miro_host.references.registry import REFERENCES
+from miro_host.wheels import Wheels
 from miro_sim.plant.params import DriveParams
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 from miro_sim.scenario import keys as sc
@@ -42,14 +44,17 @@ def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
     return trajectory if name in REFERENCES.own else CheckedReference(trajectory, name)
 
 
-def pilot_for(robot: sc.Robot, reference: Trajectory) -> Pilot:
+def pilot_for(robot: sc.Robot, reference: Trajectory, host: sc.Host) -> Pilot:
     """Estimator and law, integrator and wheel split. Raises PartError when one of the first two cannot be made."""
     chosen, controller = robot.estimator, robot.controller
     assert isinstance(chosen, EstimatorParameters)
     assert isinstance(controller, LawParameters)
     estimator = _made("estimator", chosen.name(), lambda: _remembering(chosen.estimator()))
     law = _made("law", controller.name(), lambda: _remembering(controller.law()))
-    return Pilot(reference, law, estimator=estimator, period_s=seconds(CONTROL_PERIOD_TICKS))
+    period_s = seconds(CONTROL_PERIOD_TICKS)
+    integrator = integrator_of(host.integration, controller, period_s)
+    wheels = Wheels(word_bits=host.word_bits)
+    return Pilot(reference, law, wheels, estimator=estimator, period_s=period_s, integrator=integrator)
 
 
 def _remembering(part: Any) -> Any:
@@ -131,6 +136,7 @@ def radio_for(radio: Radio) -> RadioParams:
         slicer=_slicer_for(radio),
         false_starts_hz=radio.false_starts_hz,
         lost_character_rate=radio.lost_character_rate,
+        lost_frames=radio.lost_frames,
     )
 
 

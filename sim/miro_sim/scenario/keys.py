@@ -18,8 +18,10 @@ from msgspec import Meta
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_host.estimators.registry import DEFAULT_ESTIMATOR, ESTIMATORS, AnyEstimator
+from miro_host.integrator import Integration
 from miro_host.laws.registry import DEFAULT_LAW, LAWS, Controller
 from miro_host.references.registry import AnyReference
+from miro_host.wheels import MAX_WORD_BITS, MIN_WORD_BITS
 from miro_protocol.table import DOWNLINK
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from miro_sim.plant.params import DriveParams
@@ -35,10 +37,16 @@ TurnRad = Annotated[float, Meta(ge=-3.141592653589793, le=3.141592653589793)]
 Name = Annotated[str, Meta(pattern=r"\A[a-z0-9][a-z0-9_-]{0,63}\Z")]
 
 
-class HostTimes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How long the PC computes between the camera frame and the key-up of the transmitter."""
+class Host(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The PC: how long it computes between camera frame and key-up, how it integrates, how long its words are.
+
+    `integration`: of equation (15), see `miro_host.integrator`. `word_bits`: of each wheel speed of full scale 2.88 m/s
+    that is sent; 16 is a step of 0.088 mm/s, each bit less doubles it.
+    """
 
     compute_s: Annotated[float, Meta(ge=0.00001, le=0.030)] = 0.003
+    integration: Integration = "euler"
+    word_bits: Annotated[int, Meta(ge=MIN_WORD_BITS, le=MAX_WORD_BITS)] = MAX_WORD_BITS
 
 
 class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -134,7 +142,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     stop_on_fault: bool = True
     lm629: Lm629Options = DEFAULT_OPTIONS
     camera: Camera = PixelCamera()
-    host: HostTimes = HostTimes()
+    host: Host = Host()
     networks: Annotated[tuple[Network, ...], Meta(min_length=1)] = msgspec.field(name="network")
 
     def __post_init__(self) -> None:

@@ -62,7 +62,8 @@ class Radio(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     `carrier` keyed is a transmitter that is on per frame only, `keyup_s` before its first start bit;
     between frames the receiver's slicer makes noise, unless `squelch` holds it at mark. Errors come from
     `bit_error_rate` or from `eb_n0_db`, not both. Networks with the same `channel` hear each other; without
-    one a network is alone. `profile` names sets of these keys, see `profiles`; keys that are given win.
+    one a network is alone. `lost_frames`: chance for each transmission down that it never goes on the air.
+    `profile` names sets of these keys, see `profiles`; keys that are given win.
     """
 
     profile: ProfileName | tuple[ProfileName, ...] = ()
@@ -79,6 +80,7 @@ class Radio(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     crystal_offset_ppm: OffsetPpm = 0
     false_starts_hz: Annotated[float, Meta(ge=0.0, le=9600.0)] = 0.0
     lost_character_rate: Chance = 0.0
+    lost_frames: Chance = 0.0
     bursts: Bursts | None = None
     dropouts: Dropouts | None = None
     slicer: Slicer | None = None

@@ -54,7 +54,7 @@ class Robot:
         try:
             self.reference = reference_for(spec, scenario.duration_s)
             start = self.reference.at(0.0).posture
-            self.pilot: Pilot = pilot_for(spec, self.reference)
+            self.pilot: Pilot = pilot_for(spec, self.reference, scenario.host)
         except PartError as error:
             raise self._named(error, 0) from error
         wheels = Stream(seed, f"{name}/wheels")

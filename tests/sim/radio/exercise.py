@@ -25,6 +25,7 @@ EVERYTHING = RadioParams.of(
     slicer=SlicerParams.of(settle_s=0.004, offset=-0.5, eb_n0_db=9.0),
     false_starts_hz=100.0,
     lost_character_rate=0.02,
+    lost_frames=0.1,
 )
 
 

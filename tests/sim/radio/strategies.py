@@ -39,6 +39,7 @@ params = st.builds(
     slicer=st.none() | slicers,
     false_start_threshold=rates,
     lost_threshold=st.sampled_from([0, 0, 2**32 // 5, 2**32]),
+    lost_frame_threshold=st.sampled_from([0, 0, 2**31, 2**32]),
 )
 seeds = st.integers(0, 2**63 - 1)
 

@@ -211,11 +211,20 @@ def test_a_neighbour_must_be_announced_before_its_carrier_comes_up_here():
         one.overhear(two)
 
 
+def test_lost_frames_are_as_many_as_asked_for_and_the_others_are_whole():
+    quiet = [1] * len(BITS)
+    levels = heard(RadioParams.of(lost_frames=0.3, squelch=True), 3, 1000)
+    assert all(frame in (BITS, quiet) for frame in levels)
+    assert abs(levels.count(quiet) / 1000 - 0.3) < 4 * (0.3 * 0.7 / 1000) ** 0.5
+    assert heard(RadioParams.of(lost_frames=1.0, squelch=True), 3, 5) == [quiet] * 5
+
+
 OTHERS = {
     "bursts": {"bursts": ChainParams.of(1e-3, 1e-3), "burst_threshold": 0},
     "dropouts": {"dropouts": ChainParams.of(0.0, 1e-3)},
     "false starts": {"false_start_threshold": 2**30},
     "lost": {"lost_threshold": 1},
+    "lost frames": {"lost_frame_threshold": 1},
     "jitter": {"jitter_ticks": 0},
 }
 
