@@ -10,6 +10,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from tests.mirotwin.mutated_files import without_sums
 from tests.mirotwin.synthetic import periods, robot
 from tests.naive import theory_terms as naive
 
@@ -244,6 +245,13 @@ def test_a_recording_has_the_terms_and_reads_the_same_with_and_without_them(coun
     assert len(found) == 2 * (count - 1)  # nothing is commanded in the first period
     ticks = [content["tick"] for topic, content in found if topic == "/net0/robot0/theory"]
     assert ticks == [index * CONTROL_PERIOD_TICKS for index in range(1, count)]
+
+
+def test_terms_that_make_no_sense_do_not_spoil_a_recording() -> None:
+    data = recorded(2, True)
+    changed = data.replace(b'"holds_1":true', b'"holds_1":7777')
+    assert changed != data
+    assert parse(without_sums(changed), "run.mcap") == parse(data, "run.mcap")
 
 
 def test_the_terms_of_a_whole_run_follow_from_its_recording() -> None:

@@ -18,6 +18,7 @@ from miro_protocol.stream import MAX_TICK
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
 from mirotwin.recording import images, topics
+from mirotwin.recording.derived import TheoryMessage
 
 
 class PostureMessage(msgspec.Struct, frozen=True):
@@ -67,23 +68,6 @@ class ControlMessage(msgspec.Struct, frozen=True):
     right: int
     inner: dict[str, float]
     estimate: dict[str, float] = {}
-
-
-class TheoryMessage(msgspec.Struct, frozen=True):
-    """`theory`: terms of the paper's theory, which follow from the other channels; nothing reads them back.
-
-    f of equation (15) over the period that ends at `tick` (null where nothing was commanded), rho_c, the distance of
-    the heading from across (equation 12, negative where the cosine is), and which assumptions hold (`report.theory`).
-    """
-
-    tick: int
-    f1_m_s2: float | None
-    f2_rad_s2: float | None
-    rho_c_m: float
-    across_rad: float
-    holds_1: bool
-    holds_2: bool
-    holds_3: bool
 
 
 class FirmwareMessage(msgspec.Struct, frozen=True):
@@ -194,10 +178,6 @@ ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
     "samples": SampleMessage,
     "fault": FaultMessage,
 }
-
-
-DERIVED = ("samples", "fault", "theory")
-"""Channels of a robot for people; control periods are made of the others."""
 
 
 OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {

@@ -17,6 +17,7 @@ from miro_sim.periods import Period
 from mirotwin.recording import channels
 from mirotwin.recording.channels import OTHER_CHANNELS, ROBOT_CHANNELS
 from mirotwin.recording.container import Cut, RecordingError
+from mirotwin.recording.derived import TheoryMessage
 from mirotwin.recording.images import ImageMessage
 from mirotwin.recording.messages import AGAIN, ATTACHMENTS, Messages, brief
 from mirotwin.recording.recorder import (
@@ -27,9 +28,8 @@ from mirotwin.recording.recorder import (
 )
 from mirotwin.recording.topics import Place
 
-KINDS = tuple(
-    kind for kind in (*ROBOT_CHANNELS.values(), *OTHER_CHANNELS.values()) if kind is not ImageMessage
-)
+NOT_READ = (ImageMessage, TheoryMessage)
+KINDS = tuple(kind for kind in (*ROBOT_CHANNELS.values(), *OTHER_CHANNELS.values()) if kind not in NOT_READ)
 """The messages that control periods are made of."""
 
 
@@ -88,7 +88,7 @@ class _Collector:
             self._close(message)
         elif isinstance(message, channels.WireMessage):
             self.wire.append(channels.transmission(place.network, message))
-        elif place.channel not in channels.DERIVED:
+        elif place.channel not in ("samples", "fault"):
             self.robots.setdefault((place.network, place.slot), {})[place.channel] = message
 
     def _close(self, message: channels.PeriodMessage) -> None:

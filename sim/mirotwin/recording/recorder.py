@@ -18,6 +18,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import nanoseconds
 from miro_sim.periods import Period
 from mirotwin.recording import channels, schemas, topics
+from mirotwin.recording.derived import TheoryMessage
 from mirotwin.recording.images import image_message
 from mirotwin.recording.writer import McapWriter, Writable
 
@@ -126,7 +127,7 @@ class Recorder:
             with self._undisturbed:
                 self._write_waiting()
 
-    def write_theory(self, network: int, slot: int, message: channels.TheoryMessage) -> None:
+    def write_theory(self, network: int, slot: int, message: TheoryMessage) -> None:
         """Adds what the theory says of a robot in the control period that was written last."""
         topic = topics.robot_topic(network, slot, "theory")
         self._waiting.append((topic, message.tick, message))

@@ -72,7 +72,7 @@ class Theory(msgspec.Struct, frozen=True):
     """One robot. Everything is of the truth, which no host knows, at the exposures; times are whole control periods.
 
     `reversals`: changes between forward and backward; `backward_s`: time with v < -1 cm/s. `chattering_m_s2`: how far
-    the commanded wheel speeds go back and forth within a third of a second (`miro_host.theory.chattering`).
+    the commanded wheel speeds go back and forth within a third of a second (`chattering`).
     """
 
     disturbance: Disturbance | None

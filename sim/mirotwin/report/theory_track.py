@@ -18,10 +18,10 @@ from miro_exact.dmath import atan2, wrap_pi
 from miro_host.laws.yang_kim import POSITION_ERROR_M
 from miro_host.posture import Posture
 from miro_host.theory.assumptions import ALPHA_RAD, across, radius
-from miro_host.theory.chattering import Chattering
 from miro_host.theory.computed_torque import disturbance
 from miro_sim.periods import RobotPeriod
-from mirotwin.recording.channels import TheoryMessage
+from mirotwin.recording.derived import TheoryMessage
+from mirotwin.report.chattering import Chattering
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 PI = 3.141592653589793

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.naive import theory_terms as naive
 
-from miro_host.theory.chattering import Chattering
+from mirotwin.report.chattering import Chattering
 
 WHEEL = st.integers(-16633, 16633)
 PERIOD_S = naive.PERIOD_S
