@@ -86,24 +86,10 @@ def pieces(points, headings):
         delta = (abs(wrapped(leaving - direction)) + abs(wrapped(arriving - direction))) / 2
         delta = min(delta, mpf(2))
         lengths.append(chord * (delta / sin(delta) if delta > mpf(10) ** -6 else 1))
-        ends = {
-            axis: polynomial(
-                {
-                    (0, 0): a[axis],
-                    (lengths[-1], 0): b[axis],
-                    (0, 1): (cos, sin)[axis](leaving),
-                    (lengths[-1], 1): (cos, sin)[axis](arriving),
-                }
-            )
-            for axis in (0, 1)
-        }
-        second = [[value(ends[axis], u, 2) for axis in (0, 1)] for u in (0, lengths[-1])]
-        bends.append(
-            [
-                cos(angle) * one[1] - sin(angle) * one[0]
-                for angle, one in zip((leaving, arriving), second, strict=True)
-            ]
-        )
+        slopes = {(0, 0): 0, (lengths[-1], 0): 0}
+        slopes[0, 1], slopes[lengths[-1], 1] = wrapped(leaving - direction), wrapped(arriving - direction)
+        over_chord = polynomial(slopes)
+        bends.append([value(over_chord, u, 2) for u in (0, lengths[-1])])
     curvatures = [bends[0][0]]
     for i in range(len(lengths) - 1):
         both = lengths[i] + lengths[i + 1]

@@ -5,9 +5,9 @@ speed along the path (`speeds`), and the trajectory (`waypoints`).
 
 Each piece leads from one point to the next in u = 0 to its length, a guess of the way along it. At both ends dp/du is
 the heading as a unit vector and d2p/du2 is the curvature, normal to it: so heading and curvature do not jump from piece
-to piece. The curvature at a point is the mean of those of the two cubics beside it that have the same ends and
-headings, weighted by the other's length (after C. Sprunk, Planning Motion Trajectories for Mobile Robots Using Splines,
-University of Freiburg, 2008, who takes the mean of the second derivatives).
+to piece. The curvature at a point is the mean of those that the pieces beside it would have by themselves,
+weighted by the other's length (after C. Sprunk, Planning Motion Trajectories for Mobile Robots Using Splines,
+University of Freiburg, 2008, who takes the mean of the second derivatives of cubics).
 """
 
 import math
@@ -99,11 +99,11 @@ def spline(points: Sequence[tuple[float, float]], headings: Sequence[float], clo
     for heading in headings:
         sin, cos = sincos(heading)
         tangents.append((cos, sin))
-    lengths = [_length(points[i], points[j], headings[i], headings[j]) for i, j in ends]
-    bends = [
-        _cubic_curvatures(points[i], points[j], tangents[i], tangents[j], length)
-        for (i, j), length in zip(ends, lengths, strict=True)
-    ]
+    lengths, bends = [], []
+    for i, j in ends:
+        length, bend = _arc_like(points[i], points[j], headings[i], headings[j])
+        lengths.append(length)
+        bends.append(bend)
     curvatures = []
     for i in range(count):
         before = i - 1 if i > 0 or closed else None
@@ -122,29 +122,21 @@ def spline(points: Sequence[tuple[float, float]], headings: Sequence[float], clo
     ]
 
 
-def _length(a: tuple[float, float], b: tuple[float, float], leaving: float, arriving: float) -> float:
-    """The chord times delta / sin(delta), as on an arc, with the mean angle delta between chord and headings."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    chord, direction = math.sqrt(dx * dx + dy * dy), atan2(dy, dx)
-    delta = 0.5 * (abs(wrap_pi(leaving - direction)) + abs(wrap_pi(arriving - direction)))
-    if delta < 1e-6:
-        return chord
-    delta = min(delta, BEND_MOST_RAD)
-    return chord * delta / sincos(delta)[0]
-
-
 Pair = tuple[float, float]
 
 
-def _cubic_curvatures(a: Pair, b: Pair, at_a: Pair, at_b: Pair, length: float) -> tuple[float, float]:
-    """Curvatures at both ends of the cubic from a to b with unit derivatives `at_a`, `at_b` along u."""
-    x, y = (b[0] - a[0]) / length, (b[1] - a[1]) / length
-    first_x, first_y = 6.0 * x - 4.0 * at_a[0] - 2.0 * at_b[0], 6.0 * y - 4.0 * at_a[1] - 2.0 * at_b[1]
-    last_x, last_y = 2.0 * at_a[0] + 4.0 * at_b[0] - 6.0 * x, 2.0 * at_a[1] + 4.0 * at_b[1] - 6.0 * y
-    return (
-        (at_a[0] * first_y - at_a[1] * first_x) / length,
-        (at_b[0] * last_y - at_b[1] * last_x) / length,
-    )
+def _arc_like(a: Pair, b: Pair, leaving: float, arriving: float) -> tuple[float, Pair]:
+    """The length of a piece and its curvatures at both ends, from the angles between its headings and its chord.
+
+    The length is the chord times delta / sin(delta), delta the mean of both angles. The curvatures are those of the
+    cubic over the chord whose slopes are these angles. Both are exact on an arc.
+    """
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    chord, direction = math.sqrt(dx * dx + dy * dy), atan2(dy, dx)
+    first, last = wrap_pi(leaving - direction), wrap_pi(arriving - direction)
+    delta = min(0.5 * (abs(first) + abs(last)), BEND_MOST_RAD)
+    length = chord if delta < 1e-6 else chord * delta / sincos(delta)[0]
+    return length, (-(4.0 * first + 2.0 * last) / length, (2.0 * first + 4.0 * last) / length)
 
 
 def _quintic(a: Pair, b: Pair, at_a: Pair, at_b: Pair, bend_a: float, bend_b: float, length: float) -> Piece:

@@ -162,8 +162,8 @@ def test_points_on_a_circle_give_nearly_the_circle():
     for piece in spline(places, headings(places, [None] * 8, True), True):
         for k in range(11):
             shape = piece.shape(k / 10.0)
-            assert math.hypot(shape.x_m, shape.y_m) == pytest.approx(0.3, abs=2e-4)
-            assert shape.curvature()[0] == pytest.approx(1.0 / 0.3, rel=0.06)
+            assert math.hypot(shape.x_m, shape.y_m) == pytest.approx(0.3, abs=2e-6)
+            assert shape.curvature()[0] == pytest.approx(1.0 / 0.3, rel=2e-4)
 
 
 def test_an_open_path_stands_before_its_start_and_after_its_end():
