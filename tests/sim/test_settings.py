@@ -43,7 +43,7 @@ EDITS = [
     ("slot = 0", "slot = 2", "network[0].robot[0].slot=2"),
     ("slot = 0", "slot = 2", "network.0.robot.slot = 2"),
     ('# profile = "fade15"', 'profile = ["fade15"]', 'network.radio.profile=["fade15"]'),
-    ("gamma1_per_s = 1.8", "gamma1_per_s = 2", "network.robot.controller.gamma1_per_s=2"),
+    ("gamma1_per_s = 2.05", "gamma1_per_s = 2", "network.robot.controller.gamma1_per_s=2"),
     ('name = "fig6"', 'name = "fast"', "name=fast"),
     ("[host]\ncompute_s = 0.003 ", "[host]\ncompute_s = 0.004 ", "host={compute_s = 0.004}"),
     ('title = "Straight line, initial errors (7.09 cm, 1.72 cm, -0.38 rad)"', 'title = "a = b"', "title=a = b"),

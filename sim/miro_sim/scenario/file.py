@@ -5,6 +5,7 @@ What belongs here: TOML text to `Scenario`, and the built-in scenarios. What doe
 functions, whatever the text.
 """
 
+import re
 import tomllib
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -34,9 +35,15 @@ class ScenarioText(msgspec.Struct, frozen=True):
 
 
 def builtin_names() -> list[str]:
-    """Names of the scenarios that come with the package, sorted."""
+    """Names of the scenarios that come with the package, sorted, numbers in them by their value."""
     folder = resources.files("miro_sim.scenario") / "builtin"
-    return sorted(entry.name[: -len(".toml")] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    names = [entry.name[: -len(".toml")] for entry in folder.iterdir() if entry.name.endswith(".toml")]
+    return sorted(names, key=_by_number)
+
+
+def _by_number(name: str) -> list[tuple[int, str]]:
+    """The name's words and numbers; fig9 comes before fig10."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"([0-9]+)", name)]
 
 
 def builtin_text(name: str) -> str:

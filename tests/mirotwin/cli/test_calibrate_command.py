@@ -184,7 +184,7 @@ def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
         (("--points", "bytes"), "bytes: not UTF-8 text; give a text file"),
         (("--points", "p.csv", "--start", "p.csv"), "p.csv: not TOML: "),
         (("--points", "out.toml"), "out.toml: is the input itself; choose another file with --out"),
-        (("--scenario", "fig9"), "fig9: no such scenario"),
+        (("--scenario", "fig5"), "fig5: no such scenario"),
         (
             ("--scenario", "fig6", "--points-out", "./out.toml"),
             "out.toml: is the file of --out and of --points-out",

@@ -185,7 +185,7 @@ def test_looking_changes_no_bit_of_the_world(short: Path) -> None:
         (("fig6", "--robot", "1"), "no robot in that slot; there is 0"),
         (("fig6", "--network", "1"), "there are 1, numbered from 0"),
         (("fig6", "--until", "main"), "--until does not apply to it"),
-        (("fig7",), "no such scenario"),
+        (("fig5",), "no such scenario"),
         (("gone.ihx",), "there is no such file"),
         (("gone.mcap",), "no such scenario"),
     ],

@@ -90,9 +90,9 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(
     ("header", "lines", "what"),
     [
         (
-            "scenario = 'fig9'",
+            "scenario = 'fig5'",
             "",
-            "header: scenario: 'fig9' is no built-in scenario; give one of curve, fig6, fig8",
+            "header: scenario: 'fig5' is no built-in scenario; give one of curve, fig6, ",
         ),
         ("[scenario]\nname = 'a'\nduration_s = 0.1\nnetwork = []", "", "header: scenario: network: "),
         (in_header(SHORT).replace("duration_s", "duration_x"), "", "duration_x"),
