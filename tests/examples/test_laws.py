@@ -1,6 +1,7 @@
-"""A law in a distribution of its own: installed by pip, driven, saved in mid-run, and what is said when it is wrong."""
+"""Laws in a distribution of their own: installed by pip, driven, saved in mid-run, and what is said of a wrong one."""
 
 import json
+import math
 import os
 import shutil
 import sys
@@ -15,7 +16,14 @@ from mirotwin.recording.reader import read
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "laws"
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
-SHORT = (EXAMPLE / "samson.toml").read_text(encoding="utf-8").replace("duration_s = 6.0", "duration_s = 0.5")
+SHORTENED = {
+    name: (EXAMPLE / f"{name}.toml")
+    .read_text(encoding="utf-8")
+    .replace("duration_s = 6.0", "duration_s = 0.5")
+    for name in ("samson", "pursuit")
+}
+SHORT = SHORTENED["samson"]
+INNER = {"samson": ["e1_m", "e2_m", "e3_rad"], "pursuit": ["goal_x_m", "goal_y_m"]}
 AT_TICK = 4_123_457  # in the middle of a period, a frame and a byte
 WORLD = """
 import sys
@@ -49,6 +57,14 @@ def scenario(tmp_path):
     path = tmp_path / "my.toml"
     path.write_text(SHORT)
     return path
+
+
+@pytest.fixture(params=SHORTENED)
+def either(request, tmp_path):
+    """A short scenario with each of the laws, and the law's name in file names."""
+    path = tmp_path / "either.toml"
+    path.write_text(SHORTENED[request.param])
+    return request.param, path
 
 
 def environment(site):
@@ -86,20 +102,19 @@ def refusal(done, before=()):
     return line
 
 
-def test_saved_in_mid_run_and_loaded_in_another_process_it_goes_on_with_the_same_bits(
-    site, scenario, tmp_path
-):
+def test_saved_in_mid_run_and_loaded_in_another_process_it_goes_on_with_the_same_bits(site, either, tmp_path):
+    name, scenario = either
     saved = tmp_path / "saved"
     whole = python(site, WORLD + FINISH, scenario, saved)
     python(site, WORLD + SAVE, scenario, saved)
     assert python(site, WORLD + LOAD + FINISH, scenario, saved) == whole
-    assert (
-        python(site, WORLD + LOAD + FORGET + FINISH, scenario, saved) != whole
-    )  # the memory is what matters
+    if name == "samson":  # which has a memory, and that is what matters
+        assert python(site, WORLD + LOAD + FORGET + FINISH, scenario, saved) != whole
 
 
 @pytest.mark.parametrize("engine", ["compiled", "python"])
-def test_the_command_line_runs_it_records_its_inner_values_and_replays_it(site, scenario, tmp_path, engine):
+def test_the_command_line_runs_it_records_its_inner_values_and_replays_it(site, either, tmp_path, engine):
+    name, scenario = either
     if engine == "compiled" and engines.active() != "compiled":
         pytest.skip("no compiled modules here")
     out = tmp_path / "out"
@@ -108,20 +123,44 @@ def test_the_command_line_runs_it_records_its_inner_values_and_replays_it(site, 
     digest = json.loads((out / "summary.json").read_text())["digest"]
     assert digest == python(site, WORLD + FINISH, scenario, "")
     last = read(out / "run.mcap").periods[-1].robots[0].control
-    assert list(last.inner) == ["e1_m", "e2_m", "e3_rad"]
-    assert abs(last.inner["e3_rad"]) > 0.0
+    assert list(last.inner) == INNER[name]
+    assert all(abs(value) > 0.0 for value in last.inner.values())
     assert mirotwin(site, "replay", out / "run.mcap", "--quiet").returncode == 0
     line = refusal(mirotwin("", "replay", out / "run.mcap", "--quiet"))  # where it is not installed
-    assert (
-        "run.mcap: scenario.toml: network[0].robot[0].controller.law: 'samson' is not one of the choices"
-        in line
-    )
+    place = "run.mcap: scenario.toml: network[0].robot[0].controller.law: '"
+    assert place in line
+    assert "' is not one of the choices" in line
 
 
-def test_it_tracks_the_line(site, tmp_path):
-    done = mirotwin(site, "run", EXAMPLE / "samson.toml", "--out", tmp_path / "out", "--quiet")
+@pytest.mark.parametrize("name", SHORTENED)
+def test_it_tracks_its_path(site, tmp_path, name):
+    done = mirotwin(site, "run", EXAMPLE / f"{name}.toml", "--out", tmp_path / "out", "--quiet")
     assert done.returncode == 0, done.stderr
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["tracking"]["rms_position_cm"] < 2.5
+
+
+DRIVEN = """
+from miro_host.pilot import Pilot
+from miro_host.posture import Posture
+from miro_host.reference import Line
+from pursuit_law import Parameters
+
+pilot = Pilot(Line(), Parameters(lookahead_s=0.5, max_v_dot_m_s2=1e3, max_w_dot_rad_s2=1e3).law())
+for x_m, y_m, theta_rad in ((0.5, -0.1, 0.0), (1.1, 0.0, 0.0), (0.65, 0.0, 0.0)):
+    command = pilot.update(Posture(x_m, y_m, theta_rad), 3.0)
+    print(command.v_m_s, command.w_rad_s)
+"""
+
+
+def test_pure_pursuit_drives_on_the_arc_to_the_goal_and_turns_round_for_one_behind(site):
+    """At 3 s the reference is at 0.55 m and will be at 0.65 m after the 0.5 s of the look-ahead."""
+    aside, behind, there = (
+        [float(number) for number in line.split()] for line in python(site, DRIVEN).splitlines()
+    )
+    far_m = math.hypot(0.15, 0.1)
+    assert aside == pytest.approx([far_m / 0.5, far_m / 0.5 * 2 * 0.1 / far_m**2])
+    assert behind == pytest.approx([0.9, 3.7])  # 2 / l of curvature, v / l = 2/s, cut to the limit of w
+    assert there == [0.0, 0.0]
 
 
 @pytest.mark.parametrize(
