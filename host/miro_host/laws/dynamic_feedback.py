@@ -33,11 +33,18 @@ Speed = Annotated[float, Meta(ge=1e-6, le=1.0)]
 
 
 class DynamicFeedbackParameters(LawParameters, frozen=True, kw_only=True, tag="dynamic_feedback"):
-    """k_p, k_d, and the least speed that is divided by."""
+    """k_p, k_d, and the least speed that is divided by. ValueError for one above `max_v_m_s`."""
 
     kp_per_s2: Gain = 9.0
     kd_per_s: Gain = 6.0
     v_floor_m_s: Speed = 0.05
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.v_floor_m_s > self.max_v_m_s:
+            raise ValueError(
+                f"v_floor_m_s: {self.v_floor_m_s!r} is more than max_v_m_s = {self.max_v_m_s!r}; no speed would be left"
+            )
 
     def law(self) -> "DynamicFeedback":
         return DynamicFeedback(self)
