@@ -5,6 +5,7 @@ from it where they are, and the exit code (`mirotwin.cli.program`), which follow
 """
 
 from os import PathLike
+from typing import Any
 
 LONGEST_END = 300
 """Characters of each end of a long part that are shown."""
@@ -34,6 +35,10 @@ class BadInput(ValueError):
             head = ": ".join(part for part in (head, shortened(place)) if part)
         text = ": ".join(part for part in (head, shortened(what)) if part)
         super().__init__(one_line(f"{text}; {shortened(remedy)}" if remedy else text))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """What a process hands to another: a base class, because a derived one may be made of other parts."""
+        return BadInput, (self.path, self.place, self.what, self.remedy)
 
 
 def one_line(text: str) -> str:

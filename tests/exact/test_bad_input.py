@@ -1,5 +1,7 @@
 """The one line of input that cannot be used."""
 
+import pickle
+
 import pytest
 
 from miro_exact.bad_input import BadInput
@@ -37,3 +39,13 @@ def test_the_parts_can_be_read_from_the_error() -> None:
     error = BadInput("a.ihx", 3, "bad checksum", "rebuild it")
     assert (error.path, error.place, error.what, error.remedy) == ("a.ihx", 3, "bad checksum", "rebuild it")
     assert isinstance(error, ValueError)
+
+
+def test_it_gets_from_one_process_to_another_with_its_line():
+    class Narrow(BadInput):
+        def __init__(self, what):
+            super().__init__("a.toml", 3, what, "mend it")
+
+    again = pickle.loads(pickle.dumps(Narrow("odd")))
+    assert str(again) == "a.toml:3: odd; mend it"
+    assert isinstance(again, BadInput)

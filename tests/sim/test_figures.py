@@ -6,9 +6,10 @@
 import msgspec
 import pytest
 from benchmarks.figures import Outcome, outcomes, row
-from miro_host.reference_keys import ArcRef, LineRef
 
 from miro_host.laws.epsilon_tracking import ILLUSTRATIVE, RETUNED, THEORY, EpsilonTrackingParameters
+from miro_host.references.arc import ArcRef
+from miro_host.references.line import LineRef
 from miro_sim.scenario.file import builtin_names, load, parse
 from miro_sim.scenario.keys import Robot
 
@@ -35,8 +36,8 @@ def set_to(gains: EpsilonTrackingParameters) -> list[str]:
     return [f"network.robot.controller={{{table}}}"]
 
 
-def test_the_built_in_scenarios_are_the_figures_of_the_paper_in_its_order() -> None:
-    assert builtin_names() == list(CAPTIONS)
+def test_the_built_in_scenarios_are_paths_of_our_own_and_the_figures_of_the_paper_in_its_order() -> None:
+    assert builtin_names() == ["curve", *CAPTIONS, "line", "sine", "waypoints"]
     for name, (start, path, law) in CAPTIONS.items():
         robot = only_robot(name)
         assert (robot.start_error_x_cm, robot.start_error_y_cm, robot.start_error_theta_rad) == start
