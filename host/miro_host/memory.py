@@ -26,7 +26,7 @@ class Remembering:
     as it was made.
     """
 
-    STATE: ClassVar[Mapping[str, str]] = {}
+    STATE: ClassVar[Mapping[str, Any]] = {}
     NOT_STATE: ClassVar[tuple[str, ...]] = ("parameters",)
 
     def __init__(self, parameters: Any) -> None:

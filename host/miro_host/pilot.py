@@ -18,7 +18,7 @@ import msgspec
 from miro_exact.domain import DomainError
 from miro_exact.state import Items
 from miro_host.ear import Heard
-from miro_host.estimators.interface import Estimate, Estimator, EstimatorInput
+from miro_host.estimators.interface import DEAD_S, Estimate, Estimator, EstimatorInput
 from miro_host.estimators.none import NoEstimator
 from miro_host.integrator import Integrator
 from miro_host.laws.interface import NOTHING, Accelerations, Answer, Law, LawInput, Velocities
@@ -60,7 +60,8 @@ class Pilot:
     `reference_lead_s` shifts the instant at which the reference is evaluated against the `t_s` handed to
     `update`; 0 is the paper's loop. The shift is ours, not the paper's: a positive value (up to the time
     the command takes effect) or a negative one (back to the exposure of the image in hand) compensates a
-    known delay without touching the law.
+    known delay without touching the law. `dead_s`, from a period's begin to the end of its frame, is told the
+    estimator.
     """
 
     STATE = {
@@ -69,7 +70,7 @@ class Pilot:
         "estimator": Estimator,
         "numbers": Items("d", 0xFFFF, -_LARGEST, _LARGEST),
     }
-    NOT_STATE = ("reference", "reference_lead_s", "wheels", "command")
+    NOT_STATE = ("reference", "reference_lead_s", "dead_s", "wheels", "command")
 
     def __init__(
         self,
@@ -81,12 +82,14 @@ class Pilot:
         period_s: float = PERIOD_S,
         reference_lead_s: float = 0.0,
         integrator: Integrator | None = None,
+        dead_s: float = DEAD_S,
     ) -> None:
         self.reference = reference
         self.law = law
         self.estimator: Estimator[Any] = NoEstimator().estimator() if estimator is None else estimator
         self.wheels = Wheels() if wheels is None else wheels
         self.reference_lead_s = reference_lead_s
+        self.dead_s = dead_s
         self.integrator = Integrator(law.parameters, period_s) if integrator is None else integrator
         self.command = Command(
             *(0, 0, 0.0, 0.0, dict.fromkeys(law.INNER, 0.0)),
@@ -103,7 +106,9 @@ class Pilot:
         """
         z, units = self.integrator, self.wheels.units_per_m_s
         sent = self.command.left / units, self.command.right / units
-        estimate = self._estimate(EstimatorInput(t_s, z.period_s, measured, z.v_m_s, z.w_rad_s, *sent, heard))
+        estimate = self._estimate(
+            EstimatorInput(t_s, z.period_s, measured, z.v_m_s, z.w_rad_s, *sent, heard, self.dead_s)
+        )
         if estimate is None:
             return self.command
         at_s = estimate.t_s + self.reference_lead_s

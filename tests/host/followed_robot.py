@@ -4,7 +4,7 @@ import math
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.estimators.ekf import EkfParameters
-from miro_host.estimators.interface import EstimatorInput
+from miro_host.estimators.interface import DEAD_S, EstimatorInput
 from miro_host.eye.track import Sighting
 from miro_host.pilot import PERIOD_S
 from miro_host.posture import Posture
@@ -12,7 +12,7 @@ from miro_host.wheels import Wheels
 
 TRACK_M = Wheels().track_m
 P = EkfParameters()
-DELAY_S = P.dead_s + P.lag_s
+DELAY_S = DEAD_S + P.lag_s
 
 
 def velocities(index):
@@ -37,9 +37,13 @@ class Robot:
         self.posture = Posture(0.3, -0.2, 3.0)  # turns through pi soon
         self.time_s = 0.0
         self.sent = []
+        self.count = 0
+        self.loses = None  # which of the commands does not arrive
 
     def send(self, v_m_s, w_rad_s):
-        self.sent.append((self.time_s + DELAY_S, rims(v_m_s, w_rad_s)))
+        if self.count != self.loses:
+            self.sent.append((self.time_s + DELAY_S, rims(v_m_s, w_rad_s)))
+        self.count += 1
 
     def run(self, to_s):
         steps = round((to_s - self.time_s) / 1e-4)
@@ -64,18 +68,23 @@ class Robot:
 class Loop:
     """Robot, a camera one frame late, and the filter. Each period calls `change(index, sighting)` on what is seen."""
 
-    def __init__(self, filter_, robot, change=lambda index, seen: seen):
-        self.filter, self.robot, self.change = filter_, robot, change
+    def __init__(self, estimator, robot, change=lambda index, seen: seen):
+        self.estimator, self.robot, self.change = estimator, robot, change
         self.index = 0
         self.seen = None
         self.before = (0.0, 0.0)
+
+    @property
+    def filter(self):
+        """The estimator's filter."""
+        return self.estimator.filter
 
     def period(self):
         """One period; what the filter says and where the robot really is at that time."""
         now_s = self.index * PERIOD_S
         seen = self.change(self.index, self.seen)
         given_ = EstimatorInput(now_s, PERIOD_S, seen, *self.before, *rims(*self.before))
-        estimate = self.filter.step(given_)
+        estimate = self.estimator.step(given_)
         truth = self.robot.posture
         tick = self.index * CONTROL_PERIOD_TICKS
         self.seen = Sighting(truth.x_m, truth.y_m, math.remainder(truth.theta_rad, math.tau), tick, 1.0)

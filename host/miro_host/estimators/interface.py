@@ -18,6 +18,8 @@ from miro_host.memory import Remembering
 from miro_host.posture import Posture
 
 NOTHING: Mapping[str, float] = {}
+DEAD_S = 0.028
+"""3 ms of computing, 1 ms of key-up, 24 ms on the air in a network of three robots."""
 
 
 class EstimatorInput(msgspec.Struct, frozen=True):
@@ -25,7 +27,8 @@ class EstimatorInput(msgspec.Struct, frozen=True):
 
     `measured` is what the camera's tracker hands over now, None in a frame in which the robot was not found. `v_m_s`,
     `w_rad_s` are the velocities that were commanded one period ago, `left_m_s`, `right_m_s` the speeds of the rims that
-    were sent for them, for wheels of the nominal radius. `heard` is the robot's last answer by radio.
+    were sent for them, for wheels of the nominal radius. `heard` is the robot's last answer by radio. `dead_s` is how
+    long after t_s the last bit of the next command leaves the transmitter.
     """
 
     t_s: float
@@ -36,6 +39,7 @@ class EstimatorInput(msgspec.Struct, frozen=True):
     left_m_s: float
     right_m_s: float
     heard: Heard | None = None
+    dead_s: float = DEAD_S
 
 
 class Estimate(msgspec.Struct, frozen=True):

@@ -1,0 +1,213 @@
+"""The improved chain, a law and an estimator of ours, in the whole loop: how near to the path it ends.
+
+    python -m benchmarks.improved [--seeds 0-49] [--law body_frame] [--estimator ekf] [--only CASE,..]
+
+Runs on all cores; says on standard error how far it is, and prints a Markdown table. Errors are positions in truth,
+root mean square over the last second, in cm. The exit code is 1 if a case is beyond its limits. Starts drawn at random
+are a function of the seed: headings over the whole circle, places evenly over what of the pitch is near enough.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from os import cpu_count
+from statistics import median
+from typing import NamedTuple
+
+from miro_exact.rng import Stream
+from miro_host.posture import Posture
+from miro_robot.firmware import image_path
+from miro_robot.image import Image, load_hex
+from miro_sim.pitch import ground
+from miro_sim.scenario import file as scenario_file
+from miro_sim.world.world import World
+from mirotwin.report.summary import tracking_of
+from mirotwin.report.track import Tracks
+
+ANYWHERE_M = 10.0
+WHITE = 'camera={kind="gaussian"}'
+CALIBRATED = 'camera.calibration="exact"'
+FIG7 = (
+    "network.robot.start_error_x_cm=52.58",
+    "network.robot.start_error_y_cm=16.62",
+    "network.robot.start_error_theta_rad=-3.09",
+)
+HALF_CIRCLE = (
+    "duration_s=12.0",
+    'network.robot.reference={kind="arc",heading_deg=90.0,curvature_per_m=-1.92,speed_m_s=0.14,ramp_s=0.5}',
+)
+FIGURES = {"6": ("fig6", ()), "7": ("fig6", FIG7), "8": ("fig8", ())}
+WHEELS_5 = "network.robot.wheel_radius_mismatch=0.05"
+SPREAD_5 = 0.029  # of an even spread of 5 %
+UNEVEN = (
+    "network.robot.wheel_radius_mismatch=0.0",
+    "network.robot.drive.chassis.left_radius_factor=1.05",
+    "network.robot.drive.chassis.right_radius_factor=0.95",
+)
+NOISY = "network.control_noise={v_m_s=0.05,w_rad_s=0.5}"
+LOSSY = "network.radio.bit_error_rate=1.72e-3"  # 1 - (1 - p)^130 = 20 %
+
+
+class Limits(NamedTuple):
+    """Largest median and 95th percentile in cm, and whether every run has to settle."""
+
+    median_cm: float = math.inf
+    most_cm: float = math.inf
+    settles: bool = False
+
+
+class Case(NamedTuple):
+    """A line of the table. `near_m`: random starts so near to the start of the reference, 0: as the scenario says."""
+
+    name: str
+    scenario: str
+    sets: tuple[str, ...]
+    limits: Limits = Limits()
+    near_m: float = 0.0
+    wheel_spread: float | None = None
+    runs_a_seed: int = 1
+
+
+class Result(NamedTuple):
+    """One run."""
+
+    position_cm: float
+    settled: bool
+    off_pitch_s: float
+
+
+def cases() -> list[Case]:
+    """All lines, in the order of the table."""
+    found = []
+    for camera, word, limits in (
+        (WHITE, "white noise", Limits(0.25, 0.5)),
+        (CALIBRATED, "calibrated", Limits(0.08, 0.15)),
+    ):
+        found += [Case(f"{word}, Fig. {n}", s, (camera, *more), limits) for n, (s, more) in FIGURES.items()]
+    for wheels, word in (((WHEELS_5,), "5 % wheels"), (UNEVEN, "wheels 1.05 and 0.95")):
+        for camera, of in ((WHITE, "white noise"), (CALIBRATED, "calibrated")):
+            for number in ("6", "8"):
+                name = f"{word}, {of}, Fig. {number}"
+                sets = (camera, *wheels)
+                found.append(Case(name, f"fig{number}", sets, Limits(median_cm=0.3), wheel_spread=SPREAD_5))
+    settles = Limits(settles=True)
+    found += [
+        Case("starts within 60 cm, line", "fig6", (WHITE,), settles, near_m=0.6, runs_a_seed=4),
+        Case("starts within 60 cm, arc", "fig8", (WHITE,), settles, near_m=0.6, runs_a_seed=4),
+        Case("starts anywhere, half circle, 12 s", "fig8", (WHITE, *HALF_CIRCLE), settles, ANYWHERE_M),
+    ]
+    for camera, of in ((WHITE, "white noise"), (CALIBRATED, "calibrated")):
+        found += [
+            Case(f"control noise, {of}, Fig. 6", "fig6", (camera, NOISY)),
+            Case(f"20 % of frames lost, {of}, Fig. 6", "fig6", (camera, LOSSY)),
+        ]
+    return found
+
+
+def start_of(seed: int, near_m: float) -> Posture:
+    """A start on the pitch, as an error against a reference that starts in the origin with heading 0."""
+    draws = Stream(seed, "benchmark/start")
+    index = 0
+    while True:
+        theta_rad = math.tau * draws.uniform(index + 2) - math.pi
+        x_m = ground.LEFT_M + draws.uniform(index) * ground.LENGTH_M
+        y_m = ground.BOTTOM_M + draws.uniform(index + 1) * ground.WIDTH_M
+        start = Posture(x_m, y_m, theta_rad)
+        if math.hypot(x_m, y_m) <= near_m and ground.holds(start):
+            return start
+        index += 3
+
+
+@cache
+def _image() -> Image:
+    return load_hex(image_path())
+
+
+def run(case: Case, seed: int, law: str, estimator: str) -> Result:
+    """One run of a case to its end."""
+    spread = "" if case.wheel_spread is None or estimator == "none" else f",wheel_spread={case.wheel_spread}"
+    controller = () if law == "yang_kim" else (f'network.robot.controller={{law="{law}"}}',)
+    sets = [*case.sets, *controller, f'network.robot.estimator={{kind="{estimator}"{spread}}}']
+    if case.near_m:
+        start = start_of(seed, case.near_m)
+        heading_rad = scenario_heading_rad(case)
+        sets += [
+            f"network.robot.start_error_x_cm={100.0 * start.x_m!r}",
+            f"network.robot.start_error_y_cm={100.0 * start.y_m!r}",
+            f"network.robot.start_error_theta_rad={math.remainder(start.theta_rad - heading_rad, math.tau)!r}",
+        ]
+    world = World(scenario_file.load(case.scenario, tuple(sets)).scenario, seed, _image())
+    tracks = Tracks()
+    while not world.finished:
+        tracks.add(world.step())
+    errors = next(iter(tracks.robots.values())).errors
+    found = tracking_of(errors)
+    assert found.rms_position_cm is not None
+    assert found.off_pitch_s is not None
+    return Result(found.rms_position_cm, errors[len(errors) - 1].settled, found.off_pitch_s)
+
+
+def scenario_heading_rad(case: Case) -> float:
+    """Heading of a case's reference at its start."""
+    robot = scenario_file.load(case.scenario, case.sets).scenario.networks[0].robot[0]
+    return math.radians(getattr(robot.reference, "heading_deg"))  # noqa: B009  # of a line and of an arc
+
+
+def row(case: Case, results: Sequence[Result]) -> tuple[str, bool]:
+    """The case's line of the table, and whether it is within its limits."""
+    errors = sorted(result.position_cm for result in results)
+    middle, most = median(errors), errors[min(len(errors) - 1, int(0.95 * len(errors)))]
+    settled = sum(result.settled for result in results)
+    off_s = max(result.off_pitch_s for result in results)
+    limits = case.limits
+    good = middle <= limits.median_cm and most <= limits.most_cm
+    good = good and (settled == len(results) or not limits.settles)
+    return (
+        f"| {case.name} | {middle:.3f} | {most:.3f} | {errors[-1]:.3f} | {settled} of {len(results)} | "
+        f"{off_s:.1f} | {'' if good else 'beyond its limits'} |"
+    ), good
+
+
+def table(chosen: Iterable[Case], seeds: range, law: str, estimator: str) -> bool:
+    """Prints the lines as they are finished; whether all are within their limits."""
+    print("| case | median | 95 % | worst | settled | longest off the pitch, s | |")
+    print("|---|---|---|---|---|---|---|")
+    all_good = True
+    with ProcessPoolExecutor(cpu_count()) as pool:
+        for case in chosen:
+            count = len(seeds) * case.runs_a_seed
+            every = range(seeds.start, seeds.start + count)
+            pending = pool.map(run, *zip(*[(case, seed, law, estimator) for seed in every], strict=True))
+            results = []
+            for done, result in enumerate(pending, 1):
+                results.append(result)
+                print(f"\r{case.name}: {done} of {count}   ", end="", file=sys.stderr, flush=True)
+            print("\r\033[K", end="", file=sys.stderr, flush=True)
+            line, good = row(case, results)
+            print(line, flush=True)
+            all_good = all_good and good
+    return all_good
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", default="0-49", help="first and last")
+    parser.add_argument("--law", default="body_frame")
+    parser.add_argument("--estimator", default="ekf")
+    parser.add_argument("--only", default="", help="parts of the names of cases, with commas")
+    asked = parser.parse_args()
+    first, last = (int(word) for word in asked.seeds.split("-"))
+    chosen = [case for case in cases() if any(word in case.name for word in asked.only.split(","))]
+    if not chosen:
+        parser.error("no case has such a name")
+    if not table(chosen, range(first, last + 1), asked.law, asked.estimator):
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,55 @@
+# C types of miro_host.estimators.filter.
+cimport cython
+from miro_exact cimport dmath
+from miro_host.estimators.motion cimport Motion
+
+cdef int _N
+cdef double _LARGEST
+
+
+@cython.final
+cdef class Filter:
+    cdef readonly int size
+    cdef readonly Motion motion
+    cdef readonly double position_m, heading_rad, wheel, rim_m_s, warp_m, warp_length_m, effect_s, period_s
+    cdef public int known
+    cdef public double at_s
+    cdef public double state[9]
+    cdef public double covariance[81]
+    cdef double column[9]
+    cdef double lower[9]
+
+    cpdef drifts(self, double position_m, double heading_rad, double wheel, double rim_m_s)
+    cpdef warps(self, double warp_m, double warp_length_m)
+    @cython.locals(index=int, i=int, j=int)
+    cpdef after_load(self)
+    @cython.locals(i=int, j=int, k=int, rest=double)
+    cpdef check_positive(self)
+    @cython.locals(total=double, index=int)
+    cpdef bint finite(self)
+    cpdef command(self, double left_m_s, double right_m_s, double effect_s, double period_s)
+    @cython.locals(index=int)
+    cpdef start(self, double x_m, double y_m, double theta_rad, double at_s, double position_m2, double heading_rad2)
+    @cython.locals(other=int)
+    cpdef forget(self, int index, double variance)
+    @cython.locals(motion=Motion)
+    cpdef run(self, double to_s)
+    @cython.locals(motion=Motion, time_s=double, middle=double, p='double *', n=int, i=int, j=int, rim_m2=double,
+                   sin=double, cos=double)
+    cpdef predict(self, double to_s)
+    @cython.locals(p='double *', column='double *', i=int, j=int)
+    cdef int spread(self, int extra, double variance, double along, double turn, double cos, double sin) noexcept
+    @cython.locals(kept=double, p='double *', index=int, other=int)
+    cdef int warp_on(self, double way_m) noexcept
+    @cython.locals(p='double *', lower='double *', i=int, j=int, k=int, rest=double)
+    cpdef decompose(self, double position_m2, double heading_rad2)
+    @cython.locals(lower='double *', a=double, b=double, c=double)
+    cpdef double distance2(self, double x_m, double y_m, double theta_rad, double position_m2,
+                           double heading_rad2) except? -7.5
+    @cython.locals(warp=cython.bint)
+    cpdef see(self, double x_m, double y_m, double theta_rad, double position_m2, double heading_rad2)
+    @cython.locals(innovation=double, believed=cython.bint)
+    cpdef bint count(self, int extra, double extra_m, double variance, double gate)
+    @cython.locals(p='double *', column='double *', n=int, i=int, j=int, whole=double, gain=double, against=double)
+    cdef int correct(self, int one, int other, double innovation, double variance) except -1
+    cdef int tidy(self) except -1
