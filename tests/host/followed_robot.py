@@ -2,8 +2,10 @@
 
 import math
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from miro_host.ear import Heard
 from miro_host.estimators.ekf import EkfParameters
+from miro_host.estimators.ekf_telemetry import METRES_PER_COUNT, EkfTelemetryParameters
 from miro_host.estimators.interface import DEAD_S, EstimatorInput
 from miro_host.eye.track import Sighting
 from miro_host.pilot import PERIOD_S
@@ -12,6 +14,9 @@ from miro_host.wheels import Wheels
 
 TRACK_M = Wheels().track_m
 P = EkfParameters()
+READ_S = 0.03
+"""From a period's begin to the reading of the counts."""
+SAMPLED_S = EkfTelemetryParameters().sampled_s
 DELAY_S = DEAD_S + P.lag_s
 
 
@@ -39,6 +44,9 @@ class Robot:
         self.sent = []
         self.count = 0
         self.loses = None  # which of the commands does not arrive
+        self.rims_m = [0.0, 0.0]  # what encoders would count, for wheels of the nominal radius
+        self.disobeys = lambda time_s: (0.0, 0.0)  # further speed of the rims in m/s
+        self.follows = lambda time_s: 1.0  # which share of the wheels' way the robot goes
 
     def send(self, v_m_s, w_rad_s):
         if self.count != self.loses:
@@ -53,9 +61,12 @@ class Robot:
             self.time_s += dt
             told = next((to for begin, to in reversed(self.sent) if begin < self.time_s), (0.0, 0.0))
             middle = []
+            more = self.disobeys(self.time_s)
             for index, to in enumerate(told):
                 change = max(-6.0 * dt, min(6.0 * dt, to - self.speeds[index]))
-                middle.append(self.factors[index] * (self.speeds[index] + 0.5 * change))
+                speed = self.speeds[index] + 0.5 * change + more[index]
+                self.rims_m[index] += speed * dt
+                middle.append(self.follows(self.time_s) * self.factors[index] * speed)
                 self.speeds[index] += change
             turn = (middle[1] - middle[0]) / TRACK_M * dt
             x += 0.5 * (middle[0] + middle[1]) * math.cos(theta + 0.5 * turn) * dt
@@ -68,11 +79,14 @@ class Robot:
 class Loop:
     """Robot, a camera one frame late, and the filter. Each period calls `change(index, sighting)` on what is seen."""
 
-    def __init__(self, estimator, robot, change=lambda index, seen: seen):
-        self.estimator, self.robot, self.change = estimator, robot, change
+    def __init__(self, estimator, robot, change=lambda index, seen: seen, answers=False):
+        self.estimator, self.robot, self.change, self.answers = estimator, robot, change, answers
         self.index = 0
         self.seen = None
         self.before = (0.0, 0.0)
+        self.heard = self.coming = None  # an answer arrives a period after it was begun
+        self.path = []  # true postures at the exposures
+        self.tell = lambda heard: heard  # what becomes of an answer on its way
 
     @property
     def filter(self):
@@ -83,14 +97,24 @@ class Loop:
         """One period; what the filter says and where the robot really is at that time."""
         now_s = self.index * PERIOD_S
         seen = self.change(self.index, self.seen)
-        given_ = EstimatorInput(now_s, PERIOD_S, seen, *self.before, *rims(*self.before))
+        heard = self.heard if self.heard is None else self.tell(self.heard)
+        given_ = EstimatorInput(now_s, PERIOD_S, seen, *self.before, *rims(*self.before), heard)
+        self.heard = self.coming
         estimate = self.estimator.step(given_)
+        self.exposed = self.path[-1] if self.path else self.robot.posture
+        self.path.append(self.robot.posture)
         truth = self.robot.posture
         tick = self.index * CONTROL_PERIOD_TICKS
         self.seen = Sighting(truth.x_m, truth.y_m, math.remainder(truth.theta_rad, math.tau), tick, 1.0)
         self.before = velocities(self.index)
         self.robot.send(*self.before)
         self.index += 1
+        if self.answers and self.index % 3 == 0:
+            self.robot.run(now_s + READ_S)
+            counts = [round(way / METRES_PER_COUNT) for way in self.robot.rims_m]
+            self.coming = Heard(
+                round((now_s + READ_S + SAMPLED_S) * TICKS_PER_SECOND), 0, 0, 0, 0, *counts, 0, 0
+            )
         self.robot.run(self.index * PERIOD_S)
         return estimate
 

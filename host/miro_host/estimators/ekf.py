@@ -200,7 +200,7 @@ class Ekf(Estimator[EkfParameters]):
         noise = position_m * position_m, heading_rad * heading_rad
         if one.known:
             one.predict(exposed_s)
-            if self._believed(one.distance2(*seen, *noise)):
+            if self._believed(measured, noise):
                 one.see(*seen, *noise)
                 self.refused = 0
                 return
@@ -208,7 +208,13 @@ class Ekf(Estimator[EkfParameters]):
             if self.refused < REFUSED:
                 return
         one.start(*seen, exposed_s, *noise)
+        self._begin()
+
+    def _begin(self) -> None:
+        """The posture is that of one measurement."""
         self.refused = 0
 
-    def _believed(self, distance2: float) -> bool:
+    def _believed(self, measured: Posture, noise: tuple[float, float]) -> bool:
+        """Whether a measurement is near enough to the prediction."""
+        distance2 = self.filter.distance2(measured.x_m, measured.y_m, measured.theta_rad, *noise)
         return distance2 <= self.parameters.gate * self.parameters.gate

@@ -16,6 +16,7 @@ cdef class Filter:
     cdef public double at_s
     cdef public double state[9]
     cdef public double covariance[81]
+    cdef readonly double left_m, right_m
     cdef double column[9]
     cdef double lower[9]
 
@@ -37,6 +38,7 @@ cdef class Filter:
     @cython.locals(motion=Motion, time_s=double, middle=double, p='double *', n=int, i=int, j=int, rim_m2=double,
                    sin=double, cos=double)
     cpdef predict(self, double to_s)
+    cpdef loosen(self, double position_m2, double heading_rad2)
     @cython.locals(p='double *', column='double *', i=int, j=int)
     cdef int spread(self, int extra, double variance, double along, double turn, double cos, double sin) noexcept
     @cython.locals(kept=double, p='double *', index=int, other=int)
@@ -46,6 +48,8 @@ cdef class Filter:
     @cython.locals(lower='double *', a=double, b=double, c=double)
     cpdef double distance2(self, double x_m, double y_m, double theta_rad, double position_m2,
                            double heading_rad2) except? -7.5
+    @cython.locals(p='double *')
+    cpdef double along_m2(self, double cos, double sin, double position_m2) except? -7.5
     @cython.locals(warp=cython.bint)
     cpdef see(self, double x_m, double y_m, double theta_rad, double position_m2, double heading_rad2)
     @cython.locals(innovation=double, believed=cython.bint)

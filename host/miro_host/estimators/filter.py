@@ -51,6 +51,8 @@ class Filter:
         "at_s": ("d", -_LARGE, _LARGE),
         "state": ("9d", -_LARGE, _LARGE),
         "covariance": ("81d", -_LARGE, _LARGE),
+        "left_m": ("d", -_LARGE, _LARGE),
+        "right_m": ("d", -_LARGE, _LARGE),
         "motion": Motion,
     }
     NOT_STATE = (
@@ -71,6 +73,8 @@ class Filter:
         self.period_s = 1.0
         self.known = 0
         self.at_s = 0.0
+        self.left_m = 0.0  # commanded way of the rim since its last count
+        self.right_m = 0.0
         self.state = [0.0] * 9
         self.covariance = [0.0] * 81
         self.column = [0.0] * 9
@@ -222,7 +226,15 @@ class Filter:
         self.state[0] = motion.x_m
         self.state[1] = motion.y_m
         self.state[2] = motion.theta_rad
+        self.left_m += motion.left_m
+        self.right_m += motion.right_m
         self.at_s = to_s
+
+    def loosen(self, position_m2: float, heading_rad2: float) -> None:
+        """Adds variances to the posture: something unknown moved the robot."""
+        self.covariance[0] += position_m2
+        self.covariance[_N + 1] += position_m2
+        self.covariance[2 * _N + 2] += heading_rad2
 
     def spread(self, extra: int, variance: float, along: float, turn: float, cos: float, sin: float) -> None:
         """Adds g g^T times the variance of a rim's way: it moves the robot along, turns it, and is an extra."""
@@ -288,6 +300,11 @@ class Filter:
         c = (dmath.wrap_pi(theta_rad - self.state[2]) - lower[6] * a - lower[7] * b) / lower[8]
         return a * a + b * b + c * c
 
+    def along_m2(self, cos: float, sin: float, position_m2: float) -> float:
+        """Variance of the camera's innovation in one direction, apart from that of the warp."""
+        p = self.covariance
+        return cos * cos * p[0] + 2.0 * cos * sin * p[1] + sin * sin * p[_N + 1] + position_m2
+
     def see(self, x_m: float, y_m: float, theta_rad: float, position_m2: float, heading_rad2: float) -> None:
         """Corrects by what the camera measured."""
         warp = self.size == _N
@@ -307,6 +324,10 @@ class Filter:
             self.correct(extra, NONE, innovation, variance)
             self.tidy()
         self.forget(extra, 0.0)
+        if extra == 5:
+            self.left_m = 0.0
+        else:
+            self.right_m = 0.0
         return believed
 
     def correct(self, one: int, other: int, innovation: float, variance: float) -> None:

@@ -25,6 +25,7 @@ ESTIMATORS: Registry[AnyEstimator] = Registry(
     own={
         "none": "miro_host.estimators.none:NoEstimator",
         "ekf": "miro_host.estimators.ekf:EkfParameters",
+        "ekf+telemetry": "miro_host.estimators.ekf_telemetry:EkfTelemetryParameters",
         "predict": "miro_host.estimators.predict:PredictParameters",
     },
     default=DEFAULT_ESTIMATOR,

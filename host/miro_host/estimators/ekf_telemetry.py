@@ -1,0 +1,191 @@
+"""The filter of `ekf` with the encoder counts that the robots' answers bring.
+
+What belongs here: when a count is used, and what camera and encoders say against each other. What does not: the filter
+(`filter`), unwrapping (`miro_host.ear`), what `ekf` does too.
+
+What each of them sees, and what only both do:
+
+    commands    what the wheels should do: known at once, not known to be obeyed
+    encoders    what the wheels did, every third or fifth period, some 35 ms late. Alone they never see a shift or a
+                turn of the whole pitch, and scale only as far as the wheel radius is known
+    camera      where the robot is, displaced by the warp of a wrong calibration
+
+    wheel factor    camera and encoders differ by the same share of the way, everywhere
+    slip            they differ in a burst: the wheels turned and the robot did not follow
+    warp            they differ by place: the camera's displacement changes along the path. Its mean over the path
+                    cannot be told from the posture, nor its scale from the wheels' mean radius
+    disobedience    encoders and commands differ: lost frames, noise on the commands, a motor at its limit, contact.
+                    Until the next count it looks like slip
+
+An answer's counts were read at one instant. The filter is moved there and corrected by what each rim went since the
+last count beyond what was commanded. Of the way modulo 65536 counts (0.50 m) the value nearest to the commanded way is
+taken, so that a long silence does no harm as long as the commands were obeyed within 0.25 m.
+
+An answer may also be old or repeated (ignored), come before the posture is known (it is where counting begins), tell of
+an instant before the last exposure (the next one tells more), or tell what no robot did, `count_gate` standard
+deviations off, as after a reset of the robot, whose counts begin at 0 (counting begins there). Without answers this is
+`ekf`, but for its default of `rim_noise_m_s`.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
+
+from msgspec import Meta
+
+from miro_exact.clock import TICKS_PER_SECOND
+from miro_exact.dmath import sincos
+from miro_host.ear import HALF_TURN, TURN, Heard
+from miro_host.estimators.ekf import WHEELS, Ekf, EkfParameters
+from miro_host.estimators.filter import Filter
+from miro_host.estimators.interface import EstimatorInput
+from miro_host.posture import Posture
+from miro_host.wheels import COUNTS_PER_WHEEL_TURN, PI, nearest
+
+METRES_PER_COUNT = 2.0 * PI * WHEELS.radius_m / COUNTS_PER_WHEEL_TURN
+KEPT = 0.7
+"""Of surprise and slip, from one measurement to the next."""
+SURPRISE = 1.5
+"""Mean of the camera's innovations along the heading, in standard deviations, above which the robot is taken to slip.
+Of white noise the mean has a standard deviation of 0.42."""
+
+_RANGES = {
+    "sampled_s": (0.0, 0.02),
+    "count_noise_m": (1e-6, 0.1),
+    "count_gate": (1.0, 1000.0),
+    "warp_m": (0.0, 0.1),
+    "warp_length_m": (0.01, 10.0),
+}
+
+
+class EkfTelemetryParameters(EkfParameters, frozen=True, kw_only=True, tag="ekf+telemetry"):
+    """Those of `ekf`, and: `sampled_s`, how long before its answer's first start bit a robot reads its counts (the left
+    one 0.95 ms, the right one 0.65 ms before); `count_noise_m`, standard deviation of a rim's way between two counts,
+    for rounding and for that instant; `count_gate`, in standard deviations; `warp_m` of the camera's displacement per
+    axis and `warp_length_m`, the way over which it becomes another. A `warp_m` of 0 is a camera that is right.
+    """
+
+    rim_noise_m_s: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.02
+    sampled_s: Annotated[float, Meta(ge=0.0, le=0.02)] = 0.0008
+    count_noise_m: Annotated[float, Meta(ge=1e-6, le=0.1)] = 5e-5
+    count_gate: Annotated[float, Meta(ge=1.0, le=1000.0)] = 8.0
+    warp_m: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.0
+    warp_length_m: Annotated[float, Meta(ge=0.01, le=10.0)] = 0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, (least, most) in _RANGES.items():
+            if not least <= getattr(self, name) <= most:
+                raise ValueError(
+                    f"{name}: {getattr(self, name)!r} is out of range; must be {least} to {most}"
+                )
+
+    def estimator(self) -> "EkfTelemetry":
+        return EkfTelemetry(self)
+
+    def filter(self, size: int) -> Filter:
+        made = super().filter(size)
+        made.warps(self.warp_m, self.warp_length_m)
+        return made
+
+
+class EkfTelemetry(Ekf):
+    """The filter, the last answer that was used, and the counts then; the last exposure, and the slip at it.
+
+    `slip_m_s` is how much faster the wheels go than the robot, averaged over some frames; 0 while nothing surprises.
+    """
+
+    STATE: ClassVar[Mapping[str, Any]] = {
+        "counting": "?",
+        "heard_tick": "q",
+        "left_count": "q",
+        "right_count": "q",
+        "seen_s": "d",
+        "surprise": "d",
+        "slip_m_s": "d",
+    }
+    INNER: ClassVar[tuple[str, ...]] = (*Ekf.INNER, "slip_m_s", "warp_x_m", "warp_y_m")
+    SIZE: ClassVar[int] = 9
+
+    parameters: EkfTelemetryParameters
+
+    def __init__(self, parameters: EkfTelemetryParameters) -> None:
+        super().__init__(parameters)
+        self.counting = False
+        self.heard_tick = -1
+        self.left_count = 0
+        self.right_count = 0
+        self.seen_s = 0.0
+        self.surprise = 0.0
+        self.slip_m_s = 0.0
+
+    def _named(self, posture: Posture, state: list[float]) -> dict[str, float]:
+        return {
+            **super()._named(posture, state),
+            "slip_m_s": self.slip_m_s,
+            "warp_x_m": state[7],
+            "warp_y_m": state[8],
+        }
+
+    def _measure(self, given: EstimatorInput) -> None:
+        """The camera's measurement and a new answer, in the order of the instants that they tell of."""
+        heard = given.heard
+        if heard is None or heard.tick <= self.heard_tick:
+            super()._measure(given)
+            return
+        read_s = heard.tick / TICKS_PER_SECOND - self.parameters.sampled_s
+        first = given.measured is not None and self._exposed_s(given.measured, given.t_s) < read_s
+        if first:
+            super()._measure(given)
+        if read_s <= given.t_s:
+            self.heard_tick = heard.tick
+            self._count(heard, read_s)
+        if not first:
+            super()._measure(given)
+
+    def _count(self, heard: Heard, read_s: float) -> None:
+        """Prediction to the instant of the counts, then correction by them, or the beginning of counting."""
+        one = self.filter
+        if not one.known or read_s <= one.at_s:
+            return
+        one.predict(read_s)
+        left_m = self._beyond_m(heard.position_left - self.left_count, one.left_m)
+        right_m = self._beyond_m(heard.position_right - self.right_count, one.right_m)
+        self.left_count, self.right_count = heard.position_left, heard.position_right
+        gate = self.parameters.count_gate if self.counting else 0.0
+        noise_m2 = self.parameters.count_noise_m * self.parameters.count_noise_m
+        one.count(5, left_m, noise_m2, gate)
+        one.count(6, right_m, noise_m2, gate)
+        self.counting = True
+
+    @staticmethod
+    def _beyond_m(counts: int, commanded_m: float) -> float:
+        """What a rim went beyond what was commanded, of all that fit its counter the least."""
+        commanded = commanded_m / METRES_PER_COUNT
+        whole = nearest(commanded)
+        return (((counts - whole + HALF_TURN) % TURN - HALF_TURN) + (whole - commanded)) * METRES_PER_COUNT
+
+    def _begin(self) -> None:
+        super()._begin()
+        self.counting = False
+        self.seen_s = self.filter.at_s
+        self.surprise = self.slip_m_s = 0.0
+
+    def _believed(self, measured: Posture, noise: tuple[float, float]) -> bool:
+        """Where the camera surprises again and again, the posture is loosened: the wheels are not blamed."""
+        one, state = self.filter, self.filter.state
+        sin, cos = sincos(state[2])
+        x_m, y_m = measured.x_m - state[0] - state[7], measured.y_m - state[1] - state[8]
+        ahead_m = x_m * cos + y_m * sin
+        spread_m = math.sqrt(
+            one.along_m2(cos, sin, noise[0]) + self.parameters.warp_m * self.parameters.warp_m
+        )
+        self.surprise = KEPT * self.surprise + (1.0 - KEPT) * ahead_m / spread_m
+        slip_m_s = 0.0
+        if abs(self.surprise) > SURPRISE:
+            slip_m_s = -ahead_m / (one.at_s - self.seen_s)
+            turn_rad = ahead_m / WHEELS.track_m  # of which one wheel may slip more than the other
+            one.loosen(ahead_m * ahead_m, turn_rad * turn_rad)
+        self.slip_m_s = KEPT * self.slip_m_s + (1.0 - KEPT) * slip_m_s
+        self.seen_s = one.at_s
+        return super()._believed(measured, noise)
