@@ -169,8 +169,9 @@ def test_an_estimator_is_chosen_and_checked_like_a_law() -> None:
     )
     assert chosen == PredictParameters(ahead_s=0.02)
     assert parse(SMALL, "small").networks[0].robot[0].estimator == NoEstimator()
-    assert "estimator.kind: 'kalman' is not one of the choices; use none, ekf or predict" in refusal(
-        SMALL + table + 'kind = "kalman"\n'
+    assert (
+        "estimator.kind: 'kalman' is not one of the choices; use none, ekf, ekf+telemetry or predict"
+        in refusal(SMALL + table + 'kind = "kalman"\n')
     )
     assert "estimator.ahead: unknown key; use ahead_s, in seconds" in refusal(
         SMALL + table + 'kind = "predict"\nahead = 1\n'
