@@ -23,6 +23,7 @@ from miro_sim.scenario.places import check_places
 from miro_sim.scenario.profiles import ProfileError, with_profiles
 from miro_sim.scenario.settings import blamed, make
 from miro_sim.scenario.text import check_size, written
+from miro_sim.scenario.variants import VariantError, with_variant
 
 
 class ScenarioText(msgspec.Struct, frozen=True):
@@ -145,7 +146,7 @@ def _checked(raw: dict[str, Any], origin: str, settings: Sequence[str]) -> Scena
     made = make(raw, settings, origin)
     try:
         _check_finite(raw, origin)
-        complete = _with_profiles(raw, origin)
+        complete = _with_profiles(_with_variant(raw, origin), origin)
         try:
             scenario = msgspec.convert(complete, Scenario, dec_hook=part_of)
         except msgspec.ValidationError as error:
@@ -154,6 +155,14 @@ def _checked(raw: dict[str, Any], origin: str, settings: Sequence[str]) -> Scena
     except ScenarioError as error:
         raise blamed(error, made) from error.__cause__
     return scenario
+
+
+def _with_variant(raw: dict[str, Any], origin: str) -> dict[str, Any]:
+    """The same with the keys of the variant that the file names."""
+    try:
+        return with_variant(raw)
+    except VariantError as error:
+        raise ScenarioError(origin, "variant", error.what, error.remedy) from None
 
 
 def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:

@@ -131,7 +131,9 @@ class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A whole run. `stop_on_fault` ends it at the first firmware fault; otherwise faults are counted.
+    """A whole run. A file may also have `variant` (`variants`), which stands for other keys.
+
+    `stop_on_fault` ends it at the first firmware fault; otherwise faults are counted.
 
     `lm629` turns readings of the chips' undocumented corners (`robot_fw/miro_robot/lm629/README.md`).
     """

@@ -6,7 +6,7 @@ as a whole after all settings were made, in their order, as if its file had said
 
 KEY is the path of a key, `network.0.robot.0.controller.gamma1_per_s`. An index may be left out where a list has one
 entry: `network.robot.controller.gamma1_per_s`. VALUE is read as TOML, and as text if it is none; an inline table
-replaces a whole table.
+replaces a whole table. `variant=NAME` stands for all that the variant changes (`variants`).
 """
 
 import re
@@ -20,6 +20,7 @@ from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.parts import REGISTRIES
 from miro_sim.scenario.profiles import ERROR_KEYS
 from miro_sim.scenario.text import check_size
+from miro_sim.scenario.variants import VariantError, impose
 
 Table = dict[str, Any]
 _TAGS = {registry.key for registry in REGISTRIES.values()}
@@ -81,9 +82,14 @@ def make(raw: Table, settings: Iterable[str], origin: str) -> list[Setting]:
 def _make(raw: Table, text: str, origin: str) -> Setting:
     try:
         keys, value = _read(text, origin)
+        if keys == ["variant"]:
+            impose(raw, value)
+            return Setting(text, "variant")
         return _Path(text).put(raw, keys, value, "")
     except _Refused as refused:
         raise ScenarioError(origin, f"--set {text}", refused.what, refused.remedy) from None
+    except VariantError as error:
+        raise ScenarioError(origin, f"--set {text}", error.what, error.remedy) from None
     except RecursionError:
         raise ScenarioError(origin, f"--set {text}", "nested too deeply") from None
 

@@ -8,6 +8,7 @@ from rich.table import Table
 
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as radio_profiles
+from miro_sim.scenario import variants as scenario_variants
 from mirotwin.cli.console import show as print_result
 from mirotwin.cli.options import set_option
 
@@ -50,6 +51,22 @@ def profiles() -> None:
     table.add_column("keys")
     for name, profile in radio_profiles.profiles().items():
         table.add_row(name, profile["about"], _keys(radio_profiles.keys_of(name)))
+    print_result(table)
+
+
+@scenarios.command()
+def variants() -> None:
+    """Lists the variants, for `--set variant=..` or `variant = ".."` in a file, and the keys that each sets.
+
+    With --set a variant wins over the file, and over what is set before it; in a file, keys that are given win.
+    """
+    table = Table(box=None, pad_edge=False)
+    table.add_column("variant", style="bold")
+    table.add_column("what it is")
+    table.add_column("keys")
+    for name, variant in scenario_variants.variants().items():
+        keys = _keys({key: value for key, value in variant.items() if key != "about"})
+        table.add_row(name, variant["about"], keys)
     print_result(table)
 
 

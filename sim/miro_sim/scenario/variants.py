@@ -1,0 +1,130 @@
+"""Variants: named amounts of disturbance for a whole scenario, `ideal` and `realistic`.
+
+What belongs here: the names, the keys that disturb, and which key wins. What does not: what the keys mean (`keys`) and
+whether their values are good (`file`).
+
+Two rules. On the command line (`--set variant=ideal`) a variant wins over the file, because that is what it is asked
+for: all keys that disturb are taken out of the scenario, and those of the variant put in; settings after it win over
+it. In a file (`variant = "ideal"`) it is a default: keys that the file gives win.
+"""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from miro_exact.bad_input import BadInput
+from miro_sim.scenario.profiles import overridden
+
+Table = dict[str, Any]
+
+DISTURBING_CAMERA = (
+    *("kind", "calibration", "calibration_errors", "picture", "delay_frames", "dropped_frames"),
+    *("repeated_frames", "lost_robots", "position_error_cm", "heading_error_deg", "pixel_cm"),
+)
+"""What a variant takes out of `[camera]`; lens, pattern, window and ball stay, if the kind of camera does."""
+STAYS_IN_RADIO = ("telemetry", "channel")
+DISTURBING_DRIVE = ("tyre", "ball", "disturbance")
+DISTURBING_CHASSIS = ("left_radius_factor", "right_radius_factor", "stiction_ratio")
+
+
+class VariantError(BadInput):
+    """A `variant` that is none: what, and what to write instead."""
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__("", "variant", what, remedy)
+
+
+@cache
+def variants() -> Mapping[str, Mapping[str, Any]]:
+    """Name -> `about` and keys of the variants, in the order of their file."""
+    text = (resources.files("miro_sim.scenario") / "variants.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def impose(raw: Table, name: object) -> None:
+    """Makes the tables of a scenario those of the variant, whatever they say. Raises VariantError."""
+    variant = _named(name)
+    raw.pop("variant", None)
+    if "camera" in variant:
+        raw["camera"] = dict(variant["camera"])
+    else:
+        _take_out(raw.get("camera"), DISTURBING_CAMERA)
+        raw["camera"] = {"kind": "pixels", **_table(raw.get("camera"))}
+    raw["host"] = dict(variant.get("host", {}))
+    for network in _tables(raw, "network"):
+        radio = _table(network.get("radio"))
+        kept = {key: radio[key] for key in STAYS_IN_RADIO if key in radio}
+        network["radio"] = {**kept, **variant.get("radio", {})}
+        network.pop("control_noise", None)
+        for robot in _tables(network, "robot"):
+            _take_out(robot, ("wheel_radius_mismatch",))
+            _take_out(robot.get("drive"), DISTURBING_DRIVE)
+            _take_out(_table(robot.get("drive")).get("chassis"), DISTURBING_CHASSIS)
+            robot.update(variant.get("robot", {}))
+
+
+def with_variant(raw: Table) -> Table:
+    """The same tables with what the variant of the file says where the file says nothing. Raises VariantError.
+
+    A camera of another kind, and a radio with a profile, are what the file says.
+    """
+    if "variant" not in raw:
+        return raw
+    variant = _named(raw["variant"])
+    complete = {key: value for key, value in raw.items() if key != "variant"}
+    complete["camera"] = _camera(raw.get("camera", {}), variant.get("camera", {}))
+    complete["host"] = _filled(raw.get("host", {}), variant.get("host", {}))
+    networks = raw.get("network")
+    if isinstance(networks, list):
+        complete["network"] = [_network(network, variant) for network in networks]
+    return complete
+
+
+def _network(network: Any, variant: Mapping[str, Any]) -> Any:
+    if not isinstance(network, dict):
+        return network
+    complete, radio, robots = dict(network), network.get("radio", {}), network.get("robot")
+    if isinstance(radio, dict) and "profile" not in radio:
+        complete["radio"] = overridden(variant.get("radio", {}), radio)
+    if isinstance(robots, list):
+        complete["robot"] = [_filled(robot, variant.get("robot", {})) for robot in robots]
+    return complete
+
+
+def _camera(given: Any, default: Table) -> Any:
+    return _filled(given, default) if not given or _kind(given) == default.get("kind") else given
+
+
+def _kind(camera: Any) -> object:
+    return camera.get("kind") if isinstance(camera, dict) else None
+
+
+def _filled(given: Any, default: Table) -> Any:
+    return {**default, **given} if isinstance(given, dict) else given
+
+
+def _named(name: object) -> Mapping[str, Any]:
+    if not isinstance(name, str) or name not in variants():
+        close = get_close_matches(str(name), variants(), n=1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        raise VariantError(f"{name!r} is no variant", f"{hint}variants: {', '.join(variants())}")
+    return variants()[name]
+
+
+def _table(value: object) -> Table:
+    return value if isinstance(value, dict) else {}
+
+
+def _take_out(table: object, keys: tuple[str, ...]) -> None:
+    if isinstance(table, dict):
+        for key in keys:
+            table.pop(key, None)
+
+
+def _tables(above: Table, key: str) -> Iterator[Table]:
+    """The tables of a list of tables; what has another shape is left to whoever checks the scenario."""
+    listed = above.get(key)
+    return iter([table for table in listed if isinstance(table, dict)] if isinstance(listed, list) else [])
