@@ -226,13 +226,11 @@ def test_a_standing_shaft_holds_more_and_a_turning_one_rubs_as_before(ratio, tic
     assert rough.left_rad_s == pytest.approx(plain.left_rad_s, rel=1e-12)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "all"])
 @settings(deadline=None, max_examples=30)
 @given(SPEEDS, SPEEDS, WAYS, TURNS, IMPULSES, IMPULSES)
 def test_left_and_right_are_mirror_images(kind, left, right, v, w, push_left, push_right):
     """To what the sweeps leave, which take the left wheel first: most where the ball stands."""
-    if KINDS[kind].chassis.left_radius_factor != 1.0:
-        return
     one, other = moving(KINDS[kind], left, right, v, 0.1, w), moving(KINDS[kind], right, left, v, -0.1, -w)
     one.push(push_left, push_right, 2048)
     other.push(push_right, push_left, 2048)
