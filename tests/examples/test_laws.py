@@ -142,7 +142,7 @@ def test_it_tracks_its_path(site, tmp_path, name):
 DRIVEN = """
 from miro_host.pilot import Pilot
 from miro_host.posture import Posture
-from miro_host.reference import Line
+from miro_host.references.line import Line
 from pursuit_law import Parameters
 
 pilot = Pilot(Line(), Parameters(lookahead_s=0.5, max_v_dot_m_s2=1e3, max_w_dot_rad_s2=1e3).law())

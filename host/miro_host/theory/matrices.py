@@ -1,12 +1,19 @@
 """Products and linear equations of small matrices of any shape, in a written order of additions.
 
-What belongs here: what equations (2) to (14) need beside `estimators.matrix`, whose matrices are symmetric or have five
-columns. What does not: anything that knows what a row means. A matrix is a list of rows.
+What belongs here: what equations (2) to (14) need. What does not: anything that knows what a row means. A matrix is a
+list of rows.
 """
 
-from miro_host.estimators.matrix import Matrix
-
 Vector = list[float]
+Matrix = list[Vector]
+
+
+def diagonal(values: Vector) -> Matrix:
+    """A square matrix with these values on its diagonal."""
+    made = [[0.0] * len(values) for _ in values]
+    for index, value in enumerate(values):
+        made[index][index] = value
+    return made
 
 
 def transposed(a: Matrix) -> Matrix:

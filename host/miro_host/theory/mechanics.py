@@ -14,8 +14,7 @@ columns of n-m numbers, which for its robot, m = 1, is the same.
 
 import msgspec
 
-from miro_host.estimators.matrix import Matrix
-from miro_host.theory.matrices import Vector, added, dot, product, solution, solved, times, transposed
+from miro_host.theory.matrices import Matrix, Vector, added, dot, product, solution, solved, times, transposed
 
 
 class System(msgspec.Struct, frozen=True):

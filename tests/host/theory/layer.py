@@ -5,10 +5,9 @@ What belongs here: what `test_stability` and `claims` share. What does not: asse
 
 import random
 
-from miro_host.reference import Line
-
 from miro_host.laws.yang_kim import Gains, YangKim, saturation, sign
 from miro_host.posture import Posture
+from miro_host.references.line import Line
 from miro_host.theory import stability
 from miro_host.theory.assumptions import across, radius
 
