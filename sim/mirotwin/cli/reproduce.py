@@ -21,7 +21,7 @@ from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import OutputFolder, whole_file
 from mirotwin.reproduce.page import page
 from mirotwin.reproduce.pictures import course, draw
-from mirotwin.reproduce.plan import GROUPS, IMPROVED, LEARNING, PAPER, RETUNED, STARTS, Group, Start, jobs
+from mirotwin.reproduce.plan import GROUPS, ILLUSTRATIVE, LEARNING, PAPER, RETUNED, STARTS, Group, Start, jobs
 from mirotwin.reproduce.rows import by_label
 
 PAGE = "reproduction.md"
@@ -117,11 +117,10 @@ def _draw(start: Start, folder: OutputFolder, seed: int) -> None:
     names = {
         PAPER: "the paper's law",
         RETUNED: "epsilon-tracking, retuned",
-        "epsilon, illustrative": "epsilon-tracking, illustrative",
-        IMPROVED: "body_frame with ekf",
-        LEARNING: "the same, learning the camera",
+        ILLUSTRATIVE: "epsilon-tracking, illustrative",
+        LEARNING: "body_frame, ekf, self_calibration",
     }
-    shown = (PAPER, LEARNING) if start.figure < 9 else ("epsilon, illustrative", RETUNED, PAPER, LEARNING)
+    shown = (PAPER, LEARNING) if start.figure < 9 else (ILLUSTRATIVE, RETUNED, PAPER, LEARNING)
     courses = [
         course(names[controller], folder.part(Group(start, controller).recording), 1) for controller in shown
     ]

@@ -56,7 +56,7 @@ def draw(path: Path, title: str, courses: Sequence[Course]) -> None:
         figure.suptitle(title.replace("$", r"\$"), fontsize=11)
         axes = [[figure.add_subplot(grid[row, side]) for row in range(4)] for side in (0, 1)]
         for side, name in enumerate(("in truth", "as the camera sees it")):
-            _draw_path(axes[side][0], f"(a)  x-y, {name}", courses, bool(side))
+            _draw_path(axes[side][0], f"(a)  x-y [cm], {name}", courses, bool(side))
             for row, (title, unit, band, values) in enumerate(
                 (
                     ("(b)  $x_e$", "cm", SETTLED_CM, "x_cm"),
@@ -83,8 +83,6 @@ def _draw_path(axes: Axes, title: str, courses: Sequence[Course], seen: bool) ->
         axes.plot(points.x_cm, points.y_cm, color=colour, linewidth=1.2, label=one.name)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_title(title)
-    axes.set_xlabel("x [cm]")
-    axes.set_ylabel("y [cm]")
     if not seen:
         axes.legend(fontsize=7.5, loc="best")
 

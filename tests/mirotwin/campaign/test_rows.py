@@ -1,0 +1,81 @@
+"""Many runs: rows in the order of their jobs, whoever made them, and what is left when something goes wrong."""
+
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.file import load
+from miro_sim.world.world import World
+from mirotwin.campaign.execute import rows
+from mirotwin.campaign.job import Job, Row, run
+from mirotwin.campaign.processes import processes
+from mirotwin.recording.reader import read
+from mirotwin.report.summary import tracking_of
+from mirotwin.report.track import Tracks
+
+SHORT = "duration_s=1.0"
+
+
+def job(label="a", seed=0, *settings):
+    return Job(label, "fig7", (SHORT, *settings), seed)
+
+
+def test_a_row_says_what_the_run_itself_says():
+    row = run(job(seed=3))
+    world, tracks = World(load("fig7", (SHORT,)).scenario, 3, load_hex(image_path())), Tracks()
+    while not world.finished:
+        tracks.add(world.step())
+    (track,) = tracks.robots.values()
+    tracking = tracking_of(track.errors)
+    assert row.digest == tracks.digest
+    assert (row.rms_position_cm, row.rms_x_cm) == (tracking.rms_position_cm, tracking.rms_x_cm)
+    assert row.settling_s == tracking.settling_s
+    assert row.error == ""
+
+
+def test_without_delay_noise_and_error_the_camera_sees_the_truth():
+    exact = "camera={kind = 'gaussian', position_error_cm = 0.0, heading_error_deg = 0.0, pixel_cm = 0.0}"
+    row = run(job("a", 1, exact))
+    assert row.seen_position_cm == pytest.approx(row.rms_position_cm, rel=0.1)
+    late = run(job("a", 1, exact.replace("}", ", delay_frames = 3}")))
+    assert late.seen_position_cm == pytest.approx(late.rms_position_cm, rel=0.2)
+
+
+def test_rows_come_in_the_order_of_the_jobs_and_are_the_same_from_processes():
+    jobs = [job("a", seed) for seed in range(3)] + [job("b", 0, "network.robot.start_error_x_cm=40.0")]
+    alone = [run(one) for one in jobs]
+    assert list(rows(jobs, processes(2), 3)) == alone
+    assert [(row.label, row.seed) for row in alone] == [("a", 0), ("a", 1), ("a", 2), ("b", 0)]
+
+
+def test_a_run_that_cannot_be_made_is_a_row_with_its_error_and_costs_no_other():
+    found = list(rows([job("a", 0, "network.robot.slot=9"), job("b")], processes(1), 2))
+    assert "slot" in found[0].error
+    assert found[0].digest == ""
+    assert found[1].error == ""
+
+
+def test_a_recording_is_that_of_the_run(tmp_path):
+    path = tmp_path / "one.mcap"
+    row = run(Job("a", "fig7", (SHORT,), 2, str(path)))
+    assert read(path).digest == row.digest
+
+
+def test_whoever_stops_asking_leaves_no_job_behind():
+    made = []
+
+    def slow(one):
+        time.sleep(0.02)
+        made.append(one.seed)
+        return Row(one.label, one.scenario, one.seed)
+
+    executor = ThreadPoolExecutor(1)
+    asking = rows([job("a", seed) for seed in range(100)], executor, 4, slow)
+    assert next(asking).seed == 0
+    asking.close()
+    assert len(made) < 6
+    with pytest.raises(RuntimeError):
+        executor.submit(slow, job())

@@ -1,0 +1,138 @@
+"""The paper's section V again: verdicts follow from rows, and the page is the same however it was made."""
+
+import csv
+
+import pytest
+from click.testing import CliRunner
+
+from mirotwin.campaign.job import Row
+from mirotwin.cli import main
+from mirotwin.reproduce.claims import HOLDS, NOT, PART, findings
+from mirotwin.reproduce.plan import EPSILONS, GROUPS, IMPROVED, PAPER, RETUNED, STARTS, Group, jobs
+from mirotwin.reproduce.rows import by_label, middle, never_settled, percentile
+
+VALUES = {
+    "rms_x_cm": 0.5,
+    "rms_y_cm": 0.5,
+    "rms_theta_deg": 1.0,
+    "rms_position_cm": 1.0,
+    "seen_position_cm": 0.9,
+    "chattering_m_s2": 0.1,
+    "settled": True,
+}
+
+
+def table(**changes):
+    """Rows as good as they can be, for 20 seeds of each group; `changes`: label -> what its rows have else."""
+    found = {}
+    for group in GROUPS:
+        values = {**VALUES, **({"seen_position_cm": 0.1} if group.controller == IMPROVED else {})}
+        values.update(changes.get(group.label.replace("-", "_"), {}))
+        found[group.label] = [Row(group.label, group.start.proposed, seed, **values) for seed in range(20)]
+    return found
+
+
+def called(*arguments):
+    return CliRunner().invoke(main, ["reproduce", *map(str, arguments)])
+
+
+def verdict(words, **changes):
+    (found,) = [one for one in findings(table(**changes)) if words in one.claim]
+    return found.verdict
+
+
+@pytest.mark.parametrize(
+    ("words", "changes", "expected"),
+    [
+        ("small initial errors", {}, HOLDS),
+        ("small initial errors", {"fig6_paper": {"rms_position_cm": 2.5}}, NOT),
+        ("small initial errors", {"fig6_paper": {"settled": False}}, PART),
+        ("forward and backward motion", {}, NOT),
+        ("forward and backward motion", {"fig7_paper": {"reversals": 2}}, HOLDS),
+        ("assumption 3", {}, HOLDS),
+        ("assumption 3", {"fig7_paper": {"crossings": 1}}, NOT),
+        ("converge asymptotically", {}, NOT),
+        ("converge asymptotically", {f"fig{n}_paper": {"seen_position_cm": 0.15} for n in (6, 7, 8)}, HOLDS),
+        ("goes to zero", {"fig8_paper": {"rms_theta_deg": 5.0}}, NOT),
+        ("fails to converge", {}, NOT),
+        ("fails to converge", {"fig9_epsilon_theory": {"settled": False}}, NOT),
+        ("in particular in the Y", {"fig9_epsilon_theory": {"rms_y_cm": 3.0}}, PART),
+        ("chattering", {}, NOT),
+        ("superior", {"fig9_epsilon_retuned": {"rms_position_cm": 5.0}}, PART),
+        ("superior", {f"fig{n}_epsilon_retuned": {"rms_position_cm": 5.0} for n in (6, 7, 8, 9, 10)}, HOLDS),
+    ],
+)
+def test_a_verdict_follows_from_the_rows(words, changes, expected):
+    assert verdict(words, **changes) == expected
+
+
+def test_of_rows_that_are_not_there_nothing_holds():
+    assert all(found.verdict in (NOT, PART) for found in findings({}))
+
+
+def test_each_controller_runs_from_each_start_with_the_gains_of_its_path():
+    for start in STARTS:
+        for controller in (PAPER, *EPSILONS, IMPROVED):
+            scenario, settings = Group(start, controller).scenario()
+            path = "line" if start.path == "straight line" else "curve"
+            assert (
+                scenario
+                in {
+                    ("line", True): ("fig9",),
+                    ("line", False): ("fig6", "fig7"),
+                    ("curve", True): ("fig10",),
+                    ("curve", False): ("fig8",),
+                }[path, controller in EPSILONS]
+            )
+            assert f"network.robot.start_error_x_cm={start.x_cm}" in settings
+    assert Group(STARTS[0], RETUNED).label == "fig6-epsilon-retuned"
+    assert len({group.label for group in GROUPS}) == len(GROUPS)
+
+
+def test_the_first_seed_of_each_group_is_recorded():
+    plan = jobs(range(5, 8), lambda name: f"out/{name}")
+    assert len(plan) == 3 * len(GROUPS)
+    assert [job.recording for job in plan[:3]] == ["out/fig6-paper.mcap", "", ""]
+
+
+def test_statistics_are_the_plain_ones():
+    rows = [Row("a", "s", n, rms_x_cm=float(n), settled=n != 4) for n in range(20)]
+    assert middle(rows, "rms_x_cm") == 9.5
+    assert percentile(rows, "rms_x_cm", 0.95) == 18.0
+    assert percentile(rows, "rms_x_cm", 1.0) == 19.0
+    assert percentile(rows[:1], "rms_x_cm", 0.95) == 0.0
+    assert never_settled(rows) == 1
+    assert middle([], "rms_x_cm") is None
+    assert percentile(rows, "rms_y_cm", 0.5) is None
+    assert list(by_label(rows)) == ["a"]
+
+
+@pytest.mark.parametrize("seeds", ["", "a", "3-1", "0-5000", "1-2-3", "-4"])
+def test_seeds_that_are_none_are_refused(seeds):
+    result = called("--seeds", seeds)
+    assert result.exit_code == 2
+    assert "--seeds" in result.output
+
+
+def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_again(tmp_path):
+    for folder, processes in ((tmp_path / "a", "1"), (tmp_path / "b", "2")):
+        result = called("--out", folder, "--seeds", "4", "--jobs", processes)
+        assert result.exit_code == 0, result.output
+    first, second = (
+        {path.relative_to(folder): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+        for folder in (tmp_path / "a", tmp_path / "b")
+    )
+    assert first == second
+    names = {path.name for path in first}
+    assert {"reproduction.md", "rows.csv", *(f"fig{n}.png" for n in range(6, 11))} <= names
+    assert len([name for name in names if name.endswith(".mcap")]) == len(GROUPS)
+    with (tmp_path / "a/reproduction/rows.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == len(GROUPS)
+    assert not any(row["error"] for row in rows)
+    page = (tmp_path / "a/reproduction.md").read_text()
+    assert "seeds 4 to 4" in page
+    assert "| - |" not in page
+    again = called("--out", tmp_path / "a", "--seeds", "4")
+    assert again.exit_code == 2
+    assert "--force" in again.output
