@@ -1,6 +1,6 @@
 """The improved chain, a law and an estimator of ours, in the whole loop: how near to the path it ends.
 
-    python -m benchmarks.improved [--seeds 0-49] [--law body_frame] [--estimator ekf] [--only CASE,..]
+    python -m benchmarks.improved [--seeds 0-49] [--law body_frame] [--estimator ekf] [--only "CASE;.."]
 
 Runs on all cores; says on standard error how far it is, and prints a Markdown table. Errors are positions in truth,
 root mean square over the last second, in cm. The exit code is 1 if a case is beyond its limits. Starts drawn at random
@@ -128,11 +128,12 @@ def _image() -> Image:
     return load_hex(image_path())
 
 
-def run(case: Case, seed: int, law: str, estimator: str) -> Result:
-    """One run of a case to its end."""
+def run(case: Case, seed: int, law: str, estimator: str, keys: str = "") -> Result:
+    """One run of a case to its end, with an estimator and further keys of its table."""
     spread = "" if case.wheel_spread is None or estimator == "none" else f",wheel_spread={case.wheel_spread}"
     controller = () if law == "yang_kim" else (f'network.robot.controller={{law="{law}"}}',)
-    sets = [*case.sets, *controller, f'network.robot.estimator={{kind="{estimator}"{spread}}}']
+    more = f",{keys}" if keys else ""
+    sets = [*case.sets, *controller, f'network.robot.estimator={{kind="{estimator}"{spread}{more}}}']
     if case.near_m:
         start = start_of(seed, case.near_m)
         heading_rad = scenario_heading_rad(case)
@@ -173,7 +174,7 @@ def row(case: Case, results: Sequence[Result]) -> tuple[str, bool]:
     ), good
 
 
-def table(chosen: Iterable[Case], seeds: range, law: str, estimator: str) -> bool:
+def table(chosen: Iterable[Case], seeds: range, *parts: str) -> bool:
     """Prints the lines as they are finished; whether all are within their limits."""
     print("| case | median | 95 % | worst | settled | longest off the pitch, s | |")
     print("|---|---|---|---|---|---|---|")
@@ -182,7 +183,7 @@ def table(chosen: Iterable[Case], seeds: range, law: str, estimator: str) -> boo
         for case in chosen:
             count = len(seeds) * case.runs_a_seed
             every = range(seeds.start, seeds.start + count)
-            pending = pool.map(run, *zip(*[(case, seed, law, estimator) for seed in every], strict=True))
+            pending = pool.map(run, *zip(*[(case, seed, *parts) for seed in every], strict=True))
             results = []
             for done, result in enumerate(pending, 1):
                 results.append(result)
@@ -199,13 +200,14 @@ def main() -> None:
     parser.add_argument("--seeds", default="0-49", help="first and last")
     parser.add_argument("--law", default="body_frame")
     parser.add_argument("--estimator", default="ekf")
-    parser.add_argument("--only", default="", help="parts of the names of cases, with commas")
+    parser.add_argument("--keys", default="", help="of the estimator, as in rim_noise_m_s=0.02")
+    parser.add_argument("--only", default="", help="parts of the names of cases, with ; between them")
     asked = parser.parse_args()
     first, last = (int(word) for word in asked.seeds.split("-"))
-    chosen = [case for case in cases() if any(word in case.name for word in asked.only.split(","))]
+    chosen = [case for case in cases() if any(word in case.name for word in asked.only.split(";"))]
     if not chosen:
         parser.error("no case has such a name")
-    if not table(chosen, range(first, last + 1), asked.law, asked.estimator):
+    if not table(chosen, range(first, last + 1), asked.law, asked.estimator, asked.keys):
         sys.exit(1)
 
 

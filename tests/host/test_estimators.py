@@ -41,7 +41,7 @@ def test_an_arc_ends_where_many_small_steps_end(length_m, turn_rad, theta_rad):
 
 
 def test_our_own_estimators_have_names():
-    assert ESTIMATORS.names() == ["none", "ekf", "predict"]
+    assert ESTIMATORS.names() == ["none", "ekf", "ekf+telemetry", "predict"]
 
 
 def test_without_an_estimator_a_measurement_is_the_posture_at_its_arrival():
