@@ -106,7 +106,7 @@ def _run(job: Job) -> Row:
             runner.run(world, recorder, on_period=keep)
     else:
         runner.run(world, on_period=keep)
-    faults = sum(len(found) for _, _, found in runner.faults_by_robot(world))
+    faults = len([fault for _, _, found in runner.faults_by_robot(world) for fault in found])
     gains = gains_of(text.scenario)
     place, track = next(iter(tracks.robots.items()))
     return _row(job, tracks.digest, track.errors, seen.errors, theory_of(track.theory, gains[place]), faults)

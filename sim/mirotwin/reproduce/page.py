@@ -45,7 +45,7 @@ how far the commanded wheel speeds go back and forth ([definition](theory.md)).
 
 def page(table: Table, seeds: str, folder: str) -> str:
     """The whole text; `folder`: where the pictures are, as links say it."""
-    runs = sum(len(rows) for rows in table.values())
+    runs = len([row for rows in table.values() for row in rows])
     return "\n".join(
         [HEAD.format(runs=runs, seeds=seeds), *_claims(table), *_figures(table, folder), *_cameras(table)]
     )

@@ -6,7 +6,6 @@ What belongs here: plain statistics over seeds. What does not: what they mean (`
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from statistics import median
 
 from mirotwin.campaign.job import Row
 
@@ -29,8 +28,11 @@ def values(rows: Sequence[Row], name: str) -> list[float]:
 
 def middle(rows: Sequence[Row], name: str) -> float | None:
     """The median, None where no row has it."""
-    found = values(rows, name)
-    return median(found) if found else None
+    found = sorted(values(rows, name))
+    if not found:
+        return None
+    half = len(found) // 2
+    return found[half] if len(found) % 2 else 0.5 * (found[half - 1] + found[half])
 
 
 def percentile(rows: Sequence[Row], name: str, share: float) -> float | None:
