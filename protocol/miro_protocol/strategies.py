@@ -165,6 +165,8 @@ def _heard(draw: st.DrawFn, damaged: bool, telemetry: bool) -> Heard:
     piece = st.one_of(whole, broken, slipped, _noise()) if damaged else whole
     tick, symbols, sent = 0, [], []
     for part in draw(st.lists(piece, max_size=6)):
+        if not part.data:  # two pauses with nothing between them would be one that is neither near nor far
+            continue
         tick += draw(_pauses())
         for byte, stop_good, pause in zip(part.data, part.stop_bits, part.pauses, strict=True):
             tick += pause

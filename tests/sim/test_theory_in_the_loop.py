@@ -12,9 +12,9 @@ def test_most_of_f1_is_the_dead_time_of_about_one_period():
     assert late[0] < 0.5 * theory.disturbance.f1_rms_m_s2
 
 
-def test_condition_17_is_broken_in_some_frames_of_the_figures_and_the_robot_gets_there_all_the_same():
-    theory, _ = run("fig6", 3)
-    assert 0.0 < theory.disturbance.f1_above_p1 < 0.1
+def test_condition_17_is_broken_in_many_frames_of_fig_8_and_the_robot_gets_there_all_the_same():
+    theory, _ = run("fig8", 3)
+    assert 0.1 < theory.disturbance.f1_above_p1 < 0.9
     assert theory.disturbance.f1_largest_m_s2 > 2.0 * theory.disturbance.p1_m_s2
 
 
@@ -25,7 +25,7 @@ def test_sign_functions_chatter_more_than_the_boundary_layers_of_remark_2():
 
 def test_from_the_start_of_fig_7_the_robot_passes_the_heading_that_assumption_3_forbids_and_drives_backward():
     """The paper's robot went forward and backward there too."""
-    theory, _ = run("fig6 from the start of Fig. 7, set A", 3)
+    theory, _ = run("fig7", 3)
     assert theory.assumption_3.crossings % 2 == 1
     assert theory.reversals >= 1
     assert 0.1 < theory.backward_s < 2.0

@@ -24,29 +24,11 @@ from mirotwin.report.track import Tracks
 
 CONTROLLER = "network.robot.controller"
 BODY = [f'{CONTROLLER}={{law="body_frame"}}', 'network.robot.estimator={kind="predict"}']
-FIG7 = [
-    "network.robot.start_error_x_cm=52.58",
-    "network.robot.start_error_y_cm=16.62",
-    "network.robot.start_error_theta_rad=-3.09",
-]
-GAINS = ["gamma1_per_s", "gamma2_per_s", "q1_per_s", "q2_per_s", "p1_m_s2", "p2_rad_s2"]
-GUARDS = ["layer_s1_m_s", "layer_s2_rad_s", "layer_theta_rad", "cosine_guard", "max_v_m_s", "max_w_rad_s"]
-
-
-def paper(*numbers):
-    """The paper's law with these gains, layers, guard and limits."""
-    keys = zip(GAINS + GUARDS, numbers, strict=True)
-    return [f"{CONTROLLER}={{" + ", ".join(f"{name}={value}" for name, value in keys) + "}"]
-
-
-SET_A = paper(2.05, 9.18, 0.414, 1.27, 0.77, 1.48, 0.4, 0.149, 0.083, 0.231, 0.462, 2.28)
-SET_B = paper(5.5, 15.0, 0.142, 0.0119, 0.415, 10.0, 0.0045, 0.287, 0.204, 0.052, 0.293, 2.14)
 RUNS = {
     "fig6": ("fig6", []),
     "fig6, sign functions": ("fig6", [f'{CONTROLLER}.switching="sign"']),
+    "fig7": ("fig7", []),
     "fig8": ("fig8", []),
-    "fig6 from the start of Fig. 7, set A": ("fig6", FIG7 + SET_A),
-    "fig8, set B": ("fig8", SET_B),
     "fig6, body_frame and predict": ("fig6", BODY),
     "fig8, body_frame and predict": ("fig8", BODY),
 }
