@@ -114,7 +114,8 @@ CASES = (
     _drive("force", "0.3 N, 10 mNm constant", "disturbance={force_n=0.3, torque_nm=0.01}"),
     _drive("force", "sine of 0.5 N, 20 mNm, 0.5 s", "disturbance={sine_force_n=0.5,sine_torque_nm=0.02,period_s=0.5}"),
     _drive("force", "noise of 1 N, 40 mNm, 0.1 s", "disturbance={noise_force_n=1, noise_torque_nm=0.04, period_s=0.1}"),
-    _drive("mass", "30 % more mass and inertia", "chassis.mass_kg=0.65", "chassis.yaw_inertia_kg_m2=6.11e-4"),
+    _drive("mass", "20 % more mass and inertia", "chassis.mass_kg=0.6", "chassis.yaw_inertia_kg_m2=5.64e-4"),
+    _drive("mass", "20 % less mass and inertia", "chassis.mass_kg=0.4", "chassis.yaw_inertia_kg_m2=3.76e-4"),
     _drive("mass", "three times the mass and inertia", "chassis.mass_kg=1.5", "chassis.yaw_inertia_kg_m2=1.41e-3"),
 )  # fmt: skip
 

@@ -42,6 +42,7 @@ ROUND = (
 )
 """A closed path of 2.1 m over most of the pitch."""
 FIGURES = {"6": ("fig6", ()), "7": ("fig7", ()), "8": ("fig8", ())}
+LEARNING = 'camera.self_calibration="lines"'
 WHEELS_5 = "network.robot.wheel_radius_mismatch=0.05"
 SPREAD_5 = 0.029  # of an even spread of 5 %
 UNEVEN = (
@@ -99,6 +100,9 @@ def cases() -> list[Case]:
     found += [
         Case("starts within 60 cm, line", "fig6", (WHITE,), settles, near_m=0.6, runs_a_seed=4),
         Case("starts within 60 cm, arc", "fig8", (WHITE,), settles, near_m=0.6, runs_a_seed=4),
+        Case("1997, self-calibration, Fig. 6", "fig6", (LEARNING,), Limits(0.15, math.inf)),
+        Case("1997, self-calibration, Fig. 7", "fig7", (LEARNING,), Limits(0.15, math.inf)),
+        Case("1997, self-calibration, Fig. 8", "fig8", (LEARNING,), Limits(0.15, math.inf)),
         Case("starts anywhere, closed path, 12 s", "fig6", (WHITE, *ROUND), settles, ANYWHERE_M),
     ]
     for camera, of in ((WHITE, "white noise"), (CALIBRATED, "calibrated")):

@@ -209,8 +209,8 @@ def test_the_line_on_the_screen_names_what_does_not_hold() -> None:
 
 def test_the_gains_are_those_of_each_robots_law() -> None:
     scenario = load("fig6").scenario
-    assert gains_of(scenario) == {(0, 0): Gains(0.05, 5.2)}
-    other = load("fig6", ['network.robot.controller={law="kanayama"}']).scenario
+    assert gains_of(scenario) == {(0, 0): Gains(0.77, 1.48)}
+    other = load("fig6", ['network.robot.controller={law="body_frame"}']).scenario
     assert gains_of(other) == {(0, 0): Gains(None, None)}
 
 
@@ -225,9 +225,8 @@ def recorded(count: int, with_theory: bool) -> bytes:
         for one in periods(count, [(0, 0), (1, 2)]):
             recorder.write(one)
             tracks.add(one)
-            for (network, slot), track in tracks.robots.items():
-                if with_theory and track.theory.now is not None:
-                    recorder.write_theory(network, slot, track.theory.now)
+            if with_theory:
+                recorder.write_theories(tracks.theories())
     return stream.getvalue()
 
 

@@ -250,7 +250,9 @@ def test_a_long_value_is_shown_by_its_ends() -> None:
 
 
 def test_a_name_that_is_no_scenario_gets_the_list_and_the_nearest_one() -> None:
-    with pytest.raises(ScenarioError, match=r"fig5: no such scenario; did you mean fig\d+\? .*: curve, fig6, fig7,"):
+    with pytest.raises(
+        ScenarioError, match=r"fig5: no such scenario; did you mean fig\d+\? .*: curve, fig6, fig7,"
+    ):
         load("fig5")
 
 

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 
+from miro_exact.bad_input import BadInput
 from mirotwin.campaign.job import Job, Row, run
 
 
@@ -31,5 +32,8 @@ def rows(
                 yield pending.popleft().result()
         while pending:
             yield pending.popleft().result()
+    except BrokenExecutor:
+        what = "a process that made rows has ended: killed, or out of memory"
+        raise BadInput("", "--jobs", what, "try again with fewer") from None
     finally:
         executor.shutdown(wait=True, cancel_futures=True)

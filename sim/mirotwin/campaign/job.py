@@ -14,6 +14,7 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from miro_sim.periods import Period
@@ -46,7 +47,8 @@ class Row(msgspec.Struct, frozen=True):
     """What the first robot of a run did; `error` says why there is nothing else.
 
     `rms_*`: root mean square over the last second, truth against reference; `seen_*`: measurement against the reference
-    at its exposure. `settling_s` as in summary.json; `settled` at the end of the run. The last five: `report.theory`.
+    at its exposure (None, if the robot was not seen in that second). `settling_s` as in summary.json; `settled` at the
+    end of the run. The last five: `report.theory`.
     """
 
     label: str
@@ -96,14 +98,16 @@ def _run(job: Job) -> Row:
     world = World(text.scenario, job.seed, image)
     tracks, seen = Tracks(), Seen(_delay_frames(text.scenario))
 
-    def keep(period: Period) -> None:
+    def keep(period: Period, recorder: Recorder | None = None) -> None:
         tracks.add(period)
         seen.add(period.robots[0], period.tick)
+        if recorder is not None:
+            recorder.write_theories(tracks.theories())
 
     if job.recording:
         source = source_of(text, job.seed, image)
         with Path(job.recording).open("wb") as stream, Recorder(stream, source) as recorder:
-            runner.run(world, recorder, on_period=keep)
+            runner.run(world, recorder, on_period=lambda period: keep(period, recorder))
     else:
         runner.run(world, on_period=keep)
     faults = len([fault for _, _, found in runner.faults_by_robot(world) for fault in found])
@@ -117,7 +121,9 @@ def _delay_frames(scenario: Scenario) -> int:
 
 
 def _row(job: Job, digest: str, errors: Errors, seen: Errors, theory: Theory | None, faults: int) -> Row:
-    truth, camera = tracking_of(errors), tracking_of(seen)
+    end_tick = errors[-1].tick - TICKS_PER_SECOND
+    truth = tracking_of(errors)
+    camera = tracking_of([sample for sample in seen if sample.tick > end_tick])
     return Row(
         label=job.label,
         scenario=job.scenario,

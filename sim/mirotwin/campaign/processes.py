@@ -8,17 +8,27 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from multiprocessing import get_context
 
 from miro_exact import engine
 
 
 def processes(count: int) -> ProcessPoolExecutor:
-    """Processes with the engine of this one."""
-    return ProcessPoolExecutor(
+    """Processes with the engine of this one, which have begun.
+
+    Ctrl-C goes to all processes of a terminal; the first one tells the others to end. They ignore it from their first
+    instruction on: what a process ignores, those that it starts ignore too.
+    """
+    found = ProcessPoolExecutor(
         max_workers=count, mp_context=get_context("spawn"), initializer=_begin, initargs=(engine.active(),)
     )
+    with _ignoring_interrupts():
+        for _ in range(count):  # each of which starts a process, as long as none is idle
+            found.submit(_nothing)
+    return found
 
 
 def cores() -> int:
@@ -29,6 +39,23 @@ def cores() -> int:
 
 
 def _begin(chosen: str) -> None:
-    """In a new process. Ctrl-C goes to all processes of a terminal; the first one tells the others to end."""
+    """In a new process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     engine.select(chosen)
+
+
+def _nothing() -> None:
+    """A job that only needs a process."""
+
+
+@contextmanager
+def _ignoring_interrupts() -> Iterator[None]:
+    try:
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    except ValueError:  # not the thread that signals come to
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

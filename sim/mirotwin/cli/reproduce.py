@@ -4,25 +4,37 @@ from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 import msgspec
 
+from miro_exact.seed import MAX_SEED
 from mirotwin.campaign.execute import rows
 from mirotwin.campaign.job import Job, Row
 from mirotwin.campaign.processes import cores, processes
 from mirotwin.cli.held_signals import Hold, held_signals
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
-from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain, show_line
+from mirotwin.cli.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line
 from mirotwin.cli.progress import ProgressBar
-from mirotwin.files.outputs import OutputFolder, whole_file
+from mirotwin.files.outputs import OutputFolder, check_new, whole_file
 from mirotwin.reproduce.page import page
 from mirotwin.reproduce.pictures import course, draw
-from mirotwin.reproduce.plan import GROUPS, ILLUSTRATIVE, LEARNING, PAPER, RETUNED, STARTS, Group, Start, jobs
-from mirotwin.reproduce.rows import by_label
+from mirotwin.reproduce.plan import (
+    GROUPS,
+    ILLUSTRATIVE,
+    LEARNING,
+    PAPER,
+    RETUNED,
+    STARTS,
+    Group,
+    Start,
+    jobs,
+    recorded,
+)
+from mirotwin.reproduce.rows import by_label, middle_seeds
 
 PAGE = "reproduction.md"
 FOLDER = "reproduction"
@@ -41,9 +53,11 @@ class Seeds(click.ParamType[range]):
         if isinstance(value, range):
             return value
         first, _, last = str(value).partition("-")
-        if not (first.isdecimal() and (last or first).isdecimal() and len(str(value)) < 20):
+        if not (first.isdecimal() and (last or first).isdecimal() and len(str(value)) < 40):
             self.fail(f"{value!r} is no range of seeds; write it like 0-49", param, ctx)
         found = range(int(first), int(last or first) + 1)
+        if found.stop > MAX_SEED:
+            self.fail(f"{value!r}: the largest seed is {MAX_SEED}", param, ctx)
         if not 1 <= len(found) <= MOST_SEEDS:
             self.fail(f"{value!r} has {len(found)} seeds; give 1 to {MOST_SEEDS}", param, ctx)
         return found
@@ -67,17 +81,22 @@ def reproduce(
     """Runs Figs. 6 to 10 of the paper, and the comparison of its controllers, over all seeds.
 
     Writes reproduction.md (each claim beside what was measured), and in the folder reproduction: five pictures, a row
-    for each run, and the recordings of the first seed. Running it again gives the same bytes.
+    for each run, and of each controller and start the recording of the run with the median error. Running it again
+    gives the same bytes.
     """
     choose_engine(engine)
     began_s = time.monotonic()
     folder = OutputFolder(out / FOLDER, force, [*_pictures(), ROWS, *(group.recording for group in GROUPS)])
-    plan = jobs(seeds, lambda name: str(folder.part(name)))
+    if (out / FOLDER).is_dir() or (out / PAGE).exists():
+        check_new(out / PAGE, "--out", force)
+    processors = count or cores()
     with held_signals() as hold, folder, whole_file(out / PAGE, "--out") as page_path:
         folder.keep = (ROWS,)
-        found = _run(plan, count or cores(), folder.part(ROWS), hold, quiet)
+        found = _run(jobs(seeds), processors, folder.part(ROWS), hold, quiet)
+        shown = middle_seeds(by_label(found))
+        _record(recorded(shown, lambda name: str(folder.part(name))), processors, hold, quiet)
         for start in STARTS:
-            _draw(start, folder, seeds[0])
+            _draw(start, folder, shown)
         text = page(by_label(found), f"{seeds[0]} to {seeds[-1]}", FOLDER)
         page_path.write_text(text, encoding="utf-8")
     if not quiet:
@@ -108,12 +127,19 @@ def _run(plan: Sequence[Job], count: int, path: Path, hold: Hold, quiet: bool) -
     return found
 
 
+def _record(plan: Sequence[Job], count: int, hold: Hold, quiet: bool) -> None:
+    """The runs that are shown, once more, with their recordings."""
+    with ProgressBar("recording", len(plan), quiet) as bar, hold.released():
+        for done, _ in enumerate(_rows(plan, count), 1):
+            bar.to(done)
+
+
 def _rows(plan: Sequence[Job], count: int) -> Iterator[Row]:
     yield from rows(plan, processes(count), AHEAD * count)
 
 
-def _draw(start: Start, folder: OutputFolder, seed: int) -> None:
-    """The figure's own controller, the other one, and the improved chain."""
+def _draw(start: Start, folder: OutputFolder, seeds: Mapping[str, int]) -> None:
+    """The figure's own controller, the other one, and the improved chain, each with the seed of its median error."""
     names = {
         PAPER: "the paper's law",
         RETUNED: "epsilon-tracking, retuned",
@@ -121,11 +147,16 @@ def _draw(start: Start, folder: OutputFolder, seed: int) -> None:
         LEARNING: "body_frame, ekf, self_calibration",
     }
     shown = (PAPER, LEARNING) if start.figure < 9 else (ILLUSTRATIVE, RETUNED, PAPER, LEARNING)
+    groups = {controller: Group(start, controller) for controller in shown}
     courses = [
-        course(names[controller], folder.part(Group(start, controller).recording), 1) for controller in shown
+        course(f"{names[controller]} (seed {seeds[group.label]})", folder.part(group.recording), 1)
+        for controller, group in groups.items()
+        if group.label in seeds
     ]
+    if not courses:
+        return
     errors = f"{start.x_cm:.2f} cm, {start.y_cm:.2f} cm, {start.theta_rad:.2f} rad"
-    title = f"Fig. {start.figure} again: {start.path}, initial errors ({errors}), seed {seed}"
+    title = f"Fig. {start.figure} again: {start.path}, initial errors ({errors})"
     draw(folder.part(f"{start.name}.png"), title, courses)
 
 
@@ -133,9 +164,11 @@ def _failures(found: Sequence[Row]) -> int:
     failed = [row for row in found if row.error]
     for row in failed[:5]:
         complain(f"{row.label}, seed {row.seed}: {row.error}")
+    if failed:
+        complain(f"{len(failed)} of {len(found)} runs failed; {ROWS} says which")
     faults = 0
     for row in found:
         faults += row.faults
     if faults:
         complain(f"{faults} firmware faults; rows.csv says in which runs")
-    return FIRMWARE_FAULT if faults else DONE
+    return BAD_INPUT if failed else FIRMWARE_FAULT if faults else DONE

@@ -98,9 +98,7 @@ class RunFiles:
     def _simulate(self, recorder: Recorder, bar: ProgressBar) -> None:
         def keep(period: Period) -> None:
             self.tracks.add(period)
-            for (network, slot), track in self.tracks.robots.items():
-                if track.theory.now is not None:
-                    recorder.write_theory(network, slot, track.theory.now)
+            recorder.write_theories(self.tracks.theories())
             now_s = time.monotonic()
             if now_s - self._flushed_s >= FLUSH_S:
                 recorder.flush()

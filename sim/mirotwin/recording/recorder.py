@@ -7,7 +7,7 @@ Two runs of one scenario, seed and firmware give the same bytes: no wall clock, 
 log time is the tick in nanoseconds, rounded down.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
 from typing import Protocol
@@ -127,10 +127,10 @@ class Recorder:
             with self._undisturbed:
                 self._write_waiting()
 
-    def write_theory(self, network: int, slot: int, message: TheoryMessage) -> None:
-        """Adds what the theory says of a robot in the control period that was written last."""
-        topic = topics.robot_topic(network, slot, "theory")
-        self._waiting.append((topic, message.tick, message))
+    def write_theories(self, found: Iterable[tuple[int, int, TheoryMessage]]) -> None:
+        """Adds what the theory says of robots (network, slot) in the control period that was written last."""
+        for network, slot, message in found:
+            self._waiting.append((topics.robot_topic(network, slot, "theory"), message.tick, message))
 
     def _write_waiting(self) -> None:
         add, encode, numbers = self._writer.add_message, self._encoder.encode, self._channels

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_host.laws.yang_kim import Gains as PaperGains
 from miro_sim.scenario.keys import Scenario
 from mirotwin.report.theory_track import PERIOD_S, Broken, TheoryTrack
 
@@ -85,11 +86,11 @@ class Theory(msgspec.Struct, frozen=True):
 
 
 def gains_of(scenario: Scenario) -> Mapping[tuple[int, int], Gains]:
-    """The gains of each robot's law, by network and slot."""
+    """P_1 and P_2 of each robot that the paper's law steers, by network and slot: other laws have other surfaces."""
     return {
-        (index, robot.slot): Gains(
-            getattr(robot.controller, "p1_m_s2", None), getattr(robot.controller, "p2_rad_s2", None)
-        )
+        (index, robot.slot): Gains(robot.controller.p1_m_s2, robot.controller.p2_rad_s2)
+        if isinstance(robot.controller, PaperGains)
+        else Gains()
         for index, network in enumerate(scenario.networks)
         for robot in network.robot
     }

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import overload
 
 import msgspec
@@ -19,6 +19,7 @@ import msgspec
 from miro_exact.clock import seconds
 from miro_sim.periods import Period, RobotPeriod
 from miro_sim.pitch import ground as pitch
+from mirotwin.recording.derived import TheoryMessage
 from mirotwin.report.theory_track import TheoryTrack
 
 TWO_PI = 6.283185307179586
@@ -145,6 +146,12 @@ class Tracks:
                 self._add_inner(place, period.tick, robot.control.inner)
         self.count += 1
         self.digest = period.digest
+
+    def theories(self) -> Iterator[tuple[int, int, TheoryMessage]]:
+        """Network, slot and what the theory says of each steered robot in the period that was added last."""
+        for (network, slot), track in self.robots.items():
+            if track.theory.now is not None:
+                yield network, slot, track.theory.now
 
     def _add_inner(self, place: Place, tick: int, inner: dict[str, float]) -> None:
         for name, value in inner.items():

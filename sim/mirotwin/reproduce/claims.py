@@ -113,9 +113,9 @@ def _assumption_3(table: Table) -> Finding:
     crossed = count(rows, lambda row: row.crossings > 0)
     return Finding(
         "Fig. 7",
-        "assumption 3 holds: the heading is never across the line to the origin, and this is what causes the motion",
-        "no run crosses it",
-        f"{crossed} of {len(rows)} runs cross it, as a turn from -3.09 rad to 0 has to; the median run spends"
+        "the motion comes from assumption 3, which the robot keeps: its heading is never across the line to the origin",
+        "no run crosses it (from -3.09 rad, with the origin behind it, the robot cannot turn to 0 otherwise)",
+        f"{crossed} of {len(rows)} runs cross it; the median run spends"
         f" {number(middle(rows, 'frames_across'), 0)} frames within 0.1 rad of it",
         HOLDS if rows and not crossed else NOT,
     )

@@ -24,12 +24,14 @@ HEAD = """\
 
 J.-M. Yang, J.-H. Kim, "Sliding Mode Control for Trajectory Tracking of Nonholonomic Wheeled Mobile Robots", IEEE
 Trans. Robotics and Automation 15(3), 1999. `mirotwin reproduce` makes this page, its pictures and its recordings; it
-gives the same bytes on every computer. In every run are firmware, LM629, motors, radio and camera of the robot: {runs}
-runs, seeds {seeds}, 6 s each. An error is the root mean square over the last second.
+gives the same figures on every computer, and the same bytes of pictures with the same matplotlib. In every run are
+firmware, LM629, motors, radio and camera of the robot: {runs} runs, seeds {seeds}, 6 s each. An error is the root mean
+square over the last second. Pictures show, of each controller, the run with the median error.
 
 The paper does not give its gains, paths, speeds, the place of its origin, and where its 2.40 cm come from. They are
-chosen: the paths and speeds are named in the scenarios, gains are one set for Figs. 6 and 7 and one for Fig. 8, found
-on seeds 1000 to 1099, and the camera has a calibration that is wrong by up to 2.40 cm. The law that the paper compares
+chosen: the paths and speeds are named in the scenarios; the gains are one set for Figs. 6 and 7 and one for Fig. 8,
+found by a search, checked on seeds 1000 to 1099 and then frozen; the camera has a calibration that is wrong by up to
+2.40 cm. The law that the paper compares
 with is not printed there either; it is reconstructed (`host/miro_host/laws/epsilon_tracking.py`), with three sets of
 gains: one that obeys its theory, one searched for to look like the paper's Fig. 9, and one for this loop. They are a
 demonstration, not evidence about the original.
@@ -37,9 +39,10 @@ demonstration, not evidence about the original.
 
 READING = """\
 *truth*: where the robot is, which no camera knows. *camera*: the measurement against the reference at its exposure,
-which is all that could be plotted in 1999. *settled*: ends within 3 cm and 0.15 rad. *backward*: runs in which the
-robot drives backward for a while. *across*: runs in which its heading crosses the limit of assumption 3. *chattering*:
-how far the commanded wheel speeds go back and forth ([definition](theory.md)).
+which is all that could be plotted in 1999 (only of runs that end in the camera's view). *settled*: ends within 3 cm
+and 0.15 rad. *backward*: runs in which the robot drives backward for a while. *across*: runs in which its heading
+crosses the limit of assumption 3. *chattering*: total variation of the commanded wheel speeds less the net change, in
+windows of ten frames, per second.
 """
 
 

@@ -97,4 +97,4 @@ def _draw_error(
             [seconds(tick) for tick in errors.ticks], getattr(errors, values), color=colour, linewidth=1.1
         )
     axes.margins(x=0)
-    axes.set_title(f"{title} [{unit}]   (shaded: within {band:g} {unit})")
+    axes.set_title(f"{title} [{unit}] against t [s]   (shaded: within {band:g} {unit})")

@@ -9,7 +9,7 @@ here each of them also runs from those of the other.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import msgspec
 
@@ -95,7 +95,7 @@ class Group(msgspec.Struct, frozen=True):
 
     @property
     def recording(self) -> str:
-        """The file of the first seed's recording."""
+        """The file of its recording."""
         return f"{self.label}.mcap"
 
     def scenario(self) -> tuple[str, tuple[str, ...]]:
@@ -127,12 +127,15 @@ GROUPS = tuple(Group(start, controller) for start in STARTS for controller in CO
 )
 
 
-def jobs(seeds: Sequence[int], recorded: Callable[[str], str], groups: Sequence[Group] = GROUPS) -> list[Job]:
-    """One for each group and seed. `recorded`: the file for the recording of a group's first seed, by its name."""
-    found = []
-    for group in groups:
-        scenario, settings = group.scenario()
-        for seed in seeds:
-            path = recorded(group.recording) if seed == seeds[0] else ""
-            found.append(Job(group.label, scenario, settings, seed, path))
-    return found
+def jobs(seeds: Sequence[int]) -> list[Job]:
+    """One for each group and seed."""
+    return [Job(group.label, *group.scenario(), seed) for group in GROUPS for seed in seeds]
+
+
+def recorded(seeds: Mapping[str, int], place: Callable[[str], str]) -> list[Job]:
+    """One for each group in `seeds`, with that seed. `place`: the file for a recording, by its name."""
+    return [
+        Job(group.label, *group.scenario(), seeds[group.label], place(group.recording))
+        for group in GROUPS
+        if group.label in seeds
+    ]

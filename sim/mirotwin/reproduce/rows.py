@@ -44,6 +44,16 @@ def percentile(rows: Sequence[Row], name: str, share: float) -> float | None:
     return found[max(rank, 1) - 1]
 
 
+def middle_seeds(table: Table) -> dict[str, int]:
+    """Of each group the seed whose error is the median (of an even number, the lower one); none, if all failed."""
+    found = {}
+    for label, rows in table.items():
+        ordered = sorted((row.rms_position_cm, row.seed) for row in rows if row.rms_position_cm is not None)
+        if ordered:
+            found[label] = ordered[(len(ordered) - 1) // 2][1]
+    return found
+
+
 def count(rows: Sequence[Row], holds: Callable[[Row], bool]) -> int:
     """In how many rows."""
     return len([row for row in rows if holds(row)])

@@ -1,10 +1,14 @@
 """Many runs: rows in the order of their jobs, whoever made them, and what is left when something goes wrong."""
 
+import multiprocessing
+import os
+import signal
 import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
@@ -79,3 +83,24 @@ def test_whoever_stops_asking_leaves_no_job_behind():
     assert len(made) < 6
     with pytest.raises(RuntimeError):
         executor.submit(slow, job())
+
+
+def ended(one):
+    """A job that ends its process, as running out of memory does."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_process_that_is_killed_is_told_in_a_line():
+    with pytest.raises(BadInput, match="--jobs: a process that made rows has ended"):
+        list(rows([job()], processes(1), 1, ended))
+
+
+def test_the_processes_ignore_ctrl_c_from_their_first_instruction():
+    executor = processes(2)
+    try:
+        for child in multiprocessing.active_children():
+            os.kill(child.pid, signal.SIGINT)
+        assert next(rows([job()], executor, 1)).error == ""
+    finally:
+        executor.shutdown()
+    assert signal.getsignal(signal.SIGINT) is not signal.SIG_IGN

@@ -7,9 +7,10 @@ from click.testing import CliRunner
 
 from mirotwin.campaign.job import Row
 from mirotwin.cli import main
+from mirotwin.cli.reproduce import _failures
 from mirotwin.reproduce.claims import HOLDS, NOT, PART, findings
-from mirotwin.reproduce.plan import EPSILONS, GROUPS, IMPROVED, PAPER, RETUNED, STARTS, Group, jobs
-from mirotwin.reproduce.rows import by_label, middle, never_settled, percentile
+from mirotwin.reproduce.plan import EPSILONS, GROUPS, IMPROVED, PAPER, RETUNED, STARTS, Group, jobs, recorded
+from mirotwin.reproduce.rows import by_label, middle, middle_seeds, never_settled, percentile
 
 VALUES = {
     "rms_x_cm": 0.5,
@@ -89,10 +90,15 @@ def test_each_controller_runs_from_each_start_with_the_gains_of_its_path():
     assert len({group.label for group in GROUPS}) == len(GROUPS)
 
 
-def test_the_first_seed_of_each_group_is_recorded():
-    plan = jobs(range(5, 8), lambda name: f"out/{name}")
+def test_of_each_group_the_run_with_the_median_error_is_recorded():
+    plan = jobs(range(5, 8))
     assert len(plan) == 3 * len(GROUPS)
-    assert [job.recording for job in plan[:3]] == ["out/fig6-paper.mcap", "", ""]
+    assert not any(job.recording for job in plan)
+    table = {"fig6-paper": [Row("fig6-paper", "fig6", n, rms_position_cm=abs(n - 6.9)) for n in range(5, 9)]}
+    table["fig7-paper"] = [Row("fig7-paper", "fig7", 5, error="failed")]
+    assert middle_seeds(table) == {"fig6-paper": 6}
+    (job,) = recorded(middle_seeds(table), lambda name: f"out/{name}")
+    assert (job.seed, job.recording) == (6, "out/fig6-paper.mcap")
 
 
 def test_statistics_are_the_plain_ones():
@@ -107,7 +113,7 @@ def test_statistics_are_the_plain_ones():
     assert list(by_label(rows)) == ["a"]
 
 
-@pytest.mark.parametrize("seeds", ["", "a", "3-1", "0-5000", "1-2-3", "-4"])
+@pytest.mark.parametrize("seeds", ["", "a", "3-1", "0-5000", "1-2-3", "-4", "9999999999999999999"])
 def test_seeds_that_are_none_are_refused(seeds):
     result = called("--seeds", seeds)
     assert result.exit_code == 2
@@ -132,7 +138,24 @@ def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_
     assert not any(row["error"] for row in rows)
     page = (tmp_path / "a/reproduction.md").read_text()
     assert "seeds 4 to 4" in page
-    assert "| - |" not in page
+    ours = [line for line in page.splitlines() if line.startswith("| `body_frame`")]
+    assert len(ours) == 5
+    assert not any("| - |" in line for line in ours)
     again = called("--out", tmp_path / "a", "--seeds", "4")
     assert again.exit_code == 2
     assert "--force" in again.output
+    channels = [path for path in first if path.name == "fig7-paper.mcap"]
+    assert b"/net0/robot0/theory" in first[channels[0]]
+
+
+def test_a_page_that_is_there_is_not_replaced_without_force(tmp_path):
+    (tmp_path / "reproduction.md").write_text("mine")
+    result = called("--out", tmp_path, "--seeds", "4")
+    assert result.exit_code == 2
+    assert "--force" in result.output
+    assert (tmp_path / "reproduction.md").read_text() == "mine"
+
+
+def test_runs_that_failed_are_told_and_end_with_2(capsys):
+    assert _failures([Row("a", "fig6", 1, error="no such seed"), Row("a", "fig6", 2)]) == 2
+    assert "1 of 2 runs failed" in capsys.readouterr().err
