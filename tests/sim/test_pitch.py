@@ -67,7 +67,7 @@ def test_the_built_in_scenarios_are_on_the_pitch(name: str) -> None:
         (
             "start_error_x_cm = 900\nstart_error_y_cm = -900",
             f"my.toml: {HERE}.start_error_x_cm: the robot starts off the pitch: a square of 7.5 cm there takes"
-            " x = 896.25 to 903.75 cm; the pitch has -10 to 120 cm",
+            " x = 896.25 to 903.75 cm; the pitch has -10 to 120 cm; start nearer to the reference",
         ),
         ("start_error_y_cm = 76.3", f"{HERE}.start_error_y_cm: the robot starts off the pitch"),
         ("start_error_y_cm = 75\nstart_error_theta_rad = 0.78", "takes y = 69.70 to 80.30 cm"),

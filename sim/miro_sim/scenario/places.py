@@ -64,9 +64,10 @@ def _check(robot: Robot, scenario: Scenario, origin: str, place: str) -> None:
     off = _off_pitch(start)
     if off is not None:
         axis, what = off
-        raise ScenarioError(
-            origin, f"{place}.start_error_{axis}_cm", f"the robot starts off the pitch: {what}"
-        )
+        of_reference = _off_pitch(at) is not None
+        key = "reference" if of_reference else f"start_error_{axis}_cm"
+        remedy = "begin the reference elsewhere" if of_reference else "start nearer to the reference"
+        raise ScenarioError(origin, f"{place}.{key}", f"the robot starts off the pitch: {what}", remedy)
     check_start(scenario, start, origin, place)
     on_s = 0.0
     for t_s in _instants(reference, duration_s):

@@ -24,6 +24,7 @@ from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.recording.recorder import Recorder, Source
 from mirotwin.report.learnt_calibration import learnt_calibrations
+from mirotwin.report.learnt_wheels import learnt_wheels
 from mirotwin.report.summary import Summary, summarise, to_json
 from mirotwin.report.theory import gains_of
 from mirotwin.report.track import Tracks
@@ -127,6 +128,7 @@ class RunFiles:
             reason=reason,
             settings=self.settings,
             calibrations=learnt_calibrations(self.world.networks),
+            wheels=learnt_wheels(self.world.networks),
             gains=gains_of(self.world.scenario),
         )
 

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from mirotwin.cli.console import show
 from mirotwin.report.learnt_calibration import calibration_text
+from mirotwin.report.learnt_wheels import wheels_text
 from mirotwin.report.summary import Summary, off_pitch_text, settling_text, vision_text
 from mirotwin.report.theory import theory_text
 from mirotwin.report.track import Tracks
@@ -46,6 +47,8 @@ def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
         table.add_row("camera", vision_text(summary.vision))
     for learnt in summary.calibrations:
         table.add_row("calibration", calibration_text(learnt))
+    for wheels in summary.wheels:
+        table.add_row("wheels", wheels_text(wheels))
     table.add_row(
         "link",
         f"{link.frames_sent} frames sent, {_known(link.frames_accepted)} accepted, "

@@ -12,6 +12,7 @@ import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.report.learnt_calibration import LearntCalibration
+from mirotwin.report.learnt_wheels import LearntWheels
 from mirotwin.report.theory import Gains, Theory, theory_of
 from mirotwin.report.track import ErrorSample, Place, Tracks
 
@@ -89,7 +90,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     written only where it is false: the run was broken off, and all figures are of the part before; `reason` says why,
     if a part of the scenario failed (which one, of which robot, when). `set`: the keys of the scenario that were set on
     the command line (`KEY=VALUE`), only where there were some. `calibrations`: of hosts that learn how their cameras
-    hang.
+    hang, `wheels`: of robots whose estimator learns their wheels.
     """
 
     scenario: str
@@ -104,6 +105,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     firmware: Firmware
     vision: Vision | None = None
     calibrations: tuple[LearntCalibration, ...] = ()
+    wheels: tuple[LearntWheels, ...] = ()
     theory: Theory | None = None
     robots: tuple[RobotTracking, ...] = ()
     complete: bool = True
@@ -162,6 +164,7 @@ def summarise(
     reason: str = "",
     settings: tuple[str, ...] = (),
     calibrations: tuple[LearntCalibration, ...] = (),
+    wheels: tuple[LearntWheels, ...] = (),
     gains: Mapping[Place, Gains] = {},
 ) -> Summary:
     """The summary of a run; `counters` as `World.counters()` gives them, `gains` as `theory.gains_of`."""
@@ -182,6 +185,7 @@ def summarise(
         firmware=Firmware(sha256=firmware_sha256, **counters["firmware"]),
         vision=Vision(**counters["vision"]) if counters["vision"] else None,
         calibrations=calibrations,
+        wheels=wheels,
         theory=everyone[0].theory if everyone else None,
         robots=everyone if len(everyone) > 1 else (),
         complete=complete,
