@@ -4,7 +4,12 @@ import json
 
 LEARNING = (
     *("--set", "camera.self_calibration=lines", "--set", "duration_s=2.0"),
-    *("--set", "network.robot.controller={law = 'body_frame'}", "--set", "network.robot.estimator={kind = 'ekf'}"),
+    *(
+        "--set",
+        "network.robot.controller={law = 'body_frame'}",
+        "--set",
+        "network.robot.estimator={kind = 'ekf'}",
+    ),
 )
 
 
