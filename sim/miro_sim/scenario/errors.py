@@ -17,6 +17,7 @@ from miro_sim.scenario.parts import REGISTRIES, struct_of
 
 UNITS = {
     "s": "seconds",
+    "ms": "milliseconds",
     "cm": "centimetres",
     "m": "metres",
     "rad": "radians",
@@ -38,7 +39,6 @@ UNITS = {
     "nm": "newton metres",
 }
 MORE_UNITS = (
-    "ms",
     "us",
     "ns",
     "min",

@@ -7,7 +7,7 @@ functions, whatever the text.
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from importlib import resources
 from typing import Any
@@ -24,6 +24,13 @@ from miro_sim.scenario.profiles import ProfileError, with_profiles
 from miro_sim.scenario.settings import blamed, make
 from miro_sim.scenario.text import check_size, written
 from miro_sim.scenario.variants import VariantError, with_variant
+
+Also = Callable[[Scenario, str], object]
+"""Another check of a scenario, whose origin is the second argument: raises ScenarioError."""
+
+
+def nothing_else(scenario: Scenario, origin: str) -> None:
+    """No other check."""
 
 
 class ScenarioText(msgspec.Struct, frozen=True):
@@ -58,12 +65,12 @@ def builtin_text(name: str) -> str:
     return (resources.files("miro_sim.scenario") / "builtin" / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def load(source: str, settings: Sequence[str] = ()) -> ScenarioText:
+def load(source: str, settings: Sequence[str] = (), also: Also = nothing_else) -> ScenarioText:
     """The scenario that `source` names: a file if it ends in .toml or has a path separator, else a
-    built-in. `settings` as `parse` takes them.
+    built-in. `settings` and `also` as `parse` takes them.
     """
     text = source_text(source)
-    raw, scenario = _parsed(text, source, settings)
+    raw, scenario = _parsed(text, source, settings, also)
     return ScenarioText(
         source, written(raw, source, settings) if settings else text, scenario, tuple(settings)
     )
@@ -96,26 +103,32 @@ def decode(raw: bytes, origin: str) -> str:
         raise ScenarioError(origin, f"line {line}", "not UTF-8 text", "save the file as UTF-8") from None
 
 
-def parse(text: str, origin: str, settings: Sequence[str] = ()) -> Scenario:
+def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = nothing_else) -> Scenario:
     """TOML text to a Scenario, after the `settings` (`KEY=VALUE`, see `settings`) were made in it.
+
+    `also` checks what this package does not know: what `mirotwin.checks` makes of `[expect]`.
 
     Raises ScenarioError (and nothing else) naming `origin` and the place.
     Decides the engine, if nothing has yet: where a reference leads is computed by a hot module.
     """
-    return _parsed(text, origin, settings)[1]
+    return _parsed(text, origin, settings, also)[1]
 
 
-def changed(scenario: Scenario, origin: str, settings: Sequence[str]) -> Scenario:
+def changed(scenario: Scenario, origin: str, settings: Sequence[str], also: Also = nothing_else) -> Scenario:
     """A scenario that stands in no file, with these settings. Raises ScenarioError."""
-    return _checked(without_none(msgspec.to_builtins(scenario)), origin, settings) if settings else scenario
+    return (
+        _checked(without_none(msgspec.to_builtins(scenario)), origin, settings, also)
+        if settings
+        else scenario
+    )
 
 
-def _parsed(text: str, origin: str, settings: Sequence[str]) -> tuple[dict[str, Any], Scenario]:
+def _parsed(text: str, origin: str, settings: Sequence[str], also: Also) -> tuple[dict[str, Any], Scenario]:
     """The tables with the settings made, and the scenario."""
     check_size(text, origin)
     try:
         raw = _tables(text, origin)
-        return raw, _checked(raw, origin, settings)
+        return raw, _checked(raw, origin, settings, also)
     except RecursionError:
         raise _too_deep(origin) from None
 
@@ -141,7 +154,9 @@ def _tables(text: str, origin: str) -> dict[str, Any]:
         raise ScenarioError(origin, "", "an integer of thousands of digits") from None
 
 
-def _checked(raw: dict[str, Any], origin: str, settings: Sequence[str]) -> Scenario:
+def _checked(
+    raw: dict[str, Any], origin: str, settings: Sequence[str], also: Also = nothing_else
+) -> Scenario:
     """The scenario of these tables; makes the settings in them."""
     made = make(raw, settings, origin)
     try:
@@ -152,6 +167,7 @@ def _checked(raw: dict[str, Any], origin: str, settings: Sequence[str]) -> Scena
         except msgspec.ValidationError as error:
             raise value_error(origin, complete, full_message(error)) from None
         check_places(scenario, origin)
+        also(scenario, origin)
     except ScenarioError as error:
         raise blamed(error, made) from error.__cause__
     return scenario

@@ -11,7 +11,7 @@ Every key carries its unit. Defaults are the "realistic" set: a rendered picture
 bit-error rate of 1e-4.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
@@ -57,7 +57,7 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `reference`,
     `estimator` and `controller` hold the parameters of the reference, the estimator and the law that they name. `drive`
     replaces single parameters of motors, bridges, battery, chassis and encoders, and turns on what disturbs the drive
-    (`plant.params`).
+    (`plant.params`). `expect` holds what is expected of this robot, see `Scenario`.
     """
 
     slot: Annotated[int, Meta(ge=0, le=4)] = 0
@@ -69,6 +69,7 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     estimator: AnyEstimator = msgspec.field(default_factory=lambda: ESTIMATORS.find(DEFAULT_ESTIMATOR)())
     controller: Controller = msgspec.field(default_factory=lambda: LAWS.find(DEFAULT_LAW)())
     drive: DriveParams = DriveParams()
+    expect: dict[str, Any] = {}
 
     def __post_init__(self) -> None:
         motor, encoder, voltage_v = self.drive.motor, self.drive.encoder, self.drive.battery.voltage_v
@@ -136,6 +137,9 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     `stop_on_fault` ends it at the first firmware fault; otherwise faults are counted.
 
     `lm629` turns readings of the chips' undocumented corners (`robot_fw/miro_robot/lm629/README.md`).
+
+    `expect` says what is expected of every robot: a key a check. It is handed on as it is to who judges the run
+    (`mirotwin.checks`), because a world does not depend on what is expected of it.
     """
 
     name: Name
@@ -145,6 +149,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     lm629: Lm629Options = DEFAULT_OPTIONS
     camera: Camera = PixelCamera()
     host: Host = Host()
+    expect: dict[str, Any] = {}
     networks: Annotated[tuple[Network, ...], Meta(min_length=1)] = msgspec.field(name="network")
 
     def __post_init__(self) -> None:
@@ -153,3 +158,12 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
                 f"network: {len(self.networks)} networks, each of which takes as much time as a run;"
                 f" at most {MAX_NETWORKS}, make several scenarios of them"
             )
+
+
+def without_expectations(scenario: Scenario) -> Scenario:
+    """The same scenario, of which nothing is expected: all that a world depends on."""
+    networks = []
+    for network in scenario.networks:
+        robots = tuple(msgspec.structs.replace(robot, expect={}) for robot in network.robot)
+        networks.append(msgspec.structs.replace(network, robot=robots))
+    return msgspec.structs.replace(scenario, expect={}, networks=tuple(networks))

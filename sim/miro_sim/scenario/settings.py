@@ -23,6 +23,7 @@ from miro_sim.scenario.text import check_size
 from miro_sim.scenario.variants import VariantError, impose
 
 Table = dict[str, Any]
+EXPECT = "expect."
 _TAGS = {registry.key for registry in REGISTRIES.values()}
 """Keys that say which other keys a table has."""
 
@@ -40,12 +41,17 @@ class Setting(msgspec.Struct, frozen=True):
     @property
     def place(self) -> str:
         """How errors name it."""
-        return f"--set {self.text}"
+        return _option(self.text)
 
     def concerns(self, path: str) -> bool:
         """Whether an error at this path may be the setting's."""
         ours = [place for place in (self.path, self.table) if place]
         return any(_inside(path, place) for place in ours) or _inside(self.path, path)
+
+
+def _option(text: str) -> str:
+    """A setting as it is written on the command line, where `--expect` stands for `--set expect.`."""
+    return f"--expect {text.removeprefix(EXPECT)}" if text.startswith(EXPECT) else f"--set {text}"
 
 
 def _inside(path: str, above: str) -> bool:
@@ -87,11 +93,11 @@ def _make(raw: Table, text: str, origin: str) -> Setting:
             return Setting(text, "variant")
         return _Path(text).put(raw, keys, value, "")
     except _Refused as refused:
-        raise ScenarioError(origin, f"--set {text}", refused.what, refused.remedy) from None
+        raise ScenarioError(origin, _option(text), refused.what, refused.remedy) from None
     except VariantError as error:
-        raise ScenarioError(origin, f"--set {text}", error.what, error.remedy) from None
+        raise ScenarioError(origin, _option(text), error.what, error.remedy) from None
     except RecursionError:
-        raise ScenarioError(origin, f"--set {text}", "nested too deeply") from None
+        raise ScenarioError(origin, _option(text), "nested too deeply") from None
 
 
 def _read(text: str, origin: str) -> tuple[list[str], Any]:

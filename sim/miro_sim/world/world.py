@@ -16,7 +16,7 @@ Long because one class holds the order in which all parts act; the parts themsel
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import permutations
 from typing import Any, NamedTuple
 
@@ -29,7 +29,7 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import Period
-from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world.bodies import Bodies, Pair
 from miro_sim.world.conditions import Condition
 from miro_sim.world.events import Event
@@ -56,6 +56,7 @@ class World:
 
     `script` replaces the stations' frames (replay): transmissions of the hosts, which must not overlap on one network.
     Raises ValueError for those that do, that are of no host, or of a network that the scenario does not have.
+    `observers` are called at the end of each control period, with what it left behind; they change nothing.
     """
 
     STATE = {
@@ -74,6 +75,7 @@ class World:
         "last",
         "bodies",
         "waits",
+        "observers",
         "_state",
         "_own",
         "_opened",
@@ -117,6 +119,7 @@ class World:
         self.last: Period | None = None
         self.bodies = Bodies(everyone)
         self.waits = Waits(self)
+        self.observers: list[Callable[[Period], object]] = []
         self._state: Flat | None = None
         self._own: Identity | None = None
         self._opened: tuple[bytes, bytes] | None = None  # a saved world that is whole, and its state
@@ -239,6 +242,8 @@ class World:
         self.index += 1
         self.chain = hashlib.sha256(self.state.hashed()).digest()
         self.last = Period(index=index, tick=begun, robots=robots, wire=wire, digest=self.digest)
+        for observer in self.observers:
+            observer(self.last)
 
     def mark(self) -> Mark:
         """Where the world is, to go back to within the same period."""
@@ -311,7 +316,9 @@ class World:
     def identity(self) -> Identity:
         """What a saved world must belong to so that this one can load it."""
         if self._own is None:
-            scenario = hashlib.sha256(msgspec.json.encode(self.scenario, order="sorted")).hexdigest()
+            scenario = hashlib.sha256(
+                msgspec.json.encode(without_expectations(self.scenario), order="sorted")
+            ).hexdigest()
             firmware = self.image.sha256 or hashlib.sha256(self.image.code).hexdigest()  # "": not from a file
             self._own = Identity(self.state.tables(), scenario, firmware, self.seed)
         return self._own

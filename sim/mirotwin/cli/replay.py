@@ -16,7 +16,10 @@ from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.capture.frame_list import FrameLine, frame_lines
 from mirotwin.capture.recorded import transmissions_of
+from mirotwin.checks.expect import expectations_of, says_anything
+from mirotwin.checks.watching import Checks
 from mirotwin.cli.console import show
+from mirotwin.cli.expectations import expect_option, report_failures
 from mirotwin.cli.options import Place, engine_option, firmware_option, plain_parameters, set_option
 from mirotwin.cli.program import DIVERGENCE, DONE, complain
 from mirotwin.cli.progress import ProgressBar
@@ -31,6 +34,7 @@ SHOWN = 20
 @click.argument("file", type=Place())
 @firmware_option("Image to run instead of the recorded one (of the robot's own, for a text stream).")
 @set_option("A key to set in the recorded scenario (or the default one, for a text stream), as for `run`.")
+@expect_option
 @engine_option
 @click.option("--all", "everything", is_flag=True, help=f"List all frames, not only the first {SHOWN}.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no list of frames.")
@@ -38,6 +42,7 @@ def replay(
     file: str,
     firmware: str | None,
     settings: tuple[str, ...],
+    expected: tuple[str, ...],
     engine: str | None,
     everything: bool,
     quiet: bool,
@@ -49,23 +54,29 @@ def replay(
     A text stream runs over an ideal link in the default
     scenario, and there is nothing to compare.
 
+    Where the recorded scenario or --expect expects something, that decides: the replay goes on to the end, a difference
+    is only told, and the exit code is 1 if a check fails, else 0.
+
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
-    job, image = load_job(file, firmware, engine, settings)
+    job, image = load_job(file, firmware, engine, (*settings, *expected))
+    judged = says_anything(job.scenario)
 
     with plain_parameters(file, "replayed"):
         world = World(job.scenario, job.seed, image, script=job.script)
+    checks = Checks(world, expectations_of(job.scenario, file))
     replayed: list[Period] = []
-    difference: Difference | None = None
+    difference: tuple[int, Difference] | None = None
     with ProgressBar("replaying", world.periods, quiet) as bar:
 
         def check(period: Period) -> bool:
             nonlocal difference
             replayed.append(period)
             bar.to(len(replayed))
-            if len(replayed) <= len(job.recorded):
-                difference = compare(job.recorded[period.index], period)
-            return difference is not None or len(replayed) == len(job.recorded)
+            if difference is None and len(replayed) <= len(job.recorded):
+                found = compare(job.recorded[period.index], period)
+                difference = None if found is None else (period.index, found)
+            return (difference is not None and not judged) or len(replayed) == len(job.recorded)
 
         try:
             with plain_parameters(file, "replayed"):
@@ -74,8 +85,11 @@ def replay(
             raise BadInput(file, "", f"cannot be replayed beyond tick {world.tick}: {error}") from None
     if not quiet:
         _print_frames(job, replayed, everything)
+    checks.finish()
+    failed = report_failures(checks)
     faults = report_faults(world)
-    return _verdict(job, replayed, difference) or faults
+    differs = _verdict(job, replayed, difference)
+    return (faults or failed) if judged else (differs or faults or failed)
 
 
 def _print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> None:
@@ -100,12 +114,12 @@ def _print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> Non
         show(f"{len(lines) - len(shown)} more of {len(lines)} frames; --all lists them")
 
 
-def _verdict(job: Job, replayed: Sequence[Period], difference: Difference | None) -> int:
+def _verdict(job: Job, replayed: Sequence[Period], difference: tuple[int, Difference] | None) -> int:
     if not job.recorded:
         _print_response(replayed)
         return DONE
     if difference is not None:
-        complain(f"the replay differs in control period {len(replayed) - 1}, {difference}")
+        complain(f"the replay differs in control period {difference[0]}, {difference[1]}")
         return DIVERGENCE
     if len(replayed) < len(job.recorded):
         complain(f"the replay ended after {len(replayed)} of {len(job.recorded)} recorded control periods")

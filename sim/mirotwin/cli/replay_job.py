@@ -23,6 +23,7 @@ from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.settings import in_text
 from mirotwin.capture.detect import detect
 from mirotwin.capture.input import HEAD_BYTES
+from mirotwin.checks.expect import expectations_of
 from mirotwin.cli.options import choose_engine, load_image
 from mirotwin.cli.program import complain
 from mirotwin.files.outputs import RECORDING
@@ -78,7 +79,7 @@ def _job_of_recording(recording: Recording, path: str, settings: Sequence[str]) 
     source = recording.source
     if not recording.periods:
         raise BadInput(path, "", "the recording holds no control period", "nothing can be replayed")
-    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings)
+    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings, expectations_of)
     script = script_of(recording.periods)
     check_script(script, path, len(scenario.networks))
     return Job(scenario, source.seed, script, recording.periods)
@@ -87,7 +88,9 @@ def _job_of_recording(recording: Recording, path: str, settings: Sequence[str]) 
 def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str]) -> Job:
     sent = given.transmissions()
     header = in_text(given.header.set or {})
-    scenario = changed(scenario_of_stream(sent, path, given.header), path, [*header, *settings])
+    scenario = changed(
+        scenario_of_stream(sent, path, given.header), path, [*header, *settings], expectations_of
+    )
     return Job(scenario, given.header.seed or 0, script_of_stream(sent), ())
 
 

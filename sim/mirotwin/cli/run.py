@@ -12,6 +12,9 @@ from miro_exact.seed import MAX_SEED
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin import runner
+from mirotwin.checks.expect import expectations_of
+from mirotwin.checks.watching import Checks
+from mirotwin.cli.expectations import expect_option, report_failures
 from mirotwin.cli.held_signals import held_signals
 from mirotwin.cli.options import (
     Place,
@@ -44,6 +47,7 @@ if TYPE_CHECKING:
     "A key of the scenario, by its path (network.robot.controller.q1_per_s=0.3; with several, network.0.robot.1. and so"
     " on); may be repeated. VALUE is TOML, or else text. The default folder does not change."
 )
+@expect_option
 @firmware_option("Image to run instead of the robot's own.")
 @engine_option
 @click.option(
@@ -75,6 +79,7 @@ def run(
     out: Path | None,
     seed: int,
     settings: tuple[str, ...],
+    expected: tuple[str, ...],
     firmware: str | None,
     engine: str | None,
     record: str,
@@ -90,9 +95,11 @@ def run(
     A run that is broken off (Ctrl-C, a full disk, an error) leaves run.part.mcap and summary.part.json instead, with
     all that was recorded; one that is killed leaves run.part.mcap with all but the last half second. decode, export
     and replay read it. Files of an earlier run stay as they are until the new ones are complete.
+
+    Exit code 1: a check of --expect or of the scenario's [expect] failed; 3: the firmware did what it must not.
     """
     active = choose_engine(engine)
-    text = load(scenario, settings)
+    text = load(scenario, (*settings, *expected), expectations_of)
     folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force)
     if plain_frames and frames is None:
         raise click.UsageError("--plain-frames needs --frames.")
@@ -101,6 +108,7 @@ def run(
     source = source_of(text, seed, image, record)
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
+    checks = Checks(world, expectations_of(text.scenario, text.origin))
     views: list[View] = []
     if frames is not None or record_frames:
         from mirotwin.looking.view import views_of  # loads the pictures' library
@@ -111,14 +119,15 @@ def run(
         if saved is not None:
             saved.begin(hold)
         recorded = views if record_frames else []
-        run_files = RunFiles(folder, source, world, active, hold, text.settings, recorded)
+        run_files = RunFiles(folder, source, world, active, hold, checks, text.settings, recorded)
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
     if not quiet:
         from mirotwin.cli.run_table import print_table  # loads rich
 
         print_table(summary, run_files.tracks, folder.path)
-    return report_faults(world)
+    failed = report_failures(checks)
+    return report_faults(world) or failed
 
 
 def _saved(folder: Path, views: Sequence[View], plain: bool, force: bool) -> SavedFrames:

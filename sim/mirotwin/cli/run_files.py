@@ -18,6 +18,7 @@ from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin import runner
+from mirotwin.checks.watching import Checks
 from mirotwin.cli.held_signals import Hold
 from mirotwin.cli.program import complain
 from mirotwin.cli.progress import ProgressBar
@@ -51,6 +52,7 @@ class RunFiles:
         world: World,
         engine: str,
         hold: Hold,
+        checks: Checks,
         settings: tuple[str, ...] = (),
         views: Sequence[View] = (),
     ) -> None:
@@ -59,6 +61,7 @@ class RunFiles:
         self.world = world
         self.engine = engine
         self.hold = hold
+        self.checks = checks
         self.settings = settings
         self.views = views
         self.tracks = Tracks()
@@ -72,6 +75,7 @@ class RunFiles:
         """
         try:
             self._record(bar)
+            self.checks.finish()
             summary = self._summary(complete=True)
             self.folder.part(SUMMARY).write_bytes(to_json(summary))
             if self.tracks.count and title is not None:
@@ -130,6 +134,7 @@ class RunFiles:
             calibrations=learnt_calibrations(self.world.networks),
             wheels=learnt_wheels(self.world.networks),
             gains=gains_of(self.world.scenario),
+            expectations=self.checks.verdicts(),
         )
 
     def _leave_parts(self, reason: str) -> None:

@@ -12,7 +12,7 @@ from rich.table import Table
 from mirotwin.cli.console import show
 from mirotwin.report.learnt_calibration import calibration_text
 from mirotwin.report.learnt_wheels import wheels_text
-from mirotwin.report.summary import Summary, off_pitch_text, settling_text, vision_text
+from mirotwin.report.summary import Summary, expectations_text, off_pitch_text, settling_text, vision_text
 from mirotwin.report.theory import theory_text
 from mirotwin.report.track import Tracks
 
@@ -60,6 +60,7 @@ def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
         f"{firmware.instructions} instructions, {firmware.machine_cycles} cycles ({idle:.0f} % idle), "
         f"{firmware.faults} faults",
     )
+    table.add_row("expected", expectations_text(summary.expectations))
     table.add_row("digest", summary.digest)
     table.add_row("files", str(folder))
     show(table)

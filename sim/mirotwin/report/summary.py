@@ -83,6 +83,30 @@ class Firmware(msgspec.Struct, frozen=True):
     faults: int
 
 
+class FirstFailure(msgspec.Struct, frozen=True):
+    """The earliest failure of a check: of which robot, at which tick, what was wanted and found."""
+
+    network: int
+    slot: int
+    tick: int
+    wanted: str
+    found: str
+
+
+class Expectation(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What came of a check (`mirotwin.checks`), over all robots.
+
+    `kind`: safety (never) or liveness (within a time). `verdict`: passed, failed, or "not judged" where the run had no
+    occasion for it. `failures`: how many; `first`: the earliest.
+    """
+
+    name: str
+    kind: str
+    verdict: str
+    failures: int = 0
+    first: FirstFailure | None = None
+
+
 class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """`summary.json`. `tracking` and `theory` are the first robot's; `robots` lists all when there are several.
 
@@ -90,7 +114,8 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     written only where it is false: the run was broken off, and all figures are of the part before; `reason` says why,
     if a part of the scenario failed (which one, of which robot, when). `set`: the keys of the scenario that were set on
     the command line (`KEY=VALUE`), only where there were some. `calibrations`: of hosts that learn how their cameras
-    hang, `wheels`: of robots whose estimator learns their wheels.
+    hang, `wheels`: of robots whose estimator learns their wheels. `expectations`: the checks of the run, also those
+    that are always on.
     """
 
     scenario: str
@@ -111,6 +136,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     complete: bool = True
     reason: str = ""
     set: tuple[str, ...] = ()
+    expectations: tuple[Expectation, ...] = ()
 
 
 def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
@@ -166,6 +192,7 @@ def summarise(
     calibrations: tuple[LearntCalibration, ...] = (),
     wheels: tuple[LearntWheels, ...] = (),
     gains: Mapping[Place, Gains] = {},
+    expectations: tuple[Expectation, ...] = (),
 ) -> Summary:
     """The summary of a run; `counters` as `World.counters()` gives them, `gains` as `theory.gains_of`."""
     everyone = tuple(
@@ -191,6 +218,7 @@ def summarise(
         complete=complete,
         reason=reason,
         set=settings,
+        expectations=expectations,
     )
 
 
@@ -204,6 +232,13 @@ def off_pitch_text(summary: Summary) -> str:
         if one.tracking.off_pitch_s
     ]
     return f"off it for {', '.join(left)} (the pitch has no walls here)" if left else ""
+
+
+def expectations_text(expectations: Sequence[Expectation]) -> str:
+    """How many checks passed, and the names of those that did not, for people."""
+    passed = [one.name for one in expectations if one.verdict == "passed"]
+    others = [f"{one.name} {one.verdict}" for one in expectations if one.verdict != "passed"]
+    return ", ".join([f"{len(passed)} of {len(expectations)} checks passed", *others])
 
 
 def vision_text(vision: Vision) -> str:

@@ -1,0 +1,1 @@
+"""Checks: what is expected of a run, as components with names."""

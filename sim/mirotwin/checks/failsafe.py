@@ -1,0 +1,119 @@
+"""Checks of the failsafe: without a fresh frame the wheels are told to stop in time, and the motors go off in time.
+
+What belongs here: the two times. What does not: which frame is fresh (`hearing`) and what a command tells a wheel
+(`orders`).
+
+Times count from the end of the last fresh frame's last character, when a robot can know of it (protocol/README.md,
+"Freshness and failsafe"). Too early is as wrong as too late. An order within `ACTING_MS` of a fresh frame is what that
+frame says and no failsafe.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
+
+from miro_exact.clock import HOST_CHARACTER_TICKS
+from miro_sim.world.events import Event
+from mirotwin.checks.interface import Check, Judge, Kind, Subject, in_ms, ms_ticks
+from mirotwin.checks.orders import Order, Orders
+
+ACTING_MS = 10.0
+"""Firmware has dealt with a frame so long after its last character; a fair third of a camera frame."""
+
+TimeMs = Annotated[float, Meta(gt=ACTING_MS, le=60_000.0)]
+ToleranceMs = Annotated[float, Meta(ge=0.0, le=1000.0)]
+
+
+class SilenceCheck(Check, frozen=True, kw_only=True):
+    """So long after the last fresh frame, within +- `tolerance_ms` (half a millisecond is 1.5 LM629 samples)."""
+
+    KIND: ClassVar[Kind] = "liveness"
+    MAIN: ClassVar[str] = "after_ms"
+    WANTED: ClassVar[str] = ""
+
+    after_ms: TimeMs = 110.0
+    tolerance_ms: ToleranceMs = 0.5
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return SilenceJudge(self, subject)
+
+    def fulfilled(self, order: Order) -> bool:
+        """Whether a wheel under this order is as it has to be after that time."""
+        raise NotImplementedError
+
+
+class FailsafeStop(SilenceCheck, frozen=True, kw_only=True, tag="failsafe_stop_ms"):
+    """Without a fresh frame both wheels are told to stop."""
+
+    WANTED = "both wheels told to stop"
+
+    def fulfilled(self, order: Order) -> bool:
+        return not order.moves
+
+
+class MotorsOff(SilenceCheck, frozen=True, kw_only=True, tag="motors_off_ms"):
+    """Without a fresh frame both motors go off."""
+
+    WANTED = "both motors off"
+
+    after_ms: TimeMs = 500.0
+
+    def fulfilled(self, order: Order) -> bool:
+        return order.what == "off"
+
+
+class SilenceJudge(Judge[SilenceCheck]):
+    """`fresh_tick`: end of the last fresh frame, None before the first and once its silence has been judged.
+    `in_time`: a wheel was told in time. A wheel that needed no order, because it stood, is no occasion to judge.
+    """
+
+    HEARS = ("frame", "command")
+
+    def __init__(self, check: SilenceCheck, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.orders = Orders()
+        self.fresh_tick: int | None = None
+        self.in_time = False
+        self.acting_ticks = ms_ticks(ACTING_MS)
+        self.earliest_ticks = ms_ticks(max(check.after_ms - check.tolerance_ms, 0.0))
+        self.latest_ticks = ms_ticks(check.after_ms + check.tolerance_ms)
+        self.wanted = (
+            f"{check.WANTED} {check.after_ms:g} +- {check.tolerance_ms:g} ms after the last fresh frame"
+        )
+
+    def event(self, event: Event) -> None:
+        self.until(event.tick)
+        if event.what == "frame":
+            if event.value and event.frame is not None:
+                self.fresh_tick = event.frame.last_tick + HOST_CHARACTER_TICKS
+                self.in_time = False
+            return
+        unfulfilled = self._unfulfilled()
+        order = self.orders.take(event)
+        if order is None or self.fresh_tick is None or not self.check.fulfilled(order):
+            return
+        silence = event.tick - self.fresh_tick
+        if order.side not in unfulfilled or silence <= self.acting_ticks:
+            return
+        if silence >= self.earliest_ticks:
+            self.in_time = True
+            return
+        self.judged += 1
+        self.fail(event.tick, self.wanted, f"the {order.side} one after {in_ms(silence)}")
+        self.fresh_tick = None
+
+    def until(self, tick: int) -> None:
+        if self.fresh_tick is None or tick <= self.fresh_tick + self.latest_ticks:
+            return
+        unfulfilled = self._unfulfilled()
+        self.judged += bool(unfulfilled or self.in_time)
+        if unfulfilled:
+            self.fail(
+                self.fresh_tick + self.latest_ticks, self.wanted, f"not so: {' and '.join(unfulfilled)}"
+            )
+        self.fresh_tick = None
+
+    def _unfulfilled(self) -> list[str]:
+        return [side for side, order in self.orders.last.items() if not self.check.fulfilled(order)]

@@ -1,0 +1,46 @@
+"""What a robot's receiver heard: its characters as valid frames, fresh or not, and as damage.
+
+What belongs here: decoding beside the firmware, by the rules that it has to apply (protocol/README.md, "Reception").
+What does not: what the firmware made of it.
+
+Characters are those that the robot's own serial port delivered, so radio noise is in them already. The port sets RI in
+the stop bit; the rules count from the start bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from miro_exact.clock import ROBOT_BIT_TICKS
+from miro_protocol.decoder import Decoder, Received
+from miro_protocol.freshness import Freshness
+from miro_sim.world.events import Event
+
+TO_RI_TICKS = 9 * ROBOT_BIT_TICKS + ROBOT_BIT_TICKS * 10 // 16 + ROBOT_BIT_TICKS // 32
+"""From a character's start bit to RI: 9 10/16 bits, and half of the sixteenth by which the port may see it late."""
+
+
+class Hearing:
+    """The frames that robot `slot` of `network` hears, in a network of `robots`."""
+
+    def __init__(self, network: int, slot: int, robots: int) -> None:
+        self.network = network
+        self.slot = slot
+        self.decoder = Decoder(robots)
+        self.freshness = Freshness()
+
+    def take(self, received: Event) -> Iterator[Event]:
+        """The `frame` and `damaged` events that a `received` one completes, at its tick."""
+        symbol = (received.value, received.good_stop, received.tick - TO_RI_TICKS)
+        for found in self.decoder.feed_symbols([symbol]):
+            frame = found if isinstance(found, Received) else None
+            fresh = frame is not None and self.freshness.judge(frame.seq, frame.last_tick)
+            yield Event(
+                tick=received.tick,
+                what="damaged" if frame is None else "frame",
+                network=self.network,
+                slot=self.slot,
+                value=int(fresh),
+                data=found.data,
+                frame=frame,
+            )

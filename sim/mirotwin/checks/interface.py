@@ -1,0 +1,148 @@
+"""What a check is given, what it answers, and what it must declare about itself.
+
+What belongs here: the interface. What does not: any check, how a scenario names one (`expect`), how a check is found by
+its name (`registry`), and who feeds it (`watching`).
+
+A check is two classes. Its parameters are a frozen struct whose tag is the check's name and its key in `[expect]`;
+their `judge` method makes a `Judge`, one for each robot. The judge is fed in the order of time:
+
+    logs of boards and PC ──► event(event)       of the kinds in HEARS
+    firmware faults ────────► fault(fault)
+    control periods ────────► period(record, tick)
+    all of it, up to a tick ► until(tick)        what should have happened by now?
+    the run is over ────────► end(tick)
+
+and calls `fail` for what is wrong, once each time that it becomes wrong. There are two kinds: safety (this never
+happens) fails at the tick at which it happens; liveness (this happens within a time) at the tick at which the time is
+over. `judged` counts the occasions to judge: a check that had none has not passed.
+
+A check observes. It may read the robot but changes no bit of a run, so what it remembers stands in plain attributes and
+is part of no saved world.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Generic, Literal, TypeVar
+
+import msgspec
+
+from miro_exact.clock import ticks
+from miro_robot.faults import FirmwareFault
+from miro_sim.periods import RobotPeriod
+from miro_sim.world.events import Event
+from miro_sim.world.robot import Robot
+
+Kind = Literal["safety", "liveness"]
+TICKS_PER_MS = 24_000
+KEPT = 100
+"""Failures of a judge that are kept; the others are only counted."""
+
+
+class Failure(msgspec.Struct, frozen=True):
+    """`check` failed for a robot at `tick`: what was wanted, what was found. `fault`: it is a firmware fault."""
+
+    check: str
+    network: int
+    slot: int
+    tick: int
+    wanted: str
+    found: str
+    fault: bool = False
+
+    def __str__(self) -> str:
+        place = f"{self.check}: net{self.network}/robot{self.slot}"
+        when = f"tick {self.tick} ({self.tick / TICKS_PER_MS:.3f} ms)"
+        return f"{place}: {when}: wanted {self.wanted}, found {self.found}"
+
+
+class Subject(msgspec.Struct, frozen=True):
+    """The robot that is judged. `robots`: slots of its network; `end_tick`: when the run is over by itself."""
+
+    robot: Robot
+    robots: int
+    end_tick: int
+
+    @property
+    def network(self) -> int:
+        return self.robot.network
+
+    @property
+    def slot(self) -> int:
+        return self.robot.slot
+
+
+class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="check"):
+    """Base of every check's parameters.
+
+    Derive with `frozen=True, kw_only=True, tag="name_of_the_check"`, give each key its unit and its range
+    (`typing.Annotated` with `msgspec.Meta`), and define `KIND` and `judge`. `MAIN` is the parameter that a bare value
+    in `[expect]` stands for; a check without one is written `name = true`.
+    """
+
+    KIND: ClassVar[Kind]
+    MAIN: ClassVar[str] = ""
+
+    @property
+    def name(self) -> str:
+        return str(self.__struct_config__.tag)
+
+    def objection(self, end_tick: int) -> str:
+        """Why a run that ends at `end_tick` cannot be judged, or the empty string."""
+        return ""
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        """A judge of one robot."""
+        raise NotImplementedError
+
+
+C_co = TypeVar("C_co", bound=Check, covariant=True)
+
+
+class Judge(Generic[C_co]):
+    """Judges one robot by one check. `failures`: the first hundred; `failed`: how many there were."""
+
+    HEARS: ClassVar[tuple[str, ...]] = ()
+    """Kinds of event that `event` gets: `Event.what` of the robot and of its network's PC. `frame` is a valid frame at
+    the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
+
+    def __init__(self, check: C_co, subject: Subject) -> None:
+        self.check = check
+        self.subject = subject
+        self.failures: list[Failure] = []
+        self.failed = 0
+        self.judged = 0
+
+    def fail(self, tick: int, wanted: str, found: str, fault: bool = False) -> None:
+        """Notes a failure at `tick`."""
+        self.failed += 1
+        if len(self.failures) < KEPT:
+            place = (self.subject.network, self.subject.slot)
+            self.failures.append(Failure(self.check.name, *place, tick, wanted, found, fault))
+
+    def event(self, event: Event) -> None:
+        """Something that happened, of the kinds in `HEARS`."""
+
+    def fault(self, fault: FirmwareFault) -> None:
+        """The firmware did what it must not."""
+
+    def period(self, record: RobotPeriod, tick: int) -> None:
+        """The robot as it was at `tick`, the begin of the control period that is over."""
+
+    def until(self, tick: int) -> None:
+        """All events before `tick` have been told."""
+
+    def end(self, tick: int) -> None:
+        """The run is over at `tick`."""
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.check!r}, judged={self.judged}, failed={self.failed})"
+
+
+def ms_ticks(time_ms: float) -> int:
+    """Ticks of so many milliseconds, which need not be whole."""
+    return ticks(time_ms / 1000.0)
+
+
+def in_ms(duration_ticks: int) -> str:
+    """A duration for people."""
+    return f"{duration_ticks / TICKS_PER_MS:.3f} ms"

@@ -1,0 +1,216 @@
+"""Feeds the checks of a run while it is under way, and says what came of them.
+
+What belongs here: reading the logs of a world once a control period, and the order in which judges are told. What does
+not: judging (the checks) and what a scenario expects (`expect`).
+
+    checks = Checks(world, expectations_of(scenario, "my.toml"))
+    while not world.finished:
+        world.step()
+    checks.finish()
+    checks.failures
+
+The world tells its observers at the end of each control period. Parts of a board run ahead of each other, so only
+events before the tick at which the world stands are told, in the order of ticks; the others wait for the next look. A
+wait (`World.run_until`) may note an event twice and take it back; at the end of a period each stands in the log once.
+Nothing here changes a bit of the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from operator import attrgetter
+from typing import Any, TypeVar
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_host.parts import PartError, described
+from miro_sim.periods import Period
+from miro_sim.world.events import Event, of_board
+from miro_sim.world.network import Network
+from miro_sim.world.robot import Robot
+from miro_sim.world.world import World
+from mirotwin.checks.expect import Place, always_on
+from mirotwin.checks.hearing import Hearing
+from mirotwin.checks.interface import Check, Failure, Judge, Subject
+from mirotwin.report.summary import Expectation, FirstFailure
+
+T = TypeVar("T")
+Expected = Mapping[Place, Sequence[Check]]
+_FROM_RECEIVED = ("frame", "damaged")
+_FROM_PC = ("sent", "heard", "answer", "touch")
+_BY_TICK = attrgetter("tick")
+
+
+class ExpectationFailed(AssertionError):
+    """Checks failed: one line for each failure."""
+
+    def __init__(self, failures: Sequence[Failure]) -> None:
+        super().__init__("\n".join(map(str, failures)))
+        self.failures = list(failures)
+
+
+class Checks:
+    """The checks of a world from now on: what `expected` says of each robot, and those that are always on.
+
+    The world must not be loaded meanwhile: what a check remembers is not saved.
+    """
+
+    def __init__(self, world: World, expected: Expected | None = None) -> None:
+        self.world = world
+        end_tick = world.periods * CONTROL_PERIOD_TICKS
+        self.robots = [
+            _Watched(
+                world,
+                network,
+                robot,
+                (expected or {}).get((network.index, robot.slot)) or always_on(),
+                end_tick,
+            )
+            for network in world.networks
+            for robot in network.robots
+        ]
+        self.finished = False
+        world.observers.append(self._look)
+
+    def _look(self, period: Period) -> None:
+        for watched, record in zip(self.robots, period.robots, strict=True):
+            watched.look(record, period.tick, self.world.tick)
+
+    def finish(self) -> None:
+        """The run is over, by itself or because it was broken off."""
+        if not self.finished:
+            self.finished = True
+            self.world.observers.remove(self._look)
+            for watched in self.robots:
+                watched.end(self.world.tick)
+
+    @property
+    def judges(self) -> list[Judge[Any]]:
+        return [judge for watched in self.robots for judge in watched.judges]
+
+    @property
+    def failures(self) -> list[Failure]:
+        """All that were kept, in the order of time."""
+        return sorted((one for judge in self.judges for one in judge.failures), key=_BY_TICK)
+
+    def check(self) -> None:
+        """Raises ExpectationFailed if a check has failed."""
+        if self.failures:
+            raise ExpectationFailed(self.failures)
+
+    def verdicts(self) -> tuple[Expectation, ...]:
+        """One for each name, over all robots, in the order of names as they were expected."""
+        by_name: dict[str, list[Judge[Any]]] = {}
+        for judge in self.judges:
+            by_name.setdefault(judge.check.name, []).append(judge)
+        lost = any(watched.lost for watched in self.robots)
+        return tuple(_verdict(name, judges, lost) for name, judges in by_name.items())
+
+
+class _Watched:
+    """One robot and its judges. `lost`: events that the log no longer held when they were asked for.
+
+    A judge may be a user's own: whatever it raises becomes a PartError with its name.
+    """
+
+    def __init__(
+        self, world: World, network: Network, robot: Robot, checks: Sequence[Check], end_tick: int
+    ) -> None:
+        subject = Subject(robot, network.spec.robots, end_tick)
+        self.network = network
+        self.robot = robot
+        self.judges = [self._guarded(check, partial(check.judge, subject)) for check in checks]
+        self.of_periods = [judge for judge in self.judges if type(judge).period is not Judge.period]
+        self.of_times = [judge for judge in self.judges if type(judge).until is not Judge.until]
+        self.of_events: dict[str, list[Judge[Any]]] = {}
+        for judge in self.judges:
+            for what in judge.HEARS:
+                self.of_events.setdefault(what, []).append(judge)
+        self.hearing: Hearing | None = None
+        if any(what in self.of_events for what in _FROM_RECEIVED):
+            self.hearing = Hearing(network.index, robot.slot, network.spec.robots)
+        self.hears_board = any(what not in _FROM_PC for what in self.of_events)
+        self.hears_pc = any(what in _FROM_PC for what in self.of_events)
+        self.read_board = robot.board.log.end
+        self.read_pc = network.log.end
+        self.faults = len(robot.board.faults)
+        self.waiting: list[Event] = []
+        self.lost = 0
+
+    def look(self, record: Any, begun_tick: int, tick: int) -> None:
+        """Tells the judges of the control period that began at `begun_tick` and of events before `tick`."""
+        board = self.robot.board
+        if len(board.faults) > self.faults:
+            for fault in board.faults[self.faults :]:
+                for judge in self.judges:
+                    self._guarded(judge.check, partial(judge.fault, fault))
+            self.faults = len(board.faults)
+        for judge in self.of_periods:
+            self._guarded(judge.check, partial(judge.period, record, begun_tick))
+        if self.of_events:
+            self._gather()
+            self._tell(tick)
+
+    def _gather(self) -> None:
+        """What is new in the logs."""
+        log, pc = self.robot.board.log, self.network.log
+        if self.hears_pc:
+            self.lost += max(0, pc.first - self.read_pc)
+            self.waiting += [event for _, event in pc.since(self.read_pc) if event.what in self.of_events]
+            self.read_pc = pc.end
+        if self.hears_board:
+            self.lost += max(0, log.first - self.read_board)
+            place = (self.network.index, self.robot.slot)
+            self.waiting += [event for _, event in of_board(log, self.read_board, *place)]
+            self.read_board = log.end
+
+    def _tell(self, tick: int) -> None:
+        self.waiting.sort(key=_BY_TICK)
+        told = 0
+        for event in self.waiting:
+            if event.tick >= tick:
+                break
+            told += 1
+            self._tell_one(event)
+            if event.what == "received" and self.hearing is not None:
+                for heard in self.hearing.take(event):
+                    self._tell_one(heard)
+        del self.waiting[:told]
+        for judge in self.of_times:
+            self._guarded(judge.check, partial(judge.until, tick))
+
+    def _tell_one(self, event: Event) -> None:
+        for judge in self.of_events.get(event.what, ()):
+            self._guarded(judge.check, partial(judge.event, event))
+
+    def end(self, tick: int) -> None:
+        for judge in self.judges:
+            self._guarded(judge.check, partial(judge.end, tick))
+
+    def _guarded(self, check: Check, call: Callable[[], T]) -> T:
+        try:
+            return call()
+        except Exception as error:
+            place = f"net{self.network.index}/robot{self.robot.slot}"
+            what = f"{place}: check {check.name!r} cannot judge: {described(error)}"
+            raise PartError(what, "repair the check") from error
+
+
+def _verdict(name: str, judges: Sequence[Judge[Any]], lost: bool) -> Expectation:
+    failures = sorted((one for judge in judges for one in judge.failures), key=_BY_TICK)
+    failed = 0
+    judged = 0
+    for judge in judges:
+        failed += judge.failed
+        judged += judge.judged
+    open_ = judged == 0 or (lost and any(judge.HEARS for judge in judges))
+    first = failures[0] if failures else None
+    return Expectation(
+        name=name,
+        kind=judges[0].check.KIND,
+        verdict="failed" if failed else "not judged" if open_ else "passed",
+        failures=failed,
+        first=None
+        if first is None
+        else FirstFailure(first.network, first.slot, first.tick, first.wanted, first.found),
+    )

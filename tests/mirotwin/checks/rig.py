@@ -1,0 +1,96 @@
+"""For the tests of the checks: a silent host whose frames a test sends, and firmware with one mistake planted."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import pytest
+from tests import children
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.frames import Message, TeamFrame, encode
+from miro_robot.firmware import image_path
+from miro_robot.image import Image, load_hex
+from miro_sim.scenario.file import parse
+from miro_sim.world.world import World
+from mirotwin.checks.expect import expectations_of
+from mirotwin.checks.watching import Checks
+
+MS = 24_000
+SOURCE = Path(__file__).parents[3] / "robot_fw" / "firmware"
+VERSION = (SOURCE / "sdcc.version").read_text("utf-8").strip()
+SILENT = """
+name = "silent"
+duration_s = 1.0
+stop_on_fault = {stop}
+
+[expect]
+{expect}
+
+[[network]]
+host = "silent"
+radio = {{ bit_error_rate = 0.0, squelch = {squelch} }}
+
+[[network.robot]]
+slot = 1
+reference.kind = "line"
+"""
+
+
+@cache
+def own_image() -> Image:
+    return load_hex(image_path())
+
+
+def silent_world(
+    expect: str, image: Image | None = None, squelch: bool = True, stop: bool = True
+) -> tuple[World, Checks]:
+    """One robot in slot 1 of 3 whose host sends nothing, and its checks (lines of `[expect]`)."""
+    flags = {"squelch": str(squelch).lower(), "stop": str(stop).lower()}
+    scenario = parse(SILENT.format(expect=expect, **flags), "silent", (), expectations_of)
+    world = World(scenario, 3, image or own_image())
+    return world, Checks(world, expectations_of(scenario, "silent"))
+
+
+def team(seq: int, left: int, right: int, ask: bool = False) -> TeamFrame:
+    """Velocities for the robot in slot 1."""
+    return TeamFrame(3 if ask else 0, seq, ((11, 22), (left, right), (33, 44)))
+
+
+def send(world: World, messages: Sequence[Message | bytes], period_ticks: int = CONTROL_PERIOD_TICKS) -> None:
+    """Sends each so long after the one before, the first one period from now."""
+    for message in messages:
+        world.run_to(world.tick + period_ticks)
+        world.inject(message if isinstance(message, bytes) else encode(message, 3))
+
+
+def finish(world: World, checks: Checks) -> dict[str, str]:
+    """Runs to the end; the verdicts by name."""
+    while not world.finished:
+        world.step()
+    checks.finish()
+    return {one.name: one.verdict for one in checks.verdicts()}
+
+
+def sdcc_version() -> str:
+    if shutil.which("sdcc") is None or shutil.which("make") is None:
+        return ""
+    return children.run(["sdcc", "--version"], capture_output=True, text=True, check=True).stdout
+
+
+needs_sdcc = pytest.mark.skipif(VERSION not in sdcc_version(), reason=f"needs make and SDCC {VERSION}")
+
+
+def planted(folder: Path, file: str, right: str, wrong: str) -> Image:
+    """The firmware with `right` in a source file, where it stands once, replaced by `wrong`."""
+    source = folder / "firmware"
+    shutil.copytree(SOURCE, source)
+    text = (source / file).read_text()
+    assert text.count(right) == 1
+    (source / file).write_text(text.replace(right, wrong))
+    make = ["make", "-s", "-C", source, f"OUT={folder / 'out'}", f"BUILD={folder / 'build'}"]
+    children.run(list(map(str, make)), check=True, capture_output=True)
+    return load_hex(folder / "out" / "miro.ihx")
