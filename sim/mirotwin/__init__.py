@@ -35,11 +35,15 @@ if TYPE_CHECKING:
     from mirotwin import recording as recording
     from mirotwin import replay as replay
     from mirotwin import testing as testing
+    from mirotwin.checks.watching import Checks as Checks
+    from mirotwin.checks.watching import ExpectationFailed as ExpectationFailed
     from mirotwin.recording.reader import read as read_recording
 
 _PLACES = {
+    "Checks": "mirotwin.checks.watching:Checks",
     "Decoder": "miro_protocol.decoder:Decoder",
     "Event": "miro_sim.world.events:Event",
+    "ExpectationFailed": "mirotwin.checks.watching:ExpectationFailed",
     "Image": "miro_robot.image:Image",
     "Scenario": "miro_sim.scenario.keys:Scenario",
     "TelemetryDecoder": "miro_protocol.decoder:TelemetryDecoder",
@@ -62,8 +66,10 @@ _PLACES = {
 """Public name -> the module that it is, or the module and the name in it."""
 
 __all__ = [
+    "Checks",
     "Decoder",
     "Event",
+    "ExpectationFailed",
     "Image",
     "Scenario",
     "TelemetryDecoder",

@@ -18,7 +18,7 @@ def test_the_list_of_names_is_the_one_that_is_looked_up():
 
 
 def test_a_name_that_is_not_public_is_refused_with_those_that_are():
-    with pytest.raises(AttributeError, match="'mirotwin' has no attribute 'Wrold'; it has Decoder, Event"):
+    with pytest.raises(AttributeError, match="'mirotwin' has no attribute 'Wrold'; it has Checks, Decoder"):
         _ = mirotwin.Wrold
 
 

@@ -104,7 +104,7 @@ class WithinJudge(_AnswerJudge):
         # an answer is known only when TI is set for its last character
         while self.asked and tick > self.asked[0].last_tick + self.within_ticks + TO_TI_TICKS:
             question = self.asked.pop(0)
-            self.fail(question.last_tick + self.within_ticks, self.wanted, "none")
+            self.fail(question.last_tick + self.within_ticks, self.wanted, "none by then")
 
 
 class TurnJudge(_AnswerJudge):

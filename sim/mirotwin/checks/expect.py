@@ -30,11 +30,6 @@ Place = tuple[int, int]
 """Network and slot of a robot."""
 
 
-def always_on() -> list[Check]:
-    """The checks of every run."""
-    return [struct_of(name)() for name in ALWAYS_ON]
-
-
 def struct_of(name: str) -> type[Check]:
     """The parameters of the check `name`. Raises PartError."""
     return cast(type[Check], CHECKS.find(name))

@@ -3,11 +3,11 @@
 What belongs here: reading the logs of a world once a control period, and the order in which judges are told. What does
 not: judging (the checks) and what a scenario expects (`expect`).
 
-    checks = Checks(world, expectations_of(scenario, "my.toml"))
+    checks = Checks(world)
     while not world.finished:
         world.step()
     checks.finish()
-    checks.failures
+    checks.check()  # raises ExpectationFailed; or look at `failures`, `verdicts()`
 
 The world tells its observers at the end of each control period. Parts of a board run ahead of each other, so only
 events before the tick at which the world stands are told, in the order of ticks; the others wait for the next look. A
@@ -29,7 +29,7 @@ from miro_sim.world.events import Event, of_board
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
-from mirotwin.checks.expect import Place, always_on
+from mirotwin.checks.expect import Place, expectations_of
 from mirotwin.checks.hearing import Hearing
 from mirotwin.checks.interface import Check, Failure, Judge, Subject
 from mirotwin.report.summary import Expectation, FirstFailure
@@ -50,20 +50,23 @@ class ExpectationFailed(AssertionError):
 
 
 class Checks:
-    """The checks of a world from now on: what `expected` says of each robot, and those that are always on.
+    """The checks of a world from now on: what its scenario expects of each robot, and those that are always on.
 
-    The world must not be loaded meanwhile: what a check remembers is not saved.
+    `expected` replaces that, by network and slot. The world must not be loaded meanwhile: what a check remembers is not
+    saved.
     """
 
     def __init__(self, world: World, expected: Expected | None = None) -> None:
         self.world = world
+        if expected is None:
+            expected = expectations_of(world.scenario, world.scenario.name)
         end_tick = world.periods * CONTROL_PERIOD_TICKS
         self.robots = [
             _Watched(
                 world,
                 network,
                 robot,
-                (expected or {}).get((network.index, robot.slot)) or always_on(),
+                expected.get((network.index, robot.slot), ()),
                 end_tick,
             )
             for network in world.networks

@@ -52,7 +52,7 @@ def silent_world(
     flags = {"squelch": str(squelch).lower(), "stop": str(stop).lower()}
     scenario = parse(SILENT.format(expect=expect, **flags), "silent", (), expectations_of)
     world = World(scenario, 3, image or own_image())
-    return world, Checks(world, expectations_of(scenario, "silent"))
+    return world, Checks(world)
 
 
 def team(seq: int, left: int, right: int, ask: bool = False) -> TeamFrame:

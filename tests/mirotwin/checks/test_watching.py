@@ -36,7 +36,7 @@ robot = [{{ slot = 4, reference.kind = "line", start_error_x_cm = 3.0 }}]
 def judged(seed: int, advance, text: str = TWO):
     scenario = parse(text, "two", (), expectations_of)
     world = World(scenario, seed, own_image())
-    checks = Checks(world, expectations_of(scenario, "two"))
+    checks = Checks(world)
     while not world.finished:
         advance(world)
     checks.finish()
