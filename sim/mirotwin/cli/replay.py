@@ -26,6 +26,7 @@ from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import Job, load_job
 from mirotwin.cli.run import report_faults
 from mirotwin.replay.compare import Difference, compare
+from mirotwin.report.summary import expectations_text
 
 SHOWN = 20
 
@@ -87,6 +88,8 @@ def replay(
         _print_frames(job, replayed, everything)
     checks.finish()
     failed = report_failures(checks)
+    if judged and not quiet:
+        show(expectations_text(checks.verdicts()))
     faults = report_faults(world)
     differs = _verdict(job, replayed, difference)
     return (faults or failed) if judged else (differs or faults or failed)

@@ -59,7 +59,6 @@ def load_job(
         return job, _recorded_image(recording, file) if firmware is None else load_image(firmware)
     _refuse_other_formats(data, file)
     given = stream.decode(data, file)
-    _refuse_what_cannot_be_done(given.header, file)
     image = load_image(firmware)
     _check_firmware(given.header, image, file, firmware)
     return _job_of_stream(given, file, settings), image
@@ -87,16 +86,11 @@ def _job_of_recording(recording: Recording, path: str, settings: Sequence[str]) 
 
 def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str]) -> Job:
     sent = given.transmissions()
-    header = in_text(given.header.set or {})
+    header = [*in_text(given.header.set or {}), *in_text({"expect": given.header.expect or {}})]
     scenario = changed(
         scenario_of_stream(sent, path, given.header), path, [*header, *settings], expectations_of
     )
     return Job(scenario, given.header.seed or 0, script_of_stream(sent), ())
-
-
-def _refuse_what_cannot_be_done(header: stream.Header, path: str) -> None:
-    if header.expect is not None:
-        raise BadInput(path, "header", "expect is not carried out by this version", "remove it")
 
 
 def _check_firmware(header: stream.Header, image: Image, path: str, firmware: str | None) -> None:

@@ -3,7 +3,10 @@
 import re
 import sys
 
+import msgspec
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from tests.host.distribution import install
 
 from miro_sim.scenario.errors import ScenarioError
@@ -186,3 +189,27 @@ def test_a_check_that_cannot_check_its_parameters_is_named() -> None:
         ScenarioError, match=r"expect\.loud: cannot check its parameters: RuntimeError: too loud"
     ):
         names("[expect]\nloud = true")
+
+
+KEYS = st.sampled_from(
+    ["limit_cm", "from_s", "within_ms", "after_ms", "tolerance_ms", "frames", "check", "x"]
+)
+SCALARS = st.one_of(st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.dates())
+VALUES = st.recursive(
+    SCALARS,
+    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(KEYS, inner, max_size=2),
+    max_leaves=4,
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.dictionaries(st.sampled_from([*CHECKS.own, "a b", ""]), VALUES, max_size=3))
+def test_any_table_is_checks_or_a_scenario_error(table) -> None:
+    scenario = msgspec.structs.replace(load("fig6").scenario, expect=table)
+    said = ""
+    try:
+        found = expectations_of(scenario, "x")
+    except ScenarioError as error:
+        said = str(error)
+    assert said.startswith("x: expect.") if said else len(found[0, 0]) >= len(ALWAYS_ON)
+    assert "\n" not in said

@@ -100,8 +100,9 @@ def test_what_a_replay_expects_decides_where_it_differs_too(mirotwin, finished: 
 def test_a_text_stream_is_judged_too(mirotwin, finished: Path, tmp_path: Path) -> None:
     stream = tmp_path / "sent.stream"
     mirotwin("export", finished / "run.mcap", "--out", stream)
-    code, _, err = mirotwin("replay", "-q", stream, "--expect", "frames_accepted_min=300")
+    code, out, err = mirotwin("replay", stream, "--expect", "frames_accepted_min=300")
     assert code == 1
+    assert "4 of 5 checks passed, frames_accepted_min failed\n" in out
     assert err.count("wanted at least 300 frames accepted, found 6\n") == 3  # a robot in every slot
 
 

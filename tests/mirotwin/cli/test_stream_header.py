@@ -67,6 +67,24 @@ def test_the_scenario_of_the_header_runs_with_its_seed(
     assert len(accepted) > 1
 
 
+def test_what_the_header_expects_is_judged(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    met = "[expect]\nacts_within_ms = true\naccepts_only_sent = true\nframes_accepted_min = 3"
+    stream.write(tmp_path / "a.stream", SENT, stream_header.of_text(met))
+    assert mirotwin("replay", "-q", tmp_path / "a.stream")[::2] == (0, "")
+    missed = "[expect]\nacts_within_ms = true\nwheels_within_m_s = {limit_m_s = 0.04}"
+    stream.write(tmp_path / "a.stream", SENT[:1], stream_header.of_text(missed))
+    code, _, err = mirotwin("replay", "-q", tmp_path / "a.stream")
+    assert code == 1
+    assert err.splitlines()[0].startswith(
+        "mirotwin: expectation failed: wheels_within_m_s: net0/robot0: tick "
+    )
+    assert err.count("wanted a wheel told at most 0.04 m/s, found 0.0439 m/s for the left one") == 1
+    assert mirotwin("replay", "-q", tmp_path / "a.stream", "--expect", "wheels_within_m_s=0.05")[::2] == (
+        0,
+        "",
+    )
+
+
 def test_a_built_in_scenario_is_taken_by_its_name(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
     stream.write(tmp_path / "a.stream", SENT, stream_header.of_text("scenario = 'fig8'"))
     code, out, err = mirotwin("replay", tmp_path / "a.stream")
@@ -100,7 +118,16 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(
         (in_header(SHORT), "4799000 > 55", "tick 4799000: ends at tick 4824000, but the scenario ends at"),
         ("set = {duration_x = 1}", "", "--set duration_x=1: "),
         ("set = {network.robot = 5}", "", "--set network.robot=5: "),
-        ("[expect]\nno_fault = true", "", "header: expect is not carried out by this version"),
+        (
+            "[expect]\nno_fault = 3",
+            "",
+            "--expect no_fault=3: expected true or false, got 3; write no_fault = true",
+        ),
+        (
+            "expect = {tracks_within_m = 1}",
+            "",
+            "--expect tracks_within_m=1: there is no such check; use tracks_with",
+        ),
         (f"firmware_sha256 = '{OTHER}'", "", "header: the stream is for firmware 0123456789ab.., this is"),
         (
             "",
