@@ -52,8 +52,8 @@ class ExpectationFailed(AssertionError):
 class Checks:
     """The checks of a world from now on: what its scenario expects of each robot, and those that are always on.
 
-    `expected` replaces that, by network and slot. The world must not be loaded meanwhile: what a check remembers is not
-    saved.
+    `expected` replaces that, by network and slot. Begin with the run: a check does not know what wheels were told
+    before. RuntimeError is raised if the world is loaded meanwhile, because what a check remembers is not saved.
     """
 
     def __init__(self, world: World, expected: Expected | None = None) -> None:
@@ -73,9 +73,15 @@ class Checks:
             for robot in network.robots
         ]
         self.finished = False
+        self.index = world.index
         world.observers.append(self._look)
 
     def _look(self, period: Period) -> None:
+        if period.index != self.index:
+            raise RuntimeError(
+                f"control period {period.index} follows {self.index - 1}: the world was loaded; begin new checks then"
+            )
+        self.index += 1
         for watched, record in zip(self.robots, period.robots, strict=True):
             watched.look(record, period.tick, self.world.tick)
 

@@ -7,6 +7,7 @@ from tests.mirotwin.checks.rig import MS, finish, own_image, send, silent_world,
 from tests.mirotwin.checks.test_planted import ALL
 
 from miro_host.parts import PartError
+from miro_robot.event_log import RECEIVED
 from miro_sim.scenario.file import load, parse
 from miro_sim.world import conditions
 from miro_sim.world.events import Event
@@ -92,6 +93,30 @@ def test_a_check_without_an_occasion_has_not_passed() -> None:
     found = finish(world, checks)
     assert found["failsafe_stop_ms"] == found["answers_within_ms"] == "not judged"
     assert found["no_fault"] == "passed"
+
+
+def test_a_world_that_is_loaded_meanwhile_is_no_run_to_judge() -> None:
+    world, checks = silent_world("")
+    world.step()
+    saved = world.save()
+    world.step()
+    world.load(saved)
+    with pytest.raises(
+        RuntimeError, match="control period 1 follows 1: the world was loaded; begin new checks"
+    ):
+        world.step()
+    checks.finish()
+    Checks(world)
+    world.step()
+
+
+def test_events_that_the_log_no_longer_holds_leave_nothing_judged() -> None:
+    world, checks = silent_world("acts_within_ms = true\ninside_pitch = true")
+    send(world, [team(1, 10, 10)])
+    for _ in range(2049):
+        world.robot(0, 1).board.log.note(RECEIVED, world.tick, 1, 0)
+    found = finish(world, checks)
+    assert (found["acts_within_ms"], found["inside_pitch"]) == ("not judged", "passed")
 
 
 class Raising(Check, frozen=True, kw_only=True, tag="raising"):

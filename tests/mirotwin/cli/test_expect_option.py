@@ -4,6 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
+from tests.mirotwin.checks.rig import needs_sdcc, planted
+from tests.mirotwin.checks.test_planted import ALWAYS, MISTAKES
 
 MET = ("--expect", "frames_accepted_min=3", "--expect", "inside_pitch=true")
 MISSED = ("--expect", "tracks_within_cm={limit_cm=1.9, from_s=0.0}")
@@ -126,3 +128,34 @@ def test_an_unknown_check_is_refused_before_anything_runs(
     assert (code, out) == (2, "")
     assert "--expect inside_pich=true: there is no such check; did you mean inside_pitch?\n" in err
     assert not (tmp_path / "run").exists()
+
+
+@needs_sdcc
+def test_a_stream_tells_a_late_failsafe_from_the_right_one(mirotwin, finished: Path, tmp_path: Path) -> None:
+    file, right, wrong, _ = MISTAKES["stops 15 ms late"]
+    late = planted(tmp_path, file, right, wrong).path
+    mirotwin("export", finished / "run.mcap", "--out", tmp_path / "sent.stream")
+    stream = ("replay", "-q", tmp_path / "sent.stream", "--expect", "failsafe_stop_ms=110")
+    code, _, err = mirotwin(*stream, "--firmware", late)
+    assert code == 1
+    assert (
+        "wanted both wheels told to stop 110 +- 0.5 ms after the last fresh frame, found not so: left" in err
+    )
+    assert mirotwin(*stream)[::2] == (0, "")
+
+
+@needs_sdcc
+def test_a_firmware_fault_goes_before_what_else_failed(mirotwin, short: Path, tmp_path: Path) -> None:
+    file, right, wrong, concerned = ALWAYS["stays in an interrupt"]
+    image = planted(tmp_path, file, right, wrong).path
+    out = ("--no-figure", "--out", tmp_path / "run", "--firmware", image)
+    code, _, err = mirotwin("run", short, "-q", *out, *MISSED)
+    assert code == 3
+    lines = err.splitlines()
+    assert lines[0] == f"mirotwin: expectation failed: {FAILURE}"
+    starved = "firmware starved its main loop: interrupts took all of 10 ms at "
+    assert [line.partition(starved)[0] for line in lines[1:]] == [
+        f"mirotwin: firmware fault: net0/robot{slot}: " for slot in (0, 2)
+    ]
+    verdicts = {one["name"]: one["verdict"] for one in summary(tmp_path / "run")["expectations"]}
+    assert {name for name in verdicts if verdicts[name] == "failed"} == {*concerned, "tracks_within_cm"}
