@@ -1,4 +1,4 @@
-"""What seeing costs: a window, tracking in it, a frame of six robots, and the share of a run.
+"""What seeing costs: a window, tracking in it, a frame of six robots, learning the camera, and the share of a run.
 
     python -m benchmarks.eye [--pairs 21]
 
@@ -22,6 +22,7 @@ from miro_host.eye import calibration_kinds
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.lens import Lens
 from miro_host.eye.patterns import PATTERNS, TEAMS
+from miro_host.eye.self_calibration import SETTLED_FRAMES, SelfCalibration
 from miro_host.eye.tracker import Tracker
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
@@ -123,6 +124,21 @@ def frame_us() -> float:
     return best_us(work)
 
 
+def learning_us() -> tuple[float, float]:
+    """Self-calibration from lines and walls: the mean of a frame in its first five seconds, and later."""
+    one = camera()
+    told = calibration_kinds.drawn_1997(LENS, Stream(0, "benchmark/told"))
+    learning = SelfCalibration(told)
+    took = []
+    for frame in range(600):
+        one.begin(frame, 800_800 * frame)
+        begun = time.process_time_ns()
+        learning.look(one, ())
+        took.append(time.process_time_ns() - begun)
+    first, later = took[:SETTLED_FRAMES], took[SETTLED_FRAMES:]
+    return sum(first) / len(first) / 1000.0, sum(later) / len(later) / 1000.0
+
+
 def run_s(kind: str, seed: int) -> float:
     """The loop of fig6."""
     world = World(file.load("fig6", [f'camera={{kind="{kind}"}}']).scenario, seed, IMAGE)
@@ -143,6 +159,10 @@ def main() -> None:
     print(f"tracking in it              {tracking_us():7.1f} us")
     six = frame_us()
     print(f"frame of six robots         {six:7.1f} us, {1e6 / six:.0f} frames/s")
+    first, later = learning_us()
+    print(
+        f"self-calibration, a frame   {first:7.1f} us in its first {SETTLED_FRAMES} frames, {later:.1f} us later"
+    )
     ratios = []
     for seed in range(pairs):
         kinds = ("pixels", "gaussian") if seed % 2 else ("gaussian", "pixels")

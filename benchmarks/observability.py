@@ -48,7 +48,7 @@ def field(x_m: float, y_m: float) -> np.ndarray:
         step = 0.01 * size
         changes = [0.0] * len(self_calibration.LEARNT)
         changes[index] = step
-        told = Lens(self_calibration._changed(CAMERA, changes))
+        told = Lens(self_calibration.changed(CAMERA, changes))
         read = told.ground(u, v, ROBOT_HEIGHT_M)
         columns.append([(read[0] - x_m) / step, (read[1] - y_m) / step])
     return np.array(columns).T
@@ -98,7 +98,7 @@ def line_information() -> np.ndarray:
     """Of the camera's unknowns, from each mark of one picture."""
     information = np.zeros((5, 5))
     for mark in MARKS:
-        slopes = np.array(self_calibration._slopes(CAMERA, mark)[:5])
+        slopes = np.array(self_calibration.slopes_of(CAMERA, mark)[:5])
         noise = self_calibration.WALL_NOISE_PX if mark.height_m else self_calibration.LINE_NOISE_PX
         information += np.outer(slopes, slopes) / noise**2
     return information

@@ -18,14 +18,16 @@ cdef class Filter:
     cdef public double covariance[81]
     cdef readonly double left_m, right_m
     cdef double column[9]
-    cdef double lower[9]
+    cdef double lower[25]
 
     cpdef drifts(self, double position_m, double heading_rad, double wheel, double rim_m_s)
     cpdef warps(self, double warp_m, double warp_length_m)
     @cython.locals(index=int, i=int, j=int)
     cpdef after_load(self)
-    @cython.locals(i=int, j=int, k=int, rest=double)
+    @cython.locals(i=int, j=int)
     cpdef check_positive(self)
+    @cython.locals(lower='double *', i=int, j=int, k=int, rest=double)
+    cdef int factorise(self, int size) except -1
     @cython.locals(total=double, index=int)
     cpdef bint finite(self)
     cpdef command(self, double left_m_s, double right_m_s, double effect_s, double period_s)
@@ -43,7 +45,7 @@ cdef class Filter:
     cdef int spread(self, int extra, double variance, double along, double turn, double cos, double sin) noexcept
     @cython.locals(kept=double, p='double *', index=int, other=int)
     cdef int warp_on(self, double way_m) noexcept
-    @cython.locals(p='double *', lower='double *', i=int, j=int, k=int, rest=double)
+    @cython.locals(p='double *', lower='double *', i=int, j=int, rest=double)
     cpdef decompose(self, double position_m2, double heading_rad2)
     @cython.locals(lower='double *', a=double, b=double, c=double)
     cpdef double distance2(self, double x_m, double y_m, double theta_rad, double position_m2,

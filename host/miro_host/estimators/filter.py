@@ -29,11 +29,9 @@ from miro_exact import dmath
 from miro_exact.state import FLAG
 from miro_host.estimators.motion import Motion
 
-SIZE = 9
-_N = 9  # the same as a C constant
-LARGEST_FACTOR = 1.5
-"""A wheel factor stays between this and its inverse."""
+_N = 9
 _LARGEST = 1.5
+"""A wheel factor stays between this and its inverse."""
 NONE = -1
 _LARGE = 1e6
 
@@ -78,7 +76,7 @@ class Filter:
         self.state = [0.0] * 9
         self.covariance = [0.0] * 81
         self.column = [0.0] * 9
-        self.lower = [0.0] * 9
+        self.lower = [0.0] * 25
         self.state[3] = 1.0
         self.state[4] = 1.0
         self.covariance[3 * _N + 3] = wheel_spread * wheel_spread
@@ -115,16 +113,23 @@ class Filter:
 
     def check_positive(self) -> None:
         """Raises ValueError unless the covariance of the first five is positive definite (Cholesky)."""
-        lower = [0.0] * 25
         for i in range(5):
             for j in range(i + 1):
-                rest = self.covariance[i * _N + j]
+                self.lower[5 * i + j] = self.covariance[i * _N + j]
+        self.factorise(5)
+
+    def factorise(self, size: int) -> None:
+        """Replaces a symmetric matrix in `lower`, row by row, by its Cholesky triangle. ValueError if there is none."""
+        lower = self.lower
+        for i in range(size):
+            for j in range(i + 1):
+                rest = lower[size * i + j]
                 for k in range(j):
-                    rest -= lower[5 * i + k] * lower[5 * j + k]
+                    rest -= lower[size * i + k] * lower[size * j + k]
                 if i > j:
-                    lower[5 * i + j] = rest / lower[5 * j + j]
+                    lower[size * i + j] = rest / lower[size * j + j]
                 elif rest > 0.0:
-                    lower[5 * i + i] = math.sqrt(rest)
+                    lower[size * i + i] = math.sqrt(rest)
                 else:
                     raise ValueError("the covariance is not positive definite")
 
@@ -280,14 +285,8 @@ class Filter:
                         rest += p[(i + 7) * _N + j + 7]
                 if i == j:
                     rest += position_m2 if i < 2 else heading_rad2
-                for k in range(j):
-                    rest -= lower[3 * i + k] * lower[3 * j + k]
-                if i > j:
-                    lower[3 * i + j] = rest / lower[3 * j + j]
-                elif rest > 0.0:
-                    lower[3 * i + i] = math.sqrt(rest)
-                else:
-                    raise ValueError("the covariance is not positive definite")
+                lower[3 * i + j] = rest
+        self.factorise(3)
 
     def distance2(
         self, x_m: float, y_m: float, theta_rad: float, position_m2: float, heading_rad2: float

@@ -10,7 +10,8 @@ not: the marks (`pitch_marks`), finding one in a picture (`mark_finder`), contro
 Learnt are the five numbers in which a calibration of 1997 may be wrong (middle of the picture, focal length, tilts),
 turn and distortion. The place of the camera and its height are taken as told. A line on the floor and a wall's face
 say how the camera draws the floor and 2.5 cm above it; the robots' tops at 7.5 cm follow from the parameters. The
-encoders of the robots never see where the pitch lies in the picture, so they cannot replace a line (docs/vision.md).
+encoders of the robots never see where the pitch lies in the picture, so they cannot replace a line
+(`benchmarks/observability.py` calculates it).
 
 A mark is scalar: it tells what is across its band. The estimate is linear about the calibration that was told at the
 beginning, whose derivative is kept; the expected place itself is drawn with the parameters of now. A mark is left out
@@ -98,7 +99,7 @@ class SelfCalibration:
     @property
     def calibration(self) -> Calibration:
         """What the tracker is told."""
-        return msgspec.structs.replace(self.begun, camera=_changed(self.begun.camera, self.told))
+        return msgspec.structs.replace(self.begun, camera=changed(self.begun.camera, self.told))
 
     def spreads(self) -> dict[str, float]:
         """Standard deviations of the parameters, by name."""
@@ -106,8 +107,8 @@ class SelfCalibration:
 
     def _take(self, frame: Frame, mark: Mark) -> None:
         try:
-            band = expected(Lens(_changed(self.begun.camera, self.changes)), mark)
-            slopes = _slopes(self.begun.camera, mark)
+            band = expected(Lens(changed(self.begun.camera, self.changes)), mark)
+            slopes = slopes_of(self.begun.camera, mark)
         except ValueError:  # not in the picture
             return
         off_px = find(frame, band)
@@ -130,7 +131,7 @@ class SelfCalibration:
     def after_load(self) -> None:
         """Raises ValueError for parameters of no camera and for a covariance that no step leaves."""
         for changes in (self.changes, self.told):
-            camera = _changed(self.begun.camera, changes)
+            camera = changed(self.begun.camera, changes)
             try:
                 msgspec.convert(msgspec.to_builtins(camera), CameraParameters)
             except msgspec.ValidationError as error:
@@ -140,14 +141,15 @@ class SelfCalibration:
                 raise ValueError("self-calibration: the covariance is that of no filter")
 
 
-def _changed(camera: CameraParameters, changes: Sequence[float]) -> CameraParameters:
+def changed(camera: CameraParameters, changes: Sequence[float]) -> CameraParameters:
+    """The camera with these changes of `LEARNT`."""
     return msgspec.structs.replace(
         camera, **{name: getattr(camera, name) + by for name, by in zip(LEARNT, changes, strict=True)}
     )
 
 
 @lru_cache(maxsize=4096)
-def _slopes(camera: CameraParameters, mark: Mark) -> tuple[float, ...]:
+def slopes_of(camera: CameraParameters, mark: Mark) -> tuple[float, ...]:
     """By how much the mark moves across its band with each of `LEARNT`, in pixels."""
     here = expected(Lens(camera), mark)
     found = []
@@ -155,7 +157,7 @@ def _slopes(camera: CameraParameters, mark: Mark) -> tuple[float, ...]:
         step = 0.01 * spread
         changes = [0.0] * _SIZE
         changes[index] = step
-        moved = expected(Lens(_changed(camera, changes)), mark)
+        moved = expected(Lens(changed(camera, changes)), mark)
         across = (moved.u - here.u) * here.across_u + (moved.v - here.v) * here.across_v
         found.append(across / step)
     return tuple(found)

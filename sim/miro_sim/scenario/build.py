@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, seconds
+from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_exact.rng import Stream
 from miro_host.estimators.interface import EstimatorParameters
 from miro_host.eye import calibration_kinds as kinds
@@ -26,8 +26,7 @@ from miro_host.references.checked import CheckedReference
 from miro_host.references.interface import ReferenceParameters, Trajectory
 from miro_host.references.registry import REFERENCES
 from miro_host.wheels import Wheels
-from miro_protocol.frames import TeamFrame, encode
-from miro_protocol.table import FrameType
+from miro_protocol.table import DOWNLINK
 from miro_sim.plant.params import DriveParams
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 from miro_sim.scenario import keys as sc
@@ -49,9 +48,8 @@ def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
 def dead_s(scenario: sc.Scenario, network: sc.Network) -> float:
     """What a PC knows of its own delay: from a period's begin to the end of its frame."""
     radio = network.radio
-    frame = encode(TeamFrame(FrameType.TEAM, 0, ((0, 0),) * network.robots), network.robots)
     keyup_s = radio.keyup_s if radio.carrier == "keyed" else 0.0
-    return scenario.host.compute_s + keyup_s + radio.latency_s + seconds(len(frame) * HOST_CHARACTER_TICKS)
+    return scenario.host.compute_s + keyup_s + radio.latency_s + seconds(DOWNLINK[network.robots].air_ticks)
 
 
 def pilot_for(robot: sc.Robot, reference: Trajectory, host: sc.Host, dead_s: float) -> Pilot:

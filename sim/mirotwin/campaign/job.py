@@ -19,7 +19,6 @@ from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText, load
-from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.recording.recorder import Recorder
@@ -96,7 +95,7 @@ def run(job: Job) -> Row:
 def _run(job: Job) -> Row:
     text, image = _text(job.scenario, job.settings), _image(str(image_path()))
     world = World(text.scenario, job.seed, image)
-    tracks, seen = Tracks(), Seen(_delay_frames(text.scenario))
+    tracks, seen = Tracks(), Seen(text.scenario.camera.delay_frames)
 
     def keep(period: Period, recorder: Recorder | None = None) -> None:
         tracks.add(period)
@@ -114,10 +113,6 @@ def _run(job: Job) -> Row:
     gains = gains_of(text.scenario)
     place, track = next(iter(tracks.robots.items()))
     return _row(job, tracks.digest, track.errors, seen.errors, theory_of(track.theory, gains[place]), faults)
-
-
-def _delay_frames(scenario: Scenario) -> int:
-    return scenario.camera.delay_frames
 
 
 def _row(job: Job, digest: str, errors: Errors, seen: Errors, theory: Theory | None, faults: int) -> Row:

@@ -7,7 +7,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from miro_exact.rng import Stream
@@ -97,13 +97,12 @@ def test_a_calibration_of_1997_is_right_to_half_a_millimetre_after_two_seconds(s
 
 @settings(max_examples=10, deadline=None)
 @given(
-    st.tuples(*[st.floats(-0.7 * spread, 0.7 * spread) for spread in SPREADS[:-1]]), st.floats(-0.03, 0.05)
+    st.tuples(*[st.floats(-0.3 * spread, 0.3 * spread) for spread in SPREADS[:-1]]), st.floats(-0.03, 0.05)
 )
 def test_errors_of_all_parameters_together_are_learnt(changes, k1):
     told = changed([*changes, k1])
-    begun_cm = 100.0 * worst_error_m(TRUE, Calibration(camera=told))
-    if begun_cm < 4.0:  # beyond that lines are taken for others
-        assert worst_cm(learnt(told, 120)) < 0.1
+    assume(worst_error_m(TRUE, Calibration(camera=told)) < 0.04)  # beyond that lines are taken for others
+    assert worst_cm(learnt(told, 120)) < 0.1
 
 
 def test_the_same_holds_for_another_camera_and_a_bad_picture():
@@ -154,11 +153,11 @@ def test_one_update_is_that_of_the_textbook():
         before = np.array(one.covariance).reshape(7, 7), np.array(one.changes)
         used = one.used
         mark = MARKS[one.looked * STRIDE % len(MARKS)]
-        off_px = find(picture, expected(Lens(self_calibration._changed(told, one.changes)), mark))
+        off_px = find(picture, expected(Lens(self_calibration.changed(told, one.changes)), mark))
         one.look(picture, ())
         if one.used == used:
             continue
-        h = np.array(self_calibration._slopes(told, mark))
+        h = np.array(self_calibration.slopes_of(told, mark))
         noise = self_calibration.WALL_NOISE_PX if mark.height_m else self_calibration.LINE_NOISE_PX
         gain = before[0] @ h / (h @ before[0] @ h + noise**2)
         after = (np.eye(7) - np.outer(gain, h)) @ before[0]
