@@ -9,27 +9,28 @@ What belongs here: the list of disturbances, running them, the table. What does 
 plant's, radio's and camera's pages).
 
 Ctrl-C stops it after the cells that are under way, and prints the rows that are complete. A table takes minutes;
-`--only slip --seeds 5` is a part.
+`--only slip --seeds 0-4` is a part.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-import os
-import signal
 import sys
 import time
 from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from statistics import median
 from typing import NamedTuple
+
+from benchmarks.figures import range_of_seeds
 
 from miro_host.posture import Posture
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
+from mirotwin.campaign.execute import in_order
+from mirotwin.campaign.processes import cores, processes
 from mirotwin.report.track import SETTLED_CM, SETTLED_RAD
 
 LAST_SECOND = 30
@@ -127,8 +128,13 @@ class Outcome(NamedTuple):
     unsettled: bool
 
 
-Job = tuple[int, str, str]
-"""Number of a case, controller, figure."""
+class Cell(NamedTuple):
+    """A cell of the table: number of a case, controller, figure; and its seeds."""
+
+    number: int
+    controller: str
+    figure: str
+    seeds: range
 
 
 def settings_of(case: Case, controller: str) -> list[str]:
@@ -138,11 +144,11 @@ def settings_of(case: Case, controller: str) -> list[str]:
     return ["variant=ideal", *SMALL_NOISE, *steered, *case.settings]
 
 
-def run(number: int, controller: str, figure: str, seeds: int) -> list[Outcome]:
+def run(cell: Cell) -> list[Outcome]:
     """The runs of one cell of the table."""
-    text = load(figure, settings_of(CASES[number], controller))
+    text = load(cell.figure, settings_of(CASES[cell.number], cell.controller))
     image = load_hex(image_path())
-    return [_run(World(text.scenario, seed, image)) for seed in range(seeds)]
+    return [_run(World(text.scenario, seed, image)) for seed in cell.seeds]
 
 
 def _run(world: World) -> Outcome:
@@ -153,10 +159,6 @@ def _run(world: World) -> Outcome:
     last = errors[-LAST_SECOND:]
     rms = math.sqrt(math.fsum(position * position for position, _ in last) / len(last))
     return Outcome(rms, any(position > SETTLED_CM or heading > SETTLED_RAD for position, heading in last))
-
-
-def _leave_ctrl_c_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _error(truth: Posture, reference: Posture) -> tuple[float, float]:
@@ -196,42 +198,36 @@ def chosen(only: Iterable[str]) -> list[int]:
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Each disturbance alone, on three controllers.")
-    parser.add_argument("--seeds", type=int, default=20, help="runs a cell, seeds from 0 on (default 20)")
+    parser.add_argument("--seeds", type=range_of_seeds, default=range(20), help="first and last: 0-19")
     parser.add_argument("--only", default="", help="groups or parts of names, separated by commas")
-    parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: all cores)"
-    )
+    parser.add_argument("--jobs", type=int, default=cores(), help="processes (default: all cores)")
     given = parser.parse_args(arguments)
     numbers = chosen(given.only.split(","))
     if not numbers:
         parser.error(
             f"no disturbance is called {given.only!r}; groups: {', '.join(dict.fromkeys(c.group for c in CASES))}"
         )
-    if given.seeds < 1 or given.jobs < 1:
-        parser.error("--seeds and --jobs must be 1 or above")
-    jobs: list[Job] = [
-        (number, name, figure) for number in numbers for figure in FIGURES for name in CONTROLLERS
+    if given.jobs < 1:
+        parser.error("--jobs must be 1 or above")
+    plan = [
+        Cell(number, name, figure, given.seeds)
+        for number in numbers
+        for figure in FIGURES
+        for name in CONTROLLERS
     ]
-    found: dict[Job, list[Outcome]] = {}
+    found: dict[tuple[int, str, str], list[Outcome]] = {}
     begun = time.monotonic()
-    pool = ProcessPoolExecutor(given.jobs, initializer=_leave_ctrl_c_to_the_parent)
     interrupted = False
     try:
-        waiting: dict[Future[list[Outcome]], Job] = {pool.submit(run, *job, given.seeds): job for job in jobs}
-        for done in as_completed(waiting):
-            found[waiting[done]] = done.result()
-            spent = time.monotonic() - begun
-            left = spent / len(found) * (len(jobs) - len(found))
-            print(
-                f"\r{len(found)} of {len(jobs)} cells, {left:.0f} s left  ",
-                end="",
-                file=sys.stderr,
-                flush=True,
-            )
+        results = in_order(run, plan, processes(given.jobs), 2 * given.jobs)
+        for cell, outcomes in zip(plan, results, strict=True):
+            found[cell[:3]] = outcomes
+            left = (time.monotonic() - begun) / len(found) * (len(plan) - len(found))
+            text = f"\r{len(found)} of {len(plan)} cells, {left:.0f} s left  "
+            print(text, end="", file=sys.stderr, flush=True)
     except KeyboardInterrupt:
         interrupted = True
     finally:
-        pool.shutdown(wait=not interrupted, cancel_futures=True)
         print(file=sys.stderr)
     for line in head():
         print(line)

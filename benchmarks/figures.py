@@ -1,4 +1,4 @@
-"""Scenarios over many seeds, as one row of figures each: `python -m benchmarks.figures fig6 fig8 --seeds 0:50`.
+"""Scenarios over many seeds, as one row of figures each: `python -m benchmarks.figures fig6 fig8 --seeds 0-49`.
 
 What belongs here: running a scenario once a seed, on all processors, and counting up what came of it. What does not:
 the figures of one run (`mirotwin.report`). `--set KEY=VALUE` changes keys as `mirotwin run` does, for all scenarios.
@@ -14,10 +14,8 @@ faults   firmware faults, all runs added up
 from __future__ import annotations
 
 import argparse
-import os
 import statistics
 from collections.abc import Iterable, Sequence
-from multiprocessing import get_context
 from typing import NamedTuple
 
 from miro_exact.bad_input import BadInput
@@ -26,6 +24,9 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario import file
 from miro_sim.world.world import World
+from mirotwin.campaign.execute import in_order
+from mirotwin.campaign.processes import cores, processes
+from mirotwin.campaign.seeds import seeds_of
 from mirotwin.report.summary import tracking_of
 from mirotwin.report.track import Tracks
 
@@ -68,15 +69,17 @@ class Row(NamedTuple):
         return f"{name:12} {self.runs:4}  {position:32} {self.x_cm:7.2f} {self.y_cm:7.2f} {counts}"
 
 
-def drive(task: tuple[str, Sequence[str], int]) -> Outcome:
-    """One run: name or file of a scenario, settings, seed. ValueError with the line that `mirotwin run` would print."""
-    try:
-        return _driven(*task)
-    except BadInput as error:  # which does not get from one process to another
-        raise ValueError(str(error)) from None
+class Task(NamedTuple):
+    """A name or file of a scenario, settings, seed."""
+
+    source: str
+    settings: tuple[str, ...]
+    seed: int
 
 
-def _driven(source: str, settings: Sequence[str], seed: int) -> Outcome:
+def drive(task: Task) -> Outcome:
+    """One run. Raises BadInput."""
+    source, settings, seed = task
     world = World(file.load(source, settings).scenario, seed, load_hex(image_path()))
     tracks, speeds = Tracks(), []
     while not world.finished:
@@ -120,23 +123,18 @@ def row(outcomes: Sequence[Outcome]) -> Row:
 
 def outcomes(source: str, settings: Sequence[str], seeds: Iterable[int], jobs: int = 1) -> list[Outcome]:
     """The runs of one scenario, in the order of the seeds, in `jobs` processes."""
-    tasks = [(source, tuple(settings), seed) for seed in seeds]
+    tasks = [Task(source, tuple(settings), seed) for seed in seeds]
     if jobs == 1:
         return [drive(task) for task in tasks]
-    with get_context("spawn").Pool(jobs) as pool:
-        return pool.map(drive, tasks, chunksize=1)
+    return list(in_order(drive, tasks, processes(jobs), 4 * jobs))
 
 
-def seeds_of(text: str) -> range:
-    """`0:50` is 0 to 49."""
-    first, _, end = text.partition(":")
+def range_of_seeds(text: str) -> range:
+    """For the command line."""
     try:
-        found = range(int(first), int(end)) if end else range(int(first), int(first) + 1)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}: write FIRST:END, like 0:50 for 0 to 49") from None
-    if not found or found[0] < 0:
-        raise argparse.ArgumentTypeError(f"{text!r} holds no seed")
-    return found
+        return seeds_of(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def main() -> None:
@@ -144,18 +142,16 @@ def main() -> None:
     parser.add_argument("scenario", nargs="+", help="built-in scenario or file")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings")
     parser.add_argument(
-        "--seeds", type=seeds_of, default=range(20), metavar="FIRST:END", help="0:20 unless told"
+        "--seeds", type=range_of_seeds, default=range(20), metavar="FIRST-LAST", help="0-19 unless told"
     )
-    parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, help="processes; one a processor unless told"
-    )
+    parser.add_argument("--jobs", type=int, default=cores(), help="processes; one a processor unless told")
     parser.add_argument("--each", action="store_true", help="a line for each run as well")
     options = parser.parse_args()
     print(HEAD)
     for source in options.scenario:
         try:
             found = outcomes(source, options.settings, options.seeds, options.jobs)
-        except ValueError as error:
+        except BadInput as error:
             parser.error(str(error))
         for one in found if options.each else ():
             settled = "never" if one.settled_s is None else f"{one.settled_s:.2f} s"

@@ -13,11 +13,11 @@ import argparse
 import math
 import sys
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from os import cpu_count
 from statistics import median
 from typing import NamedTuple
+
+from benchmarks.figures import range_of_seeds
 
 from miro_exact.rng import Stream
 from miro_host.posture import Posture
@@ -27,6 +27,8 @@ from miro_sim.pitch import ground
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario.build import reference_for
 from miro_sim.world.world import World
+from mirotwin.campaign.execute import in_order
+from mirotwin.campaign.processes import cores, processes
 from mirotwin.report.summary import tracking_of
 from mirotwin.report.track import Tracks
 
@@ -132,8 +134,19 @@ def _image() -> Image:
     return load_hex(image_path())
 
 
-def run(case: Case, seed: int, law: str, estimator: str, keys: str = "") -> Result:
-    """One run of a case to its end, with an estimator and further keys of its table."""
+class Task(NamedTuple):
+    """A run of a case: seed, law, estimator, and further keys of the estimator's table."""
+
+    case: Case
+    seed: int
+    law: str
+    estimator: str
+    keys: str = ""
+
+
+def run(task: Task) -> Result:
+    """To its end."""
+    case, seed, law, estimator, keys = task
     spread = "" if case.wheel_spread is None or estimator == "none" else f",wheel_spread={case.wheel_spread}"
     controller = () if law == "yang_kim" else (f'network.robot.controller={{law="{law}"}}',)
     more = f",{keys}" if keys else ""
@@ -183,35 +196,32 @@ def table(chosen: Iterable[Case], seeds: range, *parts: str) -> bool:
     print("| case | median | 95 % | worst | settled | longest off the pitch, s | |")
     print("|---|---|---|---|---|---|---|")
     all_good = True
-    with ProcessPoolExecutor(cpu_count()) as pool:
-        for case in chosen:
-            count = len(seeds) * case.runs_a_seed
-            every = range(seeds.start, seeds.start + count)
-            pending = pool.map(run, *zip(*[(case, seed, *parts) for seed in every], strict=True))
-            results = []
-            for done, result in enumerate(pending, 1):
-                results.append(result)
-                print(f"\r{case.name}: {done} of {count}   ", end="", file=sys.stderr, flush=True)
-            print("\r\033[K", end="", file=sys.stderr, flush=True)
-            line, good = row(case, results)
-            print(line, flush=True)
-            all_good = all_good and good
+    for case in chosen:
+        count = len(seeds) * case.runs_a_seed
+        tasks = [Task(case, seed, *parts) for seed in range(seeds.start, seeds.start + count)]
+        results = []
+        for result in in_order(run, tasks, processes(cores()), 4 * cores()):
+            results.append(result)
+            print(f"\r{case.name}: {len(results)} of {count}   ", end="", file=sys.stderr, flush=True)
+        print("\r\033[K", end="", file=sys.stderr, flush=True)
+        line, good = row(case, results)
+        print(line, flush=True)
+        all_good = all_good and good
     return all_good
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", default="0-49", help="first and last")
+    parser.add_argument("--seeds", type=range_of_seeds, default=range(50), help="first and last: 0-49")
     parser.add_argument("--law", default="body_frame")
     parser.add_argument("--estimator", default="ekf")
     parser.add_argument("--keys", default="", help="of the estimator, as in rim_noise_m_s=0.02")
     parser.add_argument("--only", default="", help="parts of the names of cases, with ; between them")
     asked = parser.parse_args()
-    first, last = (int(word) for word in asked.seeds.split("-"))
     chosen = [case for case in cases() if any(word in case.name for word in asked.only.split(";"))]
     if not chosen:
         parser.error("no case has such a name")
-    if not table(chosen, range(first, last + 1), asked.law, asked.estimator, asked.keys):
+    if not table(chosen, asked.seeds, asked.law, asked.estimator, asked.keys):
         sys.exit(1)
 
 

@@ -12,10 +12,12 @@ from tests.host import filter_bits
 from tests.naive import kalman
 
 from miro_exact import engine
-from miro_host.estimators.filter import SIZE, Filter
+from miro_host.estimators.filter import Filter
 from miro_host.estimators.motion import Motion
 from miro_host.pilot import PERIOD_S
 
+SIZE = 9
+"""All that the filter can estimate."""
 TRACK_M, SLOPE = 0.068, 6.0
 DRIFT = (0.002, 0.01, 0.0002, 0.01)
 WARP = (0.005, 0.3)

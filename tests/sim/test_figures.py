@@ -1,6 +1,6 @@
 """The figures of the paper as scenarios: starts, gains, and what comes of them in the whole loop.
 
-`python -m benchmarks.figures fig6 fig7 fig8 fig9 fig10 --seeds 0:50` measures what a few seeds hold here.
+`python -m benchmarks.figures fig6 fig7 fig8 fig9 fig10 --seeds 0-49` measures what a few seeds hold here.
 """
 
 import msgspec

@@ -25,14 +25,16 @@ def run_world(*sets, seed=1, scenario="fig6"):
 
 @pytest.mark.parametrize("estimator", ["ekf", "ekf+telemetry"])
 def test_a_calibrated_camera_brings_the_robot_within_a_millimetre_and_a_half(estimator):
-    result = improved.run(CASES["calibrated, Fig. 6"], 1, "body_frame", estimator)
+    result = improved.run(improved.Task(CASES["calibrated, Fig. 6"], 1, "body_frame", estimator))
     assert result.settled
     assert 0.0 < result.position_cm < 0.15
     assert result.off_pitch_s == 0.0
 
 
 def test_uneven_wheels_do_not_lead_the_robot_aside():
-    result = improved.run(CASES["wheels 1.05 and 0.95, calibrated, Fig. 8"], 1, "body_frame", "ekf")
+    result = improved.run(
+        improved.Task(CASES["wheels 1.05 and 0.95, calibrated, Fig. 8"], 1, "body_frame", "ekf")
+    )
     assert result.position_cm < 0.3
 
 

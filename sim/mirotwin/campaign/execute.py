@@ -1,30 +1,31 @@
-"""Makes the rows of many jobs in the order of the jobs, whatever executor runs them.
+"""Makes the results of many jobs in the order of the jobs, whatever executor runs them.
 
 What belongs here: handing jobs over, and the end when somebody interrupts. What does not: one run (`job`), how
 processes begin (`processes`).
 
-A row is a function of its job, so it does not matter which process made it, or how many there were.
+A result is a function of its job, so it does not matter which process made it, or how many there were.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
+from typing import TypeVar
 
 from miro_exact.bad_input import BadInput
-from mirotwin.campaign.job import Job, Row, run
+
+J = TypeVar("J")
+R = TypeVar("R")
 
 
-def rows(
-    jobs: Sequence[Job], executor: Executor, ahead: int, make: Callable[[Job], Row] = run
-) -> Iterator[Row]:
-    """The rows in the order of the jobs, each as soon as it and those before it are there.
+def in_order(make: Callable[[J], R], jobs: Iterable[J], executor: Executor, ahead: int) -> Iterator[R]:
+    """`make` of each job, as soon as it and those before it are there.
 
-    `ahead`: so many jobs are handed over before the first row is back. Whoever stops asking, or is interrupted, leaves
-    no job behind: the executor is shut down.
+    `ahead`: so many jobs are handed over before the first result is back. Whoever stops asking, or is interrupted,
+    leaves no job behind: the executor is shut down.
     """
-    pending: deque[Future[Row]] = deque()
+    pending: deque[Future[R]] = deque()
     try:
         for job in jobs:
             pending.append(executor.submit(make, job))

@@ -11,10 +11,10 @@ from typing import Any
 import click
 import msgspec
 
-from miro_exact.seed import MAX_SEED
-from mirotwin.campaign.execute import rows
-from mirotwin.campaign.job import Job, Row
+from mirotwin.campaign.execute import in_order
+from mirotwin.campaign.job import Job, Row, run
 from mirotwin.campaign.processes import cores, processes
+from mirotwin.campaign.seeds import seeds_of
 from mirotwin.cli.held_signals import Hold, held_signals
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
 from mirotwin.cli.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line
@@ -39,7 +39,6 @@ from mirotwin.reproduce.rows import by_label, middle_seeds
 PAGE = "reproduction.md"
 FOLDER = "reproduction"
 ROWS = "rows.csv"
-MOST_SEEDS = 1000
 AHEAD = 4
 """Jobs for each process that are handed over: enough to keep it busy, few enough to stop soon."""
 
@@ -52,15 +51,10 @@ class Seeds(click.ParamType[range]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
         if isinstance(value, range):
             return value
-        first, _, last = str(value).partition("-")
-        if not (first.isdecimal() and (last or first).isdecimal() and len(str(value)) < 40):
-            self.fail(f"{value!r} is no range of seeds; write it like 0-49", param, ctx)
-        found = range(int(first), int(last or first) + 1)
-        if found.stop > MAX_SEED:
-            self.fail(f"{value!r}: the largest seed is {MAX_SEED}", param, ctx)
-        if not 1 <= len(found) <= MOST_SEEDS:
-            self.fail(f"{value!r} has {len(found)} seeds; give 1 to {MOST_SEEDS}", param, ctx)
-        return found
+        try:
+            return seeds_of(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
 
 
 @click.command(short_help="Runs the paper's figures again and writes one page about them.")
@@ -135,7 +129,7 @@ def _record(plan: Sequence[Job], count: int, hold: Hold, quiet: bool) -> None:
 
 
 def _rows(plan: Sequence[Job], count: int) -> Iterator[Row]:
-    yield from rows(plan, processes(count), AHEAD * count)
+    yield from in_order(run, plan, processes(count), AHEAD * count)
 
 
 def _draw(start: Start, folder: OutputFolder, seeds: Mapping[str, int]) -> None:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import msgspec
 
+from miro_host.laws.epsilon_tracking import THEORY as THEORY_GAINS
 from mirotwin.campaign.job import Job
 
 PAPER = "paper"
@@ -56,13 +57,9 @@ STARTS = (
 
 EPSILON_SETTINGS = {
     ILLUSTRATIVE: (),  # those of fig9 and fig10
-    THEORY: (
-        "network.robot.controller.epsilon_rad=0.2",
-        "network.robot.controller.alpha_per_s=3.0",
-        "network.robot.controller.beta_per_s=22.0",
-        "network.robot.controller.length_m=0.10",
-        "network.robot.controller.sigma=invariant",
-        "network.robot.controller.switching=sign",
+    THEORY: tuple(
+        f"network.robot.controller.{gain}={getattr(THEORY_GAINS, gain)}"
+        for gain in ("epsilon_rad", "alpha_per_s", "beta_per_s", "length_m", "sigma", "switching")
     ),
     RETUNED: ("network.robot.controller={law = 'epsilon_tracking'}",),  # the defaults of the law
 }

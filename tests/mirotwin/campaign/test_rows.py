@@ -1,5 +1,6 @@
 """Many runs: rows in the order of their jobs, whoever made them, and what is left when something goes wrong."""
 
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -7,15 +8,18 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
-from mirotwin.campaign.execute import rows
+from mirotwin.campaign.execute import in_order
 from mirotwin.campaign.job import Job, Row, run
 from mirotwin.campaign.processes import processes
+from mirotwin.campaign.seeds import seeds_of
 from mirotwin.recording.reader import read
 from mirotwin.report.summary import tracking_of
 from mirotwin.report.track import Tracks
@@ -51,12 +55,12 @@ def test_without_delay_noise_and_error_the_camera_sees_the_truth():
 def test_rows_come_in_the_order_of_the_jobs_and_are_the_same_from_processes():
     jobs = [job("a", seed) for seed in range(3)] + [job("b", 0, "network.robot.start_error_x_cm=40.0")]
     alone = [run(one) for one in jobs]
-    assert list(rows(jobs, processes(2), 3)) == alone
+    assert list(in_order(run, jobs, processes(2), 3)) == alone
     assert [(row.label, row.seed) for row in alone] == [("a", 0), ("a", 1), ("a", 2), ("b", 0)]
 
 
 def test_a_run_that_cannot_be_made_is_a_row_with_its_error_and_costs_no_other():
-    found = list(rows([job("a", 0, "network.robot.slot=9"), job("b")], processes(1), 2))
+    found = list(in_order(run, [job("a", 0, "network.robot.slot=9"), job("b")], processes(1), 2))
     assert "slot" in found[0].error
     assert found[0].digest == ""
     assert found[1].error == ""
@@ -77,7 +81,7 @@ def test_whoever_stops_asking_leaves_no_job_behind():
         return Row(one.label, one.scenario, one.seed)
 
     executor = ThreadPoolExecutor(1)
-    asking = rows([job("a", seed) for seed in range(100)], executor, 4, slow)
+    asking = in_order(slow, [job("a", seed) for seed in range(100)], executor, 4)
     assert next(asking).seed == 0
     asking.close()
     assert len(made) < 6
@@ -92,7 +96,7 @@ def ended(one):
 
 def test_a_process_that_is_killed_is_told_in_a_line():
     with pytest.raises(BadInput, match="--jobs: a process that made rows has ended"):
-        list(rows([job()], processes(1), 1, ended))
+        list(in_order(ended, [job()], processes(1), 1))
 
 
 def test_the_processes_ignore_ctrl_c_from_their_first_instruction():
@@ -101,7 +105,24 @@ def test_the_processes_ignore_ctrl_c_from_their_first_instruction():
     try:
         for child in multiprocessing.active_children():
             os.kill(child.pid, signal.SIGINT)
-        assert next(rows([job()], executor, 1)).error == ""
+        assert next(in_order(run, [job()], executor, 1)).error == ""
     finally:
         executor.shutdown()
     assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize(("text", "seeds"), [("0-49", range(50)), ("7", range(7, 8)), ("3-3", range(3, 4))])
+def test_seeds_are_written_with_the_last_one(text, seeds):
+    assert seeds_of(text) == seeds
+
+
+@given(st.text(max_size=60))
+def test_any_other_text_is_refused(text):
+    with contextlib.suppress(ValueError):
+        assert 1 <= len(seeds_of(text)) <= 1000
+
+
+@pytest.mark.parametrize("text", ["", "-", "9-0", "a", "0-49-50", "0:50", "0-1000", "1" * 41, "0-\n"])
+def test_what_is_no_range_is_refused_in_a_line(text):
+    with pytest.raises(ValueError, match=r"^[^\n]*\Z"):
+        seeds_of(text)

@@ -1,0 +1,25 @@
+"""Seeds as people write them: 0-49, or one alone.
+
+What belongs here: from text to a range. What does not: what runs with them (`job`).
+"""
+
+from __future__ import annotations
+
+from miro_exact.seed import MAX_SEED
+
+MOST_SEEDS = 1000
+_LONGEST = 40
+
+
+def seeds_of(text: str) -> range:
+    """First and last seed, both included. ValueError with what is wrong."""
+    first, _, last = text.partition("-")
+    last = last or first
+    if not (len(text) <= _LONGEST and first.isdecimal() and last.isdecimal()):
+        raise ValueError(f"{text[:_LONGEST]!r} is no range of seeds; write it like 0-49")
+    if int(last) > MAX_SEED:
+        raise ValueError(f"{text!r}: the largest seed is {MAX_SEED}")
+    found = range(int(first), int(last) + 1)
+    if not 1 <= len(found) <= MOST_SEEDS:
+        raise ValueError(f"{text!r} has {len(found)} seeds; give 1 to {MOST_SEEDS}")
+    return found
