@@ -24,7 +24,7 @@ import msgspec
 
 from miro_protocol import files, stream_header
 from miro_protocol.stream_error import StreamError as StreamError
-from miro_protocol.stream_events import WHO_CAN
+from miro_protocol.stream_events import WHO_CAN, Deed
 from miro_protocol.stream_header import PREFIX, Header
 from miro_protocol.stream_line import (
     FIRST_LINE,
@@ -63,6 +63,13 @@ class Stream(msgspec.Struct, frozen=True):
     def transmissions(self) -> list[Transmission]:
         """All transmissions. Raises StreamError for an event: for readers that cannot act on any."""
         return [characters(entry, self.source) for entry in self.entries]
+
+    def happenings(self) -> list[Transmission | Deed]:
+        """All transmissions and deeds. Raises StreamError for a level on a pin, which no board leaves open."""
+        return [
+            entry.what if isinstance(entry.what, Deed) else characters(entry, self.source)
+            for entry in self.entries
+        ]
 
 
 def characters(entry: Entry, source: str) -> Transmission:

@@ -20,6 +20,15 @@ class Reset(msgspec.Struct, frozen=True):
     level: int
 
 
+class Power(msgspec.Struct, frozen=True):
+    """`TICK *@N/SLOT power 0|1`: a robot's supply is switched off or on."""
+
+    tick: int
+    network: int
+    slot: int
+    on: int
+
+
 class RadioState(msgspec.Struct, frozen=True):
     """`TICK *@N radio up|down|noise`: from then on the radio of a network works, is off, or gives noise."""
 
@@ -36,11 +45,14 @@ class PinLevel(msgspec.Struct, frozen=True):
     level: int
 
 
-StreamEvent = Reset | RadioState | PinLevel
+Deed = Reset | Power | RadioState
+"""What somebody does to a robot or a radio in a world."""
+StreamEvent = Deed | PinLevel
 
 WHO_CAN = {
-    Reset: "no command supports it yet; in Python `mirotwin.testing.bench.Bench.reset` resets a robot",
-    RadioState: "no command supports it yet; in Python `mirotwin.testing.bench.Bench.trouble` disturbs a radio",
+    Reset: "`mirotwin replay` resets robots",
+    Power: "`mirotwin replay` switches robots off and on",
+    RadioState: "`mirotwin replay` switches radios off and on",
     PinLevel: "`mirotwin fw run --pins FILE` puts levels on the pins of a bare processor",
 }
 """For a reader that cannot act on an event: who can."""

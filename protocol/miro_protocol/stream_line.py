@@ -3,6 +3,7 @@
     792000 > 55 55 ff 2d d4        characters from the host of network 0
     792000 <@1 55 55! ff           ... from a robot of network 1; the second one has a bad stop bit
     800000 *@1/2 reset 1           events, see `stream_events.py`
+    800000 *@1/2 power 0
     800000 *@1 radio down
     800000 * P1.0 0
 
@@ -17,7 +18,7 @@ from dataclasses import dataclass, field
 from reprlib import repr as brief
 
 from miro_protocol.stream_error import StreamError
-from miro_protocol.stream_events import PinLevel, RadioState, Reset, StreamEvent
+from miro_protocol.stream_events import PinLevel, Power, RadioState, Reset, StreamEvent
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DIRECTIONS, DOWN, UP, Transmission, check_bad_stop
 
@@ -35,7 +36,7 @@ _TICK = re.compile(r"[0-9]{1,19}")
 _CHARACTER = re.compile(r"([0-9a-fA-F]{2})(!?)")
 _PLACE = re.compile(r"([<>*])(?:@([0-9]{1,5})(?:/([0-9]{1,5}))?)?")
 _PIN = re.compile(r"P[0-3]\.[0-7]")
-_EVENTS = "write `*@N/SLOT reset 0|1`, `*@N radio up|down|noise` or `* P1.0 0|1`"
+_EVENTS = "write `*@N/SLOT reset 0|1`, `*@N/SLOT power 0|1`, `*@N radio up|down|noise` or `* P1.0 0|1`"
 
 Happening = Transmission | StreamEvent
 
@@ -86,10 +87,11 @@ def _event(event: StreamEvent) -> str:
         _check("level", event.level, 1)
         return f"{HAND} {event.pin} {event.level}"
     _check("network", event.network, MAX_NETWORK)
-    if isinstance(event, Reset):
+    if isinstance(event, Reset | Power):
+        word, value = ("reset", event.level) if isinstance(event, Reset) else ("power", event.on)
         _check("slot", event.slot, MAX_SLOT)
-        _check("level", event.level, 1)
-        return f"{HAND}@{event.network}/{event.slot} reset {event.level}"
+        _check("level", value, 1)
+        return f"{HAND}@{event.network}/{event.slot} {word} {value}"
     if event.state not in RADIO_STATES:
         raise ValueError(f"state = {event.state!r}: must be {', '.join(RADIO_STATES)}")
     return f"{HAND}@{event.network} radio {event.state}"
@@ -201,6 +203,8 @@ class Line:
         word, value = tokens[2][0], tokens[3][0]
         if word == "reset" and slot is not None and network is not None and value in ("0", "1"):
             return Reset(tick, network, slot, int(value))
+        if word == "power" and slot is not None and network is not None and value in ("0", "1"):
+            return Power(tick, network, slot, int(value))
         if word == "radio" and slot is None and network is not None and value in RADIO_STATES:
             return RadioState(tick, network, value)  # type: ignore[arg-type]
         if _PIN.fullmatch(word) and network is None and value in ("0", "1"):

@@ -32,6 +32,8 @@ cdef class Board(Bus):
     cdef public long long fault_count
     cdef long long busy_writes
     cdef int contention
+    cdef readonly int held
+    cdef readonly int powered
     cdef int bus_levels
     cdef unsigned char bank[13]
     cdef unsigned char watched[13]

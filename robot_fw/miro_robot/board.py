@@ -86,6 +86,8 @@ class Board(Bus):
         "fault_count": TICK,
         "busy_writes": TICK,
         "contention": FLAG,
+        "held": FLAG,
+        "powered": FLAG,
     }
     NOT_STATE = (
         "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
@@ -123,6 +125,8 @@ class Board(Bus):
         self.probe: Probe | None = None
         self.busy_writes = 0
         self.contention = 0
+        self.held = 0  # the level of RST
+        self.powered = 1
         self.bus_levels = 0xFF
         self.bank = bytearray([0xFF] * (CONSTANT_BANK + 1))
         self.external = bytearray([0xFF] * PORTS)
@@ -235,6 +239,37 @@ class Board(Bus):
                 self._drive_interrupts(now)
             if self.probe is not None:
                 self.probe.passed(now)
+
+    # ---- RST and supply ------------------------------------------------------------------------------------
+
+    def set_reset(self, level: int) -> None:
+        """The level of the CPU's RST pin from now on, between two instructions: 1 holds it in reset.
+
+        The two LM629 have a reset of their own, on a port pin: they go on until the firmware resets them.
+        """
+        if level and not self.held:
+            self.cpu.hold()
+        elif self.held and not level and self.powered:
+            self.cpu.reset()
+        self.held = level
+
+    def set_power(self, on: int) -> None:
+        """Switches the robot's supply off or on, between two instructions.
+
+        Off, the processor and both LM629 stand and the motors coast; on, all begin as at first, with zeros in RAM.
+        """
+        if on == self.powered:
+            return
+        self.powered = on
+        if on and not self.held:
+            self.cpu.reset()
+        if not on:
+            self.cpu.hold()
+            for address in range(256):
+                self.cpu.poke_iram(address, 0)
+        tick = self.cpu.cycles * CYCLE_TICKS
+        self.sync(tick)
+        self._drive_chips(tick)
 
     # ---- from chip to bridge and CPU ----------------------------------------------------------------------
 
@@ -354,6 +389,9 @@ class Board(Bus):
         while pin < _PINS:
             pins[pin] = self._level(pin)
             pin += 1
+        if not self.powered:
+            pins[_LEFT_RST] = 0
+            pins[_RIGHT_RST] = 0
         self._watch_timing(data, tick)
         if pins[_LEFT_RST] != self.left.reset_level:
             self.left.set_reset(tick, pins[_LEFT_RST])

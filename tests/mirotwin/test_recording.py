@@ -20,6 +20,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from tests.mirotwin.synthetic import periods
 
+from miro_protocol.stream_events import Power, RadioState, Reset
 from miro_sim.periods import Control
 from mirotwin.recording import channels, topics
 from mirotwin.recording import recorder as recorder_module
@@ -54,6 +55,17 @@ def test_what_goes_in_comes_out_to_the_last_bit() -> None:
     assert recording.source == SOURCE
     assert recording.periods == tuple(periods(3, [(0, 0), (0, 2), (1, 0)]))
     assert recording.digest == recording.periods[-1].digest
+
+
+def test_what_was_done_to_robots_and_radios_comes_out_again() -> None:
+    deeds = (Reset(5, 0, 2, 1), Power(6, 1, 0, 0), RadioState(7, 1, "noise"), RadioState(8, 1, "up"))
+    period = msgspec.structs.replace(next(periods(1)), deeds=deeds)
+    stream = io.BytesIO()
+    with Recorder(stream, SOURCE) as recorder:
+        recorder.write(period)
+    assert sorted(parse(stream.getvalue(), "run.mcap").periods[0].deeds, key=lambda deed: deed.tick) == [
+        *deeds
+    ]
 
 
 def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(

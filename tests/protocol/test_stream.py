@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from miro_protocol import stream, stream_header, stream_line
 from miro_protocol.stream import Entry, StreamError
-from miro_protocol.stream_events import PinLevel, RadioState, Reset
+from miro_protocol.stream_events import PinLevel, Power, RadioState, Reset
 from miro_protocol.transmission import DIRECTIONS, Transmission
 
 comments = st.text(st.characters(blacklist_categories=("Cc", "Cs", "Zl", "Zp")), max_size=20).map(str.strip)
@@ -26,6 +26,7 @@ def flawed(draw):
 slots, levels = st.integers(0, stream_line.MAX_SLOT), st.integers(0, 1)
 events = st.one_of(
     st.builds(Reset, ticks, networks, slots, levels),
+    st.builds(Power, ticks, networks, slots, levels),
     st.builds(RadioState, ticks, networks, st.sampled_from(stream_line.RADIO_STATES)),
     st.builds(PinLevel, ticks, st.from_regex(r"\AP[0-3]\.[0-7]\Z"), levels),
 )
@@ -83,6 +84,7 @@ def test_lines_look_as_the_protocol_page_shows_them():
     assert line == "792000 > 55 ff 2d d4  # team seq=3"
     assert stream.format_line(Transmission(792000, "<", b"\x55\xff", 1, (0,))) == "792000 <@1 55! ff"
     assert stream.format_line(Reset(5, 0, 2, 1)) == "5 *@0/2 reset 1"
+    assert stream.format_line(Power(5, 0, 2, 0)) == "5 *@0/2 power 0"
     assert stream.format_line(RadioState(5, 1, "noise")) == "5 *@1 radio noise"
     assert stream.format_line(PinLevel(5, "P3.2", 0)) == "5 * P3.2 0"
 
@@ -211,6 +213,8 @@ def test_any_text_at_all_is_a_stream_or_a_stream_error(head, text):
         (Transmission(0, ">", b"ab", 0, (1, 0)), ""),
         (Reset(0, 0, 5, 1), ""),
         (Reset(0, 0, 0, 2), ""),
+        (Power(0, 0, 5, 1), ""),
+        (Power(0, 0, 0, 2), ""),
         (RadioState(0, 0, "off"), ""),
         (PinLevel(0, "P4.0", 1), ""),
         (Transmission(0, ">", b"a"), "two\nlines"),
@@ -236,8 +240,9 @@ def test_transmissions_out_of_order_are_not_written():
 @pytest.mark.parametrize(
     ("event", "who"),
     [
-        ("*@0/1 reset 1", "Bench.reset"),
-        ("*@0 radio down", "Bench.trouble"),
+        ("*@0/1 reset 1", "`mirotwin replay`"),
+        ("*@0/1 power 0", "`mirotwin replay`"),
+        ("*@0 radio down", "`mirotwin replay`"),
         ("* P1.0 0", "`mirotwin fw run --pins FILE`"),
     ],
 )

@@ -44,6 +44,7 @@ cdef class Cpu(Executor):
     cpdef int code_at(self, int address) noexcept
     @cython.locals(now='long long', port=int)
     cpdef reset(self)
+    cpdef hold(self)
     cpdef int run(self, long long until_cycle) except -1
     cpdef int go_on(self, long long until_cycle) except -1
     cpdef int step(self) except -1
@@ -75,6 +76,7 @@ cdef class Cpu(Executor):
     cpdef int psw(self) noexcept
     cdef int write_psw(self, int value) except -1
     cdef int write_pcon(self, int value) except -1
+    cdef int _stop_clock(self) except -1
     cdef int write_port(self, int port, int value) except -1
     @cython.locals(value=int)
     cdef int movx_read(self, int address) except -1

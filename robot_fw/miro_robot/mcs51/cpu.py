@@ -206,6 +206,11 @@ class Cpu(Executor):
             self.write_port(port, 0xFF)
         self.peripherals.clock_serial()
 
+    def hold(self) -> None:
+        """RST goes high and stays: nothing is executed until `reset`, its falling edge."""
+        self.reset()
+        self._stop_clock()
+
     def step(self) -> int:
         """One instruction or interrupt entry; an idle CPU advances by a cycle."""
         return self.run(self.cycles + 1)
@@ -438,14 +443,18 @@ class Cpu(Executor):
             self.peripherals.write_smod(value >> 7, self.cycles)
         self.pcon = value & _PCON_BITS
         if value & _PD:
-            self.peripherals.sync(self.cycles)
-            self.peripherals.settle()
-            self.peripherals.frozen = 1
-            self.powered_down = 1
+            self._stop_clock()
         elif value & _IDL:
             self.idle = 1
         self.next_event = 0
         self.limit = 0
+
+    def _stop_clock(self) -> None:
+        """Nothing happens any more until a reset."""
+        self.peripherals.sync(self.cycles)
+        self.peripherals.settle()
+        self.peripherals.frozen = 1
+        self.powered_down = 1
 
     def write_port(self, port: int, value: int) -> None:
         if value != self.peripherals.ports.latches[port]:

@@ -5,6 +5,7 @@ from miro_sim.radio.chain cimport Chain
 from miro_exact.rng cimport Stream
 
 cdef long long _NEVER, _BIT, _HOLD
+cdef int _DOWN, _NOISE
 
 
 cdef class Transmitter:
@@ -16,7 +17,8 @@ cdef class Transmitter:
 cdef class Band:
     cdef readonly object params, seed
     cdef readonly str name
-    cdef Stream errors
+    cdef Stream errors, noise
+    cdef public int condition
     cdef long long latency
     cdef unsigned long long threshold, burst_threshold
     cdef bint slotted

@@ -7,7 +7,8 @@ What belongs here: the level as a function of time. At tick t, with u = t - late
 * the level is the AND of the TXD levels of the robots whose carrier is up (two at once: space wins);
 * with any carrier up it is inverted if the `errors` stream is below the threshold at index u // 2500; the
   threshold is that of a burst if the `bursts` chain of one of them is bad in slot u // 2500;
-* with none it is mark: this band's receiver is always squelched.
+* with none it is mark: this band's receiver is always squelched;
+* while the radio is down no carrier is up; in noise the level is the bit of the `noise` stream at index t // 2500.
 
 Sampling it as a UART is the business of `uplink`.
 """
@@ -18,11 +19,13 @@ from miro_exact.clock import HOST_BIT_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK
 from miro_exact.rng import Stream
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
+from miro_sim.radio.condition import DOWN, NOISE, UP
 from miro_sim.radio.params import RadioParams
 
 _NEVER = NEVER_TICK
 _BIT = 2500
 _HOLD = 50_000
+_DOWN, _NOISE = DOWN, NOISE
 assert (HOST_BIT_TICKS, 2 * HOST_CHARACTER_TICKS) == (_BIT, _HOLD)
 
 
@@ -45,14 +48,26 @@ class Transmitter:
 class Band:
     """The mixed level. Ticks are the receiver's; queries come in ascending order, below `limit`."""
 
-    STATE = {"transmitters": [Transmitter]}
-    NOT_STATE = ("burst_threshold", "errors", "latency", "name", "params", "seed", "slotted", "threshold")
+    STATE = {"condition": ("i", 0, NOISE), "transmitters": [Transmitter]}
+    NOT_STATE = (
+        "burst_threshold",
+        "errors",
+        "latency",
+        "name",
+        "noise",
+        "params",
+        "seed",
+        "slotted",
+        "threshold",
+    )
 
     def __init__(self, params: RadioParams, seed: int, name: str) -> None:
         self.params = params
         self.seed = seed
         self.name = name
         self.errors = Stream(seed, f"{name}/errors")
+        self.noise = Stream(seed, f"{name}/noise")
+        self.condition = UP
         self.latency = params.latency_ticks
         self.threshold = params.error_threshold
         self.burst_threshold = params.burst_threshold
@@ -91,6 +106,10 @@ class Band:
                 threshold = self.burst_threshold
             carrier = 1
             level &= transmitter.line.level_at(sent)
+        if self.condition == _NOISE:
+            return self.noise.bit(tick // _BIT)
+        if self.condition == _DOWN:
+            return 1
         if carrier and self.errors.below(slot, threshold):
             return (level ^ 1) | 2
         return level
@@ -105,6 +124,8 @@ class Band:
                 change = min(change, transmitter.last_edge + _HOLD)
                 if self.slotted:
                     change = min(change, (sent // _BIT + 1) * _BIT)
+        if self.condition == _NOISE:
+            change = min(change, (tick // _BIT + 1) * _BIT - self.latency)
         if change == _NEVER:
             return _NEVER
         return change + self.latency

@@ -8,10 +8,12 @@ from miro_exact.rng cimport Stream
 
 cdef long long _BIT, _CHARACTER
 cdef unsigned long long _ONE
+cdef int _DOWN, _NOISE
 
 
 cdef class Listener:
     cdef readonly Line line
+    cdef public int condition
     cdef readonly long long bit_errors
     cdef readonly Slicer slicer
     cdef Stream errors, noise, idle, lost, collision
@@ -25,6 +27,8 @@ cdef class Listener:
     cdef long long pause(self, long long tick, long long until, list senders, Py_ssize_t rank) except? -1
     @cython.locals(slot='long long')
     cdef void hear_nothing(self, long long tick, long long until) except *
+    @cython.locals(slot='long long')
+    cdef void hear_noise(self, long long tick, long long until) except *
     cdef int silence(self, long long tick, long long slot) except -1
     @cython.locals(slot='long long')
     cdef void hear_idle(self, long long tick, long long until, list senders, Py_ssize_t rank) except *

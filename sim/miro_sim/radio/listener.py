@@ -24,6 +24,7 @@ from miro_exact.rng import Stream
 from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
+from miro_sim.radio.condition import DOWN, NOISE, UP
 from miro_sim.radio.params import RadioParams
 from miro_sim.radio.sender import Sender
 from miro_sim.radio.slicer import Slicer
@@ -31,6 +32,7 @@ from miro_sim.radio.slicer import Slicer
 _BIT = 2500
 _CHARACTER = 10
 _ONE = 1 << 32
+_DOWN, _NOISE = DOWN, NOISE
 assert (HOST_BIT_TICKS, CHARACTER_BITS) == (_BIT, _CHARACTER)
 
 
@@ -40,7 +42,7 @@ class Listener:
     Characters that its module lost are not counted, nor what it heard of other networks.
     """
 
-    STATE = {"bit_errors": TICK, "slicer": Slicer}
+    STATE = {"condition": ("i", 0, NOISE), "bit_errors": TICK, "slicer": Slicer}
     NOT_STATE = (
         "burst_threshold",
         "bursts",
@@ -75,6 +77,7 @@ class Listener:
         self.slicer = None if params.slicer is None else Slicer(params.slicer)
         parts = (self.bursts, self.dropouts, self.slicer)
         self.perfect_idle = not self.false_start and all(part is None for part in parts)
+        self.condition = UP
         self.bit_errors = 0
 
     def __repr__(self) -> str:
@@ -85,7 +88,10 @@ class Listener:
 
         The others are heard in its pauses, and spoil its bits (`mixed`).
         """
-        if rank == len(senders):
+        if self.condition == _NOISE:
+            self.hear_noise(tick, until)
+            return
+        if rank == len(senders) or self.condition == _DOWN:
             self.hear_nothing(tick, until)
             return
         sender = senders[rank]
@@ -120,6 +126,14 @@ class Listener:
             self.line.append(tick, self.silence(tick, slot))
             if self.squelch:
                 break
+            slot += 1
+            tick = slot * _BIT
+
+    def hear_noise(self, tick: int, until: int) -> None:
+        """Somebody else's noise on the frequency, stronger than any carrier."""
+        slot = tick // _BIT
+        while tick < until:
+            self.line.append(tick, self.noise.bit(slot))
             slot += 1
             tick = slot * _BIT
 

@@ -15,6 +15,9 @@ What belongs here: the record, the PC's log, and reading the boards' logs. What 
     reached     the instruction at an address is next                         address
     edge        a pin changes                                                 pin, value (the new level)
     true        a predicate is true                                           -
+    reset       the level at a robot's reset pin is set                       value, slot
+    power       a robot's supply is switched                                  value (1: on), slot
+    radio       a network's radio works, is off, or gives noise               value (of `radio.condition`)
     touch       two robots have begun to touch, seen every millisecond        value (slot), other (network, slot)
 """
 
@@ -26,9 +29,11 @@ from collections.abc import Callable, Iterator, Sequence
 import msgspec
 
 from miro_protocol.events import Received
+from miro_protocol.stream_events import Deed, RadioState, Reset
 from miro_robot import event_log
 from miro_robot.event_log import EventLog
 from miro_robot.lm629.commands import BY_OPCODE
+from miro_sim.radio.condition import CONDITIONS
 
 PC = -1
 """Slot of what happens at the PC."""
@@ -70,6 +75,10 @@ class Event(msgspec.Struct, frozen=True, kw_only=True):
             return f" {self.pin} to {self.value}"
         if self.what in ("reached", "fault"):
             return f" {self.address:#06x}"
+        if self.what in ("reset", "power"):
+            return f" {self.value}"
+        if self.what == "radio":
+            return f" {CONDITIONS[self.value]}"
         if self.what == "sent":
             return f" {len(self.data)} characters"
         return ""
@@ -116,6 +125,15 @@ class HostLog:
         while self.end > serial and self.kept:
             self.kept.pop()
             self.end -= 1
+
+
+def of_deed(deed: Deed) -> Event:
+    """The event that a deed is, at its tick."""
+    if isinstance(deed, RadioState):
+        value = CONDITIONS.index(deed.state)
+        return Event(tick=deed.tick, what="radio", network=deed.network, value=value)
+    what, value = ("reset", deed.level) if isinstance(deed, Reset) else ("power", deed.on)
+    return Event(tick=deed.tick, what=what, network=deed.network, slot=deed.slot, value=value)
 
 
 def of_board(log: EventLog, serial: int, network: int, slot: int) -> Iterator[tuple[int, Event]]:

@@ -24,16 +24,14 @@ from miro_sim.radio import Downlink, Uplink
 from miro_sim.scenario import keys as sc
 from miro_sim.scenario.build import radio_for
 from miro_sim.world.control_noise import NoisyCommands
-from miro_sim.world.events import Event, HostLog
+from miro_sim.world.deeds import SETTLE_TICKS, Deeds
+from miro_sim.world.events import Event, HostLog, of_deed
 from miro_sim.world.outbox import LONGEST_BYTES, Outbox
 from miro_sim.world.robot import Robot
 from miro_sim.world.sight import PixelSight, Sight, sight_of
 
 LONGEST_TRANSMISSION_TICKS = 1 << 40
 """Twelve hours: no saved transmission ends later than so long after now."""
-SETTLE_TICKS = 120
-"""How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
-
 
 Host = Literal["controller", "script", "silent"]
 """Who sends: the PC's controller, once a control period; a script; or only who injects."""
@@ -51,9 +49,14 @@ class Network:
         "ear": Ear,
         "frames_sent": TICK,
         "outbox": Outbox,
+        "deeds": Deeds,
         "heard": Rows(1 << 20, "B", "?", TICK),
     }
-    NOT_HASHED = ("outbox", "heard")  # they depend on when input was announced and where the world stopped
+    NOT_HASHED = (
+        "outbox",
+        "deeds",
+        "heard",
+    )  # they depend on when input was announced and where the world stopped
     NOT_STATE = (
         *("spec", "index", "host", "compute_ticks", "keyup_ticks", "noisy_commands"),
         *("sent", "seen", "log"),  # records
@@ -92,6 +95,7 @@ class Network:
             self.uplink.listen(robot.board.cpu.txd, robot.spec.slot)
         self.ear = Ear(spec.robots)
         self.host: Host = "script" if script is not None else spec.host
+        self.deeds = Deeds(index)
         self.outbox = Outbox(0 if radio.carrier == "on" else radio.keyup_ticks, index)
         for sent in script or ():
             check_bad_stop(sent.bad_stop, len(sent.data))
@@ -126,6 +130,19 @@ class Network:
     def share_frequency(self, other: Network) -> None:
         """Lets the robots of this network hear the other one's transmitter too."""
         self.downlink.overhear(other.downlink)
+
+    def robot(self, slot: int) -> Robot:
+        """The robot in `slot`. Raises ValueError where there is none."""
+        for robot in self.robots:
+            if robot.spec.slot == slot:
+                return robot
+        there = ", ".join(str(robot.spec.slot) for robot in self.robots)
+        raise ValueError(f"net{self.index} has no robot in slot {slot}; there is {there}")
+
+    def do_due(self, tick: int) -> None:
+        """The deeds that are due, each with an event in the log."""
+        for deed in self.deeds.do_due(self, tick):
+            self.log.note(of_deed(deed))
 
     def send_due(self, rendezvous_tick: int) -> None:
         """Puts on the air what may come up before the tick up to which it is settled next."""
@@ -227,14 +244,16 @@ class Network:
         boards = [robot.board for robot in self.robots]
         return [
             list(self.sent),
+            list(self.deeds.done),
             self.log.end,
             [(list(b.left.commands), list(b.right.commands), list(b.faults), b.log.end) for b in boards],
         ]
 
     def put_back(self, records: list[Any]) -> None:
         """Takes back what `records` gave; nothing but more of the same may have happened since."""
-        sent, log_end, boards = records
+        sent, done, log_end, boards = records
         self.sent = list(sent)
+        self.deeds.done = list(done)
         self.log.cut(log_end)
         for robot, (left, right, faults, end) in zip(self.robots, boards, strict=True):
             robot.board.left.commands[:] = left
@@ -254,6 +273,8 @@ class Network:
             raise ValueError(f"the PC has heard everything up to tick {self.uplink.now}, at tick {tick}")
         if max(self.downlink.free_tick, self.downlink.busy_tick) > tick + LONGEST_TRANSMISSION_TICKS:
             raise ValueError(f"the transmitter is busy until tick {self.downlink.free_tick}, at tick {tick}")
+        if self.deeds.next_tick < tick - SETTLE_TICKS:
+            raise ValueError(f"a deed waits for tick {self.deeds.next_tick}, at tick {tick}")
         if self.outbox.waiting and self.outbox.waiting[0].sent.tick < self.downlink.free_tick:
             raise ValueError(
                 f"characters wait, but the transmitter is busy until tick {self.downlink.free_tick}"

@@ -22,16 +22,19 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
+from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, ticks
 from miro_exact.seed import MAX_SEED
 from miro_exact.state import TICK, Flat, Octets
+from miro_protocol.stream_events import Deed, Power, RadioState, Reset
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import Period
+from miro_sim.radio.condition import CONDITIONS, Condition
 from miro_sim.scenario.keys import Scenario, without_expectations
+from miro_sim.world import conditions as waiting
 from miro_sim.world.bodies import Bodies, Pair
-from miro_sim.world.conditions import Condition
+from miro_sim.world.deeds import SETTLE_TICKS
 from miro_sim.world.events import Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
@@ -54,8 +57,9 @@ class Mark(NamedTuple):
 class World:
     """A deterministic machine: same scenario, same firmware, same seed, same bits.
 
-    `script` replaces the stations' frames (replay): transmissions of the hosts, which must not overlap on one network.
-    Raises ValueError for those that do, that are of no host, or of a network that the scenario does not have.
+    `script` replaces the stations' frames (replay): transmissions of the hosts, which must not overlap on one network,
+    and deeds (`do`). Raises ValueError for those that do, that are of no host, or of a network or robot that the
+    scenario does not have.
     `observers` are called at the end of each control period, with what it left behind; they change nothing.
     """
 
@@ -82,11 +86,16 @@ class World:
     )
 
     def __init__(
-        self, scenario: Scenario, seed: int, image: Image, script: Sequence[Transmission] | None = None
+        self,
+        scenario: Scenario,
+        seed: int,
+        image: Image,
+        script: Sequence[Transmission | Deed] | None = None,
     ) -> None:
         if not 0 <= seed <= MAX_SEED:
             raise ValueError(f"seed {seed} is out of range: 0 to {MAX_SEED}")
-        for sent in script or ():
+        sending = [one for one in script or () if isinstance(one, Transmission)]
+        for sent in sending:
             if sent.direction != DOWN or not 0 <= sent.network < len(scenario.networks):
                 sender = f"{sent.direction!r} of network {sent.network}"
                 raise ValueError(f"tick {sent.tick}: {sender} is none of the {len(scenario.networks)} hosts")
@@ -101,7 +110,7 @@ class World:
                 index,
                 seed,
                 image,
-                None if script is None else [sent for sent in script if sent.network == index],
+                None if script is None else [sent for sent in sending if sent.network == index],
             )
             for index, network in enumerate(scenario.networks)
         ]
@@ -123,6 +132,9 @@ class World:
         self._state: Flat | None = None
         self._own: Identity | None = None
         self._opened: tuple[bytes, bytes] | None = None  # a saved world that is whole, and its state
+        for deed in script or ():
+            if not isinstance(deed, Transmission):
+                self._announce(deed, 0)
 
     @property
     def digest(self) -> str:
@@ -155,7 +167,9 @@ class World:
             if self.tick == self.period_end or self.stopped:
                 self.end_period()
 
-    def run_until(self, condition: Condition | Sequence[Condition], within: int | None = None) -> Event:
+    def run_until(
+        self, condition: waiting.Condition | Sequence[waiting.Condition], within: int | None = None
+    ) -> Event:
         """Moves everything on to the first tick at which `condition`, or one of several, is true.
 
         Returns the event; the world stands at its tick, or one behind it where the event belongs to the machine cycle
@@ -167,7 +181,7 @@ class World:
 
             world.run_until(conditions.Answer(robot=0), within=ticks(0.040))
         """
-        conditions = [condition] if isinstance(condition, Condition) else list(condition)
+        conditions = [condition] if isinstance(condition, waiting.Condition) else list(condition)
         return self.waits.until(conditions, within)
 
     def inject(
@@ -194,12 +208,52 @@ class World:
 
     def robot(self, network: int = 0, slot: int = 0) -> Robot:
         """The robot in `slot` of `network`. Raises ValueError where there is none."""
-        robots = self._network(network).robots
-        for robot in robots:
-            if robot.spec.slot == slot:
-                return robot
-        there = ", ".join(str(robot.spec.slot) for robot in robots)
-        raise ValueError(f"net{network} has no robot in slot {slot}; there is {there}")
+        return self._network(network).robot(slot)
+
+    def do(self, deed: Deed) -> None:
+        """Announces what is done to a robot or a radio at a tick: `Reset`, `Power`, `RadioState`.
+
+        Before anything else that happens at that tick. Raises ValueError for a tick before `earliest_deed_tick`, a
+        network or a robot that is not there, and for levels that are none.
+        """
+        self._announce(deed, self.earliest_deed_tick)
+
+    @property
+    def earliest_deed_tick(self) -> int:
+        """The earliest tick for a deed that is announced now: the radio is settled up to there."""
+        return self.tick + SETTLE_TICKS
+
+    def set_reset(self, level: int, network: int = 0, slot: int = 0) -> int:
+        """Sets the reset pin of a robot's processor, 1 for reset, as soon as possible; returns the tick."""
+        return self._do_now(Reset(self.earliest_deed_tick, network, slot, level))
+
+    def set_power(self, on: int, network: int = 0, slot: int = 0) -> int:
+        """Switches a robot's supply on (1) or off (0) as soon as possible; returns the tick."""
+        return self._do_now(Power(self.earliest_deed_tick, network, slot, on))
+
+    def set_radio(self, state: Condition, network: int = 0) -> int:
+        """Lets a radio work ("up"), be off ("down") or give "noise", as soon as possible; returns the tick."""
+        return self._do_now(RadioState(self.earliest_deed_tick, network, state))
+
+    def _do_now(self, deed: Deed) -> int:
+        self.do(deed)
+        return deed.tick
+
+    def _announce(self, deed: Deed, earliest_tick: int) -> None:
+        network = self._network(deed.network)
+        if not earliest_tick <= deed.tick < NEVER_TICK:
+            raise ValueError(
+                f"net{deed.network}: tick {deed.tick} of a deed; the earliest is {earliest_tick}"
+            )
+        if isinstance(deed, RadioState):
+            if deed.state not in CONDITIONS:
+                raise ValueError(f"net{deed.network}: a radio {deed.state!r}; give {', '.join(CONDITIONS)}")
+        else:
+            network.robot(deed.slot)
+            level = deed.level if isinstance(deed, Reset) else deed.on
+            if level not in (0, 1):
+                raise ValueError(f"net{deed.network}/robot{deed.slot}: level {level!r}; give 0 or 1")
+        network.deeds.announce(deed)
 
     # Pieces of a control period, for `run_to` and `waits`
 
@@ -217,10 +271,15 @@ class World:
 
     def rendezvous(self, tick: int) -> int:
         """Where everything meets next, going to `tick`."""
-        return min(tick, self.period_end, self.bodies.next_tick(self.tick))
+        deed_tick = NEVER_TICK
+        for network in self.networks:
+            deed_tick = min(deed_tick, network.deeds.next_after(self.tick))
+        return min(tick, self.period_end, self.bodies.next_tick(self.tick), deed_tick)
 
     def run_piece(self, tick: int) -> None:
         """Everything on to `tick`, which is no later than the end of the period."""
+        for network in self.networks:
+            network.do_due(self.tick)
         for network in self.networks:
             network.send_due(tick)
         for network in self.networks:
@@ -241,7 +300,8 @@ class World:
         self.in_period = False
         self.index += 1
         self.chain = hashlib.sha256(self.state.hashed()).digest()
-        self.last = Period(index=index, tick=begun, robots=robots, wire=wire, digest=self.digest)
+        deeds = tuple(deed for network in self.networks for deed in network.deeds.take())
+        self.last = Period(index=index, tick=begun, robots=robots, wire=wire, digest=self.digest, deeds=deeds)
         for observer in self.observers:
             observer(self.last)
 

@@ -68,6 +68,10 @@ class _AnswerJudge(Judge[Check]):
             if frame.seq % self.subject.robots == self.subject.slot:
                 self.question(frame)
 
+    def restarted(self, tick: int) -> None:
+        self.until(tick)
+        self.decoder = TelemetryDecoder()
+
     def question(self, frame: Received) -> None:
         raise NotImplementedError
 
@@ -100,6 +104,10 @@ class WithinJudge(_AnswerJudge):
                     self.fail(frame.last_tick, self.wanted, f"it after {in_ms(late)}")
                 return
 
+    def restarted(self, tick: int) -> None:
+        super().restarted(tick)
+        self.asked = []
+
     def until(self, tick: int) -> None:
         # an answer is known only when TI is set for its last character
         while self.asked and tick > self.asked[0].last_tick + self.within_ticks + TO_TI_TICKS:
@@ -120,6 +128,11 @@ class TurnJudge(_AnswerJudge):
         self.judged += 1
         self.allowed = TELEMETRY.wire_size
         self.seqs = [*self.seqs[-1:], frame.seq]
+
+    def restarted(self, tick: int) -> None:
+        super().restarted(tick)
+        self.allowed = 0
+        self.seqs = []
 
     def character(self, tick: int) -> None:
         if self.allowed:

@@ -104,6 +104,11 @@ class SilenceJudge(Judge[SilenceCheck]):
         self.fail(event.tick, self.wanted, f"the {order.side} one after {in_ms(silence)}")
         self.fresh_tick = None
 
+    def restarted(self, tick: int) -> None:
+        self.until(tick)
+        self.fresh_tick = None
+        self.orders = Orders()
+
     def until(self, tick: int) -> None:
         if self.fresh_tick is None or tick <= self.fresh_tick + self.latest_ticks:
             return

@@ -7,6 +7,7 @@ A check is two classes. Its parameters are a frozen struct whose tag is the chec
 their `judge` method makes a `Judge`, one for each robot. The judge is fed in the order of time:
 
     logs of boards and PC ──► event(event)       of the kinds in HEARS
+    resets, power ──────────► restarted(tick)
     firmware faults ────────► fault(fault)
     control periods ────────► period(record, tick)
     all of it, up to a tick ► until(tick)        what should have happened by now?
@@ -121,6 +122,9 @@ class Judge(Generic[C_co]):
 
     def event(self, event: Event) -> None:
         """Something that happened, of the kinds in `HEARS`."""
+
+    def restarted(self, tick: int) -> None:
+        """The robot's processor was reset, or its supply was switched: it remembers nothing of before."""
 
     def fault(self, fault: FirmwareFault) -> None:
         """The firmware did what it must not."""

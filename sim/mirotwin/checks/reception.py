@@ -45,6 +45,10 @@ class MovesJudge(Judge[MovesOnlyWhenFresh]):
         self.fresh_tick: int | None = None
         self.within_ticks = ms_ticks(check.within_ms)
 
+    def restarted(self, tick: int) -> None:
+        self.fresh_tick = None
+        self.orders = Orders()
+
     def event(self, event: Event) -> None:
         if event.what == "frame":
             if event.value and event.frame is not None:
@@ -97,6 +101,10 @@ class SentJudge(Judge[AcceptsOnlySent]):
         order = self.orders.take(event)
         if order is not None and order.moves:
             self.ordered_tick = event.tick
+
+    def restarted(self, tick: int) -> None:
+        self.until(tick)
+        self.orders = Orders()
 
     def _note_sent(self, event: Event) -> None:
         symbols = [
@@ -171,6 +179,12 @@ class ActsJudge(Judge[ActsCheck]):
             while any(words == told for _, words in self.waiting):
                 self.waiting.popleft()
 
+    def restarted(self, tick: int) -> None:
+        self.until(tick)
+        self.waiting.clear()
+        self.damaged = False
+        self.orders = Orders()
+
     def _frame(self, event: Event) -> None:
         damaged, self.damaged = self.damaged, False
         frame = event.frame
@@ -223,6 +237,9 @@ class AcceptedJudge(Judge[FramesAccepted]):
         self.judged += 1
         if self.frames < self.check.frames:
             self.fail(tick, f"at least {self.check.frames} frames accepted", f"{self.frames}")
+
+    def restarted(self, tick: int) -> None:
+        self.counter = 0
 
     def _count(self, counter: int | None) -> None:
         if counter is not None:

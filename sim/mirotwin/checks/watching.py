@@ -37,7 +37,8 @@ from mirotwin.report.summary import Expectation, FirstFailure
 T = TypeVar("T")
 Expected = Mapping[Place, Sequence[Check]]
 _FROM_RECEIVED = ("frame", "damaged")
-_FROM_PC = ("sent", "heard", "answer", "touch")
+_RESTARTS = ("reset", "power")
+_FROM_PC = ("sent", "heard", "answer", "touch", "radio", *_RESTARTS)
 _BY_TICK = attrgetter("tick")
 
 
@@ -139,7 +140,7 @@ class _Watched:
         if any(what in self.of_events for what in _FROM_RECEIVED):
             self.hearing = Hearing(network.index, robot.slot, network.spec.robots)
         self.hears_board = any(what not in _FROM_PC for what in self.of_events)
-        self.hears_pc = any(what in _FROM_PC for what in self.of_events)
+        self.hears_pc = bool(self.of_events)
         self.read_board = robot.board.log.end
         self.read_pc = network.log.end
         self.faults = len(robot.board.faults)
@@ -165,13 +166,18 @@ class _Watched:
         log, pc = self.robot.board.log, self.network.log
         if self.hears_pc:
             self.lost += max(0, pc.first - self.read_pc)
-            self.waiting += [event for _, event in pc.since(self.read_pc) if event.what in self.of_events]
+            self.waiting += [event for _, event in pc.since(self.read_pc) if self._concerns(event)]
             self.read_pc = pc.end
         if self.hears_board:
             self.lost += max(0, log.first - self.read_board)
             place = (self.network.index, self.robot.slot)
             self.waiting += [event for _, event in of_board(log, self.read_board, *place)]
             self.read_board = log.end
+
+    def _concerns(self, event: Event) -> bool:
+        if event.what in _RESTARTS:
+            return event.slot == self.robot.slot
+        return event.what in self.of_events
 
     def _tell(self, tick: int) -> None:
         self.waiting.sort(key=_BY_TICK)
@@ -180,6 +186,8 @@ class _Watched:
             if event.tick >= tick:
                 break
             told += 1
+            if event.what in _RESTARTS:
+                self._restart(event.tick)
             self._tell_one(event)
             if event.what == "received" and self.hearing is not None:
                 for heard in self.hearing.take(event):
@@ -187,6 +195,12 @@ class _Watched:
         del self.waiting[:told]
         for judge in self.of_times:
             self._guarded(judge.check, partial(judge.until, tick))
+
+    def _restart(self, tick: int) -> None:
+        if self.hearing is not None:
+            self.hearing = Hearing(self.network.index, self.robot.slot, self.network.spec.robots)
+        for judge in self.judges:
+            self._guarded(judge.check, partial(judge.restarted, tick))
 
     def _tell_one(self, event: Event) -> None:
         for judge in self.of_events.get(event.what, ()):

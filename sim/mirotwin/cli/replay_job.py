@@ -13,7 +13,6 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_protocol import stream
-from miro_protocol.transmission import Transmission
 from miro_robot.image import Image, Symbol, Symbols, parse_hex
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period
@@ -29,7 +28,14 @@ from mirotwin.cli.program import complain
 from mirotwin.files.outputs import RECORDING
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
-from mirotwin.replay.script import check_script, scenario_of_stream, script_of, script_of_stream
+from mirotwin.replay.script import (
+    Doing,
+    check_deeds,
+    check_script,
+    scenario_of_stream,
+    script_of,
+    script_of_stream,
+)
 
 
 class Job(msgspec.Struct, frozen=True):
@@ -37,7 +43,7 @@ class Job(msgspec.Struct, frozen=True):
 
     scenario: Scenario
     seed: int
-    script: list[Transmission]
+    script: list[Doing]
     recorded: Sequence[Period]
 
 
@@ -81,15 +87,17 @@ def _job_of_recording(recording: Recording, path: str, settings: Sequence[str]) 
     scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings, expectations_of)
     script = script_of(recording.periods)
     check_script(script, path, len(scenario.networks))
+    check_deeds(script, path, scenario)
     return Job(scenario, source.seed, script, recording.periods)
 
 
 def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str]) -> Job:
-    sent = given.transmissions()
+    sent = given.happenings()
     header = [*in_text(given.header.set or {}), *in_text({"expect": given.header.expect or {}})]
     scenario = changed(
         scenario_of_stream(sent, path, given.header), path, [*header, *settings], expectations_of
     )
+    check_deeds(sent, path, scenario)
     return Job(scenario, given.header.seed or 0, script_of_stream(sent), ())
 
 

@@ -8,13 +8,15 @@ Where a channel stands: `topics`.
 """
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import msgspec
+from msgspec import Meta
 
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
 from miro_protocol.stream import MAX_TICK
+from miro_protocol.stream_events import Deed, Power, RadioState, Reset
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
 from mirotwin.recording import images, topics
@@ -158,6 +160,18 @@ class WireMessage(msgspec.Struct, frozen=True):
     bad_stop: tuple[int, ...]
 
 
+class DeedMessage(msgspec.Struct, frozen=True):
+    """`deeds`: what was done to a robot, or (`slot` -1) to the radio of the network.
+
+    `what` is "reset" or "power" with `value` 0 or 1, or the radio "up", "down" or "noise" from then on.
+    """
+
+    tick: int
+    slot: int
+    what: Literal["reset", "power", "up", "down", "noise"]
+    value: Annotated[int, Meta(ge=0, le=1)] = 1
+
+
 class PeriodMessage(msgspec.Struct, frozen=True):
     """`/period`: a control period that is over, and the digest of all states up to its end."""
 
@@ -183,6 +197,7 @@ ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
 OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {
     topics.PERIOD: PeriodMessage,
     topics.WIRE: WireMessage,
+    topics.DEEDS: DeedMessage,
     topics.IMAGE: images.ImageMessage,
 }
 
@@ -202,7 +217,28 @@ def messages(period: Period) -> Iterator[tuple[str, int, msgspec.Struct]]:
     for sent in period.wire:
         message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
         yield topics.wire_topic(sent.network), sent.tick, message
+    for deed in period.deeds:
+        yield topics.deeds_topic(deed.network), deed.tick, _deed_message(deed)
     yield topics.PERIOD, tick, PeriodMessage(tick, period.index, period.digest)
+
+
+def _deed_message(deed: Deed) -> DeedMessage:
+    if isinstance(deed, RadioState):
+        return DeedMessage(deed.tick, -1, deed.state)
+    if isinstance(deed, Reset):
+        return DeedMessage(deed.tick, deed.slot, "reset", deed.level)
+    return DeedMessage(deed.tick, deed.slot, "power", deed.on)
+
+
+def deed(network: int, message: DeedMessage) -> Deed:
+    """What a message about a deed says. Raises ValueError when it cannot be."""
+    if not 0 <= message.tick <= MAX_TICK or message.slot < -1:
+        raise ValueError(f"{message.what} of robot {message.slot} at tick {message.tick}")
+    if message.what == "reset":
+        return Reset(message.tick, network, message.slot, message.value)
+    if message.what == "power":
+        return Power(message.tick, network, message.slot, message.value)
+    return RadioState(message.tick, network, message.what)
 
 
 def _robot_messages(robot: RobotPeriod, head: str, tick: int) -> Iterator[tuple[str, int, msgspec.Struct]]:

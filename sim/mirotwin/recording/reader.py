@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from miro_protocol.stream_events import Deed
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
 from mirotwin.recording import channels
@@ -80,6 +81,7 @@ class _Collector:
     def __init__(self) -> None:
         self.robots: dict[tuple[int, int], dict[str, Any]] = {}
         self.wire: list[Transmission] = []
+        self.deeds: list[Deed] = []
         self.periods: list[Period] = []
 
     def take(self, place: Place, message: Any) -> None:
@@ -88,6 +90,8 @@ class _Collector:
             self._close(message)
         elif isinstance(message, channels.WireMessage):
             self.wire.append(channels.transmission(place.network, message))
+        elif isinstance(message, channels.DeedMessage):
+            self.deeds.append(channels.deed(place.network, message))
         elif place.channel not in ("samples", "fault"):
             self.robots.setdefault((place.network, place.slot), {})[place.channel] = message
 
@@ -97,10 +101,13 @@ class _Collector:
         robots = tuple(
             channels.robot_period(network, slot, found) for (network, slot), found in self.robots.items()
         )
-        period = Period(message.index, message.tick, robots, tuple(self.wire), message.digest)
+        period = Period(
+            message.index, message.tick, robots, tuple(self.wire), message.digest, tuple(self.deeds)
+        )
         self.periods.append(period)
         self.robots = {}
         self.wire = []
+        self.deeds = []
 
 
 def _source(messages: Messages) -> Source:

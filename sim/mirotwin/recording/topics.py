@@ -4,6 +4,7 @@ What belongs here: text to place and back. What does not: what is said there (`c
 
     /period                  a control period of the whole world
     /net0/wire               the characters on the air of network 0
+    /net0/deeds              what was done to its robots and its radio
     /net0/camera/image       the frames of its camera
     /net0/robot2/lm629       a channel of the robot in slot 2 of network 0
 """
@@ -13,6 +14,7 @@ from typing import NamedTuple
 
 PERIOD = "/period"
 WIRE = "wire"
+DEEDS = "deeds"
 IMAGE = "camera/image"
 _TOPIC = re.compile(rf"/net([0-9]{{1,9}})(?:/robot([0-9]{{1,9}}))?/([a-z0-9_]+|{IMAGE})")
 
@@ -31,6 +33,10 @@ def robot_topic(network: int, slot: int, channel: str) -> str:
 
 def wire_topic(network: int) -> str:
     return f"/net{network}/{WIRE}"
+
+
+def deeds_topic(network: int) -> str:
+    return f"/net{network}/{DEEDS}"
 
 
 def image_topic(network: int) -> str:

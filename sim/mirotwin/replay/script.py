@@ -13,6 +13,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds, ticks
 from miro_protocol.events import Received
+from miro_protocol.stream_events import Deed, Power, Reset
 from miro_protocol.stream_header import Header
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DOWN, Transmission
@@ -27,23 +28,37 @@ AFTERMATH_TICKS = TICKS_PER_SECOND
 LONGEST_TICKS = 86_400 * TICKS_PER_SECOND
 
 
-def script_of(periods: Iterable[Period]) -> list[Transmission]:
-    """Everything the hosts of a recording sent."""
-    return script_of_stream(sent for period in periods for sent in period.wire)
+Doing = Transmission | Deed
+"""What a script consists of."""
 
 
-def script_of_stream(sent: Iterable[Transmission]) -> list[Transmission]:
-    """Everything the hosts send."""
-    return [one for one in sent if one.direction == DOWN]
+def script_of(periods: Iterable[Period]) -> list[Doing]:
+    """Everything the hosts of a recording sent, and what was done to robots and radios."""
+    found: list[Doing] = []
+    for period in periods:
+        found += [*period.wire, *period.deeds]
+    return script_of_stream(sorted(found, key=lambda one: one.tick))
 
 
-def check_script(script: Sequence[Transmission], path: str, networks: int) -> None:
+def script_of_stream(lines: Iterable[Doing]) -> list[Doing]:
+    """Everything that is sent or done to robots."""
+    return [one for one in lines if not isinstance(one, Transmission) or one.direction == DOWN]
+
+
+def sent_in(script: Iterable[Doing]) -> list[Transmission]:
+    """Only what hosts send."""
+    return [one for one in script if isinstance(one, Transmission) and one.direction == DOWN]
+
+
+def check_script(script: Sequence[Doing], path: str, networks: int) -> None:
     """Raises BadInput for transmissions of a network that overlap, or that is not there."""
     before: dict[int, Transmission] = {}
     for one in script:
         if one.network >= networks:
             what = f"network {one.network}, but the scenario has {networks}, numbered from 0"
             raise BadInput(path, f"tick {one.tick}", what)
+        if not isinstance(one, Transmission):
+            continue
         last = before.get(one.network)
         if last is not None and one.tick < last.end_tick:
             what = f"starts before the transmission of tick {last.tick} has ended (tick {last.end_tick})"
@@ -51,9 +66,19 @@ def check_script(script: Sequence[Transmission], path: str, networks: int) -> No
         before[one.network] = one
 
 
-def robots_of_stream(sent: Iterable[Transmission]) -> int:
+def check_deeds(script: Sequence[Doing], path: str, scenario: Scenario) -> None:
+    """Raises BadInput for what is done to a robot that is not there."""
+    for one in script:
+        if isinstance(one, Reset | Power):
+            slots = [robot.slot for robot in scenario.networks[one.network].robot]
+            if one.slot not in slots:
+                there = f"there is {', '.join(map(str, slots))}"
+                raise BadInput(path, f"tick {one.tick}", f"no robot in slot {one.slot}; {there}")
+
+
+def robots_of_stream(sent: Iterable[Doing]) -> int:
     """3 or 5: the layout in which more of the frames from hosts can be read."""
-    script = script_of_stream(sent)
+    script = sent_in(sent)
     counts = {robots: _frames(script, robots) for robots in ROBOT_COUNTS}
     return 5 if counts[5] > counts[3] else 3
 
@@ -65,22 +90,23 @@ def _frames(script: Iterable[Transmission], robots: int) -> int:
     return len([event for one in script for event in decoder.hear(one) if isinstance(event, Received)])
 
 
-def scenario_of_stream(sent: Sequence[Transmission], path: str, header: Header | None = None) -> Scenario:
+def scenario_of_stream(sent: Sequence[Doing], path: str, header: Header | None = None) -> Scenario:
     """The scenario that the header names or holds; without one the default scenario with an ideal link.
 
     Raises BadInput for a stream with nothing to send, for transmissions that overlap, that take more than a
     day, or that have no place in the scenario of the header; ScenarioError for that scenario.
     """
     script = script_of_stream(sent)
-    if not script:
+    if not script and (header is None or header.scenario is None):
         raise BadInput(path, "", "no line from host to robot", "nothing can be replayed")
     if header is None or header.scenario is None:
         check_script(script, path, MAX_NETWORKS)
         return _default_scenario(script, path)
     scenario = _scenario_of_header(header.scenario, f"{path}: header: scenario")
     check_script(script, path, len(scenario.networks))
+    check_deeds(script, path, scenario)
     end_tick = ticks(scenario.duration_s)
-    for one in script:
+    for one in sent_in(script):
         if one.end_tick > end_tick:
             what = f"ends at tick {one.end_tick}, but the scenario ends at tick {end_tick}"
             raise BadInput(path, f"tick {one.tick}", what, "raise its duration_s")
@@ -96,12 +122,13 @@ def _scenario_of_header(scenario: str | dict[str, object], place: str) -> Scenar
     return load(scenario).scenario
 
 
-def _default_scenario(script: Sequence[Transmission], path: str) -> Scenario:
+def _default_scenario(script: Sequence[Doing], path: str) -> Scenario:
     """The default one with ideal links, and its robot in every slot of each network's layout, all at one start.
 
     Runs for a second longer than the stream, so that the failsafe is seen.
     """
-    end_tick = max(one.end_tick for one in script) + AFTERMATH_TICKS
+    ends = [one.end_tick if isinstance(one, Transmission) else one.tick for one in script]
+    end_tick = max(ends) + AFTERMATH_TICKS
     if end_tick > LONGEST_TICKS:
         last = max(one.tick for one in script)
         raise BadInput(path, f"tick {last}", "more than a day", "let the stream start near tick 0")

@@ -174,3 +174,25 @@ def test_a_judge_hears_every_event_once_in_the_order_of_ticks() -> None:
     assert (counts["sent"], counts["frame"], counts["received"]) == (8, 8, 8 * 23)
     assert (counts["answer"], counts["transmitted"]) == (3, 3 * 19)
     assert [event.value for event in judge.heard if event.what == "frame"] == [1] * 7 + [0]
+
+
+def test_a_robot_that_is_reset_owes_nothing_from_before() -> None:
+    world, checks = silent_world(ALL)
+    world.run_to(60 * MS)
+    send(world, [team(1, 900, 900, ask=True)])
+    world.run_to(world.set_reset(1) + 100)
+    world.set_reset(0)
+    world.run_to(world.tick + 300 * MS)
+    send(world, [team(2, 700, 700, ask=True)])
+    finish(world, checks)
+    assert [failure for failure in checks.failures if failure.check != "frames_accepted_min"] == []
+
+
+def test_a_reset_pin_that_stays_down_excuses_no_other_robot() -> None:
+    scenario = parse(TWO, "two", ["expect.failsafe_stop_ms=true"], expectations_of)
+    world = World(scenario, 1, own_image())
+    checks = Checks(world)
+    world.run_to(world.set_reset(1, 0, 2))
+    finish(world, checks)
+    answers = {one.slot for one in checks.failures if one.check == "answers_within_ms"}
+    assert 2 not in answers

@@ -129,11 +129,8 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(
             "--expect tracks_within_m=1: there is no such check; use tracks_with",
         ),
         (f"firmware_sha256 = '{OTHER}'", "", "header: the stream is for firmware 0123456789ab.., this is"),
-        (
-            "",
-            "2000000 *@0/1 reset 1",
-            ":6:1: an event, which this command does not support; no command supports",
-        ),
+        (in_header(SHORT), "2000000 *@0/1 reset 1", "tick 2000000: no robot in slot 1; there is 0, 2"),
+        (in_header(SHORT), "2000000 *@1 radio up", "tick 2000000: network 1, but the scenario has 1"),
         ("", "2000000 * P1.0 1", ":6:1: an event, which this command does not support; `mirotwin fw run"),
         ("", "1701700 >@31 55\n1800000 >@32 55", "tick 1800000: network 32, but the scenario has 32"),
         (
@@ -177,3 +174,16 @@ def test_decoding_and_exporting_refuse_an_event_after_what_came_before(
     code, _, err = mirotwin(*command, path)
     assert code == 2
     assert f"{path}:3:1: an event, which this command does not support" in err
+
+
+def test_a_robot_that_is_reset_counts_anew_and_a_radio_that_is_off_lets_nothing_through(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    (tmp_path / "a.stream").write_text(
+        V2
+        + f"2 > {FRAMES[0].hex(' ')}\n800000 *@0/1 reset 1\n800100 *@0/1 reset 0\n800200 *@0/2 power 0\n"
+        + f"5000000 > {FRAMES[1].hex(' ')}\n6000000 *@0 radio down\n6400000 > {FRAMES[2].hex(' ')}\n"
+    )
+    code, out, err = mirotwin("replay", tmp_path / "a.stream")
+    assert (code, err) == (0, "")
+    assert [row[1] for row in counters(out)] == ["2", "1", "0"]

@@ -1,0 +1,15 @@
+"""Whether the radio of a network works: as it does, switched off, or drowned in noise.
+
+What belongs here: the three conditions. What does not: what a receiver makes of them (`listener` down, `band` up).
+
+    up      as the parameters say
+    down    the transmitters are off: receivers hear no carrier, which is mark if squelched, else noise
+    noise   a stronger transmitter sends noise: receivers hear a fair random bit in each bit time, squelched or not
+"""
+
+from typing import Literal
+
+Condition = Literal["up", "down", "noise"]
+UP, DOWN, NOISE = 0, 1, 2
+CONDITIONS: tuple[Condition, ...] = ("up", "down", "noise")
+"""Names, in the order of the numbers."""

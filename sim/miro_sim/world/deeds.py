@@ -1,0 +1,120 @@
+"""What somebody does to the robots and the radio of a network at a tick: reset pins, supplies, radio on and off.
+
+What belongs here: the deeds that wait, in order, and doing them. What does not: what a part makes of it (`Board`,
+`radio/`), and when the world stops for it (`world.py`).
+
+A deed takes effect before anything else happens at its tick. The radio is settled a little ahead of the robots, so its
+band down changes `SETTLE_TICKS` earlier than the rest, for the same tick: RADIO_DOWN and RADIO_UP are two entries. What
+waits is saved, but no part of the digest: a run does not depend on when a deed was announced.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from miro_exact.clock import NEVER_TICK
+from miro_exact.state import Rows
+from miro_protocol.stream_events import Deed, Power, RadioState, Reset
+from miro_sim.radio.condition import CONDITIONS
+
+if TYPE_CHECKING:
+    from miro_sim.world.network import Network
+
+SETTLE_TICKS = 120
+"""How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
+RESET, POWER, RADIO_DOWN, RADIO_UP = range(4)
+_MOST_WAITING = 1 << 16
+
+
+class Waiting(NamedTuple):
+    """A deed that waits for `tick`. `slot`: 0 for the radio's; `value`: a level, or the number of a condition."""
+
+    tick: int
+    what: int
+    slot: int
+    value: int
+
+
+class Deeds:
+    """Those of one network. `done`: the deeds of the control period that is under way, a record."""
+
+    STATE = {
+        "waiting": Rows(
+            *(
+                _MOST_WAITING,
+                ("q", -SETTLE_TICKS, NEVER_TICK),
+                ("B", RESET, RADIO_UP),
+                ("B", 0, 255),
+                ("B", 0, 2),
+            ),
+            split=tuple,
+            make=lambda cells: Waiting(*cells),
+            ordered=True,
+        )
+    }
+    NOT_STATE = ("network", "done")
+
+    def __init__(self, network: int) -> None:
+        self.network = network
+        self.waiting: list[Waiting] = []
+        self.done: list[Deed] = []
+
+    @property
+    def next_tick(self) -> int:
+        """When the next one is due."""
+        return self.waiting[0].tick if self.waiting else NEVER_TICK
+
+    def next_after(self, tick: int) -> int:
+        """When the next one is due that is not due at `tick`."""
+        for one in self.waiting:
+            if one.tick > tick:
+                return one.tick
+        return NEVER_TICK
+
+    def announce(self, deed: Deed) -> None:
+        """Behind the deeds of the same tick that were announced before."""
+        if len(self.waiting) + 2 > _MOST_WAITING:
+            raise ValueError(f"net{self.network}: {len(self.waiting)} deeds wait; at most {_MOST_WAITING}")
+        if isinstance(deed, RadioState):
+            value = CONDITIONS.index(deed.state)
+            self.waiting.append(Waiting(deed.tick - SETTLE_TICKS, RADIO_DOWN, 0, value))
+            self.waiting.append(Waiting(deed.tick, RADIO_UP, 0, value))
+        elif isinstance(deed, Reset):
+            self.waiting.append(Waiting(deed.tick, RESET, deed.slot, deed.level))
+        else:
+            self.waiting.append(Waiting(deed.tick, POWER, deed.slot, deed.on))
+        self.waiting.sort(key=lambda one: one.tick)
+
+    def do_due(self, network: Network, tick: int) -> list[Deed]:
+        """Does what is due at `tick`; returns the deeds of it that robots and PC can notice."""
+        found: list[Deed] = []
+        while self.waiting and self.waiting[0].tick <= tick:
+            one = self.waiting.pop(0)
+            deed = self._do(network, one)
+            if deed is not None:
+                found.append(deed)
+        self.done += found
+        return found
+
+    def _do(self, network: Network, one: Waiting) -> Deed | None:
+        if one.what == RADIO_DOWN:
+            for listener in network.downlink.listeners.values():
+                listener.condition = one.value
+            return None
+        if one.what == RADIO_UP:
+            network.uplink.band.condition = one.value
+            return RadioState(one.tick, self.network, CONDITIONS[one.value])
+        board = network.robot(one.slot).board
+        if one.what == RESET:
+            board.set_reset(one.value)
+            return Reset(one.tick, self.network, one.slot, one.value)
+        board.set_power(one.value)
+        return Power(one.tick, self.network, one.slot, one.value)
+
+    def take(self) -> tuple[Deed, ...]:
+        """The deeds of the period that is over."""
+        found, self.done = tuple(self.done), []
+        return found
+
+    def __repr__(self) -> str:
+        return f"Deeds(net{self.network}, {self.waiting})"
