@@ -30,7 +30,8 @@ class Header(msgspec.Struct, frozen=True, kw_only=True):
     """What a stream file says about itself; None where it does not. `text` is the document, without prefixes.
 
     `scenario`: the name of a built-in scenario, or a whole one. `set`: changes to the scenario, by the path of a key.
-    `expect`: checks, as in a scenario. `version`: of the program that wrote the file.
+    `expect`: checks, as in a scenario. `verdict`: what the one of them said that failed, `end_tick`: where that run
+    ended; with them the file is a case. `version`: of the program that wrote the file.
     """
 
     text: str = ""
@@ -39,6 +40,8 @@ class Header(msgspec.Struct, frozen=True, kw_only=True):
     firmware_sha256: Annotated[str, Meta(pattern=r"\A[0-9a-f]{64}\Z")] | None = None
     set: dict[str, Any] | None = None
     expect: dict[str, Any] | None = None
+    verdict: str | None = None
+    end_tick: Annotated[int, Meta(ge=1, le=(1 << 61) - 1)] | None = None
     version: str | None = None
 
 
@@ -136,5 +139,7 @@ _REMEDIES = {
     "firmware_sha256": "give 64 hex digits in small letters",
     "set": "give a table: paths of keys and their values",
     "expect": "give a table: checks and what they expect",
+    "verdict": "give the line of the check that failed as text",
+    "end_tick": f"give a whole number 1..{(1 << 61) - 1}",
     "version": "give the version as text",
 }

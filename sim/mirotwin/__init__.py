@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from mirotwin import recording as recording
     from mirotwin import replay as replay
     from mirotwin import testing as testing
+    from mirotwin.cases.case import case_of_checks as case_of_checks
+    from mirotwin.cases.case import write_case as write_case
+    from mirotwin.cases.trace import Trace as Trace
     from mirotwin.checks.watching import Checks as Checks
     from mirotwin.checks.watching import ExpectationFailed as ExpectationFailed
     from mirotwin.recording.reader import read as read_recording
@@ -47,9 +50,11 @@ _PLACES = {
     "Image": "miro_robot.image:Image",
     "Scenario": "miro_sim.scenario.keys:Scenario",
     "TelemetryDecoder": "miro_protocol.decoder:TelemetryDecoder",
+    "Trace": "mirotwin.cases.trace:Trace",
     "Transmission": "miro_protocol.transmission:Transmission",
     "WaitExpired": "miro_sim.world.waits:WaitExpired",
     "World": "miro_sim.world.world:World",
+    "case_of_checks": "mirotwin.cases.case:case_of_checks",
     "conditions": "miro_sim.world.conditions",
     "frames": "miro_protocol.frames",
     "image_path": "miro_robot.firmware:image_path",
@@ -62,6 +67,7 @@ _PLACES = {
     "seconds": "miro_exact.clock:seconds",
     "testing": "mirotwin.testing",
     "ticks": "miro_exact.clock:ticks",
+    "write_case": "mirotwin.cases.case:write_case",
 }
 """Public name -> the module that it is, or the module and the name in it."""
 
@@ -73,9 +79,11 @@ __all__ = [
     "Image",
     "Scenario",
     "TelemetryDecoder",
+    "Trace",
     "Transmission",
     "WaitExpired",
     "World",
+    "case_of_checks",
     "conditions",
     "frames",
     "image_path",
@@ -88,6 +96,7 @@ __all__ = [
     "seconds",
     "testing",
     "ticks",
+    "write_case",
 ]
 
 

@@ -76,7 +76,6 @@ cdef class Cpu(Executor):
     cpdef int psw(self) noexcept
     cdef int write_psw(self, int value) except -1
     cdef int write_pcon(self, int value) except -1
-    cdef int _stop_clock(self) except -1
     cdef int write_port(self, int port, int value) except -1
     @cython.locals(value=int)
     cdef int movx_read(self, int address) except -1

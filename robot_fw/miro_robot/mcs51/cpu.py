@@ -209,7 +209,8 @@ class Cpu(Executor):
     def hold(self) -> None:
         """RST goes high and stays: nothing is executed until `reset`, its falling edge."""
         self.reset()
-        self._stop_clock()
+        self.peripherals.freeze(self.cycles)
+        self.powered_down = 1
 
     def step(self) -> int:
         """One instruction or interrupt entry; an idle CPU advances by a cycle."""
@@ -443,18 +444,12 @@ class Cpu(Executor):
             self.peripherals.write_smod(value >> 7, self.cycles)
         self.pcon = value & _PCON_BITS
         if value & _PD:
-            self._stop_clock()
+            self.peripherals.freeze(self.cycles)
+            self.powered_down = 1
         elif value & _IDL:
             self.idle = 1
         self.next_event = 0
         self.limit = 0
-
-    def _stop_clock(self) -> None:
-        """Nothing happens any more until a reset."""
-        self.peripherals.sync(self.cycles)
-        self.peripherals.settle()
-        self.peripherals.frozen = 1
-        self.powered_down = 1
 
     def write_port(self, port: int, value: int) -> None:
         if value != self.peripherals.ports.latches[port]:

@@ -43,6 +43,7 @@ cdef class Peripherals:
     cpdef int clear(self, long long cycle) except -1
     cpdef int after_load(self) except -1
     cpdef int check_times(self, long long cycle) except -1
+    cpdef int freeze(self, long long cycle) except -1
     cpdef int sync(self, long long cycle) except -1
     cpdef int settle(self) except -1
     @cython.locals(pulse1='long long', pulse2='long long', first='long long', second='long long')

@@ -108,6 +108,12 @@ class Peripherals:
         self.timer_wait = -1
         self._set_serial_clock()
 
+    def freeze(self, cycle: int) -> None:
+        """Nothing happens from `cycle` on, until `clear`."""
+        self.sync(cycle)
+        self.settle()
+        self.frozen = 1
+
     # Time
 
     def sync(self, cycle: int) -> None:

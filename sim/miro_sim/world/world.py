@@ -223,17 +223,23 @@ class World:
         """The earliest tick for a deed that is announced now: the radio is settled up to there."""
         return self.tick + SETTLE_TICKS
 
-    def set_reset(self, level: int, network: int = 0, slot: int = 0) -> int:
-        """Sets the reset pin of a robot's processor, 1 for reset, as soon as possible; returns the tick."""
-        return self._do_now(Reset(self.earliest_deed_tick, network, slot, level))
+    def set_reset(self, level: int, network: int = 0, slot: int | None = None) -> int:
+        """Sets the reset pin of a robot's processor, 1 for reset, as soon as possible; returns the tick.
 
-    def set_power(self, on: int, network: int = 0, slot: int = 0) -> int:
-        """Switches a robot's supply on (1) or off (0) as soon as possible; returns the tick."""
-        return self._do_now(Power(self.earliest_deed_tick, network, slot, on))
+        `slot`: default, the first robot of the network.
+        """
+        return self._do_now(Reset(self.earliest_deed_tick, network, self._slot(network, slot), level))
+
+    def set_power(self, on: int, network: int = 0, slot: int | None = None) -> int:
+        """Switches a robot's supply on (1) or off (0) as soon as possible; returns the tick. `slot` as above."""
+        return self._do_now(Power(self.earliest_deed_tick, network, self._slot(network, slot), on))
 
     def set_radio(self, state: Condition, network: int = 0) -> int:
         """Lets a radio work ("up"), be off ("down") or give "noise", as soon as possible; returns the tick."""
         return self._do_now(RadioState(self.earliest_deed_tick, network, state))
+
+    def _slot(self, network: int, slot: int | None) -> int:
+        return self._network(network).robots[0].slot if slot is None else slot
 
     def _do_now(self, deed: Deed) -> int:
         self.do(deed)

@@ -57,11 +57,15 @@ class Failure(msgspec.Struct, frozen=True):
 
 
 class Subject(msgspec.Struct, frozen=True):
-    """The robot that is judged. `robots`: slots of its network; `end_tick`: when the run is over by itself."""
+    """The robot that is judged. `robots`: slots of its network; `end_tick`: when the run is over by itself.
+
+    `first_slot`: of the robots that are present in its network.
+    """
 
     robot: Robot
     robots: int
     end_tick: int
+    first_slot: int = 0
 
     @property
     def network(self) -> int:

@@ -27,6 +27,8 @@ CHECKS: Registry[object] = Registry(
         "frames_accepted_min": "mirotwin.checks.reception:FramesAccepted",
         "answers_within_ms": "mirotwin.checks.answers:AnswersWithin",
         "answers_only_in_turn": "mirotwin.checks.answers:AnswersOnlyInTurn",
+        "happens": "mirotwin.checks.happens:Happens",
+        "never_happens": "mirotwin.checks.happens:NeverHappens",
         "wheels_within_m_s": "mirotwin.checks.wheels:WheelsWithin",
         "tracks_within_cm": "mirotwin.checks.course:TracksWithin",
         "settles_within_s": "mirotwin.checks.course:SettlesWithin",

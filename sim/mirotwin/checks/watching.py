@@ -126,7 +126,7 @@ class _Watched:
     def __init__(
         self, world: World, network: Network, robot: Robot, checks: Sequence[Check], end_tick: int
     ) -> None:
-        subject = Subject(robot, network.spec.robots, end_tick)
+        subject = Subject(robot, network.spec.robots, end_tick, network.robots[0].slot)
         self.network = network
         self.robot = robot
         self.judges = [self._guarded(check, partial(check.judge, subject)) for check in checks]
@@ -149,14 +149,20 @@ class _Watched:
 
     def look(self, record: Any, begun_tick: int, tick: int) -> None:
         """Tells the judges of the control period that began at `begun_tick` and of events before `tick`."""
+        self._tell_faults()
+        for judge in self.of_periods:
+            self._guarded(judge.check, partial(judge.period, record, begun_tick))
+        self._tell_events(tick)
+
+    def _tell_faults(self) -> None:
         board = self.robot.board
         if len(board.faults) > self.faults:
             for fault in board.faults[self.faults :]:
                 for judge in self.judges:
                     self._guarded(judge.check, partial(judge.fault, fault))
             self.faults = len(board.faults)
-        for judge in self.of_periods:
-            self._guarded(judge.check, partial(judge.period, record, begun_tick))
+
+    def _tell_events(self, tick: int) -> None:
         if self.of_events:
             self._gather()
             self._tell(tick)
@@ -207,6 +213,9 @@ class _Watched:
             self._guarded(judge.check, partial(judge.event, event))
 
     def end(self, tick: int) -> None:
+        """The run is over, perhaps within a control period."""
+        self._tell_faults()
+        self._tell_events(tick + 1)
         for judge in self.judges:
             self._guarded(judge.check, partial(judge.end, tick))
 

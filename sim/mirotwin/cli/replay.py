@@ -23,6 +23,7 @@ from mirotwin.cli.expectations import expect_option, report_failures
 from mirotwin.cli.options import Place, engine_option, firmware_option, plain_parameters, set_option
 from mirotwin.cli.program import DIVERGENCE, DONE, complain
 from mirotwin.cli.progress import ProgressBar
+from mirotwin.cli.replay_case import replay_case
 from mirotwin.cli.replay_job import Job, load_job
 from mirotwin.cli.run import report_faults
 from mirotwin.replay.compare import Difference, compare
@@ -55,12 +56,17 @@ def replay(
     A text stream runs over an ideal link in the default
     scenario, and there is nothing to compare.
 
+    A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
+    1, or 3 for a firmware fault; 0 if other firmware or settings cure it, 4 if it does not fail again without them.
+
     Where the recorded scenario or --expect expects something, that decides: the replay goes on to the end, a difference
     is only told, and the exit code is 1 if a check fails, else 0.
 
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
     job, image = load_job(file, firmware, engine, (*settings, *expected))
+    if job.case.verdict:
+        return replay_case(job, image, file, quiet)
     judged = says_anything(job.scenario)
 
     with plain_parameters(file, "replayed"):

@@ -38,6 +38,16 @@ from mirotwin.replay.script import (
 )
 
 
+class Case(msgspec.Struct, frozen=True):
+    """What a case says of itself: the check's line, and where that run ended (0: with its scenario). `changed`: it is
+    to run with other firmware or other settings.
+    """
+
+    verdict: str = ""
+    end_tick: int = 0
+    changed: bool = False
+
+
 class Job(msgspec.Struct, frozen=True):
     """What is to be replayed: a recording, or a text stream (then `recorded` is empty)."""
 
@@ -45,6 +55,7 @@ class Job(msgspec.Struct, frozen=True):
     seed: int
     script: list[Doing]
     recorded: Sequence[Period]
+    case: Case = Case()
 
 
 def load_job(
@@ -66,8 +77,11 @@ def load_job(
     _refuse_other_formats(data, file)
     given = stream.decode(data, file)
     image = load_image(firmware)
-    _check_firmware(given.header, image, file, firmware)
-    return _job_of_stream(given, file, settings), image
+    header = given.header
+    _check_firmware(header, image, file, firmware)
+    other = header.firmware_sha256 not in (None, image.sha256) or bool(settings)
+    case = Case(header.verdict or "", header.end_tick or 0, other)
+    return msgspec.structs.replace(_job_of_stream(given, file, settings), case=case), image
 
 
 def _refuse_other_formats(data: bytes, path: str) -> None:

@@ -5,6 +5,8 @@ What belongs here: one struct a channel, and the two directions of translation. 
 `/period` message.
 
 Where a channel stands: `topics`.
+
+Long because each channel has a struct.
 """
 
 from collections.abc import Iterator

@@ -28,7 +28,8 @@ def test_a_row_says_kind_parameters_and_defaults(name: str) -> None:
     said = dict(re.findall(r"`(\w+)`(?: ([\d.]+))?", parameters))
     assert list(said) == list(struct.__struct_fields__)
     assert struct.MAIN in ("", *list(said)[:1])
-    given = {struct.MAIN: 1} if struct.MAIN else {}
+    event = {"what": "answer", "until_tick": 1} if "what" in said else {}
+    given = {struct.MAIN: 1} if struct.MAIN else event
     made = struct(**given)
     for key, default in said.items():
         assert key == struct.MAIN or not default or float(default) == getattr(made, key)

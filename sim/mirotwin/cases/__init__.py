@@ -1,0 +1,1 @@
+"""Cases: a failure as one text file that gives it again."""

@@ -1,0 +1,44 @@
+"""What went into a world from outside: all that its hosts sent, and all that was done to its robots and radios.
+
+What belongs here: keeping it while the world runs. What does not: how it is written down (`case`).
+"""
+
+from __future__ import annotations
+
+from miro_protocol.stream_events import Deed
+from miro_protocol.transmission import DOWN, Transmission
+from miro_sim.periods import Period
+from miro_sim.world.world import World
+
+
+class Trace:
+    """Of a world at tick 0 from now on. Raises ValueError for one that has moved.
+
+    A world that loads a saved one needs a trace that knows what happened before: give it as `before`.
+    """
+
+    def __init__(self, world: World, before: tuple[Transmission | Deed, ...] = ()) -> None:
+        if world.tick and not before:
+            raise ValueError(f"the world is at tick {world.tick}: what happened before is not known")
+        self.world = world
+        self._happened: list[Transmission | Deed] = list(before)
+        world.observers.append(self._look)
+
+    def _look(self, period: Period) -> None:
+        self._happened += [sent for sent in period.wire if sent.direction == DOWN]
+        self._happened += period.deeds
+
+    def happenings(self) -> tuple[Transmission | Deed, ...]:
+        """Transmissions of hosts that have been put on the air, and deeds that were done, in the order of time."""
+        found = list(self._happened)
+        if self.world.in_period:
+            for network in self.world.networks:
+                found += [*network.sent, *network.deeds.done]
+        return tuple(sorted(found, key=lambda one: one.tick))
+
+    def close(self) -> None:
+        """Lets go of the world."""
+        self.world.observers.remove(self._look)
+
+    def __repr__(self) -> str:
+        return f"Trace({len(self._happened)} happenings up to tick {self.world.tick})"

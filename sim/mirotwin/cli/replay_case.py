@@ -1,0 +1,63 @@
+"""`mirotwin replay` of a case: whether the check that failed fails again.
+
+What belongs here: running up to where the case ends, what became of the verdict, and the exit code. What does not: the
+form of a case (`mirotwin.cases`), and reading it (`replay_job`).
+"""
+
+from __future__ import annotations
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_robot.image import Image
+from miro_sim.radio.downlink import TransmissionError
+from miro_sim.world.world import World
+from mirotwin.checks.expect import expectations_of
+from mirotwin.checks.interface import Failure
+from mirotwin.checks.watching import Checks
+from mirotwin.cli.console import show
+from mirotwin.cli.options import plain_parameters
+from mirotwin.cli.program import DIVERGENCE, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, complain
+from mirotwin.cli.progress import ProgressBar
+from mirotwin.cli.replay_job import Job
+
+
+def replay_case(job: Job, image: Image, file: str, quiet: bool) -> int:
+    """Runs it; the exit code is that of its check: 1, or 3 for a firmware fault; 0 if other firmware cures it."""
+    with plain_parameters(file, "replayed"):
+        world = World(job.scenario, job.seed, image, script=job.script)
+    checks = Checks(world, expectations_of(job.scenario, file))
+    end_tick = job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS
+    with ProgressBar("replaying", -(-end_tick // CONTROL_PERIOD_TICKS), quiet) as bar:
+        try:
+            with plain_parameters(file, "replayed"):
+                while not world.finished and world.tick < end_tick:
+                    world.run_to(min(end_tick, (world.index + 1) * CONTROL_PERIOD_TICKS))
+                    bar.to(world.index)
+        except TransmissionError as error:
+            raise BadInput(file, "", f"cannot be replayed beyond tick {world.tick}: {error}") from None
+    checks.finish()
+    return _judged(job, checks)
+
+
+def _judged(job: Job, checks: Checks) -> int:
+    verdict = job.case.verdict
+    if checks.failures:
+        again = [one for one in checks.failures if str(one) == verdict]
+        first = again[0] if again else checks.failures[0]
+        complain(f"fails as recorded: {first}" if again else f"still fails, but not as recorded: {first}")
+        if not again:
+            complain(f"recorded: {verdict}")
+        return _code(first)
+    wanted = verdict.partition(":")[0]
+    if any(one.name == wanted and one.verdict == "not judged" for one in checks.verdicts()):
+        complain(f"expectation not judged: the run had no occasion for it; recorded: {verdict}")
+        return EXPECTATION_FAILED
+    if job.case.changed:
+        show(f"cured: {wanted} passes; recorded: {verdict}")
+        return DONE
+    complain(f"not reproduced: {wanted} passes; recorded: {verdict}")
+    return DIVERGENCE
+
+
+def _code(failure: Failure) -> int:
+    return FIRMWARE_FAULT if failure.fault else EXPECTATION_FAILED
