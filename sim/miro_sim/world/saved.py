@@ -4,6 +4,7 @@ What belongs here: writing that form and refusing everything else. What does not
 world's tables check (`miro_exact.state`).
 
     magic               8 bytes
+    version             16 bytes, of the program that saved it: ASCII, filled up with zeros
     tables              32 bytes, SHA-256 over names and forms of all fields of the state
     scenario, firmware  32 bytes each, SHA-256
     seed                8 bytes
@@ -11,17 +12,19 @@ world's tables check (`miro_exact.state`).
     checksum            32 bytes, SHA-256 over all before
 
 All numbers are little-endian. A version of this program whose worlds have other fields writes another hash of tables:
-its worlds are refused, and so are those of before this form.
+its worlds are refused, and so are those of before this form. It is data: nothing in it is ever executed.
 """
 
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import struct
+from functools import cache
 from typing import NamedTuple
 
-MAGIC = b"mirowrld"
-_HEAD = struct.Struct("<8s32s32s32sq")
+MAGIC = b"mirowrl2"
+_HEAD = struct.Struct("<8s16s32s32s32sq")
 _CHECKSUM_BYTES = 32
 
 
@@ -34,10 +37,19 @@ class Identity(NamedTuple):
     seed: int
 
 
+@cache
+def version() -> str:
+    """Of this program, as it is installed."""
+    try:
+        return importlib.metadata.version("mirotwin")
+    except importlib.metadata.PackageNotFoundError:
+        return "unknown"
+
+
 def sealed(identity: Identity, state: bytes) -> bytes:
     """A saved world."""
     hashes = (bytes.fromhex(text) for text in identity[:3])
-    content = _HEAD.pack(MAGIC, *hashes, identity.seed) + state
+    content = _HEAD.pack(MAGIC, version().encode("ascii")[:16], *hashes, identity.seed) + state
     return content + hashlib.sha256(content).digest()
 
 
@@ -48,11 +60,14 @@ def opened(saved: bytes, own: Identity) -> bytes:
         raise ValueError("not a saved world, or one of a version of this program that wrote another form")
     if hashlib.sha256(content).digest() != saved[-_CHECKSUM_BYTES:]:
         raise ValueError("the saved world is damaged: its checksum is wrong")
-    _, *hashes, seed = _HEAD.unpack_from(content)
+    _, saver, *hashes, seed = _HEAD.unpack_from(content)
     tables, scenario, firmware = (value.hex() for value in hashes)
     found = Identity(tables, scenario, firmware, seed)
     if found.tables != own.tables:
-        raise ValueError("the saved world has other fields: another version of this program saved it")
+        by = saver.rstrip(b"\0").decode("ascii", "backslashreplace")
+        raise ValueError(
+            f"the saved world has other fields: another version of this program saved it ({by}; this is {version()})"
+        )
     for key, here, there in zip(Identity._fields, own, found, strict=True):
         if here != there:
             raise ValueError(f"the saved world has {key} {there}, this world has {here}")
