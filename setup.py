@@ -16,6 +16,7 @@ from pathlib import Path
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
+from setuptools.command.build_py import build_py
 
 HERE = Path(__file__).parent
 ROOTS = {
@@ -153,5 +154,33 @@ class BuildHot(build_ext):
         return hot
 
 
+CARRIED = {"robot_fw/firmware": "miro_robot/firmware/source", "examples/hil": "mirotwin/starter/files"}
+"""Folders outside of the packages that a wheel carries, and where: `mirotwin init` writes them."""
+
+
+class BuildCarrying(build_py):
+    """Adds what no package folder holds."""
+
+    def run(self):
+        super().run()
+        if not self.editable_mode:
+            for path, target in self._carried():
+                self.mkpath(str(target.parent))
+                self.copy_file(str(path), str(target))
+
+    def get_outputs(self, include_bytecode=1):
+        carried = [] if self.editable_mode else [str(target) for _, target in self._carried()]
+        return [*super().get_outputs(include_bytecode), *carried]
+
+    def _carried(self):
+        for folder, place in CARRIED.items():
+            for path in sorted((HERE / folder).rglob("*")):
+                inner = path.relative_to(HERE / folder)
+                if path.is_file() and not {"build", "runs", "__pycache__", ".pytest_cache"} & set(
+                    inner.parts
+                ):
+                    yield path, Path(self.build_lib) / place / inner
+
+
 if __name__ == "__main__":
-    setup(ext_modules=hot_extensions(), cmdclass={"build_ext": BuildHot})
+    setup(ext_modules=hot_extensions(), cmdclass={"build_ext": BuildHot, "build_py": BuildCarrying})

@@ -13,6 +13,8 @@ def image_path() -> Path:
 
 
 def source_folder() -> Path | None:
-    """The C source of it, where the package is used out of its checkout; None elsewhere."""
-    folder = Path(__file__).parents[2] / "firmware"
-    return folder if folder.is_dir() else None
+    """The C source of it: in a checkout, or in a wheel beside the image; None where neither is."""
+    for folder in (Path(__file__).parents[2] / "firmware", Path(__file__).parent / "source"):
+        if (folder / "Makefile").is_file():
+            return folder
+    return None

@@ -18,6 +18,7 @@ COMMANDS = {
     "replay": "Sends recorded bytes again and compares.",
     "decode": "Decodes captured bytes to frames and damage.",
     "export": "Writes the bytes of a run for Wireshark, or as a stream file.",
+    "init": "Begins a project: firmware, tests, scenarios, a workflow for CI.",
     "scenarios": "Lists the built-in scenarios, or shows one.",
     "info": "Shows versions, engine and firmware.",
     "fw": "Firmware: run on the bare processor, disassemble, trace, profile.",
