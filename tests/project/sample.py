@@ -32,7 +32,10 @@ import setuptools
 from setup import BuildCarrying
 setuptools.setup(
     cmdclass={{"build_py": BuildCarrying}},
-    script_args=["-q", "egg_info", "--egg-base", {folder!r}, "build", "--build-base", {build!r}, "bdist_wheel", "-d", {folder!r}],
+    script_args=[
+        *("-q", "egg_info", "--egg-base", {folder!r}, "build", "--build-base", {build!r}),
+        *("bdist_wheel", "-d", {folder!r}),
+    ],
 )
 """
 TESTS = ("conform", "scenarios", "pytest")
