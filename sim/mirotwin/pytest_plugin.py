@@ -59,6 +59,15 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(FirmwareCoverage(config), "mirotwin-firmware-coverage")
 
 
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """A scenario file is a test."""
+    if not file_path.name.endswith(".scenario.toml"):
+        return None
+    from mirotwin.testing.scenario_items import ScenarioFile
+
+    return ScenarioFile.from_parent(parent, path=file_path)
+
+
 class FirmwareCoverage:
     """Of one session. On the controller of pytest-xdist it adds up what its workers counted."""
 

@@ -21,6 +21,7 @@ class Simulation(Protocol):
     tick: int
     index: int
     periods: int
+    observers: list[Callable[[Period], object]]
 
     @property
     def networks(self) -> Sequence[Any]: ...
@@ -35,13 +36,17 @@ def run(
     recorder: Recorder | None = None,
     full: bool = False,
     on_period: Callable[[Period], bool | None] = lambda period: None,
+    move: Callable[[], object] | None = None,
 ) -> None:
     """Steps the world until it is finished, or until `on_period` returns True.
 
     Every period goes to `recorder`, with `full` each LM629 sample as well, and the firmware faults at the
-    end, also when something raises: a recording up to then is worth having.
+    end, also when something raises: a recording up to then is worth having. `move`: runs the world to its end in its
+    own way, which goes together with neither `full` nor an early end.
     """
     try:
+        if move is not None:
+            _moved(world, recorder, on_period, move)
         while not world.finished:
             if full and recorder is not None:
                 _run_samples(world, recorder)
@@ -54,6 +59,26 @@ def run(
         if recorder is not None:
             for network, slot, faults in faults_by_robot(world):
                 recorder.write_faults(network, slot, faults)
+
+
+def _moved(
+    world: Simulation,
+    recorder: Recorder | None,
+    on_period: Callable[[Period], object],
+    move: Callable[[], object],
+) -> None:
+    """Lets `move` run the world, and hands on each period when it ends."""
+
+    def keep(period: Period) -> None:
+        if recorder is not None:
+            recorder.write(period)
+        on_period(period)
+
+    world.observers.append(keep)
+    try:
+        move()
+    finally:
+        world.observers.remove(keep)
 
 
 def _run_samples(world: Simulation, recorder: Recorder) -> None:

@@ -71,6 +71,22 @@ STREAMS_2 = {
     "stream 2": f"# mirotwin stream 2\n96000 > {_FRAME}\n400000 <@1 {_FRAME}  # more\n900000 >@1 55 55!\n".encode(),
     "stream 2, header": f"# mirotwin stream 2\n#: seed = 7\n#: [scenario]\n{_SCENARIO}96000 > {_FRAME}\n".encode(),
 }
+SHORT_RUN = ["--set", "duration_s=0.1", "--no-figure", "-q"]
+STEPS = b"""
+scenario = "silent"
+expect.failsafe_stop_ms = 110.0
+step = [
+  { pause_ms = 5 },
+  { stream = "on", left_m_s = 0.1, every_ms = 33.4, frames = 9 },
+  { send = "team", slot = 1, left_m_s = 0.2, wrong_bits = [3, 9], bad_stop = [3], note = "drives" },
+  { wait_for = "frame", seq = 1, within_ms = 30 },
+  { send = "bytes", hex = "55 55! 01" },
+  { wait_for = "command", name = "STT", side = "right", within_ms = 9, from_now = true },
+  { check = { moves_only_when_fresh = true, answers_within_ms = 25.0 } },
+  { hold = "wheels", left_m_s = 0.1, tolerance_m_s = 0.9, for_ms = 1 },
+  { radio = "down" }, { reset = 1 }, { silence_for_ms = 1.5 }, { power = "off" }, { save = "a.world" },
+]
+"""
 EVENTS = b"5 *@0/1 reset 1\n6 *@0 radio down\n7 * P1.0 0\n#: set = {}\n#: expect = {no_fault = true}\n"
 MOST_BYTES = 1 << 20
 NUMBERS = (
@@ -184,6 +200,11 @@ class Seeds:
             "a.toml",
             builtin_text("fig6").encode(),
             [["fw", "profile", "@", "--to", "100us"]],
+        )
+        self.kinds["steps"] = (
+            "a.scenario.toml",
+            STEPS,
+            [["run", "@", "--out", "steps", "--force", *SHORT_RUN]],
         )
         self.kinds["image"] = (
             "a.ihx",

@@ -37,7 +37,7 @@ def set_to(gains: EpsilonTrackingParameters) -> list[str]:
 
 
 def test_the_built_in_scenarios_are_paths_of_our_own_and_the_figures_of_the_paper_in_its_order() -> None:
-    assert builtin_names() == ["curve", *CAPTIONS, "line", "sine", "waypoints"]
+    assert builtin_names() == ["curve", *CAPTIONS, "line", "silent", "sine", "waypoints"]
     for name, (start, path, law) in CAPTIONS.items():
         robot = only_robot(name)
         assert (robot.start_error_x_cm, robot.start_error_y_cm, robot.start_error_theta_rad) == start

@@ -16,13 +16,14 @@ import msgspec
 
 from miro_protocol.toml_text import TEXT_KIB, not_finite, without_none
 from miro_sim.inputs import InputError, read_input
+from miro_sim.scenario.base import with_base
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.parts import full_message, part_of
 from miro_sim.scenario.places import check_places
 from miro_sim.scenario.profiles import ProfileError, with_profiles
-from miro_sim.scenario.settings import blamed, make
-from miro_sim.scenario.text import check_size, written
+from miro_sim.scenario.settings import Setting, blamed, make
+from miro_sim.scenario.text import check_integers, check_size, written
 from miro_sim.scenario.variants import VariantError, with_variant
 
 Also = Callable[[Scenario, str], object]
@@ -34,7 +35,10 @@ def nothing_else(scenario: Scenario, origin: str) -> None:
 
 
 class ScenarioText(msgspec.Struct, frozen=True):
-    """A scenario together with its text, which a recording keeps: as it was read, or as the `settings` left it."""
+    """A scenario together with its text, which a recording keeps: as it was read, or as the `settings` left it.
+
+    The text of one that names another (`base`) is that of the whole.
+    """
 
     origin: str
     text: str
@@ -70,10 +74,10 @@ def load(source: str, settings: Sequence[str] = (), also: Also = nothing_else) -
     built-in. `settings` and `also` as `parse` takes them.
     """
     text = source_text(source)
-    raw, scenario = _parsed(text, source, settings, also)
-    return ScenarioText(
-        source, written(raw, source, settings) if settings else text, scenario, tuple(settings)
-    )
+    raw, scenario, complete = _parsed(text, source, settings, also)
+    if settings or not complete:
+        text = written(raw, source, settings)
+    return ScenarioText(source, text, scenario, tuple(settings))
 
 
 def source_text(source: str) -> str:
@@ -123,14 +127,23 @@ def changed(scenario: Scenario, origin: str, settings: Sequence[str], also: Also
     )
 
 
-def _parsed(text: str, origin: str, settings: Sequence[str], also: Also) -> tuple[dict[str, Any], Scenario]:
-    """The tables with the settings made, and the scenario."""
+def _parsed(
+    text: str, origin: str, settings: Sequence[str], also: Also
+) -> tuple[dict[str, Any], Scenario, bool]:
+    """The tables with the settings made, the scenario, and whether the text alone says all of it."""
     check_size(text, origin)
     try:
         raw = _tables(text, origin)
-        return raw, _checked(raw, origin, settings, also)
+        whole, own = with_base(raw, origin, _base_tables)
+        return whole, _checked(whole, origin, settings, also, own), whole is raw
     except RecursionError:
         raise _too_deep(origin) from None
+
+
+def _base_tables(source: str) -> dict[str, Any]:
+    text = source_text(source)
+    check_size(text, source)
+    return _tables(text, source)
 
 
 def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = ()) -> Scenario:
@@ -155,12 +168,17 @@ def _tables(text: str, origin: str) -> dict[str, Any]:
 
 
 def _checked(
-    raw: dict[str, Any], origin: str, settings: Sequence[str], also: Also = nothing_else
+    raw: dict[str, Any],
+    origin: str,
+    settings: Sequence[str],
+    also: Also = nothing_else,
+    own: Sequence[Setting] = (),
 ) -> Scenario:
-    """The scenario of these tables; makes the settings in them."""
-    made = make(raw, settings, origin)
+    """The scenario of these tables; makes the settings in them. `own`: those that its file has made."""
+    made = [*own, *make(raw, settings, origin)]
     try:
         _check_finite(raw, origin)
+        check_integers(raw, origin)
         complete = _with_profiles(_with_variant(raw, origin), origin)
         try:
             scenario = msgspec.convert(complete, Scenario, dec_hook=part_of)

@@ -132,14 +132,16 @@ class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A whole run. A file may also have `variant` (`variants`), which stands for other keys.
+    """A whole run. A file may also have `variant` (`variants`), which stands for other keys, and `scenario` with `set`
+    (`base`), which stand for another scenario's.
 
     `stop_on_fault` ends it at the first firmware fault; otherwise faults are counted.
 
     `lm629` turns readings of the chips' undocumented corners (`robot_fw/miro_robot/lm629/README.md`).
 
     `expect` says what is expected of every robot: a key a check. It is handed on as it is to who judges the run
-    (`mirotwin.checks`), because a world does not depend on what is expected of it.
+    (`mirotwin.checks`), because a world does not depend on what is expected of it. So is `step`, what is done during
+    the run (`mirotwin.steps`): a world does what it is told.
     """
 
     name: Name
@@ -150,6 +152,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     camera: Camera = PixelCamera()
     host: Host = Host()
     expect: dict[str, Any] = {}
+    step: tuple[dict[str, Any], ...] = ()
     networks: Annotated[tuple[Network, ...], Meta(min_length=1)] = msgspec.field(name="network")
 
     def __post_init__(self) -> None:
@@ -161,9 +164,9 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 def without_expectations(scenario: Scenario) -> Scenario:
-    """The same scenario, of which nothing is expected: all that a world depends on."""
+    """The same scenario, of which nothing is expected, without steps: all that a world depends on."""
     networks = []
     for network in scenario.networks:
         robots = tuple(msgspec.structs.replace(robot, expect={}) for robot in network.robot)
         networks.append(msgspec.structs.replace(network, robot=robots))
-    return msgspec.structs.replace(scenario, expect={}, networks=tuple(networks))
+    return msgspec.structs.replace(scenario, expect={}, step=(), networks=tuple(networks))

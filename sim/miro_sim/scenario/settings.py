@@ -24,6 +24,7 @@ from miro_sim.scenario.variants import VariantError, impose
 
 Table = dict[str, Any]
 EXPECT = "expect."
+OPTION = "--set"
 _TAGS = {registry.key for registry in REGISTRIES.values()}
 """Keys that say which other keys a table has."""
 
@@ -32,16 +33,18 @@ class Setting(msgspec.Struct, frozen=True):
     """What a setting did. `text`: KEY=VALUE as it was given; `path`: what was set, as in errors: `network[0].host`.
 
     `table`: the table that is the setting's as a whole, because the setting made it or chose its kind; or "".
+    `option`: who made it: the command line's, or the key of a scenario file that holds settings.
     """
 
     text: str
     path: str
     table: str = ""
+    option: str = OPTION
 
     @property
     def place(self) -> str:
         """How errors name it."""
-        return _option(self.text)
+        return _option(self.text, self.option)
 
     def concerns(self, path: str) -> bool:
         """Whether an error at this path may be the setting's."""
@@ -49,9 +52,11 @@ class Setting(msgspec.Struct, frozen=True):
         return any(_inside(path, place) for place in ours) or _inside(self.path, path)
 
 
-def _option(text: str) -> str:
-    """A setting as it is written on the command line, where `--expect` stands for `--set expect.`."""
-    return f"--expect {text.removeprefix(EXPECT)}" if text.startswith(EXPECT) else f"--set {text}"
+def _option(text: str, option: str) -> str:
+    """A setting as it is written on the command line, where `--expect` stands for `--set expect.`, or in a file."""
+    if option != OPTION:
+        return f"{option}.{text}"
+    return f"--expect {text.removeprefix(EXPECT)}" if text.startswith(EXPECT) else f"{OPTION} {text}"
 
 
 def _inside(path: str, above: str) -> bool:
@@ -80,24 +85,25 @@ def in_text(table: Table, above: str = "") -> list[str]:
     return found
 
 
-def make(raw: Table, settings: Iterable[str], origin: str) -> list[Setting]:
+def make(raw: Table, settings: Iterable[str], origin: str, option: str = OPTION) -> list[Setting]:
     """Makes the settings in the tables of a scenario, in their order. Raises ScenarioError."""
-    return [_make(raw, text, origin) for text in settings]
+    return [_make(raw, text, origin, option) for text in settings]
 
 
-def _make(raw: Table, text: str, origin: str) -> Setting:
+def _make(raw: Table, text: str, origin: str, option: str) -> Setting:
     try:
         keys, value = _read(text, origin)
         if keys == ["variant"]:
             impose(raw, value)
-            return Setting(text, "variant")
-        return _Path(text).put(raw, keys, value, "")
+            return Setting(text, "variant", option=option)
+        made = _Path(text).put(raw, keys, value, "")
+        return msgspec.structs.replace(made, option=option)
     except _Refused as refused:
-        raise ScenarioError(origin, _option(text), refused.what, refused.remedy) from None
+        raise ScenarioError(origin, _option(text, option), refused.what, refused.remedy) from None
     except VariantError as error:
-        raise ScenarioError(origin, _option(text), error.what, error.remedy) from None
+        raise ScenarioError(origin, _option(text, option), error.what, error.remedy) from None
     except RecursionError:
-        raise ScenarioError(origin, _option(text), "nested too deeply") from None
+        raise ScenarioError(origin, _option(text, option), "nested too deeply") from None
 
 
 def _read(text: str, origin: str) -> tuple[list[str], Any]:

@@ -11,6 +11,9 @@ from miro_exact.bad_input import one_line
 from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, too_long
 from miro_sim.scenario.errors import ScenarioError
 
+LONGEST_BITS = 1024
+"""Beyond it an integer is beyond every float, too."""
+
 
 def check_size(text: str, origin: str) -> None:
     """Refuses what would take `tomllib` minutes."""
@@ -23,9 +26,23 @@ def check_size(text: str, origin: str) -> None:
         raise ScenarioError(origin, f"line {line}", what, "remove it; no key of a scenario has more than 6")
 
 
+def check_integers(value: Any, origin: str, path: str = "") -> None:
+    """Refuses integers in hex that are too long to be shown, let alone meant; `tomllib` reads them."""
+    if isinstance(value, int) and value.bit_length() > LONGEST_BITS:
+        raise ScenarioError(origin, path, f"an integer of {value.bit_length()} bits", "give a smaller one")
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            check_integers(inner, origin, f"{path}.{key}" if path else key)
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            check_integers(inner, origin, f"{path}[{index}]")
+
+
 def written(raw: dict[str, Any], origin: str, settings: Sequence[str]) -> str:
     """A scenario file of these tables; its head says what it was made of."""
     import tomli_w  # only scenarios with settings need it
 
     head = [f"# {origin} with these keys set:", *(f"#   {setting}" for setting in settings)]
+    if not settings:
+        head = [f"# {origin} with what the scenario says that it names"]
     return "\n".join([*map(one_line, head), "", tomli_w.dumps(raw)])

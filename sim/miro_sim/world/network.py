@@ -145,8 +145,10 @@ class Network:
             self.log.note(of_deed(deed))
 
     def send_due(self, rendezvous_tick: int) -> None:
-        """Puts on the air what may come up before the tick up to which it is settled next."""
-        for sent in self.outbox.due(rendezvous_tick + SETTLE_TICKS):
+        """Puts on the air what may come up before the tick up to which it is settled next, and nothing else: what may
+        still be announced at the rendezvous is not in the state there, whenever it was announced.
+        """
+        for sent in self.outbox.due(rendezvous_tick + SETTLE_TICKS - self.downlink.sender.latency):
             self.downlink.send(sent.tick, sent.data, sent.bad_stop)
             self.frames_sent += 1
             self.sent.append(sent)

@@ -115,7 +115,7 @@ class Outbox:
     def due(self, until_tick: int) -> list[Transmission]:
         """Takes out what may come up on the air before `until_tick`, in order."""
         count = 0
-        while count < len(self.waiting) and self.waiting[count].sent.tick <= until_tick + self.lead_ticks:
+        while count < len(self.waiting) and self.waiting[count].sent.tick < until_tick + self.lead_ticks:
             count += 1
         taken = [one.sent for one in self.waiting[:count]]
         del self.waiting[:count]

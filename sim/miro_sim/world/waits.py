@@ -68,6 +68,16 @@ class Waits:
             for robot in network.robots:
                 self.read[index, robot.spec.slot] = robot.board.log.end
 
+    def collect(self) -> None:
+        """Takes over what the logs hold, which is not for ever: for who moves the world without a wait."""
+        if not self.decoders:
+            self._make_decoders()
+        self._gather(Watch(self.world, ()))
+
+    def pass_over(self) -> None:
+        """What was collected of before the tick of now does not count for the next wait."""
+        self.backlog = [entry for entry in self.backlog if entry[0][0] >= self.world.tick]
+
     def _make_decoders(self) -> None:
         """One for each robot, of what its receiver hears."""
         for index, network in enumerate(self.world.networks):

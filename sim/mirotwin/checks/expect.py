@@ -38,12 +38,12 @@ def struct_of(name: str) -> type[Check]:
 def expectations_of(scenario: Scenario, origin: str) -> dict[Place, list[Check]]:
     """The checks of each robot, the four of every run first. Raises ScenarioError with the path of what is wrong."""
     end_tick = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
-    for_all = _table(scenario, origin, "expect", scenario.expect, end_tick)
+    for_all = checks_of_table(scenario, origin, "expect", scenario.expect, end_tick)
     found: dict[Place, list[Check]] = {}
     for index, network in enumerate(scenario.networks):
         for at, robot in enumerate(network.robot):
             path = f"network[{index}].robot[{at}].expect"
-            own = _table(scenario, origin, path, robot.expect, end_tick)
+            own = checks_of_table(scenario, origin, path, robot.expect, end_tick)
             wanted = {**{name: struct_of(name)() for name in ALWAYS_ON}, **for_all, **own}
             found[index, robot.slot] = [check for check in wanted.values() if check is not None]
     return found
@@ -54,10 +54,10 @@ def says_anything(scenario: Scenario) -> bool:
     return bool(scenario.expect or any(robot.expect for one in scenario.networks for robot in one.robot))
 
 
-def _table(
+def checks_of_table(
     scenario: Scenario, origin: str, path: str, table: Mapping[str, Any], end_tick: int
 ) -> dict[str, Check | None]:
-    """The checks of one table; None for one that is not expected."""
+    """The checks of one table at `path`; None for one that is not expected. Raises ScenarioError."""
     found: dict[str, Check | None] = {}
     for name, value in table.items():
         place = f"{path}.{name}"

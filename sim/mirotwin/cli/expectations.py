@@ -1,4 +1,4 @@
-"""What commands that run a scenario say of its checks: `--expect`, one line a failure, and the exit code.
+"""What commands that run a scenario say of its checks and steps: `--expect`, one line a failure, and the exit code.
 
 What belongs here: words and exit codes. What does not: the checks (`mirotwin.checks`).
 """
@@ -6,13 +6,16 @@ What belongs here: words and exit codes. What does not: the checks (`mirotwin.ch
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from miro_sim.scenario.settings import EXPECT
 from mirotwin.checks.watching import Checks
 from mirotwin.cli.program import DONE, EXPECTATION_FAILED, complain
+
+if TYPE_CHECKING:
+    from mirotwin.steps.player import Player
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 LINES = 5
@@ -54,3 +57,11 @@ def report_failures(checks: Checks) -> int:
             if more:
                 complain(f"expectation failed: {verdict.name}: {more} more times")
     return code
+
+
+def report_steps(player: Player, checks: Checks) -> int:
+    """The same where steps were done: the step that failed, and the checks that steps began, too."""
+    if player.failure is not None:
+        complain(f"step failed: {player.failure}")
+    codes = [report_failures(one) for one in (checks, *player.checks)]
+    return EXPECTATION_FAILED if player.failure is not None else max(codes)

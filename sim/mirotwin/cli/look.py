@@ -20,6 +20,7 @@ from mirotwin.cli.options import (
     firmware_option,
     load_image,
     plain_parameters,
+    refuse_steps,
     set_option,
 )
 from mirotwin.cli.program import DONE, FIRMWARE_FAULT, show_line
@@ -74,6 +75,7 @@ def look(
     """
     choose_engine(engine)
     text = load(scenario, settings)
+    refuse_steps(text.scenario, scenario)
     frame = ticks(at_s) // CONTROL_PERIOD_TICKS
     name = text.scenario.name
     out = out or Path(f"{name}-{seed}-net{network}-frame-{frame:06d}.png")

@@ -22,6 +22,7 @@ from miro_host.parts import PartError
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from miro_sim.inputs import TEXT_BYTES, check_regular
+from miro_sim.scenario.keys import Scenario
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 LONGEST_S = 1e9
@@ -101,6 +102,13 @@ def load_image(path: str | Path | None, limit: int = 8192, named: bool = True) -
     if named:
         _ = image.symbols.names
     return image
+
+
+def refuse_steps(scenario: Scenario, origin: str) -> None:
+    """For commands that run a scenario without its steps: raises BadInput if it has any."""
+    if scenario.step:
+        what = f"has {len(scenario.step)} steps, which only `mirotwin run` and `mirotwin test` do"
+        raise BadInput(origin, "step", what, "run it, and give the run.mcap that it writes")
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.checks.expect import expectations_of
 from mirotwin.checks.watching import Checks
-from mirotwin.cli.expectations import expect_option, report_failures
+from mirotwin.cli.expectations import expect_option, report_failures, report_steps
 from mirotwin.cli.held_signals import held_signals
 from mirotwin.cli.options import (
     Place,
@@ -31,6 +31,10 @@ from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.run_files import RunFiles
 from mirotwin.files.outputs import OutputFolder
 from mirotwin.recording.source import source_of
+from mirotwin.steps.plan import check_symbols
+from mirotwin.steps.player import Player
+from mirotwin.steps.reading import steps_of
+from mirotwin.steps.running import everything, keep_saved
 
 if TYPE_CHECKING:
     from mirotwin.looking.saved_frames import SavedFrames
@@ -96,19 +100,27 @@ def run(
     all that was recorded; one that is killed leaves run.part.mcap with all but the last half second. decode, export
     and replay read it. Files of an earlier run stay as they are until the new ones are complete.
 
-    Exit code 1: a check of --expect or of the scenario's [expect] failed; 3: the firmware did what it must not.
+    The steps of a scenario (`[[step]]`) are done, as by `mirotwin test`.
+
+    Exit code 1: a step, or a check of --expect or of the scenario's [expect] failed; 3: the firmware did what it must
+    not.
     """
     active = choose_engine(engine)
-    text = load(scenario, (*settings, *expected), expectations_of)
+    text = load(scenario, (*settings, *expected), everything)
+    steps = steps_of(text.scenario, text.origin)
+    if steps and record == "full":
+        raise click.UsageError(f"--record full does not go with the steps of {scenario}.")
     folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force)
     if plain_frames and frames is None:
         raise click.UsageError("--plain-frames needs --frames.")
     image = load_image(firmware)
+    check_symbols(steps, image, text.origin)
 
     source = source_of(text, seed, image, record)
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
     checks = Checks(world, expectations_of(text.scenario, text.origin))
+    player = Player(world, steps, text.origin) if steps else None
     views: list[View] = []
     if frames is not None or record_frames:
         from mirotwin.looking.view import views_of  # loads the pictures' library
@@ -119,13 +131,16 @@ def run(
         if saved is not None:
             saved.begin(hold)
         recorded = views if record_frames else []
-        run_files = RunFiles(folder, source, world, active, hold, checks, text.settings, recorded)
+        run_files = RunFiles(folder, source, world, active, hold, checks, text.settings, recorded, player)
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
     if not quiet:
         from mirotwin.cli.run_table import print_table  # loads rich
 
         print_table(summary, run_files.tracks, folder.path)
+    if player is not None:
+        keep_saved(player, folder.path)
+        return report_faults(world) or report_steps(player, checks)
     failed = report_failures(checks)
     return report_faults(world) or failed
 

@@ -26,12 +26,13 @@ from mirotwin.files.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.recording.recorder import Recorder, Source
 from mirotwin.report.learnt_calibration import learnt_calibrations
 from mirotwin.report.learnt_wheels import learnt_wheels
-from mirotwin.report.summary import Summary, summarise, to_json
+from mirotwin.report.summary import Steps, Summary, summarise, to_json
 from mirotwin.report.theory import gains_of
 from mirotwin.report.track import Tracks
 
 if TYPE_CHECKING:
     from mirotwin.looking.view import View
+    from mirotwin.steps.player import Player
 
 SUMMARY = "summary.json"
 FIGURE = "figure.png"
@@ -42,7 +43,7 @@ FLUSH_S = 0.2
 class RunFiles:
     """Runs `world` and fills `folder`, which is open and in which `hold` holds signals.
 
-    The recording gets each frame of `views`.
+    The recording gets each frame of `views`. `player` runs a world with steps.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class RunFiles:
         checks: Checks,
         settings: tuple[str, ...] = (),
         views: Sequence[View] = (),
+        player: Player | None = None,
     ) -> None:
         self.folder = folder
         self.source = source
@@ -64,6 +66,7 @@ class RunFiles:
         self.checks = checks
         self.settings = settings
         self.views = views
+        self.player = player
         self.tracks = Tracks()
         self._wall_s = 0.0
         self._flushed_s = -FLUSH_S
@@ -116,7 +119,18 @@ class RunFiles:
         for view in self.views:
             view.shows.append(keep_frame)
         with bar, self.hold.released():
-            runner.run(self.world, recorder, self.source.record == "full", keep)
+            runner.run(
+                self.world,
+                recorder,
+                self.source.record == "full",
+                keep,
+                None if self.player is None else self._play,
+            )
+
+    def _play(self) -> None:
+        assert self.player is not None
+        self.player.play()
+        self.player.finish()
 
     def _summary(self, complete: bool, reason: str = "") -> Summary:
         return summarise(
@@ -135,7 +149,13 @@ class RunFiles:
             wheels=learnt_wheels(self.world.networks),
             gains=gains_of(self.world.scenario),
             expectations=self.checks.verdicts(),
+            steps=None if self.player is None else self._steps(self.player),
         )
+
+    def _steps(self, player: Player) -> Steps:
+        verdicts = [verdict for checks in player.checks for verdict in checks.verdicts()]
+        failed = f"{player.failure}" if player.failure else ""
+        return Steps(player.done, len(player.steps), failed, tuple(verdicts))
 
     def _leave_parts(self, reason: str) -> None:
         """What is left when the run is broken off: nothing, if not even one control period was recorded.

@@ -41,6 +41,7 @@ from mirotwin.cli.options import (
     firmware_option,
     load_image,
     plain_parameters,
+    refuse_steps,
     set_option,
 )
 from mirotwin.cli.progress import ProgressBar
@@ -182,6 +183,7 @@ def _robot_run(request: Request) -> RobotRun:
     if subject in builtin_names() or subject.endswith(".toml") or not is_path:
         choose_engine(request.engine)
         text = load(subject, request.settings)
+        refuse_steps(text.scenario, subject)
         image = load_image(request.firmware)
         scenario, seed, script = text.scenario, request.seed or 0, None
     else:

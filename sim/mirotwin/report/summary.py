@@ -107,6 +107,18 @@ class Expectation(msgspec.Struct, frozen=True, omit_defaults=True):
     first: FirstFailure | None = None
 
 
+class Steps(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What came of the steps of a scenario (`mirotwin.steps`): so many were done, which failed, if one did, and how.
+
+    `expectations`: the checks that steps began.
+    """
+
+    done: int
+    count: int
+    failed: str = ""
+    expectations: tuple[Expectation, ...] = ()
+
+
 class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """`summary.json`. `tracking` and `theory` are the first robot's; `robots` lists all when there are several.
 
@@ -137,6 +149,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     reason: str = ""
     set: tuple[str, ...] = ()
     expectations: tuple[Expectation, ...] = ()
+    steps: Steps | None = None
 
 
 def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
@@ -193,6 +206,7 @@ def summarise(
     wheels: tuple[LearntWheels, ...] = (),
     gains: Mapping[Place, Gains] = {},
     expectations: tuple[Expectation, ...] = (),
+    steps: Steps | None = None,
 ) -> Summary:
     """The summary of a run; `counters` as `World.counters()` gives them, `gains` as `theory.gains_of`."""
     everyone = tuple(
@@ -219,6 +233,7 @@ def summarise(
         reason=reason,
         set=settings,
         expectations=expectations,
+        steps=steps,
     )
 
 

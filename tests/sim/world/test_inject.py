@@ -59,6 +59,17 @@ def test_when_input_is_announced_changes_nothing(data):
     assert world.digest == digest
 
 
+@pytest.mark.parametrize("radio", ["", "latency_s = 0.01", "latency_s = 0.02", 'carrier = "on"'])
+def test_what_is_announced_at_the_begin_of_a_period_is_not_in_the_digest_of_the_one_before(radio):
+    late, early = (two_networks(f"host = 'silent'\n[network.radio]\n{radio}") for _ in range(2))
+    late.run_to(PERIOD)
+    tick = late.inject(FRAME)
+    early.inject(FRAME, at_tick=tick)
+    late.run_to(3 * PERIOD)
+    early.run_to(3 * PERIOD)
+    assert late.digest == early.digest
+
+
 def test_a_robot_hears_an_injected_frame():
     world = silent()
     tick = world.inject(FRAME)

@@ -1,0 +1,56 @@
+"""A scenario that is another one with a few keys changed: `scenario = "silent"` at the top of a file.
+
+    scenario = "silent"                    a built-in one, or a file beside this one (a path that ends in .toml)
+    duration_s = 1.0                       any key of a scenario: stands instead of the other one's, a table as a whole
+    set = { network.robot.slot = 1 }       single keys of tables, as `--set` on the command line
+
+What belongs here: putting the tables of both together. What does not: finding the other one's text (`file`), the rules
+of settings (`settings`). The words are those of a stream file's header. The result is a whole scenario, which is what a
+recording keeps: it depends on no other file.
+"""
+
+from collections.abc import Callable
+from pathlib import PurePath
+from typing import Any
+
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.settings import Setting, in_text, make
+from miro_sim.scenario.text import check_integers
+
+Table = dict[str, Any]
+SCENARIO, SET = "scenario", "set"
+
+
+def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tuple[Table, list[Setting]]:
+    """The tables of a whole scenario, and the settings of the file's `set` that were made in them.
+
+    `tables_of` gives the tables of the scenario with a name or path. Raises ScenarioError.
+    """
+    if SCENARIO not in raw:
+        return raw, []
+    name = raw[SCENARIO]
+    if not isinstance(name, str) or not name:
+        what = f"expected a name or a path, got {name!r}"
+        raise ScenarioError(origin, SCENARIO, what, 'write scenario = "silent"')
+    own = {key: value for key, value in raw.items() if key not in (SCENARIO, SET)}
+    settings = raw.get(SET, {})
+    if not isinstance(settings, dict):
+        raise ScenarioError(origin, SET, "expected a table of keys", "write set = { KEY = VALUE }")
+    check_integers(raw, origin)  # they could not be written as text either
+    try:
+        base = tables_of(_beside(origin, name))
+    except ScenarioError as error:
+        place = ": ".join(part for part in (f"{error.path}", f"{error.place}") if part)
+        raise ScenarioError(origin, SCENARIO, f"{place}: {error.what}", error.remedy) from None
+    if SCENARIO in base:
+        what = f"{name} is itself another scenario with keys changed"
+        raise ScenarioError(origin, SCENARIO, what, f"name {base[SCENARIO]!r}, and repeat its keys")
+    complete = {**base, **own}
+    return complete, make(complete, in_text(settings), origin, SET)
+
+
+def _beside(origin: str, name: str) -> str:
+    """The path of a file that a file names; a name without a separator or suffix is a built-in scenario."""
+    if not (name.endswith(".toml") or "/" in name or "\\" in name):
+        return name
+    return str(PurePath(origin).parent / name)

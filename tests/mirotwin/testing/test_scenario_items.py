@@ -1,0 +1,55 @@
+"""pytest collects scenario files: as a user has it, in a session of its own."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from tests import children
+
+HEAD = 'scenario = "silent"\nduration_s = 0.3\n'
+GOOD = HEAD + 'step = [{ pause_ms = 5 }, { send = "poll" }, { expect = "answer", within_ms = 60 }]\n'
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("session")
+    (folder / "pytest.ini").write_text("[pytest]\n")
+    (folder / "good.scenario.toml").write_text(GOOD)
+    (folder / "late.scenario.toml").write_text(GOOD.replace("60", "20"))
+    (folder / "wrong.scenario.toml").write_text(GOOD.replace("within_ms", "within_s"))
+    return folder
+
+
+def session(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "pytest", "-q", *arguments]
+    return children.run(command, cwd=folder, capture_output=True, text=True)
+
+
+def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(folder: Path) -> None:
+    done = session(folder, "-p", "no:xdist", "--junitxml=out.xml")
+    assert done.returncode == 1, done.stdout
+    assert "2 failed, 1 passed" in done.stdout
+    assert (
+        "\nstep failed: step 3: expect answer: tick 600000 (25.000 ms): wanted answer within 20 ms, "
+        in done.stdout
+    )
+    assert (
+        "\nwrong.scenario.toml: step 3.within_s: unknown key; use within_ms, in milliseconds\n" in done.stdout
+    )
+    assert "\nagain: mirotwin test late.scenario.toml --seed 0\n" in done.stdout
+    assert "Traceback" not in done.stdout
+    assert ".py:" not in done.stdout
+    (suite,) = ElementTree.parse(folder / "out.xml").getroot()
+    names = {one.get("name") for one in suite.iter("property")}
+    assert names == {"mirotwin_seed", "mirotwin_digest", "mirotwin_firmware_sha256", "mirotwin_reproduce"}
+
+
+def test_tests_are_chosen_spread_over_processes_and_begun_again_with_the_last_failed(folder: Path) -> None:
+    assert "1 passed" in session(folder, "-k", "good", "-n", "2").stdout
+    assert session(folder, "-p", "no:xdist").returncode == 1
+    assert "2 failed" in session(folder, "--lf", "-p", "no:xdist").stdout
+    assert "good.scenario.toml::good" in session(folder, "--collect-only", "-p", "no:xdist").stdout
