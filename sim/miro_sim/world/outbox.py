@@ -92,6 +92,9 @@ class Outbox:
         """
         if sent.tick < free_tick:
             raise ValueError(f"tick {sent.tick}: the transmitter is busy until tick {free_tick}")
+        if not self.waiting or self.waiting[-1].sent.end_tick <= sent.tick:  # a long script comes in order
+            self.waiting.append(Waiting(sent, INJECTED))
+            return
         for old, origin in self.waiting:
             if _overlap(old, sent) and (origin == INJECTED or old.tick < sent.tick):
                 busy = f"is busy from tick {old.tick} to {old.end_tick}"

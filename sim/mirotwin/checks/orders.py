@@ -18,21 +18,25 @@ from miro_robot.lm629.commands import BY_NAME
 from miro_sim.world.events import SIDES, Event
 
 _RESET, _STT, _LTRJ = (BY_NAME[name].opcode for name in ("RESET", "STT", "LTRJ"))
-_OFF, _STOPS = 0x0100, 0x0600
+_OFF, _STOPS, _ABRUPT = 0x0100, 0x0600, 0x0200
 _VELOCITY_MODE, _FORWARD = 0x0800, 0x1000
-_ACCELERATION, _VELOCITY, _VELOCITY_RELATIVE = 0x20, 0x08, 0x04
+_ACCELERATION, _ACCELERATION_RELATIVE, _VELOCITY, _VELOCITY_RELATIVE = 0x20, 0x10, 0x08, 0x04
 
 
 class Order(msgspec.Struct, frozen=True):
     """A wheel is told at `tick`: "off", "stop", or "drive" with this velocity (16.16 counts per sample).
 
     `word`: the velocity as the radio carries it, in 1/256 count per sample; None where it is no such number.
+    `acceleration` (16.16 counts per sample^2) is the one last loaded, which counts from this order on. `abrupt`: a stop
+    without a ramp.
     """
 
     tick: int
     side: str
     what: Literal["off", "stop", "drive"]
     velocity: int = 0
+    acceleration: int = 0
+    abrupt: bool = False
 
     @property
     def moves(self) -> bool:
@@ -49,21 +53,29 @@ class _Loaded:
     def __init__(self) -> None:
         self.control = 0
         self.velocity = 0
+        self.acceleration = 0
 
     def load(self, data: bytes) -> None:
         self.control = int.from_bytes(data[:2], "big")
-        at = 2 + (4 if self.control & _ACCELERATION else 0)
+        at = 2
+        if self.control & _ACCELERATION:
+            value = int.from_bytes(data[at : at + 4], "big", signed=True)
+            relative = self.control & _ACCELERATION_RELATIVE
+            self.acceleration = self.acceleration + value if relative else value
+            at += 4
         if self.control & _VELOCITY:
             value = int.from_bytes(data[at : at + 4], "big", signed=True)
             self.velocity = self.velocity + value if self.control & _VELOCITY_RELATIVE else value
 
     def start(self, tick: int, side: str) -> Order:
         if self.control & _OFF:
-            return Order(tick, side, "off")
+            return Order(tick, side, "off", acceleration=self.acceleration)
         if self.control & _STOPS:
-            return Order(tick, side, "stop")
+            abrupt = bool(self.control & _ABRUPT)
+            return Order(tick, side, "stop", acceleration=self.acceleration, abrupt=abrupt)
         backward = self.control & _VELOCITY_MODE and not self.control & _FORWARD
-        return Order(tick, side, "drive", -self.velocity if backward else self.velocity)
+        velocity = -self.velocity if backward else self.velocity
+        return Order(tick, side, "drive", velocity, self.acceleration)
 
 
 class Orders:

@@ -33,5 +33,6 @@ CHECKS: Registry[object] = Registry(
         "tracks_within_cm": "mirotwin.checks.course:TracksWithin",
         "settles_within_s": "mirotwin.checks.course:SettlesWithin",
         "inside_pitch": "mirotwin.checks.course:InsidePitch",
+        "conforms_to": "mirotwin.conform.judgement:ConformsTo",
     },
 )

@@ -15,6 +15,7 @@ COMMANDS = {
     "look": "Draws what the camera sees and what the tracker makes of it.",
     "calibrate": "Finds a camera's parameters from control points.",
     "track": "Finds robots in pictures of your own, or in recorded ones.",
+    "conform": "Tries the protocol's rules on a firmware image.",
     "test": "Runs scenario files as tests: steps, checks, a verdict each.",
     "replay": "Sends recorded bytes again and compares.",
     "decode": "Decodes captured bytes to frames and damage.",

@@ -29,7 +29,7 @@ def test_a_row_says_kind_parameters_and_defaults(name: str) -> None:
     assert list(said) == list(struct.__struct_fields__)
     assert struct.MAIN in ("", *list(said)[:1])
     event = {"what": "answer", "until_tick": 1} if "what" in said else {}
-    given = {struct.MAIN: 1} if struct.MAIN else event
+    given = {struct.MAIN: "P01" if struct.MAIN == "rule" else 1} if struct.MAIN else event
     made = struct(**given)
     for key, default in said.items():
         assert key == struct.MAIN or not default or float(default) == getattr(made, key)

@@ -1,0 +1,45 @@
+"""Writes the table of docs/conformance.md from the rules: `python -m mirotwin.conform.document`.
+
+What belongs here: turning rules into Markdown. What does not: prose, which is in that page.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+
+from mirotwin.conform.rule import Air, Rule
+from mirotwin.conform.table import CHAPTERS
+
+
+def render() -> str:
+    """All rules by chapter, ending in a newline."""
+    return "\n".join(line for chapter in CHAPTERS for line in _chapter(chapter.title, chapter.rules))
+
+
+def _chapter(title: str, rules: list[Rule]) -> Iterator[str]:
+    yield f"### {title}\n"
+    yield "| rule | name | a robot must | from | tried with |"
+    yield "|---|---|---|---|---|"
+    for rule in rules:
+        airs = "; ".join(dict.fromkeys(map(_air, rule.airs)))
+        yield f"| {rule.id} | {rule.name} | {rule.text.replace('|', chr(92) + '|')} | {_source(rule.source)} | {airs} |"
+    yield ""
+
+
+def _source(source: str) -> str:
+    page, _, section = source.partition(", ")
+    anchor = "".join(one for one in section.lower().replace(" ", "-") if one.isalnum() or one == "-")
+    return f"[{section}](../{page}#{anchor})"
+
+
+def _air(air: Air) -> str:
+    slots = ", ".join(map(str, air.slots))
+    more = ", keyed carrier with noise" if air.keyed else ""
+    if air.baud_offset_ppm:
+        more += f", host {air.baud_offset_ppm / 10_000:+g} %"
+    return f"N = {air.robots}, slot {slots}{more}"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(render())

@@ -1,0 +1,38 @@
+"""What came of the rules as JUnit XML, for the test pages of CI systems.
+
+What belongs here: the document. What does not: judging. No wall time is in it: the same image gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from xml.etree import ElementTree
+
+from miro_exact.bad_input import one_line
+from mirotwin.conform.rule import Rule
+from mirotwin.conform.run import Outcome, failure_text
+from mirotwin.conform.table import chapter_of
+
+
+def junit(outcomes: Sequence[Outcome], rules: Sequence[Rule], properties: Mapping[str, str]) -> bytes:
+    """One test case a rule, in a suite with these properties."""
+    failed = [outcome for outcome in outcomes if not outcome.passed]
+    suite = ElementTree.Element(
+        "testsuite", name="mirotwin conform", tests=f"{len(outcomes)}", failures=f"{len(failed)}", errors="0"
+    )
+    shown = ElementTree.SubElement(suite, "properties")
+    for name, value in properties.items():
+        ElementTree.SubElement(shown, "property", name=name, value=one_line(value))
+    by_id = {rule.id: rule for rule in rules}
+    for outcome in outcomes:
+        rule = by_id[outcome.rule]
+        case = ElementTree.SubElement(
+            suite, "testcase", classname=f"conform.{chapter_of(rule).title}", name=f"{rule.id} {rule.name}"
+        )
+        if not outcome.passed:
+            lines = [one_line(failure_text(failure)) for failure in outcome.failures]
+            failure = ElementTree.SubElement(case, "failure", message=lines[0])
+            failure.text = "\n".join([rule.text, f"({rule.source})", *lines])
+    ElementTree.indent(suite)
+    text: bytes = ElementTree.tostring(suite, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"

@@ -1,0 +1,78 @@
+"""A rule: one sentence of the protocol that binds a robot, and how it is tried.
+
+What belongs here: the record, and the air in which a rule is tried. What does not: the rules (`rules/`), what a trial
+says (`talk`) and how it is judged (`judgement`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from miro_robot.faults import FaultKind
+
+if TYPE_CHECKING:
+    from mirotwin.conform.talk import Talk
+
+
+class Air(msgspec.Struct, frozen=True):
+    """A network of `robots` slots with a robot in each of `slots`, and a radio without errors.
+
+    `keyed`: the carrier is on for frames only and the receiver hears noise in between; else it is on all the time.
+    `baud_offset_ppm`: so much faster is the host's serial port.
+    """
+
+    robots: int = 3
+    slots: tuple[int, ...] = (1,)
+    keyed: bool = False
+    baud_offset_ppm: int = 0
+
+
+BOTH = (Air(3, (1,)), Air(5, (3,)))
+"""A robot in either layout."""
+THREE = (Air(3, (1,)),)
+"""One robot, where the layout does not matter."""
+
+
+class Rule(msgspec.Struct, frozen=True):
+    """`text` is a sentence with MUST, `source` the page and section that it comes from.
+
+    `script` says what the host of a network says and what its robots have to make of it; it is called for each of
+    `airs`. `faults`: kinds of firmware fault that break this rule, in its own trial and in those of others.
+    """
+
+    id: str
+    text: str
+    source: str
+    script: Callable[[Talk], None]
+    airs: tuple[Air, ...] = BOTH
+    faults: tuple[FaultKind, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """A few words, for tables."""
+        return self.script.__name__.replace("_", " ")
+
+
+class Chapter:
+    """Collects the rules of a file: `@chapter.rule("P01", "The robot MUST ..", SOURCE)` before a script."""
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self.rules: list[Rule] = []
+
+    def rule(
+        self,
+        id: str,
+        text: str,
+        source: str,
+        airs: tuple[Air, ...] = BOTH,
+        faults: tuple[FaultKind, ...] = (),
+    ) -> Callable[[Callable[[Talk], None]], Callable[[Talk], None]]:
+        def keep(script: Callable[[Talk], None]) -> Callable[[Talk], None]:
+            self.rules.append(Rule(id, text, source, script, airs, faults))
+            return script
+
+        return keep

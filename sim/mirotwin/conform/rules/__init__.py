@@ -1,0 +1,12 @@
+"""The rules, a chapter a file. `SOURCES`: the pages and sections that they come from."""
+
+FRAME = "protocol/README.md, Frame"
+TURNS = "protocol/README.md, Turns"
+VERSIONS = "protocol/README.md, Versions"
+WHY = "protocol/README.md, Why"
+RECEPTION = "protocol/README.md, Reception"
+FRESHNESS = "protocol/README.md, Freshness and failsafe"
+POWER_ON = "robot_fw/README.md, After power-on"
+WHEELS = "robot_fw/README.md, From LM629 to wheel"
+FIRMWARE = "robot_fw/README.md, The firmware"
+FAULTS = "robot_fw/README.md, Faults: what firmware must not do"

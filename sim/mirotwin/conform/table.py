@@ -1,0 +1,41 @@
+"""All rules, in the order of their numbers, and finding one.
+
+What belongs here: the list of chapters. What does not: the rules themselves (`rules/`).
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+
+from miro_exact.bad_input import BadInput
+from mirotwin.conform.rule import Chapter, Rule
+from mirotwin.conform.rules import answers, boot, driving, failsafe, fresh, reception, service, sound
+
+CHAPTERS: tuple[Chapter, ...] = (
+    boot.CHAPTER,
+    reception.CHAPTER,
+    fresh.CHAPTER,
+    driving.CHAPTER,
+    failsafe.CHAPTER,
+    service.CHAPTER,
+    answers.CHAPTER,
+    sound.CHAPTER,
+)
+RULES: tuple[Rule, ...] = tuple(rule for chapter in CHAPTERS for rule in chapter.rules)
+_BY_ID = {rule.id: rule for rule in RULES}
+
+
+def chapter_of(rule: Rule) -> Chapter:
+    """The chapter that a rule stands in."""
+    return next(chapter for chapter in CHAPTERS if rule in chapter.rules)
+
+
+def find(id: str) -> Rule:
+    """The rule called `id`, in capitals or not. Raises BadInput, with the nearest one that there is."""
+    found = _BY_ID.get(id.upper())
+    if found is not None:
+        return found
+    close = get_close_matches(id.upper(), _BY_ID, n=1)
+    hint = f"did you mean {close[0]}? " if close else ""
+    remedy = f"{hint}`mirotwin conform --list` shows {RULES[0].id} to {RULES[-1].id}"
+    raise BadInput("", "", f"there is no rule {id[:40]!r}", remedy)
