@@ -16,11 +16,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from miro_exact.clock import ms as ms
     from miro_exact.clock import seconds as seconds
     from miro_exact.clock import ticks as ticks
+    from miro_exact.clock import us as us
     from miro_protocol import frames as frames
     from miro_protocol.decoder import Decoder as Decoder
     from miro_protocol.decoder import TelemetryDecoder as TelemetryDecoder
+    from miro_protocol.frames import ServiceFrame as ServiceFrame
+    from miro_protocol.frames import TeamFrame as TeamFrame
+    from miro_protocol.frames import TelemetryFrame as Telemetry
     from miro_protocol.transmission import Transmission as Transmission
     from miro_robot.firmware import image_path as image_path
     from miro_robot.image import Image as Image
@@ -49,6 +54,9 @@ _PLACES = {
     "ExpectationFailed": "mirotwin.checks.watching:ExpectationFailed",
     "Image": "miro_robot.image:Image",
     "Scenario": "miro_sim.scenario.keys:Scenario",
+    "ServiceFrame": "miro_protocol.frames:ServiceFrame",
+    "TeamFrame": "miro_protocol.frames:TeamFrame",
+    "Telemetry": "miro_protocol.frames:TelemetryFrame",
     "TelemetryDecoder": "miro_protocol.decoder:TelemetryDecoder",
     "Trace": "mirotwin.cases.trace:Trace",
     "Transmission": "miro_protocol.transmission:Transmission",
@@ -60,6 +68,7 @@ _PLACES = {
     "image_path": "miro_robot.firmware:image_path",
     "load_hex": "miro_robot.image:load_hex",
     "load_scenario": "miro_sim.scenario.file:load",
+    "ms": "miro_exact.clock:ms",
     "parse_scenario": "miro_sim.scenario.file:parse",
     "read_recording": "mirotwin.recording.reader:read",
     "recording": "mirotwin.recording",
@@ -67,6 +76,7 @@ _PLACES = {
     "seconds": "miro_exact.clock:seconds",
     "testing": "mirotwin.testing",
     "ticks": "miro_exact.clock:ticks",
+    "us": "miro_exact.clock:us",
     "write_case": "mirotwin.cases.case:write_case",
 }
 """Public name -> the module that it is, or the module and the name in it."""
@@ -78,6 +88,9 @@ __all__ = [
     "ExpectationFailed",
     "Image",
     "Scenario",
+    "ServiceFrame",
+    "TeamFrame",
+    "Telemetry",
     "TelemetryDecoder",
     "Trace",
     "Transmission",
@@ -89,6 +102,7 @@ __all__ = [
     "image_path",
     "load_hex",
     "load_scenario",
+    "ms",
     "parse_scenario",
     "read_recording",
     "recording",
@@ -96,6 +110,7 @@ __all__ = [
     "seconds",
     "testing",
     "ticks",
+    "us",
     "write_case",
 ]
 

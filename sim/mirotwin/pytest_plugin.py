@@ -1,34 +1,46 @@
-"""pytest plugin: which lines of the firmware a test session ran.
+"""pytest plugin: a world for each test, and which lines of the firmware a session ran.
 
-    pytest --firmware-coverage=firmware.info [--firmware-image=mine.ihx] [--firmware-sources=DIR]
+    def test_a_poll_is_answered(link, robot):
+        link.poll(slot=0)
+        answer = link.expect(Telemetry, within=ms(40))
 
-What belongs here: watching every CPU that tests load the image into (in this process and in those of pytest-xdist),
-and the report at the end. What does not: the mapping to lines (`miro_robot.inspect.coverage`). Without the option
-nothing of the project is imported, and nothing is watched.
+    pytest --mirotwin-firmware=mine.ihx --mirotwin-seed=7 --firmware-coverage=fw.info
+
+What belongs here: options, fixtures and hooks, each as short as it can be. What does not: what they do, which is in
+`mirotwin.testing` (its README has the fixtures for users). Sessions that use none of it import nothing else of ours.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import cached_property
+from collections.abc import Generator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
-    from miro_robot.image import Image
-    from miro_robot.inspect.coverage import Counts
-    from miro_robot.mcs51.cpu import Cpu
-    from mirotwin.report.firmware_coverage import Report
+    from miro_sim.world.world import World
+    from mirotwin.testing.link import Link
+    from mirotwin.testing.rig import Rig
+    from mirotwin.testing.robot import RobotUnderTest
 
-OUTPUT = "firmware_coverage"
-"""Under this name a pytest-xdist worker hands over its counts."""
-TABLE_COLUMNS = 160
+_INI = {
+    "mirotwin_firmware": "the firmware of the tests (default: the robot's own)",
+    "mirotwin_seed": "the seed of tests whose marker names none (default: 0)",
+    "mirotwin_artifacts": "where failed tests leave their folders",
+    "mirotwin_repeat": "how often each test runs, with seeds that count up",
+}
+_SEED, _RIG = "_mirotwin_seed", "mirotwin_rig"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    group = parser.getgroup("mirotwin", "firmware coverage (mirotwin)")
+    group = parser.getgroup("mirotwin", "worlds for tests, firmware coverage (mirotwin)")
+    group.addoption("--mirotwin-firmware", metavar="IMAGE.ihx", help=_INI["mirotwin_firmware"])
+    group.addoption("--mirotwin-seed", metavar="N", type=int, help="the seed of all tests")
+    group.addoption("--mirotwin-artifacts", metavar="DIR", help=_INI["mirotwin_artifacts"])
+    group.addoption("--mirotwin-repeat", metavar="N", type=int, help=_INI["mirotwin_repeat"])
+    for name, what in _INI.items():
+        parser.addini(name, what, type="string")
     group.addoption(
         "--firmware-coverage",
         metavar="FILE.info",
@@ -50,12 +62,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line(
+        "markers",
+        "mirotwin(scenario=, settings=, firmware=, seed=, expect=, boot=): the world of the test (mirotwin)",
+    )
+    _check_options(config)
     share = config.getoption("--firmware-coverage-fail-under")
     if not 0.0 <= share <= 100.0:
         raise pytest.UsageError(f"--firmware-coverage-fail-under: {share} is no percentage; give 0 to 100")
     if share and not config.getoption("--firmware-coverage"):
         raise pytest.UsageError("--firmware-coverage-fail-under: goes with --firmware-coverage=FILE.info")
     if config.getoption("--firmware-coverage") and not config.getoption("--collect-only"):
+        from mirotwin.testing.session_coverage import FirmwareCoverage
+
         config.pluginmanager.register(FirmwareCoverage(config), "mirotwin-firmware-coverage")
 
 
@@ -68,113 +87,150 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     return ScenarioFile.from_parent(parent, path=file_path)
 
 
-class FirmwareCoverage:
-    """Of one session. On the controller of pytest-xdist it adds up what its workers counted."""
+# Options
 
-    def __init__(self, config: pytest.Config) -> None:
-        from miro_robot.inspect.counters import Counters
-        from miro_robot.mcs51.cpu import on_load
-        from mirotwin.files.outputs import check_file, check_not_input
 
-        self.config = config
-        self.out = Path(config.getoption("--firmware-coverage"))
-        self.wanted: float = config.getoption("--firmware-coverage-fail-under")
-        self.from_workers: list[Counts] = []
-        self.counters = Counters()
+def _check_options(config: pytest.Config) -> None:
+    if _number(config, "repeat", 1) < 1:
+        raise pytest.UsageError(
+            f"--mirotwin-repeat: {_number(config, 'repeat', 1)} is too few; give 1 or more"
+        )
+    if _number(config, "seed", 0) < 0:
+        raise pytest.UsageError(f"--mirotwin-seed: {_number(config, 'seed', 0)}: give 0 or more")
+    artifacts = _path(config, "artifacts")
+    if artifacts is not None and artifacts.exists() and not artifacts.is_dir():
+        raise pytest.UsageError(f"--mirotwin-artifacts: {artifacts} is no folder")
+    firmware = _path(config, "firmware")
+    if firmware is not None:
+        from mirotwin.testing.wanted import image_of
+
         try:
-            self.image = _image(config.getoption("--firmware-image"))
-            check_file(self.out, "--firmware-coverage")
-            check_not_input(self.out, "--firmware-coverage", self.image.path)
-            _check_folders(config.getoption("--firmware-sources"))
+            image_of(str(firmware))
         except ValueError as error:
-            raise pytest.UsageError(str(error)) from None
-        on_load.set(self.watch)
-
-    def watch(self, cpu: Cpu) -> None:
-        """Counts what `cpu` does from now on, if it was the image that it got."""
-        from miro_robot.inspect.watcher import Inspector, attach
-
-        inspector = cpu.inspector
-        watched = isinstance(inspector, Inspector) and self.counters in inspector.watchers
-        if not watched and cpu.code == self.image.code:
-            attach(cpu, self.counters)
-
-    def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        from miro_robot.inspect.coverage import counts_of
-
-        if hasattr(session.config, "workeroutput"):  # a worker of pytest-xdist: JSON has no numbers as keys
-            counts = counts_of(self.counters)
-            session.config.workeroutput[OUTPUT] = [[address, *both] for address, both in counts.items()]
-        elif session.exitstatus == pytest.ExitCode.OK and self._too_few():
-            session.exitstatus = pytest.ExitCode.TESTS_FAILED
-
-    @pytest.hookimpl(optionalhook=True)
-    def pytest_testnodedown(self, node: Any) -> None:
-        handed: Iterable[tuple[int, int, int]] = getattr(node, "workeroutput", {}).get(OUTPUT, ())
-        self.from_workers.append({address: (executed, jumped) for address, executed, jumped in handed})
-
-    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
-        from rich.console import Console
-
-        from mirotwin.report.firmware_coverage import table, write
-
-        if hasattr(self.config, "workeroutput"):  # the controller's file has the counts of all
-            return
-        report = self._report
-        write(report.tracefile, report, self.out, "--firmware-coverage")
-        terminalreporter.section(f"coverage of {self.image.path.name}, written to {self.out}")
-        console = Console(highlight=False, markup=False, width=TABLE_COLUMNS)
-        with console.capture() as capture:
-            console.print(table(report.tracefile))
-            console.print(f"instructions: {report.instructions}")
-        for line in capture.get().splitlines():
-            terminalreporter.write_line(line.rstrip())
-        if self._too_few():
-            terminalreporter.write_line(
-                f"fewer lines ran than the {self.wanted} % of --firmware-coverage-fail-under", red=True
-            )
-
-    @cached_property
-    def _report(self) -> Report:
-        """Of the whole session: for when its last test has run."""
-        from miro_robot.firmware import source_folder
-        from miro_robot.image.debug_info import Sources
-        from miro_robot.inspect.coverage import counts_of, merged
-        from mirotwin.report.firmware_coverage import collect
-
-        own = source_folder()
-        folders = [
-            *map(Path, self.config.getoption("--firmware-sources")),
-            self.image.path.parent,
-            *([own] if own else []),
-        ]
-        counts = merged([counts_of(self.counters), *self.from_workers])
-        return collect(self.image, counts, Sources(folders), self.out)
-
-    def _too_few(self) -> bool:
-        from miro_robot.inspect.coverage import line_share
-
-        share = line_share(self._report.tracefile)
-        return bool(share.total) and 100.0 * share.hit / share.total < self.wanted
+            raise pytest.UsageError(f"--mirotwin-firmware: {error}") from None
 
 
-def _image(path: str | None) -> Image:
-    from miro_robot.firmware import image_path
-    from miro_robot.image import load_hex
-    from miro_sim.inputs import check_regular
-
-    if path:
-        check_regular(path)
-    image = load_hex(path or image_path())
-    _ = (
-        image.symbols.names
-    )  # the listing needs them: what is wrong with their files is said before the tests run
-    return image
+def _number(config: pytest.Config, name: str, default: int) -> int:
+    """An option, else what the ini file says."""
+    given = config.getoption(f"--mirotwin-{name}")
+    if given is not None:
+        return int(given)
+    text = config.getini(f"mirotwin_{name}") or str(default)
+    try:
+        return int(text)
+    except ValueError:
+        raise pytest.UsageError(f"mirotwin_{name}: {text!r} is no whole number") from None
 
 
-def _check_folders(folders: list[str]) -> None:
-    for folder in folders:
-        if not Path(folder).is_dir():
-            raise ValueError(
-                f"{folder}: --firmware-sources: there is no such folder; name the one with the C files"
-            )
+def _path(config: pytest.Config, name: str) -> Path | None:
+    """The same for paths: an option's goes from where pytest was called, an ini file's from where that lies."""
+    given = config.getoption(f"--mirotwin-{name}")
+    if given is not None:
+        return Path(config.invocation_params.dir, given)
+    text = config.getini(f"mirotwin_{name}")
+    return Path(config.rootpath, text) if text else None
+
+
+# Which tests run, and with which seed
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    repeat = _number(metafunc.config, "repeat", 1)
+    if repeat > 1 and _SEED in metafunc.fixturenames:
+        first = _first_seed(metafunc.definition)
+        seeds = range(first, first + repeat)
+        metafunc.parametrize(_SEED, seeds, indirect=True, ids=[f"seed{seed}" for seed in seeds])
+
+
+def _first_seed(item: pytest.Item) -> int:
+    """From the command line, else from the innermost marker that has one, else from the ini file."""
+    if item.config.getoption("--mirotwin-seed") is None:
+        for mark in item.iter_markers("mirotwin"):
+            if isinstance(mark.kwargs.get("seed"), int):
+                return int(mark.kwargs["seed"])
+    return _number(item.config, "seed", 0)
+
+
+@pytest.fixture(name=_SEED)
+def _seed_of_the_test(request: pytest.FixtureRequest) -> int:
+    return int(request.param) if hasattr(request, "param") else _first_seed(request.node)
+
+
+# Fixtures
+
+
+@pytest.fixture(name=_RIG)
+def _rig_of_the_test(request: pytest.FixtureRequest, _mirotwin_seed: int) -> Rig:
+    """The world of the test and all that belongs to it."""
+    from mirotwin.testing import items
+
+    return items.rig_for(request.node, _path(request.config, "firmware"), _mirotwin_seed)
+
+
+@pytest.fixture
+def world(mirotwin_rig: Rig) -> World:
+    """A world of the test's own: one robot that is up, a silent host, an ideal radio; see the marker `mirotwin`."""
+    return mirotwin_rig.world
+
+
+@pytest.fixture
+def links(mirotwin_rig: Rig) -> list[Link]:
+    """The hosts' ends of all networks."""
+    return mirotwin_rig.links
+
+
+@pytest.fixture
+def link(mirotwin_rig: Rig) -> Link:
+    """The host's end of the first network: sends, polls, expects."""
+    return mirotwin_rig.links[0]
+
+
+@pytest.fixture
+def robots(mirotwin_rig: Rig) -> list[RobotUnderTest]:
+    """All robots, by network and slot."""
+    return mirotwin_rig.robots
+
+
+@pytest.fixture
+def robot(mirotwin_rig: Rig) -> RobotUnderTest:
+    """The first robot: wheels, memory, breakpoints, switches."""
+    return mirotwin_rig.robots[0]
+
+
+# Judging and reporting
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
+    """The checks judge a test that has come to its end."""
+    try:
+        result = yield
+    except (ValueError, TimeoutError) as error:
+        shown: BaseException = error
+        if _RIG in getattr(item, "funcargs", ()):
+            from mirotwin.testing import items
+
+            shown = items.at_the_tests_line(item, error)
+        raise shown from None
+    if _RIG in getattr(item, "funcargs", ()):
+        from mirotwin.testing import items
+
+        items.judge(item)
+    return result
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    if call.when != "setup" and _RIG in getattr(item, "funcargs", ()):
+        from mirotwin.testing import items
+
+        if call.when == "call":
+            paths = _path(item.config, "firmware"), _path(item.config, "artifacts")
+            items.tell(item, report, call.excinfo, *paths)
+        else:
+            items.let_go(item)
+    return report

@@ -58,3 +58,15 @@ def test_no_tick_stands_for_a_time_that_is_not_finite(seconds):
 
 def test_nanoseconds_are_whole_and_rounded_down():
     assert [clock.nanoseconds(tick) for tick in (0, 1, 2, 3, 24_000_000)] == [0, 41, 83, 125, 10**9]
+
+
+@given(st.integers(-(10**12), 10**12))
+def test_whole_milliseconds_and_microseconds_are_exact(time):
+    assert clock.ms(time) == 24_000 * time
+    assert clock.us(time) == 24 * time
+
+
+def test_a_part_of_a_microsecond_is_rounded_as_seconds_are():
+    assert clock.us(0.1) == clock.ticks(1e-7) == 2
+    assert clock.ms(0.3) == 7200
+    assert clock.ms(Fraction(1, 48_000)) == 1

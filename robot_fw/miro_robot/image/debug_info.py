@@ -67,7 +67,7 @@ class DebugInfo:
         cdb = parse_cdb(read_text(image.path.with_suffix(".cdb")))
         link_map = read_text(image.path.with_suffix(".map"))
         listed = [
-            found for listing in _listings(image.path, link_map) for found in _read_listing(listing, image)
+            found for listing in listings(image.path, link_map) for found in _read_listing(listing, image)
         ]
         lines = [(address, line) for address, _, line in listed if line is not None]
         tables = [(address, end) for address, end, line in listed if line is None]
@@ -145,7 +145,7 @@ def _name(path: str) -> str:
     return path.replace("\\", "/").rpartition("/")[2]
 
 
-def _listings(image: Path, link_map: str) -> Iterator[Path]:
+def listings(image: Path, link_map: str) -> Iterator[Path]:
     """The relinked listings of the image's modules: beside the image, or where the linker found the modules."""
     for module in dict.fromkeys([*map_modules(link_map), image.stem]):
         places = (

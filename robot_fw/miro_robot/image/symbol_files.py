@@ -134,7 +134,7 @@ def map_constants(text: str) -> list[tuple[int, int]]:
     return [(int(at, 16), int(at, 16) + int(size, 16)) for at, size in areas if int(size, 16)]
 
 
-_CDB_SPACES = {
+CDB_SPACES = {
     "C": "code",
     "D": "code",
     "E": "iram",
@@ -163,8 +163,8 @@ def parse_cdb(text: str) -> CdbFile:
     for number, line in enumerate(text.splitlines(), start=1):
         if line.startswith("S:"):
             symbol = _CDB_SYMBOL.match(line)
-            if symbol and symbol[3] in _CDB_SPACES:
-                spaces[_scope(symbol[1])] = _CDB_SPACES[symbol[3]]
+            if symbol and symbol[3] in CDB_SPACES:
+                spaces[_scope(symbol[1])] = CDB_SPACES[symbol[3]]
         elif line.startswith("L:A$"):
             if (found := _CDB_INSTRUCTION.match(line)) and (address := int(found[1], 16)) < _SPACE:
                 instructions.setdefault(address, number)
@@ -204,3 +204,17 @@ def parse_listing(text: str) -> tuple[ListedCode, ...]:
             data = bytes.fromhex(code[2])
             found.append(ListedCode(number, int(code[1], 16), data, line, bool(code[3])))
     return tuple(found)
+
+
+_BIT_CODES = b"\x10\x20\x30\x72\x82\x92\xa0\xa2\xb0\xb2\xc2\xd2"  # their second byte is the address of a bit
+_RST_BIT = re.compile(r"^ {6}[0-9A-F]{6} ([0-9A-F]{2}) ([0-9A-F]{2}).*\t\w+\t(?:c,\s*/?)?(_\w+)\b")
+
+
+@lru_cache(_KEPT)
+def parse_bits(text: str) -> dict[str, frozenset[int]]:
+    """Addresses of the bits that instructions of a relinked listing name: SDCC's linker writes them nowhere else."""
+    found: dict[str, frozenset[int]] = {}
+    for row in text.splitlines():
+        if (code := _RST_BIT.match(row)) and int(code[1], 16) in _BIT_CODES:
+            found[code[3]] = found.get(code[3], frozenset()) | {int(code[2], 16)}
+    return found

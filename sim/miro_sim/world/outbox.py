@@ -116,7 +116,7 @@ class Outbox:
         return max([free_tick, *(one.sent.end_tick for one in self.waiting)])
 
     def due(self, until_tick: int) -> list[Transmission]:
-        """Takes out what may come up on the air before `until_tick`, in order."""
+        """Takes out what comes up on the air before `until_tick`, in order; what comes then can be announced still."""
         count = 0
         while count < len(self.waiting) and self.waiting[count].sent.tick < until_tick + self.lead_ticks:
             count += 1

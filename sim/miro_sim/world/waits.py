@@ -32,10 +32,13 @@ Entry = tuple[Key, Event]
 
 
 class WaitExpired(TimeoutError):
-    """What was asked for did not happen in time. `seen`: the events meanwhile, at most the last 1000."""
+    """What was asked for at `begun_tick` did not happen in time. `seen`: the last events meanwhile, at most 1000."""
 
-    def __init__(self, conditions: Sequence[Condition], tick: int, why: str, seen: Sequence[Event]) -> None:
+    def __init__(
+        self, conditions: Sequence[Condition], begun_tick: int, tick: int, why: str, seen: Sequence[Event]
+    ) -> None:
         self.conditions = tuple(conditions)
+        self.begun_tick = begun_tick
         self.tick = tick
         self.seen = list(seen)
         wanted = " or ".join(map(str, conditions))
@@ -90,6 +93,7 @@ class Waits:
         world = self.world
         if within is not None and within < 0:
             raise ValueError(f"within {within}: give a number of ticks that is not negative")
+        begun_tick = world.tick
         deadline = NEVER_TICK if within is None else world.tick + within
         seen: list[Event] = []
         if not self.decoders:
@@ -102,7 +106,7 @@ class Waits:
             while found is None:
                 if world.finished or world.tick >= deadline:
                     why = "the run ended" if world.finished else f"{within} ticks passed"
-                    raise WaitExpired(conditions, world.tick, why, seen)
+                    raise WaitExpired(conditions, begun_tick, world.tick, why, seen)
                 self._run_piece(watch, min(deadline, world.tick + piece))
                 found = self._consume(watch, world.tick, seen)
                 piece *= 2

@@ -167,6 +167,12 @@ class World:
             if self.tick == self.period_end or self.stopped:
                 self.end_period()
 
+    def run_for(self, ticks: int) -> None:
+        """Moves everything on by so many ticks, as `run_to`. Raises ValueError for a negative number."""
+        if ticks < 0:
+            raise ValueError(f"ticks = {ticks}: time does not go back")
+        self.run_to(self.tick + ticks)
+
     def run_until(
         self, condition: waiting.Condition | Sequence[waiting.Condition], within: int | None = None
     ) -> Event:

@@ -84,7 +84,7 @@ class Bench:
         "freshness": Freshness,
         "telemetry": TelemetryDecoder,
     }
-    NOT_STATE = ("n", "slot", "radio", "seed", "image", "addresses", "sent", "heard", "answers")
+    NOT_STATE = ("n", "slot", "radio", "seed", "image", "addresses", "sent", "heard", "resets", "answers")
 
     def __init__(
         self,
@@ -117,6 +117,7 @@ class Bench:
         self.now = 0
         self.sent: list[Entry] = []
         self.heard: list[Symbol] = []
+        self.resets: list[int] = []
         self.answers: list[tuple[int, TelemetryFrame]] = []
         self.receiver = LineReceiver()
         self.decoder = Decoder(n)
@@ -173,6 +174,7 @@ class Bench:
         """The reset pin of the robot's processor, with nothing on the air. Its program begins again."""
         self.run_to(max(self.now, self.downlink.free_tick + self.radio.latency_ticks + LOOKING_TICKS))
         self.board.cpu.reset()
+        self.resets.append(self.now)
         self.decoder = Decoder(self.n)
         self.freshness = Freshness()
         self.possible = [(0, (0, 0, 0))]
@@ -264,6 +266,7 @@ class Bench:
         if snapshot(other) != saved:
             self.fail(f"tick {self.now}: the state changes when it is saved and loaded")
         other.sent, other.heard, other.answers = list(self.sent), list(self.heard), list(self.answers)
+        other.resets = list(self.resets)
         return other
 
     def digest(self) -> str:

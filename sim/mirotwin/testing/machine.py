@@ -5,11 +5,13 @@ What belongs here: the rules and what must hold after each. What does not: how i
 What must hold: no firmware fault; decoders never raise; firmware and Python count the same frames; a state that
 is saved and loaded is the same and goes on the same way; every answer is from the robot asked and counts
 what it accepted. A failure carries what the robot heard as a stream file, and leaves it in `stream_file`: Hypothesis
-runs the smallest failing example last, so that is what stands in the file, and `mirotwin replay` takes it.
+runs the smallest failing example last, so that is what stands in the file, then as a case where a check can judge it.
+`mirotwin replay` takes both.
 """
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
@@ -20,9 +22,13 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_protocol.strategies import numbers
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_DATA, VELOCITY, FrameType, Opcode
+from miro_robot.firmware import image_path
 from miro_robot.image import Image
 from miro_sim.radio import RadioParams
+from mirotwin.cases.case import write_case
+from mirotwin.testing import shrinking
 from mirotwin.testing.bench import MS, Bench, LinkFailure
+from mirotwin.testing.bench_case import case_of_bench
 from mirotwin.testing.profiles import link_profiles, seeds
 
 STEPS = st.sampled_from([1, 1, 1, 2, 8, 9, 0, 63])
@@ -33,12 +39,14 @@ TIMES = st.integers(1, 40).map(lambda count: 5 * count * MS)
 class LinkMachine(RuleBasedStateMachine):
     """Subclass it to test another firmware: give `image`, and narrow `profiles` if it need not bear all.
 
-    `stream_file`: where a failure leaves what the robot heard; None for nowhere.
+    `stream_file`: where a failure leaves what the robot heard; None for nowhere. `shrink_seconds`: how long Hypothesis
+    may look for a smaller example of the same failure; what it has by then is what it shows.
     """
 
     image: ClassVar[Image | None] = None
     profiles: ClassVar[st.SearchStrategy[RadioParams]] = link_profiles()
     stream_file: ClassVar[Path | None] = Path("link-failure.stream")
+    shrink_seconds: ClassVar[float] = 30.0
 
     bench: Bench
     seq: int
@@ -128,9 +136,19 @@ class LinkMachine(RuleBasedStateMachine):
         try:
             action()
         except LinkFailure as failure:
+            shrinking.no_limit() if shrinking.is_last_run() else shrinking.limit(self.shrink_seconds)
             if self.stream_file is not None:
-                self.stream_file.write_text(failure.stream, encoding="utf-8")
-                failure.add_note(
-                    f"written to {self.stream_file}; see it with: mirotwin replay {self.stream_file}"
-                )
+                failure.add_note(self._leave(self.stream_file, failure))
             raise
+
+    def _leave(self, file: Path, failure: LinkFailure) -> str:
+        """Writes what the robot heard; in the end, where a check can judge it, as a case. Returns how to use it."""
+        case = None
+        if shrinking.is_last_run() and hasattr(self, "bench"):
+            case = case_of_bench(self.bench)
+        write_case(file, failure.stream if case is None else case)
+        words = ["mirotwin", "replay", str(file)]
+        if self.image is not None and self.image.path != image_path():
+            words += ["--firmware", str(self.image.path)]
+        what = "see it with" if case is None else "it fails again by"
+        return f"written to {file}; {what}: {shlex.join(words)}"

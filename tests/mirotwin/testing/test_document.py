@@ -5,11 +5,19 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from tests.mirotwin.testing.sessions import session
 
 from miro_robot.firmware import image_path
 
 PAGE = Path(__file__).parents[3] / "sim/mirotwin/testing/README.md"
-BENCH, MACHINE = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+PLUGIN, BENCH, MACHINE = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_the_examples_of_the_fixtures_pass(tmp_path: Path) -> None:
+    (tmp_path / "test_mine.py").write_text(PLUGIN)
+    done = session(tmp_path)
+    assert done.returncode == 0, done.stdout
+    assert f"{PLUGIN.count('def test_')} passed" in done.stdout
 
 
 def test_the_bench_counts_and_hears_answers(capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,10 +6,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import msgspec
 import pytest
 from hypothesis import Phase, find, given, settings
 from hypothesis import strategies as st
+from hypothesis.internal.conjecture import engine
 from hypothesis.stateful import run_state_machine_as_test
 from intelhex import IntelHex
 from tests.mirotwin.cli.conftest import Result, mirotwin
@@ -21,6 +21,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from miro_sim.radio import RadioParams
 from mirotwin.testing.bench import Bench, LinkFailure
+from mirotwin.testing.bench_case import case_of_bench
 from mirotwin.testing.machine import LinkMachine
 from mirotwin.testing.profiles import link_profiles, seeds
 
@@ -68,7 +69,9 @@ def broken(tmp_path_factory: pytest.TempPathFactory) -> Image:
     code = IntelHex(str(image_path()))
     code[symbol.address] = UNDEFINED
     code.write_hex_file(str(path))
-    return msgspec.structs.replace(load_hex(path), symbols=original.symbols)
+    for suffix in (".map", ".cdb"):
+        path.with_suffix(suffix).write_bytes(image_path().with_suffix(suffix).read_bytes())
+    return load_hex(path)
 
 
 def test_a_planted_fault_is_found_and_shrunk_to_a_stream_file_that_shows_it_again(
@@ -84,7 +87,7 @@ def test_a_planted_fault_is_found_and_shrunk_to_a_stream_file_that_shows_it_agai
             Planted,
             settings=settings(max_examples=60, stateful_step_count=3, deadline=None, database=None),
         )
-    assert any("mirotwin replay" in note for note in caught.value.__notes__)
+    assert any("it fails again by: mirotwin replay" in note for note in caught.value.__notes__)
     sent = stream.read(tmp_path / "failure.stream").transmissions()
     (frame,) = [
         event for one in sent for event in Decoder(3).feed(one.data) if isinstance(event, Received)
@@ -92,5 +95,52 @@ def test_a_planted_fault_is_found_and_shrunk_to_a_stream_file_that_shows_it_agai
     assert frame.type == 3  # one poll is left of it all
     code, _, err = mirotwin("replay", tmp_path / "failure.stream", "--firmware", broken.path)
     assert code == 3
+    assert "fails as recorded: no_fault" in err
     assert "undefined opcode A5" in err
-    assert mirotwin("replay", tmp_path / "failure.stream")[0] == 0
+    own = mirotwin("replay", tmp_path / "failure.stream", "--firmware", image_path())
+    assert own[0] == 0
+    assert "cured: no_fault passes" in own[1]
+
+
+def test_a_reset_is_part_of_the_case(broken: Image) -> None:
+    bench = Bench(3, 1, image=broken)
+    bench.send(TeamFrame(0, 4, ((0, 0),) * 3))
+    bench.reset()
+    with pytest.raises(LinkFailure, match="undefined opcode A5"):
+        bench.send(TeamFrame(3, 4, ((0, 0),) * 3))
+    case = case_of_bench(bench)
+    assert case is not None
+    assert "no_fault" in case
+    assert [" reset 1\n" in case, " reset 0\n" in case] == [True, True]
+
+
+def test_shrinking_ends_when_its_time_is_over(broken: Image, tmp_path: Path) -> None:
+    runs = []
+
+    class Planted(LinkMachine):
+        image = broken
+        stream_file = None
+        shrink_seconds = 0.0
+
+        def _do(self, action: Callable[[], None]) -> None:
+            try:
+                super()._do(action)
+            except LinkFailure:
+                runs.append(engine.MAX_SHRINKING_SECONDS)
+                raise
+
+    limit = engine.MAX_SHRINKING_SECONDS
+    with pytest.raises(LinkFailure):
+        run_state_machine_as_test(  # type: ignore[no-untyped-call]
+            Planted,
+            settings=settings(
+                max_examples=20,
+                stateful_step_count=8,
+                deadline=None,
+                database=None,
+                report_multiple_bugs=False,
+            ),
+        )
+    assert runs[0] == 0.0
+    assert len(runs) <= 4  # the first, once more before shrinking, at its limit, and the one that is shown
+    assert limit == engine.MAX_SHRINKING_SECONDS

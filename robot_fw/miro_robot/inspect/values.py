@@ -1,0 +1,75 @@
+"""The values of a firmware's variables, by name and type: `read_value(cpu, image, "last_left")`.
+
+What belongs here: fetching the bytes from the CPU's memories and putting them back. What does not: which variables
+there are (`image.variables`) and what their bytes mean (`image.c_types`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_exact.bad_input import BadInput
+from miro_robot.image import Image
+from miro_robot.image.c_types import bytes_of, value_of
+from miro_robot.image.variables import Variable, find_variable
+from miro_robot.mcs51.cpu import Cpu
+
+_BITS_OF_IRAM = 0x20  # where the bit addresses below 80h begin
+_FIRST_SFR = 0x80
+
+
+def read_value(cpu: Cpu, image: Image, name: str, as_type: str = "") -> Any:
+    """What the variable `name` holds now: int (pointers too), float, bool, a list for an array, a dict for a struct.
+
+    `name` and `as_type` as in `find_variable`. Ports are read at their latch. Raises BadInput for a name that is not
+    there, and one in external RAM, which no board has.
+    """
+    variable, variables = find_variable(image, name, as_type)
+    return value_of(variable.type, _bytes(cpu, image, variable), variables.fields(variable))
+
+
+def write_value(cpu: Cpu, image: Image, name: str, value: Any, as_type: str = "") -> None:
+    """Puts `value` into a variable in internal RAM, between two instructions; of a struct, the members that are named.
+
+    Raises BadInput as `read_value`, for a value that does not fit, and for a variable elsewhere.
+    """
+    variable, variables = find_variable(image, name, as_type)
+    before = _bytes(cpu, image, variable)
+    try:
+        data = bytes_of(variable.type, value, before, variables.fields(variable))
+    except ValueError as error:
+        raise BadInput(image.path, name, str(error)) from None
+    if variable.space == "bit" and variable.address < _FIRST_SFR:
+        at, mask = _bit(variable.address)
+        cpu.poke_iram(at, cpu.peek_iram(at) & ~mask | (mask if data[0] & 1 else 0))
+    elif variable.space == "iram":
+        for offset, byte in enumerate(data):
+            cpu.poke_iram(variable.address + offset, byte)
+    else:
+        raise BadInput(
+            image.path, name, f"is in {variable.space}, not in internal RAM", "write it by firmware"
+        )
+
+
+def _bytes(cpu: Cpu, image: Image, variable: Variable) -> bytes:
+    """As many bytes as the type has, from the place where the variable lies."""
+    space, address = variable.space, variable.address
+    if space == "bit":
+        at, mask = _bit(address)
+        byte = cpu.peek_iram(at) if address < _FIRST_SFR else cpu.sfr(at)
+        return bytes([1 if byte & mask else 0])
+    places = range(address, address + variable.type.size)
+    if space == "code":
+        return bytes(cpu.code_at(place) for place in places)
+    if space == "iram":
+        return bytes(cpu.peek_iram(place) for place in places)
+    if space == "sfr" and places.stop <= 0x100:
+        return bytes(cpu.sfr(place) for place in places)
+    raise BadInput(image.path, variable.name, f"is in {space}: the board has no such memory")
+
+
+def _bit(address: int) -> tuple[int, int]:
+    """(byte, mask) of a bit address: below 80h in internal RAM from 20h on, above in a register."""
+    if address < _FIRST_SFR:
+        return _BITS_OF_IRAM + (address >> 3), 1 << (address & 7)
+    return address & 0xF8, 1 << (address & 7)

@@ -1,0 +1,198 @@
+"""The robot fixture: what a robot does at its wheels, and what stands in its memory.
+
+What belongs here: reading and writing by name, breakpoints, wheels, the robot's switches. What does not: the radio
+(`link`), and what is right or wrong (the checks, the test).
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Any, Literal
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import ms
+from miro_robot.faults import FirmwareFault
+from miro_robot.inspect.values import read_value, write_value
+from miro_robot.lm629.buffers import FORWARD, STOP_ABRUPTLY, STOP_SMOOTHLY, VELOCITY_MODE
+from miro_robot.lm629.buffers import MOTOR_OFF as OFF_WORD
+from miro_robot.lm629.chip import Lm629
+from miro_robot.lm629.signals import MOTOR_OFF
+from miro_sim.world.conditions import Reached, When
+from miro_sim.world.events import Event
+from miro_sim.world.robot import Robot
+from miro_sim.world.waits import WaitExpired, Waits
+from miro_sim.world.world import World
+from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called, why_ended
+
+RESET_TICKS = ms(1)
+"""An AT89C52 needs its pin high for two machine cycles, 24 ticks; both LM629 are reset by the firmware."""
+UP_TICKS = ms(267)
+_SCON, _REN = 0x98, 0x10
+Told = Literal["drive", "stop", "off"]
+
+
+class Wheel(msgspec.Struct, frozen=True):
+    """One wheel now. `told`: what its LM629 was told; `commanded`: the velocity, in 1/256 count per sample as a team
+    frame has it, 0 unless it drives; `speed_m_s`: of the rim, in truth; `pwm`: duty in 1/128, negative backward;
+    `position`: counts of the LM629 as of its last sample.
+    """
+
+    told: Told
+    commanded: int
+    speed_m_s: float
+    pwm: int
+    position: int
+
+
+class Wheels(msgspec.Struct, frozen=True):
+    """Both wheels at one tick."""
+
+    left: Wheel
+    right: Wheel
+
+    @property
+    def told(self) -> tuple[Told, Told]:
+        return self.left.told, self.right.told
+
+    @property
+    def commanded(self) -> tuple[int, int]:
+        return self.left.commanded, self.right.commanded
+
+    @property
+    def speed_m_s(self) -> tuple[float, float]:
+        return self.left.speed_m_s, self.right.speed_m_s
+
+    @property
+    def pwm(self) -> tuple[int, int]:
+        return self.left.pwm, self.right.pwm
+
+
+class RobotUnderTest:
+    """The robot in `slot` of `network`. `written`: whether the test has changed its memory by itself."""
+
+    def __init__(self, world: World, network: int, slot: int) -> None:
+        self.world = world
+        self.network = network
+        self.slot = slot
+        self.written = False
+        self._robot = world.robot(network, slot)
+        self._waits = Waits(world)
+
+    @property
+    def wheels(self) -> Wheels:
+        """What the wheels do now, and what they were told."""
+        board, spec = self._robot.board, self._robot.spec
+        v_m_s, w_rad_s = self._robot.drive.velocity_at(self.world.tick)
+        half_m_s = 0.5 * spec.drive.chassis.track_m * w_rad_s
+        return Wheels(_wheel(board.left, v_m_s - half_m_s), _wheel(board.right, v_m_s + half_m_s))
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """(x in m, y in m, heading in rad), in truth."""
+        return self._robot.drive.pose_at(self.world.tick)
+
+    @property
+    def faults(self) -> list[FirmwareFault]:
+        """What the firmware did that it must not."""
+        return list(self._robot.board.faults)
+
+    @shown_where_it_was_called
+    def read(self, name: str, as_type: str = "") -> Any:
+        """The firmware's variable `name` by its C type: `read("last_left")`, `read("motion:state")`, `read("body[3]")`,
+        `read("pt.x")`. An array is a list, a struct a dict. `as_type`, `int16` or `uint8[4]`, is for images without
+        .cdb. Raises BadInput with the names that come close.
+        """
+        return read_value(self._robot.board.cpu, self.world.image, name, as_type)
+
+    @shown_where_it_was_called
+    def write(self, name: str, value: Any, as_type: str = "") -> None:
+        """Changes a variable in internal RAM. No recording holds that: a failure after it leaves no case."""
+        self.written = True
+        write_value(self._robot.board.cpu, self.world.image, name, value, as_type)
+
+    @shown_where_it_was_called
+    def break_at(self, place: int | str, within: int | None = None) -> Event:
+        """Runs on until the instruction at `place`, an address or a symbol, is the next. `within`: ticks from now;
+        None: the limit of virtual time. Raises WaitFailed, and BadInput for a symbol that is not there.
+        """
+        if isinstance(place, str):
+            self._check_symbol(place)
+        begun = self.world.tick
+        condition = Reached(place=place, network=self.network, slot=self.slot)
+        try:
+            return self._waits.until([condition], within)
+        except WaitExpired as error:
+            limit = (
+                f": {why_ended(self.world)}"
+                if self.world.finished
+                else f" within {(within or 0) / 24_000:g} ms"
+            )
+            seen = [event for event in error.seen if event.tick >= begun]
+            raise WaitFailed(f"{place} was not reached{limit}", begun, error.tick, seen) from None
+
+    # Its switches
+
+    @shown_where_it_was_called
+    def reset(self, for_ticks: int = RESET_TICKS) -> None:
+        """Holds the processor in reset for so long, and lets it go; `wait_until_up` is for what comes then."""
+        self.world.run_to(self.world.set_reset(1, self.network, self.slot))
+        self.world.run_for(for_ticks)
+        self.world.run_to(self.world.set_reset(0, self.network, self.slot))
+
+    def power_off(self) -> None:
+        """Switches the robot off: its memory is lost, its wheels roll out."""
+        self.world.run_to(self.world.set_power(0, self.network, self.slot))
+
+    def power_on(self) -> None:
+        """Switches it on again; it begins from reset."""
+        self.world.run_to(self.world.set_power(1, self.network, self.slot))
+
+    @shown_where_it_was_called
+    def wait_until_up(self, within: int = UP_TICKS) -> int:
+        """Runs on until the firmware has turned its serial receiver on, and returns the tick. Raises WaitFailed."""
+        begun = self.world.tick
+        up = When(predicate=is_up, network=self.network, slot=self.slot)
+        try:
+            return self._waits.until([up], within).tick
+        except WaitExpired as error:
+            what = f"the firmware has not turned its serial receiver on within {within / 24_000:g} ms"
+            raise WaitFailed(what, begun, error.tick, error.seen) from None
+
+    def _check_symbol(self, name: str) -> None:
+        symbols = self.world.image.symbols
+        symbol = symbols.find(name)
+        if symbol is not None and symbol.space == "code":
+            return
+        code = [one.removeprefix("_") for one, there in symbols.names.items() if there.space == "code"]
+        close = get_close_matches(name, code, n=3)
+        remedy = f"did you mean {', '.join(close)}?" if close else "give a function's name, or an address"
+        what = "there is no such function" if symbol is None else "is no code"
+        raise BadInput(self.world.image.path, name, what, remedy)
+
+    def __repr__(self) -> str:
+        wheels = self.wheels
+        return (
+            f"RobotUnderTest(net{self.network}/robot{self.slot}, {wheels.told}, commanded={wheels.commanded})"
+        )
+
+
+def is_up(robot: Robot) -> bool:
+    """Whether the firmware has turned the serial receiver on (REN in SCON): all that a robot on a radio has to do."""
+    return bool(robot.board.cpu.sfr(_SCON) & _REN)
+
+
+def _wheel(chip: Lm629, speed_m_s: float) -> Wheel:
+    buffer = chip.trajectory_buffer
+    control = buffer.taken_control
+    told: Told = "drive"
+    if control & OFF_WORD if chip.start_taken else chip.signals.word & MOTOR_OFF:
+        told = "off"
+    elif control & (STOP_ABRUPTLY | STOP_SMOOTHLY):
+        told = "stop"
+    velocity = buffer.taken_velocity >> 8 if told == "drive" else 0
+    if control & VELOCITY_MODE and not control & FORWARD:
+        velocity = -velocity
+    pwm = -chip.pwm_magnitude if chip.sign else chip.pwm_magnitude
+    return Wheel(told, velocity, speed_m_s, pwm, chip.real_position)
