@@ -41,7 +41,7 @@ LINES = 5
     "--artifacts",
     type=Place(path_type=Path),
     metavar="DIR",
-    help="Leave each failure there as a case, P12.stream, for `mirotwin replay`; older ones are replaced.",
+    help="Leave each failure there as a case, P12.stream, for `mirotwin replay`; earlier ones are replaced.",
 )
 @click.option(
     "--seed",
