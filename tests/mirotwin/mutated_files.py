@@ -157,7 +157,7 @@ class Seeds:
         self._run("fw", "coverage", "echo.ihx", "--max-cycles", "2000", "--out", "fw.info")
         self._add_texts(image)
         look = [["decode", "@"], ["decode", "@", "--json"], ["export", "@", "--out", "-"]]
-        self.kinds["recording"] = ("a.mcap", recording, [*look, ["replay", "@"]])
+        self.kinds["recording"] = ("a.mcap", recording, [*look, ["replay", "@"], ["diff", "@", "@"]])
         self.kinds["recording without sums"] = ("a.mcap", without_sums(recording), [*look, ["replay", "@"]])
         self.kinds["capture"] = ("a.pcapng", (folder / "run.pcapng").read_bytes(), look)
         stream = (folder / "run.stream").read_bytes()

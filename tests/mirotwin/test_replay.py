@@ -16,7 +16,8 @@ from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis, Period
 from miro_sim.scenario.places import check_places
 from mirotwin.capture.frame_list import frame_lines
-from mirotwin.replay.compare import compare
+from mirotwin.replay.compare import differences
+from mirotwin.replay.difference import Difference
 from mirotwin.replay.script import (
     robots_of_stream,
     scenario_of_stream,
@@ -24,7 +25,12 @@ from mirotwin.replay.script import (
     script_of_stream,
 )
 
-PERIOD = list(periods(4, [(0, 0), (1, 2)]))[3]
+*BEFORE, PERIOD = periods(4, [(0, 0), (1, 2)])
+
+
+def compare(recorded: Period, replayed: Period) -> Difference | None:
+    """The first difference, with the period in the place of the last of four."""
+    return next(iter(differences([*BEFORE, recorded], [*BEFORE, replayed])), None)
 
 
 def changed(side: str | None = None, **fields: Any) -> Period:
@@ -68,10 +74,10 @@ def test_the_hosts_own_state_is_not_the_robots_response() -> None:
         (changed("right", pwm_magnitude=0), "/net1/robot2/pwm right magnitude: recorded 3, replayed 0"),
         (
             changed("right", commands=()),
-            "right command: recorded 1Fh 1800002a at tick 2402406, replayed nothing",
+            "right command: recorded LTRJ 1Fh 1800002a at tick 2402406, replayed nothing",
         ),
         (changed(v_m_s=0.3), "/net1/robot2/truth v_m_s: recorded 0.30000000000000004, replayed 0.3"),
-        (changed(truth=Posture(0.0, 0.0, 0.0)), "/net1/robot2/truth: recorded Posture("),
+        (changed(truth=Posture(0.0, 0.0, 0.0)), "/net1/robot2/truth x_m: recorded "),
     ],
 )
 def test_the_first_difference_is_named_with_tick_robot_channel_and_both_values(
@@ -84,18 +90,19 @@ def test_the_first_difference_is_named_with_tick_robot_channel_and_both_values(
 
 
 def test_a_different_command_comes_before_what_it_leads_to() -> None:
-    later = (PERIOD.robots[1].left.commands[0][0] + 1, 0x1F, "1800002b")
-    found = compare(PERIOD, changed("left", commands=(later,), real_position=5))
+    recorded = changed("left", commands=((PERIOD.tick - 100, 0x1F, "1800002a"),))
+    other = (PERIOD.tick - 99, 0x1F, "1800002b")
+    found = compare(recorded, changed("left", commands=(other,), real_position=5))
     assert found is not None
     assert found.channel == "lm629 left command"
-    assert found.tick == PERIOD.robots[1].left.commands[0][0]
+    assert found.tick == PERIOD.tick - 100
 
 
 def test_an_answer_that_is_not_there_is_a_difference() -> None:
     silent = msgspec.structs.replace(PERIOD, wire=PERIOD.wire[:1])
     found = compare(PERIOD, silent)
     assert found is not None
-    assert (found.channel, found.replayed, found.tick) == ("wire", "nothing", PERIOD.wire[1].tick)
+    assert (found.channel, found.replayed, found.tick) == ("wire", None, PERIOD.wire[1].tick)
 
 
 @given(

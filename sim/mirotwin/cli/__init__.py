@@ -18,6 +18,7 @@ COMMANDS = {
     "conform": "Tries the protocol's rules on a firmware image.",
     "test": "Runs scenario files as tests: steps, checks, a verdict each.",
     "replay": "Sends recorded bytes again and compares.",
+    "diff": "Compares two recordings.",
     "decode": "Decodes captured bytes to frames and damage.",
     "export": "Writes the bytes of a run for Wireshark, or as a stream file.",
     "init": "Begins a project: firmware, tests, scenarios, a workflow for CI.",

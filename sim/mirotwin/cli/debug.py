@@ -31,11 +31,16 @@ def sources_option(command: Callable[..., Any]) -> Callable[..., Any]:
 def sources_of(image: Image, given: Sequence[str]) -> Sources:
     """The folders to look in: those given, the image's own, and the robot's firmware's."""
 
+    own = source_folder()
+    return Sources([*map(Path, checked_sources(given)), image.path.parent, *([own] if own else [])])
+
+
+def checked_sources(given: Sequence[str]) -> Sequence[str]:
+    """The folders of --sources. Raises BadInput for what is none."""
     for folder in given:
         if not Path(folder).is_dir():
             raise BadInput(folder, "--sources", "there is no such folder", "name the one with the C files")
-    own = source_folder()
-    return Sources([*map(Path, given), image.path.parent, *([own] if own else [])])
+    return given
 
 
 def with_debug_files(image: Image) -> Image:

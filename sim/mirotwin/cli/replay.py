@@ -5,45 +5,56 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import click
-from rich.table import Table
+import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import seconds
-from miro_protocol.transmission import DOWN
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.seed import MAX_SEED
 from miro_sim.periods import Period
 from miro_sim.radio.downlink import TransmissionError
 from miro_sim.world.world import World
 from mirotwin import runner
-from mirotwin.capture.frame_list import FrameLine, frame_lines
-from mirotwin.capture.recorded import transmissions_of
 from mirotwin.checks.expect import expectations_of, says_anything
 from mirotwin.checks.watching import Checks
+from mirotwin.cli.compare_options import Asked, compare_options
 from mirotwin.cli.console import show
+from mirotwin.cli.debug import checked_sources, sources_option
+from mirotwin.cli.differences import differences_as_json, print_differences, print_firmwares, print_json
 from mirotwin.cli.expectations import expect_option, report_failures
-from mirotwin.cli.options import Place, engine_option, firmware_option, plain_parameters, set_option
+from mirotwin.cli.options import Place, Whole, engine_option, firmware_option, plain_parameters, set_option
 from mirotwin.cli.program import DIVERGENCE, DONE, complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_case import replay_case
+from mirotwin.cli.replay_firmware import firmwares_apart, lines_from_option, load_images, program_of
 from mirotwin.cli.replay_job import Job, load_job
+from mirotwin.cli.replay_tables import SHOWN, print_frames, print_response
 from mirotwin.cli.run import report_faults
-from mirotwin.replay.compare import Difference, compare
+from mirotwin.replay.compare import differences
+from mirotwin.replay.difference import Difference
+from mirotwin.replay.firmwares import FirmwareDifference
 from mirotwin.report.summary import expectations_text
-
-SHOWN = 20
 
 
 @click.command(short_help="Sends recorded bytes again and compares.")
 @click.argument("file", type=Place())
 @firmware_option("Image to run instead of the recorded one (of the robot's own, for a text stream).")
+@lines_from_option
+@sources_option
+@click.option("--seed", type=Whole(0, MAX_SEED), help="Master seed instead of the recorded one.")
 @set_option("A key to set in the recorded scenario (or the default one, for a text stream), as for `run`.")
+@compare_options
 @expect_option
 @engine_option
 @click.option("--all", "everything", is_flag=True, help=f"List all frames, not only the first {SHOWN}.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no list of frames.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no lists of frames or differences.")
 def replay(
     file: str,
     firmware: str | None,
+    lines_from: tuple[str, ...],
+    sources: tuple[str, ...],
+    seed: int | None,
     settings: tuple[str, ...],
+    asked: Asked,
     expected: tuple[str, ...],
     engine: str | None,
     everything: bool,
@@ -51,7 +62,10 @@ def replay(
 ) -> int:
     """Sends the bytes of FILE (run.mcap, or a text stream) again and compares what the robot does.
 
-    Exit code 4 when it differs from the recording, also where a firmware fault comes of it: 4 goes before 3.
+    Exit code 4 when it differs from the recording, also where a firmware fault comes of it: 4 goes before 3. The first
+    difference is said on stderr, and the first of each channel in a table. Where another --firmware makes it differ,
+    the first instruction that both execute otherwise is looked for.
+
     A recording that was broken off, or a part of one, is compared as far as it goes, with a note.
     A text stream runs over an ideal link in the default
     scenario, and there is nothing to compare.
@@ -59,96 +73,118 @@ def replay(
     A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
     1, or 3 for a firmware fault; 0 if other firmware or settings cure it, 4 if it does not fail again without them.
 
-    Where the recorded scenario or --expect expects something, that decides: the replay goes on to the end, a difference
-    is only told, and the exit code is 1 if a check fails, else 0.
+    Where the recorded scenario or --expect expects something, that decides: a difference is only told, and the exit
+    code is 1 if a check fails, else 0.
 
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
-    job, image = load_job(file, firmware, engine, (*settings, *expected))
+    job, image = load_job(file, firmware, engine, (*settings, *expected), seed)
+    if asked.given and not job.recorded:
+        raise BadInput(file, asked.given, "a text stream holds nothing to compare with", "leave it out")
+    images = load_images(lines_from, job.image)
+    checked_sources(sources)
     if job.case.verdict:
+        _check_case(file, asked)
         return replay_case(job, image, file, quiet)
     judged = says_anything(job.scenario)
-
     with plain_parameters(file, "replayed"):
         world = World(job.scenario, job.seed, image, script=job.script)
     checks = Checks(world, expectations_of(job.scenario, file))
-    replayed: list[Period] = []
-    difference: tuple[int, Difference] | None = None
-    with ProgressBar("replaying", world.periods, quiet) as bar:
+    periods = _periods(file, job, asked)
+    replayed = _run(file, world, periods, quiet or asked.as_json)
+    rule = msgspec.structs.replace(asked.rule, digests=job.state == world.state.tables())
+    found = differences(job.recorded, replayed, rule)
+    apart = None
+    if found and job.image is not None and job.image.code != image.code:
+        programs = program_of(job.image, images, ()), program_of(image, (), sources)
+        apart = firmwares_apart(file, job, programs, found)
+    checks.finish()
 
-        def check(period: Period) -> bool:
-            nonlocal difference
+    if not quiet and not asked.as_json:
+        print_frames(job, replayed, everything)
+        if job.recorded and found:
+            print_differences(found, asked.everything)
+    if not job.recorded and not asked.as_json:
+        print_response(replayed)
+    failed = report_failures(checks)
+    if judged and not quiet and not asked.as_json:
+        show(expectations_text(checks.verdicts()))
+    faults = report_faults(world)
+    differs = _verdict(job, asked, periods, replayed, found, apart)
+    code = (faults or failed) if judged else (differs or faults or failed)
+    if asked.as_json:
+        compared = {
+            "periods": {"recorded": len(job.recorded), "replayed": len(replayed)},
+            **asked.rule_as_json(),
+        }
+        firmwares = {"recorded": job.image.sha256 if job.image else None, "replayed": image.sha256}
+        instruction = None if apart is None else apart.as_json()
+        document = {"file": file, "seed": job.seed, "firmware": firmwares, **compared}
+        result = {
+            **differences_as_json(found, asked.everything),
+            "instruction": instruction,
+            "exit_code": code,
+        }
+        print_json({**document, **result})
+    return code
+
+
+def _check_case(file: str, asked: Asked) -> None:
+    """Raises BadInput for what a case has no use for: its verdict is a line and an exit code."""
+    for option, given in (("--to", asked.rule.to_tick is not None), ("--json", asked.as_json)):
+        if given:
+            raise BadInput(file, option, "is not for a case, which ends where it failed", "leave it out")
+
+
+def _periods(file: str, job: Job, asked: Asked) -> int | None:
+    """How many control periods are replayed; None: to the end of the scenario."""
+    if not job.recorded:
+        return None if asked.rule.to_tick is None else -(-asked.rule.to_tick // CONTROL_PERIOD_TICKS)
+    there = len(job.recorded)
+    if asked.rule.from_tick >= there * CONTROL_PERIOD_TICKS:
+        what = f"the recording ends at tick {there * CONTROL_PERIOD_TICKS}"
+        raise BadInput(file, f"--from {asked.rule.from_tick}", what, "look earlier")
+    if asked.rule.to_tick is None:
+        return there
+    return min(there, -(-asked.rule.to_tick // CONTROL_PERIOD_TICKS))
+
+
+def _run(file: str, world: World, periods: int | None, quiet: bool) -> list[Period]:
+    replayed: list[Period] = []
+    with ProgressBar("replaying", periods or world.periods, quiet) as bar:
+
+        def keep(period: Period) -> bool:
             replayed.append(period)
             bar.to(len(replayed))
-            if difference is None and len(replayed) <= len(job.recorded):
-                found = compare(job.recorded[period.index], period)
-                difference = None if found is None else (period.index, found)
-            return (difference is not None and not judged) or len(replayed) == len(job.recorded)
+            return len(replayed) == periods
 
         try:
             with plain_parameters(file, "replayed"):
-                runner.run(world, None, False, check)
+                runner.run(world, None, False, keep)
         except TransmissionError as error:
             raise BadInput(file, "", f"cannot be replayed beyond tick {world.tick}: {error}") from None
-    if not quiet:
-        _print_frames(job, replayed, everything)
-    checks.finish()
-    failed = report_failures(checks)
-    if judged and not quiet:
-        show(expectations_text(checks.verdicts()))
-    faults = report_faults(world)
-    differs = _verdict(job, replayed, difference)
-    return (faults or failed) if judged else (differs or faults or failed)
+    return replayed
 
 
-def _print_frames(job: Job, replayed: Sequence[Period], everything: bool) -> None:
-    robots = {index: network.robots for index, network in enumerate(job.scenario.networks)}
-    lines = sorted(
-        frame_lines(transmissions_of(job.recorded or replayed), robots), key=lambda line: line.tick
-    )
-    shown: Sequence[FrameLine] = lines if everything else lines[:SHOWN]
-    table = Table(box=None, pad_edge=False)
-    table.add_column("tick", justify="right")
-    table.add_column("t [s]", justify="right")
-    table.add_column("")
-    table.add_column("from")
-    table.add_column("frame", overflow="fold")
-    for line in shown:
-        sender = "host" if line.direction == DOWN else "robot ?" if line.slot < 0 else f"robot {line.slot}"
-        if len(robots) > 1:
-            sender = f"net{line.network} {sender}"
-        table.add_row(str(line.tick), f"{seconds(line.tick):.4f}", line.direction, sender, line.text)
-    show(table)
-    if len(shown) < len(lines):
-        show(f"{len(lines) - len(shown)} more of {len(lines)} frames; --all lists them")
-
-
-def _verdict(job: Job, replayed: Sequence[Period], difference: tuple[int, Difference] | None) -> int:
+def _verdict(
+    job: Job,
+    asked: Asked,
+    periods: int | None,
+    replayed: Sequence[Period],
+    found: Sequence[Difference],
+    apart: FirmwareDifference | None,
+) -> int:
     if not job.recorded:
-        _print_response(replayed)
         return DONE
-    if difference is not None:
-        complain(f"the replay differs in control period {difference[0]}, {difference[1]}")
+    if found:
+        complain(f"the replay differs in control period {found[0].period}, {found[0]}")
+        if apart is not None:
+            print_firmwares(apart)
         return DIVERGENCE
-    if len(replayed) < len(job.recorded):
-        complain(f"the replay ended after {len(replayed)} of {len(job.recorded)} recorded control periods")
+    if periods is not None and len(replayed) < periods:
+        complain(f"the replay ended after {len(replayed)} of {periods} recorded control periods")
         return DIVERGENCE
-    show(f"the robots' response equals the recorded one in all {len(replayed)} control periods")
+    if not asked.as_json:
+        how = "" if asked.rule.kind == "bits" else f" ({asked.described()})"
+        show(f"the robots' response equals the recorded one in all {len(replayed)} control periods{how}")
     return DONE
-
-
-def _print_response(replayed: Sequence[Period]) -> None:
-    """What the robots made of a stream: there is no recording to compare with."""
-    table = Table(box=None, pad_edge=False)
-    for name in ("robot", "accepted", "rejected", "stale", "commands", "left [counts]", "right [counts]"):
-        table.add_column(name, justify="right")
-    for index, robot in enumerate(replayed[-1].robots):
-        seen = [period.robots[index] for period in replayed]
-        commands = sum(len(one.left.commands) + len(one.right.commands) for one in seen)
-        counters = [
-            str(count) if count is not None else "?"
-            for count in (robot.accepted, robot.rejected, robot.stale)
-        ]
-        positions = (str(robot.left.real_position), str(robot.right.real_position))
-        table.add_row(f"{robot.slot}", *counters, str(commands), *positions)
-    show(table)

@@ -7,13 +7,12 @@ What belongs here: from a file's content to scenario, seed, bytes to send, and i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_protocol import stream
-from miro_robot.image import Image, Symbol, Symbols, parse_hex
+from miro_robot.image import Image
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period
 from miro_sim.scenario.file import changed
@@ -28,6 +27,7 @@ from mirotwin.cli.program import complain
 from mirotwin.files.outputs import RECORDING
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
+from mirotwin.replay.rerun import image_if_any, image_of
 from mirotwin.replay.script import (
     Doing,
     check_deeds,
@@ -49,21 +49,27 @@ class Case(msgspec.Struct, frozen=True):
 
 
 class Job(msgspec.Struct, frozen=True):
-    """What is to be replayed: a recording, or a text stream (then `recorded` is empty)."""
+    """What is to be replayed: a recording, or a text stream (then `recorded` is empty and `image` None).
+
+    `image`: the one that was recorded, None where it is none. `state`: the form of the states whose digests were
+    recorded, if a replay computes the same states, else empty: a controller's states are not computed again.
+    """
 
     scenario: Scenario
     seed: int
     script: list[Doing]
     recorded: Sequence[Period]
+    image: Image | None = None
+    state: str = ""
     case: Case = Case()
 
 
 def load_job(
-    file: str, firmware: str | None, engine: str | None, settings: Sequence[str] = ()
+    file: str, firmware: str | None, engine: str | None, settings: Sequence[str] = (), seed: int | None = None
 ) -> tuple[Job, Image]:
     """Reads `file` and loads the image that was asked for, recorded, or the robot's own.
 
-    `settings`: keys to set in the recorded scenario, or in the default one.
+    `settings`: keys to set in the recorded scenario, or in the default one. `seed`: instead of its own.
     """
     check_no_folder(file, RECORDING)
     data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
@@ -72,16 +78,20 @@ def load_job(
         recording = parse(data, file)
         if recording.broken_off:
             complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
-        job = _job_of_recording(recording, file, settings)
-        return job, _recorded_image(recording, file) if firmware is None else load_image(firmware)
+        if not recording.periods:
+            raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
+        image = image_of(recording, file) if firmware is None else image_if_any(recording, file)
+        job = _job_of_recording(recording, file, settings, image, seed)
+        return job, image if firmware is None and image is not None else load_image(firmware)
     _refuse_other_formats(data, file)
     given = stream.decode(data, file)
     image = load_image(firmware)
     header = given.header
     _check_firmware(header, image, file, firmware)
-    other = header.firmware_sha256 not in (None, image.sha256) or bool(settings)
+    reseeded = seed not in (None, header.seed or 0)
+    other = header.firmware_sha256 not in (None, image.sha256) or bool(settings) or reseeded
     case = Case(header.verdict or "", header.end_tick or 0, other)
-    return msgspec.structs.replace(_job_of_stream(given, file, settings), case=case), image
+    return msgspec.structs.replace(_job_of_stream(given, file, settings, seed), case=case), image
 
 
 def _refuse_other_formats(data: bytes, path: str) -> None:
@@ -94,25 +104,29 @@ def _refuse_other_formats(data: bytes, path: str) -> None:
         raise BadInput(path, "offset 0", what, "give a run.mcap that `mirotwin run` wrote, or a stream file")
 
 
-def _job_of_recording(recording: Recording, path: str, settings: Sequence[str]) -> Job:
+def _job_of_recording(
+    recording: Recording, path: str, settings: Sequence[str], image: Image | None, seed: int | None
+) -> Job:
     source = recording.source
-    if not recording.periods:
-        raise BadInput(path, "", "the recording holds no control period", "nothing can be replayed")
     scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings, expectations_of)
     script = script_of(recording.periods)
     check_script(script, path, len(scenario.networks))
     check_deeds(script, path, scenario)
-    return Job(scenario, source.seed, script, recording.periods)
+    as_it_was = image is not None and not settings and seed in (None, source.seed)
+    silent = all(network.host == "silent" for network in scenario.networks)
+    state = source.state if as_it_was and silent else ""
+    return Job(scenario, source.seed if seed is None else seed, script, recording.periods, image, state)
 
 
-def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str]) -> Job:
+def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str], seed: int | None) -> Job:
     sent = given.happenings()
     header = [*in_text(given.header.set or {}), *in_text({"expect": given.header.expect or {}})]
     scenario = changed(
         scenario_of_stream(sent, path, given.header), path, [*header, *settings], expectations_of
     )
     check_deeds(sent, path, scenario)
-    return Job(scenario, given.header.seed or 0, script_of_stream(sent), ())
+    own = given.header.seed or 0
+    return Job(scenario, own if seed is None else seed, script_of_stream(sent), ())
 
 
 def _check_firmware(header: stream.Header, image: Image, path: str, firmware: str | None) -> None:
@@ -124,12 +138,3 @@ def _check_firmware(header: stream.Header, image: Image, path: str, firmware: st
     if firmware is None:
         raise BadInput(path, "header", what, "name the image with --firmware")
     complain(f"{path}: {what}")
-
-
-def _recorded_image(recording: Recording, path: str) -> Image:
-    """The image in the recording, with the symbols it had when it was recorded."""
-
-    source = recording.source
-    image = parse_hex(source.firmware, Path(path) / "firmware.ihx")
-    symbols = Symbols({name: Symbol(address, space) for name, (address, space) in source.symbols.items()})
-    return msgspec.structs.replace(image, symbols=symbols)

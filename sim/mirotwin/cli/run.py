@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+import msgspec
 
 from miro_exact.seed import MAX_SEED
 from miro_sim.scenario.file import load
@@ -119,6 +120,7 @@ def run(
     source = source_of(text, seed, image, record)
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
+    source = msgspec.structs.replace(source, state=world.state.tables())
     checks = Checks(world, expectations_of(text.scenario, text.origin))
     player = Player(world, steps, text.origin) if steps else None
     views: list[View] = []

@@ -133,4 +133,5 @@ def _source(messages: Messages) -> Source:
         firmware_sha256=metadata.get("firmware_sha256", ""),
         symbols=symbols,
         record=metadata.get("record", "default"),
+        state=metadata.get("state", ""),
     )

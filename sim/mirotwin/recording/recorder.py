@@ -50,7 +50,7 @@ class Fault(Protocol):
 
 class Source(msgspec.Struct, frozen=True):
     """What a run was made from: scenario text, seed, firmware file, and its symbols (name -> address,
-    space).
+    space). `state`: the form of the states that its digests are of (`Flat.tables`), "" where it is not known.
     """
 
     scenario_name: str
@@ -60,6 +60,7 @@ class Source(msgspec.Struct, frozen=True):
     firmware_sha256: str
     symbols: dict[str, tuple[int, str]] = {}
     record: str = "default"
+    state: str = ""
 
 
 _Message = tuple[str, int, msgspec.Struct]
@@ -94,6 +95,7 @@ class Recorder:
                 "seed": str(source.seed),
                 "firmware_sha256": source.firmware_sha256,
                 "record": source.record,
+                **({"state": source.state} if source.state else {}),
             },
         )
         self._writer.add_attachment(SCENARIO_ATTACHMENT, "application/toml", source.scenario_text.encode())

@@ -49,7 +49,7 @@ def test_its_recording_replays_to_the_same_response(mirotwin: Callable[..., Resu
 def test_a_recording_may_be_replayed_with_other_settings(mirotwin: Callable[..., Result], run: Path) -> None:
     code, _, err = mirotwin("replay", run / "run.mcap", "-q", "--set", "network.robot.1.slot=1")
     assert code == 4
-    assert "the replay differs in control period 1" in err
+    assert "the replay differs in control period 0" in err
     code, _, err = mirotwin("replay", run / "run.mcap", "--set", "network.robot.1.slot=7")
     assert (code, err.count("\n")) == (2, 1)
     assert "run.mcap: scenario.toml: --set network.robot.1.slot=7: 7 is out of range; must be <= 4" in err

@@ -1,0 +1,174 @@
+"""Where two builds go apart whose code lies at other addresses: the first variables that differ, and who wrote them.
+
+What belongs here: comparing variables by name, and finding the instruction that wrote one. What does not: firmwares of
+the same layout, which are compared instruction by instruction (`instructions.py`), and names of places (`program.py`).
+
+Such builds execute nothing at the same address, and most things at other times. They are compared where both processors
+sleep, and so have done all there was to do: every half millisecond the variables that both symbol files name. What
+holds times (a timer's count, say) differs between builds of other speed, and means nothing; so those that still differ
+at the end are listed by when that began, and with the last instruction of each build that changed them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from miro_exact.clock import CYCLE_TICKS, seconds
+from miro_robot.inspect.watcher import Watcher, attach, detach
+from mirotwin.replay.lockstep import Pair
+from mirotwin.replay.program import Place, Program
+from mirotwin.replay.variables import extents
+
+if TYPE_CHECKING:
+    from miro_robot.mcs51.cpu import Cpu
+    from miro_sim.world.robot import Robot
+    from miro_sim.world.world import Mark, World
+
+LOOK_TICKS = 12_012
+"""No part of a millisecond: what the firmware does once a millisecond must not be awake at each look."""
+TRACED = 3
+_INTEGERS = (1, 2, 4)
+Key = tuple[int, int, str]
+Found = tuple["VariableDifference", "tuple[Mark, Mark]"]
+"""With the marks of the look before."""
+
+
+class VariableDifference(msgspec.Struct, frozen=True):
+    """A variable that differs from the look at `tick` on, and did not at the one before.
+
+    Values: of 1, 2 and 4 bytes little-endian numbers, else bytes in hex. `writers`: the instructions that changed it
+    last, up to then and since the look before; None where none did.
+    """
+
+    tick: int
+    network: int
+    slot: int
+    name: str
+    one: int | str
+    other: int | str
+    writers: tuple[Place | None, Place | None] = (None, None)
+
+    def __str__(self) -> str:
+        at = f"tick {self.tick} ({seconds(self.tick):.6f} s)"
+        return f"{at}: net{self.network}/robot{self.slot}: {self.name}: {self.one}, {self.other}"
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "tick": self.tick,
+            "t_s": seconds(self.tick),
+            "network": self.network,
+            "slot": self.slot,
+            "name": self.name,
+            "values": [self.one, self.other],
+            "writers": [None if place is None else place.as_json() for place in self.writers],
+        }
+
+
+class Builds:
+    """Two worlds at one tick with firmwares of other layouts. `looks`: how often both processors slept."""
+
+    def __init__(self, one: World, other: World, programs: tuple[Program, Program]) -> None:
+        self.pair = Pair(one, other)
+        self.programs = programs
+        first, second = (extents(program.image) for program in programs)
+        self.places = {
+            name: (first[name][0], second[name][0], min(first[name][1], second[name][1]))
+            for name in first
+            if name in second
+        }
+        self.looks = 0
+        self.last_tick = 0  # of the look before
+        self.since: dict[Key, Found] = {}
+        self.gone: dict[Key, Found] = {}  # what differed at two looks or more, the first time
+
+    def variables(self, until_tick: int) -> list[VariableDifference]:
+        """Those that differ when both processors sleep last before `until_tick`, by when that began.
+
+        Where none does, those that did for a while.
+        """
+        before = self.pair.mark()
+        while self.pair.tick < until_tick and not self.pair.over:
+            self.pair.run_to(min(until_tick, self.pair.tick + LOOK_TICKS))
+            if self._look(before):
+                before = self.pair.mark()
+                self.last_tick = self.pair.tick
+        found = sorted((self.since or self.gone).values(), key=lambda one: one[0].tick)
+        return [self._traced(one, mark) if index < TRACED else one for index, (one, mark) in enumerate(found)]
+
+    def _look(self, before: tuple[Mark, Mark]) -> bool:
+        """Compares the variables of each robot whose processors sleep; whether all do."""
+        slept = True
+        for robot, twin in zip(_robots(self.pair.one), _robots(self.pair.other), strict=True):
+            if not (robot.board.cpu.idle and twin.board.cpu.idle):
+                slept = False
+                continue
+            self.looks += 1
+            for name, (first, second, size) in self.places.items():
+                here, there = _bytes(robot, first, size), _bytes(twin, second, size)
+                key = robot.network, robot.slot, name
+                if here == there:
+                    was = self.since.pop(key, None)
+                    if was is not None and was[0].tick < self.last_tick:
+                        self.gone.setdefault(key, was)
+                elif key not in self.since:
+                    found = VariableDifference(self.pair.tick, *key, _value(here), _value(there))
+                    self.since[key] = found, before
+        return slept
+
+    def _traced(self, found: VariableDifference, before: tuple[Mark, Mark]) -> VariableDifference:
+        """The same with the instructions that wrote it."""
+        self.pair.go_back(before)
+        first, second, size = self.places[found.name]
+        watchers = (Writes(first, size), Writes(second, size))
+        cpus = [
+            world.robot(found.network, found.slot).board.cpu for world in (self.pair.one, self.pair.other)
+        ]
+        for cpu, watcher in zip(cpus, watchers, strict=True):
+            attach(cpu, watcher)
+        try:
+            self.pair.run_to(found.tick)
+        finally:
+            for cpu, watcher in zip(cpus, watchers, strict=True):
+                detach(cpu, watcher)
+        writers = [
+            None if watcher.last is None else program.place(*watcher.last)
+            for program, watcher in zip(self.programs, watchers, strict=True)
+        ]
+        return msgspec.structs.replace(found, writers=tuple(writers))
+
+
+class Writes(Watcher):
+    """Keeps the last instruction that changed one of `size` bytes of internal RAM: (PC, tick)."""
+
+    def __init__(self, first: int, size: int) -> None:
+        self.first = first
+        self.size = size
+        self.value = b""
+        self.last: tuple[int, int] | None = None
+
+    def attached(self, cpu: Cpu) -> None:
+        self.value = self._now(cpu)
+
+    def executed(self, cpu: Cpu, pc: int, start: int) -> None:
+        now = self._now(cpu)
+        if now != self.value:
+            self.value = now
+            self.last = pc, start * CYCLE_TICKS
+
+    def _now(self, cpu: Cpu) -> bytes:
+        return bytes(cpu.peek_iram(self.first + offset) for offset in range(self.size))
+
+
+def _robots(world: World) -> list[Robot]:
+    return [robot for network in world.networks for robot in network.robots]
+
+
+def _bytes(robot: Robot, first: int, size: int) -> bytes:
+    peek = robot.board.cpu.peek_iram
+    return bytes([peek(first + offset) for offset in range(size)])
+
+
+def _value(data: bytes) -> int | str:
+    return int.from_bytes(data, "little") if len(data) in _INTEGERS else data.hex(" ")

@@ -1,0 +1,90 @@
+"""A value that two runs have otherwise, and how it is said.
+
+What belongs here: the record, its words, and its form in JSON. What does not: finding it (`fields.py`, `sequences.py`,
+`compare.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import msgspec
+
+from miro_exact.clock import seconds
+from mirotwin.recording.topics import PERIOD, robot_topic
+
+WORDS = ("recorded", "replayed")
+"""What the two sides of a replay are called; `mirotwin diff` calls them by its arguments."""
+
+
+DIGEST = "digest"
+"""The channel of the states' digests: of what a control period leaves behind, nothing of which need be recorded."""
+
+
+class Difference(msgspec.Struct, frozen=True):
+    """A value of two runs at `tick`, in control period `period`.
+
+    `channel` as in a recording, with the field: `lm629 left status`, `wire`. `slot` -1: of a whole network; `network`
+    -1: of the whole world. `recorded`, `replayed`: numbers, or text for characters and commands; None: nothing there.
+    """
+
+    tick: int
+    period: int
+    network: int
+    slot: int
+    channel: str
+    recorded: int | float | str | None
+    replayed: int | float | str | None
+
+    @property
+    def topic(self) -> str:
+        if self.network < 0:
+            return f"{PERIOD} {self.channel}"
+        if self.slot < 0:
+            return f"/net{self.network}/{self.channel}"
+        return robot_topic(self.network, self.slot, self.channel)
+
+    def values(self) -> tuple[str, str]:
+        """Both as people read them."""
+        if self.channel == DIGEST:
+            return f"{self.recorded}"[:12], f"{self.replayed}"[:12]
+        return shown(self.recorded), shown(self.replayed)
+
+    def said(self, words: tuple[str, str] = WORDS) -> str:
+        """One line; `words` name the two runs."""
+        recorded, replayed = self.values()
+        values = f"{words[0]} {recorded}, {words[1]} {replayed}"
+        return f"tick {self.tick} ({seconds(self.tick):.6f} s), {self.topic}: {values}"
+
+    def __str__(self) -> str:
+        return self.said()
+
+    def as_json(self, words: tuple[str, str] = WORDS) -> dict[str, Any]:
+        """What `--json` says of it."""
+        return {
+            "tick": self.tick,
+            "t_s": seconds(self.tick),
+            "period": self.period,
+            "network": None if self.network < 0 else self.network,
+            "slot": None if self.slot < 0 else self.slot,
+            "channel": self.channel,
+            words[0]: self.recorded,
+            words[1]: self.replayed,
+        }
+
+
+def first_per_channel(found: Iterable[Difference]) -> list[tuple[Difference, int]]:
+    """The first difference of each channel of each robot, and how many the channel has; in the order of `found`."""
+    first: dict[tuple[int, int, str], Difference] = {}
+    count: dict[tuple[int, int, str], int] = {}
+    for one in found:
+        key = one.network, one.slot, one.channel
+        first.setdefault(key, one)
+        count[key] = count.get(key, 0) + 1
+    return [(one, count[key]) for key, one in first.items()]
+
+
+def shown(value: object) -> str:
+    """A value in the words of a recording."""
+    return "nothing" if value is None else str(value)

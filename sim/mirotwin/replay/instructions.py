@@ -1,0 +1,261 @@
+"""The first instructions that two firmwares of the same layout execute otherwise.
+
+What belongs here: stepping two worlds instruction by instruction, beside each other. What does not: images of another
+layout (`builds.py`), names of places (`program.py`), and states as a whole (`lockstep.py`).
+
+Two instructions are looked for. *Changed*: the first one executed whose code is not the same; found at full speed, by
+marks at all changed places. *Effect*: the one after which the processors' states are not the same again. The worlds'
+states are compared every millisecond; from the last time they are the same on, each step is. An effect that is gone
+within a millisecond is no such effect: what the first changed instruction does is told of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import msgspec
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS
+from miro_exact.state import Flat
+from miro_robot.inspect.watcher import Watcher, attach, detach
+from miro_robot.mcs51.opcodes import LENGTH
+from miro_sim.world.conditions import Reached
+from miro_sim.world.waits import WaitExpired
+from mirotwin.replay.lockstep import LOOK_TICKS, Pair
+from mirotwin.replay.program import Place, Program, changed_instructions
+from mirotwin.replay.state_fields import FieldDifference, item_differences
+from mirotwin.replay.variables import STACK, name_of_byte
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+    from miro_robot.mcs51.cpu import Cpu
+    from miro_sim.world.robot import Robot
+    from miro_sim.world.world import World
+
+STEPPED_TICKS = 4 * CONTROL_PERIOD_TICKS
+"""How long each step is compared at most: as long again the states differ, but not for what a processor does."""
+LASTING_TICKS = 12_012
+"""For how long states must differ so that it is an effect: half a millisecond, no part of one."""
+REGISTERS = {
+    "pc": "PC", "a": "ACC", "b": "B", "sp": "SP", "dptr": "DPTR", "cy": "CY", "ac": "AC", "ov": "OV",
+    "pcon": "PCON", "bank": "register bank", "user_flags": "F0, UD", "cycles": "machine cycles",
+    **{f"peripherals.ports.latches[{port}]": f"P{port}" for port in range(4)},
+}  # fmt: skip
+_RAM_BYTES = 0x100
+NOT_TOLD = ("instructions", "idle_cycles", "blocked")
+"""Counts that follow from the others."""
+
+
+class InstructionDifference(msgspec.Struct, frozen=True):
+    """What two firmwares execute otherwise: where, and the registers and variables that differ after it.
+
+    `parted`: the instruction, of the first firmware, behind which they go on at different places.
+    """
+
+    network: int
+    slot: int
+    one: Place
+    other: Place
+    values: tuple[FieldDifference, ...]
+    parted: Place | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "network": self.network,
+            "slot": self.slot,
+            "places": [self.one.as_json(), self.other.as_json()],
+            "values": [{"name": value.path, "values": [value.one, value.other]} for value in self.values],
+            "parted": None if self.parted is None else self.parted.as_json(),
+        }
+
+
+class Step(NamedTuple):
+    """An instruction, or an interrupt's call (`code` empty), and the processor's state after it."""
+
+    cycle: int
+    pc: int
+    code: bytes
+    state: bytes
+    next_pc: int
+
+
+class Live:
+    """The state of a processor without what lies above its stack pointer: nobody reads that before it is written.
+
+    `stack`: where the stack begins, by the image's symbols; None: not known, and all of RAM counts.
+    """
+
+    def __init__(self, cpu: Cpu, image: Image) -> None:
+        self.cpu = cpu
+        self.flat = Flat(cpu)
+        symbol = image.symbols.names.get(STACK)
+        self.stack = None if symbol is None else symbol.address
+        assert self.flat.fields[0].path == "iram"
+
+    def save(self) -> bytes:
+        state, top = self.flat.save(), self.cpu.sp + 1
+        if self.stack is None or top < self.stack:
+            return state
+        return state[:top] + bytes(_RAM_BYTES - top) + state[_RAM_BYTES:]
+
+
+class Processors(Pair):
+    """Two worlds whose processors alone are compared."""
+
+    def __init__(self, one: World, other: World) -> None:
+        super().__init__(one, other)
+        both = zip(_robots(one), _robots(other), strict=True)
+        self.live = [(Live(a.board.cpu, one.image), Live(b.board.cpu, other.image)) for a, b in both]
+
+    def differ(self) -> bool:
+        return any(here.save() != there.save() for here, there in self.live)
+
+
+class Steps(Watcher):
+    """Keeps what a processor does."""
+
+    def __init__(self, cpu: Cpu, image: Image) -> None:
+        self.live = Live(cpu, image)
+        self.found: list[Step] = []
+
+    def executed(self, cpu: Cpu, pc: int, start: int) -> None:
+        code = bytes(cpu.code_at(pc + offset) for offset in range(LENGTH[cpu.code_at(pc)]))
+        self.found.append(Step(start, pc, code, self.live.save(), cpu.pc))
+
+    def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
+        self.found.append(Step(start, pc, b"", self.live.save(), cpu.pc))
+
+
+class Stepper:
+    """Two worlds at one tick with firmwares of the same layout."""
+
+    def __init__(self, one: World, other: World, programs: tuple[Program, Program]) -> None:
+        self.pair = Processors(one, other)
+        self.programs = programs
+
+    def changed(self, until_tick: int) -> InstructionDifference | None:
+        """The first changed instruction that is executed; both worlds stand before it then."""
+        one, other = self.pair.one, self.pair.other
+        places = changed_instructions(one.image, other.image)
+        conditions = [
+            Reached(place=place, network=robot.network, slot=robot.slot)
+            for robot in _robots(one)
+            for place in places
+        ]
+        if not conditions:
+            return None
+        try:
+            event = one.run_until(conditions, until_tick - one.tick)
+        except WaitExpired:
+            return None
+        other.run_to(one.tick)
+        robot, twin = one.robot(event.network, event.slot), other.robot(event.network, event.slot)
+        return self._stepped_once(robot, twin, event.address)
+
+    def _stepped_once(self, robot: Robot, twin: Robot, pc: int) -> InstructionDifference:
+        """What the instruction does that both processors execute next."""
+        tick = robot.board.cpu.cycles * CYCLE_TICKS
+        for here, there in self._pieces(tick + 1, tick + 1):
+            if here.robot is robot and here.steps and there.steps:
+                return self._difference(here, there, 0, -1)
+        one, other = (program.place(pc, tick) for program in self.programs)
+        return InstructionDifference(robot.network, robot.slot, one, other, ())
+
+    def effect(self, until_tick: int) -> InstructionDifference | None:
+        """The instruction after which the processors are not in the same state again, from now to `until_tick`."""
+        while True:
+            found_tick = self.pair.narrow(LOOK_TICKS, until_tick)
+            if found_tick is None:
+                return None
+            found = [
+                self._difference(here, there, *lasting)
+                for here, there in self._pieces(found_tick + LASTING_TICKS, found_tick + STEPPED_TICKS)
+                if (lasting := _lasting(here.steps, there.steps)) is not None
+            ]
+            if found:
+                return min(found, key=lambda one: one.one.tick)
+
+    def _pieces(self, tick: int, end_tick: int) -> Iterator[tuple[Stepped, Stepped]]:
+        """Runs both to `tick` and in pieces on to `end_tick`; all robots of the first piece that is not the same."""
+        images = self.pair.one.image, self.pair.other.image
+        robots = zip(_robots(self.pair.one), _robots(self.pair.other), strict=True)
+        pairs = [(Stepped(robot, images[0]), Stepped(twin, images[1])) for robot, twin in robots]
+        try:
+            while True:
+                self.pair.run_to(tick)
+                unlike = [(one, other) for one, other in pairs if one.steps != other.steps]
+                if unlike or tick >= end_tick or self.pair.over:
+                    yield from unlike or pairs
+                    return
+                for stepped in (each for pair in pairs for each in pair):
+                    stepped.watcher.found.clear()
+                tick = min(end_tick, tick + LOOK_TICKS)
+        finally:
+            for stepped in (each for pair in pairs for each in pair):
+                stepped.detach()
+
+    def _difference(self, here: Stepped, there: Stepped, index: int, parted: int) -> InstructionDifference:
+        robot = here.robot
+        values = _values(robot, self.pair.one.image, here.steps[index].state, there.steps[index].state)
+        places = [
+            program.place(step.pc, step.cycle * CYCLE_TICKS)
+            for at in (index, *([parted] if parted >= 0 else []))
+            for program, step in zip(self.programs, (here.steps[at], there.steps[at]), strict=True)
+        ]
+        return InstructionDifference(
+            robot.network, robot.slot, places[0], places[1], tuple(values), *places[2:3]
+        )
+
+
+class Stepped:
+    """A robot whose steps are kept, until `detach`."""
+
+    def __init__(self, robot: Robot, image: Image) -> None:
+        self.robot = robot
+        self.watcher = Steps(robot.board.cpu, image)
+        attach(robot.board.cpu, self.watcher)
+
+    @property
+    def steps(self) -> list[Step]:
+        return self.watcher.found
+
+    def detach(self) -> None:
+        detach(self.robot.board.cpu, self.watcher)
+
+
+def _lasting(one: Sequence[Step], other: Sequence[Step]) -> tuple[int, int] | None:
+    """From which step on the states are not the same again, and at which they go different ways (-1: at none)."""
+    steps = list(zip(one, other, strict=False))
+    first = len(steps)
+    while first and steps[first - 1][0][1:] != steps[first - 1][1][1:]:
+        first -= 1
+    if first == len(steps):
+        return None
+    parted = (at for at in range(first, len(steps)) if steps[at][0].next_pc != steps[at][1].next_pc)
+    return first, next(parted, -1)
+
+
+def _robots(world: World) -> list[Robot]:
+    return [robot for network in world.networks for robot in network.robots]
+
+
+def _values(robot: Robot, image: Image, one: bytes, other: bytes) -> Iterator[FieldDifference]:
+    """Registers and variables that differ, by the names that people have for them; of the first robot's firmware."""
+    flat = Flat(robot.board.cpu)
+    values, others = flat.decode(one), flat.decode(other)
+    for path, value in values.items():
+        if path in NOT_TOLD:
+            continue
+        for item, here, there in item_differences(value, others[path]):
+            name = path + item
+            if path == "iram":
+                name = _byte_name(image, int(item[1:-1]), values["bank"])
+            yield FieldDifference(REGISTERS.get(name, name), "", here, there)
+
+
+def _byte_name(image: Image, address: int, bank: int) -> str:
+    if bank <= address < bank + 8:
+        return f"R{address - bank}"
+    name = name_of_byte(image, address)
+    return f"{name} ({address:02X}h)" if name else f"RAM {address:02X}h"

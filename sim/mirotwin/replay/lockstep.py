@@ -1,0 +1,136 @@
+"""Two worlds side by side: the first tick at which their states differ, and the fields that do.
+
+What belongs here: moving both, and finding the tick. What does not: what a field's name and value look like
+(`state_fields.py`), the instruction that made the difference (`instructions.py`), and recordings (`rerun.py`).
+
+    found = mirotwin.replay.first_difference(one, other)
+    print(found)       # tick 1203 (0.000050 s): networks[0].robots[0].board.cpu.iram[35h] ..
+
+States are compared every millisecond, then within the first one that differs in shorter steps, down to a tick. What
+differs and is the same again between two looks is not seen: a register, say, that is overwritten at once.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from mirotwin.replay.state_fields import FieldDifference, differing
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import Mark, World
+
+LOOK_TICKS = 24_000
+STEPS_TICKS = (1_000, 40, 1)
+"""Each within one of the step before."""
+NAMED = 3
+
+
+class StateDifference(msgspec.Struct, frozen=True):
+    """The states of two worlds differ at `tick`, in control period `period`, and did not a tick before.
+
+    `fields` is not empty. Where the worlds were made otherwise, that may be tick 0.
+    """
+
+    tick: int
+    period: int
+    fields: tuple[FieldDifference, ...]
+
+    def __str__(self) -> str:
+        more = len(self.fields) - NAMED
+        named = "; ".join(str(field) for field in self.fields[:NAMED])
+        rest = f"; and {more} more fields" if more > 0 else ""
+        return f"tick {self.tick} ({seconds(self.tick):.6f} s), control period {self.period}: {named}{rest}"
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "tick": self.tick,
+            "t_s": seconds(self.tick),
+            "period": self.period,
+            "fields": [field.as_json() for field in self.fields],
+        }
+
+
+class Pair:
+    """Two worlds at one tick. Raises ValueError for worlds that are not."""
+
+    def __init__(self, one: World, other: World) -> None:
+        if one.tick != other.tick:
+            raise ValueError(f"the worlds stand at ticks {one.tick} and {other.tick}: move them to one tick")
+        self.one = one
+        self.other = other
+        self.alike = one.state.tables() == other.state.tables()
+
+    @property
+    def tick(self) -> int:
+        return max(self.one.tick, self.other.tick)
+
+    @property
+    def over(self) -> bool:
+        """Whether one of them does not go on."""
+        return self.one.stopped or self.other.stopped
+
+    def run_to(self, tick: int) -> None:
+        self.one.run_to(tick)
+        self.other.run_to(tick)
+
+    def differ(self) -> bool:
+        if self.alike and self.one.state.hashed() == self.other.state.hashed():
+            return False
+        return bool(self.fields())  # the digests before may differ, and all else be the same again
+
+    def fields(self) -> tuple[FieldDifference, ...]:
+        """Those that differ, of the fields that both have."""
+        return tuple(differing(self.one, self.other))
+
+    def mark(self) -> tuple[Mark, Mark]:
+        return self.one.mark(), self.other.mark()
+
+    def go_back(self, marks: tuple[Mark, Mark]) -> None:
+        self.one.go_back(marks[0])
+        self.other.go_back(marks[1])
+
+    def narrow(self, step_ticks: int, end_tick: int) -> int | None:
+        """Runs both in steps up to `end_tick`, to the first place where they differ, and goes back to the one before.
+
+        Returns the tick of that place. None: there is none, and both stand at the end.
+        """
+        while self.tick < end_tick and not self.over:
+            before = self.mark()
+            next_tick = (self.tick // step_ticks + 1) * step_ticks
+            self.run_to(min(next_tick, end_tick))
+            if self.differ():
+                found_tick = self.tick
+                self.go_back(before)
+                return found_tick
+        return None
+
+
+def first_difference(
+    one: World, other: World, until_tick: int | None = None, look_ticks: int = LOOK_TICKS
+) -> StateDifference | None:
+    """The first tick at which the states of two worlds differ, from where both stand up to `until_tick`.
+
+    Default: to the end of the shorter one. None: they never do, looked at every `look_ticks`. Both worlds are left at
+    the tick that was found. What enters no digest is not compared: how early input was announced. Worlds of other
+    scenarios are compared in the fields that both have. Both go back and on again, so their observers are told some
+    periods twice. Raises ValueError unless both stand at one tick, and for steps that are none.
+    """
+    if look_ticks < 1:
+        raise ValueError(f"look_ticks is {look_ticks}: give 1 or more")
+    pair = Pair(one, other)
+    if not pair.differ():
+        end_tick = CONTROL_PERIOD_TICKS * min(one.periods, other.periods)
+        found_tick = end_tick if until_tick is None else until_tick
+        for step_ticks in (look_ticks, *(step for step in STEPS_TICKS if step < look_ticks)):
+            narrowed_tick = pair.narrow(step_ticks, found_tick)
+            if narrowed_tick is None:
+                return None
+            found_tick = narrowed_tick
+        pair.run_to(found_tick)
+    fields = pair.fields()
+    return (
+        StateDifference(pair.tick, max(0, pair.tick - 1) // CONTROL_PERIOD_TICKS, fields) if fields else None
+    )

@@ -1,0 +1,100 @@
+"""A firmware as people know it: where an address stands in it, by symbol, C line and text.
+
+What belongs here: an image with its names, and whether two images have the same layout. What does not: what it executes
+(`instructions.py`, `builds.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import seconds
+from miro_robot.image import Image
+from miro_robot.image.debug_info import DebugInfo, Sources
+from miro_robot.inspect.symbol_names import SymbolNames
+from miro_robot.mcs51.opcodes import LENGTH, disassemble
+
+
+class Place(msgspec.Struct, frozen=True):
+    """An instruction that was executed at `tick`. `line`: `failsafe.c:41`, "" where no debug file tells.
+
+    `symbol` with offset; `source`: what stands in that line, "" where the file is not there; `text` disassembled.
+    """
+
+    tick: int
+    pc: int
+    symbol: str
+    line: str
+    source: str
+    text: str
+
+    def __str__(self) -> str:
+        line = f", {self.line}" if self.line else ""
+        source = f" `{self.source}`" if self.source else ""
+        at = f"tick {self.tick} ({seconds(self.tick):.6f} s)"
+        return f"{at}: {self.pc:#06x} in {self.symbol}{line}{source}: {self.text}"
+
+    def as_json(self) -> dict[str, Any]:
+        fields = {name: getattr(self, name) or None for name in ("symbol", "line", "source")}
+        return {"tick": self.tick, "t_s": seconds(self.tick), "pc": self.pc, **fields, "text": self.text}
+
+
+NOWHERE = Path("no-such-folder") / "image.ihx"
+"""Of an image whose debug files are to be left alone."""
+
+
+class Program:
+    """One image with its debug files, as far as they are there. `folders`: where C files may be.
+
+    `problem`: why the debug files are not used, where they belong to another image.
+    """
+
+    def __init__(self, image: Image, folders: Sequence[Path] = ()) -> None:
+        self.problem: BadInput | None = None
+        self.sources = Sources([image.path.parent, *folders])
+        try:
+            self.debug = DebugInfo.of(image)
+        except BadInput as error:
+            self.problem = error
+            self.debug = DebugInfo()
+            image = msgspec.structs.replace(image, path=NOWHERE)
+        self.image = image
+        self.names = SymbolNames(image)
+
+    @property
+    def has_lines(self) -> bool:
+        return bool(self.debug.lines)
+
+    def place(self, pc: int, tick: int) -> Place:
+        line = self.debug.line_at(pc)
+        text = " ".join(disassemble(self.image.code, pc, self.names).split())
+        source = "" if line is None else self.sources.text(line)
+        return Place(tick, pc, self.names.place(pc), "" if line is None else str(line), source, text)
+
+
+def same_layout(one: Image, other: Image) -> bool:
+    """Whether all code, and what has a name, lies at the same addresses in both: then PC is compared with PC.
+
+    Where one of them has no symbols, the extent of the code decides.
+    """
+    if one.used != other.used:
+        return False
+    names, others = one.symbols.names, other.symbols.names
+    return not names or not others or names == others
+
+
+def changed_instructions(one: Image, other: Image) -> list[int]:
+    """Addresses at which an instruction may begin that differs between two images of the same layout."""
+    found = set()
+    for address, (here, there) in enumerate(zip(one.code, other.code, strict=False)):
+        if here != there:
+            for before in range(min(3, address + 1)):
+                first = address - before
+                if max(LENGTH[one.code[first]], LENGTH[other.code[first]]) > before:
+                    found.add(first)
+    return sorted(found)

@@ -1,0 +1,126 @@
+"""What happens in a run one after the other, with ticks: LM629 commands and characters on the air.
+
+What belongs here: making sequences of a recording's periods, and comparing two of them with a tolerance in time. What
+does not: values that every period has (`fields.py`), and which sequences are compared (`compare.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.stream_events import Deed, RadioState, Reset
+from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.lm629.commands import BY_OPCODE
+from miro_sim.periods import Period
+
+SAME_TICKS = CONTROL_PERIOD_TICKS // 2
+"""Two alike that are no farther apart are one that came at another time; others came once each."""
+
+
+class Happening(NamedTuple):
+    """Something with a tick; `text` says all of it but when."""
+
+    tick: int
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.text} at tick {self.tick}"
+
+
+Pair = tuple[Happening | None, Happening | None]
+
+
+def commands(periods: Sequence[Period], index: int, side: str, answers: bool) -> list[Happening]:
+    """Complete commands to one LM629 of the robot in place `index`; with `answers` also what it gave back.
+
+    What a chip answers, a position say, depends on when it was asked.
+    """
+    found = (command for period in periods for command in getattr(period.robots[index], side).commands)
+    return [Happening(tick, _command(opcode, data, answers)) for tick, opcode, data in found]
+
+
+def transmissions(periods: Sequence[Period], network: int, sent: bool) -> list[Happening]:
+    """What was said on a network's air: by its host as `sent`, or else by its robots as the PC heard them."""
+    return [Happening(one.tick, _text(one)) for one in _on_air(periods, network, sent)]
+
+
+def characters(periods: Sequence[Period], network: int) -> list[Happening]:
+    """The same of its robots, character by character: where they are parted by pauses is no matter."""
+    found = []
+    for one in _on_air(periods, network, False):
+        for value, stop_good, tick in one.symbols():
+            found.append(Happening(tick, f"{value:02x}{'' if stop_good else ' with a bad stop bit'}"))
+    return found
+
+
+def _command(opcode: int, data: str, answers: bool) -> str:
+    known = BY_OPCODE.get(opcode)
+    if known is None:
+        return f"{opcode:02X}h {data}".rstrip()
+    shown = "" if known.words_out and not answers else data
+    return f"{known.name} {opcode:02X}h {shown}".rstrip()
+
+
+def deeds(periods: Sequence[Period], network: int) -> list[Happening]:
+    """What was done to a network's robots and its radio."""
+    found = (deed for period in periods for deed in period.deeds if deed.network == network)
+    return [Happening(deed.tick, _deed(deed)) for deed in found]
+
+
+def _deed(deed: Deed) -> str:
+    if isinstance(deed, RadioState):
+        return f"radio {deed.state}"
+    what, level = ("reset", deed.level) if isinstance(deed, Reset) else ("power", deed.on)
+    return f"robot {deed.slot} {what} {level}"
+
+
+def _on_air(periods: Sequence[Period], network: int, sent: bool) -> Iterator[Transmission]:
+    for period in periods:
+        for one in period.wire:
+            if one.network == network and (one.direction == DOWN) == sent:
+                yield one
+
+
+def _text(one: Transmission) -> str:
+    bad = f", bad stop bits at {', '.join(map(str, one.bad_stop))}," if one.bad_stop else ""
+    return f"{one.data.hex(' ')}{bad}"
+
+
+def unlike(one: Sequence[Happening], other: Sequence[Happening], within_ticks: int) -> Iterator[Pair]:
+    """The pairs that differ, in the order of time; None stands where one side has nothing.
+
+    Two that say the same are alike if they are at most `within_ticks` apart. After a pair that is not alike the
+    comparison goes on behind it: what is missing on one side shifts nothing.
+    """
+    first = second = 0
+    while first < len(one) and second < len(other):
+        here, there = one[first], other[second]
+        apart = abs(here.tick - there.tick)
+        alike = here.text == there.text and apart <= SAME_TICKS
+        if alike and apart > within_ticks:  # unless the later one is the next on the earlier side
+            early = (one, first, there) if here.tick < there.tick else (other, second, here)
+            alike = not _follows(*early, within_ticks)
+        if alike or apart <= within_ticks:
+            if not alike or apart > within_ticks:
+                yield here, there
+            first, second = first + 1, second + 1
+        elif here.tick < there.tick:
+            yield here, None
+            first += 1
+        else:
+            yield None, there
+            second += 1
+    yield from ((here, None) for here in one[first:])
+    yield from ((None, there) for there in other[second:])
+
+
+def _follows(found: Sequence[Happening], index: int, wanted: Happening, within_ticks: int) -> bool:
+    """Whether one behind `index` says what `wanted` says, at its time."""
+    for place in range(index + 1, len(found)):
+        if found[place].tick > wanted.tick + within_ticks:
+            return False
+        if found[place].text == wanted.text and found[place].tick >= wanted.tick - within_ticks:
+            return True
+    return False

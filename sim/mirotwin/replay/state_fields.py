@@ -1,0 +1,109 @@
+"""Fields of two states that differ, by name: the path in the tables of state, and what it is called in the firmware.
+
+What belongs here: names and values as people read them. What does not: when states are compared (`lockstep.py`).
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from mirotwin.replay.variables import name_of_byte
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
+
+_RAM = ".cpu.iram"
+_STEP = re.compile(r"(\w+)(?:\[(\w+)\])?")
+_CHAIN = "chain"
+"""The digest before: it differs because something else did."""
+
+
+Value = int | float | str | None
+
+
+class FieldDifference(msgspec.Struct, frozen=True):
+    """A field of the state: `path` by the tables, `symbol` where the firmware has a name for it, and both values.
+
+    A value is a number, or the text of something longer; None: there is no such item.
+    """
+
+    path: str
+    symbol: str
+    one: Value
+    other: Value
+
+    def __str__(self) -> str:
+        name = f" ({self.symbol})" if self.symbol else ""
+        return f"{self.path}{name}: {_shown(self.one)}, {_shown(self.other)}"
+
+    def as_json(self) -> dict[str, Any]:
+        return {"path": self.path, "symbol": self.symbol or None, "values": [self.one, self.other]}
+
+
+def differing(one: World, other: World) -> Iterator[FieldDifference]:
+    """The fields that differ, item by item, of those that both worlds have and that enter a digest."""
+    first, second = one.state, other.state
+    values, others = first.decode(first.save()), second.decode(second.save())
+    for path, value in values.items():
+        if path == _CHAIN or path not in others or _is_apart(one, path):
+            continue
+        for item, here, there in item_differences(value, others[path]):
+            if path.endswith(_RAM):
+                index = int(item[1:-1])
+                yield FieldDifference(f"{path}[{index:02X}h]", name_of_byte(one.image, index), here, there)
+            else:
+                yield FieldDifference(path + item, "", here, there)
+
+
+def _is_apart(root: Any, path: str) -> bool:
+    """Whether a table names it, or a part that it belongs to, in `NOT_HASHED`: it enters no digest."""
+    part = root
+    for name, index in _STEP.findall(path):
+        if any(name in cls.__dict__.get("NOT_HASHED", ()) for cls in type(part).__mro__):
+            return True
+        part = getattr(part, name, None)  # None: a field of a compiled part, which has no parts
+        if index and part is not None:
+            part = part[int(index) if index.isdecimal() else index]
+    return False
+
+
+def item_differences(one: Any, other: Any, path: str = "") -> Iterator[tuple[str, Value, Value]]:
+    """(`[3]`, `.x_m`, .., or "" for what has no items; both values) of what differs."""
+    if _bits(one) == _bits(other):
+        return
+    items, others = _items(one), _items(other)
+    if not items or not others:
+        yield path, _plain(one), _plain(other)
+        return
+    for name in {**items, **others}:
+        yield from item_differences(items.get(name), others.get(name), path + name)
+
+
+def _items(value: Any) -> dict[str, Any]:
+    if isinstance(value, msgspec.Struct):
+        return {f".{name}": getattr(value, name) for name in value.__struct_fields__}
+    if isinstance(value, bytes | bytearray | list | tuple):
+        return {f"[{index}]": item for index, item in enumerate(value)}
+    return {}
+
+
+def _bits(value: Any) -> Any:
+    """Floats by their bits: -0.0 is not 0.0 in a digest."""
+    return struct.pack("<d", value) if isinstance(value, float) else value
+
+
+def _plain(value: Any) -> Value:
+    return value if value is None or isinstance(value, int | float | str) else repr(value)
+
+
+def _shown(value: Value) -> str:
+    if isinstance(value, bool) or value is None or isinstance(value, str):
+        return "nothing" if value is None else str(value)
+    if isinstance(value, float):
+        return f"{value!r} ({struct.pack('>d', value).hex()}h)"
+    return f"{value} ({value:X}h)" if value > 9 else str(value)

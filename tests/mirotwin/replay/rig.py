@@ -1,0 +1,102 @@
+"""For the tests of replay and diff: a short scenario, its script, and worlds in which something is planted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import msgspec
+from tests.mirotwin.checks.rig import own_image, planted, team
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.frames import encode
+from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.image import Image
+from miro_sim.periods import Period
+from miro_sim.scenario.file import parse
+from miro_sim.scenario.keys import Scenario
+from miro_sim.world.world import World
+
+TEXT = """
+name = "pair"
+duration_s = 0.4
+
+[[network]]
+radio = { bit_error_rate = 0.0 }
+
+[[network.robot]]
+slot = 1
+reference.kind = "line"
+"""
+STOP_AT = 0x045E
+"""The operand of `age == FAILSAFE_STOP_MS` in the robot's own image."""
+
+
+@cache
+def scenario() -> Scenario:
+    return parse(TEXT, "pair")
+
+
+def script(frames: int = 4) -> list[Transmission]:
+    """Frames that make the robot drive and answer, and then nothing: the failsafe comes 110 ms later."""
+    return [
+        Transmission((seq + 1) * CONTROL_PERIOD_TICKS, DOWN, encode(team(seq, 900, 700, ask=True), 3))
+        for seq in range(1, frames + 1)
+    ]
+
+
+def world(image: Image | None = None, seed: int = 3) -> World:
+    return World(scenario(), seed, image or own_image(), script=script())
+
+
+class Planted(World):
+    """A world that somebody changes from outside at a tick, however it gets there."""
+
+    def plant(self, tick: int, change: Callable[[World], object]) -> Planted:
+        self.planted_tick = tick
+        self.change = change
+        return self
+
+    def run_to(self, tick: int) -> None:
+        if self.tick < self.planted_tick <= tick:
+            super().run_to(self.planted_tick)
+            self.change(self)
+        super().run_to(tick)
+
+
+def planted_world(tick: int, change: Callable[[World], object]) -> Planted:
+    return Planted(scenario(), 3, own_image(), script=script()).plant(tick, change)
+
+
+def periods(of: World) -> list[Period]:
+    found = []
+    while not of.finished:
+        found.append(of.step())
+    return found
+
+
+def with_byte(image: Image, address: int, value: int) -> Image:
+    """The image with another byte of code, its symbols, and no debug files."""
+    code = bytearray(image.code)
+    code[address] = value
+    return msgspec.structs.replace(image, code=bytes(code), sha256="", path=Path("nowhere/patched.ihx"))
+
+
+BUILDS = {
+    "late": ("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)"),
+    "late and moved": (
+        "failsafe.c",
+        "age == FAILSAFE_STOP_MS)",
+        "age == FAILSAFE_STOP_MS + 15 + (ticks & 0))",
+    ),
+    "slower": (
+        *("telemetry.c", "        return;\n    begin();"),
+        '        return;\n    for (low = 200; low; --low) {\n        __asm__("nop");\n    }\n    begin();',
+    ),
+}
+
+
+def built(folder: Path, name: str) -> Image:
+    """The firmware with one of the changes above."""
+    return planted(folder, *BUILDS[name])

@@ -1,0 +1,173 @@
+"""Two firmwares in one run: the first instruction that both execute otherwise, or the variables that differ."""
+
+from pathlib import Path
+
+import msgspec
+import pytest
+from tests.mirotwin.checks.rig import SOURCE, needs_sdcc, own_image
+from tests.mirotwin.replay.rig import STOP_AT, built, periods, with_byte, world
+
+from miro_robot.image import Image, Symbols
+from mirotwin.replay.compare import Rule, differences
+from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
+from mirotwin.replay.program import Program, changed_instructions, same_layout
+from mirotwin.replay.sequences import characters
+from mirotwin.replay.variables import extents, name_of_byte
+
+END = 9_600_000
+
+
+def apart(other: Image, folder: Path | None = None, until_tick: int = END) -> FirmwareDifference:
+    programs = Program(own_image(), [SOURCE]), Program(other, [] if folder is None else [folder])
+    return first_instruction(world, *programs, until_tick)
+
+
+@pytest.fixture(scope="module")
+def images(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Image, Path]]:
+    found = {}
+    for name in ("late", "late and moved", "slower"):
+        folder = tmp_path_factory.mktemp("build")
+        found[name] = built(folder, name), folder / "firmware"
+    return found
+
+
+@needs_sdcc
+def test_a_constant_is_named_with_instruction_c_line_register_and_both_values(
+    images: dict[str, tuple[Image, Path]],
+) -> None:
+    image, folder = images["late"]
+    found = apart(image, folder)
+    assert found.changed is not None
+    one, other = found.changed.one, found.changed.other
+    assert (one.pc, one.symbol, one.tick) == (other.pc, other.symbol, other.tick)
+    assert one.symbol.startswith("_failsafe_tick+")
+    assert one.line.startswith("failsafe.c:")
+    assert (one.source, other.source) == (
+        "if (age == FAILSAFE_STOP_MS) {",
+        "if (age == FAILSAFE_STOP_MS + 15) {",
+    )
+    assert (one.text, other.text) == ("MOV A,#6Eh", "MOV A,#7Dh")
+    assert [(value.path, value.one, value.other) for value in found.changed.values] == [("ACC", 110, 125)]
+    assert found.notes == ()
+
+
+@needs_sdcc
+def test_the_effect_is_where_the_states_differ_for_good_and_go_different_ways(
+    images: dict[str, tuple[Image, Path]],
+) -> None:
+    image, folder = images["late"]
+    found = apart(image, folder).effect
+    assert found is not None
+    replayed = differences(periods(world()), periods(world(image)), Rule(kind="commands"))
+    assert replayed[0].recorded is not None
+    assert replayed[0].recorded.startswith("LTRJ 1Fh 0400 at tick ")  # the smooth stop
+    assert 0 < replayed[0].tick - found.one.tick < 24_000  # in the failsafe's own millisecond
+    assert found.parted is not None
+    assert found.parted.symbol.startswith("_failsafe_tick+")
+    assert found.parted.text.startswith("CJNE A,_age,")
+
+
+@needs_sdcc
+def test_a_build_of_another_layout_is_compared_by_variables_with_who_wrote_them(
+    images: dict[str, tuple[Image, Path]],
+) -> None:
+    image, folder = images["late and moved"]
+    assert not same_layout(own_image(), image)
+    first = differences(periods(world()), periods(world(image)), Rule(kind="commands"))[0]
+    found = apart(image, folder, first.tick + 24_000)
+    assert (found.changed, found.effect) == (None, None)
+    assert "lies at other addresses" in found.notes[0]
+    state = next(one for one in found.variables if one.name == "_state")
+    assert (state.one, state.other) == (2, 1)  # stopped, driving
+    writer, nobody = state.writers
+    assert nobody is None
+    assert writer is not None
+    assert writer.symbol.startswith("_motion_stop")
+    assert writer.source == "state = STATE_STOPPED;"
+    assert writer.line.startswith("motion.c:")
+    assert abs(state.tick - first.tick) < 24_000
+
+
+@needs_sdcc
+def test_builds_that_differ_in_speed_alone_send_the_same_commands(
+    images: dict[str, tuple[Image, Path]],
+) -> None:
+    image, _ = images["slower"]
+    assert not same_layout(own_image(), image)
+    recorded, replayed = periods(world()), periods(world(image))
+    heard, later = characters(recorded, 0), characters(replayed, 0)
+    assert [one.text for one in heard] == [one.text for one in later]
+    assert later[0].tick > heard[0].tick + 2496
+    assert "wire" in {one.channel for one in differences(recorded, replayed)}
+    assert differences(recorded, replayed, Rule(kind="commands")) == []
+    assert differences(recorded, replayed, Rule(kind="bytes")) == []
+    assert differences(recorded, replayed, Rule(kind="wheels")) == []
+    assert differences(recorded, replayed, Rule(kind="commands", within_ticks=100)) != []
+
+
+def test_without_a_compiler_a_patched_constant_is_found_too() -> None:
+    image = with_byte(own_image(), STOP_AT, 125)
+    found = apart(image)
+    assert found.changed is not None
+    assert (found.changed.one.pc, found.changed.other.text) == (STOP_AT - 1, "MOV A,#7Dh")
+    assert found.effect is not None
+    assert found.effect.network == 0
+    assert found.effect.slot == 1
+
+
+def test_data_that_no_instruction_lies_in_is_found_by_its_effect() -> None:
+    """A nibble of the CRC table in code memory: read by MOVC, executed by nobody."""
+    own = own_image()
+    table = own.symbols.names["_crc_nibble_low"].address
+    found = apart(with_byte(own, table + 5, own.code[table + 5] ^ 1))
+    assert found.changed is None
+    assert found.effect is not None
+    assert found.effect.one.text.startswith("MOVC A,@A+")
+    assert found.effect.one.text == found.effect.other.text
+    assert "no changed instruction is executed: what differs is data in code memory" in found.notes
+
+
+def test_what_is_never_executed_has_no_effect() -> None:
+    own = own_image()
+    found = apart(
+        with_byte(own, 0x0003, 0x22), until_tick=2_400_000
+    )  # the vector of an interrupt that is off
+    assert (found.changed, found.effect) == (None, None)
+    assert "no instruction has a lasting effect" in found.notes[0]
+
+
+def test_an_image_without_symbols_is_told_to_have_none() -> None:
+    own = own_image()
+    bare = msgspec.structs.replace(
+        with_byte(own, STOP_AT, 125), symbols=Symbols({}), path=Path("nowhere/bare.ihx"), used=((0, 10),)
+    )
+    found = apart(bare, until_tick=100_000)
+    assert "the images have no symbols of internal RAM in common" in found.notes[0]
+    assert any("no symbols of nowhere/bare.ihx" in note for note in found.notes)
+
+
+def test_the_places_of_a_changed_byte_are_the_instructions_that_may_hold_it() -> None:
+    own = own_image()
+    assert changed_instructions(own, own) == []
+    places = changed_instructions(own, with_byte(own, STOP_AT, 125))
+    assert STOP_AT - 1 in places
+    assert set(places) <= {STOP_AT - 2, STOP_AT - 1, STOP_AT}
+
+
+def test_bytes_of_internal_ram_have_names() -> None:
+    own = own_image()
+    assert name_of_byte(own, own.symbols.names["_age"].address) == "_age"
+    assert name_of_byte(own, own.symbols.names["_last_left"].address + 1) == "_last_left+1"
+    assert name_of_byte(own, 0x0B) == "R3 of bank 1"
+    assert name_of_byte(own, 0xFF) == "stack"
+    assert extents(own)["_last_left"] == (own.symbols.names["_last_left"].address, 2)
+    assert extents(own)["_state"][1] == 1
+    assert "__start__stack" not in extents(own)
+
+
+def test_where_the_last_variable_ends_is_not_guessed() -> None:
+    own = own_image()
+    names = {name: at for name, at in own.symbols.names.items() if name != "__start__stack"}
+    stackless = msgspec.structs.replace(own, symbols=Symbols(names), path=Path("nowhere/a.ihx"))
+    last = max((at.address, name) for name, at in names.items() if at.space == "iram")
+    assert extents(stackless)[last[1]] == (last[0], 1)

@@ -1,0 +1,251 @@
+"""What counts as a difference under each rule, on periods that are made by hand."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.mirotwin.synthetic import periods
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.stream_events import Power, RadioState, Reset
+from miro_protocol.transmission import Transmission
+from miro_sim.periods import Period
+from mirotwin.replay.compare import Difference, Rule, differences
+from mirotwin.replay.difference import first_per_channel
+from mirotwin.replay.sequences import SAME_TICKS, Happening, unlike
+
+RUN = list(periods(6, [(0, 0), (0, 2)]))
+MS = 24_000
+
+
+def with_commands(ticks: Sequence[int], data: str = "0400") -> list[Period]:
+    """The run with commands to the left LM629 of the first robot at these ticks and nothing else."""
+    changed = []
+    before = -1
+    for period in RUN:
+        mine = tuple((tick, 0x1F, data) for tick in ticks if before < tick <= period.tick)
+        before = period.tick
+        robots = tuple(
+            msgspec.structs.replace(
+                robot,
+                left=msgspec.structs.replace(robot.left, commands=mine if index == 0 else ()),
+                right=msgspec.structs.replace(robot.right, commands=()),
+            )
+            for index, robot in enumerate(period.robots)
+        )
+        changed.append(msgspec.structs.replace(period, robots=robots))
+    return changed
+
+
+def with_answers(*answers: Transmission) -> list[Period]:
+    return [
+        msgspec.structs.replace(
+            period, wire=tuple(one for one in answers if one.tick // CONTROL_PERIOD_TICKS == period.index)
+        )
+        for period in RUN
+    ]
+
+
+def with_position(offset: int, name: str = "real_position") -> list[Period]:
+    changed = []
+    for period in RUN:
+        robot = period.robots[1]
+        right = msgspec.structs.replace(robot.right, **{name: getattr(robot.right, name) + offset})
+        moved = msgspec.structs.replace(robot, right=right)
+        changed.append(msgspec.structs.replace(period, robots=(period.robots[0], moved)))
+    return changed
+
+
+@pytest.mark.parametrize("kind", ["bits", "bytes", "commands", "wheels"])
+def test_a_run_equals_itself_under_every_rule(kind: str) -> None:
+    assert differences(RUN, RUN, Rule(kind=kind, host=True, digests=True)) == []
+
+
+def test_commands_may_come_at_another_time_within_the_tolerance() -> None:
+    recorded, faster = with_commands([100_000, 900_000]), with_commands([97_504, 897_504])
+    assert len(differences(recorded, faster)) == 2
+    assert differences(recorded, faster, Rule(kind="commands")) == []
+    assert differences(recorded, faster, Rule(kind="commands", within_ticks=2496)) == []
+    (first, _) = differences(recorded, faster, Rule(kind="commands", within_ticks=2495))
+    assert (first.recorded, first.replayed) == (
+        "LTRJ 1Fh 0400 at tick 100000",
+        "LTRJ 1Fh 0400 at tick 97504",
+    )
+
+
+def test_another_value_at_the_same_time_is_a_difference_under_commands() -> None:
+    (found,) = differences(with_commands([100_000]), with_commands([100_000], "0401"), Rule(kind="commands"))
+    assert found.channel == "lm629 left command"
+    assert (found.network, found.slot, found.tick) == (0, 0, 100_000)
+
+
+def test_a_missing_command_shifts_none_behind_it() -> None:
+    every = list(range(100_000, 4_000_000, 100_000))
+    (found,) = differences(
+        with_commands(every),
+        with_commands([tick for tick in every if tick != 1_000_000]),
+        Rule(kind="commands"),
+    )
+    assert (found.tick, found.replayed) == (1_000_000, None)
+
+
+def test_wheels_and_pwm_are_no_matter_to_commands_nor_commands_to_wheels() -> None:
+    assert differences(RUN, with_position(1000), Rule(kind="commands")) == []
+    assert differences(with_commands([100_000]), with_commands([]), Rule(kind="wheels")) == []
+
+
+@pytest.mark.parametrize(("name", "within"), [("real_position", 20), ("desired_position", 20)])
+def test_positions_may_differ_by_the_tolerance_and_no_count_more(name: str, within: int) -> None:
+    for offset in (within, -within):
+        assert differences(RUN, with_position(offset, name), Rule(kind="wheels")) == []
+    found = differences(RUN, with_position(within + 1, name), Rule(kind="wheels"))
+    assert {(one.slot, one.channel) for one in found} == {(2, f"lm629 right {name}")}
+    assert len(found) == len(RUN)
+
+
+def test_desired_velocities_may_differ_by_the_tolerance() -> None:
+    for offset, count in ((16_384, 0), (16_385, len(RUN))):
+        assert len(differences(RUN, with_position(offset, "desired_velocity"), Rule(kind="wheels"))) == count
+    rule = Rule(kind="wheels", within_counts_per_sample=1.0)
+    assert differences(RUN, with_position(65_536, "desired_velocity"), rule) == []
+
+
+def test_bytes_are_compared_one_by_one_however_they_are_parted() -> None:
+    one = with_answers(Transmission(300_000, "<", b"\x55\x2d\xd4"))
+    parted = with_answers(
+        Transmission(300_100, "<", b"\x55"), Transmission(300_000 + 2 * 24_960, "<", b"\xd4")
+    )
+    (found,) = differences(one, parted, Rule(kind="bytes"))
+    assert found.recorded == "2d at tick 324960"
+    assert found.replayed is None
+    assert len(differences(one, parted)) == 3
+
+
+def test_a_bad_stop_bit_is_part_of_a_byte() -> None:
+    (found,) = differences(
+        with_answers(Transmission(300_000, "<", b"\x55\x2d")),
+        with_answers(Transmission(300_000, "<", b"\x55\x2d", 0, (1,))),
+        Rule(kind="bytes"),
+    )
+    assert found.replayed == "2d with a bad stop bit at tick 324960"
+
+
+def test_what_is_under_way_at_the_end_is_not_compared_with_a_tolerance() -> None:
+    end = len(RUN) * CONTROL_PERIOD_TICKS
+    late = with_answers(Transmission(end - 26_000, "<", b"\x55"))
+    assert differences(late, with_answers(), Rule(kind="bytes")) == []
+    assert len(differences(late, with_answers())) == 1
+    command = RUN[-1].tick - 10_000
+    assert differences(with_commands([command]), with_commands([]), Rule(kind="commands")) == []
+    assert len(differences(with_commands([command]), with_commands([]))) == 1
+
+
+def test_only_differences_in_the_window_are_told() -> None:
+    moved = with_position(1)
+    assert len(differences(RUN, moved)) == 6
+    window = Rule(from_tick=2 * CONTROL_PERIOD_TICKS, to_tick=4 * CONTROL_PERIOD_TICKS)
+    assert [one.period for one in differences(RUN, moved, window)] == [2, 3]
+
+
+def test_the_hosts_values_and_deeds_are_compared_on_request() -> None:
+    deeds = (Reset(5, 0, 2, 0), Power(6, 0, 2, 1), RadioState(7, 0, "noise"))
+    robots = (msgspec.structs.replace(RUN[2].robots[0], control=None), RUN[2].robots[1])
+    changed = [*RUN[:2], msgspec.structs.replace(RUN[2], robots=robots, deeds=deeds), *RUN[3:]]
+    assert differences(RUN, changed) == []
+    found = differences(RUN, changed, Rule(host=True))
+    named = {one.channel for one in found}
+    assert {"control v_m_s", "control inner.u1", "deeds"} <= named
+    assert [one.replayed for one in found if one.channel == "deeds"] == [
+        *("robot 2 reset 0 at tick 5", "robot 2 power 1 at tick 6", "radio noise at tick 7"),
+    ]
+    assert found[0].channel == "deeds"
+
+
+def test_a_digest_alone_is_a_difference_at_the_end_of_its_period() -> None:
+    changed = [*RUN[:3], msgspec.structs.replace(RUN[3], digest="00" * 32), *RUN[4:]]
+    assert differences(RUN, changed) == []
+    (found,) = differences(RUN, changed, Rule(digests=True))
+    assert (found.tick, found.period, found.channel) == (4 * CONTROL_PERIOD_TICKS, 3, "digest")
+    assert str(found).startswith("tick 3203200 (0.133467 s), /period digest: recorded ")
+    assert found.as_json()["replayed"] == "00" * 32
+
+
+def test_runs_are_compared_as_far_as_both_go() -> None:
+    assert differences(RUN, RUN[:2]) == differences(RUN[:1], RUN) == differences([], RUN) == []
+
+
+def test_the_first_of_each_channel_is_told_with_how_many_there_are() -> None:
+    found = differences(RUN, with_position(1))
+    ((first, count),) = first_per_channel(found)
+    assert (first, count) == (found[0], 6)
+
+
+happenings = st.lists(
+    st.tuples(st.integers(1, 400_000), st.sampled_from("ab")), max_size=8, unique_by=lambda one: one[0]
+).map(lambda found: [Happening(tick, text) for tick, text in sorted(found)])
+
+
+@given(happenings, happenings, st.integers(0, 30_000))
+def test_every_happening_is_alike_or_told_once_and_in_order(
+    one: list[Happening], other: list[Happening], within: int
+) -> None:
+    found = list(unlike(one, other, within))
+    for side, whole in ((0, one), (1, other)):
+        told = [pair[side] for pair in found if pair[side] is not None]
+        assert all(each in whole for each in told)
+        assert all(before.tick < after.tick for before, after in pairwise(told))
+    left = [each for each in one if each not in [pair[0] for pair in found]]
+    right = [each for each in other if each not in [pair[1] for pair in found]]
+    assert [each.text for each in left] == [each.text for each in right]
+    assert all(abs(a.tick - b.tick) <= within for a, b in zip(left, right, strict=True))
+
+
+@given(happenings, st.integers(-20_000, 20_000))
+def test_a_run_that_is_shifted_as_a_whole_is_alike_within_the_shift(one: list[Happening], shift: int) -> None:
+    apart = one[:1]
+    for each in one[1:]:  # so far from each other that none can be taken for its neighbour
+        if each.tick - apart[-1].tick > SAME_TICKS:
+            apart.append(each)
+    other = [Happening(each.tick + shift, each.text) for each in apart]
+    assert list(unlike(apart, other, abs(shift))) == []
+    if shift:
+        assert len(list(unlike(apart, other, abs(shift) - 1))) == len(apart)
+
+
+def test_a_difference_has_a_line_for_people_and_json_for_programs() -> None:
+    found = Difference(24_000, 0, 1, 2, "pwm left sign", 1, None)
+    assert str(found) == "tick 24000 (0.001000 s), /net1/robot2/pwm left sign: recorded 1, replayed nothing"
+    assert found.said(("A", "B")).endswith("A 1, B nothing")
+    assert found.as_json(("a", "b")) == {
+        "tick": 24_000,
+        "t_s": 0.001,
+        "period": 0,
+        "network": 1,
+        "slot": 2,
+        "channel": "pwm left sign",
+        "a": 1,
+        "b": None,
+    }
+
+
+def test_what_a_chip_answers_is_no_part_of_a_command() -> None:
+    def reading(data: str) -> list[Period]:
+        return [
+            msgspec.structs.replace(
+                period,
+                robots=tuple(
+                    msgspec.structs.replace(
+                        robot, left=msgspec.structs.replace(robot.left, commands=((period.tick, 0x0A, data),))
+                    )
+                    for robot in period.robots
+                ),
+            )
+            for period in RUN
+        ]
+
+    one, other = reading("00000a3d"), reading("00000a46")
+    assert differences(one, other, Rule(kind="commands")) == []
+    assert differences(one, other)[0].recorded == "RDRP 0Ah 00000a3d at tick 0"
