@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests import children
 from tests.mirotwin.checks.rig import MS, needs_sdcc, own_image, planted, silent_world, team
-from tests.mirotwin.checks.test_planted import ALL, MISTAKES
+from tests.mirotwin.checks.test_planted import ALL
 from tests.mirotwin.cli.conftest import Result, mirotwin
 
 from miro_protocol import stream
@@ -96,9 +96,9 @@ def test_a_case_that_has_no_occasion_any_more_does_not_count_as_cured(
 
 @needs_sdcc
 def test_a_case_of_planted_firmware_is_cured_by_the_shipped_one(
-    mirotwin: Callable[..., Result], tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+    mirotwin: Callable[..., Result], tmp_path: Path
 ) -> None:
-    image = planted(tmp_path_factory.mktemp("late"), *MISTAKES["stops 15 ms late"][:3])
+    image = planted("stops 15 ms late")
     world, checks = silent_world("failsafe_stop_ms = true", image)
     trace = Trace(world)
     world.run_to(60 * MS)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 
-import pytest
-from tests import children
+from tests.mutants.build import build
+from tests.mutants.draw import source_files
+from tests.mutants.planted import PLANTED
+from tests.mutants.sdcc import needs_sdcc as needs_sdcc
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.frames import Message, TeamFrame, encode
@@ -20,8 +20,6 @@ from mirotwin.checks.expect import expectations_of
 from mirotwin.checks.watching import Checks
 
 MS = 24_000
-SOURCE = Path(__file__).parents[3] / "robot_fw" / "firmware"
-VERSION = (SOURCE / "sdcc.version").read_text("utf-8").strip()
 SILENT = """
 name = "silent"
 duration_s = 1.0
@@ -75,22 +73,10 @@ def finish(world: World, checks: Checks) -> dict[str, str]:
     return {one.name: one.verdict for one in checks.verdicts()}
 
 
-def sdcc_version() -> str:
-    if shutil.which("sdcc") is None or shutil.which("make") is None:
-        return ""
-    return children.run(["sdcc", "--version"], capture_output=True, text=True, check=True).stdout
-
-
-needs_sdcc = pytest.mark.skipif(VERSION not in sdcc_version(), reason=f"needs make and SDCC {VERSION}")
-
-
-def planted(folder: Path, file: str, right: str, wrong: str) -> Image:
-    """The firmware with `right` in a source file, where it stands once, replaced by `wrong`."""
-    source = folder / "firmware"
-    shutil.copytree(SOURCE, source)
-    text = (source / file).read_text()
-    assert text.count(right) == 1
-    (source / file).write_text(text.replace(right, wrong))
-    make = ["make", "-s", "-C", source, f"OUT={folder / 'out'}", f"BUILD={folder / 'build'}"]
-    children.run(list(map(str, make)), check=True, capture_output=True)
-    return load_hex(folder / "out" / "miro.ihx")
+@cache
+def planted(mistake: str) -> Image:
+    """The firmware with a mistake of the table `tests.mutants.planted`."""
+    one = PLANTED[mistake]
+    built = build({one.file: one.applied(source_files()[one.file])})
+    assert not built.error, built.error
+    return load_hex(built.image)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from tests.mirotwin.checks.rig import needs_sdcc, planted
-from tests.mirotwin.checks.test_planted import ALWAYS, MISTAKES
+from tests.mirotwin.checks.test_planted import ALWAYS
 
 MET = ("--expect", "frames_accepted_min=3", "--expect", "inside_pitch=true")
 MISSED = ("--expect", "tracks_within_cm={limit_cm=1.9, from_s=0.0}")
@@ -132,8 +132,7 @@ def test_an_unknown_check_is_refused_before_anything_runs(
 
 @needs_sdcc
 def test_a_stream_tells_a_late_failsafe_from_the_right_one(mirotwin, finished: Path, tmp_path: Path) -> None:
-    file, right, wrong, _ = MISTAKES["stops 15 ms late"]
-    late = planted(tmp_path, file, right, wrong).path
+    late = planted("stops 15 ms late").path
     mirotwin("export", finished / "run.mcap", "--out", tmp_path / "sent.stream")
     stream = ("replay", "-q", tmp_path / "sent.stream", "--expect", "failsafe_stop_ms=110")
     code, _, err = mirotwin(*stream, "--firmware", late)
@@ -146,8 +145,8 @@ def test_a_stream_tells_a_late_failsafe_from_the_right_one(mirotwin, finished: P
 
 @needs_sdcc
 def test_a_firmware_fault_goes_before_what_else_failed(mirotwin, short: Path, tmp_path: Path) -> None:
-    file, right, wrong, concerned = ALWAYS["stays in an interrupt"]
-    image = planted(tmp_path, file, right, wrong).path
+    concerned = ALWAYS["stays in an interrupt"]
+    image = planted("stays in an interrupt").path
     out = ("--no-figure", "--out", tmp_path / "run", "--firmware", image)
     code, _, err = mirotwin("run", short, "-q", *out, *MISSED)
     assert code == 3

@@ -70,6 +70,8 @@ def test_what_is_announced_at_the_begin_of_a_period_is_not_in_the_digest_of_the_
     late.run_to(3 * PERIOD)
     early.run_to(3 * PERIOD)
     assert late.digest == early.digest
+
+
 @pytest.mark.parametrize("latency_s", [0.0, 0.005])
 def test_what_is_injected_at_the_last_moment_of_a_period_gives_the_digest_of_a_script(latency_s):
     scenario = load(

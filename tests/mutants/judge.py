@@ -1,0 +1,36 @@
+"""Which rules of `mirotwin conform` an image breaks.
+
+What belongs here: the one place where the score meets conformance. What does not: rules, and what a score is made of.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import msgspec
+
+from miro_robot.image import load_hex
+from mirotwin.conform.run import try_all, with_faults
+from mirotwin.conform.table import RULES
+
+
+class Judged(msgspec.Struct, frozen=True):
+    """Ids of the broken rules, in their order, and what judging took (processor time)."""
+
+    rules: tuple[str, ...]
+    seconds: float
+
+
+def judged(image: Path, tried: tuple[str, ...] = ()) -> Judged:
+    """Tries these rules on an image; () is all of them."""
+    rules = [rule for rule in RULES if not tried or rule.id in tried]
+    begun = time.process_time()
+    outcomes = with_faults(list(try_all(rules, load_hex(image))), rules)
+    broken = tuple(outcome.rule for outcome in outcomes if not outcome.passed)
+    return Judged(broken, time.process_time() - begun)
+
+
+def all_rules() -> tuple[str, ...]:
+    """Ids of the rules there are."""
+    return tuple(rule.id for rule in RULES)
