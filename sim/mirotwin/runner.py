@@ -18,11 +18,14 @@ from mirotwin.recording.recorder import Recorder
 class Simulation(Protocol):
     """What is used of `world.World`."""
 
-    tick: int
-    index: int
-    periods: int
-    observers: list[Callable[[Period], object]]
-
+    @property
+    def tick(self) -> int: ...
+    @property
+    def index(self) -> int: ...
+    @property
+    def periods(self) -> int: ...
+    @property
+    def observers(self) -> list[Callable[[Period], object]]: ...
     @property
     def networks(self) -> Sequence[Any]: ...
     @property

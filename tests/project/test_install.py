@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import sys
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -118,3 +119,15 @@ def test_each_instruction_of_the_compiled_cpu_jumps_to_the_next_by_itself(tree):
     (loop,) = tree.rglob("*.threaded.c")
     assert loop.name == "execute.threaded.c"
     assert loop.read_text().count("goto *arm_of[") == len(opcodes.TABLE)
+
+
+def test_an_installation_puts_one_file_beside_pyserials_handlers_and_replaces_none(tree):
+    built = python(tree, "setup.py", "-q", "build_py", "--build-lib", "built")
+    assert built.returncode == 0, built.stderr
+    put = [
+        str(path.relative_to(tree / "built")) for path in (tree / "built/serial").rglob("*") if path.is_file()
+    ]
+    assert put == ["serial/urlhandler/protocol_miro.py"]
+    own = resources.files("serial") / "urlhandler"
+    assert {entry.name for entry in own.iterdir()} >= {"__init__.py", "protocol_loop.py"}
+    assert (tree / "built/mirotwin/bridges/serial_port.py").exists()

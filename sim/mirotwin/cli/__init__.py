@@ -11,6 +11,7 @@ from mirotwin.cli.program import Program, print_version
 
 COMMANDS = {
     "run": "Runs a scenario and writes its files.",
+    "serve": "Offers the robot's radio as PTY, TCP and RFC 2217 ports.",
     "reproduce": "Runs the paper's figures again and writes one page about them.",
     "look": "Draws what the camera sees and what the tracker makes of it.",
     "calibrate": "Finds a camera's parameters from control points.",

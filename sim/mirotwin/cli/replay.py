@@ -139,7 +139,8 @@ def _check_case(file: str, asked: Asked) -> None:
 def _periods(file: str, job: Job, asked: Asked) -> int | None:
     """How many control periods are replayed; None: to the end of the scenario."""
     if not job.recorded:
-        return None if asked.rule.to_tick is None else -(-asked.rule.to_tick // CONTROL_PERIOD_TICKS)
+        ends = [tick for tick in (asked.rule.to_tick, job.case.end_tick) if tick]
+        return -(-min(ends) // CONTROL_PERIOD_TICKS) if ends else None
     there = len(job.recorded)
     if asked.rule.from_tick >= there * CONTROL_PERIOD_TICKS:
         what = f"the recording ends at tick {there * CONTROL_PERIOD_TICKS}"

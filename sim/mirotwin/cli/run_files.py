@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from msgspec.structs import replace
+
 from miro_exact.bad_input import BadInput
 from miro_sim.periods import Period
 from miro_sim.world.world import World
@@ -31,6 +33,7 @@ from mirotwin.report.theory import gains_of
 from mirotwin.report.track import Tracks
 
 if TYPE_CHECKING:
+    from mirotwin.bridges.session import Session
     from mirotwin.looking.view import View
     from mirotwin.steps.player import Player
 
@@ -43,7 +46,8 @@ FLUSH_S = 0.2
 class RunFiles:
     """Runs `world` and fills `folder`, which is open and in which `hold` holds signals.
 
-    The recording gets each frame of `views`. `player` runs a world with steps.
+    The recording gets each frame of `views`. `player` runs a world with steps. A live `session` drives the world, else
+    it runs as fast as it can.
     """
 
     def __init__(
@@ -57,6 +61,7 @@ class RunFiles:
         settings: tuple[str, ...] = (),
         views: Sequence[View] = (),
         player: Player | None = None,
+        session: Session | None = None,
     ) -> None:
         self.folder = folder
         self.source = source
@@ -67,6 +72,7 @@ class RunFiles:
         self.settings = settings
         self.views = views
         self.player = player
+        self.session = session
         self.tracks = Tracks()
         self._wall_s = 0.0
         self._flushed_s = -FLUSH_S
@@ -120,7 +126,7 @@ class RunFiles:
             view.shows.append(keep_frame)
         with bar, self.hold.released():
             runner.run(
-                self.world,
+                self.session or self.world,
                 recorder,
                 self.source.record == "full",
                 keep,
@@ -133,7 +139,7 @@ class RunFiles:
         self.player.finish()
 
     def _summary(self, complete: bool, reason: str = "") -> Summary:
-        return summarise(
+        summary = summarise(
             scenario=self.source.scenario_name,
             seed=self.source.seed,
             engine=self.engine,
@@ -151,6 +157,7 @@ class RunFiles:
             expectations=self.checks.verdicts(),
             steps=None if self.player is None else self._steps(self.player),
         )
+        return summary if self.session is None else replace(summary, live=self.session.live())
 
     def _steps(self, player: Player) -> Steps:
         verdicts = [verdict for checks in player.checks for verdict in checks.verdicts()]

@@ -13,6 +13,7 @@ import msgspec
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.report.learnt_calibration import LearntCalibration
 from mirotwin.report.learnt_wheels import LearntWheels
+from mirotwin.report.live import Live
 from mirotwin.report.theory import Gains, Theory, theory_of
 from mirotwin.report.track import ErrorSample, Place, Tracks
 
@@ -127,7 +128,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     if a part of the scenario failed (which one, of which robot, when). `set`: the keys of the scenario that were set on
     the command line (`KEY=VALUE`), only where there were some. `calibrations`: of hosts that learn how their cameras
     hang, `wheels`: of robots whose estimator learns their wheels. `expectations`: the checks of the run, also those
-    that are always on.
+    that are always on. `live`: how a live session was paced, and what passed through its ports.
     """
 
     scenario: str
@@ -149,6 +150,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     reason: str = ""
     set: tuple[str, ...] = ()
     expectations: tuple[Expectation, ...] = ()
+    live: Live | None = None
     steps: Steps | None = None
 
 

@@ -61,13 +61,17 @@ def run_publishing(times: Times, scenario: Path, out: Path) -> None:
     run = runner.run
 
     def published(
-        world: runner.Simulation, recorder: Recorder | None, full: bool, keep: Callable[[Period], bool | None]
+        world: runner.Simulation,
+        recorder: Recorder | None,
+        full: bool,
+        keep: Callable[[Period], bool | None],
+        move: Callable[[], object] | None = None,
     ) -> None:
         def note(period: Period) -> bool | None:
             times.put(period.index)
             return keep(period)
 
-        run(world, recorder, full, note)
+        run(world, recorder, full, note, move)
 
     runner.run = published  # type: ignore[assignment]
     main(["run", str(scenario), "--out", str(out), "--quiet"])

@@ -1,0 +1,73 @@
+"""The wall clock beside virtual time, and threads that take turns at one world.
+
+What belongs here: all that bridges know of real time. What does not: the world. A world that is paced is moved on to
+`Pace.tick()` and never beyond; it may be behind, which is counted.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from miro_exact.clock import TICKS_PER_SECOND, seconds, ticks
+
+LATE_TICKS = ticks(0.020)
+"""What counts as late: a little more than the 16 ms for which an adapter of USB may keep a character."""
+
+Turns = threading.RLock
+"""A lock for one world: a terminal reads in one thread and writes in another."""
+
+
+class Pace:
+    """Wall time as ticks from when it was made (or `start`ed): `factor` virtual seconds in one.
+
+    `late_ticks`: the most that a world was behind; `late_s`: virtual time in which it was behind by 20 ms or more.
+    """
+
+    def __init__(self, factor: float = 1.0) -> None:
+        self.factor = factor
+        self.late_ticks = 0
+        self.late_s = 0.0
+        self.start(0)
+
+    def start(self, tick: int) -> None:
+        """Now is `tick`."""
+        self._began_tick = tick
+        self._began_s = time.monotonic()
+
+    def tick(self) -> int:
+        """Where virtual time should be now."""
+        since_s = time.monotonic() - self._began_s
+        return self._began_tick + int(since_s * self.factor * TICKS_PER_SECOND)
+
+    def note(self, from_tick: int, to_tick: int, due_tick: int) -> bool:
+        """Counts that a world went on from one tick to the other when it should have been at `due_tick`; is it late?"""
+        behind = due_tick - to_tick
+        self.late_ticks = max(self.late_ticks, behind)
+        if behind < LATE_TICKS:
+            return False
+        self.late_s += seconds(to_tick - from_tick)
+        return True
+
+    def wait_s(self, tick: int) -> float:
+        """Wall time until virtual time should be at `tick`; 0 where it should be there already."""
+        return max(0, tick - self.tick()) / (self.factor * TICKS_PER_SECOND)
+
+    def sleep_until(self, tick: int) -> None:
+        """Sleeps until virtual time should be at `tick`."""
+        time.sleep(self.wait_s(tick))
+
+
+class Every:
+    """`due()` is true once each `wall_s` of wall time, and at the first call."""
+
+    def __init__(self, wall_s: float) -> None:
+        self.wall_s = wall_s
+        self._last_s = -wall_s
+
+    def due(self) -> bool:
+        now_s = time.monotonic()
+        if now_s - self._last_s < self.wall_s:
+            return False
+        self._last_s = now_s
+        return True

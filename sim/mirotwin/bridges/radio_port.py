@@ -1,0 +1,70 @@
+"""The serial port of the PC's radio on one network of a world, in virtual time.
+
+    bytes to send ──► transmit buffer, 4096 characters ──► air ──► robots
+    bytes heard   ◄──────────── the PC's receiver ◄─────── air ◄── robots
+
+What belongs here: when bytes go on the air, how many wait, and what came back since last asked. What does not: passing
+time (who has a world does that), buffers of received bytes, clients.
+
+A character with a bad stop bit is delivered like any other, as serial ports do unless they are told to check; the
+recording knows which had one. Slicer noise is heard by robots only: the PC's receiver has a squelch.
+"""
+
+from __future__ import annotations
+
+from miro_exact.clock import HOST_CHARACTER_TICKS
+from miro_sim.world.deeds import SETTLE_TICKS
+from miro_sim.world.outbox import INJECTED
+from miro_sim.world.world import World
+
+TRANSMIT_CHARACTERS = 4096
+"""What may wait to be sent: the transmit buffer of a serial port under Linux."""
+
+
+class RadioPort:
+    """The port of `network`. Raises ValueError for a network that is not there."""
+
+    def __init__(self, world: World, network: int = 0) -> None:
+        world.earliest_tick(network)  # refuses a network that is not there
+        self.world = world
+        self.network = network
+        self._parts = world.networks[network]
+        self._read = self._parts.log.end
+
+    @property
+    def free_tick(self) -> int:
+        """When everything that was given to the port has been sent; the past, if it has."""
+        return self._parts.outbox.end_tick(self._parts.downlink.free_tick)
+
+    @property
+    def waiting(self) -> int:
+        """Characters that are not sent yet; the one under way counts."""
+        return max(0, -(-(self.free_tick - self.world.tick) // HOST_CHARACTER_TICKS))
+
+    @property
+    def room(self) -> int:
+        """Characters that the transmit buffer takes now."""
+        return max(0, TRANSMIT_CHARACTERS - self.waiting)
+
+    def send(self, data: bytes) -> int:
+        """Puts at least one character into the transmit buffer; returns the tick of the first start bit.
+
+        The carrier comes up at the next tick that is settled on no wire: 120 ticks from now. `World.inject` would take
+        the radio's latency off, which is before now for the PC; what it puts on the air before the begin of the control
+        period would, replayed, belong to the period before, and the digests would differ.
+        """
+        outbox = self._parts.outbox
+        earliest = self.world.tick + SETTLE_TICKS + outbox.lead_ticks
+        return self.world.inject(data, self.network, max(earliest, self.free_tick))
+
+    def purge(self) -> None:
+        """Takes back what has not begun to be sent."""
+        outbox = self._parts.outbox
+        outbox.waiting = [one for one in outbox.waiting if one.origin != INJECTED]
+
+    def heard(self) -> bytes:
+        """What the PC has heard since the last call; to be called before 4096 events at the PC have passed."""
+        log = self._parts.log
+        found = bytes(event.value for _, event in log.since(self._read) if event.what == "heard")
+        self._read = log.end
+        return found
