@@ -1,4 +1,7 @@
-"""`mirotwin replay --compare`: how strictly a replay is compared, what is told of it, and the first instruction."""
+"""`mirotwin replay --compare`: how strictly a replay is compared, what is told of it, and the first instruction.
+
+Long because every option has its odd inputs, and all share two recordings.
+"""
 
 import json
 from collections.abc import Callable
