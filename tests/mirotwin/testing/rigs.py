@@ -1,0 +1,15 @@
+"""A rig as the fixtures make it, for tests in this process."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from mirotwin.testing.rig import Rig
+from mirotwin.testing.wanted import marked, wanted
+
+HERE = Path(__file__).parent
+
+
+def rig(seed: int = 0, **keys: Any) -> Rig:
+    return Rig(wanted(marked([((), keys)]), HERE, None, seed))
