@@ -44,12 +44,13 @@ def run(
     """Steps the world until it is finished, or until `on_period` returns True.
 
     Every period goes to `recorder`, with `full` each LM629 sample as well, and the firmware faults at the
-    end, also when something raises: a recording up to then is worth having. `move`: runs the world to its end in its
-    own way, which goes together with neither `full` nor an early end.
+    end, also when something raises: a recording up to then is worth having. `move`: runs the world in its own way,
+    which goes together with neither `full` nor an early end by `on_period`.
     """
     try:
         if move is not None:
             _moved(world, recorder, on_period, move)
+            return
         while not world.finished:
             if full and recorder is not None:
                 _run_samples(world, recorder)

@@ -43,7 +43,7 @@ class Opened:
             self._record(text, seed, folder)
 
     def _record(self, text: ScenarioText, seed: int, folder: OutputFolder) -> None:
-        source = source_of(text, seed, self.world.image)
+        source = source_of(text, self.world)
         with ExitStack() as files:
             files.enter_context(folder)
             folder.keep = KEPT

@@ -104,7 +104,7 @@ def _run(job: Job) -> Row:
             recorder.write_theories(tracks.theories())
 
     if job.recording:
-        source = source_of(text, job.seed, image)
+        source = source_of(text, world)
         with Path(job.recording).open("wb") as stream, Recorder(stream, source) as recorder:
             runner.run(world, recorder, on_period=lambda period: keep(period, recorder))
     else:

@@ -88,7 +88,7 @@ def replay(
         return replay_case(job, image, file, quiet)
     judged = says_anything(job.scenario)
     with plain_parameters(file, "replayed"):
-        world = World(job.scenario, job.seed, image, script=job.script)
+        world = job.world(image)
     checks = Checks(world, expectations_of(job.scenario, file))
     periods = _periods(file, job, asked)
     replayed = _run(file, world, periods, quiet or asked.as_json)
@@ -141,13 +141,14 @@ def _periods(file: str, job: Job, asked: Asked) -> int | None:
     if not job.recorded:
         ends = [tick for tick in (asked.rule.to_tick, job.case.end_tick) if tick]
         return -(-min(ends) // CONTROL_PERIOD_TICKS) if ends else None
-    there = len(job.recorded)
+    first = job.recorded[0].index
+    there = first + len(job.recorded)
     if asked.rule.from_tick >= there * CONTROL_PERIOD_TICKS:
         what = f"the recording ends at tick {there * CONTROL_PERIOD_TICKS}"
         raise BadInput(file, f"--from {asked.rule.from_tick}", what, "look earlier")
     if asked.rule.to_tick is None:
-        return there
-    return min(there, -(-asked.rule.to_tick // CONTROL_PERIOD_TICKS))
+        return there - first
+    return min(there, -(-asked.rule.to_tick // CONTROL_PERIOD_TICKS)) - first
 
 
 def _run(file: str, world: World, periods: int | None, quiet: bool) -> list[Period]:

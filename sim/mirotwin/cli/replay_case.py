@@ -10,7 +10,6 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import Image
 from miro_sim.radio.downlink import TransmissionError
-from miro_sim.world.world import World
 from mirotwin.checks.expect import expectations_of
 from mirotwin.checks.interface import Failure
 from mirotwin.checks.watching import Checks
@@ -24,7 +23,7 @@ from mirotwin.cli.replay_job import Job
 def replay_case(job: Job, image: Image, file: str, quiet: bool) -> int:
     """Runs it; the exit code is that of its check: 1, or 3 for a firmware fault; 0 if other firmware cures it."""
     with plain_parameters(file, "replayed"):
-        world = World(job.scenario, job.seed, image, script=job.script)
+        world = job.world(image)
     checks = Checks(world, expectations_of(job.scenario, file))
     end_tick = job.case.end_tick or world.periods * CONTROL_PERIOD_TICKS
     with ProgressBar("replaying", -(-end_tick // CONTROL_PERIOD_TICKS), quiet) as bar:

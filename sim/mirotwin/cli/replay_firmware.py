@@ -62,7 +62,7 @@ def firmwares_apart(
     """Where the recorded image and the one that ran go apart, up to the first difference."""
 
     def make(which: Image) -> World:
-        return World(job.scenario, job.seed, which, script=job.script)
+        return job.world(which)
 
     with plain_parameters(file, "replayed"):
         return first_instruction(make, *programs, found[0].tick + LOOK_TICKS)

@@ -7,11 +7,13 @@ What belongs here: from a file's content to scenario, seed, bytes to send, and i
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_protocol import stream
+from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
 from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period
@@ -36,6 +38,9 @@ from mirotwin.replay.script import (
     script_of,
     script_of_stream,
 )
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
 
 
 class Case(msgspec.Struct, frozen=True):
@@ -62,6 +67,28 @@ class Job(msgspec.Struct, frozen=True):
     image: Image | None = None
     state: str = ""
     case: Case = Case()
+    resumed: bytes = b""
+
+    def world(self, image: Image | None = None) -> World:
+        """A world that is to do it again, with `image`; a run that was resumed begins where that one did."""
+        from miro_sim.world.world import World  # a hot module: not before the engine was chosen
+
+        run = image or self.image
+        assert run is not None
+        if not self.resumed:
+            return World(self.scenario, self.seed, run, script=self.script)
+        world = World(self.scenario, self.seed, run, script=())
+        try:
+            world.load(self.resumed)
+        except ValueError as error:
+            what = f"the recorded run was resumed, and what it went on from fits nothing else: {error}"
+            raise BadInput("", "replay", what, "replay it without --firmware, --set and --seed") from None
+        for one in self.script:
+            if isinstance(one, Transmission):
+                world.inject(one.data, one.network, one.tick, one.bad_stop)
+            else:
+                world.do(one)
+        return world
 
 
 def load_job(
@@ -115,7 +142,8 @@ def _job_of_recording(
     as_it_was = image is not None and not settings and seed in (None, source.seed)
     silent = all(network.host == "silent" for network in scenario.networks)
     state = source.state if as_it_was and silent else ""
-    return Job(scenario, source.seed if seed is None else seed, script, recording.periods, image, state)
+    own = source.seed if seed is None else seed
+    return Job(scenario, own, script, recording.periods, image, state, resumed=source.resumed)
 
 
 def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str], seed: int | None) -> Job:

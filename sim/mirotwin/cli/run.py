@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-import msgspec
 
 from miro_exact.seed import MAX_SEED
 from miro_sim.scenario.file import load
@@ -15,6 +14,7 @@ from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.checks.expect import expectations_of
 from mirotwin.checks.watching import Checks
+from mirotwin.cli.bare_options import Moment, Time
 from mirotwin.cli.expectations import expect_option, report_failures, report_steps
 from mirotwin.cli.held_signals import held_signals
 from mirotwin.cli.options import (
@@ -30,7 +30,8 @@ from mirotwin.cli.options import (
 from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.run_files import RunFiles
-from mirotwin.files.outputs import OutputFolder
+from mirotwin.cli.run_stops import Stops
+from mirotwin.files.outputs import FILES, OutputFolder
 from mirotwin.recording.source import source_of
 from mirotwin.steps.plan import check_symbols
 from mirotwin.steps.player import Player
@@ -74,6 +75,19 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Put every frame into the recording, as --plain-frames saves it; `track` and Foxglove read them.",
 )
+@click.option(
+    "--save-at",
+    type=Moment(),
+    multiple=True,
+    help="Save the world there as at-TICK.world: ticks, or 1.5s, 20ms; may be repeated.",
+)
+@click.option("--to-tick", type=Moment(), help="End the run there.")
+@click.option(
+    "--resume",
+    type=Place(),
+    metavar="FILE.world",
+    help="Go on from a saved world of the same scenario, settings, seed and firmware.",
+)
 @click.option("--force", is_flag=True, help="Replace the files of an earlier run in the folders.")
 @click.option(
     "--no-figure", is_flag=True, help="Do not draw figure.png, which takes most of the time of a short run."
@@ -91,6 +105,9 @@ def run(
     frames: Path | None,
     plain_frames: bool,
     record_frames: bool,
+    save_at: tuple[Time, ...],
+    to_tick: Time | None,
+    resume: str | None,
     force: bool,
     no_figure: bool,
     quiet: bool,
@@ -103,6 +120,9 @@ def run(
 
     The steps of a scenario (`[[step]]`) are done, as by `mirotwin test`.
 
+    A run that is resumed has the bits of one that never stopped. Its recording begins with the first whole control
+    period, and holds the saved world.
+
     Exit code 1: a step, or a check of --expect or of the scenario's [expect] failed; 3: the firmware did what it must
     not.
     """
@@ -111,16 +131,20 @@ def run(
     steps = steps_of(text.scenario, text.origin)
     if steps and record == "full":
         raise click.UsageError(f"--record full does not go with the steps of {scenario}.")
-    folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force)
+    stops = Stops(save_at, to_tick, resume)
+    if stops and (steps or record == "full"):
+        other = f"the steps of {scenario}" if steps else "--record full"
+        raise click.UsageError(f"--save-at, --resume and --to-tick do not go with {other}.")
+    folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force, (*FILES, *stops.names))
     if plain_frames and frames is None:
         raise click.UsageError("--plain-frames needs --frames.")
     image = load_image(firmware)
     check_symbols(steps, image, text.origin)
 
-    source = source_of(text, seed, image, record)
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
-    source = msgspec.structs.replace(source, state=world.state.tables())
+        stops.begin(world)
+    source = source_of(text, world, record, stops.resumed)
     checks = Checks(world, expectations_of(text.scenario, text.origin))
     player = Player(world, steps, text.origin) if steps else None
     views: list[View] = []
@@ -133,7 +157,9 @@ def run(
         if saved is not None:
             saved.begin(hold)
         recorded = views if record_frames else []
-        run_files = RunFiles(folder, source, world, active, hold, checks, text.settings, recorded, player)
+        run_files = RunFiles(
+            folder, source, world, active, hold, checks, text.settings, recorded, player, stops=stops
+        )
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
     if not quiet:

@@ -10,8 +10,9 @@ several times a second; a process that is killed loses no more.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
@@ -34,6 +35,7 @@ from mirotwin.report.track import Tracks
 
 if TYPE_CHECKING:
     from mirotwin.bridges.session import Session
+    from mirotwin.cli.run_stops import Stops
     from mirotwin.looking.view import View
     from mirotwin.steps.player import Player
 
@@ -47,7 +49,7 @@ class RunFiles:
     """Runs `world` and fills `folder`, which is open and in which `hold` holds signals.
 
     The recording gets each frame of `views`. `player` runs a world with steps. A live `session` drives the world, else
-    it runs as fast as it can.
+    it runs as fast as it can. `stops`: where it saves the world, and ends.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class RunFiles:
         views: Sequence[View] = (),
         player: Player | None = None,
         session: Session | None = None,
+        stops: Stops | None = None,
     ) -> None:
         self.folder = folder
         self.source = source
@@ -73,6 +76,7 @@ class RunFiles:
         self.views = views
         self.player = player
         self.session = session
+        self.stops = stops
         self.tracks = Tracks()
         self._wall_s = 0.0
         self._flushed_s = -FLUSH_S
@@ -130,8 +134,15 @@ class RunFiles:
                 recorder,
                 self.source.record == "full",
                 keep,
-                None if self.player is None else self._play,
+                self._own_way(),
             )
+
+    def _own_way(self) -> Callable[[], None] | None:
+        """How the world moves where it is not just stepped."""
+        if self.player is not None:
+            return self._play
+        stops = self.stops
+        return partial(stops.move, self.world, self.folder) if stops else None
 
     def _play(self) -> None:
         assert self.player is not None

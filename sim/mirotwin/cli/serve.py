@@ -109,9 +109,9 @@ def serve(
     text = live_scenario(scenario, (*settings, *expected), expectations_of)
     folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}-live", force, (*FILES, CASE))
     image = load_image(firmware)
-    source = source_of(text, seed, image)
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
+    source = source_of(text, world)
     trace, checks = Trace(world), Checks(world, expectations_of(text.scenario, text.origin))
     wanted = Wanted(pty, tcp, rfc2217, host, force)
 

@@ -185,15 +185,14 @@ def _robot_run(request: Request) -> RobotRun:
         text = load(subject, request.settings)
         refuse_steps(text.scenario, subject)
         image = load_image(request.firmware)
-        scenario, seed, script = text.scenario, request.seed or 0, None
+        with plain_parameters(subject):
+            world = World(text.scenario, request.seed or 0, image)
     else:
         _refuse(request, "a recording or stream, which has its seed", "seed")
         job, image = load_job(subject, request.firmware, request.engine, request.settings)
-        scenario, seed, script = job.scenario, job.seed, job.script
-        periods = len(job.recorded) or None
-
-    with plain_parameters(subject):
-        world = World(scenario, seed, image, script=script)
+        periods = job.recorded[-1].index + 1 if job.recorded else None
+        with plain_parameters(subject):
+            world = job.world(image)
     network, index = _which_robot(world, request)
     return RobotRun(world, network, index, periods)
 

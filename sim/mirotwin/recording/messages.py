@@ -18,6 +18,7 @@ from mirotwin.recording.recorder import (
     FIRMWARE_ATTACHMENT,
     FORMAT,
     METADATA,
+    RESUMED_ATTACHMENT,
     SCENARIO_ATTACHMENT,
     SYMBOLS_ATTACHMENT,
 )
@@ -61,7 +62,7 @@ class Messages:
                     yield place, message
             elif isinstance(record, Channel):
                 self._open(record)
-            elif isinstance(record, Attachment) and record.name in ATTACHMENTS:
+            elif isinstance(record, Attachment) and record.name in (*ATTACHMENTS, RESUMED_ATTACHMENT):
                 self.attachments[record.name] = record.data
             elif isinstance(record, Metadata):
                 self._take_metadata(record)

@@ -6,6 +6,7 @@ periods are returned.
 """
 
 import re
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from mirotwin.recording.images import ImageMessage
 from mirotwin.recording.messages import AGAIN, ATTACHMENTS, Messages, brief
 from mirotwin.recording.recorder import (
     FIRMWARE_ATTACHMENT,
+    RESUMED_ATTACHMENT,
     SCENARIO_ATTACHMENT,
     SYMBOLS_ATTACHMENT,
     Source,
@@ -55,7 +57,7 @@ def read(path: str | Path) -> Recording:
 def parse(data: bytes, path: str) -> Recording:
     """A recording from its bytes; `path` names it in errors."""
     messages = Messages(BytesIO(data), path, KINDS)
-    collector = _Collector()
+    collector = _Collector(lambda: RESUMED_ATTACHMENT in messages.attachments)
     cut: Cut | None = None
     try:
         for place, message in messages:
@@ -76,9 +78,14 @@ def parse(data: bytes, path: str) -> Recording:
 
 
 class _Collector:
-    """Puts messages of a robot together by channel, until `/period` closes the period."""
+    """Puts messages of a robot together by channel, until `/period` closes the period.
 
-    def __init__(self) -> None:
+    `resumed`: whether the run went on from a saved world, known with the first message: its first period is any.
+    """
+
+    def __init__(self, resumed: Callable[[], bool]) -> None:
+        self.resumed = resumed
+        self.first = 0
         self.robots: dict[tuple[int, int], dict[str, Any]] = {}
         self.wire: list[Transmission] = []
         self.deeds: list[Deed] = []
@@ -96,8 +103,10 @@ class _Collector:
             self.robots.setdefault((place.network, place.slot), {})[place.channel] = message
 
     def _close(self, message: channels.PeriodMessage) -> None:
-        if message.index != len(self.periods):
-            raise ValueError(f"period {message.index} where {len(self.periods)} should be")
+        if not self.periods and self.resumed():
+            self.first = message.index
+        if message.index != self.first + len(self.periods):
+            raise ValueError(f"period {message.index} where {self.first + len(self.periods)} should be")
         robots = tuple(
             channels.robot_period(network, slot, found) for (network, slot), found in self.robots.items()
         )
@@ -134,4 +143,5 @@ def _source(messages: Messages) -> Source:
         symbols=symbols,
         record=metadata.get("record", "default"),
         state=metadata.get("state", ""),
+        resumed=attachments.get(RESUMED_ATTACHMENT, b""),
     )

@@ -28,6 +28,8 @@ FORMAT = "3"
 SCENARIO_ATTACHMENT = "scenario.toml"
 FIRMWARE_ATTACHMENT = "firmware.ihx"
 SYMBOLS_ATTACHMENT = "symbols.json"
+RESUMED_ATTACHMENT = "resumed.world"
+"""Only in a recording of a run that went on from a saved world."""
 TOGETHER = 10
 """Control periods that are written one after the other: after a simulated one the caches hold nothing of this."""
 BROKEN_OFF = "mirotwin.broken_off"
@@ -51,6 +53,7 @@ class Fault(Protocol):
 class Source(msgspec.Struct, frozen=True):
     """What a run was made from: scenario text, seed, firmware file, and its symbols (name -> address,
     space). `state`: the form of the states that its digests are of (`Flat.tables`), "" where it is not known.
+    `resumed`: the saved world that the run went on from, empty for one from its begin.
     """
 
     scenario_name: str
@@ -61,6 +64,7 @@ class Source(msgspec.Struct, frozen=True):
     symbols: dict[str, tuple[int, str]] = {}
     record: str = "default"
     state: str = ""
+    resumed: bytes = b""
 
 
 _Message = tuple[str, int, msgspec.Struct]
@@ -102,6 +106,8 @@ class Recorder:
         self._writer.add_attachment(FIRMWARE_ATTACHMENT, "text/plain", source.firmware)
         symbols = msgspec.json.encode(source.symbols, order="deterministic")
         self._writer.add_attachment(SYMBOLS_ATTACHMENT, "application/json", symbols)
+        if source.resumed:
+            self._writer.add_attachment(RESUMED_ATTACHMENT, "application/octet-stream", source.resumed)
 
     def __enter__(self) -> "Recorder":
         return self

@@ -1,6 +1,6 @@
 """What a recording says that a run was made from.
 
-What belongs here: making it of a scenario and an image. What does not: its fields (`recorder`).
+What belongs here: making it of a scenario and a world. What does not: its fields (`recorder`).
 """
 
 from __future__ import annotations
@@ -8,22 +8,25 @@ from __future__ import annotations
 import hashlib
 
 from miro_exact.bad_input import BadInput
-from miro_robot.image import Image
 from miro_sim.scenario.file import ScenarioText
+from miro_sim.world.world import World
 from mirotwin.recording.recorder import Source
 
 
-def source_of(text: ScenarioText, seed: int, image: Image, record: str = "default") -> Source:
-    """Raises BadInput for an image whose file is another now."""
+def source_of(text: ScenarioText, world: World, record: str = "default", resumed: bytes = b"") -> Source:
+    """Of a run of `world`, which is made of `text`. Raises BadInput for an image whose file is another now."""
+    image = world.image
     firmware = image.path.read_bytes()
     if hashlib.sha256(firmware).hexdigest() != image.sha256:
         raise BadInput(image.path, "", "changed while it was read", "start again once it is built")
     return Source(
         scenario_name=text.scenario.name,
         scenario_text=text.text,
-        seed=seed,
+        seed=world.seed,
         firmware=firmware,
         firmware_sha256=image.sha256,
         symbols={name: (at.address, at.space) for name, at in image.symbols.names.items()},
         record=record,
+        state=world.state.tables(),
+        resumed=resumed,
     )

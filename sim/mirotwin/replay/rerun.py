@@ -61,9 +61,11 @@ def world_of(recording: Recording, path: str, image: Image | None = None, script
 def repeating(recording: Recording, path: str, period: int, scripted: bool) -> World | None:
     """A world that repeats the recording, at the begin of control period `period`; see `world_of`.
 
-    None: it does not give the recorded digests up to there. Another version of this program made the recording, input
-    was put in beside a controller, or it was edited.
+    None: a run that was resumed, or it does not give the recorded digests up to there. Another version of this program
+    made the recording, input was put in beside a controller, or it was edited.
     """
+    if recording.source.resumed:
+        return None
     try:
         world = world_of(recording, path, scripted=scripted)
     except ValueError:

@@ -146,7 +146,7 @@ def test_a_bit_that_somebody_changed_is_found_in_its_control_period(
             body.x_m = math.nextafter(body.x_m, math.inf)
 
     world = Planted(text.scenario, 5, own_image()).plant(tick, change)
-    source = msgspec.structs.replace(source_of(text, 5, own_image()), state=world.state.tables())
+    source = source_of(text, world)
     path = tmp_path / "planted.mcap"
     with path.open("wb") as stream, Recorder(stream, source) as recorder:
         while not world.finished:

@@ -199,7 +199,7 @@ def test_a_live_session_with_deeds_replays_to_the_same_digests(
     path.write_text(SHORT.replace("[[network]]", '[[network]]\nhost = "silent"', 1))
     text = load(str(path))
     world = World(text.scenario, 8, own_image())
-    source = msgspec.structs.replace(source_of(text, 8, own_image()), state=world.state.tables())
+    source = source_of(text, world)
     with (tmp_path / "live.mcap").open("wb") as stream, Recorder(stream, source) as recorder:
         world.observers.append(recorder.write)
         for seq, tick in enumerate((12_345, 900_001, 2_345_678)):
