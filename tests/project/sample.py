@@ -14,7 +14,6 @@ import os
 import re
 import shutil
 import sys
-import sysconfig
 import tempfile
 import time
 import venv
@@ -74,7 +73,8 @@ class Sample:
         venv.create(self.folder / "venv", with_pip=True, symlinks=os.name != "nt")
         self.must("pip", "install", "-q", wheel, "pytest", cwd=self.folder)
         if smoke:
-            target = Path(sysconfig.get_path("platlib", vars={"base": str(self.folder / "venv")}))
+            where = "import sysconfig; print(sysconfig.get_path('platlib'))"
+            target = Path(self.must("python", "-c", where, cwd=self.folder).strip())
             for package in PACKAGE_FOLDERS:
                 for path in (one for pattern in ENGINES for one in (ROOT / package).rglob(pattern)):
                     shutil.copy2(path, target / path.relative_to(ROOT / package))
@@ -101,7 +101,7 @@ def tried(sample: Sample) -> list[str]:
     sample.must("mirotwin", "init", "mine", cwd=sample.folder)
     for test in TESTS:
         begun = time.perf_counter()
-        code, out = sample.run("make", test)
+        code, out = sample.run("make", "-s", test)
         print(f"make {test}: {time.perf_counter() - begun:.1f} s", flush=True)
         if code:
             found.append(f"make {test} fails:\n{out}")
@@ -110,7 +110,7 @@ def tried(sample: Sample) -> list[str]:
     assert text.count(MISTAKE[1]) == 1
     source.write_text(text.replace(*MISTAKE[1:]), encoding="utf-8")
     for test in TESTS:
-        code, out = sample.run("make", test)
+        code, out = sample.run("make", "-s", test)
         lines = sample.again(out)
         print(
             f"make {test} with a failsafe of 125 ms: exit code {code}, {len(lines)} lines to reproduce",

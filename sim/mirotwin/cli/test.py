@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,6 +25,7 @@ from mirotwin.files.outputs import check_file, check_not_input, whole_file
 from mirotwin.report.junit import TestCase, junit_xml
 from mirotwin.steps.collecting import SUFFIX, collect
 from mirotwin.steps.keys import end_ms
+from mirotwin.steps.left_behind import CASE
 from mirotwin.steps.running import Outcome, Verdict, reproduce_line, run_test, stem_of
 
 WORDS = {"passed": "passed", "failed": "FAILED", "fault": "FAULT", "error": "ERROR"}
@@ -90,14 +92,14 @@ def test(
         outcome = run_test(file, image, seed, settings, artifacts, again)
         times_s.append(time.perf_counter() - began_s)
         outcomes.append(outcome)
-        _show(outcome, quiet)
+        _show(outcome, quiet, again, firmware)
     if junit is not None:
         lines = [reproduce_line(file, seed, firmware, settings) for file in chosen]
         _write_junit(junit, outcomes, times_s, lines)
     return _summary(outcomes)
 
 
-def _show(outcome: Outcome, quiet: bool) -> None:
+def _show(outcome: Outcome, quiet: bool, again: str, firmware: str | None) -> None:
     passed = outcome.verdict == "passed"
     if quiet and passed:
         return
@@ -112,6 +114,12 @@ def _show(outcome: Outcome, quiet: bool) -> None:
         show_line(f"    {line}")
     if outcome.left:
         show_line(f"    left in {outcome.left}")
+        case = Path(outcome.left) / CASE
+        if case.exists():
+            image = f" --firmware {shlex.quote(firmware)}" if firmware else ""
+            show_line(f"    mirotwin replay {shlex.quote(str(case))}{image}")
+    if not passed and outcome.verdict != "error":
+        show_line(f"    {again}")
 
 
 def _summary(outcomes: Sequence[Outcome]) -> int:

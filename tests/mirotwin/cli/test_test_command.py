@@ -49,9 +49,10 @@ def test_each_file_has_a_line_with_its_verdict_and_one_for_each_failure(mirotwin
     assert lines[2].startswith(
         f"    step failed: step 3 (too soon): expect answer: tick 600000 (25.000 ms): {wanted}"
     )
-    assert lines[3] == "ERROR  hil/sub/c.scenario.toml"
-    assert lines[4].endswith("c.scenario.toml: step 3.within_s: unknown key; use within_ms, in milliseconds")
-    assert lines[6].startswith("    expectation failed: failsafe_stop_ms: net0/robot0: tick ")
+    assert lines[3] == "    mirotwin test hil/sub/b.scenario.toml --seed 0"
+    assert lines[4] == "ERROR  hil/sub/c.scenario.toml"
+    assert lines[5].endswith("c.scenario.toml: step 3.within_s: unknown key; use within_ms, in milliseconds")
+    assert lines[7].startswith("    expectation failed: failsafe_stop_ms: net0/robot0: tick ")
     assert lines[-1] == "1 cannot be run, 3 failed, 1 passed"
 
 
