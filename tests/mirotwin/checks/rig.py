@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 
 from tests.mutants.build import build
-from tests.mutants.draw import source_files
+from tests.mutants.draw import SOURCE, source_files
 from tests.mutants.planted import PLANTED
 from tests.mutants.sdcc import needs_sdcc as needs_sdcc
 
@@ -77,6 +79,23 @@ def finish(world: World, checks: Checks) -> dict[str, str]:
 def planted(mistake: str) -> Image:
     """The firmware with a mistake of the table `tests.mutants.planted`."""
     one = PLANTED[mistake]
-    built = build({one.file: one.applied(source_files()[one.file])})
-    assert not built.error, built.error
-    return load_hex(built.image)
+    return built(one.file, one.right, one.wrong)
+
+
+@cache
+def built(file: str, right: str, wrong: str) -> Image:
+    """The firmware with `right` in a source file, where it stands once, replaced by `wrong`."""
+    text = source_files()[file]
+    assert text.count(right) == 1
+    found = build({file: text.replace(right, wrong)})
+    assert not found.error, found.error
+    return load_hex(found.image)
+
+
+def built_in(folder: Path, file: str, right: str, wrong: str) -> Image:
+    """The same as files of one's own: the sources in `firmware`, the image with its symbols in `out`."""
+    image = built(file, right, wrong)
+    shutil.copytree(SOURCE, folder / "firmware")
+    (folder / "firmware" / file).write_text(source_files()[file].replace(right, wrong), encoding="utf-8")
+    shutil.copytree(image.path.parent, folder / "out")
+    return load_hex(folder / "out" / image.path.name)

@@ -8,7 +8,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from tests.mirotwin.checks.rig import needs_sdcc, planted
+from tests.mirotwin.checks.rig import built_in, needs_sdcc
 from tests.mirotwin.conform.images import BABBLES, FAULTS, HANGS, POKES, PUSHES, READS_BOTH, RUNS_OUT, hex_of
 from tests.mirotwin.conform.mistakes import MISTAKES
 
@@ -23,7 +23,7 @@ def program(folder: Path, code: bytes) -> Path:
 
 def planted_file(folder: Path, name: str) -> Path:
     mistake = MISTAKES[name]
-    planted(folder, mistake.file, mistake.right, mistake.wrong)
+    built_in(folder, mistake.file, mistake.right, mistake.wrong)
     return folder / "out" / "miro.ihx"
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from tests.mirotwin.checks.rig import needs_sdcc, own_image, planted, silent_world
+from tests.mirotwin.checks.rig import built, needs_sdcc, own_image, silent_world
 from tests.mirotwin.conform.images import HANGS, image_of
 from tests.mirotwin.conform.mistakes import MISTAKES
 
@@ -37,9 +37,9 @@ def test_an_image_that_does_nothing_breaks_the_rule(id: str) -> None:
 
 @needs_sdcc
 @pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_in_the_firmware_breaks_the_rules_that_it_concerns(name: str, tmp_path: Path) -> None:
+def test_a_mistake_in_the_firmware_breaks_the_rules_that_it_concerns(name: str) -> None:
     mistake = MISTAKES[name]
-    image = planted(tmp_path, mistake.file, mistake.right, mistake.wrong)
+    image = built(mistake.file, mistake.right, mistake.wrong)
     kept = [id for id in mistake.fails.split() if not broken(id, image)]
     assert kept == []
 

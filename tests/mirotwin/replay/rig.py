@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import msgspec
-from tests.mirotwin.checks.rig import own_image, planted, team
+from tests.mirotwin.checks.rig import built_in, own_image, team
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.frames import encode
@@ -99,4 +99,4 @@ BUILDS = {
 
 def built(folder: Path, name: str) -> Image:
     """The firmware with one of the changes above."""
-    return planted(folder, *BUILDS[name])
+    return built_in(folder, *BUILDS[name])

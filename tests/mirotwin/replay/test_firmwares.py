@@ -4,8 +4,9 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from tests.mirotwin.checks.rig import SOURCE, needs_sdcc, own_image
+from tests.mirotwin.checks.rig import needs_sdcc, own_image
 from tests.mirotwin.replay.rig import STOP_AT, built, periods, with_byte, world
+from tests.mutants.draw import SOURCE
 
 from miro_robot.image import Image, Symbols
 from mirotwin.replay.compare import Rule, differences

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.mirotwin.checks.rig import needs_sdcc, own_image, planted
+from tests.mirotwin.checks.rig import built, needs_sdcc, own_image
 
 from miro_robot.image import Image
 from mirotwin.steps.running import Outcome, run_test
@@ -46,14 +46,14 @@ def test_steps_alone_find_it_at_the_step_that_it_concerns(mistake: str, tmp_path
     file, right, wrong, place = MISTAKES[mistake]
     path = tmp_path / "alone.scenario.toml"
     path.write_text(STEPS_ALONE)
-    outcome = run(path, planted(tmp_path, file, right, wrong))
+    outcome = run(path, built(file, right, wrong))
     assert outcome.verdict == "failed"
     assert outcome.lines[0].startswith(f"step failed: {place}")
 
 
 @needs_sdcc
 def test_a_failsafe_of_125_ms_fails_a_step_and_the_checks_of_the_example(tmp_path: Path) -> None:
-    image = planted(tmp_path, "failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)")
+    image = built("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)")
     outcome = run(EXAMPLES / "failsafe.scenario.toml", image)
     step, check = outcome.lines[:2]
     assert step.startswith("step failed: step 9 (smooth stop): wait_for command: tick ")
@@ -64,7 +64,7 @@ def test_a_failsafe_of_125_ms_fails_a_step_and_the_checks_of_the_example(tmp_pat
 @needs_sdcc
 def test_firmware_that_takes_damaged_frames_fails_the_other_example(tmp_path: Path) -> None:
     wrong = "take_body(from + RX3_AT_HDR); if (0) {"
-    image = planted(tmp_path, "decode.c", "if (!take_body(from + RX3_AT_HDR)) {", wrong)
+    image = built("decode.c", "if (!take_body(from + RX3_AT_HDR)) {", wrong)
     outcome = run(EXAMPLES / "damage.scenario.toml", image)
     assert outcome.lines[0].startswith("step failed: step 3: never command: tick ")
 

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.mirotwin.checks.rig import needs_sdcc, planted
+from tests.mirotwin.checks.rig import built_in, needs_sdcc
 from tests.mirotwin.testing.sessions import run, session
 
 from miro_robot.firmware import image_path
@@ -109,7 +109,7 @@ def test_the_help_names_options_and_the_marker(tmp_path: Path) -> None:
 
 @needs_sdcc
 def test_the_line_of_a_planted_mistake_reproduces_it_and_its_cure_passes(tmp_path: Path) -> None:
-    image = planted(
+    image = built_in(
         tmp_path / "bad", "failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)"
     )
     tests = """
