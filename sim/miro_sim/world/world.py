@@ -16,6 +16,7 @@ Long because one class holds the order in which all parts act; the parts themsel
 from __future__ import annotations
 
 import hashlib
+import operator
 from collections.abc import Callable, Sequence
 from itertools import permutations
 from typing import Any, NamedTuple
@@ -160,7 +161,11 @@ class World:
         return self.last
 
     def run_to(self, tick: int) -> None:
-        """Moves everything on to `tick`, or to the control period in which a firmware fault stops the run."""
+        """Moves everything on to `tick`, or to the control period in which a firmware fault stops the run.
+
+        Raises ValueError for what is no whole number.
+        """
+        tick = _whole(tick)
         while self.tick < tick and not self.stopped:
             self.begin_period()
             self.run_piece(self.rendezvous(tick))
@@ -188,7 +193,7 @@ class World:
             world.run_until(conditions.Answer(robot=0), within=ticks(0.040))
         """
         conditions = [condition] if isinstance(condition, waiting.Condition) else list(condition)
-        return self.waits.until(conditions, within)
+        return self.waits.until(conditions, None if within is None else _whole(within))
 
     def inject(
         self, data: bytes, network: int = 0, at_tick: int | None = None, bad_stop: tuple[int, ...] = ()
@@ -201,6 +206,7 @@ class World:
         Raises ValueError for a network that is not there, a tick before `earliest_tick`, a transmitter that is busy
         then, and indices of no characters.
         """
+        at_tick = None if at_tick is None else _whole(at_tick)
         return self._network(network).inject(data, at_tick, self.tick, bad_stop)
 
     def earliest_tick(self, network: int = 0) -> int:
@@ -253,6 +259,7 @@ class World:
 
     def _announce(self, deed: Deed, earliest_tick: int) -> None:
         network = self._network(deed.network)
+        _whole(deed.tick)
         if not earliest_tick <= deed.tick < NEVER_TICK:
             raise ValueError(
                 f"net{deed.network}: tick {deed.tick} of a deed; the earliest is {earliest_tick}"
@@ -412,3 +419,10 @@ def _total(values: Sequence[int | None]) -> int | None:
             return None
         total += value
     return total
+
+
+def _whole(ticks: int) -> int:
+    try:
+        return operator.index(ticks)
+    except TypeError:
+        raise ValueError(f"{ticks!r} is no whole number of ticks") from None

@@ -101,6 +101,9 @@ def _read(path: str) -> Recording:
     recording = parse(data, path)
     if not recording.periods:
         raise BadInput(path, "", "the recording holds no control period", "there is nothing to compare")
+    if recording.source.resumed:
+        what = f"a run that was resumed: it begins with control period {recording.periods[0].index}"
+        raise BadInput(path, "", what, "replay it, or compare recordings of whole runs")
     if recording.broken_off:
         complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
     return recording

@@ -47,7 +47,7 @@ class ConformsTo(Check, frozen=True, kw_only=True, tag="conforms_to"):
 
 
 class RuleJudge(Judge[ConformsTo]):
-    """`foreign`: the host of this network says something else than in the trial."""
+    """`foreign`: the host of this network says something else than in the trial; `to_come`: what it has to say yet."""
 
     HEARS = ("command", "heard", "answer", "sent")
 
@@ -83,7 +83,7 @@ class RuleJudge(Judge[ConformsTo]):
         self.seen.samples.append((tick, board.left.sample_tick, board.right.sample_tick))
 
     def end(self, tick: int) -> None:
-        if self.foreign:
+        if self.foreign or (self.to_come and self.to_come[-1].tick < tick):
             self.failures.clear()
             self.failed = 0
             return

@@ -106,9 +106,10 @@ def scenario_of_stream(sent: Sequence[Doing], path: str, header: Header | None =
     check_script(script, path, len(scenario.networks))
     check_deeds(script, path, scenario)
     end_tick = ticks(scenario.duration_s)
-    for one in sent_in(script):
-        if one.end_tick > end_tick:
-            what = f"ends at tick {one.end_tick}, but the scenario ends at tick {end_tick}"
+    for one in script:
+        last_tick = one.end_tick if isinstance(one, Transmission) else one.tick
+        if last_tick > end_tick:
+            what = f"ends at tick {last_tick}, but the scenario ends at tick {end_tick}"
             raise BadInput(path, f"tick {one.tick}", what, "raise its duration_s")
     return scenario
 
@@ -133,7 +134,7 @@ def _default_scenario(script: Sequence[Doing], path: str) -> Scenario:
         last = max(one.tick for one in script)
         raise BadInput(path, f"tick {last}", "more than a day", "let the stream start near tick 0")
     count = 1 + max(one.network for one in script)
-    base = load(DEFAULT_SCENARIO).scenario
+    base = load(DEFAULT_SCENARIO, ["camera={kind = 'gaussian'}"]).scenario  # nothing steers by it
     model = base.networks[0].robot[0]
     assert isinstance(model.reference, msgspec.Struct)  # parameters of a line
     standing = msgspec.structs.replace(model.reference, drive_s=0.0)  # nothing steers by it

@@ -108,6 +108,9 @@ def wanted(mark: Marked, folder: Path, firmware: str | Path | None, seed: int) -
     if not 0 <= seed <= MAX_SEED:
         raise BadInput("", "seed", f"{seed} is out of range", f"give 0 to {MAX_SEED}")
     scenario = _scenario(mark, folder)
+    if scenario.step:
+        what = f"scenario {scenario.name} has {len(scenario.step)} steps, which a test in Python does not do"
+        raise BadInput("", MARKER, what, "pytest collects *.scenario.toml files by themselves")
     if mark.firmware is not None:
         firmware = _near(mark.firmware, folder)
     image = image_of(str(firmware) if firmware is not None else None)

@@ -173,3 +173,21 @@ def test_a_world_that_has_moved_has_no_trace() -> None:
     world.run_to(1)
     with pytest.raises(ValueError, match="the world is at tick 1: what happened before is not known"):
         Trace(world)
+
+
+def test_a_verdict_of_a_check_that_nothing_expects_is_refused(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    path = failing(tmp_path)
+    path.write_text(path.read_text().replace("[expect.failsafe_stop_ms]", "[expect.motors_off_ms]"))
+    code, out, err = mirotwin("replay", path, "-q")
+    assert (code, out) == (2, "")
+    assert "the verdict is of the check 'failsafe_stop_ms', which nothing expects" in err
+
+
+def test_a_case_ends_where_it_failed_whatever_the_duration_of_its_scenario(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    code, _, err = mirotwin("replay", failing(tmp_path), "-q", "--set", "duration_s=0.25")
+    assert code == 1
+    assert "fails as recorded: failsafe_stop_ms" in err

@@ -35,6 +35,17 @@ def test_a_resumed_run_has_the_digests_of_one_that_never_stopped(
     assert (code, err) == (0, "")
 
 
+def test_a_resumed_run_is_not_compared_with_a_whole_one(
+    mirotwin: Callable[..., Result], tmp_path: Path, short: Path
+) -> None:
+    whole, rest = tmp_path / "whole", tmp_path / "rest"
+    mirotwin("run", short, "--out", whole, "--save-at", "100ms", *QUIET)
+    mirotwin("run", short, "--out", rest, "--resume", whole / "at-2400000.world", *QUIET)
+    code, out, err = mirotwin("diff", whole / "run.mcap", rest / "run.mcap")
+    assert (code, out) == (2, "")
+    assert "a run that was resumed: it begins with control period 3" in err
+
+
 def test_a_run_ends_where_it_is_told_to(mirotwin: Callable[..., Result], tmp_path: Path, short: Path) -> None:
     assert mirotwin("run", short, "--out", tmp_path / "a", "--to-tick", "2500000", *QUIET)[0] == 0
     summary = json.loads((tmp_path / "a" / "summary.json").read_text())

@@ -130,6 +130,11 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(
         ),
         (f"firmware_sha256 = '{OTHER}'", "", "header: the stream is for firmware 0123456789ab.., this is"),
         (in_header(SHORT), "2000000 *@0/1 reset 1", "tick 2000000: no robot in slot 1; there is 0, 2"),
+        (
+            in_header(SHORT),
+            "4900000 *@0 radio up",
+            "tick 4900000: ends at tick 4900000, but the scenario ends at",
+        ),
         (in_header(SHORT), "2000000 *@1 radio up", "tick 2000000: network 1, but the scenario has 1"),
         ("", "2000000 * P1.0 1", ":6:1: an event, which this command does not support; `mirotwin fw run"),
         ("", "1701700 >@31 55\n1800000 >@32 55", "tick 1800000: network 32, but the scenario has 32"),
@@ -187,3 +192,11 @@ def test_a_robot_that_is_reset_counts_anew_and_a_radio_that_is_off_lets_nothing_
     code, out, err = mirotwin("replay", tmp_path / "a.stream")
     assert (code, err) == (0, "")
     assert [row[1] for row in counters(out)] == ["2", "1", "0"]
+
+
+def test_a_deed_at_a_network_beyond_the_colours_of_teams_is_done(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    (tmp_path / "a.stream").write_text(V2 + "960000 *@5 radio up\n970000 *@5/0 reset 1\n")
+    code, _, err = mirotwin("replay", tmp_path / "a.stream")
+    assert (code, err) == (0, "")

@@ -12,8 +12,10 @@ from tests.mirotwin.checks.rig import built, needs_sdcc, own_image, silent_world
 from tests.mirotwin.conform.images import HANGS, image_of
 from tests.mirotwin.conform.mistakes import MISTAKES
 
+from miro_protocol.transmission import Transmission
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
+from miro_sim.world.world import World
 from mirotwin.checks.watching import Checks
 from mirotwin.conform.judgement import ConformsTo
 from mirotwin.conform.run import try_rule
@@ -100,6 +102,18 @@ def test_a_run_that_is_no_trial_of_the_rule_is_not_judged() -> None:
     world, _ = silent_world("")
     checks = Checks(world, {(0, 1): [ConformsTo(rule="P02")]})
     world.inject(bytes(10))
+    while not world.finished:
+        world.step()
+    checks.finish()
+    assert [one.verdict for one in checks.verdicts()] == ["not judged"]
+
+
+def test_a_trial_of_which_a_network_says_less_is_not_judged_there() -> None:
+    trial = trial_of(find("P29"))
+    said = [one for one in trial.script if one.network == 0 or not isinstance(one, Transmission)]
+    world = World(trial.scenario, 0, own_image(), script=said)
+    places = [(1, robot.slot) for robot in world.networks[1].robots]
+    checks = Checks(world, {place: [ConformsTo(rule="P29")] for place in places})
     while not world.finished:
         world.step()
     checks.finish()

@@ -152,3 +152,17 @@ def test_coverage_counts_the_same_however_the_tests_are_spread(tmp_path: Path) -
         counts.append((tmp_path / "fw.info").read_text())
     assert counts[0] == counts[1]
     assert "FNDA:3,_main" in counts[0]
+
+
+def test_a_scenario_with_steps_is_no_world_for_a_test_in_python(tmp_path: Path) -> None:
+    (tmp_path / "a.scenario.toml").write_text('scenario = "silent"\n\n[[step]]\npause_ms = 5\n')
+    tests = """
+import pytest
+
+@pytest.mark.mirotwin(scenario="a.scenario.toml")
+def test_it(world):
+    pass
+"""
+    out = session(tmp_path, "test_mine.py", tests=tests).stdout
+    assert "1 error" in out
+    assert "has 1 steps, which a test in Python does not do" in out

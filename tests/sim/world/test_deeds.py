@@ -221,3 +221,21 @@ def test_a_deed_is_saved_with_the_world():
     other.load(world.save())
     other.run_to(BOOTED_TICK + PERIOD)
     assert other.robot().board.held
+
+
+@pytest.mark.parametrize(
+    "move",
+    [
+        lambda world: world.run_to(1.5),
+        lambda world: world.run_for(0.5),
+        lambda world: world.run_until(wait.Heard(), within=1e3),
+        lambda world: world.inject(b"U", at_tick=1e6),
+        lambda world: world.do(Reset(1e6, 0, 0, 1)),
+    ],
+)
+def test_a_time_that_is_no_whole_number_of_ticks_is_refused(move):
+    world = fig6()
+    before = world.save()
+    with pytest.raises(ValueError, match="is no whole number of ticks"):
+        move(world)
+    assert world.save() == before
