@@ -115,7 +115,8 @@ def test_inside_the_layer_v_has_one_term_more_than_equation_23(path, t, posture,
     assume(abs(across(posture)) > 0.8)  # far from the guard of the cosine
     s, s_rate, e, by_proof = rates(NO_GUARD, path, t, posture, v, w, (0.0, 0.0))
     assume(near_no_seam(e) and e.phi_e_rad != 0.0)
-    assume(e.theta_e_rate * s[1] == 0.0 or abs(e.theta_e_rate * s[1]) > 1e-200)  # the term itself underflows
+    factors = (e.theta_e_rate, s[1], e.phi_e_rad)
+    assume(all(factor == 0.0 or abs(factor) > 1e-60 for factor in factors))  # else their product underflows
     more = s[1] * stability.layer_term(e, NO_GUARD.layer_theta_rad)
     scale = 1.0 + abs(s[0]) + abs(s[1])
     assert stability.lyapunov_rate(s, s_rate) == pytest.approx(by_proof + more, abs=1e-6 * scale * scale)
