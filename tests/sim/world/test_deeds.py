@@ -1,10 +1,14 @@
 """Reset pins, supplies and radios while a world runs: what follows, and that it does not depend on who asked when."""
 
+import sys
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests import children
 from tests.sim.world.rig import PERIOD, fig6, image, two_networks
 
+from miro_exact import engine
 from miro_exact.clock import ticks
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.stream_events import Power, RadioState, Reset
@@ -239,3 +243,36 @@ def test_a_time_that_is_no_whole_number_of_ticks_is_refused(move):
     with pytest.raises(ValueError, match="is no whole number of ticks"):
         move(world)
     assert world.save() == before
+
+
+ENGINES = """
+import sys
+from miro_exact import engine
+if sys.argv[1] == "python":
+    engine.install()
+from miro_protocol.stream_events import Power, RadioState, Reset
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.file import load
+from miro_sim.world.world import World
+
+deeds = [RadioState(400_000, 0, "noise"), RadioState(700_003, 0, "up")]
+deeds += [Reset(900_001, 0, 0, 1), Reset(900_400, 0, 0, 0)]
+deeds += [Power(1_200_000, 0, 0, 0), RadioState(1_300_000, 0, "down"), Power(1_500_123, 0, 0, 1)]
+settings = ["network.host=silent", "network.radio.profile=fade15", "camera={kind = 'gaussian'}"]
+world = World(load("fig6", settings).scenario, 7, load_hex(image_path()), script=deeds)
+world.run_to(3 * 800_800)
+print(engine.active(), world.digest)
+"""
+
+
+@pytest.mark.skipif(engine.active() != "compiled", reason="no compiled modules here")
+def test_deeds_give_the_same_bits_compiled_and_uncompiled():
+    found = [
+        children.run(
+            [sys.executable, "-c", ENGINES, name], capture_output=True, text=True, check=True
+        ).stdout.split()
+        for name in engine.ENGINES
+    ]
+    assert sorted(name for name, _ in found) == sorted(engine.ENGINES)
+    assert len({digest for _, digest in found}) == 1

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from miro_protocol.table import DEFAULT_ACCELERATION, Opcode
-from miro_robot.lm629.signals import COMMAND_ERROR
 from miro_sim.world.events import SIDES
 from mirotwin.conform.rule import Air, Chapter
 from mirotwin.conform.rules import FIRMWARE, FRAME, RECEPTION, VERSIONS
 from mirotwin.conform.rules.failsafe import stops_behind
+from mirotwin.conform.rules.sound import nothing_refused
 from mirotwin.conform.seen import Seen, Words
 from mirotwin.conform.talk import ACTING_TICKS, Found, Frame, Talk, ms
 
@@ -108,15 +108,7 @@ def acceleration_waits(talk: Talk) -> None:
     talk.wait(300.0)  # told to stand by the failsafe
     _driven_with(talk, talk.team(), 7000)
     talk.answered(talk.ask(slot, gap_ms=40.0), slot)
-    end = talk.now
-
-    def refused(seen: Seen) -> Found:
-        for tick, side, chip in seen.chips(0, end):
-            if chip.status & COMMAND_ERROR:
-                return tick, f"command error of the {side} one"
-        return None
-
-    talk.expect(end, "no command that an LM629 refuses", refused)
+    nothing_refused(talk)
 
 
 def _sent_in_motion(talk: Talk, value: int) -> None:
