@@ -248,8 +248,7 @@ def test_a_time_that_is_no_whole_number_of_ticks_is_refused(move):
 ENGINES = """
 import sys
 from miro_exact import engine
-if sys.argv[1] == "python":
-    engine.install()
+engine.select(sys.argv[1])
 from miro_protocol.stream_events import Power, RadioState, Reset
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
