@@ -10,6 +10,7 @@ waits is saved, but no part of the digest: a run does not depend on when a deed 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from miro_exact.clock import NEVER_TICK
@@ -110,6 +111,14 @@ class Deeds:
             return Reset(one.tick, self.network, one.slot, one.value)
         board.set_power(one.value)
         return Power(one.tick, self.network, one.slot, one.value)
+
+    def check(self, slots: Sequence[int]) -> None:
+        """Raises ValueError where what was loaded concerns a robot that is not in `slots`, or a level that is none."""
+        for one in self.waiting:
+            if one.what in (RESET, POWER) and (one.slot not in slots or one.value > 1):
+                raise ValueError(
+                    f"a deed waits for slot {one.slot} with level {one.value}, at tick {one.tick}"
+                )
 
     def take(self) -> tuple[Deed, ...]:
         """The deeds of the period that is over."""

@@ -277,6 +277,7 @@ class Network:
             raise ValueError(f"the transmitter is busy until tick {self.downlink.free_tick}, at tick {tick}")
         if self.deeds.next_tick < tick - SETTLE_TICKS:
             raise ValueError(f"a deed waits for tick {self.deeds.next_tick}, at tick {tick}")
+        self.deeds.check([robot.slot for robot in self.robots])
         if self.outbox.waiting and self.outbox.waiting[0].sent.tick < self.downlink.free_tick:
             raise ValueError(
                 f"characters wait, but the transmitter is busy until tick {self.downlink.free_tick}"

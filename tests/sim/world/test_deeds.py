@@ -15,6 +15,7 @@ from miro_protocol.stream_events import Power, RadioState, Reset
 from miro_protocol.table import DOWNLINK
 from miro_sim.scenario.file import load
 from miro_sim.world import conditions as wait
+from miro_sim.world.deeds import POWER, RESET, Waiting
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 
@@ -243,6 +244,14 @@ def test_a_time_that_is_no_whole_number_of_ticks_is_refused(move):
     with pytest.raises(ValueError, match="is no whole number of ticks"):
         move(world)
     assert world.save() == before
+
+
+@pytest.mark.parametrize("waiting", [Waiting(50_000, RESET, 3, 1), Waiting(50_000, POWER, 0, 2)])
+def test_a_saved_deed_that_cannot_be_done_is_refused(waiting):
+    world, other = silent(), silent()
+    world.networks[0].deeds.waiting = [waiting]
+    with pytest.raises(ValueError, match="a deed waits for slot"):
+        other.load(world.save())
 
 
 ENGINES = """
