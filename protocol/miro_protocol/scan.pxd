@@ -18,6 +18,13 @@ cdef class Scanner:
     cdef int _count, _last_bad, _last_apart, _reason
     cdef long long _next_tick
     cdef bint _paused
+    cdef unsigned char body[64]
+
+    cpdef begin(self)
+    @cython.locals(place=int, sync=int, found=int)
+    cpdef bint take(self, int byte, bint bad_stop, long long tick) except -1
+    cdef void _clear(self) noexcept
+    cpdef int body_at(self, int place) noexcept
 
     @cython.locals(tick='long long', flaws=int, place=Py_ssize_t, length=Py_ssize_t, found=int, view='const unsigned char[::1]')
     cpdef list feed(self, data, start_tick=*)

@@ -9,6 +9,8 @@ comparison each; the CRC is computed only for a window that begins with a sync. 
 character, on any input. The characters since the last event are kept, at most `run_limit` + F - 1 of them.
 
 The CRC runs over the characters as received: whitening is taken off in the same step.
+
+Long because the window, its ways in and what it gives out share one set of fields, and a compiled class is one file.
 """
 
 from __future__ import annotations
@@ -61,6 +63,7 @@ class Scanner:
         *("format", "_sync", "_white", "_lead", "_table", "_start", "_intact", "_size", "_step"),
         *("_spacing", "_tolerance", "_run_limit"),
         *("_count", "_last_bad", "_last_apart"),  # follow from _data and _flaws
+        "body",  # of the frame that `take` was asked about
     )
 
     def __init__(
@@ -92,6 +95,34 @@ class Scanner:
         self._reason = _NO_SYNC
         self._next_tick = 0  # where a character would start that follows at once
         self._paused = True
+        self.body = bytearray(64)
+
+    def begin(self) -> None:
+        """As new: nothing was heard yet."""
+        self.valid = 0
+        self.rejected = 0
+        self._clear()
+        self._next_tick = 0
+        self._paused = True
+
+    def take(self, byte: int, bad_stop: bool, tick: int) -> bool:
+        """A character, without events: whether it completes a frame, whose HDR and payload `body_at` then gives.
+
+        For who judges millions of frames; `tick` is that of the start bit, below 2^62.
+        """
+        found = self._put_symbol(byte, bad_stop, tick)
+        if found == _FRAME:
+            sync = self._count - self._size
+            for place in range(self._size - 4):
+                self.body[place] = self._data[sync + 2 + place] ^ self._white[place]
+            self._clear()
+        elif found:
+            self._give_out(found, [])
+        return found == _FRAME
+
+    def body_at(self, place: int) -> int:
+        """A byte of the frame that `take` completed last, without whitening: HDR at 0, then the payload."""
+        return self.body[place]
 
     @property
     def pending(self) -> int:
@@ -256,6 +287,10 @@ class Scanner:
         if start > 0:
             self._give_out_damaged(start, events)
         events.append(frame)
+        self._clear()
+
+    def _clear(self) -> None:
+        """No character waits for its event."""
         self._count = 0
         self._last_bad = -1
         self._last_apart = -1

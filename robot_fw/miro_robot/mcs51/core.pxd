@@ -1,4 +1,8 @@
+cimport cython
+
 from miro_robot.mcs51.bus cimport Bus
+
+cdef int _SPREAD_FROM, _SPREAD_TO, _DEPTH
 
 cdef class Core:
     cdef readonly Bus bus
@@ -25,6 +29,21 @@ cdef class Core:
     cdef readonly long long instructions
     cdef readonly long long idle_cycles
     cdef readonly long long faults
+    cdef unsigned char[::1] edges
+    cdef int edge_mask
+    cdef int edge_before
+    cdef int edge_outer[8]
+    cdef int edge_depth
+    cdef public int highest_sp
+
+    cpdef begin_edges(self)
+    @cython.final
+    @cython.locals(place='unsigned int', index=int, count=int)
+    cdef void count_edge(self, int target) noexcept
+    @cython.final
+    cdef void enter_edges(self) noexcept
+    @cython.final
+    cdef void leave_edges(self) noexcept
 
     cdef unsigned int line_at(self, int address) noexcept
     cdef int begin_run(self) except -1

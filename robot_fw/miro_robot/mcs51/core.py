@@ -14,6 +14,10 @@ LAST_CYCLE = 1 << 55
 """Ticks and the counts of a timer up to then fit into 64 bits."""
 
 
+_SPREAD_FROM, _SPREAD_TO = 0x9E35, 0x3C6F  # odd, so that different branches differ in the low bits
+_DEPTH = 8  # interrupts in service whose branches are kept; RETI may be forgotten, so more can come
+
+
 class Core:
     """What instructions work on; `cycles` counts since power-on."""
 
@@ -44,6 +48,7 @@ class Core:
         "limit",
         "until",
         "stop",
+        *("edges", "edge_mask", "edge_before", "edge_outer", "edge_depth", "highest_sp"),  # what was seen
     )
 
     def __init__(self, bus: Bus) -> None:
@@ -71,6 +76,52 @@ class Core:
         self.instructions = 0
         self.idle_cycles = 0
         self.faults = 0
+        self.edges = memoryview(bytearray(1))
+        self.edge_mask = 0  # 0: edges are not counted
+        self.edge_before = 0
+        self.edge_outer = [0] * 8
+        self.edge_depth = 0
+        self.highest_sp = 0  # of a stack that grew since it was last set
+
+    def watch_edges(self, edges: memoryview) -> None:
+        """Counts from now on how often each edge between two taken branches is passed, in `edges`.
+
+        A writable buffer of 2^n bytes, at most 65536; a count goes from 255 to 1. One byte: counts nothing.
+        """
+        size = len(edges)
+        if size & (size - 1) or not 1 <= size <= 0x10000:
+            raise ValueError(f"a map of {size} bytes: give it 1, 2, 4 .. 65536")
+        self.edges = memoryview(edges).cast("B")
+        self.edge_mask = size - 1
+        self.begin_edges()
+
+    def begin_edges(self) -> None:
+        """No branch has been taken yet: after the core was put back to another moment."""
+        self.edge_before = 0
+        self.edge_depth = 0
+        self.highest_sp = self.sp
+
+    def count_edge(self, target: int) -> None:
+        """A branch goes to `target`. The index is that of AFL: this place, and the one before shifted by a bit."""
+        place = (self.at * _SPREAD_FROM + target * _SPREAD_TO) >> 3
+        index = (place ^ self.edge_before) & self.edge_mask
+        self.edge_before = (place & self.edge_mask) >> 1
+        count = self.edges[index] + 1
+        self.edges[index] = (count & 0xFF) + (count >> 8)
+
+    def enter_edges(self) -> None:
+        """An interrupt is taken: its branches do not follow those of the program that it interrupts."""
+        if self.edge_depth < _DEPTH:
+            self.edge_outer[self.edge_depth] = self.edge_before
+        self.edge_depth += 1
+        self.edge_before = 0
+
+    def leave_edges(self) -> None:
+        """The routine is over: what comes next follows the branch before it."""
+        if self.edge_depth:
+            self.edge_depth -= 1
+            if self.edge_depth < _DEPTH:
+                self.edge_before = self.edge_outer[self.edge_depth]
 
     def line_at(self, address: int) -> int:
         """`LINE` of the opcode at `address` and, in the upper half, the address behind its instruction."""

@@ -113,9 +113,7 @@ class Cpu(Executor):
         self.next_mark = _NEVER
         self.marks = 0  # marks passed since interrupts took over
         self.code_limit = 0x10000
-        self.stop_asleep = (
-            0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes the CPU
-        )
+        self.stop_asleep = 0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes it
         self.inspector: Inspector | None = None
         self._erase()
 
@@ -362,6 +360,7 @@ class Cpu(Executor):
             self.marks = 0
         self.idle = 0
         self.pcon &= 0xFF ^ _IDL
+        self.enter_edges()
         self.peripherals.taken(source, self.cycles)
         self.start = self.cycles
         self.at = self.pc
@@ -371,6 +370,7 @@ class Cpu(Executor):
         self.limit = 0
 
     def end_of_interrupt(self) -> None:
+        self.leave_edges()
         self.peripherals.interrupts.leave()
         self._block()
 

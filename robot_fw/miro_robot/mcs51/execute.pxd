@@ -42,6 +42,8 @@ cdef class Executor(Core):
     @cython.final
     cdef inline int branch(self, int offset) noexcept
     @cython.final
+    cdef inline int fork(self, int target) noexcept
+    @cython.final
     cdef inline int call(self, int target) except -1
     @cython.final
     cdef inline int claim(self) except -1

@@ -203,7 +203,7 @@ class Executor(Core):
             elif row == 0x72:  # ORL C,bit
                 self.cy |= self.read_bit(first)
             elif row == 0x73:  # JMP @A+DPTR
-                pc = self.jump((self.a + self.dptr) & 0xFFFF)
+                pc = self.fork((self.a + self.dptr) & 0xFFFF)
             elif row == 0x74:  # MOV A,#imm
                 self.a = first
             elif row == 0x75:  # MOV dir,#imm
@@ -417,7 +417,13 @@ class Executor(Core):
         return target
 
     def branch(self, offset: int) -> int:
-        return self.jump((self.pc + (offset ^ 0x80) - 0x80) & 0xFFFF)
+        return self.fork((self.pc + (offset ^ 0x80) - 0x80) & 0xFFFF)
+
+    def fork(self, target: int) -> int:
+        """A jump that was a choice, or is as short as one."""
+        if self.edge_mask:
+            self.count_edge(target)
+        return self.jump(target)
 
     def call(self, target: int) -> int:
         """PCL first, then PCH: LCALL, ACALL and interrupts alike."""
@@ -430,7 +436,9 @@ class Executor(Core):
     def claim(self) -> None:
         """SP counts up; a byte is about to be stored there."""
         self.sp = (self.sp + 1) & 0xFF
-        if self.sp == 0:
+        if self.sp > self.highest_sp:
+            self.highest_sp = self.sp
+        elif self.sp == 0:
             self.fault(_STACK_OVERFLOW)
 
     def pop(self) -> int:

@@ -1,0 +1,181 @@
+"""A machine put back to one moment over and over: fed through RXD, run until its firmware sleeps or a deadline.
+
+What belongs here: putting back, edges on RXD, how far to run. What does not: what is sent (`program.py`), what is wrong
+with what comes of it (`judge.py`, `referee.py`), and reports.
+
+    saved moment --> machine <-- RXD: levels, as an ideal radio would give them <-- characters of a program
+                        |
+                        +--> edges between branches, stack, event log --> judge
+
+A character begins with the end of the one before it or after a pause, and a bad stop bit is space for three quarters of
+a bit, as on the air (`miro_sim.radio.sender`): the same characters at the same ticks in a world give the same levels.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from miro_exact.clock import NEVER_TICK, TICKS_PER_SECOND
+from miro_exact.state import Flat
+from miro_robot.board import Board
+from miro_robot.harness.judge import Judge
+from miro_robot.harness.program import RESET_TICKS, Program
+from miro_robot.mcs51.cpu import Cpu
+
+LEAD_TICKS = 1200
+"""From the saved moment to the first start bit."""
+SETTLE_TICKS = 30 * TICKS_PER_SECOND // 1000
+"""How long after its last character firmware that sleeps may stay awake."""
+AWAKE_TICKS = 10 * TICKS_PER_SECOND // 1000
+"""How long after the last character a run goes on where firmware never sleeps."""
+AHEAD_TICKS = 240  # an instruction and what looks ahead may overrun a stop by so much
+
+DONE, STOPPED, AWAKE = range(3)
+"""How a run ended: as it should, by a fault or the judge, or without going to sleep."""
+
+_LEAD, _SETTLE, _AWAKE_TICKS, _AHEAD = LEAD_TICKS, SETTLE_TICKS, AWAKE_TICKS, AHEAD_TICKS
+_DONE, _STOPPED, _AWAKE = DONE, STOPPED, AWAKE
+_RESET_TICKS = RESET_TICKS
+_LOOK = TICKS_PER_SECOND // 10_000  # how often it is looked at whether firmware sleeps
+_WAIT = TICKS_PER_SECOND // 1000  # ... and whether what the judge waits for came
+_BURST = 64  # characters on RXD that are not heard yet
+_BAD_STOP, _RESET = 1, 2
+
+
+class Harness:
+    """`machine` is what the state tables of are saved: a `Board`, or something that holds a `Cpu`.
+
+    `bit_ticks`: of the line. The machine is where it shall begin, with nothing on RXD. `sleeps`: whether its firmware
+    does when it has nothing to do.
+    """
+
+    NOT_STATE = (
+        *("machine", "board", "cpu", "judge", "bit_ticks", "begin_tick", "sleeps", "now_tick", "end_tick"),
+        *("_flat", "_state"),
+    )
+
+    def __init__(
+        self, machine: Any, cpu: Cpu, judge: Judge, bit_ticks: int, board: Board | None = None
+    ) -> None:
+        self.machine = machine
+        self.board = board
+        self.cpu = cpu
+        self.judge = judge
+        self.bit_ticks = bit_ticks
+        cpu.rxd.settled_tick = NEVER_TICK
+        cpu.txd.unread = True
+        self.begin_tick = 12 * cpu.cycles
+        self.now_tick = 0
+        self.end_tick = 0  # of the last character of a run
+        self.sleeps = 1
+        self._flat = Flat(machine)
+        self._state = self._flat.save()
+        self._flat.load(self._state)
+        self.sleeps = 1 if self._falls_asleep(self.begin_tick + _SETTLE) else 0
+        self.back()
+
+    def back(self) -> None:
+        """To the moment at which the harness was made."""
+        self._flat.load(self._state)
+        self.cpu.begin_edges()
+        if self.board is not None and len(self.board.faults):
+            self.board.faults.clear()
+        self.now_tick = self.begin_tick
+        self.judge.begin(self.begin_tick)
+
+    def play(self, program: Program) -> int:
+        """Puts the machine back and sends what the program has read. Returns DONE, STOPPED or AWAKE."""
+        self.back()
+        tick = self.begin_tick + _LEAD
+        waiting = 0
+        for place in range(program.count):
+            flaws = program.flaws[place]
+            pause = program.pauses[place]
+            if pause or flaws & _RESET:
+                if flaws & _RESET and self._reset(tick):
+                    return _STOPPED
+                tick += pause
+                if self._run(tick - _AHEAD):
+                    return _STOPPED
+                waiting = 0
+            elif waiting >= _BURST:
+                if self._run(tick - _AHEAD):
+                    return _STOPPED
+                waiting = 0
+            self._character(program.characters[place], flaws & _BAD_STOP, tick)
+            tick += 10 * self.bit_ticks
+            waiting += 1
+        self.end_tick = tick
+        if program.ends_with_reset() and self._reset(tick):
+            return _STOPPED
+        if self._run(tick + program.trailing_ticks()):
+            return _STOPPED
+        return self._settle(tick + program.trailing_ticks())
+
+    def _character(self, value: int, bad_stop: int, tick: int) -> None:
+        bit = self.bit_ticks
+        rxd = self.cpu.rxd
+        rxd.append(tick, 0)
+        for place in range(8):
+            tick += bit
+            rxd.append(tick, value >> place & 1)
+        tick += bit
+        if bad_stop:
+            rxd.append(tick, 0)
+            tick += 3 * bit // 4
+        rxd.append(tick, 1)
+
+    def _reset(self, tick: int) -> int:
+        """The reset pin, a little after `tick`."""
+        tick += _AHEAD
+        if self._run(tick):
+            return 1
+        self._set_reset(1)
+        if self._run(tick + _RESET_TICKS):
+            return 1
+        self._set_reset(0)
+        self.judge.restarted(tick + _RESET_TICKS)
+        return 0
+
+    def _set_reset(self, level: int) -> None:
+        if self.board is not None:
+            self.board.set_reset(level)
+        elif level:
+            self.cpu.hold()
+        else:
+            self.cpu.reset()
+
+    def _run(self, until: int) -> int:
+        """To a tick, and lets the judge look. 1: a fault, or the judge has seen enough."""
+        if until <= self.now_tick:
+            return 0
+        if self.board is not None:
+            stopped = self.board.run(until)
+        else:
+            stopped = self.cpu.run((until + 11) // 12)
+        self.now_tick = until
+        self.judge.look(until)
+        return 1 if stopped or self.judge.code else 0
+
+    def _settle(self, tick: int) -> int:
+        """Until the firmware sleeps and the judge waits for nothing."""
+        if not self.sleeps:
+            return _STOPPED if self._run(tick + _AWAKE_TICKS) else _DONE
+        if not self._falls_asleep(tick + _SETTLE):
+            return _STOPPED if self.judge.code or self._faulted() else _AWAKE
+        while self.judge.waits():
+            if self._run(self.now_tick + _WAIT):
+                return _STOPPED
+        return _DONE
+
+    def _falls_asleep(self, until: int) -> bool:
+        """Whether it does before `until`; no longer than that."""
+        while self.now_tick < until:
+            if self._run(self.now_tick + _LOOK):
+                return False
+            if self.cpu.idle or self.cpu.powered_down:
+                return True
+        return False
+
+    def _faulted(self) -> bool:
+        return self.board is not None and self.board.fault_count > 0

@@ -1,0 +1,57 @@
+cimport cython
+
+cdef int _MOST, _MOST_RESETS, _PAIR, _SEQS, _XOR_OUT
+cdef long long _MOST_TICKS, _PAUSE, _SILENCE, _RESET_TICKS, _UP_TICKS
+cdef int _BYTES, _FRAMES, _SESSION
+cdef int _TEAM, _SERVICE, _ASK
+cdef int _BAD_STOP, _RESET
+
+
+cdef class Program:
+    cdef readonly int how, slot, robots
+    cdef readonly object repair
+    cdef readonly long long character_ticks
+    cdef unsigned char characters[2048]
+    cdef unsigned char flaws[2048]
+    cdef long long pauses[2048]
+    cdef readonly int count, frames
+    cdef readonly long long length
+    cdef bytes _sync, _lead, _white
+    cdef int _payload
+    cdef unsigned int _layout
+    cdef unsigned short _table[256]
+    cdef unsigned char _body[64]
+    cdef const unsigned char[::1] _data
+    cdef Py_ssize_t _place, _end
+    cdef int _seq, _first, _size, _damage_at, _damage, _cut, _stop_at, _flags, _resets
+    cdef long long _wait
+
+    cpdef int read(self, data) except -1
+    cpdef long long trailing_ticks(self) noexcept
+    cpdef bint ends_with_reset(self) noexcept
+    cdef bint _has_room(self) noexcept
+    @cython.locals(value=int)
+    cdef int _next(self) noexcept
+    @cython.locals(place=int)
+    cdef void _put(self, int value) noexcept
+    cdef void _pause(self, long long ticks) noexcept
+    cdef void _forget_flaws(self) noexcept
+    @cython.locals(hdr=int)
+    cdef int _one_frame(self) except -1
+    cdef int _operation(self, int kind) except -1
+    @cython.locals(hdr=int)
+    cdef int _frame_operation(self, int kind) except -1
+    @cython.locals(place=int)
+    cdef void _payload_from_input(self) noexcept
+    @cython.locals(place=int, value=int)
+    cdef void _own_velocities(self) noexcept
+    @cython.locals(body='unsigned char *', place=int, register='unsigned int', kind=int)
+    cdef void _seal(self, int hdr) noexcept
+    @cython.locals(place=int, value=int)
+    cdef int _foreign(self) except -1
+    @cython.locals(first=int, size=int, place=int)
+    cdef void _again(self) noexcept
+    cdef void _begin_frame(self) noexcept
+    @cython.locals(before=int)
+    cdef void _put_of_frame(self, int value) noexcept
+    cdef void _end_frame(self) noexcept

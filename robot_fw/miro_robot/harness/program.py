@@ -1,0 +1,361 @@
+"""The bytes of a fuzz input as what a robot hears: characters, pauses, bad stop bits, resets.
+
+What belongs here: the three ways to read an input, and sealing frames (number, CRC, whitening), so that a fuzzer that
+knows nothing of them gets past them. What does not: sending (`harness.py`) and judging (`referee.py`).
+
+    BYTES       each byte is a character; all follow each other without a pause
+    FRAMES      HDR and payload of one frame after the other, sealed. Bits 7 and 6 of HDR are the type, bits 2 to 0 how
+                many steps the number goes on (1 to 8)
+    SESSION     operations: a byte whose low nibble chooses, then its arguments; what is missing at the end is 0
+
+    nibble  operation       arguments
+    0 1 2   TEAM            own left, own right (int16, low byte first); the other robots stop
+    3 4     ASK             the same as a question to robot (number mod N)
+    5       SERVICE         payload
+    6       FULL            payload of a team frame
+    7       FRAME           HDR as it is (its number is not counted), payload
+    8       AGAIN           - the wire bytes of the last frame once more
+    9       RAW             count - 1 (low 5 bits), so many characters
+    A       PAUSE           0.1 ms to 25.6 ms, in steps of 0.1 ms
+    B       SILENCE         3 ms to 768 ms, in steps of 3 ms
+    C       DAMAGE          place in the next frame, bits to turn over
+    D       CUT             characters that the next frame has
+    E       STOP_BIT        place in the next frame of a bad stop bit
+    F       RESET           - the reset pin, and 5 ms to come up
+
+Velocity -32768 is an encoding error, which no host sends: -32767 goes out in its place.
+
+A wire format of somebody else's comes in as `repair`, a function from a frame's body to its characters; its bodies are
+a count (low 5 bits) and so many bytes, for all frame operations alike.
+
+Long because one class reads the input and writes the characters, and a compiled class is one file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from miro_exact.clock import TICKS_PER_SECOND
+from miro_protocol import crc
+from miro_protocol.table import SEQ_MODULUS, FrameType, downlink
+from miro_protocol.whitening import STRING
+
+BYTES, FRAMES, SESSION = range(3)
+INPUTS = ("bytes", "frames", "session")
+"""By these numbers."""
+OPERATIONS = (
+    *("team", "team", "team", "ask", "ask", "service", "full", "frame"),
+    *("again", "raw", "pause", "silence", "damage", "cut", "stop bit", "reset"),
+)
+"""By nibble."""
+
+MOST_CHARACTERS = 2048
+MOST_TICKS = 3 * TICKS_PER_SECOND
+RESET_TICKS = 48
+"""How long the reset pin is up: two machine cycles are enough, these are four (AT89C52 data sheet 0313H)."""
+UP_TICKS = 5 * TICKS_PER_SECOND // 1000
+
+_MOST = MOST_CHARACTERS
+_MOST_TICKS = MOST_TICKS
+_MOST_RESETS = 16
+_PAUSE = TICKS_PER_SECOND // 10_000
+_SILENCE = 3 * TICKS_PER_SECOND // 1000
+_RESET_TICKS, _UP_TICKS = RESET_TICKS, UP_TICKS
+_BYTES, _FRAMES, _SESSION = BYTES, FRAMES, SESSION
+_TEAM, _SERVICE, _ASK = FrameType.TEAM, FrameType.SERVICE, FrameType.TEAM_ASK
+_SEQS = SEQ_MODULUS
+_PAIR = downlink(3).payload_size // 3  # two int16
+_XOR_OUT = crc.XOR_OUT
+_BAD_STOP, _RESET = 1, 2
+
+
+class Program:
+    """Reads inputs for robot `slot` of `robots`. After `read`: `count` characters, each with the pause before it.
+
+    `how` is BYTES, FRAMES or SESSION. `repair`: another wire format. `character_ticks`: of the line.
+    """
+
+    NOT_STATE = (
+        *(
+            "how",
+            "slot",
+            "robots",
+            "repair",
+            "character_ticks",
+            "characters",
+            "flaws",
+            "pauses",
+            "count",
+            "length",
+        ),
+        *(
+            "frames",
+            "_sync",
+            "_lead",
+            "_payload",
+            "_layout",
+            "_white",
+            "_table",
+            "_place",
+            "_end",
+            "_data",
+            "_seq",
+        ),
+        *(
+            "_first",
+            "_size",
+            "_damage_at",
+            "_damage",
+            "_cut",
+            "_stop_at",
+            "_wait",
+            "_flags",
+            "_resets",
+            "_body",
+        ),
+    )
+
+    def __init__(
+        self,
+        how: int,
+        slot: int = 0,
+        robots: int = 3,
+        repair: Callable[[bytes], bytes] | None = None,
+        character_ticks: int = 0,
+    ) -> None:
+        if not BYTES <= how <= SESSION:
+            raise ValueError(f"how = {how}: give BYTES, FRAMES or SESSION")
+        form = downlink(robots)
+        self.how = how
+        self.slot = slot
+        self.robots = robots
+        self.repair = repair
+        self.character_ticks = character_ticks or form.character_ticks
+        self.characters = bytearray(2048)
+        self.flaws = bytearray(2048)  # bad stop bit; reset before it
+        self.pauses = [0] * 2048
+        self.count = 0
+        self.frames = 0  # how many frames were sealed
+        self.length = 0  # ticks from the begin to the end of the last character, without waiting at the end
+        self._sync = form.sync
+        self._lead = form.lead
+        self._payload = form.payload_size
+        self._layout = crc.register(bytes([form.layout]))
+        self._white = STRING
+        self._table = crc.byte_table()
+        self._body = bytearray(64)
+        self._data: bytes | bytearray | memoryview = b""
+        self._place = 0
+        self._end = 0
+        self._seq = 0
+        self._first = 0  # where the last frame begins
+        self._size = 0
+        self._damage_at = -1
+        self._damage = 0
+        self._cut = -1
+        self._stop_at = -1
+        self._wait = 0  # ticks of pause before the next character
+        self._flags = 0
+        self._resets = 0
+
+    def read(self, data: bytes | bytearray | memoryview) -> int:
+        """Any bytes at all; what is too much is left out. Returns how many characters there are."""
+        self.count = 0
+        self.frames = 0
+        self.length = 0
+        self._data = data
+        self._place = 0
+        self._end = len(data)
+        self._seq = 0
+        self._size = 0
+        self._forget_flaws()
+        self._wait = 0
+        self._flags = 0
+        self._resets = 0
+        if self.how == _BYTES:
+            while self._place < self._end:
+                self._put(self._next())
+        elif self.how == _FRAMES:
+            while self._place < self._end and self._has_room():
+                self._one_frame()
+        else:
+            while self._place < self._end and self._has_room():
+                self._operation(self._next() & 0x0F)
+        return self.count
+
+    def trailing_ticks(self) -> int:
+        """The pause after the last character."""
+        return self._wait
+
+    def ends_with_reset(self) -> bool:
+        """Whether the reset pin goes up after the last character."""
+        return self._flags & _RESET != 0
+
+    def character(self, place: int) -> tuple[int, bool, bool, int]:
+        """Value, whether its stop bit is bad, whether a reset comes before it, and the pause before it in ticks."""
+        flaws = self.flaws[place]
+        return self.characters[place], bool(flaws & _BAD_STOP), bool(flaws & _RESET), self.pauses[place]
+
+    def _has_room(self) -> bool:
+        return self.count < _MOST and self.length < _MOST_TICKS
+
+    def _next(self) -> int:
+        """The next byte of the input, 0 behind its end."""
+        if self._place >= self._end:
+            return 0
+        value = self._data[self._place]
+        self._place += 1
+        return value
+
+    def _put(self, value: int) -> None:
+        """One more character."""
+        place = self.count
+        if place >= _MOST or self.length >= _MOST_TICKS:
+            return
+        self.characters[place] = value
+        self.flaws[place] = self._flags
+        self.pauses[place] = self._wait
+        self.length += self._wait + self.character_ticks
+        self._wait = 0
+        self._flags = 0
+        self.count = place + 1
+
+    def _pause(self, ticks: int) -> None:
+        if self.length + self._wait + ticks <= _MOST_TICKS:
+            self._wait += ticks
+
+    def _forget_flaws(self) -> None:
+        self._damage_at = -1
+        self._cut = -1
+        self._stop_at = -1
+
+    # ---- operations ----------------------------------------------------------------------------------------
+
+    def _one_frame(self) -> None:
+        """FRAMES: HDR and payload."""
+        if self.repair is not None:
+            self._foreign()
+        else:
+            hdr = self._next()
+            self._seq = (self._seq + (hdr & 7) + 1) % _SEQS
+            self._payload_from_input()
+            self._seal((hdr & 0xC0) | self._seq)
+
+    def _operation(self, kind: int) -> None:
+        if kind < 9 and kind != 8:
+            self._frame_operation(kind)
+        elif kind == 8:
+            self._again()
+        elif kind == 9:
+            for _ in range((self._next() & 0x1F) + 1):
+                self._put(self._next())
+        elif kind == 10:
+            self._pause((self._next() + 1) * _PAUSE)
+        elif kind == 11:
+            self._pause((self._next() + 1) * _SILENCE)
+        elif kind == 12:
+            self._damage_at = self._next()
+            self._damage = self._next()
+        elif kind == 13:
+            self._cut = self._next()
+        elif kind == 14:
+            self._stop_at = self._next()
+        elif self._resets < _MOST_RESETS and not self._flags & _RESET:
+            self._resets += 1
+            self._pause(_UP_TICKS + _RESET_TICKS)
+            self._flags |= _RESET
+
+    def _frame_operation(self, kind: int) -> None:
+        if self.repair is not None:
+            self._foreign()
+        elif kind == 7:
+            hdr = self._next()
+            self._payload_from_input()
+            self._seal(hdr)
+        else:
+            self._seq = (self._seq + 1) % _SEQS
+            if kind >= 5:
+                self._payload_from_input()
+            else:
+                self._own_velocities()
+            self._seal((_SERVICE if kind == 5 else _ASK if kind in (3, 4) else _TEAM) << 6 | self._seq)
+
+    def _payload_from_input(self) -> None:
+        for place in range(self._payload):
+            self._body[1 + place] = self._next()
+
+    def _own_velocities(self) -> None:
+        for place in range(self._payload):
+            self._body[1 + place] = 0
+        for place in range(_PAIR):
+            value = self._next()
+            if self.slot < self.robots:
+                self._body[1 + _PAIR * self.slot + place] = value
+
+    # ---- frames --------------------------------------------------------------------------------------------
+
+    def _seal(self, hdr: int) -> None:
+        """Number, CRC and whitening; then what is to be wrong with it."""
+        body = self._body
+        kind = hdr >> 6
+        body[0] = hdr
+        if kind in (_TEAM, _ASK):
+            for place in range(1, self._payload, 2):
+                if body[place] == 0 and body[place + 1] == 0x80:
+                    body[place] = 1  # -32768
+        register = self._layout
+        for place in range(self._payload + 1):
+            register = (register >> 8) ^ self._table[(register ^ body[place]) & 0xFF]
+        register ^= _XOR_OUT
+        body[self._payload + 1] = register & 0xFF
+        body[self._payload + 2] = register >> 8
+        self._begin_frame()
+        for place in range(len(self._lead)):
+            self._put_of_frame(self._lead[place])
+        for place in range(len(self._sync)):
+            self._put_of_frame(self._sync[place])
+        for place in range(self._payload + 3):
+            self._put_of_frame(body[place] ^ self._white[place])
+        self._end_frame()
+
+    def _foreign(self) -> None:
+        """A frame of a wire format that Python repairs."""
+        body = bytearray((self._next() & 0x1F) + 1)
+        for place in range(len(body)):
+            body[place] = self._next()
+        self._begin_frame()
+        assert self.repair is not None
+        for value in self.repair(bytes(body)):
+            self._put_of_frame(value)
+        self._end_frame()
+
+    def _again(self) -> None:
+        first = self._first
+        size = self._size
+        if size == 0:
+            return
+        self._begin_frame()
+        for place in range(size):
+            self._put_of_frame(self.characters[first + place])
+        self._end_frame()
+
+    def _begin_frame(self) -> None:
+        self._first = self.count
+        self._size = 0
+        self.frames += 1
+
+    def _put_of_frame(self, value: int) -> None:
+        if self._cut >= 0 and self._size >= self._cut:
+            return
+        if self.count >= _MOST:
+            return
+        if self._size == self._damage_at:
+            value ^= self._damage
+        if self._size == self._stop_at:
+            self._flags |= _BAD_STOP
+        before = self.count
+        self._put(value)
+        self._size += self.count - before
+
+    def _end_frame(self) -> None:
+        self._forget_flaws()
