@@ -33,6 +33,7 @@ cdef class Board(Bus):
     cdef long long busy_writes
     cdef int contention
     cdef readonly int held
+    cdef int forced
     cdef readonly int powered
     cdef int bus_levels
     cdef unsigned char bank[13]

@@ -58,11 +58,9 @@ the AT89S52 data sheet (1919D), section 28. Neither says when P2 goes back to it
 _WR, _RD = 0x40, 0x80  # pins of P3
 _LEFT_CS, _LEFT_RD, _LEFT_WR, _LEFT_PS, _LEFT_RST = range(5)  # inputs of the two LM629: SIDES by CHIP_INPUTS
 _RIGHT_CS, _RIGHT_RD, _RIGHT_WR, _RIGHT_PS, _RIGHT_RST = range(5, 10)
-_PINS = 10
-_NEVER = NEVER_TICK
+_PINS, _NEVER = 10, NEVER_TICK
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
-_RESET_PULSE = RESET_PULSE
-_FAULT, _REACHED, _RECEIVED, _SENT = FAULT, REACHED, RECEIVED, SENT
+_RESET_PULSE, _FAULT, _REACHED, _RECEIVED, _SENT = RESET_PULSE, FAULT, REACHED, RECEIVED, SENT
 RESET_PULSE_TICKS = LIMITS[RESET_PULSE].ticks
 
 
@@ -92,7 +90,7 @@ class Board(Bus):
     NOT_STATE = (
         "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_bank", "pin_bit", "pin_inverted", "hi_port", "hi_bit", "hi_inverted",
-        "hi_count", "hi_side", "hi_seen", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus",
+        "hi_count", "hi_side", "hi_seen", "forced", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus",
         "log", "pins",
         # the bus is at rest between two instructions: `after_load` sets both to that
         "left_timing", "right_timing",
@@ -125,7 +123,7 @@ class Board(Bus):
         self.probe: Probe | None = None
         self.busy_writes = 0
         self.contention = 0
-        self.held = 0  # the level of RST
+        self.held = self.forced = 0  # the level of RST; whether pins change by RST or the supply
         self.powered = 1
         self.bus_levels = 0xFF
         self.bank = bytearray([0xFF] * (CONSTANT_BANK + 1))
@@ -245,12 +243,15 @@ class Board(Bus):
     def set_reset(self, level: int) -> None:
         """The level of the CPU's RST pin from now on, between two instructions: 1 holds it in reset.
 
-        The two LM629 have a reset of their own, on a port pin: they go on until the firmware resets them.
+        The two LM629 have a reset of their own, on a port pin: they go on until the firmware resets them. That all
+        ports go high at once is no fault of the firmware.
         """
+        self.forced = 1
         if level and not self.held:
             self.cpu.hold()
         elif self.held and not level and self.powered:
             self.cpu.reset()
+        self.forced = 0
         self.held = level
 
     def set_power(self, on: int) -> None:
@@ -264,12 +265,14 @@ class Board(Bus):
         if on and not self.held:
             self.cpu.reset()
         if not on:
+            self.forced = 1
             self.cpu.hold()
             for address in range(256):
                 self.cpu.poke_iram(address, 0)
         tick = self.cpu.cycles * CYCLE_TICKS
         self.sync(tick)
         self._drive_chips(tick)
+        self.forced = 0
 
     # ---- from chip to bridge and CPU ----------------------------------------------------------------------
 
@@ -462,13 +465,14 @@ class Board(Bus):
         self._note(kind, pc, tick, "")
 
     def _note(self, kind: int, pc: int, tick: int, detail: str) -> None:
-        self.fault_count += 1
-        self.log.note(_FAULT, tick, kind, pc)
-        if len(self.faults) < FAULTS_KEPT:
-            symbol = self.symbols.name_at(pc) if self.symbols is not None else ""
-            self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol, detail))
-        if self.stop_on_fault:
-            self.cpu.request_stop()
+        if not self.forced:
+            self.fault_count += 1
+            self.log.note(_FAULT, tick, kind, pc)
+            if len(self.faults) < FAULTS_KEPT:
+                symbol = self.symbols.name_at(pc) if self.symbols is not None else ""
+                self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol, detail))
+            if self.stop_on_fault:
+                self.cpu.request_stop()
 
     # ---- state --------------------------------------------------------------------------------------------
 

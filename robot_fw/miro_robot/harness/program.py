@@ -322,7 +322,8 @@ class Program:
         """A frame of a wire format that Python repairs."""
         body = bytearray((self._next() & 0x1F) + 1)
         for place in range(len(body)):
-            body[place] = self._next()
+            value = self._next()  # on its own: Cython 3.2 calls a C function three times in an item of a bytearray
+            body[place] = value
         self._begin_frame()
         assert self.repair is not None
         for value in self.repair(bytes(body)):

@@ -6,7 +6,7 @@ from miro_robot.event_log cimport EventLog
 from miro_robot.harness.judge cimport Judge
 
 cdef int _NO_FAULT, _LM629, _MAIN_LOOP, _STACK, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS
-cdef long long _ACTING, _ANSWER, _TOLERANCE, _NEVER, _CHARACTER, _TO_RI, _TO_TI
+cdef long long _ACTING, _ANSWER, _TOLERANCE, _TESTING, _NEVER, _CHARACTER, _TO_RI, _TO_TI
 cdef int _SATURATION, _TEAM, _ASK, _SEQS, _SLOT_MASK, _ANSWER_SIZE
 cdef int _RECEIVED, _SENT, _COMMAND, _FAULT
 cdef int _RESET, _STT, _LTRJ, _COMMAND_ERROR
@@ -27,7 +27,7 @@ cdef class Referee(Judge):
     cdef long long velocity[2]
     cdef int order[2]
     cdef long long speed[2]
-    cdef long long fresh_tick, told_tick, wanted_tick
+    cdef long long fresh_tick, heard_tick, told_tick, wanted_tick
     cdef long long wanted[2]
     cdef long long pairs[128]
     cdef int pair_end
@@ -45,8 +45,10 @@ cdef class Referee(Judge):
     cpdef look(self, long long tick)
     cdef void _found(self, int code, long long tick) noexcept
     cdef void _fault(self, long long tick, int kind, int pc) noexcept
-    @cython.locals(what=int, since='long long')
+    @cython.locals(what=int)
     cdef void _pass(self, long long tick) noexcept
+    @cython.locals(latest='long long')
+    cdef void _pass_silence(self, int what, long long tick) noexcept
     cdef bint _fulfilled(self, int what, int side) noexcept
     cdef int _received(self, long long tick, int good_stop, int value) except -1
     @cython.locals(hdr=int, kind=int, seq=int, fresh=bint, team=bint)

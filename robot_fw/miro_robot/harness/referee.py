@@ -55,11 +55,12 @@ NAMES = (
 ACTING_TICKS = 10 * TICKS_PER_MS
 ANSWER_TICKS = 30 * TICKS_PER_MS
 TOLERANCE_TICKS = TICKS_PER_MS // 2
+TESTING_TICKS = 2 * TICKS_PER_MS
 
 _NO_FAULT, _LM629, _MAIN_LOOP, _STACK, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS = range(
     1, 12
 )
-_ACTING, _ANSWER, _TOLERANCE = ACTING_TICKS, ANSWER_TICKS, TOLERANCE_TICKS
+_ACTING, _ANSWER, _TOLERANCE, _TESTING = ACTING_TICKS, ANSWER_TICKS, TOLERANCE_TICKS, TESTING_TICKS
 _SILENCES = (FAILSAFE_STOP_TICKS, FAILSAFE_OFF_TICKS)
 _NEVER = NEVER_TICK
 _CHARACTER = HOST_CHARACTER_TICKS
@@ -86,7 +87,17 @@ class Referee(Judge):
     NOT_STATE: tuple[str, ...] = (
         *Judge.NOT_STATE,
         *("board", "slot", "robots", "window", "telemetry", "freshness", "read", "pc", "accepted"),
-        *("control", "velocity", "order", "speed", "fresh_tick", "told_tick", "wanted_tick", "wanted"),
+        *(
+            "control",
+            "velocity",
+            "order",
+            "speed",
+            "fresh_tick",
+            "heard_tick",
+            "told_tick",
+            "wanted_tick",
+            "wanted",
+        ),
         *("pairs", "pair_ticks", "pair_end", "silence_tick", "in_silence", "silences"),
         *("asked_tick", "asked_seq", "allowed", "before_seq", "payload", "log"),
     )
@@ -112,6 +123,7 @@ class Referee(Judge):
         self.order = [0] * 2
         self.speed = [0] * 2
         self.fresh_tick = -1  # of the last fresh frame
+        self.heard_tick = -1  # of the last character
         self.told_tick = -1  # of an order to move whose pair is not judged yet
         self.wanted_tick = _NEVER  # until when the wheels have to be told `wanted`
         self.wanted = [0] * 2
@@ -139,6 +151,7 @@ class Referee(Judge):
         self.telemetry.begin()
         self.freshness.last_seq = None
         self.fresh_tick = -1
+        self.heard_tick = -1
         self.told_tick = -1
         self.wanted_tick = _NEVER
         self.asked_tick = _NEVER
@@ -205,11 +218,18 @@ class Referee(Judge):
         if tick > self.asked_tick + _TO_TI:
             self._found(_ANSWERS, self.asked_tick)
         for what in range(2):
-            since = self.silence_tick[what]
-            if since >= 0 and tick > since + self.silences[what] + _TOLERANCE:
-                if not (self._fulfilled(what, 0) and self._fulfilled(what, 1)):
-                    self._found(_STOPS + what, since + self.silences[what] + _TOLERANCE)
-                self.silence_tick[what] = -1
+            if self.silence_tick[what] >= 0:
+                self._pass_silence(what, tick)
+
+    def _pass_silence(self, what: int, tick: int) -> None:
+        """A robot that receives characters then may be testing a frame."""
+        latest = self.silence_tick[what] + self.silences[what] + _TOLERANCE
+        if latest - _TESTING <= self.heard_tick <= latest:
+            latest += _TESTING
+        if tick > latest:
+            if not (self._fulfilled(what, 0) and self._fulfilled(what, 1)):
+                self._found(_STOPS + what, latest)
+            self.silence_tick[what] = -1
 
     def _fulfilled(self, what: int, side: int) -> bool:
         """Whether a wheel is as it has to be in silence: told to stop (0), off (1)."""
@@ -220,6 +240,7 @@ class Referee(Judge):
     # ---- what is heard -------------------------------------------------------------------------------------
 
     def _received(self, tick: int, good_stop: int, value: int) -> None:
+        self.heard_tick = tick
         if self.window.take(value, good_stop == 0, tick - _TO_RI):
             self._frame(tick - _TO_RI)
 
