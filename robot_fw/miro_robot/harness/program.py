@@ -322,7 +322,7 @@ class Program:
         """A frame of a wire format that Python repairs."""
         body = bytearray((self._next() & 0x1F) + 1)
         for place in range(len(body)):
-            value = self._next()  # on its own: Cython 3.2 calls a C function three times in an item of a bytearray
+            value = self._next()  # on its own: Cython 3.2 would call it three times in the next line
             body[place] = value
         self._begin_frame()
         assert self.repair is not None

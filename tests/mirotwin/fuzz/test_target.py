@@ -150,7 +150,9 @@ def test_firmware_that_does_not_listen_is_refused(tmp_path):
 def stop_after_ms(target, waited):
     """When the wheels are told to stop, after the end of a fresh frame, while a frame with a bad CRC comes in then."""
     begun = target.board.log.end
-    code = target.run(b"\x00\x10\x00\x10\x00\x0b\x18" + bytes([0x0A, waited]) + b"\x0c\x1e\x01\x00\x07\x00\x07\x00\x0b\x10")
+    code = target.run(
+        b"\x00\x10\x00\x10\x00\x0b\x18" + bytes([0x0A, waited]) + b"\x0c\x1e\x01\x00\x07\x00\x07\x00\x0b\x10"
+    )
     assert code == 0, target.finding
     events = [target.board.log.event(serial) for serial in range(begun, target.board.log.end)]
     stop = [tick for tick, kind, told, *_ in events if kind == event_log.COMMAND and told & 0xFF == 1][2]
@@ -163,5 +165,7 @@ def test_a_robot_that_tests_a_frame_stops_when_the_test_is_over():
     after_ms = [stop_after_ms(target, waited) for waited in range(30)]
     assert max(after_ms) < 112.0
     assert [late for late in after_ms if late > 110.6]
-    _, checks = world_of(target, b"\x00\x10\x00\x10\x00\x0b\x18\x0a\x0e\x0c\x1e\x01\x00\x07\x00\x07\x00\x0b\x10", JUDGED)
+    _, checks = world_of(
+        target, b"\x00\x10\x00\x10\x00\x0b\x18\x0a\x0e\x0c\x1e\x01\x00\x07\x00\x07\x00\x0b\x10", JUDGED
+    )
     assert not checks.failures
