@@ -21,6 +21,7 @@ cdef class Harness:
     cdef bytes _state
 
     cpdef back(self)
+    cdef int _forget_records(self, Board board) except -1
     @cython.locals(tick='long long', pause='long long', place=int, flaws=int, waiting=int)
     cpdef int play(self, Program program) except -1
     @cython.locals(bit='long long', place=int, rxd=Line)

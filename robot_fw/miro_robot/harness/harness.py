@@ -78,10 +78,16 @@ class Harness:
         """To the moment at which the harness was made."""
         self._flat.load(self._state)
         self.cpu.begin_edges()
-        if self.board is not None and len(self.board.faults):
-            self.board.faults.clear()
+        if self.board is not None:
+            self._forget_records(self.board)
         self.now_tick = self.begin_tick
         self.judge.begin(self.begin_tick)
+
+    def _forget_records(self, board: Board) -> None:
+        """What observers could have read: it would fill the memory."""
+        board.faults.clear()
+        board.left.commands.clear()
+        board.right.commands.clear()
 
     def play(self, program: Program) -> int:
         """Puts the machine back and sends what the program has read. Returns DONE, STOPPED or AWAKE."""

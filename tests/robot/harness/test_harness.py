@@ -54,6 +54,17 @@ def test_the_same_input_passes_the_same_edges_whatever_came_between(harness):
     assert (harness.cpu.cycles, harness.cpu.pc, harness.now_tick) == after
 
 
+def test_runs_leave_nothing_behind_that_grows(harness):
+    sizes = set()
+    for _ in range(5):
+        harness.play(program(b"\x00\x10\x00\x20\x00" * 3))
+        chips = harness.board.left, harness.board.right
+        sizes.add(
+            (*(len(chip.commands) for chip in chips), len(harness.board.faults), len(harness.cpu.txd.ticks))
+        )
+    assert len(sizes) == 1
+
+
 def test_other_inputs_pass_other_edges(harness):
     maps = []
     for data in (b"", b"\x09\x00\x55", b"\x00\x10\x00\x20\x00", b"\x00\x10\x00\x20\x80", b"\x0b\xa0"):
