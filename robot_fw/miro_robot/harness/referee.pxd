@@ -53,6 +53,8 @@ cdef class Referee(Judge):
     cdef int _received(self, long long tick, int good_stop, int value) except -1
     @cython.locals(hdr=int, kind=int, seq=int, fresh=bint, team=bint)
     cdef int _frame(self, long long tick) except -1
+    @cython.locals(side=int)
+    cdef bint _stops_already(self) noexcept
     @cython.locals(place=int, side=int, word=int)
     cdef bint _read_pair(self) noexcept
     @cython.locals(side=int, opcode=int, control=int, backward=bint)

@@ -257,13 +257,20 @@ class Referee(Judge):
             self.silence_tick[0] = tick + _CHARACTER
             self.silence_tick[1] = tick + _CHARACTER
             if team:
-                self.wanted_tick = tick + _ACTING
+                self.wanted_tick = _NEVER if self._stops_already() else tick + _ACTING
             if kind == _ASK and seq % self.robots == self.slot:
                 if self.asked_tick == _NEVER:
                     self.asked_tick = tick + _ANSWER
                 self.before_seq = self.asked_seq
                 self.asked_seq = seq
                 self.allowed = _ANSWER_SIZE
+
+    def _stops_already(self) -> bool:
+        """Whether velocity 0 is wanted, and both wheels are told so with their loops closed."""
+        for side in range(2):
+            if self.wanted[side] != 0 or self.order[side] == _OFF_ORDER or not self._fulfilled(0, side):
+                return False
+        return True
 
     def _read_pair(self) -> bool:
         """What the team frame has for this robot; False if it is not to be acted on."""

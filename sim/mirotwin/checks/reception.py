@@ -146,7 +146,7 @@ class ActsCheck(Check, frozen=True, kw_only=True):
 
 
 class ActsWithin(ActsCheck, frozen=True, kw_only=True, tag="acts_within_ms"):
-    """On each fresh team frame both wheels are told its velocities in time."""
+    """On each fresh team frame both wheels are told its velocities in time, unless that is 0 and they stop already."""
 
 
 class BackInSync(ActsCheck, frozen=True, kw_only=True, tag="back_in_sync_within_ms"):
@@ -193,7 +193,12 @@ class ActsJudge(Judge[ActsCheck]):
         words = words_of(frame, self.subject)
         if words is not None:
             self.judged += 1
-            self.waiting.append((frame.last_tick + self.within_ticks, words))
+            if words != (0, 0) or not self._stopping():
+                self.waiting.append((frame.last_tick + self.within_ticks, words))
+
+    def _stopping(self) -> bool:
+        """Whether both wheels are told to stop, with their loops closed: velocity 0 says nothing new to them."""
+        return all(order.what != "off" and not order.moves for order in self.orders.last.values())
 
     def until(self, tick: int) -> None:
         while self.waiting and tick > self.waiting[0][0]:

@@ -147,6 +147,15 @@ def test_firmware_that_does_not_listen_is_refused(tmp_path):
         target_for(load_hex(file))
 
 
+def test_wheels_that_stop_already_need_no_new_order_for_velocity_0(shipped):
+    acceleration = b"\x05\x00\x02\x10" + bytes(9)
+    stopped = b"\x00" + bytes(4)
+    data = acceleration + b"\x00\x00\x00\x00\x04" + acceleration + stopped + stopped + b"\x0a\x80"
+    assert shipped.run(data) == 0, shipped.finding
+    _, checks = world_of(shipped, data, JUDGED)
+    assert not checks.failures
+
+
 def stop_after_ms(target, waited):
     """When the wheels are told to stop, after the end of a fresh frame, while a frame with a bad CRC comes in then."""
     begun = target.board.log.end
