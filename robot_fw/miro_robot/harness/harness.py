@@ -21,6 +21,7 @@ from miro_robot.board import Board
 from miro_robot.harness.judge import Judge
 from miro_robot.harness.program import RESET_TICKS, Program
 from miro_robot.mcs51.cpu import Cpu
+from miro_robot.plant import Plant
 
 LEAD_TICKS = 1200
 """From the saved moment to the first start bit."""
@@ -64,6 +65,9 @@ class Harness:
         self.bit_ticks = bit_ticks
         cpu.rxd.settled_tick = NEVER_TICK
         cpu.txd.unread = True
+        if board is not None and type(board.plant) is Plant:
+            board.left.pulses = 0  # the motors are unplugged
+            board.right.pulses = 0
         self.begin_tick = 12 * cpu.cycles
         self.now_tick = 0
         self.end_tick = 0  # of the last character of a run

@@ -40,6 +40,7 @@ cdef class MotorAxis:
     cdef public long long threshold, real_position, real_velocity, index_position, breakpoint
     cdef public int breakpoint_armed, breakpoint_side, excessive
     cdef public int pwm, pwm_magnitude, sign, hi
+    cdef public int pulses
 
     cpdef set_reset(self, long long tick, int level)
     cpdef _enter_reset(self, int mode, int lock, long long until_tick)

@@ -94,7 +94,7 @@ class MotorAxis:
             "clamps",
             "rates_of_buffer",
         ),
-        *("commands", "encoder_edges", "log", "side"),
+        *("commands", "encoder_edges", "log", "side", "pulses"),
         *("hi", "writes_while_busy"),  # copies of what the parts hold
     )
 
@@ -122,6 +122,7 @@ class MotorAxis:
         self.encoder_edges: list[tuple[int, int, int]] | None = None
         self.log: EventLog | None = None
         self.side = 0
+        self.pulses = 1  # 0: nobody sees the magnitude pin, which stays low
         self.writes_while_busy = 0
         self.reset_level = 1
         self.reset_tick = 0
@@ -225,7 +226,7 @@ class MotorAxis:
             self.sample_tick = now + _SAMPLE_TICKS
             self._sample(now)
         self.pwm = 0
-        if self.pwm_magnitude == 0:
+        if self.pwm_magnitude == 0 or self.pulses == 0:
             self.next_tick = self.sample_tick
         elif self.pulse_late:
             self.next_tick = now + _PWM_TICKS - 16 * self.pwm_magnitude

@@ -54,6 +54,22 @@ def test_the_same_input_passes_the_same_edges_whatever_came_between(harness):
     assert (harness.cpu.cycles, harness.cpu.pc, harness.now_tick) == after
 
 
+def test_firmware_cannot_tell_whether_the_pulses_for_unplugged_motors_are_drawn(harness):
+    drawn = harness_for(board_with(load_hex(image_path())))
+    drawn.board.left.pulses = drawn.board.right.pulses = 1
+    data = b"\x03\x00\x10\x00\x20\x0b\x05\x03\x00\x20\x00\xf0\x05\x00\x01\x99\x00\x11\x00\x22\x0b\xb0"
+    edges = bytearray(8192), bytearray(8192)
+    seen = []
+    for one, counted in zip((harness, drawn), edges, strict=True):
+        one.cpu.watch_edges(memoryview(counted))
+        begun = one.board.log.end
+        assert one.play(program(data)) == DONE
+        events = [one.board.log.event(serial) for serial in range(begun, one.board.log.end)]
+        seen.append((events, one.cpu.cycles, one.cpu.instructions, bytes(map(one.cpu.peek_iram, range(256)))))
+    assert seen[0] == seen[1]
+    assert edges[0] == edges[1]
+
+
 def test_runs_leave_nothing_behind_that_grows(harness):
     sizes = set()
     for _ in range(5):
