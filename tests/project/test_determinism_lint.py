@@ -16,7 +16,12 @@ PACKAGES = (
 )
 
 # The edge: what people see of a run, never what the run is made of.
-EDGE = ("sim/mirotwin/cli/", "sim/mirotwin/report/figure.py", "sim/mirotwin/bridges/pacing.py")
+EDGE = (
+    "sim/mirotwin/cli/",
+    "sim/mirotwin/report/figure.py",
+    "sim/mirotwin/bridges/pacing.py",
+    "sim/mirotwin/fuzz/afl/",  # when an engine tries what; each find is run again by itself
+)
 # Frames and chips are integers from end to end, so the order of a sum cannot matter.
 INTEGERS_ONLY = ("protocol/miro_protocol/", "robot_fw/miro_robot/")
 

@@ -1,0 +1,162 @@
+"""The target process: one machine behind AFL++'s fork-server protocol. It never forks.
+
+What belongs here: the protocol, and a single run of standard input where no AFL++ is. What does not: the target
+(`mirotwin.fuzz.target`) and starting AFL++ (`run`).
+
+    python -m mirotwin.fuzz.afl.serve SPECIFICATION [BESIDE]
+
+SPECIFICATION is the JSON of a `TargetSpec`. BESIDE is a path without ending: `BESIDE.target` gets what went wrong,
+`BESIDE.counts` the counters that only this process knows (`counts`).
+
+AFL++ expects a server that forks a child for each input, and tells its process id and its wait status. Here the target
+puts itself back instead: the id is one that no process has, because AFL++ kills that process when an answer takes too
+long. The wait status is 0, or a signal number for a find. AFL++ reads the id without a limit of time, so both are
+written at once at the end: it is woken once an input instead of twice, and a slow target is no hang. Hangs are findings
+of the target, which limits virtual time.
+
+What the four bytes at the start say (`FS_OPT_..` in AFL++ 4's types.h): options are used, the size of the map, and test
+cases come through shared memory (a length of 4 bytes, then as many bytes).
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import struct
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from miro_exact.bad_input import BadInput
+from mirotwin.fuzz.afl.counts import Counts
+from mirotwin.fuzz.afl.parents import end_with_parent
+from mirotwin.fuzz.afl.shared_memory import attach
+from mirotwin.fuzz.spec import spec_of
+
+if TYPE_CHECKING:
+    from mirotwin.fuzz.target import Target
+
+CONTROL_FD, STATUS_FD = 198, 199
+MAP_VARIABLE, CASES_VARIABLE = "__AFL_SHM_ID", "__AFL_SHM_FUZZ_ID"
+
+ENABLED, MAP_SIZE_FOLLOWS, CASES_IN_SHARED_MEMORY = 0x8000_0001, 0x4000_0000, 0x0100_0000
+NO_PROCESS = 0x7FFF_FFFE
+"""Above the highest process id of Linux (2^22)."""
+
+FIRST_SIGNAL, LAST_SIGNAL = 33, 126
+"""Signals that stand for the kinds of findings 1, 2, ..: none that a program is killed with by accident."""
+
+NOTHING, FOUND, REFUSED, BROKEN = 0, 1, 2, 70
+"""Exit codes. AFL++ sees none of them: it ends a server by a signal."""
+RUNS_A_COUNT = 64
+"""Executions after which the counters are written anew."""
+
+
+class Served(Protocol):
+    """What of a target the server uses."""
+
+    map_size: int
+    executions: int
+    frames_fed: int
+    characters_fed: int
+
+    def use_map(self, edges: memoryview) -> None: ...
+    def run(self, data: memoryview) -> int: ...
+
+
+def wait_status(kind: int) -> int:
+    """What AFL++ is told of a run that gave `kind`: 0, or a signal, which is the number in a crash's file name."""
+    return min(FIRST_SIGNAL + kind - 1, LAST_SIGNAL) if kind else 0
+
+
+def kind_of_signal(number: int) -> int:
+    """The kind of finding that a signal stands for."""
+    return number - FIRST_SIGNAL + 1
+
+
+def hello(map_size: int) -> bytes:
+    """What the server says first."""
+    options = ENABLED | MAP_SIZE_FOLLOWS | CASES_IN_SHARED_MEMORY | (map_size - 1) << 1
+    return struct.pack("<I", options)
+
+
+def answer(target: Served, cases: memoryview, control: int, status: int, keep: Callable[[], None]) -> None:
+    """Runs what AFL++ puts into `cases` until it closes `control`. `keep` is called now and then."""
+    length, data = cases[:4].cast("I"), cases[4:]
+    answers = [struct.pack("<II", NO_PROCESS, wait_status(kind)) for kind in range(256)]
+    run, read, write = target.run, os.read, os.write
+    while True:
+        for _ in range(RUNS_A_COUNT):
+            if not read(control, 4):
+                return
+            write(status, answers[run(data[: length[0]])])
+        keep()
+
+
+def serve(target: Served, counts: Counts, control: int = CONTROL_FD, status: int = STATUS_FD) -> bool:
+    """Serves AFL++ until it ends; False when there is none."""
+    if MAP_VARIABLE in os.environ:
+        target.use_map(attach(int(os.environ[MAP_VARIABLE]))[: target.map_size])
+    if not _is_writable(status):
+        return False
+    if MAP_VARIABLE not in os.environ:
+        raise BadInput("AFL++", "", f"{MAP_VARIABLE} is not set", "start this program by afl-fuzz")
+    with suppress(BrokenPipeError):  # AFL++ has ended
+        os.write(status, hello(target.map_size))
+        if not os.read(control, 4):
+            return True
+        if CASES_VARIABLE not in os.environ:
+            raise BadInput("AFL++", "", f"{CASES_VARIABLE} is not set", "install AFL++ 4.00c or newer")
+        cases = attach(int(os.environ[CASES_VARIABLE]))
+        answer(target, cases, control, status, lambda: counts.keep(target))
+    return True
+
+
+def _is_writable(number: int) -> bool:
+    try:
+        return os.write(number, b"") == 0
+    except OSError:
+        return False
+
+
+def run_once(target: Target, data: bytes) -> int:
+    """One run as a person wants to see it: the finding, and the input as lines. Returns the exit code."""
+    if not target.run(data):
+        print("nothing found")
+        return NOTHING
+    found = target.finding
+    print(f"{found.check}: {found.what} (tick {found.tick}, PC {found.pc:#06x})" if found else "found")
+    print(target.describe(data))
+    return FOUND
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The process: returns its exit code."""
+    beside = arguments[1] if len(arguments) > 1 else ""
+    try:
+        target = spec_of(arguments[0]).make()
+        with Counts(Path(f"{beside}.counts") if beside else None) as counts:
+            if serve(target, counts):
+                return NOTHING
+        return run_once(target, sys.stdin.buffer.read())
+    except BadInput as error:
+        _complain(beside, f"{error}")
+        return REFUSED
+    except Exception:  # AFL++ shows nothing of it, and says only that its server is gone
+        _complain(beside, traceback.format_exc())
+        return BROKEN
+
+
+def _complain(beside: str, text: str) -> None:
+    print(text, file=sys.stderr)
+    if beside:
+        Path(f"{beside}.target").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    if _is_writable(STATUS_FD):
+        end_with_parent(signal.SIGKILL)
+    sys.exit(main(sys.argv[1:]))

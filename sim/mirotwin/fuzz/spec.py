@@ -1,0 +1,86 @@
+"""What a process needs to know to make a target: one JSON text, handed from process to process.
+
+What belongs here: the fields, their limits, the text. What does not: the targets, which are imported when one is made.
+Nothing here imports a hot module: the process that reads a specification chooses its engine by it.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+
+import msgspec
+from msgspec import Meta
+
+from miro_exact import engine
+from miro_exact.bad_input import BadInput
+
+if TYPE_CHECKING:
+    from mirotwin.fuzz.target import Target
+
+MAKERS = {"miro": "mirotwin.fuzz.spec:miro_target", "bare": "mirotwin.fuzz.bare:bare_target"}
+"""Board -> "module:function"; the function takes the specification and returns its target."""
+
+Whole = Annotated[int, Meta(ge=0)]
+
+
+class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A target, as data.
+
+    `board`: "miro" is the robot's, "bare" a CPU with a UART. `image`: path of an Intel HEX file, "" is the robot's own
+    firmware. `input`: how the bytes of an input are read ("bytes", "frames" or "session"). `robots` and `slot` are the
+    MIRO's. `protocol`: name of the wire format of frames, "" for the board's own; `check`: name of the check that
+    judges in each execution, "" for the board's own; `baud`: rate of the bare CPU's UART, 0 for what its maker takes;
+    `parameters`: what else a maker takes. `engine`: "compiled" or "python", "" for the one that is installed.
+    `maker`: "module:function" in the place of the board's own maker.
+    """
+
+    board: Literal["miro", "bare"] = "miro"
+    image: str = ""
+    input: str = "session"
+    robots: Whole = 3
+    slot: Whole = 0
+    protocol: str = ""
+    check: str = ""
+    baud: Whole = 0
+    parameters: dict[str, Any] = {}
+    engine: Literal["", "compiled", "python"] = ""
+    maker: str = ""
+
+    def text(self) -> str:
+        """JSON of one line. `@@` never stands in it: afl-fuzz would put the name of a file there."""
+        return msgspec.json.encode(self).decode().replace("@@", "@\\u0040")
+
+    def make(self) -> Target:
+        """The target, on the engine that the specification names. Raises BadInput for what cannot be had."""
+        if self.engine:
+            engine.select(self.engine)
+        return cast("Target", _function(self.maker or MAKERS[self.board])(self))
+
+
+def spec_of(text: str) -> TargetSpec:
+    """The specification that `text` is the JSON of. Raises BadInput, which names the field."""
+    try:
+        return msgspec.json.decode(text, type=TargetSpec)
+    except msgspec.DecodeError as error:  # a ValidationError is one too
+        remedy = f"give JSON with {', '.join(TargetSpec.__struct_fields__)}"
+        raise BadInput("target", "", f"{error}", remedy) from None
+
+
+def miro_target(spec: TargetSpec) -> Target:
+    """The MIRO's board with the firmware of the specification."""
+    from miro_robot.firmware import image_path
+    from miro_robot.image import load_hex
+    from mirotwin.fuzz.target import target_for
+
+    image = load_hex(Path(spec.image) if spec.image else image_path())
+    return target_for(image, spec.input, spec.robots, spec.slot)
+
+
+def _function(place: str) -> Any:
+    module, _, name = place.partition(":")
+    try:
+        return getattr(import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise BadInput("target", "maker", f"{place}: {error}", "write it as module:function") from None

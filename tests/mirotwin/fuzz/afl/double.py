@@ -1,0 +1,85 @@
+"""A target of a few branches: what the fork server and the launcher are tested with.
+
+What belongs here: a target that finds something for known inputs, and the specification that makes it. What does not:
+machines.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from mirotwin.fuzz.spec import TargetSpec
+
+MAP_SIZE = 8192
+MAKER = "tests.mirotwin.fuzz.afl.double:double_of"
+WORD = b"DUCK"
+
+
+class Found:
+    """A finding of the double."""
+
+    def __init__(self, check: str, pc: int) -> None:
+        self.check, self.tick, self.pc, self.what = check, 24, pc, f"found at {pc}"
+
+
+class Double:
+    """One branch for each byte of `WORD` that stands in its place; the whole word is a finding of kind 2.
+
+    Edges begin at 1: afl-showmap leaves cell 0 out.
+
+    `kind`: findings have this number. `raises`: a run of an input that begins with `!` raises; `sleeps`: it sleeps.
+    """
+
+    input = "bytes"
+    map_size = MAP_SIZE
+    image: Any = None
+
+    def __init__(
+        self, kind: int = 2, raises: bool = False, sleeps: bool = False, always: bool = False
+    ) -> None:
+        self.kind, self.raises, self.sleeps, self.always = kind, raises, sleeps, always
+        self.edges: Any = bytearray(MAP_SIZE)
+        self.finding: Any = None
+        self.frames_fed = self.characters_fed = self.executions = 0
+
+    def use_map(self, edges: Any) -> None:
+        self.edges = edges
+
+    def run(self, data: Any) -> int:
+        self.executions += 1
+        self.characters_fed += len(data)
+        if data[:1] == b"!":
+            if self.raises:
+                raise RuntimeError("the double raises")
+            if self.sleeps:
+                time.sleep(3600)
+        self.finding = None
+        right = 0
+        self._count(1)
+        while right < len(WORD) and right < len(data) and data[right] == WORD[right]:
+            right += 1
+            self._count(1 + right)
+        if right == len(WORD) or self.always:
+            self.finding = Found("word", right)
+            return self.kind
+        return 0
+
+    def _count(self, edge: int) -> None:
+        self.edges[edge] = (self.edges[edge] + 1) & 0xFF
+
+    def happenings(self, data: bytes) -> list[Any]:
+        return []
+
+    def describe(self, data: bytes) -> str:
+        return data.hex(" ")
+
+
+def double_of(spec: TargetSpec) -> Any:
+    """A double with the parameters of the specification."""
+    return Double(**spec.parameters)
+
+
+def spec(**parameters: Any) -> TargetSpec:
+    """The specification of a double."""
+    return TargetSpec(maker=MAKER, parameters=parameters)

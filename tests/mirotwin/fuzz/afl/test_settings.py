@@ -1,0 +1,158 @@
+"""How afl-fuzz is called, on which cores, and what its errors come to."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.mirotwin.fuzz.afl.double import spec
+
+from miro_exact.bad_input import BadInput
+from mirotwin.fuzz.afl import cores, missing
+from mirotwin.fuzz.afl.ending import REMEDIES, why_ended
+from mirotwin.fuzz.afl.run import AflRun
+from mirotwin.fuzz.afl.settings import REASONS, Call, environment, job_name
+from mirotwin.fuzz.spec import TargetSpec, spec_of
+
+
+def test_one_job_is_not_distributed_and_several_are() -> None:
+    call = Call(("{}",), Path("seeds"), Path("out"), Path("words"), seconds=60, seed=7)
+    alone, main, other = call.line(0, 1), call.line(0, 2), call.line(1, 2)
+    assert not {"-M", "-S"} & set(alone)
+    assert main[main.index("-M") + 1] == "main"
+    assert other[other.index("-S") + 1] == "job1"
+    assert [line[line.index("-s") + 1] for line in (main, other)] == ["7", "8"]
+    server = [sys.executable, "-m", "mirotwin.fuzz.afl.serve", "{}"]
+    assert alone[alone.index("--") + 1 :] == [*server, "out/default"]
+    assert alone[alone.index("-x") + 1] == "words"
+    assert alone[alone.index("-V") + 1] == "60"
+
+
+def test_what_is_not_asked_for_is_not_on_the_command_line() -> None:
+    line = Call(("{}",), Path("seeds"), Path("out")).line(0, 1)
+    assert not {"-x", "-V", "-s"} & set(line)
+
+
+@given(image=st.text("@/x", max_size=8))
+def test_no_specification_holds_what_afl_replaces_by_the_name_of_a_file(image: str) -> None:
+    one = TargetSpec(image=image)
+    assert "@@" not in one.text()
+    assert spec_of(one.text()) == one
+
+
+def test_a_folder_whose_name_afl_would_replace_is_refused() -> None:
+    with pytest.raises(BadInput, match="out@@: afl-fuzz puts the name of a file for @@; choose another"):
+        Call(("{}",), Path("seeds"), Path("out@@")).line(0, 1)
+
+
+def test_our_settings_win_and_others_are_passed_on() -> None:
+    found = environment({"AFL_MAP_SIZE": "65536", "AFL_SHUFFLE_QUEUE": "1", "HOME": "/h"}, 8192)
+    assert found["AFL_MAP_SIZE"] == "8192"
+    assert found["AFL_SHUFFLE_QUEUE"] == "1"
+    assert found["HOME"] == "/h"
+    assert all(found[name].isdecimal() for name in REASONS)
+
+
+def test_each_setting_has_a_reason() -> None:
+    assert all(reason.strip() for reason in REASONS.values())
+
+
+def test_the_first_of_several_jobs_is_the_main_one() -> None:
+    assert [job_name(job, 3) for job in range(3)] == ["main", "job1", "job2"]
+    assert job_name(0, 1) == "default"
+
+
+def test_what_is_missing_says_how_to_get_it() -> None:
+    said = missing(("afl-fuzz-of-tomorrow",))
+    assert (
+        said == "afl-fuzz-of-tomorrow is not on the PATH; install AFL++ (Debian, Ubuntu: `apt install afl++`)"
+    )
+
+
+def test_a_campaign_without_afl_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(BadInput, match=r"^AFL\+\+: afl-fuzz is not on the PATH; install AFL\+\+"):
+        AflRun([spec().text()], tmp_path, tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("jobs", "said"), [(0, r"^--jobs: 0: there is nothing to do; give 1 or more"), (-3, r"^--jobs: -3: ")]
+)
+def test_a_campaign_of_no_job_is_refused(tmp_path: Path, jobs: int, said: str) -> None:
+    with pytest.raises(BadInput, match=said):
+        AflRun([spec().text()], tmp_path, tmp_path / "out", jobs=jobs)
+
+
+# ---- cores -------------------------------------------------------------------------------------------------
+
+
+def process(proc: Path, number: int, allowed: str, kernel: bool = False) -> None:
+    """A process as `man 5 proc` describes its status."""
+    (proc / str(number)).mkdir(parents=True)
+    memory = "" if kernel else "VmSize:\t    8548 kB\n"
+    (proc / str(number) / "status").write_text(f"Name:\tx\n{memory}Cpus_allowed_list:\t{allowed}\n")
+
+
+def test_the_core_to_which_the_fewest_are_bound_comes_first(tmp_path: Path) -> None:
+    free = sorted(os.sched_getaffinity(0))
+    for number in range(3):
+        process(tmp_path, 10 + number, str(free[0]))
+    process(tmp_path, 20, f"{free[0]}-{free[-1]}" if len(free) > 1 else "0-63")
+    process(tmp_path, 30, str(free[-1]), kernel=True)
+    (tmp_path / "40").mkdir()
+    assert cores.bound(tmp_path) == {free[0]: 3}
+    assert cores.cores_for(1, tmp_path) == [free[1 % len(free)]]
+    assert sorted(cores.cores_for(2 * len(free), tmp_path)) == sorted(2 * free)
+
+
+def test_more_jobs_than_cores_are_told() -> None:
+    count = len(os.sched_getaffinity(0))
+    assert cores.shared_cores(count) is None
+    assert f"; --jobs {count} makes as many executions" in (cores.shared_cores(count + 1) or "")
+
+
+# ---- errors ------------------------------------------------------------------------------------------------
+
+ABORT = """\
+\x1b[1;94m[*] \x1b[0mGetting to work...\x1b[0m
+\x1b[?25h\x1b[0m\x1b[1;91m
+[-] PROGRAM ABORT : \x1b[0m%s\x1b[1;91m
+         Location : \x1b[0mmain(), src/afl-fuzz.c:1234
+
+"""
+OS_ERROR = """\
+[-]  SYSTEM ERROR : \x1b[0mUnable to create 'out'\x1b[1;91m
+    Stop location : \x1b[0msetup_dirs_fds(), src/afl-fuzz-init.c:1869
+       OS message : \x1b[0mRead-only file system
+"""
+
+
+def said(folder: Path, output: str, complaint: str = "") -> str:
+    (folder / "main.log").write_text(output)
+    (folder / "main.target").write_text(complaint)
+    return f"{why_ended(folder / 'main.log', folder / 'main.target')}"
+
+
+def test_the_line_of_afl_is_quoted_with_a_remedy(tmp_path: Path) -> None:
+    line = said(tmp_path, ABORT % "We need at least one valid input seed that does not crash!")
+    what = "afl-fuzz ended: We need at least one valid input seed that does not crash!"
+    assert line == f"{tmp_path}/main.log: {what}; {REMEDIES[0][1]}"
+
+
+def test_the_message_of_the_system_is_quoted_too(tmp_path: Path) -> None:
+    line = said(tmp_path, OS_ERROR)
+    assert "Unable to create 'out' (Read-only file system); choose a folder that can be written to" in line
+
+
+def test_what_the_target_complained_of_is_the_cause(tmp_path: Path) -> None:
+    output = ABORT % "Fork server handshake failed"
+    assert said(tmp_path, output, "x.ihx:3: no hex\n") == f"{tmp_path}/main.target:1: x.ihx:3: no hex"
+    long = said(tmp_path, output, "Traceback\n  File x\nKeyError: 3\n")
+    assert long == f"{tmp_path}/main.target:3: KeyError: 3; whole text: {tmp_path}/main.target"
+
+
+@pytest.mark.parametrize("output", ["", "\n \n", "Segmentation fault\n"])
+def test_an_end_without_a_reason_shows_the_last_line(tmp_path: Path, output: str) -> None:
+    assert (output.strip() or "it said nothing") in said(tmp_path, output)
