@@ -121,6 +121,17 @@ def load_job(
     return msgspec.structs.replace(_job_of_stream(given, file, settings, seed), case=case), image
 
 
+def load_stream(file: str, engine: str | None) -> Job:
+    """The job of a stream file, whatever firmware it is for: that is the caller's to choose."""
+    check_no_folder(file, RECORDING)
+    data = read_input(file)
+    choose_engine(engine)
+    _refuse_other_formats(data, file)
+    given = stream.decode(data, file)
+    case = Case(given.header.verdict or "", given.header.end_tick or 0)
+    return msgspec.structs.replace(_job_of_stream(given, file, (), None), case=case)
+
+
 def _refuse_other_formats(data: bytes, path: str) -> None:
     format, _ = detect(data[:HEAD_BYTES])
     if format == "pcapng":

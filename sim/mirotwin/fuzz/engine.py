@@ -1,0 +1,63 @@
+"""Who makes up inputs: AFL++ where it is installed, else Hypothesis.
+
+What belongs here: what a campaign asks of an engine, and which one it gets. What does not: the engines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+from mirotwin.fuzz.files import CampaignFolder
+from mirotwin.fuzz.spec import TargetSpec
+from mirotwin.fuzz.target import Target
+
+
+class Progress(Protocol):
+    """How far an engine is. `run_time_s` of wall time; `edges`: places of the map that were ever counted."""
+
+    @property
+    def executions(self) -> int: ...
+    @property
+    def executions_per_s(self) -> float: ...
+    @property
+    def edges(self) -> int | None: ...
+
+
+class Engine(Protocol):
+    """One campaign of an engine. Paths are files that hold an input each."""
+
+    def start(self) -> None: ...
+    def stop(self) -> None: ...
+    def progress(self) -> Progress: ...
+    def new_crashes(self) -> list[Path]:
+        """Inputs that failed, since the last call."""
+        ...
+
+    def new_queue(self) -> list[Path]:
+        """Inputs that found something new, since the last call."""
+        ...
+
+
+def engine_for(
+    spec: TargetSpec, inputs: Sequence[bytes], folder: CampaignFolder, target: Target, jobs: int, seed: int
+) -> tuple[Engine, list[str]]:
+    """AFL++, or Hypothesis, with what a user should hear about it. Raises BadInput for what cannot be."""
+    from mirotwin.fuzz.afl.inputs import message_tokens, wire_tokens, write_dictionary, write_seeds
+    from mirotwin.fuzz.afl.run import AflRun
+    from mirotwin.fuzz.afl.settings import missing
+
+    seeds, dictionary = folder.folder("seeds"), folder.path / "dictionary"
+    write_seeds(seeds, {f"seed-{number:04d}": data for number, data in enumerate(inputs)})
+    tokens = wire_tokens(spec.robots) if spec.input == "bytes" else message_tokens(spec.robots)
+    write_dictionary(dictionary, tokens)
+    place = (seeds, folder.folder("engine"), dictionary, jobs, seed)
+    lacking = missing()
+    if lacking is None:
+        afl = AflRun([spec.text()], *place, watch=target)
+        return afl, afl.notes()
+    from mirotwin.fuzz.hypothesis_engine import HypothesisRun
+
+    note = f"{lacking}; until then Hypothesis makes up the inputs, which is slower and not guided by edges"
+    return HypothesisRun([spec.text()], *place), [note]

@@ -1,0 +1,37 @@
+"""What the tests of campaigns share: the command in this process, with an engine that needs no other program."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.mirotwin.cli.conftest import finished as finished
+from tests.mirotwin.cli.conftest import mirotwin as mirotwin
+from tests.mirotwin.cli.conftest import short as short
+from tests.mirotwin.fuzz.random_engine import RandomEngine
+
+from miro_robot.image import Image
+
+
+@pytest.fixture
+def engines(monkeypatch: pytest.MonkeyPatch) -> list[RandomEngine]:
+    """The engines that `mirotwin fuzz` makes in a test: in this process, by chance."""
+    made: list[RandomEngine] = []
+
+    def engine_for(spec, inputs, folder, target, jobs, seed):
+        made.append(RandomEngine(target, list(inputs), folder.folder("engine"), seed))
+        return made[-1], []
+
+    monkeypatch.setattr("mirotwin.cli.fuzz.engine_for", engine_for)
+    return made
+
+
+@pytest.fixture
+def built() -> Callable[[str], Path]:
+    """The image of the firmware with a planted mistake, by its name."""
+    from tests.mirotwin.checks.rig import planted
+
+    def find(name: str) -> Path:
+        image: Image = planted(name)
+        return image.path
+
+    return find

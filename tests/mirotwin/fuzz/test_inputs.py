@@ -1,0 +1,121 @@
+"""What was sent becomes inputs, and the target hears the same of them."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from miro_protocol.frames import ServiceFrame, TeamFrame, encode
+from miro_protocol.stream_events import Reset
+from miro_protocol.transmission import DOWN, UP, Transmission
+from miro_robot.harness.program import BYTES, FRAMES, INPUTS, SESSION, Program
+from mirotwin.fuzz.inputs import PAUSE_TICKS, SILENCE_TICKS, TOGETHER, input_of, inputs_of
+from mirotwin.fuzz.seeds import foreign_seeds, seeds, sent, talks
+
+NUMBERS = st.integers(-32767, 32767)
+
+
+@st.composite
+def messages(draw, robots=3):
+    seq = draw(st.integers(0, 63))
+    if draw(st.booleans()):
+        pairs = draw(st.tuples(*[st.tuples(NUMBERS, NUMBERS)] * robots))
+        return TeamFrame(draw(st.sampled_from([0, 3])), seq, pairs)
+    return ServiceFrame.filter(
+        seq, draw(st.integers(0, robots - 1)), *draw(st.tuples(*[st.integers(0, 9)] * 4))
+    )
+
+
+def heard(kind, data, robots=3):
+    """The characters of an input, and the pause before each."""
+    program = Program(kind, 0, robots)
+    found = [program.character(place) for place in range(program.read(data))]
+    return bytes(one[0] for one in found), [one[3] for one in found]
+
+
+@given(st.lists(st.tuples(messages(), st.integers(0, 2_000_000)), min_size=1, max_size=8))
+def test_a_session_says_the_same_characters_with_pauses_that_are_right_to_a_step(said):
+    transmissions, tick = [], 0
+    for message, pause in said:
+        transmissions.append(Transmission(tick + pause, DOWN, encode(message, 3)))
+        tick = transmissions[-1].end_tick
+    characters, pauses = heard(SESSION, input_of("session", transmissions, 3))
+    assert characters == b"".join(one.data for one in transmissions)
+    size = len(transmissions[0].data)
+    for place, (_, pause) in enumerate(said[1:], 1):
+        assert abs(pauses[place * size] - pause) <= PAUSE_TICKS
+    assert pauses[0] == 0
+
+
+@given(st.binary(min_size=1, max_size=100))
+def test_characters_that_are_no_frame_are_said_as_they_are(data):
+    assert heard(SESSION, input_of("session", [Transmission(0, DOWN, data)], 3))[0] == data
+
+
+def test_characters_before_and_behind_a_frame_stay_where_they_were():
+    data = b"\x01\x02" + encode(TeamFrame(0, 5, ((1, 2), (3, 4), (5, 6))), 3) + b"\x03"
+    assert heard(SESSION, input_of("session", [Transmission(0, DOWN, data)], 3))[0] == data
+
+
+def test_a_long_silence_is_as_long():
+    frame = encode(TeamFrame(0, 1, ((1, 1),) * 3), 3)
+    one = Transmission(0, DOWN, frame)
+    other = Transmission(one.end_tick + 700 * 24_000, DOWN, frame)
+    _, pauses = heard(SESSION, input_of("session", [one, other], 3))
+    assert abs(pauses[len(frame)] - 700 * 24_000) <= SILENCE_TICKS
+
+
+@given(st.lists(messages(), min_size=1, max_size=6))
+def test_frames_keep_their_payloads_and_types(said):
+    wire = [Transmission(0, DOWN, encode(message, 3)) for message in said]
+    characters, _ = heard(FRAMES, input_of("frames", wire, 3))
+    size = len(wire[0].data)
+    assert len(characters) == size * len(said)
+    if all(
+        (b.seq - a.seq) % 64 in range(1, 9) for a, b in zip([TeamFrame(0, 0, ()), *said], said, strict=False)
+    ):
+        assert characters == b"".join(one.data for one in wire)
+
+
+def test_bytes_are_the_characters():
+    assert (
+        heard(BYTES, input_of("bytes", [Transmission(0, DOWN, b"ab"), Transmission(99, DOWN, b"c")], 3))[0]
+        == b"abc"
+    )
+
+
+def test_a_reset_is_said_in_a_session():
+    happened = [Transmission(0, DOWN, b"a"), Reset(10**6, 0, 0, 1), Reset(10**6 + 48, 0, 0, 0)]
+    happened += [Transmission(2 * 10**6, DOWN, b"b")]
+    program = Program(SESSION)
+    count = program.read(input_of("session", happened, 3))
+    assert [program.character(place)[2] for place in range(count)] == [False, True]
+
+
+def test_a_long_recording_becomes_many_short_inputs_and_answers_are_left_out():
+    frames = [
+        Transmission(10**6 * place, DOWN, encode(TeamFrame(0, place % 64, ((place, 1),) * 3), 3))
+        for place in range(30)
+    ]
+    frames.append(Transmission(10**8, UP, b"answer"))
+    found = inputs_of("session", frames, 3)
+    assert len(found) == -(-30 // TOGETHER)
+    said = b"".join(heard(SESSION, one)[0] for one in found)
+    assert said == b"".join(one.data for one in frames[:-1])
+
+
+@pytest.mark.parametrize("kind", INPUTS)
+@pytest.mark.parametrize(("robots", "slot"), [(3, 0), (3, 2), (5, 4)])
+def test_each_built_in_seed_is_read_as_what_it_says(kind, robots, slot):
+    for talk in talks(robots, slot):
+        wire = sent(talk, robots)
+        data = input_of(kind, wire, robots)
+        assert data in seeds(kind, robots, slot)
+        characters, _ = heard(INPUTS.index(kind), data, robots)
+        assert len(characters) == sum(len(one.data) for one in wire)
+        if kind != "frames":
+            assert characters == b"".join(one.data for one in wire)
+
+
+@pytest.mark.parametrize("kind", INPUTS)
+def test_seeds_for_a_foreign_target_are_not_empty(kind):
+    assert all(foreign_seeds(kind))
