@@ -64,7 +64,7 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
     checks: tuple[str, ...]
     covering: str | None
     out: Path
-    seed: int
+    seed: int | None
     minimise_s: float
     force: bool
     quiet: bool
@@ -105,8 +105,13 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
     "--robots", type=click.Choice(["3", "5"]), default="3", show_default=True, help="Slots of the network."
 )
 @click.option("--slot", type=Whole(0, 4), default=0, show_default=True, help="Slot of the robot.")
-@click.option("--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Seed of the engine.")
-@click.option("--out", type=Place(path_type=Path), metavar="DIR", help="Default: runs/fuzz-IMAGE-SEED.")
+@click.option("--seed", type=Whole(0, MAX_SEED), help="Seed of the engine. Default: from the system.")
+@click.option(
+    "--out",
+    type=Place(path_type=Path),
+    metavar="DIR",
+    help="Folder for what it leaves. Default: runs/fuzz-IMAGE.",
+)
 @click.option("--force", is_flag=True, help="Replace an earlier campaign in --out.")
 @click.option(
     "--minimise",
@@ -151,7 +156,7 @@ def fuzz(
         raise click.UsageError(
             f"--slot {slot} does not exist among {robots} robots; give 0 to {int(robots) - 1}."
         )
-    default = Path("runs") / f"fuzz-{firmware.path.stem}-{given['seed']}"
+    default = Path("runs") / f"fuzz-{firmware.path.stem}"
     asked = Asked(out=out or default, **given)
     spec = TargetSpec(image=image or "", input=kind, robots=int(robots), slot=slot, engine=active)
     return _campaign(spec, firmware, asked)

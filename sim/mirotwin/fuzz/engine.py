@@ -41,7 +41,12 @@ class Engine(Protocol):
 
 
 def engine_for(
-    spec: TargetSpec, inputs: Sequence[bytes], folder: CampaignFolder, target: Target, jobs: int, seed: int
+    spec: TargetSpec,
+    inputs: Sequence[bytes],
+    folder: CampaignFolder,
+    target: Target,
+    jobs: int,
+    seed: int | None,
 ) -> tuple[Engine, list[str]]:
     """AFL++, or Hypothesis, with what a user should hear about it. Raises BadInput for what cannot be."""
     from mirotwin.fuzz.afl.inputs import message_tokens, wire_tokens, write_dictionary, write_seeds

@@ -1,0 +1,263 @@
+"""`mirotwin fuzz` as a user meets it: what it says, what it leaves, and how it refuses what it cannot use."""
+
+import json
+import signal
+import sys
+
+import pytest
+from tests import children
+from tests.host.distribution import install
+from tests.mirotwin.checks.rig import needs_sdcc, own_image
+
+from miro_protocol import stream
+from mirotwin.fuzz.files import CampaignFolder
+
+MISTAKE = "takes frames with a bad CRC"
+
+
+def started(tmp_path, *arguments):
+    """The command in a process of its own, with the engine of the tests."""
+    program = (
+        "import mirotwin.cli.fuzz as fuzz\n"
+        "from tests.mirotwin.fuzz.random_engine import RandomEngine\n"
+        "fuzz.engine_for = lambda spec, inputs, folder, target, jobs, seed: (\n"
+        "    RandomEngine(target, list(inputs), folder.folder('engine'), seed), [])\n"
+        "from mirotwin.entry import main\n"
+        "main()\n"
+    )
+    command = [sys.executable, "-c", program, "fuzz", "--out", tmp_path / "out", *arguments]
+    return children.start([*map(str, command)], stdout=-1, stderr=-1, text=True)
+
+
+@needs_sdcc
+def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin, engines, built, tmp_path):
+    image = built(MISTAKE)
+    code, out, err = mirotwin("fuzz", image, "--time", "6s", "--minimise", "1s", "--out", tmp_path / "out")
+    assert code == 1
+    assert engines[0].stopped
+    assert "mirotwin: found: " in err
+    lines = out.splitlines()
+    (replay,) = [line.split() for line in lines if line.strip().startswith("mirotwin replay")][:1]
+    assert replay[3:] == ["--firmware", str(image)]
+    again, _, said = mirotwin(*replay[1:])
+    assert (again, said.startswith("mirotwin: fails as recorded: ")) == (1, True)
+    assert lines[-1] == f"written to {tmp_path / 'out'}"
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["complete"]
+    assert [find["confirmed"] for find in summary["finds"]] == [True] * len(summary["finds"])
+    assert (tmp_path / "out" / "coverage.info").read_text().startswith("TN:\nSF:")
+    assert list((tmp_path / "out" / "corpus").iterdir())
+
+
+@pytest.mark.parametrize("kind", ["bytes", "frames"])
+def test_shipped_firmware_passes_and_coverage_is_told(mirotwin, engines, tmp_path, kind):
+    code, out, err = mirotwin("fuzz", "--time", "2", "--input", kind, "--out", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert out.startswith("miro.ihx: ")
+    assert "never reached: " in out
+    assert "no finds" in out.splitlines()
+
+
+def test_an_input_that_reaches_a_function_is_left_as_a_stream(mirotwin, engines, tmp_path):
+    code, out, _ = mirotwin("fuzz", "--time", "30s", "--covering", "motion_off", "--out", tmp_path / "out")
+    assert code == 0
+    path = tmp_path / "out" / "covering" / "motion_off.stream"
+    assert f"--covering motion_off: reached by {path}" in out
+    assert mirotwin("replay", path, "-q")[0] == 0
+
+
+def test_a_function_that_no_input_reaches_is_said(mirotwin, engines, tmp_path):
+    code, _, err = mirotwin("fuzz", "--time", "1s", "--covering", "give_up", "--out", tmp_path / "out")
+    assert code == 1
+    assert "--covering give_up: not reached by " in err
+
+
+def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
+    arguments = ("--check", "wheels_within_m_s={limit_m_s=0.01, overshoot_m_s=0.0}", "--minimise", "1s")
+    code, out, _ = mirotwin("fuzz", "--time", "3s", *arguments, "--out", tmp_path / "out")
+    assert code == 1
+    assert "wheels_within_m_s: judged " in out
+    assert list((tmp_path / "out" / "finds").glob("wheels_within_m_s-*.stream"))
+
+
+BROKEN = """
+from mirotwin.checks.interface import Check, Judge
+
+class Broken(Check, frozen=True, kw_only=True, tag="broken"):
+    KIND = "safety"
+    def judge(self, subject):
+        return BrokenJudge(self, subject)
+
+class BrokenJudge(Judge):
+    def period(self, record, tick):
+        raise RuntimeError("oh")
+"""
+
+
+def test_a_check_that_raises_ends_the_campaign_with_its_name(mirotwin, engines, tmp_path, monkeypatch):
+    parts = {"broken": "broken_check:Broken"}
+    install(tmp_path / "dist", "broken", "1.0", parts, "checks", broken_check=BROKEN)
+    monkeypatch.syspath_prepend(str(tmp_path / "dist"))
+    code, _, err = mirotwin("fuzz", "--time", "20s", "--check", "broken", "--out", tmp_path / "out")
+    assert code == 2
+    assert "--check: " in err
+    assert "check 'broken' cannot judge: RuntimeError: oh; the campaign has ended; repair the check" in err
+    assert engines[0].stopped
+
+
+def test_ctrl_c_ends_it_with_what_was_found(tmp_path):
+    process = started(tmp_path, "--time", "60s")
+    try:
+        for line in iter(process.stderr.readline, ""):
+            if "fuzzing" in line:
+                break
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert "mirotwin: interrupted; looking for 5 s at most at what is left" in err
+    assert f"written to {tmp_path / 'out'}" in out
+    assert not json.loads((tmp_path / "out" / "summary.json").read_text())["complete"]
+
+
+def test_plain_lines_where_stderr_is_no_terminal(tmp_path):
+    process = started(tmp_path, "--time", "12s")
+    _, err = process.communicate(timeout=120)
+    assert process.returncode == 0
+    line = next(line for line in err.splitlines() if line.startswith("mirotwin: fuzzing miro.ihx: 0:1"))
+    assert line.rpartition(", ")[2].endswith(" left")
+    assert "/s, " in line
+    assert " edges, no finds" in line
+
+
+# ---- saved cases -----------------------------------------------------------------------------------------------
+
+
+@needs_sdcc
+def test_saved_cases_fail_with_the_mistake_and_pass_without(mirotwin, engines, built, tmp_path):
+    image = built(MISTAKE)
+    mirotwin("fuzz", image, "--time", "5s", "--minimise", "1s", "-q", "--out", tmp_path / "out")
+    cases = tmp_path / "out" / "finds"
+    names = sorted(cases.glob("*.stream"))
+    assert names
+    code, out, err = mirotwin("fuzz", image, "--regress", cases)
+    assert (code, err) == (1, "")
+    lines = out.splitlines()
+    assert [line.split(":")[0] for line in lines[:-1]] == [f"FAILED  {name}" for name in names]
+    assert lines[0].endswith(stream.read(names[0]).header.verdict)
+    assert lines[-1].endswith(f" 0 passed, {len(names)} failed")
+    code, out, err = mirotwin("fuzz", "--regress", cases)
+    assert (code, err) == (0, "")
+    assert out.splitlines() == [
+        *(f"passed  {name}" for name in names),
+        f"{len(names)} {'case' if len(names) == 1 else 'cases'}: {len(names)} passed, 0 failed",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda folder: None, "there is no such folder; name the folder with the saved cases"),
+        (lambda folder: folder.mkdir(), "holds no case; put the cases of `mirotwin fuzz` there"),
+        (lambda folder: (folder.mkdir(), (folder / "a.stream").write_text("x")), "a.stream:1:1: "),
+    ],
+)
+def test_a_folder_without_cases_is_refused(mirotwin, tmp_path, make, said):
+    make(tmp_path / "cases")
+    code, _, err = mirotwin("fuzz", "--regress", tmp_path / "cases")
+    assert code == 2
+    assert said in err
+
+
+def test_options_of_a_campaign_do_not_go_with_saved_cases(mirotwin, tmp_path):
+    code, _, err = mirotwin("fuzz", "--regress", tmp_path, "--time", "5s")
+    assert code == 2
+    assert "--time does not go with --regress." in err
+
+
+# ---- what cannot be used ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--time", "soon"], "'soon' is not a time, such as 30s, 5min or 2h."),
+        (["--time", "0s"], "'0s' is not a time"),
+        (["--jobs", "0"], "--jobs"),
+        (["--slot", "3"], "--slot 3 does not exist among 3 robots; give 0 to 2."),
+        (["--covering", "motion_of"], "there is no such function; did you mean "),
+        (["--check", "no_fualt"], "there is no such check; did you mean no_fault?"),
+        (["--check", "settles_within_s"], "within_s is missing"),
+        (["--input", "words"], "--input"),
+        (["nowhere.ihx"], "nowhere.ihx: there is no such file"),
+        (["--corpus", "nowhere"], "nowhere: --corpus: there is no such folder"),
+        (["--covering", "main"], "main runs while the firmware starts, before any input"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_in_one_line(mirotwin, engines, tmp_path, arguments, said):
+    code, _, err = mirotwin("fuzz", *arguments, "--out", tmp_path / "out")
+    assert code == 2
+    assert said in err
+    assert err.count("\n") == 1
+    assert not engines
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_with_something_in_it_is_refused_and_an_earlier_campaign_is_replaced(
+    mirotwin, engines, tmp_path
+):
+    out = tmp_path / "out"
+    arguments = ("fuzz", "--time", "0.5s", "-q", "--out", out)
+    assert mirotwin(*arguments)[0] == 0
+    code, _, err = mirotwin(*arguments)
+    assert (code, "is not empty" in err, "--force" in err) == (2, True, True)
+    (out / "finds").mkdir(exist_ok=True)
+    (out / "finds" / "old.stream").write_text("old")
+    assert mirotwin(*arguments, "--force")[0] == 0
+    assert not (out / "finds" / "old.stream").exists()
+    (out / "mine.txt").write_text("mine")
+    code, _, err = mirotwin(*arguments, "--force")
+    assert (code, "holds what no campaign leaves (mine.txt)" in err) == (2, True)
+    assert (out / "mine.txt").read_text() == "mine"
+
+
+def test_a_corpus_inside_the_folder_that_is_replaced_is_refused(mirotwin, engines, tmp_path):
+    out = tmp_path / "out"
+    assert mirotwin("fuzz", "--time", "0.5s", "-q", "--out", out)[0] == 0
+    code, _, err = mirotwin("fuzz", "--out", out, "--force", "--corpus", out / "corpus")
+    assert code == 2
+    assert "which the campaign replaces; choose another folder with --out" in err
+    other = mirotwin("fuzz", "--time", "0.5s", "-q", "--out", tmp_path / "other", "--corpus", out)
+    assert other[0] == 0
+
+
+@needs_sdcc
+def test_firmware_that_fails_before_it_hears_anything_is_refused(mirotwin, engines, built, tmp_path):
+    code, _, err = mirotwin("fuzz", built("stays in an interrupt"), "--time", "1s", "--out", tmp_path / "out")
+    assert code in (1, 2)
+    if code == 2:
+        assert "mend" in err
+
+
+def test_a_symbol_needs_symbols(mirotwin, engines, tmp_path):
+    bare = tmp_path / "bare.ihx"
+    bare.write_bytes(own_image().path.read_bytes())
+    code, _, err = mirotwin("fuzz", bare, "--covering", "main", "--out", tmp_path / "out")
+    assert code == 2
+    assert "the image has no symbols; put the .map or .cdb that the linker wrote beside the image" in err
+
+
+def test_an_image_without_symbols_can_be_fuzzed(mirotwin, engines, tmp_path):
+    bare = tmp_path / "bare.ihx"
+    bare.write_bytes(own_image().path.read_bytes())
+    code, out, _ = mirotwin("fuzz", bare, "--time", "1s", "--out", tmp_path / "out")
+    assert code == 0
+    assert (tmp_path / "out" / "coverage.info.lst").exists()
+    assert out.startswith("bare.ihx: ")
+
+
+def test_a_campaign_folder_that_cannot_be_made_is_refused(tmp_path):
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(ValueError, match="not a folder"):
+        CampaignFolder(tmp_path / "file")
