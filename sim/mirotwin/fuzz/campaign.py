@@ -27,6 +27,8 @@ LOOK_S = 0.2
 """Wall time between two looks at the engine."""
 SLICE_S = 0.5
 """How long inputs of the queue are looked at in one go."""
+LOOKED = 8
+"""Inputs of the queue that are looked at between two finds, which take longer."""
 AFTER_S = 20.0
 """How long inputs are still looked at once the time is over."""
 
@@ -79,6 +81,7 @@ class Campaign:
         self._to_judge: deque[bytes] = deque()
         self._seen: set[bytes] = set()
         self._judging_s = 0.0
+        self._looked = LOOKED
         self._began_s = time.monotonic()
         self._stopped_s: float | None = None
         self._shown_s = 0.0
@@ -158,15 +161,17 @@ class Campaign:
             inputs.append(data)
 
     def _work(self, end_s: float, time_s: float | None, at_ease: bool = False) -> None:
-        """Finds first, then coverage, then checks in Python, which get a third of the time while the engine runs."""
+        """Finds, and coverage between two of them; then checks in Python, a third of the time while the engine runs."""
         while self.reached_by is None or at_ease:
             if time.monotonic() >= end_s or (time_s is not None and self.run_s >= time_s):
                 return
-            if self._crashes:
+            if self._crashes and (not self._queue or self._looked >= LOOKED):
                 done = self._crashes
+                self._looked = 0
                 self._keep(self.finds.take(done[0]))
             elif self._queue:
                 done = self._queue
+                self._looked += 1
                 self._look(done[0])
             elif self._to_judge and (at_ease or 3 * self._judging_s <= self.run_s):
                 done = self._to_judge

@@ -32,7 +32,7 @@ from mirotwin.report.firmware_coverage import collect, write
 MINIMISE_S = 10.0
 TRIES = 50_000
 TRIES_IN_A_WORLD = 400
-SAME_TRIED = 12
+SAME_TRIED = 6
 """Inputs of one check and PC in a row that are minimised although nothing new comes of them."""
 CONFIRMED, UNCONFIRMED = "finds", "unconfirmed"
 
