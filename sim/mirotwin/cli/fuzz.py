@@ -11,8 +11,10 @@ import click
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.seed import MAX_SEED
 from miro_host.parts import PartError
+from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import Image
 from mirotwin.checks.expect import expectations_of
 from mirotwin.cli.debug import sources_of, sources_option
@@ -36,6 +38,7 @@ from mirotwin.testing.wanted import silent_scenario
 
 UNITS_S = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 LONGEST_S = 1e7
+AWAKE_MS = 1000 * AWAKE_TICKS // TICKS_PER_SECOND
 INTERRUPTED_S = 5.0
 """How long inputs are still looked at behind a Ctrl-C."""
 
@@ -256,6 +259,11 @@ def _check_at_rest(target: Target, image: Image) -> None:
     """Raises BadInput for firmware in which something is wrong before it has heard anything."""
     target.run(b"")
     finding = target.finding
+    harness = getattr(target, "harness", None)
+    if harness is not None and not harness.sleeps:
+        complain(
+            f"{image.path}: never sleeps (IDL); each run goes on for {AWAKE_MS} ms behind its last character"
+        )
     if finding is not None:
         what = f"fails before it has heard anything: {finding.check}: {finding.what}"
         raise BadInput(image.path, "", what, "mend that first: each input would find it")

@@ -8,6 +8,8 @@ import pytest
 from tests import children
 from tests.host.distribution import install
 from tests.mirotwin.checks.rig import needs_sdcc, own_image
+from tests.mutants.build import build
+from tests.mutants.draw import source_files
 
 from miro_protocol import stream
 from mirotwin.fuzz.files import CampaignFolder
@@ -238,6 +240,16 @@ def test_firmware_that_fails_before_it_hears_anything_is_refused(mirotwin, engin
     assert code in (1, 2)
     if code == 2:
         assert "mend" in err
+
+
+@needs_sdcc
+def test_firmware_that_never_sleeps_is_fuzzed_with_a_word_about_it(mirotwin, engines, tmp_path):
+    source = source_files()["main.c"]
+    assert source.count("        sleep = IDL;\n") == 1
+    built = build({"main.c": source.replace("        sleep = IDL;\n", "        sleep = 0;\n")})
+    code, _, err = mirotwin("fuzz", built.image, "--time", "1s", "--out", tmp_path / "out")
+    assert "miro.ihx: never sleeps (IDL); each run goes on for 10 ms behind its last character" in err
+    assert code in (0, 1)
 
 
 def test_a_symbol_needs_symbols(mirotwin, engines, tmp_path):
