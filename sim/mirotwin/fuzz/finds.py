@@ -22,9 +22,10 @@ from miro_robot.image.debug_info import Sources
 from miro_robot.inspect.coverage import Counts
 from miro_robot.inspect.lcov import Tracefile
 from mirotwin.checks.interface import Failure
+from mirotwin.fuzz.budget import Budget
 from mirotwin.fuzz.confirm import Court, Expected, Judgement
 from mirotwin.fuzz.files import CampaignFolder
-from mirotwin.fuzz.minimise import Budget, minimise
+from mirotwin.fuzz.minimise import minimise
 from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.target import Finding, Target
 from mirotwin.report.firmware_coverage import collect, write

@@ -5,7 +5,8 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mirotwin.fuzz.minimise import Budget, minimise
+from mirotwin.fuzz.budget import Budget
+from mirotwin.fuzz.minimise import minimise
 
 
 def small(data, still, tries=100_000):
