@@ -1,0 +1,64 @@
+"""A wire format as fuzzers need it: bodies become frames, characters become frames and damage, and back.
+
+What belongs here: the interface, and a protocol with its parameters as one text. What does not: any protocol (ours is
+`miro_wire.py`) and how one is found by its name (`mirotwin.fuzz.protocols`).
+
+A body is what a frame carries, without all that can be computed: checksum, escapes, delimiters. Mistakes of firmware
+lie behind the checksum, and random bytes never get there; a fuzzer changes bodies, and `repair` makes frames of them
+that the receiver has to take.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class Frame(msgspec.Struct, frozen=True):
+    """A good frame: its body, and `start` .. `end` - 1, where its characters stand among those decoded."""
+
+    body: bytes
+    start: int
+    end: int
+
+
+class Damage(msgspec.Struct, frozen=True):
+    """Characters `start` .. `end` - 1 that are no frame; `reason` in a few words."""
+
+    start: int
+    end: int
+    reason: str
+
+
+class Protocol(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="protocol"):
+    """Base of every wire format. The fields are its parameters.
+
+    Derive with `frozen=True, tag="its_name"`, give each parameter its range (`typing.Annotated` with `msgspec.Meta`),
+    and define all three methods. Two laws hold for any bytes:
+
+        decode(encode(body)) == [Frame(body, 0, size)]          of a body that can be sent
+        decode(repair(body)) == [Frame(some body, 0, size)]     of any body at all
+    """
+
+    @property
+    def name(self) -> str:
+        return str(self.__struct_config__.tag)
+
+    def encode(self, body: bytes) -> bytes:
+        """All characters of the frame around `body`. Raises ValueError for a body that no frame can carry."""
+        raise NotImplementedError
+
+    def decode(self, wire: bytes) -> list[Frame | Damage]:
+        """What a receiver finds in characters that follow each other, in their order. Raises nothing."""
+        raise NotImplementedError
+
+    def repair(self, body: bytes, number: int | None = None) -> bytes:
+        """The frame that comes closest to `body`, whatever that is. Raises nothing.
+
+        `number`: the frame is so many frames behind the first one of its session; a format with sequence numbers puts
+        the right one in. None: those that stand in the body stay.
+        """
+        raise NotImplementedError
+
+    def samples(self) -> tuple[bytes, ...]:
+        """Bodies that mean something, one of each kind: what fuzzing begins with."""
+        return (b"",)
