@@ -22,7 +22,9 @@ class Miro(Protocol, frozen=True, tag="miro"):
     def encode(self, body: bytes) -> bytes:
         form = downlink(self.robots)
         if len(body) != form.body_size:
-            raise ValueError(f"body of {len(body)} bytes: a network of {self.robots} robots has {form.body_size}")
+            raise ValueError(
+                f"body of {len(body)} bytes: a network of {self.robots} robots has {form.body_size}"
+            )
         return seal(form, body)
 
     def decode(self, wire: bytes) -> list[Frame | Damage]:

@@ -31,7 +31,8 @@ class Header(msgspec.Struct, frozen=True, kw_only=True):
 
     `scenario`: the name of a built-in scenario, or a whole one. `set`: changes to the scenario, by the path of a key.
     `expect`: checks, as in a scenario. `verdict`: what the one of them said that failed, `end_tick`: where that run
-    ended; with them the file is a case. `version`: of the program that wrote the file.
+    ended; with them the file is a case. `bare`: clock and bit length where it is for a bare processor and not for the
+    robot. `version`: of the program that wrote the file.
     """
 
     text: str = ""
@@ -42,6 +43,7 @@ class Header(msgspec.Struct, frozen=True, kw_only=True):
     expect: dict[str, Any] | None = None
     verdict: str | None = None
     end_tick: Annotated[int, Meta(ge=1, le=(1 << 61) - 1)] | None = None
+    bare: dict[str, Any] | None = None
     version: str | None = None
 
 
@@ -140,6 +142,7 @@ _REMEDIES = {
     "set": "give a table: paths of keys and their values",
     "expect": "give a table: checks and what they expect",
     "verdict": "give the line of the check that failed as text",
+    "bare": "give a table: crystal_hz, bit_ticks, begin_tick",
     "end_tick": f"give a whole number 1..{(1 << 61) - 1}",
     "version": "give the version as text",
 }

@@ -4,7 +4,7 @@ cdef int _MOST, _MOST_RESETS, _PAIR, _SEQS, _XOR_OUT
 cdef long long _MOST_TICKS, _PAUSE, _SILENCE, _RESET_TICKS, _UP_TICKS
 cdef int _BYTES, _FRAMES, _SESSION
 cdef int _TEAM, _SERVICE, _ASK
-cdef int _BAD_STOP, _RESET
+cdef int _BAD_STOP, _RESET, _LONG
 
 
 cdef class Program:
@@ -47,7 +47,7 @@ cdef class Program:
     cdef void _own_velocities(self) noexcept
     @cython.locals(body='unsigned char *', place=int, register='unsigned int', kind=int)
     cdef void _seal(self, int hdr) noexcept
-    @cython.locals(place=int, value=int)
+    @cython.locals(count=int, size=int, place=int, value=int)
     cdef int _foreign(self) except -1
     @cython.locals(first=int, size=int, place=int)
     cdef void _again(self) noexcept

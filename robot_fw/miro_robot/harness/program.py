@@ -26,7 +26,7 @@ knows nothing of them gets past them. What does not: sending (`harness.py`) and 
 Velocity -32768 is an encoding error, which no host sends: -32767 goes out in its place.
 
 A wire format of somebody else's comes in as `repair`, a function from a frame's body to its characters; its bodies are
-a count (low 5 bits) and so many bytes, for all frame operations alike.
+a count - 1 (low 5 bits; times 8 if the upper 3 bits are 1) and so many bytes, for all frame operations alike.
 
 Long because one class reads the input and writes the characters, and a compiled class is one file.
 """
@@ -67,6 +67,7 @@ _SEQS = SEQ_MODULUS
 _PAIR = downlink(3).payload_size // 3  # two int16
 _XOR_OUT = crc.XOR_OUT
 _BAD_STOP, _RESET = 1, 2
+_LONG = 0xE0  # counts of eight bytes each, in a foreign body
 
 
 class Program:
@@ -320,8 +321,12 @@ class Program:
 
     def _foreign(self) -> None:
         """A frame of a wire format that Python repairs."""
-        body = bytearray((self._next() & 0x1F) + 1)
-        for place in range(len(body)):
+        count = self._next()
+        size = (count & 0x1F) + 1
+        if count >= _LONG:
+            size *= 8
+        body = bytearray(size)
+        for place in range(size):
             value = self._next()  # on its own: Cython 3.2 would call it three times in the next line
             body[place] = value
         self._begin_frame()

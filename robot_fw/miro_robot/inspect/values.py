@@ -25,7 +25,7 @@ def read_value(cpu: Cpu, image: Image, name: str, as_type: str = "") -> Any:
     there, and one in external RAM, which no board has.
     """
     variable, variables = find_variable(image, name, as_type)
-    return value_of(variable.type, _bytes(cpu, image, variable), variables.fields(variable))
+    return value_of(variable.type, bytes_at(cpu, image, variable), variables.fields(variable))
 
 
 def write_value(cpu: Cpu, image: Image, name: str, value: Any, as_type: str = "") -> None:
@@ -34,7 +34,7 @@ def write_value(cpu: Cpu, image: Image, name: str, value: Any, as_type: str = ""
     Raises BadInput as `read_value`, for a value that does not fit, and for a variable elsewhere.
     """
     variable, variables = find_variable(image, name, as_type)
-    before = _bytes(cpu, image, variable)
+    before = bytes_at(cpu, image, variable)
     try:
         data = bytes_of(variable.type, value, before, variables.fields(variable))
     except ValueError as error:
@@ -51,7 +51,7 @@ def write_value(cpu: Cpu, image: Image, name: str, value: Any, as_type: str = ""
         )
 
 
-def _bytes(cpu: Cpu, image: Image, variable: Variable) -> bytes:
+def bytes_at(cpu: Cpu, image: Image, variable: Variable) -> bytes:
     """As many bytes as the type has, from the place where the variable lies."""
     space, address = variable.space, variable.address
     if space == "bit":

@@ -19,7 +19,7 @@ class XramBus(Bus):
     """
 
     STATE = {"memory": "65536B"}
-    NOT_STATE = ("code_of", "faulted", "sent")
+    NOT_STATE: tuple[str, ...] = ("code_of", "faulted", "sent")
 
     def __init__(self, sent: Callable[[int, int], None], faulted: Callable[[int, int, int], None]) -> None:
         self.memory = bytearray(0x10000)

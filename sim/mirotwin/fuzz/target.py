@@ -12,20 +12,20 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.stream_events import Deed, Reset
+from miro_protocol.stream_events import Deed
 from miro_protocol.table import downlink
-from miro_protocol.transmission import DOWN, Transmission
+from miro_protocol.transmission import Transmission
 from miro_robot.board import Board
-from miro_robot.harness.harness import AHEAD_TICKS, AWAKE, LEAD_TICKS, Harness
-from miro_robot.harness.program import INPUTS, RESET_TICKS, Program
+from miro_robot.harness.harness import AWAKE, Harness
+from miro_robot.harness.program import INPUTS, Program
 from miro_robot.harness.referee import NAMES, Referee
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
+from mirotwin.fuzz.harness_target import MAP_SIZE as MAP_SIZE
+from mirotwin.fuzz.harness_target import HarnessTarget
 
-MAP_SIZE = 8192
-"""Bytes of the edge map. AFL++ is 1.5 times as fast with it as with its own 64 KiB; firmware has some hundred edges."""
 NEVER_SLEEPS = "never_sleeps"
 NEVER_SLEEPS_CODE = len(NAMES)
 BOOT_PERIODS = 8
@@ -62,7 +62,7 @@ class Target(Protocol):
     def describe(self, data: bytes) -> str: ...
 
 
-class RobotTarget:
+class RobotTarget(HarnessTarget):
     """The MIRO's board with `image`, as robot `slot` of `robots`, motors unplugged, up and in silence.
 
     `run(data)` puts it back and plays an input of any length; returns 0, or the kind of `finding`, by the place of its
@@ -70,49 +70,23 @@ class RobotTarget:
     `accepted`: fresh frames of the last run; `highest_sp`: how high its stack grew.
     """
 
-    map_size = MAP_SIZE
-
     def __init__(self, image: Image, input: str = "session", robots: int = 3, slot: int = 0) -> None:
         if input not in INPUTS:
             raise BadInput("", "", f"input {input!r}", f"use {', '.join(INPUTS)}")
-        self.input = input
-        self.image = image
         self.robots = robots
-        self.slot = slot
         self.board = _booted(image, slot, robots)
         self.referee = Referee(self.board, slot, robots)
-        self.harness = Harness(
-            self.board, self.board.cpu, self.referee, downlink(robots).bit_ticks, self.board
-        )
-        self.program = Program(INPUTS.index(input), slot, robots)
-        self.executions = 0
-        self.frames_fed = 0
-        self.characters_fed = 0
+        cpu, bit_ticks = self.board.cpu, downlink(robots).bit_ticks
+        harness = Harness(self.board, cpu, self.referee, bit_ticks, self.board)
+        super().__init__(image, harness, Program(INPUTS.index(input), slot, robots), slot)
         self.code = 0
-        self.use_map(bytearray(MAP_SIZE))
-
-    @property
-    def cpu(self) -> Cpu:
-        return self.board.cpu
 
     @property
     def accepted(self) -> int:
         return self.referee.accepted
 
-    @property
-    def highest_sp(self) -> int:
-        return self.cpu.highest_sp
-
-    def use_map(self, edges: Any) -> None:
-        self.edges = edges
-        self.cpu.watch_edges(memoryview(edges))
-
     def run(self, data: Any) -> int:
-        program = self.program
-        self.characters_fed += program.read(data)
-        self.frames_fed += program.frames
-        self.executions += 1
-        ended = self.harness.play(program)
+        ended = self.play(data)
         self.code = self.referee.code
         if ended == AWAKE and not self.code:
             self.code = NEVER_SLEEPS_CODE
@@ -130,47 +104,6 @@ class RobotTarget:
         if self.board.faults:
             return Finding(check, tick, self.referee.pc, str(self.board.faults[0]))
         return Finding(check, tick, 0, f"{check} at tick {tick}")
-
-    def happenings(self, data: bytes) -> list[Transmission | Deed]:
-        """What the robot hears of an input, and its resets, at ticks since power-on."""
-        program = self.program
-        program.read(data)
-        found: list[Transmission | Deed] = []
-        tick = self.harness.begin_tick + LEAD_TICKS
-        first = tick
-        values = bytearray()
-        bad: list[int] = []
-        for place in range(program.count):
-            value, bad_stop, reset, pause = program.character(place)
-            if reset or pause:
-                if values:
-                    found.append(Transmission(first, DOWN, bytes(values), bad_stop=tuple(bad)))
-                    values, bad = bytearray(), []
-                if reset:
-                    found += self._reset(tick)
-                tick += pause
-                first = tick
-            if bad_stop:
-                bad.append(len(values))
-            values.append(value)
-            tick += program.character_ticks
-        if values:
-            found.append(Transmission(first, DOWN, bytes(values), bad_stop=tuple(bad)))
-        if program.ends_with_reset():
-            found += self._reset(tick)
-        return found
-
-    def _reset(self, tick: int) -> list[Deed]:
-        at = tick + AHEAD_TICKS
-        return [Reset(at, 0, self.slot, 1), Reset(at + RESET_TICKS, 0, self.slot, 0)]
-
-    def end_tick(self) -> int:
-        """How far the last run went."""
-        return self.harness.now_tick
-
-    def describe(self, data: bytes) -> str:
-        """An input as lines, one for each piece of what the robot hears."""
-        return "\n".join(_described(one) for one in self.happenings(data))
 
     def __repr__(self) -> str:
         return f"RobotTarget({self.image.path}, input={self.input!r}, robot {self.slot} of {self.robots})"
@@ -197,12 +130,3 @@ def _booted(image: Image, slot: int, robots: int) -> Board:
     waited_ms = BOOT_PERIODS * CONTROL_PERIOD_TICKS / 24_000
     what = f"the firmware has not turned its serial receiver on {waited_ms:.0f} ms after power-on"
     raise BadInput(image.path, "", what, "only firmware that listens can be fuzzed through its serial port")
-
-
-def _described(one: Transmission | Deed) -> str:
-    if isinstance(one, Transmission):
-        bad = f", bad stop bits at {', '.join(map(str, one.bad_stop))}" if one.bad_stop else ""
-        return f"{one.tick}: {one.data.hex(' ')}{bad}"
-    if isinstance(one, Reset):
-        return f"{one.tick}: reset {one.level}"
-    return str(one)

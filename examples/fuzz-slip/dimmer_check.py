@@ -1,0 +1,25 @@
+"""What the dimmer must keep to, whatever it is sent: checks for `mirotwin fuzz --check`.
+
+What belongs here: what is wrong about a run. What does not: the wire format (`slip_protocol.py`).
+"""
+
+from slip_protocol import Damage, Slip
+
+from mirotwin.fuzz.exchange import Exchange
+
+BRIGHT = 100
+P1 = 0x90
+
+
+def lamps_as_told(run: Exchange) -> str | None:
+    """Levels are 0..100, a lamp is on P1 if its level is not 0, and each answer is a good frame."""
+    levels = run.memory["level"]
+    for lamp, level in enumerate(levels):
+        if level > BRIGHT:
+            return f"lamp {lamp} has level {level}, of 0..{BRIGHT}"
+        if bool(run.memory.sfr(P1) >> lamp & 1) != (level > 0):
+            return f"lamp {lamp} has level {level} and is {'on' if level == 0 else 'off'}"
+    for one in Slip().decode(run.sent_bytes):
+        if isinstance(one, Damage):
+            return f"the answer {run.sent_bytes[one.start : one.end].hex(' ')} is no frame: {one.reason}"
+    return None

@@ -1,0 +1,36 @@
+cimport cython
+
+from miro_robot.harness.judge cimport Judge
+from miro_robot.mcs51.cpu cimport Cpu
+from miro_robot.mcs51.xram cimport XramBus
+
+cdef int _KEPT, _NO_FAULT
+cdef long long _NEVER, _STOPPED, _LONGEST
+
+cdef class HeardBus(XramBus):
+    cdef public Cpu cpu
+    cdef unsigned char received_values[4096]
+    cdef unsigned char received_stops[4096]
+    cdef long long received_ticks[4096]
+    cdef readonly int received
+    cdef unsigned char sent_values[4096]
+    cdef long long sent_ticks[4096]
+    cdef readonly int sent_count
+    cdef readonly int fault_kind
+    cdef readonly int fault_pc
+    cdef readonly long long fault_tick
+
+    cpdef begin(self)
+    cpdef byte_received(self, int value, int stop, long long tick)
+    cpdef byte_sent(self, int value, long long tick)
+    cpdef fault(self, int kind, int pc, long long tick)
+
+cdef class BareJudge(Judge):
+    cdef readonly HeardBus bus
+    cdef readonly Cpu cpu
+    cdef long long slept_tick
+
+    cpdef begin(self, long long tick)
+    cpdef look(self, long long tick)
+    @cython.locals(now='long long')
+    cpdef bint waits(self) except -1

@@ -1,0 +1,175 @@
+"""A target that is any 8051 firmware with a serial port, on a bare processor.
+
+What belongs here: the target. What does not: the machine (`bare_machine`), checks in Python (`exchange`), and cases
+(`bare_case`).
+
+Where the firmware sleeps when it has nothing to do, a run ends when it sleeps and has sent all it had; where it polls
+for ever, 10 ms (at 24 MHz) after the last character.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from miro_exact.bad_input import BadInput
+from miro_protocol.protocol import Damage, Protocol
+from miro_protocol.stream_events import Deed
+from miro_protocol.transmission import Transmission
+from miro_robot.bare.machine import CRYSTAL_HZ
+from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
+from miro_robot.harness.heard_bus import LONGEST_ANSWER_TICKS, BareJudge
+from miro_robot.harness.program import INPUTS, Program
+from miro_robot.image import SPACE_BYTES, Image, load_hex
+from miro_sim.inputs import check_regular
+from mirotwin.fuzz.bare_machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
+from mirotwin.fuzz.exchange import Exchange, NamedCheck, check_named
+from mirotwin.fuzz.harness_target import HarnessTarget, described
+from mirotwin.fuzz.protocols import protocol_named
+from mirotwin.fuzz.target import NEVER_SLEEPS, Finding
+
+if TYPE_CHECKING:
+    from mirotwin.fuzz.spec import TargetSpec
+
+NO_FAULT = "no_fault"
+NO_FAULT_CODE, NEVER_SLEEPS_CODE, CHECK_CODE = 1, 2, 3
+MOST_OF_A_BODY = 32
+"""Bytes of a body in a seed; the harness's program has a form for longer ones, which a fuzzer finds."""
+_BITS = 10
+
+
+class BareTarget(HarnessTarget):
+    """`image` on a bare processor, up and in silence.
+
+    `protocol` makes frames of bodies; without it they are sent as they are. `check` judges each run, `baud` 0 takes the
+    rate of the receiver. `run(data)` returns 0 or what `finding` is: a fault, no sleep, what the check says.
+    Raises BadInput where the firmware does not come up.
+    """
+
+    def __init__(
+        self,
+        image: Image,
+        input: str = "session",
+        protocol: Protocol | None = None,
+        check: NamedCheck | None = None,
+        crystal_hz: int = CRYSTAL_HZ,
+        baud: int = 0,
+        boot_ms: int = BOOT_MS,
+    ) -> None:
+        if input not in INPUTS:
+            raise BadInput("", "--input", f"{input!r} is no class of inputs", f"use {', '.join(INPUTS)}")
+        self.protocol = protocol
+        self.check = check
+        self.processor = BareProcessor(image)
+        try:
+            BareLine(crystal_hz)
+        except ValueError as error:
+            raise BadInput("", "--crystal", str(error)) from None
+        self.processor.start_up(crystal_hz, boot_ms)
+        bit_ticks = bit_ticks_of(self.processor, crystal_hz, baud, boot_ms)
+        self.line = BareLine(crystal_hz, bit_ticks, self.processor.begin_tick)
+        self.judge = BareJudge(self.processor.bus, self.processor.cpu)
+        harness = Harness(self.processor, self.processor.cpu, self.judge, bit_ticks)
+        program = Program(INPUTS.index(input), repair=self._repaired, character_ticks=_BITS * bit_ticks)
+        super().__init__(image, harness, program)
+        self.code = 0
+        self._wrong = ""
+
+    def _repaired(self, body: bytes) -> bytes:
+        return body if self.protocol is None else self.protocol.repair(body, self.program.frames - 1)
+
+    def run(self, data: Any) -> int:
+        ended = self.play(data)
+        self.code = NO_FAULT_CODE if self.judge.code else 0
+        if ended == AWAKE and not self.code:
+            self.code = self._awake()
+        if self.check is not None and not self.code:
+            self._judge(self.check)
+        return self.code
+
+    def _judge(self, check: NamedCheck) -> None:
+        """What the check says. That it fails itself is a finding too: it is told when the find is confirmed."""
+        try:
+            self._wrong = check.judge(self.exchange()) or ""
+        except BadInput as error:
+            self._wrong = str(error)
+        self.code = CHECK_CODE if self._wrong else 0
+
+    def _awake(self) -> int:
+        """Firmware that waits for its transmitter is awake, and no worse for it: as long as it sends, it may go on."""
+        cpu, bus = self.cpu, self.processor.bus
+        end = 12 * cpu.cycles + LONGEST_ANSWER_TICKS
+        sent = -1
+        while sent != bus.sent_count and 12 * cpu.cycles < end:
+            sent = bus.sent_count
+            idle = cpu.idle_cycles
+            cpu.run(cpu.cycles + SETTLE_TICKS // 12)
+            if bus.fault_kind:
+                return NO_FAULT_CODE
+            if cpu.idle_cycles > idle:
+                return 0
+        return NEVER_SLEEPS_CODE
+
+    def exchange(self) -> Exchange:
+        """What went in and out in the last run; its memory is good until the next one."""
+        return self.processor.exchange()
+
+    def end_tick(self) -> int:
+        return 12 * self.cpu.cycles
+
+    @property
+    def finding(self) -> Finding | None:
+        """Of the last run."""
+        fault = self.processor.fault()
+        if self.code == NO_FAULT_CODE and fault is not None:
+            return Finding(NO_FAULT, fault.tick, fault.pc, str(fault))
+        if self.code == NEVER_SLEEPS_CODE:
+            where = self.image.symbols.name_at(self.cpu.pc)
+            what = f"awake long after the last character{f', in {where}' if where else ''}"
+            return Finding(NEVER_SLEEPS, self.end_tick(), 0, what)
+        if self.code == CHECK_CODE and self.check is not None:
+            return Finding(self.check.name, self.end_tick(), 0, self._wrong)
+        return None
+
+    def describe(self, data: bytes) -> str:
+        return "\n".join(self._line(one) for one in self.happenings(data))
+
+    def _line(self, one: Transmission | Deed) -> str:
+        if self.protocol is None or not isinstance(one, Transmission):
+            return described(one)
+        said = [
+            f"damage ({part.reason})" if isinstance(part, Damage) else f"frame {part.body.hex(' ')}"
+            for part in self.protocol.decode(one.data)
+        ]
+        return f"{described(one)}  # {'; '.join(said)}"
+
+    def seeds(self) -> list[bytes]:
+        """Inputs to begin with: the protocol's samples, one by one and all together."""
+        samples = (b"\0", b"A", bytes(range(8))) if self.protocol is None else self.protocol.samples()
+        if self.input == "bytes":
+            each = [body if self.protocol is None else self.protocol.repair(body) for body in samples]
+        else:
+            each = [frame_input(body, self.input) for body in samples]
+        return list(dict.fromkeys([*each, b"".join(each)]))
+
+    def __repr__(self) -> str:
+        return f"BareTarget({self.image.path}, input={self.input!r}, {self.line})"
+
+
+def frame_input(body: bytes, input: str) -> bytes:
+    """The input that sends one body; of a class other than `bytes`, which has none."""
+    kept = body[:MOST_OF_A_BODY] or b"\0"
+    return (b"\x07" if input == "session" else b"") + bytes([len(kept) - 1]) + kept
+
+
+def bare_target(spec: TargetSpec) -> BareTarget:
+    """The target of a specification; `parameters` may hold `crystal_hz` and `boot_ms`. Raises BadInput."""
+    check_regular(spec.image)
+    return BareTarget(
+        load_hex(Path(spec.image), SPACE_BYTES),
+        spec.input,
+        protocol_named(spec.protocol) if spec.protocol else None,
+        check_named(spec.check) if spec.check else None,
+        baud=spec.baud,
+        **spec.parameters,
+    )

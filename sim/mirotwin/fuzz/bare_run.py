@@ -1,0 +1,122 @@
+"""What a bare processor hears, played from power-on: without a saved moment, and without a harness.
+
+What belongs here: this one run and the verdict of a check on it. What does not: the target, whose finds are tried here
+once more, and files (`bare_case`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import NEVER_TICK
+from miro_protocol.stream_events import Deed, Reset
+from miro_protocol.transmission import Transmission
+from miro_robot.harness.harness import SETTLE_TICKS
+from miro_robot.harness.heard_bus import LONGEST_ANSWER_TICKS
+from miro_robot.image import Image
+from miro_robot.mcs51.uart import STOPPED_TICK
+from mirotwin.fuzz.bare_machine import BareLine, BareProcessor
+from mirotwin.fuzz.exchange import NamedCheck
+
+AHEAD_TICKS = 240  # the CPU may look so far beyond the end of a run
+_BITS = 10
+_LOOK = 2_000  # cycles between two looks at whether firmware sleeps
+
+
+class BareRun:
+    """`image` from power-on to `end_tick`, and on until it has sent what it had if it sleeps.
+
+    `idle`: it slept within the last 30 ms (at 24 MHz) before the end, or `sleeps` says that it never does.
+    """
+
+    def __init__(
+        self,
+        image: Image,
+        line: BareLine,
+        heard: Sequence[Transmission | Deed],
+        end_tick: int,
+        source: str = "",
+    ) -> None:
+        self.processor = BareProcessor(image)
+        self.line = line
+        self.source = source
+        self.idle = True
+        self.sleeps = False
+        self._end_of_last = 0
+        first = min((one.tick - AHEAD_TICKS for one in heard), default=line.begin_tick)
+        if not self._to(max(0, min(line.begin_tick, first))):
+            return
+        self._begin()
+        for one in heard:
+            if not self._to(one.tick - AHEAD_TICKS if isinstance(one, Transmission) else one.tick):
+                return
+            if isinstance(one, Transmission):
+                self._characters(one)
+            elif isinstance(one, Reset):
+                self._reset(one)
+        self._end(end_tick)
+
+    def verdict(self, check: NamedCheck | None) -> str:
+        """What the check says is wrong, or the empty string. Without a check, faults count."""
+        fault = self.processor.fault()
+        if fault is not None or check is None:
+            return str(fault or "")
+        return check.judge(self.processor.exchange()) or ""
+
+    def _to(self, tick: int) -> bool:
+        """Runs on; False after a fault."""
+        cycle = (tick + 11) // 12
+        if cycle > self.processor.cpu.cycles:
+            self.processor.cpu.run(cycle)
+        return not self.processor.bus.fault_kind
+
+    def _begin(self) -> None:
+        self.processor.begin_tick = 12 * self.processor.cpu.cycles
+        self.sleeps = self.processor.cpu.idle_cycles > 0
+        self.processor.bus.begin()
+
+    def _characters(self, sent: Transmission) -> None:
+        if sent.tick < self._end_of_last:
+            what = f"the characters at tick {sent.tick} begin before those before them end"
+            raise BadInput(self.source, "", what, f"leave {self._end_of_last - sent.tick} ticks between them")
+        bit, rxd, tick = self.line.bit_ticks, self.processor.cpu.rxd, sent.tick
+        for at, value in enumerate(sent.data):
+            for place, level in enumerate((0, *(value >> place & 1 for place in range(8)))):
+                rxd.append(tick + place * bit, level)
+            stop = tick + (_BITS - 1) * bit
+            if at in sent.bad_stop:
+                rxd.append(stop, 0)
+                stop += 3 * bit // 4
+            rxd.append(stop, 1)
+            tick += _BITS * bit
+        self._end_of_last = tick
+
+    def _reset(self, deed: Reset) -> None:
+        if deed.level:
+            self.processor.cpu.hold()
+        else:
+            self.processor.cpu.reset()
+
+    def _end(self, end_tick: int) -> None:
+        cpu = self.processor.cpu
+        if not self._to(end_tick - SETTLE_TICKS):
+            return
+        idle_cycles = cpu.idle_cycles
+        if not self._to(end_tick) or not self.sleeps:
+            return
+        self.idle = cpu.idle_cycles > idle_cycles
+        last = 12 * cpu.cycles + LONGEST_ANSWER_TICKS
+        while (
+            self.idle
+            and not self._is_done()
+            and 12 * cpu.cycles < last
+            and self._to(12 * (cpu.cycles + _LOOK))
+        ):
+            pass
+
+    def _is_done(self) -> bool:
+        cpu = self.processor.cpu
+        if cpu.powered_down:
+            return True
+        return bool(cpu.idle) and cpu.peripherals.uart.ti_tick() >= min(STOPPED_TICK, NEVER_TICK)

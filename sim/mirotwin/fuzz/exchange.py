@@ -1,0 +1,186 @@
+"""What went in and out of a bare processor during one run, and the checks in Python that judge it.
+
+What belongs here: what such a check is given, and finding one by its name. What does not: who runs the firmware
+(`bare.py`).
+
+A check is a function that says what is wrong in one line, or None:
+
+    def level_is_kept(run: Exchange) -> str | None:
+        if run.memory["level"] > 100:
+            return f"the level is {run.memory['level']}"
+        return None
+
+It is named as `mycheck.py:level_is_kept`, or, where a distribution has it, by an entry point:
+
+    [project.entry-points."mirotwin.bare_checks"]
+    level_is_kept = "mycheck:level_is_kept"
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import traceback
+from collections.abc import Callable
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_host.parts import described
+from miro_robot.faults import FirmwareFault
+from miro_robot.harness.heard_bus import HeardBus
+from miro_robot.image import Image
+from miro_robot.image.c_types import value_of
+from miro_robot.image.variables import Variable, Variables, find_variable
+from miro_robot.inspect.values import bytes_at
+from miro_robot.mcs51.cpu import Cpu
+
+OPTION = "--check"
+GROUP = "mirotwin.bare_checks"
+
+
+class Character(NamedTuple):
+    """As the serial port had it. `tick`: RI or TI went up, in periods of the crystal since power-on.
+
+    `stop_good`: the stop bit was a mark, so far as the mode of the serial port can tell.
+    """
+
+    value: int
+    tick: int
+    stop_good: bool = True
+
+
+class Memory:
+    """The memories of the processor, as they are at the end of the run. Good until the next run."""
+
+    def __init__(self, cpu: Cpu, bus: HeardBus, image: Image) -> None:
+        self._cpu = cpu
+        self._bus = bus
+        self._image = image
+        self._known: dict[str, tuple[Variable, Variables]] = {}  # by the names asked for
+
+    def __getitem__(self, name: str) -> Any:
+        """The variable `name` by its C type: int, float, bool, a list for an array, a dict for a struct.
+
+        Names as `file:name`, `name[2]`, `name.x`. Raises BadInput for one that the .cdb beside the image does not know.
+        """
+        if name not in self._known:
+            self._known[name] = find_variable(self._image, name)
+        variable, variables = self._known[name]
+        return value_of(variable.type, self._bytes(variable), variables.fields(variable))
+
+    def _bytes(self, variable: Variable) -> bytes:
+        if variable.space != "xram":
+            return bytes_at(self._cpu, self._image, variable)
+        return bytes(self._bus.movx_read(variable.address + at, 0) for at in range(variable.type.size))
+
+    @property
+    def iram(self) -> bytes:
+        return bytes(self._cpu.peek_iram(address) for address in range(0x100))
+
+    @property
+    def xram(self) -> bytes:
+        return self._bus.content()
+
+    def sfr(self, address: int) -> int:
+        """A special function register (80h..FFh; ports: their latch)."""
+        return self._cpu.sfr(address)
+
+
+class Exchange(msgspec.Struct, frozen=True):
+    """One run: characters that the serial port took and gave, in the order of time, and what was left behind.
+
+    `begin_tick`: the firmware had started up and the first character could come. `fault`: the run ended with it.
+    """
+
+    received: tuple[Character, ...]
+    sent: tuple[Character, ...]
+    fault: FirmwareFault | None
+    begin_tick: int
+    end_tick: int
+    memory: Memory
+
+    @property
+    def received_bytes(self) -> bytes:
+        return bytes(one.value for one in self.received)
+
+    @property
+    def sent_bytes(self) -> bytes:
+        return bytes(one.value for one in self.sent)
+
+
+Check = Callable[[Exchange], object]
+"""Returns what is wrong, or None."""
+
+
+class NamedCheck(msgspec.Struct, frozen=True):
+    """A check as it was named. `text`: what `check_named` took; `from_file`: the name is that of a file."""
+
+    name: str
+    text: str
+    function: Check
+    from_file: bool
+
+    def judge(self, run: Exchange) -> str | None:
+        """What is wrong, in one line. Raises BadInput where the check fails itself."""
+        try:
+            found = self.function(run)
+        except BadInput:
+            raise
+        except Exception as error:
+            last = traceback.extract_tb(error.__traceback__)[-1]
+            place = f"{Path(last.filename).name}:{last.lineno}"
+            what = f"raised {described(error)} at {place}"
+            raise BadInput("", f"{OPTION} {self.text}", what, "repair the check") from error
+        if found is None or isinstance(found, str):
+            return None if found is None else " ".join(found.split()) or "failed"
+        what = f"returned {found!r:.40}"
+        raise BadInput("", f"{OPTION} {self.text}", what, "return None, or what is wrong as text")
+
+
+def check_named(text: str) -> NamedCheck:
+    """The check that `FILE.py:FUNCTION`, or the name of an entry point, means. Raises BadInput."""
+    path, _, function = text.rpartition(":")
+    if path.endswith(".py"):
+        return NamedCheck(function, text, _callable(_module(path, text), function, text), True)
+    entries = list(entry_points(group=GROUP, name=text))
+    if not entries:
+        names = sorted(entry.name for entry in entry_points(group=GROUP))
+        remedy = f"give FILE.py:FUNCTION{''.join(f', {name}' for name in names)}"
+        raise BadInput("", OPTION, f"there is no check {text!r} for a bare processor", remedy)
+    try:
+        found = entries[0].load()
+    except (Exception, SystemExit) as error:
+        what = f"check {text!r} ({entries[0].value}) cannot be imported: {described(error)}"
+        raise BadInput("", OPTION, what, "repair or uninstall it") from error
+    if not callable(found):
+        raise BadInput("", OPTION, f"check {text!r} ({entries[0].value}) is no function", "name a function")
+    return NamedCheck(text, text, found, False)
+
+
+def _module(path: str, text: str) -> ModuleType:
+    if not Path(path).is_file():
+        raise BadInput(path, OPTION, "there is no such file", "give FILE.py:FUNCTION")
+    spec = importlib.util.spec_from_file_location(Path(path).stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        raise BadInput(path, OPTION, f"cannot be run: {described(error)}", "repair it") from error
+    return module
+
+
+def _callable(module: ModuleType, name: str, text: str) -> Check:
+    found: Check | None = getattr(module, name, None)
+    if callable(found):
+        return found
+    names = [
+        key for key, value in vars(module).items() if callable(value) and value.__module__ == module.__name__
+    ]
+    choices = f"it has {', '.join(names)}" if names else "it has none"
+    raise BadInput(text.rpartition(":")[0], OPTION, f"there is no function {name!r}", choices)
