@@ -72,8 +72,9 @@ class BareRun:
         return not self.processor.bus.fault_kind
 
     def _begin(self) -> None:
-        self.processor.begin_tick = 12 * self.processor.cpu.cycles
-        self.sleeps = self.processor.cpu.idle_cycles > 0
+        cpu = self.processor.cpu
+        self.processor.begin_tick = 12 * cpu.cycles
+        self.sleeps = bool(cpu.idle or cpu.idle_cycles)
         self.processor.bus.begin()
 
     def _characters(self, sent: Transmission) -> None:

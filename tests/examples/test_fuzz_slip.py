@@ -1,0 +1,111 @@
+"""The example of a foreign firmware: SLIP frames with a checksum, its format and its check as plug-ins."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests import children
+from tests.mutants.sdcc import needs_sdcc
+
+from miro_protocol.protocol import Damage, Frame
+from miro_robot.image import load_hex
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "fuzz-slip"
+CRYSTAL_HZ = 11_059_200
+CHECK = f"{EXAMPLE / 'dimmer_check.py'}:lamps_as_told"
+FINDS = sorted((EXAMPLE / "finds").glob("*.stream"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def on_the_path():
+    sys.path.insert(0, str(EXAMPLE))
+    yield
+    sys.path.remove(str(EXAMPLE))
+
+
+@pytest.fixture(scope="module")
+def images(tmp_path_factory):
+    """Both firmwares, built by the example's Makefile."""
+    folder = shutil.copytree(
+        EXAMPLE, tmp_path_factory.mktemp("slip") / "it", ignore=shutil.ignore_patterns("build")
+    )
+    children.run(["make", "-s", "-C", folder], check=True)
+    return {name: load_hex(folder / "build" / f"{name}.ihx") for name in ("dimmer", "mended")}
+
+
+def slip():
+    from slip_protocol import Slip
+
+    return Slip()
+
+
+def target(image, kind="frames", check=False):
+    from mirotwin.fuzz.bare import BareTarget
+    from mirotwin.fuzz.exchange import check_named
+
+    judge = check_named(CHECK) if check else None
+    return BareTarget(image, kind, slip(), judge, crystal_hz=CRYSTAL_HZ)
+
+
+@given(st.lists(st.binary(min_size=1, max_size=40), max_size=4))
+def test_frames_are_decoded_as_they_were_encoded(bodies):
+    wires = [slip().encode(body) for body in bodies]
+    found = slip().decode(b"".join(wires))
+    assert [one.body for one in found if isinstance(one, Frame)] == bodies
+    assert [one.end - one.start for one in found] == [len(wire) for wire in wires]
+
+
+@given(st.binary(max_size=40), st.binary(max_size=20))
+def test_any_bytes_are_repaired_and_garbage_costs_at_most_itself(body, garbage):
+    wire = slip().repair(body)
+    found = slip().decode(garbage + wire)
+    assert found[-1] == Frame(body or b"\0", found[-1].start, len(garbage + wire))
+    assert all(isinstance(one, Damage) or one.end <= len(garbage) for one in found[:-1])
+
+
+@needs_sdcc
+@pytest.mark.parametrize("name", ["dimmer", "mended"])
+def test_the_firmware_answers_what_the_format_says(images, name):
+    dimmer = target(images[name], check=True)
+    for body, answer in (
+        (b"\x01\x02\x64", b"\x01\x02\x64"),
+        (b"\x02\x01", b"\x02\x01\x00"),
+        (b"\x03lamp", b"\x03\x04"),
+        (b"\x04", b"\x04"),
+        (b"\x01\x02\x65", None),  # too bright
+        (b"\x01\x03\x00", None),  # no such lamp
+    ):
+        assert dimmer.run(bytes([len(body) - 1]) + body) == 0
+        run = dimmer.exchange()
+        assert run.sent_bytes == (b"" if answer is None else slip().encode(answer))
+    dimmer.run(b"\x02\x01\x02\x64")
+    assert run.memory["level"] == [0, 0, 100]
+    assert run.memory["level[2]"] == 100
+
+
+@needs_sdcc
+def test_its_mistake_is_found_among_the_escapes_and_the_mended_one_stands(images):
+    for count, code in ((12, 0), (18, 3), (31, 1)):
+        data = bytes([count, 3]) + b"\xc0" * count
+        assert target(images["dimmer"], check=True).run(data) == code
+        assert target(images["mended"], check=True).run(data) == 0
+
+
+@needs_sdcc
+@pytest.mark.parametrize("path", FINDS, ids=lambda path: path.stem)
+def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
+    from mirotwin.fuzz.bare_case import replay_bare
+
+    again = replay_bare(path, images["dimmer"], CHECK)
+    assert again.failed
+    assert again.line.startswith("fails as recorded: ")
+    assert again.code == (3 if "no_fault" in path.stem else 1)
+    cured = replay_bare(path, images["mended"], CHECK)
+    assert (cured.code, cured.line.partition(":")[0]) == (0, "cured")
+
+
+def test_there_is_a_find_of_each_kind():
+    assert {path.stem.partition("-")[0] for path in FINDS} == {"no_fault", "lamps_as_told"}

@@ -1,0 +1,78 @@
+"""Small firmwares for a bare processor, in assembler: they need no compiler."""
+
+import hashlib
+from pathlib import Path
+
+from tests.robot.mcs51.asm import assemble
+
+from miro_robot.image import Image, Symbols
+
+SERIAL = """
+MOV TMOD,#20h
+MOV TH1,#0FDh
+MOV TL1,#0FDh
+SETB TR1
+MOV SCON,#50h
+"""
+
+POLLS = (
+    SERIAL
+    + """
+loop:
+JNB RI,$
+CLR RI
+MOV A,SBUF
+MOV SBUF,A
+INC 30h
+CJNE A,#21h,loop
+LJMP 4000h
+"""
+)
+"""Echoes; at `!` it runs into nothing. 30h counts. It never sleeps."""
+
+SLEEPS = (
+    """
+LJMP start
+ORG 23h
+JBC RI,got
+CLR TI
+RETI
+got:
+MOV A,SBUF
+MOV DPTR,#1234h
+MOVX @DPTR,A
+CJNE A,#3Fh,other
+stuck:
+SJMP stuck
+other:
+CJNE A,#21h,answer
+LJMP 4000h
+answer:
+MOV SBUF,A
+RETI
+start:
+"""
+    + SERIAL
+    + """
+MOV IE,#90h
+sleep:
+ORL PCON,#01h
+SJMP sleep
+"""
+)
+"""Echoes from its interrupt and sleeps; at `!` it runs into nothing, at `?` it is stuck. XRAM 1234h: the last one."""
+
+DEAF = "loop:\nSJMP loop"
+FAULTY = "LJMP 4000h"
+
+
+def image(text, name="test.ihx"):
+    code = assemble(text)
+    return Image(
+        path=Path(name),
+        code=code + b"\xff" * (0x10000 - len(code)),
+        used=((0, len(code)),),
+        size=len(code),
+        sha256=hashlib.sha256(code).hexdigest(),
+        symbols=Symbols({}),
+    )

@@ -1,0 +1,203 @@
+"""Any firmware with a serial port as a target: what it hears, how runs end, what is found."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.mirotwin.fuzz.bare.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
+
+from miro_exact.bad_input import BadInput
+from miro_protocol.miro_wire import Miro
+from miro_protocol.protocol import Protocol
+from mirotwin.fuzz.bare import CHECK_CODE, NEVER_SLEEPS_CODE, NO_FAULT_CODE, BareTarget, frame_input
+from mirotwin.fuzz.bare_run import BareRun
+from mirotwin.fuzz.exchange import NamedCheck
+
+INPUTS = st.sampled_from(["bytes", "frames", "session"])
+
+
+class Counted(Protocol, frozen=True, tag="counted"):
+    """Frames are their number, and the body."""
+
+    def repair(self, body, number=None):
+        return bytes([255 if number is None else number]) + body
+
+
+def check(function):
+    return NamedCheck(function.__name__, "test", function, False)
+
+
+def test_characters_come_in_at_the_rate_of_the_receiver_and_answers_go_out():
+    target = BareTarget(image(SLEEPS), "bytes")
+    assert target.run(b"hello") == 0
+    run = target.exchange()
+    assert run.received_bytes == run.sent_bytes == b"hello"
+    assert {later.tick - one.tick for one, later in zip(run.received, run.received[1:], strict=False)} == {
+        10 * target.line.bit_ticks
+    }
+    assert all(one.stop_good for one in run.received)
+    assert run.fault is None
+    assert run.begin_tick < run.received[0].tick < run.end_tick
+
+
+def test_a_run_is_over_when_firmware_sleeps_and_has_sent_all_it_had():
+    target = BareTarget(image(SLEEPS), "bytes")
+    target.run(b"abc")
+    run = target.exchange()
+    assert len(run.sent) == 3
+    assert run.end_tick - run.sent[-1].tick < 2 * 24_000
+
+
+def test_firmware_that_polls_for_ever_is_listened_to_for_a_while_and_nothing_is_wrong_with_it():
+    target = BareTarget(image(POLLS), "bytes")
+    assert target.run(b"abc") == 0
+    run = target.exchange()
+    assert run.received_bytes == b"abc"
+    assert run.end_tick - run.received[-1].tick == pytest.approx(10 * 24_000, rel=0.05)
+
+
+@pytest.mark.parametrize("firmware", [POLLS, SLEEPS])
+def test_a_fault_is_found_with_tick_and_place(firmware):
+    target = BareTarget(image(firmware), "bytes")
+    assert target.run(b"ab!cd") == NO_FAULT_CODE
+    found = target.finding
+    assert (found.check, found.pc) == ("no_fault", 0x4000)
+    assert "executed outside the loaded image at 0x4000" in found.what
+    assert found.tick > target.exchange().received[2].tick
+    assert target.run(b"abcd") == 0
+    assert target.finding is None
+
+
+def test_firmware_that_sleeps_no_more_is_found_and_only_where_it_is_one_that_sleeps():
+    target = BareTarget(image(SLEEPS), "bytes")
+    assert target.run(b"a?") == NEVER_SLEEPS_CODE
+    assert target.finding.check == "never_sleeps"
+    assert target.run(b"a") == 0
+
+
+def test_firmware_that_waits_for_its_transmitter_is_awake_and_not_stuck():
+    """It sends 200 characters for one, without an interrupt: 104 ms at 19200 baud."""
+    text = SLEEPS.replace(
+        "answer:\nMOV SBUF,A\n", "answer:\nMOV R7,#200\nmore:\nMOV SBUF,A\nJNB TI,$\nCLR TI\nDJNZ R7,more\n"
+    )
+    target = BareTarget(image(text), "bytes")
+    assert target.run(b"a") == 0
+    assert len(target.exchange().sent) == 200
+
+
+@settings(deadline=None, max_examples=60)
+@given(INPUTS, st.sampled_from([POLLS, SLEEPS]), st.binary(max_size=60))
+def test_any_input_gives_the_same_from_power_on_as_from_the_saved_moment(kind, firmware, data):
+    target = TARGETS[kind, firmware]
+    code = target.run(data)
+    run = target.exchange()
+    beyond = 240 if code == NO_FAULT_CODE else 0
+    again = BareRun(target.image, target.line, target.happenings(data), run.end_tick + beyond).processor
+    whole = again.exchange()
+    assert whole.received == run.received
+    assert whole.sent[: len(run.sent)] == run.sent
+    assert (whole.fault, whole.memory.iram, whole.memory.xram) == (
+        run.fault,
+        run.memory.iram,
+        run.memory.xram,
+    )
+
+
+TARGETS = {
+    (kind, firmware): BareTarget(image(firmware), kind, Counted())
+    for kind in ("bytes", "frames", "session")
+    for firmware in (POLLS, SLEEPS)
+}
+
+
+def test_bodies_become_frames_with_the_number_that_is_next():
+    target = BareTarget(image(SLEEPS), "frames", Counted())
+    target.run(b"\x00A\x01BC\x00D")
+    assert target.exchange().received_bytes == b"\x00A\x01BC\x02D"
+    target.run(b"\x00A")
+    assert target.exchange().received_bytes == b"\x00A"
+    assert (target.frames_fed, target.executions) == (4, 2)
+
+
+def test_a_body_may_have_more_than_32_bytes():
+    target = BareTarget(image(SLEEPS), "frames", Counted())
+    target.run(b"\xff" + b"A" * 256)
+    assert len(target.exchange().received_bytes) == 257
+
+
+def test_bad_stop_bits_pauses_and_damage_of_a_session_reach_the_receiver():
+    target = BareTarget(image(SLEEPS), "session")
+    raw = b"\x09\x02abc"
+    target.run(b"\x0a\x09" + raw)
+    late = target.exchange().received
+    target.run(raw)
+    soon = target.exchange().received
+    assert [one.tick - other.tick for one, other in zip(late, soon, strict=True)] == pytest.approx(
+        [24_000] * 3, abs=72
+    )
+    target.run(b"\x0e\x01" + b"\x07\x02abc")
+    assert [one.stop_good for one in target.exchange().received] == [True, False, True]
+    target.run(b"\x0c\x01\x20" + b"\x07\x02abc")
+    assert target.exchange().received_bytes == b"aBc"
+
+
+def test_without_a_protocol_bodies_are_sent_as_they_are_and_any_protocol_describes_them():
+    bare = BareTarget(image(SLEEPS), "frames")
+    bare.run(frame_input(b"xyz", "frames"))
+    assert bare.exchange().received_bytes == b"xyz"
+    ours = BareTarget(image(SLEEPS), "session", Miro())
+    line = ours.describe(frame_input(bytes(13), "session"))
+    assert line.endswith("# frame " + " ".join(["00"] * 13))
+    assert ": 55 55 55 55 55 ff 2d d4 " in line
+
+
+def test_seeds_are_the_samples_one_by_one_and_together():
+    target = BareTarget(image(SLEEPS), "frames", Miro())
+    seeds = target.seeds()
+    assert len(seeds) == len(Miro().samples()) + 1
+    target.run(seeds[-1])
+    assert target.frames_fed == len(Miro().samples())
+    plain = BareTarget(image(SLEEPS), "bytes", Miro()).seeds()[0]
+    assert plain == Miro().encode(Miro().samples()[0])
+
+
+def test_a_check_judges_each_run_and_sees_memory_characters_and_time():
+    def keeps_the_last(run):
+        last = run.received[-1].value if run.received else 0
+        return None if run.memory.xram[0x1234] == last < 0x80 else f"the last one is {last}"
+
+    target = BareTarget(image(SLEEPS), "bytes", check=check(keeps_the_last))
+    assert target.run(b"abc") == 0
+    assert target.run(b"ab\xff") == CHECK_CODE
+    assert target.finding.what == "the last one is 255"
+    assert target.finding.check == "keeps_the_last"
+
+
+def test_a_check_that_raises_is_a_finding_that_says_where():
+    def divides(run):
+        return 1 // (len(run.received) - 2)
+
+    target = BareTarget(image(SLEEPS), "bytes", check=check(divides))
+    assert target.run(b"ab") == CHECK_CODE
+    assert "raised ZeroDivisionError" in target.finding.what
+    assert "at test_bare.py:" in target.finding.what
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: BareTarget(image(DEAF)), "has not turned its serial receiver on 200 ms after power-on"),
+        (lambda: BareTarget(image(FAULTY)), "comes up with a fault: firmware executed outside"),
+        (lambda: BareTarget(image(POLLS), baud=3), "--baud: 3 is outside 50.."),
+        (lambda: BareTarget(image(POLLS), baud=10_000_000), "is outside 50..750000 at 24000000 Hz"),
+        (lambda: BareTarget(image(POLLS), crystal_hz=1), "--crystal: crystal 1 Hz is outside"),
+        (lambda: BareTarget(image(POLLS), "words"), "'words' is no class of inputs"),
+    ],
+)
+def test_what_cannot_be_fuzzed_is_refused_with_the_reason(make, said):
+    with pytest.raises(BadInput, match=said.replace("(", r"\(")):
+        make()
+
+
+def test_a_given_rate_is_taken_instead_of_the_receivers():
+    target = BareTarget(image(SERIAL + "SJMP $"), "bytes", crystal_hz=11_059_200, baud=9600)
+    assert target.line.bit_ticks == 1152

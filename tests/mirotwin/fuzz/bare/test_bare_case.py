@@ -1,0 +1,157 @@
+"""Finds on a bare processor as files: the same verdict again, on this firmware and on others."""
+
+import pytest
+from tests.mirotwin.fuzz.bare.firmwares import POLLS, SLEEPS, image
+
+from miro_exact.bad_input import BadInput
+from miro_protocol.stream_events import Reset
+from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.bare.machine import BareMachine
+from miro_robot.bare.pins import PinEvent
+from mirotwin.fuzz.bare import BareTarget
+from mirotwin.fuzz.bare_case import case_text, failure_of, replay_bare
+from mirotwin.fuzz.bare_run import AHEAD_TICKS, BareRun
+from mirotwin.fuzz.exchange import NamedCheck
+
+MENDED = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
+WRONG = 'def short(run):\n    return f"{len(run.sent)} are too many" if len(run.sent) > 2 else None\n'
+
+
+def too_long(run):
+    return f"{len(run.sent)} are too many" if len(run.sent) > 2 else None
+
+
+CHECK = NamedCheck("too_long", "too_long", too_long, True)
+
+
+def case(tmp_path, data, firmware=SLEEPS, check=None):
+    """The file of what a target finds in `data`."""
+    target = BareTarget(image(firmware), "bytes", check=check)
+    assert target.run(data)
+    found = target.finding
+    heard = target.happenings(data)
+    end_tick = found.tick + (AHEAD_TICKS if found.check == "no_fault" else 0)
+    failure = failure_of(BareRun(target.image, target.line, heard, end_tick), found.check, check)
+    path = tmp_path / "find.stream"
+    path.write_text(case_text(target.image, target.line, heard, end_tick, failure))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("data", "firmware", "code", "said"),
+    [
+        (b"ab!", SLEEPS, 3, "fails as recorded: no_fault: tick "),
+        (b"ab!", POLLS, 3, "fails as recorded: no_fault: tick "),
+        (b"ab?", SLEEPS, 1, "fails as recorded: never_sleeps: tick "),
+    ],
+)
+def test_a_case_fails_again_as_recorded(tmp_path, data, firmware, code, said):
+    again = replay_bare(case(tmp_path, data, firmware), image(firmware))
+    assert (again.code, again.failed) == (code, True)
+    assert again.line.startswith(said)
+
+
+@pytest.mark.parametrize("data", [b"ab!", b"ab?"])
+def test_other_firmware_cures_it(tmp_path, data):
+    again = replay_bare(case(tmp_path, data), image(MENDED))
+    assert (again.code, again.failed) == (0, False)
+    assert again.line.startswith("cured: ")
+
+
+def test_other_firmware_may_fail_otherwise(tmp_path):
+    again = replay_bare(case(tmp_path, b"ab!"), image("NOP\n" + SLEEPS.replace("ORG 23h", "ORG 23h")))
+    assert (again.code, again.failed) == (3, True)
+    assert again.line.startswith("still fails, but not as recorded: ")
+
+
+def test_a_case_that_does_not_fail_again_differs(tmp_path):
+    path = case(tmp_path, b"ab!")
+    path.write_text(path.read_text().replace(" > 61 62 21", " > 61 62 20"))
+    again = replay_bare(path, image(SLEEPS))
+    assert (again.code, again.failed) == (4, False)
+    assert again.line.startswith("not reproduced: no_fault passes")
+
+
+def test_a_case_of_a_check_needs_that_check(tmp_path):
+    path = case(tmp_path, b"abc", check=CHECK)
+    file = tmp_path / "mycheck.py"
+    file.write_text(WRONG.replace("short", "too_long"))
+    again = replay_bare(path, image(SLEEPS), f"{file}:too_long")
+    assert (again.code, again.line.partition(":")[0]) == (1, "fails as recorded")
+    assert again.line.endswith("3 are too many")
+    with pytest.raises(
+        BadInput, match="names the check 'too_long', which is not installed; give it: --check "
+    ):
+        replay_bare(path, image(SLEEPS))
+    file.write_text(WRONG)
+    with pytest.raises(BadInput, match="is a case of the check 'too_long', and --check gives 'short'"):
+        replay_bare(path, image(SLEEPS), f"{file}:short")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("#: [bare]", "#: [set]", "says nothing of a bare processor"),
+        ("bit_ticks = 1152", "bit_ticks = 1", "a bit of 1 ticks is outside 32..24000000"),
+        ("bit_ticks = 1152", "", "says no bit_ticks; give the length of a bit"),
+        ("bit_ticks = 1152", 'bit_ticks = "x"', "Expected `int`, got `str`"),
+        ("crystal_hz = 24000000", "crystal_hz = 5", "crystal 5 Hz is outside"),
+        ("begin_tick = ", "begin_tick = -1", "begin_tick -1"),
+        ("no_fault = true", "no_fault = true\n#: never_sleeps = true", "a case has one check"),
+    ],
+)
+def test_a_header_that_says_nothing_useful_is_refused(tmp_path, old, new, said):
+    path = case(tmp_path, b"ab!")
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(BadInput) as caught:
+        replay_bare(path, image(SLEEPS))
+    assert said in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_characters_that_overlap_are_refused(tmp_path):
+    line = BareTarget(image(SLEEPS), "bytes").line
+    path = tmp_path / "x.stream"
+    path.write_text(
+        case_text(
+            image(SLEEPS), line, [Transmission(5000, DOWN, b"ab"), Transmission(5100, DOWN, b"c")], 9000
+        )
+    )
+    with pytest.raises(BadInput, match="the characters at tick 5100 begin before those before them end"):
+        replay_bare(path, image(SLEEPS))
+
+
+def test_a_stream_that_expects_nothing_is_judged_by_faults(tmp_path):
+    line = BareTarget(image(SLEEPS), "bytes").line
+    path = tmp_path / "x.stream"
+    for data, code in ((b"ab", 0), (b"a!", 3)):
+        path.write_text(case_text(image(SLEEPS), line, [Transmission(5000, DOWN, data)], 200_000))
+        assert replay_bare(path, image(SLEEPS)).code == code
+
+
+def test_a_reset_starts_the_firmware_anew(tmp_path):
+    line = BareTarget(image(SLEEPS), "bytes").line
+    resets = [Reset(40_000, 0, 0, 1), Reset(40_048, 0, 0, 0)]
+    said = [Transmission(5000, DOWN, b"a?"), *resets, Transmission(80_000, DOWN, b"b")]
+    run = BareRun(image(SLEEPS), line, said, 200_000)
+    assert run.processor.exchange().sent_bytes == b"ab"
+    assert run.idle
+
+
+def test_the_bare_machine_of_fw_run_has_the_same_fault_from_the_levels_on_its_pin():
+    target = BareTarget(image(SLEEPS), "session")
+    data = b"\x09\x01ab" + b"\x0a\x05" + b"\x0e\x00\x07\x01c!" + b"\x09\x00!"
+    assert target.run(data)
+    events = []
+    for one in target.happenings(data):
+        tick = one.tick
+        for at, value in enumerate(one.data):
+            levels = [0, *(value >> place & 1 for place in range(8)), 0 if at in one.bad_stop else 1]
+            events += [PinEvent(tick + place * 1152, 3, 0, level) for place, level in enumerate(levels)]
+            events += [PinEvent(tick + 9 * 1152 + 864, 3, 0, 1)] if at in one.bad_stop else []
+            tick += 11_520
+    machine = BareMachine(image(SLEEPS), pins=tuple(events))
+    machine.run(max_cycles=100_000)
+    assert (machine.faults[0].tick, machine.faults[0].pc) == (target.finding.tick, target.finding.pc)
