@@ -47,7 +47,7 @@ cdef class Program:
     cdef void _own_velocities(self) noexcept
     @cython.locals(body='unsigned char *', place=int, register='unsigned int', kind=int)
     cdef void _seal(self, int hdr) noexcept
-    @cython.locals(count=int, size=int, place=int, value=int)
+    @cython.locals(count=int, size=int, left=int, place=int, value=int)
     cdef int _foreign(self) except -1
     @cython.locals(first=int, size=int, place=int)
     cdef void _again(self) noexcept

@@ -26,7 +26,7 @@ knows nothing of them gets past them. What does not: sending (`harness.py`) and 
 Velocity -32768 is an encoding error, which no host sends: -32767 goes out in its place.
 
 A wire format of somebody else's comes in as `repair`, a function from a frame's body to its characters; its bodies are
-a count - 1 (low 5 bits; times 8 if the upper 3 bits are 1) and so many bytes, for all frame operations alike.
+a count - 1 (low 5 bits, then times 8 if the upper 3 are 1) and so many bytes, or what is left, for all frame operations.
 
 Long because one class reads the input and writes the characters, and a compiled class is one file.
 """
@@ -325,6 +325,9 @@ class Program:
         size = (count & 0x1F) + 1
         if count >= _LONG:
             size *= 8
+        left = self._end - self._place
+        if size > left:
+            size = left if left > 0 else 1
         body = bytearray(size)
         for place in range(size):
             value = self._next()  # on its own: Cython 3.2 would call it three times in the next line
