@@ -19,7 +19,8 @@ def lamps_as_told(run: Exchange) -> str | None:
             return f"lamp {lamp} has level {level}, of 0..{BRIGHT}"
         if bool(run.memory.sfr(P1) >> lamp & 1) != (level > 0):
             return f"lamp {lamp} has level {level} and is {'on' if level == 0 else 'off'}"
-    for one in Slip().decode(run.sent_bytes):
+    said = run.sent_since_reset
+    for one in Slip().decode(said):
         if isinstance(one, Damage):
-            return f"the answer {run.sent_bytes[one.start : one.end].hex(' ')} is no frame: {one.reason}"
+            return f"the answer {said[one.start : one.end].hex(' ')} is no frame: {one.reason}"
     return None

@@ -1,5 +1,6 @@
 """The example of a foreign firmware: SLIP frames with a checksum, its format and its check as plug-ins."""
 
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from miro_robot.image import load_hex
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fuzz-slip"
 CRYSTAL_HZ = 11_059_200
 CHECK = f"{EXAMPLE / 'dimmer_check.py'}:lamps_as_told"
+PROGRAM = "from mirotwin.entry import main; main()"
 FINDS = sorted((EXAMPLE / "finds").glob("*.stream"))
 
 
@@ -105,6 +107,33 @@ def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
     assert again.code == (3 if "no_fault" in path.stem else 1)
     cured = replay_bare(path, images["mended"], CHECK)
     assert (cured.code, cured.line.partition(":")[0]) == (0, "cured")
+
+
+@needs_sdcc
+def test_the_command_of_its_page_finds_both_and_nothing_in_the_mended_one(images, tmp_path):
+    """Its finds are given as seeds, so that a second is enough."""
+    for name, code in (("dimmer", 1), ("mended", 0)):
+        out = tmp_path / name
+        image = images[name].path
+        options = [
+            "--bare",
+            "--crystal",
+            CRYSTAL_HZ,
+            "--check",
+            CHECK,
+            "--check-all",
+            "--corpus",
+            EXAMPLE / "finds",
+        ]
+        command = [sys.executable, "-c", PROGRAM, "fuzz", image, *options, "--time", "1s", "--out", out]
+        environment = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join([str(EXAMPLE), os.environ.get("PYTHONPATH", "")]),
+        }
+        done = children.run([*map(str, command)], env=environment, capture_output=True, text=True)
+        assert done.returncode == code, done.stdout + done.stderr
+        found = {path.name.partition("-")[0] for path in out.glob("finds/*.stream")}
+        assert found == ({"lamps_as_told", "no_fault"} if code else set())
 
 
 def test_there_is_a_find_of_each_kind():

@@ -19,6 +19,7 @@ cdef class HeardBus(XramBus):
     cdef readonly int fault_kind
     cdef readonly int fault_pc
     cdef readonly long long fault_tick
+    cdef public long long reset_tick
 
     cpdef begin(self)
     cpdef byte_received(self, int value, int stop, long long tick)
@@ -31,6 +32,7 @@ cdef class BareJudge(Judge):
     cdef long long slept_tick
 
     cpdef begin(self, long long tick)
+    cpdef restarted(self, long long tick)
     cpdef look(self, long long tick)
     @cython.locals(now='long long')
     cpdef bint waits(self) except -1

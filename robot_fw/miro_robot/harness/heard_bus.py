@@ -31,7 +31,7 @@ class HeardBus(XramBus):
         *("code_of", "faulted", "sent", "cpu"),
         *("received_values", "received_stops", "received_ticks", "received"),  # what was seen
         *("sent_values", "sent_ticks", "sent_count"),
-        *("fault_kind", "fault_pc", "fault_tick"),
+        *("fault_kind", "fault_pc", "fault_tick", "reset_tick"),
     )
 
     def __init__(self) -> None:
@@ -47,12 +47,14 @@ class HeardBus(XramBus):
         self.fault_kind = 0
         self.fault_pc = 0
         self.fault_tick = 0
+        self.reset_tick = -1  # of the last reset, -1 without one
 
     def begin(self) -> None:
         """Forgets what it kept."""
         self.received = 0
         self.sent_count = 0
         self.fault_kind = 0
+        self.reset_tick = -1
 
     def byte_received(self, value: int, stop: int, tick: int) -> None:
         if self.received < _KEPT:
@@ -103,6 +105,9 @@ class BareJudge(Judge):
         self.tick = 0
         self.slept_tick = _NEVER
         self.bus.begin()
+
+    def restarted(self, tick: int) -> None:
+        self.bus.reset_tick = tick
 
     def look(self, tick: int) -> None:
         if self.bus.fault_kind and self.code == 0:

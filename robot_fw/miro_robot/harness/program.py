@@ -26,7 +26,7 @@ knows nothing of them gets past them. What does not: sending (`harness.py`) and 
 Velocity -32768 is an encoding error, which no host sends: -32767 goes out in its place.
 
 A wire format of somebody else's comes in as `repair`, a function from a frame's body to its characters; its bodies are
-a count - 1 (low 5 bits, then times 8 if the upper 3 are 1) and so many bytes, or what is left, for all frame operations.
+a count - 1 (low 5 bits, times 8 if the upper 3 are 1) and so many bytes, or what is left, for all frame operations.
 
 Long because one class reads the input and writes the characters, and a compiled class is one file.
 """

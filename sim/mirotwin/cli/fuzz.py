@@ -18,14 +18,23 @@ from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import Image
 from mirotwin.checks.expect import expectations_of
 from mirotwin.cli.debug import sources_of, sources_option
+from mirotwin.cli.fuzz_bare import (
+    BareAsked,
+    bare_court,
+    bare_fuzz_options,
+    bare_seeds,
+    bare_spec,
+    load_bare_firmware,
+    take_bare_fuzz,
+)
 from mirotwin.cli.fuzz_progress import FuzzProgress
 from mirotwin.cli.fuzz_regress import refuse_others, regress
 from mirotwin.cli.fuzz_summary import Ended, report
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option, load_image
 from mirotwin.cli.program import Terminated, complain
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
+from mirotwin.fuzz.confirm import Court, WorldCourt
 from mirotwin.fuzz.confirm import Place as RobotPlace
-from mirotwin.fuzz.confirm import WorldCourt
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside
@@ -127,6 +136,7 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
 @click.option(
     "--regress", "cases", type=Place(path_type=Path), metavar="DIR", help="Run the saved cases of a folder."
 )
+@bare_fuzz_options
 @sources_option
 @engine_option
 @click.option("-q", "--quiet", is_flag=True, help="No progress, and of the results only what failed.")
@@ -146,31 +156,46 @@ def fuzz(
     in each; what fails is made small, played again in a World, and left in --out as finds/NAME.stream, a case for
     `mirotwin replay`. Afterwards it says which functions and lines no input has reached.
 
+    With --bare it is any 8051 firmware with a serial port, on a processor to which nothing of the robot is connected.
+
     Ctrl-C ends a campaign early, with all that was found.
 
     Exit code 1: something was found and confirmed, or --covering was not reached; with --regress: a case fails.
     """
     active = cast(Literal["compiled", "python"], choose_engine(engine))
-    firmware = load_image(image)
+    bare = take_bare_fuzz(given)
+    firmware = load_bare_firmware(image) if bare.bare else load_image(image)
     if cases is not None:
         refuse_others()
-        return regress(cases, firmware, engine, given["quiet"])
+        return regress(cases, firmware, engine, given["quiet"], given["checks"])
     if slot >= int(robots):
         raise click.UsageError(
             f"--slot {slot} does not exist among {robots} robots; give 0 to {int(robots) - 1}."
         )
     default = Path("runs") / f"fuzz-{firmware.path.stem}"
     asked = Asked(out=out or default, **given)
+    if bare.bare:
+        return _bare_campaign(image or "", kind, active, firmware, asked, bare)
     spec = TargetSpec(image=image or "", input=kind, robots=int(robots), slot=slot, engine=active)
-    return _campaign(spec, firmware, asked)
+    expected = _expected(asked.checks)
+    court = WorldCourt(RobotPlace(firmware, spec.robots, spec.slot))
+    return _campaign(spec, firmware, asked, court, expected, seeds(spec.input, spec.robots, spec.slot))
 
 
-def _campaign(spec: TargetSpec, image: Image, asked: Asked) -> int:
+def _bare_campaign(
+    path: str, kind: str, engine: Literal["compiled", "python"], image: Image, asked: Asked, bare: BareAsked
+) -> int:
+    court, expected = bare_court(asked.checks)
+    spec = bare_spec(path, kind, engine, bare, asked.checks)
+    return _campaign(spec, image, asked, court, expected, bare_seeds(spec))
+
+
+def _campaign(
+    spec: TargetSpec, image: Image, asked: Asked, court: Court, expected: dict[str, Any], inputs: list[bytes]
+) -> int:
     folder = CampaignFolder(asked.out, asked.force)
     check_outside(asked.out, asked.corpus)
-    expected = _expected(asked.checks)
     covering = _covering(asked.covering, image)
-    inputs = seeds(spec.input, spec.robots, spec.slot)
     if asked.corpus is not None:
         corpus = read_corpus(asked.corpus, spec.input, spec.robots)
         inputs = list(dict.fromkeys((*inputs, *corpus.inputs)))
@@ -183,7 +208,6 @@ def _campaign(spec: TargetSpec, image: Image, asked: Asked) -> int:
         what = f"{covering.name} runs while the firmware starts, before any input"
         raise BadInput("", "--covering", what, "name a function that an input has to reach")
     folder.make()
-    court = WorldCourt(RobotPlace(image, spec.robots, spec.slot))
     finds = Finds(target, reached, court, folder, sources_of(image, asked.sources), asked.minimise_s)
     failing = [data for data in inputs if target.run(data)]
     passing = [data for data in inputs if not target.run(data)]

@@ -21,6 +21,7 @@ from miro_robot.image import Image
 from miro_sim.radio.downlink import TransmissionError
 from mirotwin.checks.expect import expectations_of
 from mirotwin.checks.watching import Checks
+from mirotwin.cli.fuzz_bare import is_bare_case, problem_of_bare_case
 from mirotwin.cli.options import plain_parameters
 from mirotwin.cli.program import DONE, EXPECTATION_FAILED, show_line
 from mirotwin.cli.progress import ProgressBar
@@ -28,19 +29,24 @@ from mirotwin.cli.replay_job import Job, load_stream
 
 OPTION = "--regress"
 SUFFIX = ".stream"
-TOGETHER = ("image", "cases", "engine", "quiet")
+TOGETHER = ("image", "cases", "engine", "quiet", "bare", "checks")
 """Parameters of the command that go with it."""
 
 
-def regress(folder: Path, image: Image, engine: str | None, quiet: bool) -> int:
-    """Runs all cases of a folder on `image`; returns the exit code: 1 where one fails."""
+def regress(folder: Path, image: Image, engine: str | None, quiet: bool, checks: tuple[str, ...] = ()) -> int:
+    """Runs all cases of a folder on `image`; returns the exit code: 1 where one fails.
+
+    `checks`: those of --check, for cases of a bare processor that name one.
+    """
     cases = cases_in(folder)
     failed = 0
     with ProgressBar("running cases", len(cases), quiet) as bar:
         lines: list[str] = []
         for done, path in enumerate(cases, 1):
-            job = load_stream(str(path), engine)
-            problem = _problem(job, image, path)
+            if is_bare_case(path):
+                problem = problem_of_bare_case(path, image, checks)
+            else:
+                problem = _problem(load_stream(str(path), engine), image, path)
             failed += bool(problem)
             lines.append(f"{'FAILED' if problem else 'passed'}  {path}" + (f": {problem}" if problem else ""))
             bar.to(done)

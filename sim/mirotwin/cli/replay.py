@@ -21,7 +21,16 @@ from mirotwin.cli.console import show
 from mirotwin.cli.debug import checked_sources, sources_option
 from mirotwin.cli.differences import differences_as_json, print_differences, print_firmwares, print_json
 from mirotwin.cli.expectations import expect_option, report_failures
-from mirotwin.cli.options import Place, Whole, engine_option, firmware_option, plain_parameters, set_option
+from mirotwin.cli.fuzz_bare import is_bare_case, replay_bare_case
+from mirotwin.cli.options import (
+    Place,
+    Whole,
+    choose_engine,
+    engine_option,
+    firmware_option,
+    plain_parameters,
+    set_option,
+)
 from mirotwin.cli.program import DIVERGENCE, DONE, complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_case import replay_case
@@ -72,12 +81,17 @@ def replay(
 
     A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
     1, or 3 for a firmware fault; 0 if other firmware or settings cure it, 4 if it does not fail again without them.
+    A case of `mirotwin fuzz --bare` needs --firmware.
 
     Where the recorded scenario or --expect expects something, that decides: a difference is only told, and the exit
     code is 1 if a check fails, else 0.
 
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
+    if is_bare_case(file):
+        _check_bare(file, asked, (*settings, *expected), seed)
+        choose_engine(engine)
+        return replay_bare_case(file, firmware)
     job, image = load_job(file, firmware, engine, (*settings, *expected), seed)
     if asked.given and not job.recorded:
         raise BadInput(file, asked.given, "a text stream holds nothing to compare with", "leave it out")
@@ -134,6 +148,13 @@ def _check_case(file: str, asked: Asked) -> None:
     for option, given in (("--to", asked.rule.to_tick is not None), ("--json", asked.as_json)):
         if given:
             raise BadInput(file, option, "is not for a case, which ends where it failed", "leave it out")
+
+
+def _check_bare(file: str, asked: Asked, settings: tuple[str, ...], seed: int | None) -> None:
+    """Raises BadInput for options that need the robot's world."""
+    given = asked.given or ("--seed" if seed is not None else "--set and --expect" if settings else "")
+    if given:
+        raise BadInput(file, given, "is not for a case of a bare processor", "leave it out")
 
 
 def _periods(file: str, job: Job, asked: Asked) -> int | None:

@@ -108,9 +108,9 @@ def case_text(
     return stream.format_stream([stream.Entry(one) for one in heard], stream_header.of_text(text))
 
 
-def is_bare(found: stream.Stream) -> bool:
-    """Whether a stream file is for a bare processor."""
-    return found.header.bare is not None
+def check_of_case(path: str | Path) -> str:
+    """The name of the check that a case is of."""
+    return _name(stream.read(path))
 
 
 def replay_bare(path: str | Path, image: Image, check: str | None = None) -> Verdict:

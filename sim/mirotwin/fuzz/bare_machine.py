@@ -89,6 +89,7 @@ class BareProcessor:
             sent=tuple(Character(value, tick) for value, tick in self.bus.said()),
             fault=self.fault(),
             begin_tick=self.begin_tick,
+            reset_tick=None if self.bus.reset_tick < 0 else self.bus.reset_tick,
             end_tick=12 * self.cpu.cycles,
             memory=self.memory,
         )

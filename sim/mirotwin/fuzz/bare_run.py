@@ -98,6 +98,7 @@ class BareRun:
             self.processor.cpu.hold()
         else:
             self.processor.cpu.reset()
+            self.processor.bus.reset_tick = deed.tick
 
     def _end(self, end_tick: int) -> None:
         cpu = self.processor.cpu

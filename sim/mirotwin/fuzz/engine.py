@@ -13,6 +13,9 @@ from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 
+_TOKENS, _TOKEN = 32, 64
+"""How many inputs are words of a foreign format, and how much of them."""
+
 
 class Progress(Protocol):
     """How far an engine is. `run_time_s` of wall time; `edges`: places of the map that were ever counted."""
@@ -55,7 +58,10 @@ def engine_for(
 
     seeds, dictionary = folder.folder("seeds"), folder.path / "dictionary"
     write_seeds(seeds, {f"seed-{number:04d}": data for number, data in enumerate(inputs)})
-    tokens = wire_tokens(spec.robots) if spec.input == "bytes" else message_tokens(spec.robots)
+    if spec.board == "bare":
+        tokens = {f"seed {number}": data[:_TOKEN] for number, data in enumerate(inputs[:_TOKENS]) if data}
+    else:
+        tokens = wire_tokens(spec.robots) if spec.input == "bytes" else message_tokens(spec.robots)
     write_dictionary(dictionary, tokens)
     place = (seeds, folder.folder("engine"), dictionary, jobs, seed)
     lacking = missing()

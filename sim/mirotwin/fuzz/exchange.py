@@ -93,13 +93,15 @@ class Memory:
 class Exchange(msgspec.Struct, frozen=True):
     """One run: characters that the serial port took and gave, in the order of time, and what was left behind.
 
-    `begin_tick`: the firmware had started up and the first character could come. `fault`: the run ended with it.
+    `begin_tick`: the firmware had started up and the first character could come. `reset_tick`: the processor was reset,
+    for the last time, None if it never was. `fault`: the run ended with it.
     """
 
     received: tuple[Character, ...]
     sent: tuple[Character, ...]
     fault: FirmwareFault | None
     begin_tick: int
+    reset_tick: int | None
     end_tick: int
     memory: Memory
 
@@ -110,6 +112,11 @@ class Exchange(msgspec.Struct, frozen=True):
     @property
     def sent_bytes(self) -> bytes:
         return bytes(one.value for one in self.sent)
+
+    @property
+    def sent_since_reset(self) -> bytes:
+        """What was sent behind the last reset, which may have cut something off."""
+        return bytes(one.value for one in self.sent if self.reset_tick is None or one.tick > self.reset_tick)
 
 
 Check = Callable[[Exchange], object]

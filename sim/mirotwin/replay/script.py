@@ -96,6 +96,9 @@ def scenario_of_stream(sent: Sequence[Doing], path: str, header: Header | None =
     Raises BadInput for a stream with nothing to send, for transmissions that overlap, that take more than a
     day, or that have no place in the scenario of the header; ScenarioError for that scenario.
     """
+    if header is not None and header.bare is not None:
+        what = "is for a bare processor and not for the robot"
+        raise BadInput(path, "header: bare", what, "`mirotwin replay FILE --firmware IMAGE.ihx` plays it")
     script = script_of_stream(sent)
     if not script and (header is None or header.scenario is None):
         raise BadInput(path, "", "no line from host to robot", "nothing can be replayed")

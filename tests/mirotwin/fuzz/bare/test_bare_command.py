@@ -1,0 +1,135 @@
+"""`mirotwin fuzz --bare`, and cases of a bare processor on the command line."""
+
+import pytest
+from intelhex import IntelHex
+from tests.mirotwin.cli.conftest import mirotwin as mirotwin
+from tests.mirotwin.fuzz.bare.firmwares import FAULTY, POLLS, SLEEPS, image
+from tests.mirotwin.fuzz.conftest import engines as engines
+
+CHECK = """
+def never_q(run):
+    return "it heard a q" if b"q" in run.received_bytes else None
+"""
+
+
+@pytest.fixture
+def hexes(tmp_path):
+    """The firmwares as files."""
+    mended = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
+    made = {}
+    for name, text in {"sleeps": SLEEPS, "polls": POLLS, "mended": mended, "faulty": FAULTY}.items():
+        found = image(text)
+        file = IntelHex()
+        file.frombytes(found.code[: found.size])
+        made[name] = str(tmp_path / f"{name}.ihx")
+        file.write_hex_file(made[name])
+    return made
+
+
+@pytest.fixture
+def check(tmp_path):
+    path = tmp_path / "mycheck.py"
+    path.write_text(CHECK)
+    return f"{path}:never_q"
+
+
+def corpus(tmp_path, *inputs):
+    folder = tmp_path / "corpus"
+    folder.mkdir()
+    for number, data in enumerate(inputs):
+        (folder / str(number)).write_bytes(data)
+    return str(folder)
+
+
+def campaign(mirotwin, tmp_path, firmware, *options):
+    common = ("--bare", "--time", "0.4s", "--minimise", "1s", "--out", str(tmp_path / "out"))
+    return mirotwin("fuzz", firmware, *common, *options)
+
+
+def test_finds_are_confirmed_from_power_on_and_left_as_cases_that_replay(mirotwin, engines, hexes, tmp_path):
+    inputs = corpus(tmp_path, b"hello!", b"what?")
+    code, out, err = campaign(mirotwin, tmp_path, hexes["sleeps"], "--input", "bytes", "--corpus", inputs)
+    assert code == 1
+    assert "not confirmed" not in out + err
+    cases = sorted((tmp_path / "out" / "finds").glob("*.stream"))
+    assert {path.name.partition("-")[0] for path in cases} == {"never_sleeps", "no_fault"}
+    assert {path.read_text().partition(" > ")[2].strip() for path in cases} == {"21", "3f"}
+    for path in cases:
+        failed = 3 if path.name.startswith("no_fault") else 1
+        again, _, err = mirotwin("replay", str(path), "--firmware", hexes["sleeps"])
+        assert (again, err.startswith("mirotwin: fails as recorded: ")) == (failed, True)
+        again, out, _ = mirotwin("replay", str(path), "--firmware", hexes["mended"])
+        assert (again, out.startswith("cured: ")) == (0, True)
+    folder = str(tmp_path / "out" / "finds")
+    code, out, _ = mirotwin("fuzz", hexes["sleeps"], "--regress", folder)
+    assert (code, out.splitlines()[-1]) == (1, "2 cases: 0 passed, 2 failed")
+    code, out, _ = mirotwin("fuzz", hexes["mended"], "--regress", folder, "--bare")
+    assert (code, out.splitlines()[-1]) == (0, "2 cases: 2 passed, 0 failed")
+
+
+def test_a_check_looks_at_what_is_new_or_at_everything(mirotwin, engines, hexes, check, tmp_path):
+    inputs = corpus(tmp_path, b"quiet")
+    for number, more in enumerate(((), ("--check-all",))):
+        out_folder = tmp_path / f"out{number}"
+        options = ("--input", "bytes", "--corpus", inputs, "--check", check, "--out", str(out_folder), *more)
+        code, _, err = campaign(mirotwin, tmp_path, hexes["polls"], *options)
+        assert code == 1
+        assert "it heard a q" in err
+        (case,) = (out_folder / "finds").glob("never_q-*.stream")
+    folder = str(case.parent)
+    code, out, _ = mirotwin("fuzz", hexes["polls"], "--regress", folder, "--check", check)
+    assert (code, "FAILED" in out) == (1, True)
+    code, _, err = mirotwin("replay", str(case), "--firmware", hexes["polls"])
+    assert code == 2
+    assert "names the check 'never_q', which is not installed; give it: --check FILE.py:never_q" in err
+
+
+def test_a_check_that_raises_ends_the_campaign_with_its_place(mirotwin, engines, hexes, check, tmp_path):
+    (tmp_path / "mycheck.py").write_text("def never_q(run):\n    return run.nothing\n")
+    inputs = corpus(tmp_path, b"quiet")
+    for more in ((), ("--check-all",)):
+        options = ("--input", "bytes", "--corpus", inputs, "--check", check, "--force", *more)
+        code, _, err = campaign(mirotwin, tmp_path, hexes["polls"], *options)
+        assert code == 2
+        assert "raised AttributeError: 'Exchange' object has no attribute 'nothing' at mycheck.py:2" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--bare",), "--bare needs an IMAGE.ihx."),
+        (("sleeps", "--protocol", "miro"), "--protocol does not go without --bare."),
+        (("sleeps", "--crystal", "12000000"), "--crystal does not go without --bare."),
+        (("sleeps", "--bare", "--slot", "1"), "--slot does not go with --bare."),
+        (("sleeps", "--bare", "--check-all"), "--check-all needs a --check."),
+        (("sleeps", "--bare", "--protocol", "mire"), "did you mean miro?"),
+        (("sleeps", "--bare", "--check", "nothing"), "there is no check 'nothing' for a bare processor"),
+        (("sleeps", "--bare", "--baud", "100000000"), "--baud: 100000000 is outside 50..750000"),
+        (("faulty", "--bare"), "comes up with a fault"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(mirotwin, engines, hexes, tmp_path, arguments, said):
+    given = [hexes.get(one, one) for one in arguments]
+    code, _, err = mirotwin("fuzz", *given, "--time", "1s", "--out", str(tmp_path / "out"))
+    assert code == 2
+    assert said in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_case_of_a_bare_processor_is_not_played_on_the_robot(mirotwin, engines, hexes, tmp_path):
+    inputs = corpus(tmp_path, b"!")
+    campaign(mirotwin, tmp_path, hexes["sleeps"], "--input", "bytes", "--corpus", inputs)
+    (case,) = map(str, (tmp_path / "out" / "finds").glob("*.stream"))
+    for arguments, said in (
+        (("replay", case), "is for a bare processor, which has no firmware of its own; give --firmware"),
+        (
+            ("replay", case, "--firmware", hexes["sleeps"], "--seed", "1"),
+            "--seed: is not for a case of a bare",
+        ),
+        (
+            ("fw", "trace", case, "--firmware", hexes["sleeps"]),
+            "is for a bare processor and not for the robot",
+        ),
+    ):
+        code, _, err = mirotwin(*arguments)
+        assert (code, said in err) == (2, True), err
