@@ -1,0 +1,161 @@
+"""One trial: an engine fuzzes an image until a find of it is confirmed, or the time is over.
+
+What belongs here: starting engines and judging their finds. What does not: which trials there are (`fuzz_time`).
+
+What counts is processor time of the engine's processes, from their start to the find, because it depends little on what
+else the machine does. A trial ends after `limit_s` of it, or after three times as long on the wall clock. A find is
+confirmed when checks fail for it in a world with the mistaken firmware that do not fail there with the shipped one.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from benchmarks.processor_time import of_descendants
+from tests.mutants.heard import Input, verdicts
+
+from miro_robot.firmware import image_path
+from miro_robot.image import Image, load_hex
+from mirotwin.fuzz.afl.inputs import message_tokens, write_dictionary, write_seeds
+from mirotwin.fuzz.afl.run import AflRun
+from mirotwin.fuzz.hypothesis_engine import HypothesisRun
+from mirotwin.fuzz.seeds import seeds
+from mirotwin.fuzz.spec import TargetSpec
+from mirotwin.fuzz.target import Target
+
+ENGINES = ("afl", "hypothesis", "link")
+LOOK_S = 0.05
+WALL_FACTOR = 3.0
+ROBOTS, SLOT = 3, 0
+
+
+class Wanted(msgspec.Struct, frozen=True):
+    """A trial. `check`: the one that the mistake fails, "" where any will do."""
+
+    table: str
+    mistake: str
+    check: str
+    engine: str
+    seed: int
+    limit_s: float
+    image: str
+
+    @property
+    def key(self) -> str:
+        return f"{self.table}: {self.mistake}: {self.engine}: {self.seed}"
+
+
+class Trial(msgspec.Struct, frozen=True):
+    """What came of it. `found_s`: None where nothing was found; `checks`: those that failed; `seeded`: by a seed."""
+
+    wanted: Wanted
+    found_s: float | None
+    wall_s: float
+    checks: tuple[str, ...] = ()
+    seeded: bool = False
+    executions: int = 0
+    unconfirmed: int = 0
+
+    @property
+    def named(self) -> bool:
+        """Found, by the check that the mistake names."""
+        return self.found_s is not None and (not self.wanted.check or self.wanted.check in self.checks)
+
+    def __str__(self) -> str:
+        when = f"{self.found_s:.1f} s" if self.found_s is not None else f"not in {self.wanted.limit_s:.0f} s"
+        how = f" ({', '.join(self.checks)}{', by a seed' if self.seeded else ''})" if self.checks else ""
+        return f"{self.wanted.key}: {when}{how}; {self.executions} executions, {self.unconfirmed} unconfirmed"
+
+
+def measured(wanted: Wanted) -> Trial:
+    """Runs the trial."""
+    with tempfile.TemporaryDirectory(prefix="fuzz-time-") as name:
+        return _of_link(wanted) if wanted.engine == "link" else _of_engine(wanted, Path(name))
+
+
+def confirmed(image: Image, heard: Input) -> tuple[str, ...]:
+    """The checks that fail by this input with `image` alone."""
+    failed = _failed(image, heard)
+    return tuple(check for check in failed if check not in _failed(shipped(), heard)) if failed else ()
+
+
+@cache
+def shipped() -> Image:
+    """The firmware without a mistake."""
+    return load_hex(image_path())
+
+
+def _failed(image: Image, heard: Input) -> list[str]:
+    return (
+        [check for check, verdict in verdicts(image, heard).items() if verdict == "failed"] if heard else []
+    )
+
+
+def _of_engine(wanted: Wanted, folder: Path) -> Trial:
+    spec = TargetSpec(image=wanted.image, robots=ROBOTS, slot=SLOT)
+    target = spec.make()
+    given = seeds(spec.input, ROBOTS, SLOT)
+    write_seeds(folder / "seeds", {f"seed-{number}": data for number, data in enumerate(given)})
+    write_dictionary(folder / "dictionary", message_tokens(ROBOTS))
+    place = (folder / "seeds", folder / "out", folder / "dictionary", 1, wanted.seed)
+    engine: Any = AflRun if wanted.engine == "afl" else HypothesisRun
+    looked = _Looked(target)
+    with ExitStack() as at_end:
+        begun_s, spent_s = time.monotonic(), 0.0
+        seeded = looked.at(given)  # afl-fuzz leaves seeds out that fail
+        run = None if seeded else at_end.enter_context(engine([spec.text()], *place))
+        while run and not looked.checks and _goes_on(wanted, begun_s, spent_s):
+            time.sleep(LOOK_S)
+            spent_s = of_descendants()
+            looked.at([path.read_bytes() for path in run.new_crashes()])
+        wall_s = time.monotonic() - begun_s
+        executions = run.progress().executions if run else target.executions
+    found_s = spent_s if looked.checks else None
+    return Trial(wanted, found_s, wall_s, looked.checks, seeded, executions, looked.unconfirmed)
+
+
+def _goes_on(wanted: Wanted, begun_s: float, spent_s: float) -> bool:
+    return spent_s < wanted.limit_s and time.monotonic() - begun_s < WALL_FACTOR * wanted.limit_s
+
+
+class _Looked:
+    """At finds. `checks`: those that fail by the first one that is confirmed."""
+
+    def __init__(self, target: Target) -> None:
+        self.target = target
+        self.checks: tuple[str, ...] = ()
+        self.unconfirmed = 0
+
+    def at(self, inputs: Sequence[bytes]) -> bool:
+        """Whether one of these is confirmed."""
+        for data in inputs:
+            if not self.checks and self.target.run(data):
+                self.checks = confirmed(self.target.image, self.target.happenings(data))
+                self.unconfirmed += not self.checks
+        return bool(self.checks)
+
+
+def _of_link(wanted: Wanted) -> Trial:
+    """The link machine compares counters and answers instead of judging by checks."""
+    line = [sys.executable, "-m", "benchmarks.fuzz_time_link", wanted.image, str(wanted.seed)]
+    begun_s, spent_s = time.monotonic(), 0.0
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        while process.poll() is None and _goes_on(wanted, begun_s, spent_s):
+            time.sleep(LOOK_S)
+            spent_s = of_descendants() or spent_s
+        process.kill()
+        assert process.stdout is not None
+        last = process.stdout.read().strip().splitlines()[-1:]
+    wall_s = time.monotonic() - begun_s
+    if not last:
+        return Trial(wanted, None, wall_s)
+    return Trial(wanted, spent_s, wall_s, ("the link machine",), executions=int(last[0]))

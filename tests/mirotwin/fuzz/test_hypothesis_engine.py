@@ -1,0 +1,146 @@
+"""The engine where AFL++ is missing: what it keeps, that a seed repeats it, and that it ends at once."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.mirotwin.fuzz.toy import Toy
+
+from miro_exact.bad_input import BadInput
+from miro_robot.firmware import image_path
+from miro_robot.harness.program import INPUTS, OPERATIONS
+from miro_robot.image import load_hex
+from mirotwin.fuzz.hypothesis_engine import Explorer, HypothesisRun, explore
+from mirotwin.fuzz.hypothesis_inputs import inputs
+from mirotwin.fuzz.spec import TargetSpec
+from mirotwin.fuzz.target import target_for
+
+TOY = TargetSpec(input="bytes", maker="tests.mirotwin.fuzz.toy:toy")
+
+
+def kept_after(
+    runs: int, seed: int, seeds: tuple[bytes, ...] = ()
+) -> tuple[list[tuple[str, bytes]], Explorer]:
+    kept: list[tuple[str, bytes]] = []
+    explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
+    explore(explorer, TOY, seeds, seed, lambda: explorer.target.executions < runs)
+    return kept, explorer
+
+
+def test_an_input_is_kept_when_it_executes_an_edge_or_a_class_of_counts_that_is_new() -> None:
+    kept: list[tuple[str, bytes]] = []
+    explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
+    for data in (b"a", b"b", b"ab", b"F", b"abcd", b"1234567", b"12345678", b"Fa"):
+        explorer.run(data)
+    assert kept == [("queue", data) for data in (b"a", b"ab", b"F", b"abcd", b"12345678")]
+    assert explorer.edges == 3
+
+
+def test_a_finding_is_kept_once_for_each_check_and_place() -> None:
+    kept: list[tuple[str, bytes]] = []
+    explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
+    for data in (b"FZ\x01", b"FZ\x01\x02", b"FZ\x02"):
+        explorer.run(data)
+    assert kept == [("crashes", b"FZ\x01"), ("crashes", b"FZ\x02")]
+    assert explorer.edges == 0
+
+
+def test_the_seeds_are_run_first_and_the_number_of_runs_is_kept_to() -> None:
+    kept, explorer = kept_after(3, 0, (b"a", b"FZ"))
+    assert kept[:2] == [("queue", b"a"), ("crashes", b"FZ")]
+    assert explorer.target.executions == 3
+
+
+def test_the_same_seed_keeps_the_same_inputs_and_another_one_others() -> None:
+    one, two, other = (kept_after(1200, seed)[0] for seed in (1, 1, 2))
+    assert one == two
+    assert one != other
+
+
+@pytest.mark.parametrize("kind", INPUTS)
+@pytest.mark.parametrize("foreign", [False, True])
+def test_inputs_of_all_kinds_are_drawn(kind: str, foreign: bool) -> None:
+    @given(inputs(kind, 5, 4, foreign), st.data())
+    def is_read(data: bytes, draw: st.DataObject) -> None:
+        assert data
+        assert draw.draw(inputs(kind, 3, 0, foreign, (data,)))
+
+    is_read()
+
+
+def test_a_session_is_made_of_whole_operations() -> None:
+    target = target_for(load_hex(image_path()))
+
+    @given(inputs("session"))
+    def is_whole(data: bytes) -> None:
+        assert data[0] < len(OPERATIONS)
+        target.program.read(data)
+        assert target.program.count or data[0] >= OPERATIONS.index("again")
+
+    is_whole()
+
+
+def test_the_shipped_firmware_is_fed_and_its_edges_are_found() -> None:
+    kept: list[str] = []
+    target = target_for(load_hex(image_path()))
+    explorer = Explorer(target, lambda kind, data: kept.append(kind))
+    explore(explorer, TargetSpec(), (), 3, lambda: target.executions < 60)
+    assert explorer.edges > 100
+    assert set(kept) == {"queue"}
+
+
+@pytest.fixture
+def seeds(tmp_path: Path) -> Path:
+    folder = tmp_path / "seeds"
+    folder.mkdir()
+    (folder / "one").write_bytes(b"FZ\x07")
+    return folder
+
+
+def waited(run: HypothesisRun, limit_s: float = 60.0) -> Iterator[None]:
+    end_s = time.monotonic() + limit_s
+    while time.monotonic() < end_s:
+        yield
+        time.sleep(0.05)
+    raise AssertionError(f"nothing came in {limit_s} s: {run.progress()}")
+
+
+def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once(
+    tmp_path: Path, seeds: Path
+) -> None:
+    crashes: list[Path] = []
+    queue: list[Path] = []
+    with HypothesisRun([TOY.text()], seeds, tmp_path / "out", jobs=2, seed=5) as run:
+        for _ in waited(run):
+            crashes += run.new_crashes()
+            queue += run.new_queue()
+            progress = run.progress()
+            if progress.executions and len(crashes) >= 2 and len(queue) >= 2:
+                break
+        assert run.running
+        begun_s = time.monotonic()
+    assert time.monotonic() - begun_s < 2.0
+    assert not run.running
+    assert len(set(crashes)) == len(crashes)
+    assert {path.parent.parent.name for path in crashes} == {"job0", "job1"}
+    assert crashes[0].read_bytes().startswith(b"FZ")
+    assert progress.edges is not None
+    assert progress.characters > progress.executions
+    run.stop()
+
+
+def test_a_target_that_cannot_be_made_ends_the_campaign_with_its_own_line(
+    tmp_path: Path, seeds: Path
+) -> None:
+    spec = TargetSpec(image=str(tmp_path / "none.ihx"))
+    with HypothesisRun([spec.text()], seeds, tmp_path / "out") as run, pytest.raises(BadInput, match=r"none\.ihx"):
+        for _ in waited(run):
+            run.progress()
+
+
+def test_no_job_is_refused(tmp_path: Path, seeds: Path) -> None:
+    with pytest.raises(BadInput, match=r"^--jobs: 0: there is nothing to do; give 1 or more$"):
+        HypothesisRun([TOY.text()], seeds, tmp_path / "out", jobs=0)
