@@ -27,7 +27,7 @@ def replaced(page: str, part: str) -> str:
 
 
 def render(trials: Iterable[Trial]) -> str:
-    """Both tables; one without trials is left out."""
+    """Both tables; one without trials is left out. Empty cells were not tried."""
     every = list(trials)
     parts = []
     if hard := [one for one in every if one.wanted.table == "for fuzzing"]:
@@ -44,8 +44,7 @@ def _times(trials: Sequence[Trial]) -> str:
     for name, mistake in FOR_FUZZING.items():
         of_name = [one for one in trials if one.wanted.mistake == name]
         cells = [_cell([one for one in of_name if one.wanted.engine == engine]) for engine in engines]
-        if of_name:
-            rows.append((name, mistake.needs, f"`{mistake.check}`", *cells))
+        rows.append((name, mistake.needs, f"`{mistake.check}`", *cells))
     totals = [_total([one for one in trials if one.wanted.engine == engine]) for engine in engines]
     heads = [TITLES[engine] for engine in engines]
     table = _table(("mistake", "needs", "check", *heads), [*rows, ("found", "", "", *totals)])
@@ -55,7 +54,7 @@ def _times(trials: Sequence[Trial]) -> str:
 
 
 def _cell(trials: Sequence[Trial]) -> str:
-    """One number a seed, the median last."""
+    """One number a seed."""
     if not trials:
         return ""
     if all(one.seeded for one in trials):

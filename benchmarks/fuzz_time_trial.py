@@ -33,7 +33,7 @@ from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 
 ENGINES = ("afl", "hypothesis", "link")
-LOOK_S = 0.05
+LOOK_S = 0.2
 WALL_FACTOR = 3.0
 ROBOTS, SLOT = 3, 0
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.mirotwin.fuzz.toy import Toy
 
@@ -13,6 +13,7 @@ from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_robot.harness.program import INPUTS, OPERATIONS
 from miro_robot.image import load_hex
+from mirotwin.fuzz import hypothesis_engine
 from mirotwin.fuzz.hypothesis_engine import Explorer, HypothesisRun, explore
 from mirotwin.fuzz.hypothesis_inputs import inputs
 from mirotwin.fuzz.spec import TargetSpec
@@ -54,8 +55,11 @@ def test_the_seeds_are_run_first_and_the_number_of_runs_is_kept_to() -> None:
     assert explorer.target.executions == 3
 
 
-def test_the_same_seed_keeps_the_same_inputs_and_another_one_others() -> None:
-    one, two, other = (kept_after(1200, seed)[0] for seed in (1, 1, 2))
+def test_the_same_seed_keeps_the_same_inputs_over_several_rounds_and_another_one_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(hypothesis_engine, "ROUND_EXAMPLES", 60)
+    one, two, other = (kept_after(200, seed)[0] for seed in (1, 1, 2))
     assert one == two
     assert one != other
 
@@ -63,6 +67,7 @@ def test_the_same_seed_keeps_the_same_inputs_and_another_one_others() -> None:
 @pytest.mark.parametrize("kind", INPUTS)
 @pytest.mark.parametrize("foreign", [False, True])
 def test_inputs_of_all_kinds_are_drawn(kind: str, foreign: bool) -> None:
+    @settings(max_examples=20)
     @given(inputs(kind, 5, 4, foreign), st.data())
     def is_read(data: bytes, draw: st.DataObject) -> None:
         assert data
@@ -74,6 +79,7 @@ def test_inputs_of_all_kinds_are_drawn(kind: str, foreign: bool) -> None:
 def test_a_session_is_made_of_whole_operations() -> None:
     target = target_for(load_hex(image_path()))
 
+    @settings(max_examples=30)
     @given(inputs("session"))
     def is_whole(data: bytes) -> None:
         assert data[0] < len(OPERATIONS)
@@ -136,9 +142,16 @@ def test_a_target_that_cannot_be_made_ends_the_campaign_with_its_own_line(
     tmp_path: Path, seeds: Path
 ) -> None:
     spec = TargetSpec(image=str(tmp_path / "none.ihx"))
-    with HypothesisRun([spec.text()], seeds, tmp_path / "out") as run, pytest.raises(BadInput, match=r"none\.ihx"):
-        for _ in waited(run):
-            run.progress()
+    with (
+        HypothesisRun([spec.text()], seeds, tmp_path / "out") as run,
+        pytest.raises(BadInput, match=r"none\.ihx"),
+    ):
+        _wait_for_ever(run)
+
+
+def _wait_for_ever(run: HypothesisRun) -> None:
+    for _ in waited(run):
+        run.progress()
 
 
 def test_no_job_is_refused(tmp_path: Path, seeds: Path) -> None:

@@ -1,0 +1,58 @@
+"""The tables of docs/fuzzing.md: what a trial becomes, and that the page has each mistake as it is now."""
+
+from benchmarks.fuzz_time_tables import BEGIN, END, PAGE, render, replaced
+from benchmarks.fuzz_time_trial import Trial, Wanted
+from benchmarks.processor_time import of_descendants
+from tests import children
+from tests.mutants.for_fuzzing import FOR_FUZZING
+
+NAME = "takes a ninth step"
+
+
+def trial(
+    engine: str, seed: int, found_s: float | None, checks: tuple[str, ...] = (), seeded: bool = False
+) -> Trial:
+    wanted = Wanted("for fuzzing", NAME, FOR_FUZZING[NAME].check, engine, seed, 60.0, "miro.ihx")
+    return Trial(wanted, found_s, 70.0, checks, seeded)
+
+
+def row(*trials: Trial) -> list[str]:
+    lines = [line for line in render(trials).splitlines() if line.startswith(f"| {NAME} ")]
+    return [cell.strip() for cell in lines[0].split("|")[4:-1]]
+
+
+def test_a_cell_has_one_number_a_seed_in_their_order() -> None:
+    check = (FOR_FUZZING[NAME].check,)
+    assert row(trial("afl", 2, None), trial("afl", 1, 3.14, check), trial("hypothesis", 1, 5.0, check)) == [
+        "3.1 -",
+        "5.0",
+    ]
+
+
+def test_a_find_by_another_check_is_marked_and_the_link_machine_has_none() -> None:
+    found = (trial("afl", 1, 3.0, ("no_fault",)), trial("link", 1, 4.0, ("the link machine",)))
+    assert row(*found) == ["3.0*", "4.0"]
+    assert "* is not by the check that the mistake names" in render(found)
+
+
+def test_what_a_seed_shows_is_said_once() -> None:
+    check = (FOR_FUZZING[NAME].check,)
+    assert row(*(trial("afl", seed, 0.0, check, seeded=True) for seed in (1, 2, 3))) == ["0.0 (a seed)"]
+
+
+def test_another_part_is_put_between_the_marks() -> None:
+    assert replaced(f"a\n{BEGIN}old\n{END}b\n", "new\n") == f"a\n{BEGIN}new\n{END}b\n"
+
+
+def test_the_page_has_every_mistake_with_what_it_needs_and_its_check() -> None:
+    page = PAGE.read_text("utf-8")
+    for one in FOR_FUZZING.values():
+        assert f"| {one.name} | {one.needs} | `{one.check}` |" in page
+
+
+def test_the_processor_time_of_a_child_is_counted_while_it_lives() -> None:
+    before_s = of_descendants()
+    with children.start(["python3", "-c", "while True: pass"]) as busy:
+        while of_descendants() <= before_s:
+            assert busy.poll() is None
+        busy.kill()
