@@ -8,7 +8,7 @@ What belongs here: which trials there are, and keeping their results. What does 
 tables (`fuzz_time_tables`).
 
 Trials run one after the other, one process of the engine each. Their results stand in `build/mutants/fuzz_time.json`;
-what stands there for the same image and limit is not measured again, unless `--again` is given.
+what stands there for the same image, and was found or not within that limit, is not measured again without `--again`.
 """
 
 from __future__ import annotations
@@ -52,8 +52,7 @@ def wanted(
     for seed in range(1, seeds + 1):
         for engine in engines:
             for name, (check, changed) in names.items():
-                image = build(changed).image
-                yield Wanted(table, name, check, engine, seed, limit_s, str(image))
+                yield Wanted(table, name, check, engine, seed, limit_s, build(changed).folder.name)
 
 
 def _for_fuzzing() -> dict[str, tuple[str, dict[str, str]]]:
@@ -101,7 +100,7 @@ def _measure(asked: argparse.Namespace) -> None:
     for one in wanted(chosen, engines, asked.seeds or (1 if asked.planted else 3), limit_s, table):
         found = results()
         known = found.trials.get(one.key)
-        if known and not asked.again and known.wanted == one:
+        if known and not asked.again and known.answers(one):
             continue
         found.load = os.getloadavg()[0]
         trial = measured(one)

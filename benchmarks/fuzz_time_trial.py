@@ -21,15 +21,16 @@ from typing import Any
 
 import msgspec
 from benchmarks.processor_time import of_descendants
+from mirotwin.fuzz.afl.inputs import message_tokens, write_dictionary, write_seeds
+from mirotwin.fuzz.afl.run import AflRun
+from mirotwin.fuzz.seeds import seeds
+from mirotwin.fuzz.spec import TargetSpec
+from tests.mutants.build import CACHE, IMAGE
 from tests.mutants.heard import Input, verdicts
 
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
-from mirotwin.fuzz.afl.inputs import message_tokens, write_dictionary, write_seeds
-from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.hypothesis_engine import HypothesisRun
-from mirotwin.fuzz.seeds import seeds
-from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 
 ENGINES = ("afl", "hypothesis", "link")
@@ -39,7 +40,7 @@ ROBOTS, SLOT = 3, 0
 
 
 class Wanted(msgspec.Struct, frozen=True):
-    """A trial. `check`: the one that the mistake fails, "" where any will do."""
+    """A trial. `check`: the one that the mistake fails, "" where any will do; `image`: its folder."""
 
     table: str
     mistake: str
@@ -52,6 +53,10 @@ class Wanted(msgspec.Struct, frozen=True):
     @property
     def key(self) -> str:
         return f"{self.table}: {self.mistake}: {self.engine}: {self.seed}"
+
+    @property
+    def path(self) -> str:
+        return str(CACHE / self.image / IMAGE)
 
 
 class Trial(msgspec.Struct, frozen=True):
@@ -69,6 +74,11 @@ class Trial(msgspec.Struct, frozen=True):
     def named(self) -> bool:
         """Found, by the check that the mistake names."""
         return self.found_s is not None and (not self.wanted.check or self.wanted.check in self.checks)
+
+    def answers(self, wanted: Wanted) -> bool:
+        """Whether `wanted`, which has the same key, would come to the same."""
+        enough = self.found_s is not None or self.wanted.limit_s >= wanted.limit_s
+        return enough and self.wanted.image == wanted.image
 
     def __str__(self) -> str:
         when = f"{self.found_s:.1f} s" if self.found_s is not None else f"not in {self.wanted.limit_s:.0f} s"
@@ -101,7 +111,7 @@ def _failed(image: Image, heard: Input) -> list[str]:
 
 
 def _of_engine(wanted: Wanted, folder: Path) -> Trial:
-    spec = TargetSpec(image=wanted.image, robots=ROBOTS, slot=SLOT)
+    spec = TargetSpec(image=wanted.path, robots=ROBOTS, slot=SLOT)
     target = spec.make()
     given = seeds(spec.input, ROBOTS, SLOT)
     write_seeds(folder / "seeds", {f"seed-{number}": data for number, data in enumerate(given)})
@@ -146,7 +156,7 @@ class _Looked:
 
 def _of_link(wanted: Wanted) -> Trial:
     """The link machine compares counters and answers instead of judging by checks."""
-    line = [sys.executable, "-m", "benchmarks.fuzz_time_link", wanted.image, str(wanted.seed)]
+    line = [sys.executable, "-m", "benchmarks.fuzz_time_link", wanted.path, str(wanted.seed)]
     begun_s, spent_s = time.monotonic(), 0.0
     with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         while process.poll() is None and _goes_on(wanted, begun_s, spent_s):

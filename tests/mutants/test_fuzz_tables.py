@@ -1,5 +1,6 @@
 """The tables of docs/fuzzing.md: what a trial becomes, and that the page has each mistake as it is now."""
 
+import msgspec
 from benchmarks.fuzz_time_tables import BEGIN, END, PAGE, render, replaced
 from benchmarks.fuzz_time_trial import Trial, Wanted
 from benchmarks.processor_time import of_descendants
@@ -12,7 +13,7 @@ NAME = "takes a ninth step"
 def trial(
     engine: str, seed: int, found_s: float | None, checks: tuple[str, ...] = (), seeded: bool = False
 ) -> Trial:
-    wanted = Wanted("for fuzzing", NAME, FOR_FUZZING[NAME].check, engine, seed, 60.0, "miro.ihx")
+    wanted = Wanted("for fuzzing", NAME, FOR_FUZZING[NAME].check, engine, seed, 60.0, "folder")
     return Trial(wanted, found_s, 70.0, checks, seeded)
 
 
@@ -24,7 +25,7 @@ def row(*trials: Trial) -> list[str]:
 def test_a_cell_has_one_number_a_seed_in_their_order() -> None:
     check = (FOR_FUZZING[NAME].check,)
     assert row(trial("afl", 2, None), trial("afl", 1, 3.14, check), trial("hypothesis", 1, 5.0, check)) == [
-        "3.1 -",
+        "3.1 >60",
         "5.0",
     ]
 
@@ -38,6 +39,13 @@ def test_a_find_by_another_check_is_marked_and_the_link_machine_has_none() -> No
 def test_what_a_seed_shows_is_said_once() -> None:
     check = (FOR_FUZZING[NAME].check,)
     assert row(*(trial("afl", seed, 0.0, check, seeded=True) for seed in (1, 2, 3))) == ["0.0 (a seed)"]
+
+
+def test_a_find_answers_for_any_limit_and_none_for_shorter_ones_of_the_same_image() -> None:
+    found, none = trial("afl", 1, 3.0), trial("afl", 1, None)
+    longer, shorter = (msgspec.structs.replace(none.wanted, limit_s=limit_s) for limit_s in (90.0, 30.0))
+    assert (found.answers(longer), none.answers(longer), none.answers(shorter)) == (True, False, True)
+    assert not found.answers(msgspec.structs.replace(none.wanted, image="other"))
 
 
 def test_another_part_is_put_between_the_marks() -> None:
