@@ -21,16 +21,16 @@ from typing import Any
 
 import msgspec
 from benchmarks.processor_time import of_descendants
-from mirotwin.fuzz.afl.inputs import message_tokens, write_dictionary, write_seeds
-from mirotwin.fuzz.afl.run import AflRun
-from mirotwin.fuzz.seeds import seeds
-from mirotwin.fuzz.spec import TargetSpec
 from tests.mutants.build import CACHE, IMAGE
 from tests.mutants.heard import Input, verdicts
 
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
+from mirotwin.fuzz.afl.inputs import message_tokens, write_dictionary, write_seeds
+from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.hypothesis_engine import HypothesisRun
+from mirotwin.fuzz.seeds import seeds
+from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 
 ENGINES = ("afl", "hypothesis", "link")

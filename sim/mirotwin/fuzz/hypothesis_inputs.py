@@ -1,7 +1,7 @@
 """Hypothesis strategies of fuzz inputs: whole operations, so that every byte drawn stands where it means something.
 
 What belongs here: the bytes of an input of each kind. What does not: how they are read (`miro_robot.harness.program`,
-which has the table of operations), running them (`hypothesis_engine`), and frames with a right CRC as such
+which has the table of operations), running them (`hypothesis_search`), and frames with a right CRC as such
 (`miro_protocol.strategies`).
 
 Each draw costs Hypothesis some 20 us, as much as a short run of the target: what need not be drawn apart is
@@ -110,7 +110,7 @@ def _operation(name: str, arguments: Bytes | None = None) -> Bytes:
 def _settings(size: int, slot: int) -> Bytes:
     """Payloads of service frames for this robot, with an opcode that there is."""
     heads = [bytes([slot, opcode]) for opcode in Opcode]
-    longest = max(sum(field.size for field in fields) for fields in SERVICE_DATA.values())
+    longest = max(len(b"".join(bytes(field.size) for field in fields)) for fields in SERVICE_DATA.values())
     return st.tuples(st.sampled_from(heads), _exactly(longest)).map(
         lambda drawn: b"".join(drawn).ljust(size, b"\0")
     )
