@@ -59,7 +59,7 @@ def format_line(what: Happening, comment: str = "") -> str:
     """The line without its newline. ValueError when it could not be read back as the same."""
     if not 0 <= what.tick <= MAX_TICK:
         raise ValueError(f"tick = {what.tick}: must be 0..{MAX_TICK}")
-    if comment != comment.strip() or len(comment.splitlines()) > 1:
+    if comment != comment.strip() or "\n" in comment:
         raise ValueError(f"comment = {comment!r}: must be one line without blanks around it")
     said = _characters(what) if isinstance(what, Transmission) else _event(what)
     line = f"{what.tick} {said}"

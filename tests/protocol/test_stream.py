@@ -201,6 +201,13 @@ def test_any_text_at_all_is_a_stream_or_a_stream_error(head, text):
     assert again.header == found.header
 
 
+@pytest.mark.parametrize("comment", ["one\rtwo", "one\x0btwo", "one\x1etwo", "one\x85two", "one\u2028two"])
+def test_a_comment_that_was_read_can_be_written_whatever_editors_take_for_the_end_of_a_line(comment):
+    found = stream.parse(f"1 > 55 # {comment}")
+    assert found.entries[0].comment == comment
+    assert stream.parse(stream.format_stream(found.entries)) == found
+
+
 @pytest.mark.parametrize(
     ("wrong", "comment"),
     [
