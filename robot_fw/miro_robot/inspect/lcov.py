@@ -26,6 +26,7 @@ _RECORDS = {
     "BRDA": re.compile(rf"({_NUMBER}),({_NUMBER}),({_NUMBER}),({_NUMBER}|-)"),
     "DA": re.compile(rf"({_NUMBER}),({_NUMBER})(?:,.*)?"),
 }
+_LIKE_A_LINE = re.compile(rf"{_NUMBER},")
 _OTHER_BRANCH = re.compile(
     rf"{_NUMBER},[efU]*{_NUMBER},.+,(?:{_NUMBER}|-)"
 )  # lcov 2: marked, or named by a text
@@ -92,7 +93,7 @@ def encode(tracefile: Mapping[str, FileRecord]) -> str:
 def _encode_file(path: str, record: FileRecord) -> Iterable[str]:
     by_line = sorted(record.functions.items(), key=lambda item: (item[1][0], item[0]))
     yield f"SF:{_in_one_line(path)}"
-    yield from (f"FN:{line},{_in_one_line(name)}" for name, (line, _) in by_line)
+    yield from (f"FN:{_begin(line, name)},{_in_one_line(name)}" for name, (line, _) in by_line)
     yield from (f"FNDA:{count},{_in_one_line(name)}" for name, (_, count) in by_line)
     yield f"FNF:{len(by_line)}"
     yield f"FNH:{len([name for name, (_, count) in by_line if count])}"
@@ -104,6 +105,11 @@ def _encode_file(path: str, record: FileRecord) -> Iterable[str]:
     yield f"LF:{len(record.lines)}"
     yield f"LH:{record.lines_hit}"
     yield "end_of_record"
+
+
+def _begin(line: int, name: str) -> str:
+    """A function's first line; the last one too if the name begins like a line, which would be taken for that."""
+    return f"{line},{line}" if _LIKE_A_LINE.match(name) else f"{line}"
 
 
 def _in_one_line(name: str) -> str:

@@ -35,6 +35,12 @@ def test_what_is_written_is_read_back(tracefile):
     assert decode(encode(tracefile), "x.info") == tracefile
 
 
+@pytest.mark.parametrize("name", ["0,1", "12,main", "3,4,5", "1,", "operator,"])
+def test_a_name_that_begins_like_a_line_is_read_back_as_a_name(name):
+    tracefile = {"a.c": FileRecord(functions={name: (7, 2)})}
+    assert decode(encode(tracefile), "x.info") == tracefile
+
+
 @given(TRACEFILES, TRACEFILES)
 def test_adding_up_does_not_depend_on_the_order(one, other):
     forth, back = deepcopy(one), deepcopy(other)
