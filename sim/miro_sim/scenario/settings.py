@@ -111,6 +111,8 @@ def _read(text: str, origin: str) -> tuple[list[str], Any]:
     keys = [part.strip() for part in re.sub(r"\[(\d+)\]", r".\1", key).split(".")]
     if not equals or not all(keys):
         raise _Refused("is no setting", "write KEY=VALUE, such as network.radio.latency_s=0.01")
+    if not _is_utf8(text):
+        raise _Refused("is not UTF-8 text", "write the setting in UTF-8, or into a scenario file")
     try:
         check_size(text, origin)
     except ScenarioError as error:
@@ -120,6 +122,15 @@ def _read(text: str, origin: str) -> tuple[list[str], Any]:
     except ValueError:  # no TOML, or an integer with more digits than Python converts
         return keys, value
     return keys, read["value"] if len(read) == 1 else value
+
+
+def _is_utf8(text: str) -> bool:
+    """False for bytes of a command line that no encoding makes text of: Python hands them on as lone surrogates."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 class _Path:
