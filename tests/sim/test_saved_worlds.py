@@ -1,5 +1,6 @@
 """A saved world is loaded as it was saved, or refused in one line; compiled code never trusts what it says."""
 
+import hashlib
 import struct
 
 import pytest
@@ -81,6 +82,13 @@ def test_a_world_with_other_fields_is_refused_as_one_of_another_version(saved):
     other = sealed(world.identity()._replace(tables="00" * 32), opened(saved, world.identity()))
     with pytest.raises(ValueError, match="another version of this program saved it"):
         world.load(other)
+
+
+def test_a_version_that_is_no_text_makes_no_second_line_and_moves_no_cursor(saved):
+    content = saved[:8] + b"\x1b[2J\n\0\xd4" + saved[15:24] + bytes(32) + saved[56:-32]
+    with pytest.raises(ValueError, match="another version of this program saved it") as caught:
+        fresh().load(content + hashlib.sha256(content).digest())
+    assert str(caught.value).isprintable()
 
 
 def test_what_a_saved_world_belongs_to_is_told(saved):

@@ -23,6 +23,8 @@ import struct
 from functools import cache
 from typing import NamedTuple
 
+from miro_exact.bad_input import one_line
+
 MAGIC = b"mirowrl2"
 _HEAD = struct.Struct("<8s16s32s32s32sq")
 _CHECKSUM_BYTES = 32
@@ -64,7 +66,7 @@ def opened(saved: bytes, own: Identity) -> bytes:
     tables, scenario, firmware = (value.hex() for value in hashes)
     found = Identity(tables, scenario, firmware, seed)
     if found.tables != own.tables:
-        by = saver.rstrip(b"\0").decode("ascii", "backslashreplace")
+        by = one_line(saver.rstrip(b"\0").decode("ascii", "backslashreplace"))
         raise ValueError(
             f"the saved world has other fields: another version of this program saved it ({by}; this is {version()})"
         )
