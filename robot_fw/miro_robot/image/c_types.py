@@ -55,6 +55,10 @@ class Field(msgspec.Struct, frozen=True):
 Fields = Mapping[str, tuple[Field, ...]]
 """The members of structs, by tag."""
 
+MOST_BYTES = 0x10000
+"""No variable is larger than a memory of the 8051."""
+_MOST_DEEP = 8
+_FLOAT_BYTES = 4
 _ARRAY = re.compile(r"DA([0-9]{1,6})d")
 _BITS = re.compile(r"SB([0-9]{1,2})\$([0-9]{1,2})")
 _NAMED = re.compile(r"(u?)int(8|16|32|64)(?:\[([0-9]{1,5})\])?")
@@ -65,20 +69,49 @@ _NUMBERS = ("SC", "SS", "SI", "SL")
 
 def type_of(chain: str, size: int, signed: bool) -> CType | None:
     """The type of a record's three parts, None for one that is damaged or unknown."""
+    return _type_of(chain, size, signed) if size <= MOST_BYTES and chain.count(",") <= _MOST_DEEP else None
+
+
+def _type_of(chain: str, size: int, signed: bool) -> CType | None:
     head, _, inner = chain.partition(",")
     if array := _ARRAY.fullmatch(head):
         count = int(array[1])
-        element = type_of(inner, size // count if count else 0, signed)
+        element = _type_of(inner, size // count, signed) if count and size >= count else None
         return None if element is None else CType("array", size, element=element, count=count)
     if bits := _BITS.fullmatch(head):
-        return CType("bits", size, signed, first_bit=int(bits[1]), bits=int(bits[2]))
+        first_bit, width = int(bits[1]), int(bits[2])
+        fits = 0 < width <= 8 * size - first_bit
+        return CType("bits", size, signed, first_bit=first_bit, bits=width) if fits else None
     if head.startswith("ST"):
         return CType("struct", size, tag=head[2:])
+    if head in _PLAIN:
+        return CType(_PLAIN[head], size) if size == _FLOAT_BYTES or head != "SF" else None
+    if not size:
+        return None
     if head in _POINTERS:
         return CType("pointer", size)
-    if head in _PLAIN:
-        return CType(_PLAIN[head], size)
     return CType("int", size, signed) if head in _NUMBERS else None
+
+
+def values_in(kind: CType, fields: Fields, inside: tuple[str, ...] = ()) -> int:
+    """How many numbers a type is made of. 0 for one that cannot be: a member that lies outside its struct, a struct
+    within itself, more than `MOST_BYTES` in all (of a union, members count that lie over each other).
+    """
+    if kind.kind == "array" and kind.element is not None:
+        found = kind.count * values_in(kind.element, fields, inside)
+    elif kind.kind == "struct":
+        if kind.tag in inside or len(inside) >= _MOST_DEEP:
+            return 0
+        found = 0
+        for field in fields.get(kind.tag, ()):
+            more = values_in(field.type, fields, (*inside, kind.tag))
+            if not more or field.offset + field.type.size > kind.size or found > MOST_BYTES:
+                return 0
+            found += more
+        found = max(1, found)  # one that the file does not describe is empty
+    else:
+        found = 1
+    return found if found <= MOST_BYTES else 0
 
 
 def type_named(name: str) -> CType | None:

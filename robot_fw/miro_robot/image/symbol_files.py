@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 
 _KEPT = 32
-_SPACE = 0x10000
+_SPACE = 0x10000  # an address beyond is damage: no memory of the 8051 has it
 _Scope = tuple[str, str]
 """(scope, name) of a C name: scope is G, or F and the file."""
 
@@ -103,7 +103,7 @@ def parse_map(text: str) -> MapFile:
         elif (line[:1].isspace() or line[1:2] == ":") and (record := _RECORD.match(line)):
             prefix, address = record[1], int(record[2], 16)
             if name := record[3]:
-                if space:
+                if space and address < _SPACE:
                     names[name] = Symbol(address, space)
                 if prefix in (None, "C:") and first <= address < min(end, _SPACE):
                     places.append(CodePlace(area, name, address, number))
@@ -169,10 +169,12 @@ def parse_cdb(text: str) -> CdbFile:
             if (found := _CDB_INSTRUCTION.match(line)) and (address := int(found[1], 16)) < _SPACE:
                 instructions.setdefault(address, number)
         elif line.startswith("L:C$"):
-            if found := _CDB_LINE.match(line):
-                lines.append((int(found[3], 16), SourceLine(found[1], int(found[2]))))
+            if (found := _CDB_LINE.match(line)) and (address := int(found[3], 16)) < _SPACE:
+                lines.append((address, SourceLine(found[1], int(found[2]))))
         elif line.startswith("L:") and (found := _CDB_NAME.match(line)):
             scope, address = (found[2], found[3]), int(found[4], 16)
+            if address >= _SPACE:
+                continue
             if found[1]:
                 ends.append((scope, address))
                 continue

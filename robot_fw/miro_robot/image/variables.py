@@ -20,7 +20,7 @@ from functools import lru_cache
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_robot.image.c_types import CType, Field, type_named, type_of
+from miro_robot.image.c_types import MOST_BYTES, CType, Field, type_named, type_of, values_in
 from miro_robot.image.debug_info import listings
 from miro_robot.image.hex import Image
 from miro_robot.image.symbol_files import CDB_SPACES, parse_bits, read_text
@@ -79,17 +79,22 @@ def parse_variables(text: str) -> Variables:
                 declared.setdefault((symbol[1], symbol[2], symbol[3]), (kind, CDB_SPACES[symbol[7]], module))
         elif line.startswith("L:") and (place := _PLACE.match(line)):
             known = declared.get((place[1], place[2], place[3]))
-            if known is not None:
+            address = int(place[4], 16)
+            if known is not None and address < MOST_BYTES:  # beyond any memory is damage
                 kind, space, where = known
                 scope = _scope(place[1])
-                variable = Variable(place[2], scope, int(place[4], 16), space, kind, where)
+                variable = Variable(place[2], scope, address, space, kind, where)
                 found.setdefault(place[2], {})[scope] = variable
     bits = {
         (name, _scope(where)): Variable(name, _scope(where), -1, space, kind, module)
         for (where, name, _), (kind, space, module) in declared.items()
         if space == "bit" and _scope(where) not in found.get(name, {})
     }
-    by_name = {name: tuple(each.values()) for name, each in found.items()}
+    by_name = {}
+    for name, each in found.items():
+        sound = [one for one in each.values() if values_in(one.type, structs.get(one.module, {}))]
+        if sound:
+            by_name[name] = tuple(sound)
     return Variables(by_name, structs, tuple(bits.values()))
 
 

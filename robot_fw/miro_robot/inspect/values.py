@@ -63,7 +63,7 @@ def bytes_at(cpu: Cpu, image: Image, variable: Variable) -> bytes:
         return bytes(cpu.code_at(place) for place in places)
     if space == "iram":
         return bytes(cpu.peek_iram(place) for place in places)
-    if space == "sfr" and places.stop <= 0x100:
+    if space == "sfr" and address >= _FIRST_SFR and places.stop <= 0x100:
         return bytes(cpu.sfr(place) for place in places)
     raise BadInput(image.path, variable.name, f"is in {space}: the board has no such memory")
 
