@@ -15,15 +15,20 @@ import tomllib
 from functools import cache
 from importlib import resources
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
+from msgspec import Meta
 
 from miro_exact.bad_input import BadInput
+from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, too_long
 
 SIDES = ("left", "right")
 CHIP_INPUTS = ("cs", "rd", "wr", "ps", "rst")
 PORTS = 4
-MAX_LATCHES = 8
+MAX_LATCHES = MAX_BUFFERS = 8
+MAX_HI_PINS = 8
+"""Pins of the CPU that outputs of the LM629 drive."""
 CONSTANT_BANK = PORTS + MAX_LATCHES
 """Banks of eight levels a chip input can be taken from: four ports, the latches, and one of constant ones."""
 
@@ -34,20 +39,24 @@ class WiringError(BadInput):
     """A board file that cannot be built: file, key, what, remedy."""
 
 
+Address = Annotated[int, Meta(ge=0, le=0xFFFF)]
+Byte = Annotated[int, Meta(ge=0, le=0xFF)]
+
+
 class Latch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Eight output bits that a MOVX write with `address & mask` equal to `address` stores."""
 
     name: str
-    address: int
-    mask: int = 0xFFFF
-    initial: int = 0xFF
+    address: Address
+    mask: Address = 0xFFFF
+    initial: Byte = 0xFF
 
 
 class InputBuffer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Puts the LM629 data bus on the external bus when a MOVX read addresses it."""
 
-    address: int
-    mask: int = 0xFFFF
+    address: Address
+    mask: Address = 0xFFFF
 
 
 class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -98,6 +107,10 @@ class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 raise WiringError(
                     self.name, "nets", f"P{port} is the data bus, nothing else can drive its pins"
                 )
+        driven = [source for _, _, source, _ in inputs if source.endswith(".hi")]
+        if len(driven) > MAX_HI_PINS:
+            what = f"{len(driven)} port pins follow an LM629's HI, at most {MAX_HI_PINS} can"
+            raise WiringError(self.name, "nets", what)
         return inputs
 
     def _latch_bank(self, name: str, net: str) -> int:
@@ -126,12 +139,18 @@ def _miro() -> Wiring:
 
 
 def _wiring(text: str, origin: str) -> Wiring:
+    if too_long(text):
+        raise WiringError(origin, "", f"holds more than {TEXT_KIB} KiB", "is this a board file?")
+    if (line := long_key_line(text)) is not None:
+        raise WiringError(origin, line, f"a key of more than {KEY_PARTS} parts", "no key has more than 2")
     try:
         wiring = msgspec.convert(tomllib.loads(text), Wiring)
-    except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+    except (ValueError, RecursionError) as error:
         raise WiringError(origin, "", f"{error}") from error
     if len(wiring.latch) > MAX_LATCHES:
         raise WiringError(origin, "latch", f"{len(wiring.latch)} latches, at most {MAX_LATCHES} fit")
+    if len(wiring.buffer) > MAX_BUFFERS:
+        raise WiringError(origin, "buffer", f"{len(wiring.buffer)} buffers, at most {MAX_BUFFERS} fit")
     if wiring.crystal_hz != 24_000_000:
         raise WiringError(origin, "crystal_hz", "only 24000000 is supported, time is counted in its ticks")
     wiring.data_bank()

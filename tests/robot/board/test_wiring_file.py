@@ -1,0 +1,60 @@
+"""A board file is built as it says, or refused in one line that names it: whatever numbers and nets it has."""
+
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from miro_robot.board import Board
+from miro_robot.plant import Plant
+from miro_robot.wiring import MAX_HI_PINS, WiringError, load_wiring
+
+MIRO = resources.files("miro_robot.boards").joinpath("miro.toml").read_text("utf-8")
+LATCH = '\n[[latch]]\nname = "OUT"\naddress = {address}\nmask = {mask}\ninitial = {initial}\n'
+SOUND = {"address": "0x8000", "mask": "0xC000", "initial": "0"}
+FREE = ("P1.4", "P1.5", "P1.6", "P1.7", "P2.6", "P2.7", "P3.4", "P3.5", "P3.6", "P3.7")
+
+
+def made(folder: Path, text: str) -> Board:
+    path = folder / "board.toml"
+    path.write_text(text)
+    return Board(load_wiring(path), Plant(), 0, 3)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("address", "0x10000"),
+        ("address", "-1"),
+        ("address", "9" * 30),
+        ("mask", "0x10000"),
+        ("initial", "256"),
+    ],
+)
+def test_a_number_that_no_bus_has_is_refused(tmp_path: Path, key: str, value: str) -> None:
+    made(tmp_path, MIRO + LATCH.format(**SOUND))
+    with pytest.raises(WiringError, match=r"board\.toml: Expected `int`|too large|not in range|int. out of"):
+        made(tmp_path, MIRO + LATCH.format(**{**SOUND, key: value}))
+
+
+def test_at_most_eight_pins_follow_an_interrupt_output(tmp_path: Path) -> None:
+    """The MIRO has two of them; more than there is room for were written behind the table."""
+    more = [f'"{pin}" = "left.hi"\n' for pin in FREE[: MAX_HI_PINS - 2]]
+    driven = made(tmp_path, MIRO + "".join(more)).wiring.cpu_inputs()
+    assert len([source for _, _, source, _ in driven if source.endswith(".hi")]) == MAX_HI_PINS
+    with pytest.raises(WiringError, match="9 port pins follow an LM629's HI, at most 8 can"):
+        made(tmp_path, f'{MIRO}{"".join(more)}"{FREE[-1]}" = "right.hi"\n')
+
+
+def test_more_buffers_than_fit_are_refused_and_not_left_out(tmp_path: Path) -> None:
+    made(tmp_path, MIRO + "\n[[buffer]]\naddress = 1\n" * 8)
+    with pytest.raises(WiringError, match="9 buffers, at most 8 fit"):
+        made(tmp_path, MIRO + "\n[[buffer]]\naddress = 1\n" * 9)
+
+
+@pytest.mark.parametrize(
+    "text", ["a = " + "[" * 5000, "a = " + "9" * 5000, "a" + ".b" * 5000 + " = 1", "#" * 600_000]
+)
+def test_text_that_is_no_board_is_refused_at_once(tmp_path: Path, text: str) -> None:
+    with pytest.raises(WiringError, match=r"board\.toml"):
+        made(tmp_path, text)
