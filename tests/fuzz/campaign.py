@@ -1,0 +1,175 @@
+"""A campaign of one target in a process of its own, and what came of it.
+
+What belongs here: folders, child processes, reading what they say. What does not: what a child does (`guided`,
+`chance`), and the sanitizers' build (`sanitized`).
+
+    build/fuzzing/found/TARGET      inputs that reached something new
+    build/fuzzing/findings/TARGET   inputs that break the promise, and the report of each
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+from tests import children
+from tests.fuzz import corpus, sanitized
+from tests.fuzz.catalogue import TARGETS
+from tests.fuzz.sanitized import MissingError as MissingError
+
+ROOT = Path(__file__).parents[2]
+WORK = ROOT / "build" / "fuzzing"
+HANGS_S = 20
+MEMORY_MB = 3000
+_LIBRARY = ("exact", "protocol", "robot_fw", "host", "sim")
+_RATE = re.compile(r"stat::average_exec_per_sec:\s+([0-9]+)")
+_EXECUTED = re.compile(r"stat::number_of_executed_units:\s+([0-9]+)")
+_COVERAGE = re.compile(r"cov: ([0-9]+) ft: ([0-9]+)")
+_WRITTEN = re.compile(r"Test unit written to (\S+)")
+_ERROR = re.compile(
+    r"^(?:\w+\.)*\w*(?:Error|Exception|Broken)\b.*|^ERROR: .*|^==[0-9]+== ?ERROR.*|.*runtime error: .*", re.M
+)
+
+
+class Result(NamedTuple):
+    """`per_s`: of the inputs alone. `reached`: edges and features of libFuzzer, or outcomes. `what`: of a finding."""
+
+    executions: int
+    per_s: float
+    reached: str
+    finding: Path | None = None
+    what: str = ""
+
+    def line(self, name: str) -> str:
+        rate = f"{self.executions:8d} inputs, {self.per_s:7.0f}/s, {self.reached}"
+        if self.finding is None:
+            return f"{name:16} {rate}"
+        again = f"python -m tests.fuzz {name} --run {os.path.relpath(self.finding, ROOT)}"
+        return f"{name:16} {rate}\n{'':16} FOUND {self.what}\n{'':16} {again}"
+
+
+class Engine(NamedTuple):
+    """`guided`: by Atheris. `environment`: what a child gets beside ours. `fixed`: the engine of hot modules, or ""."""
+
+    guided: bool
+    environment: dict[str, str]
+    about: str
+    fixed: str = ""
+
+    def describe(self) -> str:
+        return self.about
+
+    def run(self, name: str, limit_s: float, seed: int) -> Result:
+        findings, found = (WORK / part / name for part in ("findings", "found"))
+        for path in (findings, found):
+            path.mkdir(parents=True, exist_ok=True)
+        seeds = WORK / "seeds" / name
+        _write_seeds(name, seeds)
+        engine = self.fixed or TARGETS[name].engine
+        module = "guided" if self.guided else "chance"
+        command = [sys.executable, "-m", f"tests.fuzz.{module}", name, engine]
+        if self.guided:
+            command += _words(name, limit_s, seed, findings)
+            command += [str(found), str(seeds)]
+        else:
+            command += [str(limit_s), str(seed), str(findings), str(seeds)]
+        child = children.run(
+            command,
+            cwd=ROOT,
+            env=child_environment(self.environment),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="backslashreplace",
+        )
+        return _result(child, limit_s, findings)
+
+
+def prepared(plain: bool, sanitize: bool) -> Engine:
+    """What a campaign runs with. Raises MissingError for tools that are asked for and are not there."""
+    atheris = not plain and importlib.util.find_spec("atheris") is not None
+    about = "guided by Atheris" if atheris else "changes by chance"
+    if not plain and not atheris:
+        about += " (for guidance: pip install -r tests/fuzz/requirements.txt)"
+    if not sanitize:
+        return Engine(atheris, {}, about)
+    build = sanitized.built(WORK / "sanitized", atheris)
+    return Engine(atheris, build.environment, f"{about}; {build.about}", "compiled")
+
+
+def child_environment(more: dict[str, str]) -> dict[str, str]:
+    """Of this process, with our packages from this checkout unless `more` says from where."""
+    own = os.pathsep.join(str(ROOT / part) for part in _LIBRARY)
+    paths = [str(ROOT), more.get("PYTHONPATH", own), os.environ.get("PYTHONPATH", "")]
+    named = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **more}
+    return {**named, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
+
+
+def _write_seeds(name: str, folder: Path) -> None:
+    """Kept inputs, and the target's own seeds: these are made by a process of ours, which is quicker uninstrumented."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in folder.glob("*"):
+        path.unlink()
+    for data in [*(data for _, data in corpus.kept(name)), *TARGETS[name].seeds()]:
+        (folder / corpus.file_name(data)).write_bytes(data)
+
+
+def _words(name: str, limit_s: float, seed: int, findings: Path) -> list[str]:
+    target = TARGETS[name]
+    words = [
+        f"-max_total_time={max(1, int(limit_s))}",
+        f"-max_len={target.most_bytes}",
+        f"-timeout={HANGS_S}",
+    ]
+    words += [
+        f"-rss_limit_mb={MEMORY_MB}",
+        "-print_final_stats=1",
+        f"-artifact_prefix={findings}/",
+        f"-seed={seed + 1}",
+    ]
+    if target.words:
+        path = findings.parent / f"{name}.dict"
+        quoted = ("".join(f"\\x{byte:02x}" for byte in word) for word in target.words)
+        path.write_text("".join(f'"{word}"\n' for word in quoted))
+        words.append(f"-dict={path}")
+    return words
+
+
+def _result(child: subprocess.CompletedProcess[str], limit_s: float, findings: Path) -> Result:
+    text = child.stdout
+    executed = _EXECUTED.search(text)
+    coverage = _COVERAGE.findall(text)
+    reached = "{} edges, {} features".format(*coverage[-1]) if coverage else ""
+    if said := re.search(r"^outcomes: ([0-9]+), inputs: ([0-9]+)$", text, re.M):
+        return Result(int(said[2]), int(said[2]) / limit_s, f"{said[1]} outcomes")
+    executions = int(executed[1]) if executed else 0
+    rate = _RATE.search(text)
+    per_s = float(rate[1]) if rate else 0.0
+    if child.returncode == 0:
+        return Result(executions, per_s, reached)
+    written = _WRITTEN.search(text)
+    errors = [found.strip() for found in _ERROR.findall(text)]
+    path = Path(written[1]) if written else findings / "last"
+    path.with_name(f"{path.name}.txt").write_text(text)
+    return Result(executions, per_s, reached, path, errors[0] if errors else text.strip()[-200:])
+
+
+def once(name: str, path: Path, sanitize: bool) -> int:
+    """One input in this process, or in one with the sanitizers; its exit code."""
+    environment = prepared(False, True).environment if sanitize else {}
+    engine = "compiled" if sanitize else TARGETS[name].engine
+    command = [sys.executable, "-m", "tests.fuzz.once", name, engine, str(path)]
+    return children.run(command, cwd=Path.cwd(), env=child_environment(environment)).returncode
+
+
+def keep(name: str) -> int:
+    """Chooses the kept inputs anew from those kept, seeds and found ones, in a process of its own; how many."""
+    folders = [str(WORK / part / name) for part in ("found", "seeds")]
+    command = [sys.executable, "-m", "tests.fuzz.choose", name, TARGETS[name].engine, *folders]
+    children.run(command, cwd=ROOT, env=child_environment({}), check=True)
+    return len(corpus.kept(name))

@@ -1,0 +1,165 @@
+"""What a machine is given beside its firmware: levels on pins, serial input with conditions, a board file.
+
+What belongs here: `--pins`, `--stdin` and their conditions, and boards other than the robot's. What does not: files of
+names (`firmware`).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+from tests.fuzz.target import Draws, Run, Target, folder, refused
+from tests.mirotwin.mutated_files import ECHO, hex_records
+
+_NAME = "fuzz.ihx"
+
+
+def _pins() -> Run:
+    from miro_exact.bad_input import BadInput
+    from miro_robot.bare.pins import read_pins
+
+    def run(data: bytes) -> str:
+        try:
+            events = read_pins(data.decode("utf-8", "replace"), "fuzz.pins")
+        except BadInput as error:
+            return refused(error)
+        text = "".join(f"{event.tick} * P{event.port}.{event.bit} {event.level}\n" for event in events)
+        assert read_pins(text, "again") == events, "written and read again, the events differ"
+        return f"{min(len(events), 3)} events"
+
+    return run
+
+
+def _serial() -> Run:
+    """Pieces of input with conditions, and pins, for a program that sends back what it gets."""
+    from miro_exact.state import snapshot
+    from miro_robot.bare.input import Piece
+    from miro_robot.bare.machine import BareMachine
+    from miro_robot.bare.pins import PinEvent
+    from miro_robot.image import load_hex
+
+    path = folder() / _NAME
+    path.write_bytes(hex_records(ECHO))
+    image = load_hex(path)
+
+    def run(data: bytes) -> str:
+        draw = Draws(data)
+        baud = (None, 9600, 4800, draw.below(1 << 20))[draw.below(4)]
+        crystal_hz = (24_000_000, 11_059_200, draw.below(1 << 27))[draw.below(3)]
+        gap_ticks, cut = draw.below(1 << 16), 1 + draw.below(1 << 12)
+        pieces, pins, tick = [], [], 0
+        while draw.left:
+            kind = draw.below(4)
+            if kind == 3:
+                tick += draw.below(1 << 16)
+                pins.append(PinEvent(tick, 1 + draw.below(3), draw.below(8), draw.below(2)))
+                continue
+            when = draw.take(draw.below(4)) if kind == 1 else b""
+            delay_ticks = draw.below(1 << 24) if kind else None
+            pieces.append(Piece(draw.take(draw.below(16)), when, delay_ticks))
+        sent: tuple[list[int], list[int]] = ([], [])
+        try:
+            whole, parts = (
+                BareMachine(
+                    *(image, False, tuple(pieces), baud, lambda some, at=at: sent[at].extend(some)),
+                    crystal_hz=crystal_hz,
+                    gap_ticks=gap_ticks,
+                    pins=tuple(pins),
+                )
+                for at in range(2)
+            )
+        except ValueError as error:
+            return refused(error)
+        ended = whole.run(max_cycles=8_000)
+        for cycles in (cut, cut + 7, 8_000):
+            again = parts.run(max_cycles=cycles)
+        assert (sent[0], ended) == (sent[1], again), "run in parts, the output differs"
+        assert whole.cpu.cycles == parts.cpu.cycles, "run in parts, the time differs"
+        if ended == "cycles":
+            assert len(snapshot(whole)) == len(snapshot(parts))
+        return f"{ended}, {min(len(sent[0]), 3)} characters"
+
+    return run
+
+
+def _board() -> Run:
+    from miro_robot.board import Board
+    from miro_robot.image import load_hex
+    from miro_robot.plant import Plant
+    from miro_robot.wiring import WiringError, load_wiring
+
+    path = folder() / "fuzz-board.toml"
+    code = folder() / _NAME
+    code.write_bytes(hex_records(_BUS_PROGRAM))
+    image = load_hex(code)
+
+    def run(data: bytes) -> str:
+        path.write_bytes(data)
+        try:
+            wiring = load_wiring(path)
+        except WiringError as error:
+            return refused(error)
+        board = Board(wiring, Plant(), 1, 5)
+        board.load(image)
+        board.cpu.rxd.settled_tick = 1 << 40
+        board.run(12 * 3000)
+        return f"ran, {len(wiring.latch)} latches, {min(board.fault_count, 2)} faults"
+
+    return run
+
+
+# MOV DPTR,#8000h; loop: INC A; MOVX @DPTR,A; MOVX A,@DPTR; MOV P0..P3,A; INC DPTR; SJMP loop
+_BUS_PROGRAM = bytes.fromhex("908000 04 F0 E0 F580 F590 F5A0 F5B0 A3 80F2".replace(" ", ""))
+
+
+@cache
+def _miro_toml() -> bytes:
+    from importlib import resources
+
+    return resources.files("miro_robot.boards").joinpath("miro.toml").read_bytes()
+
+
+def _board_seeds() -> list[bytes]:
+    text = _miro_toml().decode()
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    plain = "\n".join(lines)
+    latched = (
+        plain.replace('data = "P0"', 'data = "OUT"').replace("P2.0", "CTRL.0").replace("P2.1", "!CTRL.1")
+    )
+    latched += (
+        '\n[[latch]]\nname = "CTRL"\naddress = 0x8000\nmask = 0xC000\ninitial = 0\n[[latch]]\nname = "OUT"\n'
+    )
+    return [plain.encode(), (latched + "address = 0x4000\n[[buffer]]\naddress = 1\n").encode()]
+
+
+def _serial_seeds() -> list[bytes]:
+    return [
+        b"\x00\x00\x00\x00\x00\x10\x00\x05hello\x01\x02lo\x10\x20\x00\x03abc",
+        b"\x01\x00\x00\x20\x01\x40\x00\x03abc\x03\x00\x10\x01\x02\x01\x02\x00\x80\x00\x02xy",
+        b"\x03\x00\x4b\x00\x01\x00\x00\x00\x20\x00\x02ab",
+    ]
+
+
+TARGETS = {
+    "pins": Target(
+        "levels on pins", _pins, lambda: [b"0 * P3.2 1\n24000 * P3.2 0 # falls\n24120 * P1.0 1\n"]
+    ),
+    "serial": Target(
+        "serial input with conditions and pins, in parts", _serial, _serial_seeds, most_bytes=128
+    ),
+    "board": Target(
+        "board files, and the board that comes of one",
+        _board,
+        _board_seeds,
+        words=(
+            b"[[latch]]\n",
+            b"[[buffer]]\n",
+            b"address = ",
+            b"mask = ",
+            b"initial = ",
+            b"slot.0",
+            b"CTRL.0",
+            b"P3.6",
+        ),
+    ),
+}

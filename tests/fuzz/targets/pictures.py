@@ -1,0 +1,279 @@
+"""What the tracker reads: pictures, calibrations, colours, control points, samples; and the tracker on drawn patches.
+
+What belongs here: files of `track` and `calibrate`. What does not: pictures inside a recording's container.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+
+from tests.fuzz.target import Draws, Run, Target, refused
+
+_ORIGIN = "fuzz.file"
+_WIDTH, _HEIGHT = 320, 240
+
+
+def _with_sums(png: bytes) -> bytes:
+    """A PNG file whose chunks have the right sums."""
+    data, place = bytearray(png), 8
+    while place + 12 <= len(data):
+        size = int.from_bytes(data[place : place + 4], "big")
+        end = place + 8 + size
+        if end + 4 > len(data):
+            break
+        data[end : end + 4] = zlib.crc32(data[place + 4 : end]).to_bytes(4, "big")
+        place = end + 4
+    return bytes(data)
+
+
+def _picture() -> Run:
+    from miro_exact.bad_input import BadInput
+    from mirotwin.looking.picture import Picture, parse, png
+
+    def read(data: bytes) -> str:
+        try:
+            found = parse(data, _ORIGIN)
+        except BadInput as error:
+            return refused(error)
+        assert len(found.window(0, 0, _WIDTH, _HEIGHT)) == 3 * _WIDTH * _HEIGHT
+        assert isinstance(parse(png(found.image()), "again"), Picture)
+        return "taken"
+
+    def run(data: bytes) -> str:
+        return f"{read(data)}; sums put right: {read(_with_sums(data))}"
+
+    return run
+
+
+def _calibration() -> Run:
+    from miro_host.eye import eye_file
+    from miro_host.eye.calibration import Calibration
+    from miro_host.eye.eye_file import EyeError
+
+    def run(data: bytes) -> str:
+        try:
+            found = eye_file.parse(data.decode("utf-8", "replace"), Calibration, _ORIGIN)
+        except EyeError as error:
+            return refused(error)
+        assert eye_file.parse(found.text(), Calibration, "again") == found, (
+            "written and read again, it differs"
+        )
+        lens, drawn = found.lens(), 0
+        for u, v in ((0.0, 0.0), (160.0, 120.0), (319.0, 239.0)):
+            try:
+                x_m, y_m = lens.ground(u, v, found.height_m(0.05))
+            except ValueError as error:
+                refused(error)
+                continue
+            assert math.isfinite(x_m + y_m), "a place that is no number"
+            drawn += 1
+        return f"taken, {drawn} of 3 pixels lie on the ground"
+
+    return run
+
+
+def _colours() -> Run:
+    from miro_host.eye import eye_file
+    from miro_host.eye.colours import ColourClasses
+    from miro_host.eye.eye_file import EyeError
+
+    def run(data: bytes) -> str:
+        try:
+            found = eye_file.parse(data.decode("utf-8", "replace"), ColourClasses, _ORIGIN)
+        except EyeError as error:
+            return refused(error)
+        assert eye_file.parse(found.text(), ColourClasses, "again") == found, (
+            "written and read again, they differ"
+        )
+        assert len(found.table) == 65536
+        return f"{min(len(found.colours), 3)} colours"
+
+    return run
+
+
+def _points() -> Run:
+    from miro_host.eye.camera_parameters import CameraParameters
+    from miro_host.eye.eye_file import EyeError
+    from miro_host.eye.fit import fit, parse_points
+
+    def run(data: bytes) -> str:
+        try:
+            found = parse_points(data.decode("utf-8", "replace"), _ORIGIN)
+            fit(found, CameraParameters(), _ORIGIN)
+        except EyeError as error:
+            return refused(error)
+        return "fits"
+
+    return run
+
+
+def _samples() -> Run:
+    from miro_host.eye.colours import classes_of
+    from miro_host.eye.eye_file import EyeError
+    from miro_host.eye.sample_file import parse_samples
+
+    def run(data: bytes) -> str:
+        try:
+            found = classes_of(parse_samples(data.decode("utf-8", "replace"), _ORIGIN), _ORIGIN)
+        except EyeError as error:
+            return refused(error)
+        assert found.text()
+        return f"{min(len(found.colours), 3)} colours"
+
+    return run
+
+
+def _tracker() -> Run:
+    """Rectangles of the classes' colours, anywhere, also over the edge, in a few pictures one after the other."""
+    from miro_host.eye import eye_file
+    from miro_host.eye.calibration_kinds import exact
+    from miro_host.eye.camera_parameters import CameraParameters
+    from miro_host.eye.colours import ColourClasses
+    from miro_host.eye.patterns import PATTERNS
+    from miro_host.eye.tracker import Tracker
+    from mirotwin.looking.picture import Picture
+
+    classes = eye_file.parse(_colours_toml().decode(), ColourClasses, "colours")
+    paints = [bytes((int(mean.y), int(mean.cb), int(mean.cr))) for mean in classes.colours.values()]
+    plain = bytes((40, 128, 128)) * (_WIDTH * _HEIGHT)
+    calibration = exact(CameraParameters())
+
+    def run(data: bytes) -> str:
+        draw = Draws(data)
+        pattern = list(PATTERNS)[draw.below(len(PATTERNS))]
+        centroid = ("binary", "weighted")[draw.below(2)]
+        tracker = Tracker("yellow", (0, 1, 2), pattern, calibration, classes, centroid)
+        pixels, tick, seen = bytearray(plain), 0, 0
+        while True:
+            kind = draw.below(16)
+            if kind == 0 or not draw.left:
+                tick += 800_800 * (1 + draw.below(4))
+                found = tracker.track(Picture(bytes(pixels)), tick)
+                assert len(found) == 3
+                seen = max(seen, sum(one is not None for one in found))
+                pixels = bytearray(plain)
+                if not draw.left:
+                    return f"{seen} robots"
+            left, top, width, height = (
+                draw.below(_WIDTH),
+                draw.below(_HEIGHT),
+                1 + draw.below(64),
+                1 + draw.below(64),
+            )
+            paint = paints[kind % len(paints)] if kind < 12 else draw.take(3).ljust(3, b"\x80")
+            width = min(width, _WIDTH - left)
+            for row in range(top, min(top + height, _HEIGHT)):
+                at = 3 * (row * _WIDTH + left)
+                pixels[at : at + 3 * width] = paint * width
+
+    return run
+
+
+def _colours_toml() -> bytes:
+    from miro_host.eye.camera_parameters import CameraParameters
+    from miro_sim.pitch.colour_samples import colours_of
+    from miro_sim.pitch.picture_settings import PictureSettings
+
+    return colours_of(CameraParameters(), PictureSettings(), "diagonal", True).text().encode()
+
+
+def _calibration_seeds() -> list[bytes]:
+    from miro_host.eye.calibration_kinds import exact, none
+    from miro_host.eye.camera_parameters import CameraParameters
+
+    whole = exact(CameraParameters()).text()
+    more = "version = 1\nignore_height = true\nfree = ['focal_px']\n"
+    table = "[residuals]\nrms_px = 0.1\nmax_px = 0.3\npoints = 2\npx = [0.1, 0.3]\n"
+    return [
+        whole.encode(),
+        (more + none(CameraParameters()).text().partition("[camera]")[2].join(["[camera]", table])).encode(),
+    ]
+
+
+def _points_seeds() -> list[bytes]:
+    from miro_host.eye.camera_parameters import CameraParameters
+    from mirotwin.looking import marks
+
+    lines = marks.text(CameraParameters(), 0.1, 3).splitlines()
+    some = [lines[0], *lines[1 :: max(1, len(lines) // 24)]]
+    return ["\n".join(some).encode(), ("\n".join([lines[0], *lines[1:9]]) + "\n").encode()]
+
+
+def _samples_seeds() -> list[bytes]:
+    rgb = {"yellow": (231, 209, 40), "blue": (30, 40, 200), "magenta": (200, 30, 180), "floor": (34, 78, 52)}
+    text = "colour,r,g,b\n" + "".join(f"{name},{r},{g},{b}\n" * 4 for name, (r, g, b) in rgb.items())
+    return [text.encode(), b"colour,y,cb,cr\n" + b"cyan, 160,150,60\n" * 4 + b'"green",90,90,90\n' * 5]
+
+
+def _picture_seeds() -> list[bytes]:
+    from PIL import Image
+
+    from mirotwin.looking.picture import png
+
+    image = Image.new("RGB", (_WIDTH, _HEIGHT), (30, 60, 90))
+    small = Image.new("L", (8, 8))
+    plain = b"P6\n# comment\n320 240\n255\n" + b"abc" * 500
+    bits = b"P4 320 240\n" + bytes(400)
+    return [png(image), png(image.convert("LA")), png(small), plain, bits]
+
+
+def _tracker_seeds() -> list[bytes]:
+    """A robot that goes to the right, with either pattern; three robots; patches at the edge."""
+
+    def patch(kind: int, left: int, top: int, side: int = 8) -> bytes:
+        return bytes([kind]) + left.to_bytes(2, "little") + bytes([top, side - 1, side - 1])
+
+    def robot(identity: int, left: int, top: int, first: int = 8, up: int = 9) -> bytes:
+        return patch(first, left + up, top) + patch(identity, left, top + 9)
+
+    going = b"".join(robot(1, 140 + 5 * at, 99, 0 if at else 8) for at in range(3))
+    strip = b"".join(robot(3, 140, 99 - 6 * at, 0 if at else 8, 0) for at in range(2))
+    three = robot(1, 140, 99) + robot(3, 200, 60) + robot(4, 60, 160)
+    edge = patch(8, 312, 231, 64) + patch(3, 0, 0, 64) + patch(12, 160, 0)
+    return [b"\0\0" + going, b"\1\1" + strip, b"\0\1" + three + b"\0" * 6 + robot(1, 141, 98), b"\0\0" + edge]
+
+
+_TOML = (
+    b"[camera]\n",
+    b"[residuals]\n",
+    b"[colours.",
+    b"[floor]\n",
+    b"version = 1",
+    b" = ",
+    b"1e300",
+    b"-0.0",
+    b"inf",
+)
+
+TARGETS = {
+    "picture": Target(
+        "PNG and PPM files, also with right sums",
+        _picture,
+        _picture_seeds,
+        words=(
+            b"IHDR",
+            b"IDAT",
+            b"PLTE",
+            b"tRNS",
+            b"iCCP",
+            b"zTXt",
+            b"iTXt",
+            b"acTL",
+            b"fcTL",
+            b"fdAT",
+            b"P3 320 240 ",
+        ),
+    ),
+    "calibration": Target(
+        "calibrations, written again, and their lens", _calibration, _calibration_seeds, words=_TOML
+    ),
+    "colours": Target(
+        "colour classes, written again, and their table", _colours, lambda: [_colours_toml()], words=_TOML
+    ),
+    "points": Target(
+        "control points, and the camera that fits them", _points, _points_seeds, most_bytes=2048
+    ),
+    "samples": Target("sampled pixels, and their classes", _samples, _samples_seeds, most_bytes=1024),
+    "tracker": Target("the tracker on pictures of rectangles", _tracker, _tracker_seeds, most_bytes=256),
+}

@@ -1,0 +1,250 @@
+"""Saved states whose fields are others and whose checksum is right: worlds, a board, a bare machine.
+
+What belongs here: loading. What does not: how a world is saved, and bytes that are changed blindly
+(`tests.sim.mutated_worlds`).
+
+An input names fields by number, each with the bytes that stand there instead. A field of fixed size keeps it unless
+the input says otherwise. The state must be refused with a ValueError and without a change, or run on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from tests.fuzz.target import Draws, Run, Target, folder, refused
+
+Span = tuple[int, int]
+_FRESH_AFTER = 64
+"""Inputs that one world, board or machine loads: what was loaded before must not matter."""
+
+
+def spans_of(fields: Sequence[Any], state: bytes) -> list[Span]:
+    """Begin and end of each field in the bytes of a state."""
+    found, at = [], 0
+    for field in fields:
+        _, end = field.kind.decode(state, at)
+        found.append((at, end))
+        at = end
+    return found
+
+
+def patched(state: bytes, spans: Sequence[Span], draw: Draws) -> bytes:
+    """`state` with the fields that are drawn, until there are no more."""
+    others: dict[int, bytes] = {}
+    while draw.left:
+        number, head = draw.below(len(spans)), draw.below(256)
+        begin, end = spans[number]
+        data = draw.take(min(head & 0x7F, 64))
+        before = others.get(number, state[begin:end])
+        others[number] = data if head & 0x80 else (data + before[len(data) :])[: len(before)]
+    for number in sorted(others, reverse=True):
+        begin, end = spans[number]
+        state = state[:begin] + others[number] + state[end:]
+    return state
+
+
+def _loading(make: Callable[[], Any], states: Sequence[bytes], go_on: Callable[[Any], object]) -> Run:
+    """`make` gives something new to load into, `go_on` lets it run a little."""
+    count, subject = 0, make()
+    spans = [spans_of(subject.state.fields, state) for state in states]
+
+    def run(data: bytes) -> str:
+        nonlocal count, subject
+        count += 1
+        if count % _FRESH_AFTER == 0:
+            subject = make()
+        draw = Draws(data)
+        which = draw.below(len(states))
+        state = patched(states[which], spans[which], draw)
+        before = subject.state.save()
+        try:
+            subject.put(state)
+        except ValueError as error:
+            assert subject.state.save() == before, "refused with a change"
+            return refused(error)
+        go_on(subject)
+        subject.state.save()
+        return "ran"
+
+    return run
+
+
+class _World:
+    """A world with its `Flat` state; what is put is sealed anew."""
+
+    def __init__(self, profile: str) -> None:
+        from tests.sim.mutated_worlds import fresh
+
+        self.world = fresh(profile)
+        self.state = self.world.state
+
+    def put(self, state: bytes) -> None:
+        from miro_sim.world.saved import sealed
+
+        self.world.load(sealed(self.world.identity(), state))
+
+
+def _world(profile: str) -> Run:
+    from tests.sim.mutated_worlds import saved_worlds
+
+    from miro_exact.clock import CONTROL_PERIOD_TICKS
+    from miro_sim.world.saved import opened
+
+    identity = _World(profile).world.identity()
+    states = [opened(saved, identity) for saved in saved_worlds(profile)]
+
+    def go_on(subject: _World) -> None:
+        subject.world.run_to(subject.world.tick + CONTROL_PERIOD_TICKS // 4)
+
+    return _loading(lambda: _World(profile), states, go_on)
+
+
+def _sealed() -> Run:
+    """The form around the state: magic, version, what a world belongs to, checksum."""
+    import hashlib
+
+    from tests.sim.mutated_worlds import fresh, saved_worlds
+
+    world = fresh()
+    saved = saved_worlds()[1][:-32]
+    before = world.state.save()
+
+    def run(data: bytes) -> str:
+        draw = Draws(data)
+        content = bytearray(saved)
+        while draw.left:
+            place = draw.below(200) if draw.below(2) else draw.below(len(content))
+            content[place : place + draw.below(4)] = draw.take(draw.below(9))
+            if not content:
+                break
+        whole = bytes(content) + (hashlib.sha256(content).digest() if len(data) % 4 else data[:32])
+        try:
+            world.load(whole)
+        except ValueError as error:
+            assert world.state.save() == before, "refused with a change"
+            return refused(error)
+        world.state.load(before)
+        return "loaded"
+
+    return run
+
+
+class _Flat:
+    """Anything with a table of state."""
+
+    def __init__(self, root: Any) -> None:
+        from miro_exact.state import Flat
+
+        self.root = root
+        self.state = Flat(root)
+
+    def put(self, state: bytes) -> None:
+        self.state.load(state)
+
+
+def _board() -> Run:
+    from miro_robot.board import Board
+    from miro_robot.firmware import image_path
+    from miro_robot.image import load_hex
+    from miro_robot.plant import Plant
+    from miro_robot.wiring import load_wiring
+
+    image = load_hex(image_path())
+
+    def make() -> _Flat:
+        board = Board(load_wiring(), Plant(), 1, 3)
+        board.load(image)
+        board.cpu.rxd.settled_tick = 1 << 40
+        return _Flat(board)
+
+    states = []
+    subject = make()
+    for tick in (1, 30_001, 240_000, 2_000_003):
+        subject.root.run(tick)
+        states.append(subject.state.save())
+
+    def go_on(subject: _Flat) -> None:
+        subject.root.cpu.rxd.settled_tick = 1 << 60
+        subject.root.run(12 * subject.root.cpu.cycles + 24_000)
+
+    return _loading(make, states, go_on)
+
+
+def _bare() -> Run:
+    from tests.mirotwin.mutated_files import ECHO, hex_records
+
+    from miro_robot.bare.input import Piece
+    from miro_robot.bare.machine import BareMachine
+    from miro_robot.bare.pins import PinEvent
+    from miro_robot.image import load_hex
+
+    path = folder() / "state.ihx"
+    path.write_bytes(hex_records(ECHO))
+    image = load_hex(path)
+
+    def make() -> _Flat:
+        pieces = (Piece(b"abc"), Piece(b"de", b"c", 5))
+        return _Flat(
+            BareMachine(image, False, pieces, 9600, pins=(PinEvent(5000, 1, 2, 0), PinEvent(90_000, 1, 2, 1)))
+        )
+
+    states = []
+    subject = make()
+    for cycles in (1, 1_500, 5_000):
+        subject.root.run(max_cycles=cycles)
+        states.append(subject.state.save())
+
+    def go_on(subject: _Flat) -> None:
+        subject.root.run(max_cycles=subject.root.cpu.cycles + 2_000)
+
+    return _loading(make, states, go_on)
+
+
+def _seeds() -> list[bytes]:
+    return [
+        b"\x00",
+        b"\x01\x05\x00\x04\x01\x00\x00\x00",
+        b"\x02\x20\x00\x88\x01\x00\x00\x00\xff\xff\xff\xff\x30\x00\x08" + b"\xff" * 8,
+        b"\x03\x64\x00\x01\x80\x80\x01\x80\x00",
+    ]
+
+
+def _sealed_seeds() -> list[bytes]:
+    return [
+        b"\x01\x00\x00\x01M",
+        b"\x01\x08\x01\x04\x010.2.",
+        b"\x00\x00\x10\x03\x00",
+        b"\x01\x98\x08\x08" + bytes(8),
+    ]
+
+
+_NUMBERS = tuple(
+    number.to_bytes(8, "little", signed=number < 0)
+    for number in (1, -1, 1 << 31, 1 << 40, 1 << 61, (1 << 63) - 1, -(1 << 63), 4096, 4097)
+)
+_NUMBERS += (
+    b"\x00\x00\x00\x00\x00\x00\xf8\x7f",
+    b"\x00\x00\x00\x00\x00\x00\xf0\x7f",
+    b"\x9c\x75\x00\x88\x3c\xe4\x37\x7e",
+)
+
+TARGETS = {
+    "world": Target(
+        "saved worlds with other values, radio `wire`",
+        lambda: _world("wire"),
+        _seeds,
+        most_bytes=128,
+        words=_NUMBERS,
+    ),
+    "world-shared": Target(
+        "the same with radio `shared`", lambda: _world("shared"), _seeds, most_bytes=128, words=_NUMBERS
+    ),
+    "sealed": Target("the form around a saved world", _sealed, _sealed_seeds, most_bytes=64),
+    "board-state": Target(
+        "a board's state with other values", _board, _seeds, most_bytes=128, words=_NUMBERS
+    ),
+    "bare-state": Target(
+        "a bare machine's state with other values", _bare, _seeds, most_bytes=128, words=_NUMBERS
+    ),
+}

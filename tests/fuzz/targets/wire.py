@@ -1,0 +1,290 @@
+"""The wire: the window decoder by each way of feeding it, frames, the host's ear.
+
+What belongs here: characters in, events out. What does not: files of characters (`captures`).
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from array import array
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from tests.fuzz.target import Draws, Run, Target, pieces, refused
+
+_LIMITS = (1, 7, 64, 4096)
+_SPACINGS = (0, 0, 0, 480, 1200, 1920, -480, -1200, -1920, 100_000, -100_000, 1 << 40)
+"""Ticks that a character comes late."""
+
+
+def _uncompiled() -> Any:
+    """The scanner's source as a module of its own: the twin, whichever engine runs."""
+    from miro_protocol import decoder
+
+    source = Path(decoder.__file__).with_name("scan.py")
+    spec = importlib.util.spec_from_file_location("scan_from_source", source)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.Scanner
+
+
+def _feed() -> Run:
+    from miro_exact.state import snapshot
+    from miro_protocol.frames import seal
+    from miro_protocol.scan import Scanner
+    from miro_protocol.table import TELEMETRY, downlink
+
+    forms = (downlink(3), downlink(5), TELEMETRY)
+
+    def same(scanners: Sequence[Scanner], events: Sequence[list[Any]]) -> None:
+        assert events[0] == events[1] == events[2], "cut elsewhere, the events differ"
+        first, second, third = map(snapshot, scanners)
+        assert first == second == third, "cut elsewhere, the states differ"
+
+    def run(data: bytes) -> str:
+        draw = Draws(data)
+        form, limit, cut = forms[draw.below(3)], _LIMITS[draw.below(4)], 1 + draw.below(40)
+        scanners = [Scanner(form, limit) for _ in range(3)]
+        fed, given, next_tick, paused, frames = b"", b"", 0, True, 0
+        while draw.left:
+            action = draw.below(8)
+            if action == 0:
+                for scanner in scanners:
+                    scanner.gap()
+                next_tick, paused = next_tick + (0 if paused else form.character_ticks), True
+                continue
+            if action == 1:
+                ends = [scanner.flush() for scanner in scanners]
+                same(scanners, ends)
+                given += b"".join(event.data for event in ends[0])
+                assert given == fed, "the events are not the characters fed"
+                next_tick, paused = next_tick + (0 if paused else form.character_ticks), True
+                continue
+            start = None
+            if action in (2, 3):
+                start = draw.signed(8) if action == 2 else next_tick + draw.signed(2)
+            body = draw.take(form.size - 4).ljust(form.size - 4, b"\0") if action >= 6 else b""
+            chunk = seal(form, body) if body else draw.take(1 + draw.below(80))
+            if not chunk:
+                continue
+            before = snapshot(scanners[0])
+            try:
+                whole = scanners[0].feed(chunk, start)
+            except ValueError as error:
+                refused(error)
+                assert snapshot(scanners[0]) == before, "refused with a change"
+                continue
+            tick = next_tick if start is None else start
+            parts = []
+            for number, part in enumerate(pieces(chunk, cut)):
+                parts += scanners[1].feed(part, None if number else start)
+            symbols = [(byte, True, tick + at * form.character_ticks) for at, byte in enumerate(chunk)]
+            same(scanners, (whole, parts, scanners[2].feed_symbols(symbols)))
+            fed += chunk
+            given += b"".join(event.data for event in whole)
+            next_tick, paused = tick + len(chunk) * form.character_ticks, False
+            frames += sum(hasattr(event, "body") for event in whole)
+            assert len(given) + scanners[0].pending == len(fed), "characters were lost"
+        return f"{form.name}: {min(frames, 3)} frames, {min(scanners[0].rejected, 3)} rejected"
+
+    return run
+
+
+def _columns() -> Run:
+    from miro_exact.state import snapshot
+    from miro_protocol.frames import seal
+    from miro_protocol.scan import Scanner
+    from miro_protocol.table import TELEMETRY, downlink
+
+    forms = (downlink(3), downlink(5), TELEMETRY)
+    Twin = _uncompiled()
+
+    def rows(draw: Draws, form: Any) -> list[tuple[int, bool, int]]:
+        found, tick = [], 0
+        while draw.left:
+            flaw = draw.below(256)
+            if flaw == 0xFF:
+                tick = draw.signed(8)
+                continue
+            body = draw.take(form.size - 4).ljust(form.size - 4, b"\0") if flaw == 0xFE else b""
+            bad = flaw >> 4 == 0xD
+            for byte in seal(form, body) if body else draw.take(1):
+                found.append((byte, not bad, tick))
+                tick += form.character_ticks
+            tick += _SPACINGS[flaw % len(_SPACINGS)] if flaw < 0xD0 else 0
+        return found
+
+    def run(data: bytes) -> str:
+        draw = Draws(data)
+        form, limit, cut = forms[draw.below(3)], _LIMITS[draw.below(4)], 1 + draw.below(40)
+        symbols = rows(draw, form)
+        whole, parts, columns, twin = (kind(form, limit) for kind in (Scanner, Scanner, Scanner, Twin))
+        good = 0
+        for _byte, _stop_good, tick in symbols:  # up to the first that cannot be taken
+            if not -(1 << 62) <= tick <= (1 << 62) - form.character_ticks:
+                break
+            good += 1
+        data_of = bytes(byte for byte, _, _ in symbols[:good])
+        stops = bytes(not stop_good for _, stop_good, _ in symbols[:good])
+        ticks = memoryview(array("q", [tick for _, _, tick in symbols[:good]]))
+        events = whole.feed_symbols(symbols[:good])
+        found = [
+            *parts.feed_symbols(symbols[: min(cut, good)]),
+            *parts.feed_symbols(symbols[min(cut, good) : good]),
+        ]
+        assert events == found, "cut elsewhere, the events differ"
+        assert events == columns.feed_columns(data_of, stops, ticks), "by columns, the events differ"
+        assert events == twin.feed_symbols(symbols[:good]), "the twins differ"
+        states = [snapshot(one) for one in (whole, parts, columns, twin)]
+        assert states == states[:1] * 4, "the states differ"
+        frames = sum(hasattr(event, "body") for event in events)
+        if good < len(symbols):
+            for one in (whole, parts, twin):
+                try:
+                    one.feed_symbols(symbols[good : good + 1])
+                except ValueError as error:
+                    outcome = refused(error)
+                else:
+                    raise AssertionError(f"takes tick {symbols[good][2]}")
+            return outcome
+        events += whole.flush()
+        assert b"".join(event.data for event in events) == data_of, "the events are not the characters fed"
+        return f"{form.name}: {min(frames, 3)} frames, {min(whole.rejected, 3)} rejected"
+
+    return run
+
+
+def _frames() -> Run:
+    from miro_protocol.decoder import WindowDecoder
+    from miro_protocol.frames import ContentError, describe, encode, format_of, seal
+    from miro_protocol.table import TELEMETRY, downlink
+
+    def run(data: bytes) -> str:
+        draw = Draws(data)
+        n = (3, 5)[draw.below(2)]
+        form = (downlink(n), TELEMETRY)[draw.below(2)]
+        body = draw.take(form.size - 4).ljust(form.size - 4, b"\0")
+        wire = seal(form, body)
+        (event,) = WindowDecoder(form).feed(wire)
+        assert event.body == body
+        assert event.data == wire
+        try:
+            message = event.message(n)  # type: ignore[union-attr]
+        except ContentError as error:
+            return refused(error)
+        assert describe(message).isprintable()
+        assert format_of(message, n) is form
+        assert encode(message, n) == wire, "encoded again, the frame differs"
+        return type(message).__name__
+
+    return run
+
+
+def _ear() -> Run:
+    from miro_exact.state import snapshot
+    from miro_host.ear import Ear
+    from miro_protocol.frames import seal
+    from miro_protocol.table import TELEMETRY
+
+    def run(data: bytes) -> str:
+        draw = Draws(data)
+        robots, cut = (3, 5)[draw.below(2)], 1 + draw.below(64)
+        symbols, tick = [], 0
+        while draw.left:
+            kind = draw.below(4)
+            body = draw.take(TELEMETRY.size - 4).ljust(TELEMETRY.size - 4, b"\0")
+            chunk = seal(TELEMETRY, body) if kind < 3 else body
+            tick += draw.below(1 << 16) * 24
+            symbols += [(byte, True, tick + at * TELEMETRY.character_ticks) for at, byte in enumerate(chunk)]
+            tick += len(chunk) * TELEMETRY.character_ticks
+        whole, parts = Ear(robots), Ear(robots)
+        events = whole.hear(symbols)
+        found = [event for at in range(0, len(symbols), cut) for event in parts.hear(symbols[at : at + cut])]
+        assert events == found, "cut elsewhere, the events differ"
+        assert snapshot(whole) == snapshot(parts), "cut elsewhere, the states differ"
+        return (
+            f"{sum(one is not None for one in whole.heard)} of {robots} heard, {min(len(events), 4)} events"
+        )
+
+    return run
+
+
+def _frame_seeds() -> list[bytes]:
+    from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
+    from miro_protocol.whitening import whiten
+
+    sent = [
+        (TeamFrame(0, 3, ((100, -100),) * 3), 3),
+        (TeamFrame(3, 60, ((-32767, 32767),) * 5), 5),
+        (ServiceFrame.filter(5, 1, 100, 20, 300, 4), 3),
+        (ServiceFrame.acceleration(6, 2, 5973), 5),
+        (ServiceFrame.ping(7, 0), 3),
+        (TelemetryFrame(9, 2, 0, 0x80, 0x84, 1000, 65000, 9, 1), 3),
+    ]
+    found = []
+    for message, n in sent:
+        up = isinstance(message, TelemetryFrame)
+        wire = encode(message, n)
+        found.append(bytes([n == 5, up]) + whiten(wire[8 - up :])[:-2])
+    return found
+
+
+def _feed_seeds() -> list[bytes]:
+    bodies = [seed[2:] for seed in _frame_seeds()]
+    program = [b"\x00\x03\x05"]
+    for body in bodies[:1] + bodies[2:3] * 2:
+        program += [
+            b"\x06" + body[:13].ljust(13, b"\0"),
+            b"\x04\x08noise.+U",
+            b"\x00",
+            b"\x03\x10\x00\x04abcd",
+        ]
+    return [
+        b"".join(program) + b"\x01",
+        b"\x01\x01\x02\x07" + bodies[1] + b"\x02" + b"\xff" * 8 + b"ab\x01",
+        b"\x02\x03\x07\x06" + bodies[5] + b"\x05\x12" + b"\x55\x55\x55\x55\xff\x2d\xd4" + b"x" * 12 + b"\x01",
+    ]
+
+
+def _column_seeds() -> list[bytes]:
+    bodies = [seed[2:] for seed in _frame_seeds()]
+    return [
+        b"\x00\x03\x05\xfe" + bodies[0] + b"\x00U\x00U\xd1\xff\x02-\x03\xd4\xfe" + bodies[2],
+        b"\x01\x02\x09\xfe" + bodies[1] + b"\x09a\x0ab\x0bc\xff" + b"\xff" * 7 + b"\x3f\x00a\x00b",
+        b"\x02\x00\x01\xfe" + bodies[5] + b"\x00U\x01U\x00\xff\x00-\x00\xd4" + b"\x00x" * 12,
+    ]
+
+
+def _ear_seeds() -> list[bytes]:
+    body = _frame_seeds()[5][2:]
+    return [
+        b"\x00\x05" + b"".join(bytes([kind]) + body + b"\x10\x20" for kind in (0, 3, 1)),
+        b"\x01\x00\x00" + body,
+    ]
+
+
+_SEEN = "python"  # the decoder is a hot module: coverage sees the source
+
+TARGETS = {
+    "feed": Target(
+        "the decoder: bytes cut anywhere, with ticks, gaps and flushes",
+        _feed,
+        _feed_seeds,
+        _SEEN,
+        most_bytes=160,
+    ),
+    "columns": Target(
+        "the decoder: symbols, by row and by column, both twins",
+        _columns,
+        _column_seeds,
+        _SEEN,
+        most_bytes=160,
+    ),
+    "frames": Target(
+        "bodies of frames, sealed: what they say, and back", _frames, _frame_seeds, _SEEN, most_bytes=32
+    ),
+    "ear": Target("telemetry: the host's ear, cut anywhere", _ear, _ear_seeds, _SEEN, most_bytes=256),
+}
