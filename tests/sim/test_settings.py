@@ -142,7 +142,9 @@ def test_a_setting_that_cannot_be_is_refused_and_named(setting: str, said: str) 
     assert len(message) < 1500
 
 
-@pytest.mark.parametrize("setting", ["na\udca9me=x", "name=\udca9", "expect.\udca9=true", "network.radio={a='\udcff'}"])
+@pytest.mark.parametrize(
+    "setting", ["na\udca9me=x", "name=\udca9", "expect.\udca9=true", "network.radio={a='\udcff'}"]
+)
 def test_bytes_of_a_command_line_that_are_no_text_are_refused(setting: str) -> None:
     assert "is not UTF-8 text" in refusal(setting)
 

@@ -263,44 +263,6 @@ def test_a_damaged_type_is_a_type_or_none(chain: str, size: int, signed: bool) -
     assert isinstance(type_of(chain, size, signed), CType | None)
 
 
-_POINT = "T:Fmain$point[({0}S:S$x$0_0$0({4}SF:S),Z,0,0)]"
-
-
-@pytest.mark.parametrize(
-    "damaged",
-    [
-        ["S:G$x$0_0$0({3}SF:S),E,0,0"],  # a float has 4 bytes
-        ["S:G$x$0_0$0({1}SB0$0:S),E,0,0"],  # no bit
-        ["S:G$x$0_0$0({1}SB5$4:S),E,0,0"],  # bits behind the end
-        ["S:G$x$0_0$0({0}SI:S),E,0,0"],
-        ["S:G$x$0_0$0({0}DA999999d,SC:S),E,0,0"],
-        ["S:G$x$0_0$0({0}" + "DA999d," * 4 + "SC:S),E,0,0"],
-        ["S:G$x$0_0$0({70000}DA70000d,SC:S),E,0,0"],
-        ["S:G$x$0_0$0({1}" + "DA1d," * 2000 + "SC:S),E,0,0"],
-        ["T:Fmain$self[({0}S:S$x$0_0$0({1}STself:S),Z,0,0)]", "S:G$x$0_0$0({1}STself:S),E,0,0"],
-        [_POINT, "S:G$x$0_0$0({3}STpoint:S),E,0,0"],  # its member ends behind it
-        [
-            *(
-                f"T:Fmain$p{at}[" + f"({{0}}S:S$y$0_0$0({{1}}STp{at + 1}:S),Z,0,0)" * 9 + "]"
-                for at in range(8)
-            ),
-            "S:G$x$0_0$0({1}STp0:S),E,0,0",
-        ],  # 9 to the power of 8 numbers, all in one place
-    ],
-)
-def test_a_variable_whose_type_cannot_be_is_left_out_at_once(damaged: list[str]) -> None:
-    good = [_POINT, "S:G$good$0_0$0({8}DA2d,STpoint:S),E,0,0", "L:G$good$0_0$0:10"]
-    text = "\n".join(["M:main", *damaged, "L:G$x$0_0$0:8", *good])
-    assert list(parse_variables(text).by_name) == ["good"]
-
-
-def test_a_variable_beyond_any_memory_is_left_out() -> None:
-    text = "S:G$x$0_0$0({1}SC:U),E,0,0\nL:G$x$0_0$0:{}\n"
-    assert list(parse_variables(text.replace("{}", "FFFF")).by_name) == ["x"]
-    for address in ("10000", "7FFFFFFF", "FFFFFFFF"):
-        assert parse_variables(text.replace("{}", address)).by_name == {}
-
-
 @given(st.integers(0, 4000), st.integers(0, 255))
 def test_a_damaged_debug_file_is_read_as_far_as_it_goes(at: int, byte: int) -> None:
     text = image_path().with_suffix(".cdb").read_text()[:5000]

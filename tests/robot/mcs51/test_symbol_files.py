@@ -264,17 +264,6 @@ def test_symbols_of_another_image_leave_places_without_a_name_and_say_why(tmp_pa
     assert load_hex(ROBOT).symbols.problem is None
 
 
-@pytest.mark.parametrize(("address", "found"), [("0000FFFF", True), ("00010000", False), ("FFFFFFFE", False)])
-def test_a_name_or_a_line_beyond_any_memory_is_no_record(address, found):
-    page = "CSEG  00000000  0000001A =  26. bytes (REL,CON,CODE)\n"
-    assert bool(parse_map(f"{page}C:   {address}  _far   named\n").names) is found
-    short = address.lstrip("0")
-    cdb = parse_cdb(
-        f"S:G$far$0_0$0({{2}}DF,SV:S),C,0,0\nL:G$far$0$0:{short}\nL:XG$far$0$0:{short}\nL:C$a.c$7$1$1:{short}\n"
-    )
-    assert [bool(part) for part in (cdb.names, cdb.begins, cdb.ends, cdb.lines)] == [found] * 4
-
-
 def test_files_with_a_content_that_was_read_before_are_not_parsed_again(tmp_path):
     load_hex(ROBOT).symbols.find("main")
     parsed = [parse.cache_info().misses for parse in (parse_map, parse_cdb)]
