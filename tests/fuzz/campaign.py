@@ -92,13 +92,14 @@ class Engine(NamedTuple):
 
 def prepared(plain: bool, sanitize: bool) -> Engine:
     """What a campaign runs with. Raises MissingError for tools that are asked for and are not there."""
-    atheris = not plain and importlib.util.find_spec("atheris") is not None
+    installed = importlib.util.find_spec("atheris") is not None
+    atheris = installed and not plain
     about = "guided by Atheris" if atheris else "changes by chance"
     if not plain and not atheris:
         about += " (for guidance: pip install -r tests/fuzz/requirements.txt)"
     if not sanitize:
         return Engine(atheris, {}, about)
-    build = sanitized.built(WORK / "sanitized", atheris)
+    build = sanitized.built(WORK / "sanitized", installed)
     return Engine(atheris, build.environment, f"{about}; {build.about}", "compiled")
 
 
