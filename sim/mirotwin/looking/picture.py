@@ -10,7 +10,9 @@ that no red, green and blue can show, by what was cut off.
 from __future__ import annotations
 
 import io
+import struct
 import warnings
+import zlib
 from pathlib import Path
 
 from PIL import Image, UnidentifiedImageError
@@ -20,6 +22,8 @@ from miro_host.eye.camera_parameters import HEIGHT, WIDTH
 from miro_host.eye.frame import Frame
 
 SUFFIXES = (".png", ".ppm")
+_DAMAGED = (OSError, ValueError, SyntaxError, LookupError, TypeError, ArithmeticError, struct.error, zlib.error)
+"""What Pillow raises for pictures that are damaged: an `iCCP` chunk that is empty is an IndexError."""
 _ROWS = 12
 """Rows that a camera is asked for at once."""
 
@@ -77,13 +81,13 @@ def parse(data: bytes, origin: str, place: str = "") -> Picture:
     """The same from the file's bytes; `origin` and `place` name them in errors."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a size that is refused below
+            warnings.simplefilter("ignore")  # of a size that is refused below, of what is not looked at
             image = Image.open(io.BytesIO(data), formats=("PNG", "PPM"))
-        if image.size != (WIDTH, HEIGHT):
-            what = f"{image.size[0]} x {image.size[1]} pixels"
-            remedy = f"give pictures of {WIDTH} x {HEIGHT} (of a run: --plain-frames)"
-            raise BadInput(origin, place, what, remedy)
-        return Picture(image.convert("RGB").convert("YCbCr").tobytes())
+            if image.size != (WIDTH, HEIGHT):
+                what = f"{image.size[0]} x {image.size[1]} pixels"
+                remedy = f"give pictures of {WIDTH} x {HEIGHT} (of a run: --plain-frames)"
+                raise BadInput(origin, place, what, remedy)
+            return Picture(image.convert("RGB").convert("YCbCr").tobytes())
     except UnidentifiedImageError:
         raise BadInput(origin, place, "is no PNG or PPM picture", "convert it to PNG") from None
     except Image.DecompressionBombError:
@@ -91,6 +95,6 @@ def parse(data: bytes, origin: str, place: str = "") -> Picture:
         raise BadInput(origin, place, what, f"give pictures of {WIDTH} x {HEIGHT}") from None
     except BadInput:
         raise
-    except (OSError, ValueError, SyntaxError) as error:
+    except _DAMAGED as error:
         what = f"is damaged: {error}"
         raise BadInput(origin, place, what, "write the picture again") from None

@@ -6,6 +6,7 @@ What belongs here: files of `track` and `calibrate`. What does not: pictures ins
 from __future__ import annotations
 
 import math
+import warnings
 import zlib
 
 from tests.fuzz.target import Draws, Run, Target, refused
@@ -32,10 +33,12 @@ def _picture() -> Run:
     from mirotwin.looking.picture import Picture, parse, png
 
     def read(data: bytes) -> str:
-        try:
-            found = parse(data, _ORIGIN)
-        except BadInput as error:
-            return refused(error)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            try:
+                found = parse(data, _ORIGIN)
+            except BadInput as error:
+                return refused(error)
         assert len(found.window(0, 0, _WIDTH, _HEIGHT)) == 3 * _WIDTH * _HEIGHT
         assert isinstance(parse(png(found.image()), "again"), Picture)
         return "taken"
