@@ -34,7 +34,8 @@ _COPIED = (
 _PACKAGES = ("exact", "protocol", "robot_fw", "host", "sim")
 _SOURCES = (".py", ".pxd", ".pyx")
 _CHECKS = "address,undefined"
-_FLAGS = "-fno-omit-frame-pointer -g1"
+_FLAGS = "-fno-sanitize=shift-base -fno-omit-frame-pointer -g1"
+"""A negative number shifted to the left is what Python has it be, with GCC and clang alike, though C does not say so."""
 
 
 class MissingError(Exception):
@@ -73,7 +74,7 @@ def built(folder: Path, guided: bool) -> Build:
 
 
 def _hash() -> str:
-    found = hashlib.sha256()
+    found = hashlib.sha256(_FLAGS.encode())
     for package in _PACKAGES:
         for path in sorted((ROOT / package).rglob("*")):
             if path.suffix in _SOURCES:
@@ -97,6 +98,11 @@ def _build(folder: Path, compiler: str, guided: bool) -> None:
     flags = {"CC": compiler, "LDSHARED": f"{compiler} -shared", "CFLAGS": f"-fsanitize={checks} {_FLAGS}"}
     if not guided:
         flags["LDFLAGS"] = f"-fsanitize={_CHECKS}" + (" -shared-libsan" if compiler == "clang" else "")
+    written = folder / "flags"
+    if not written.exists() or written.read_text() != flags["CFLAGS"]:
+        for path in [*folder.rglob("*.so"), *folder.rglob("*.o")]:
+            path.unlink()
+    written.write_text(flags["CFLAGS"])
     command = [sys.executable, "setup.py", "-q", "build_ext", "--inplace"]
     made = children.run(command, cwd=folder, env={**os.environ, **flags}, capture_output=True, text=True)
     if made.returncode:
