@@ -24,7 +24,7 @@ from tests.fuzz.sanitized import MissingError as MissingError
 
 ROOT = Path(__file__).parents[2]
 WORK = ROOT / "build" / "fuzzing"
-HANGS_S = 20
+HANGS_S, HANGS_SANITIZED_S = 20, 200
 MEMORY_MB = 3000
 _LIBRARY = ("exact", "protocol", "robot_fw", "host", "sim")
 _RATE = re.compile(r"stat::average_exec_per_sec:\s+([0-9]+)")
@@ -74,7 +74,8 @@ class Engine(NamedTuple):
         module = "guided" if self.guided else "chance"
         command = [sys.executable, "-m", f"tests.fuzz.{module}", name, engine]
         if self.guided:
-            command += _words(name, limit_s, seed, findings)
+            hangs_s = HANGS_SANITIZED_S if self.fixed else HANGS_S
+            command += _words(name, limit_s, seed, findings, hangs_s)
             command += [str(found), str(seeds)]
         else:
             command += [str(limit_s), str(seed), str(findings), str(seeds)]
@@ -120,12 +121,12 @@ def _write_seeds(name: str, folder: Path) -> None:
         (folder / corpus.file_name(data)).write_bytes(data)
 
 
-def _words(name: str, limit_s: float, seed: int, findings: Path) -> list[str]:
+def _words(name: str, limit_s: float, seed: int, findings: Path, hangs_s: int) -> list[str]:
     target = TARGETS[name]
     words = [
         f"-max_total_time={max(1, int(limit_s))}",
         f"-max_len={target.most_bytes}",
-        f"-timeout={HANGS_S}",
+        f"-timeout={hangs_s}",
     ]
     words += [
         f"-rss_limit_mb={MEMORY_MB}",
@@ -153,9 +154,9 @@ def _result(child: subprocess.CompletedProcess[str], limit_s: float, findings: P
     per_s = float(rate[1]) if rate else 0.0
     if child.returncode == 0:
         return Result(executions, per_s, reached)
-    written = _WRITTEN.search(text)
+    written = _WRITTEN.findall(text)
     errors = [found.strip() for found in _ERROR.findall(text)]
-    path = Path(written[1]) if written else findings / "last"
+    path = Path(written[-1]) if written else findings / "last"
     path.with_name(f"{path.name}.txt").write_text(text)
     return Result(executions, per_s, reached, path, errors[0] if errors else text.strip()[-200:])
 

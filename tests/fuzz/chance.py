@@ -12,7 +12,7 @@ import sys
 import traceback
 from pathlib import Path
 
-HANGS_S = 20
+HANGS_S = 200  # the sanitizers may be there
 
 
 def main() -> int:

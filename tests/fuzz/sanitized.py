@@ -35,7 +35,7 @@ _PACKAGES = ("exact", "protocol", "robot_fw", "host", "sim")
 _SOURCES = (".py", ".pxd", ".pyx")
 _CHECKS = "address,undefined"
 _FLAGS = "-fno-sanitize=shift-base -fno-omit-frame-pointer -g1"
-"""A negative number shifted to the left is what Python has it be, with GCC and clang alike, though C does not say so."""
+"""A negative number shifted to the left is what Python makes of it, with GCC and clang alike; C does not say so."""
 
 
 class MissingError(Exception):
