@@ -22,7 +22,16 @@ from miro_host.eye.camera_parameters import HEIGHT, WIDTH
 from miro_host.eye.frame import Frame
 
 SUFFIXES = (".png", ".ppm")
-_DAMAGED = (OSError, ValueError, SyntaxError, LookupError, TypeError, ArithmeticError, struct.error, zlib.error)
+_DAMAGED = (
+    OSError,
+    ValueError,
+    SyntaxError,
+    LookupError,
+    TypeError,
+    ArithmeticError,
+    struct.error,
+    zlib.error,
+)
 """What Pillow raises for pictures that are damaged: an `iCCP` chunk that is empty is an IndexError."""
 _ROWS = 12
 """Rows that a camera is asked for at once."""
