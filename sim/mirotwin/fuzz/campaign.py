@@ -92,6 +92,7 @@ class Campaign:
             for data in data_of:
                 self._seen.add(data)
                 inputs.append(data)
+        self._looked = LOOKED - len(self._queue)  # these are quick, and --covering may need no more
 
     # ---- the loop ------------------------------------------------------------------------------------------
 
