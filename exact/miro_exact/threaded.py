@@ -10,10 +10,11 @@ import re
 
 INTERPRETER_ARMS = 64  # a loop around a choice of at least so many executes a program
 SWITCH_OF_A_LOOP = re.compile(
-    r"^(?P<indent> +)switch \((?P<value>\w+)\) {\n(?P<arms>.*?)(?P=indent)  default: break;\n(?P=indent)}\n"
+    r"^(?P<indent> +)switch \((?P<value>\w+)\) {\n(?P<arms>(?:(?!}).*\n)*?)(?P=indent)  default: break;\n(?P=indent)}\n"
     r"(?P=indent)(?P<again>__pyx_L\w+):;\n",
-    re.M | re.S,
+    re.M,
 )
+"""Within one function: none of its lines begins with a brace."""
 
 
 def threaded(c: str, mark: bytes) -> str:

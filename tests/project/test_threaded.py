@@ -67,6 +67,11 @@ def test_a_loop_over_many_instructions_is_threaded_and_does_the_same(tmp_path):
     assert hot_modules.dispatch_replicated([tmp_path / "plain", tmp_path / "threaded"])
 
 
+def test_a_choice_in_a_function_before_does_not_hide_the_loop():
+    other = "int other(int a) {\n    switch (a) {\n      case 1:\n      return 2;\n    }\n    return a;\n}\n"
+    assert threaded(other + program(range(100)), hot_modules.DISPATCH_MARK).count("goto *arm_of[") == 100
+
+
 @pytest.mark.parametrize(
     "text",
     [
