@@ -131,7 +131,7 @@ _FAILSAFE = (
         "A number that is nine ahead is fresh within 150 ms.",
         "a number that is just nine ahead, soon",
     ),
-    _of_planted("keeps its memory over a reset", "acts_within_ms", "a reset, then an old number"),
+    _of_planted("keeps its memory over a reset", "moves_only_when_fresh", "a reset, then an old number"),
 )
 _WHEELS = (
     ForFuzzing(
