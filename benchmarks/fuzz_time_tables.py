@@ -63,6 +63,8 @@ def _cell(trials: Sequence[Trial]) -> str:
 
 
 def _number(one: Trial) -> str:
+    if one.refused:
+        return "not fuzzed"
     if one.found_s is None:
         return f">{one.wanted.limit_s:g}"
     return f"{one.found_s:.1f}" + ("" if one.named or one.wanted.engine == "link" else "*")

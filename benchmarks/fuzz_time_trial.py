@@ -24,6 +24,7 @@ from benchmarks.processor_time import of_descendants
 from tests.mutants.build import CACHE, IMAGE
 from tests.mutants.heard import Input, verdicts
 
+from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from mirotwin.fuzz.afl.inputs import message_tokens, write_dictionary, write_seeds
@@ -60,7 +61,9 @@ class Wanted(msgspec.Struct, frozen=True):
 
 
 class Trial(msgspec.Struct, frozen=True):
-    """What came of it. `found_s`: None where nothing was found; `checks`: those that failed; `seeded`: by a seed."""
+    """What came of it. `found_s`: None where nothing was found; `checks`: those that failed; `seeded`: by a seed.
+    `refused`: why no target could be made, because the firmware does not come up; that counts as found.
+    """
 
     wanted: Wanted
     found_s: float | None
@@ -69,6 +72,7 @@ class Trial(msgspec.Struct, frozen=True):
     seeded: bool = False
     executions: int = 0
     unconfirmed: int = 0
+    refused: str = ""
 
     @property
     def named(self) -> bool:
@@ -82,6 +86,8 @@ class Trial(msgspec.Struct, frozen=True):
 
     def __str__(self) -> str:
         when = f"{self.found_s:.1f} s" if self.found_s is not None else f"not in {self.wanted.limit_s:.0f} s"
+        if self.refused:
+            return f"{self.wanted.key}: refused: {self.refused}"
         how = f" ({', '.join(self.checks)}{', by a seed' if self.seeded else ''})" if self.checks else ""
         return f"{self.wanted.key}: {when}{how}; {self.executions} executions, {self.unconfirmed} unconfirmed"
 
@@ -112,7 +118,10 @@ def _failed(image: Image, heard: Input) -> list[str]:
 
 def _of_engine(wanted: Wanted, folder: Path) -> Trial:
     spec = TargetSpec(image=wanted.path, robots=ROBOTS, slot=SLOT)
-    target = spec.make()
+    try:
+        target = spec.make()
+    except BadInput as error:
+        return Trial(wanted, 0.0, 0.0, refused=error.what)
     given = seeds(spec.input, ROBOTS, SLOT)
     write_seeds(folder / "seeds", {f"seed-{number}": data for number, data in enumerate(given)})
     write_dictionary(folder / "dictionary", message_tokens(ROBOTS))

@@ -48,6 +48,12 @@ def test_a_find_answers_for_any_limit_and_none_for_shorter_ones_of_the_same_imag
     assert not found.answers(msgspec.structs.replace(none.wanted, image="other"))
 
 
+def test_firmware_that_does_not_come_up_is_told_with_what_was_said_of_it() -> None:
+    wanted = Wanted("planted", "pushes for ever", "", "afl", 1, 15.0, "folder")
+    table = render([Trial(wanted, 0.0, 0.0, refused="it comes up with a fault")])
+    assert "| pushes for ever | not fuzzed | it comes up with a fault |" in table
+
+
 def test_another_part_is_put_between_the_marks() -> None:
     assert replaced(f"a\n{BEGIN}old\n{END}b\n", "new\n") == f"a\n{BEGIN}new\n{END}b\n"
 
