@@ -49,6 +49,8 @@ cdef class Referee(Judge):
     cdef void _pass(self, long long tick) noexcept
     @cython.locals(latest='long long')
     cdef void _pass_silence(self, int what, long long tick) noexcept
+    @cython.locals(since='long long')
+    cdef bint _is_over(self, int what, long long tick) noexcept
     cdef bint _fulfilled(self, int what, int side) noexcept
     cdef int _received(self, long long tick, int good_stop, int value) except -1
     @cython.locals(hdr=int, kind=int, seq=int, fresh=bint, team=bint)

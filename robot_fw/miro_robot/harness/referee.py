@@ -231,6 +231,11 @@ class Referee(Judge):
                 self._found(_STOPS + what, latest)
             self.silence_tick[what] = -1
 
+    def _is_over(self, what: int, tick: int) -> bool:
+        """Whether a silence's time is over, though it is not judged: characters then put nothing off."""
+        since = self.silence_tick[what]
+        return since >= 0 and tick > since + self.silences[what] + _TOLERANCE
+
     def _fulfilled(self, what: int, side: int) -> bool:
         """Whether a wheel is as it has to be in silence: told to stop (0), off (1)."""
         if what:
@@ -240,7 +245,8 @@ class Referee(Judge):
     # ---- what is heard -------------------------------------------------------------------------------------
 
     def _received(self, tick: int, good_stop: int, value: int) -> None:
-        self.heard_tick = tick
+        if not (self._is_over(0, tick) or self._is_over(1, tick)):
+            self.heard_tick = tick
         if self.window.take(value, good_stop == 0, tick - _TO_RI):
             self._frame(tick - _TO_RI)
 

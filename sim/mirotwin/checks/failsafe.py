@@ -92,7 +92,8 @@ class SilenceJudge(Judge[SilenceCheck]):
     def event(self, event: Event) -> None:
         self.until(event.tick)
         if event.what == "received":
-            self.heard_tick = event.tick
+            if self.fresh_tick is None or event.tick <= self.fresh_tick + self.latest_ticks:
+                self.heard_tick = event.tick  # what comes when the time is over puts nothing off
         elif event.what == "frame":
             if event.value and event.frame is not None:
                 self.fresh_tick = event.frame.last_tick + HOST_CHARACTER_TICKS
