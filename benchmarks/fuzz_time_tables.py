@@ -81,13 +81,8 @@ def _planted(trials: Sequence[Trial]) -> str:
     for name in PLANTED:
         if name in by_name:
             one = by_name[name]
-            rows.append(
-                (
-                    name,
-                    _number(one) + (" (a seed)" if one.seeded else ""),
-                    ", ".join(f"`{check}`" for check in one.checks),
-                )
-            )
+            failed = ", ".join(f"`{check}`" for check in one.checks)
+            rows.append((name, _number(one) + (" (a seed)" if one.seeded else ""), one.refused or failed))
     limit_s = trials[0].wanted.limit_s
     found = len([one for one in trials if one.found_s is not None])
     head = f"Of {len(trials)} planted mistakes AFL++ found {found}, one seed, within {limit_s:g} s each.\n\n"
