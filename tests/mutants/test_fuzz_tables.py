@@ -54,6 +54,11 @@ def test_firmware_that_does_not_come_up_is_told_with_what_was_said_of_it() -> No
     assert "| pushes for ever | not fuzzed | it comes up with a fault |" in table
 
 
+def test_only_the_first_seed_is_counted() -> None:
+    table = render([trial("afl", 1, None), trial("afl", 2, 3.0), trial("afl", 3, 4.0)])
+    assert "| found with the first seed |  |  | 0 of 1 |" in table
+
+
 def test_another_part_is_put_between_the_marks() -> None:
     assert replaced(f"a\n{BEGIN}old\n{END}b\n", "new\n") == f"a\n{BEGIN}new\n{END}b\n"
 
