@@ -30,6 +30,7 @@ cdef class Harness:
     cdef int _set_reset(self, int level) except -1
     @cython.locals(stopped=int)
     cdef int _run(self, long long until) except -1
+    @cython.locals(latest='long long')
     cdef int _settle(self, long long tick) except -1
     cdef bint _falls_asleep(self, long long until) except -1
     cdef bint _faulted(self) noexcept

@@ -173,7 +173,8 @@ class Harness:
             return _STOPPED if self._run(tick + _AWAKE_TICKS) else _DONE
         if not self._falls_asleep(tick + _SETTLE):
             return _STOPPED if self.judge.code or self._faulted() else _AWAKE
-        while self.judge.waits():
+        latest = self.now_tick + 2 * _SETTLE
+        while self.now_tick < latest and self.judge.waits():
             if self._run(self.now_tick + _WAIT):
                 return _STOPPED
         return _DONE

@@ -7,6 +7,8 @@ from miro_robot.harness.judge cimport Judge
 
 cdef int _NO_FAULT, _LM629, _MAIN_LOOP, _STACK, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS
 cdef long long _ACTING, _ANSWER, _TOLERANCE, _TESTING, _NEVER, _CHARACTER, _TO_RI, _TO_TI
+cdef long long _EDGE, _FRESH_AGAIN
+cdef int _FRESH_STEPS
 cdef int _SATURATION, _TEAM, _ASK, _SEQS, _SLOT_MASK, _ANSWER_SIZE
 cdef int _RECEIVED, _SENT, _COMMAND, _FAULT
 cdef int _RESET, _STT, _LTRJ, _COMMAND_ERROR
@@ -21,6 +23,9 @@ cdef class Referee(Judge):
     cdef Scanner window, telemetry
     cdef object freshness
     cdef long long read
+    cdef int decided
+    cdef long long up_tick
+    cdef int fresh_seq
     cdef readonly int pc
     cdef readonly int accepted
     cdef int control[2]
@@ -55,6 +60,8 @@ cdef class Referee(Judge):
     cdef int _received(self, long long tick, int good_stop, int value) except -1
     @cython.locals(hdr=int, kind=int, seq=int, fresh=bint, team=bint)
     cdef int _frame(self, long long tick) except -1
+    @cython.locals(since='long long', step=int)
+    cdef void _ask_whether_decided(self, int seq, long long tick) noexcept
     @cython.locals(side=int)
     cdef bint _stops_already(self) noexcept
     @cython.locals(place=int, side=int, word=int)

@@ -22,6 +22,8 @@ from miro_protocol.scan import Scanner
 from miro_protocol.table import (
     FAILSAFE_OFF_TICKS,
     FAILSAFE_STOP_TICKS,
+    FRESH_AGAIN_TICKS,
+    FRESH_STEPS,
     ROBOT_BIT_TICKS,
     SEQ_MODULUS,
     SLOT_MASK,
@@ -56,11 +58,13 @@ ACTING_TICKS = 10 * TICKS_PER_MS
 ANSWER_TICKS = 30 * TICKS_PER_MS
 TOLERANCE_TICKS = TICKS_PER_MS // 2
 TESTING_TICKS = 2 * TICKS_PER_MS
+EDGE_TICKS = TICKS_PER_MS // 5
 
 _NO_FAULT, _LM629, _MAIN_LOOP, _STACK, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS = range(
     1, 12
 )
 _ACTING, _ANSWER, _TOLERANCE, _TESTING = ACTING_TICKS, ANSWER_TICKS, TOLERANCE_TICKS, TESTING_TICKS
+_EDGE, _FRESH_AGAIN, _FRESH_STEPS = EDGE_TICKS, FRESH_AGAIN_TICKS, FRESH_STEPS
 _SILENCES = (FAILSAFE_STOP_TICKS, FAILSAFE_OFF_TICKS)
 _NEVER = NEVER_TICK
 _CHARACTER = HOST_CHARACTER_TICKS
@@ -88,17 +92,16 @@ class Referee(Judge):
         *Judge.NOT_STATE,
         *("board", "slot", "robots", "window", "telemetry", "freshness", "read", "pc", "accepted"),
         *(
-            "control",
-            "velocity",
-            "order",
-            "speed",
+            "decided",
+            "up_tick",
             "fresh_tick",
+            "fresh_seq",
             "heard_tick",
             "told_tick",
             "wanted_tick",
             "wanted",
         ),
-        *("pairs", "pair_ticks", "pair_end", "silence_tick", "in_silence", "silences"),
+        *("control", "velocity", "order", "speed", "pairs", "pair_end", "silence_tick", "silences"),
         *("asked_tick", "asked_seq", "allowed", "before_seq", "payload", "log"),
     )
 
@@ -115,6 +118,9 @@ class Referee(Judge):
         self.freshness = Freshness()
         self.silences = list(_SILENCES)
         self.read = 0  # serial number of the next event
+        self.decided = 1  # 0: it cannot be said any more what the robot must do
+        self.up_tick = -1  # until when firmware that was reset may take to come up
+        self.fresh_seq = 0
         self.pc = 0
         self.accepted = 0
         # Per side: what LTRJ loaded, and the order in force.
@@ -142,6 +148,8 @@ class Referee(Judge):
         self.accepted = 0
         self.read = self.log.end
         self.freshness.accepted = 0
+        self.decided = 1
+        self.up_tick = -1
         self._forget()
         self.pair_end = 0
 
@@ -166,11 +174,14 @@ class Referee(Judge):
             self.silence_tick[side] = -1
 
     def restarted(self, tick: int) -> None:
+        """Pins that all went high at once may have told an LM629 nonsense, until firmware has reset it."""
         self.look(tick)
         self._forget()
+        self.decided = 1
+        self.up_tick = tick + _ACTING
 
     def waits(self) -> bool:
-        return self.asked_tick != _NEVER or self.wanted_tick != _NEVER
+        return self.decided != 0 and (self.asked_tick != _NEVER or self.wanted_tick != _NEVER)
 
     def look(self, tick: int) -> None:
         """Judges what has happened before `tick`."""
@@ -195,11 +206,11 @@ class Referee(Judge):
         if self.code == 0:
             self._pass(tick)
             word = self.board.left.signals.word | self.board.right.signals.word
-            if word & _COMMAND_ERROR:
+            if word & _COMMAND_ERROR and tick > self.up_tick:
                 self._found(_LM629, tick)
 
     def _found(self, code: int, tick: int) -> None:
-        if self.code == 0:
+        if self.code == 0 and (self.decided or code == _NO_FAULT):
             self.code = code
             self.tick = tick
 
@@ -255,11 +266,13 @@ class Referee(Judge):
         hdr = self.window.body_at(0)
         kind = hdr >> 6
         seq = hdr % _SEQS
+        self._ask_whether_decided(seq, tick)
         fresh = self.freshness.judge(seq, tick)
         team = kind in (_TEAM, _ASK) and self._read_pair()
         if fresh:
             self.accepted += 1
             self.fresh_tick = tick
+            self.fresh_seq = seq
             self.silence_tick[0] = tick + _CHARACTER
             self.silence_tick[1] = tick + _CHARACTER
             if team:
@@ -270,6 +283,14 @@ class Referee(Judge):
                 self.before_seq = self.asked_seq
                 self.asked_seq = seq
                 self.allowed = _ANSWER_SIZE
+
+    def _ask_whether_decided(self, seq: int, tick: int) -> None:
+        """Firmware tells 150 ms to within 0.1 ms: what it makes of a frame right at that edge, nobody can say."""
+        since = tick - self.fresh_tick - _FRESH_AGAIN
+        if self.fresh_tick >= 0 and -_EDGE <= since <= _EDGE:
+            step = (seq - self.fresh_seq) % _SEQS
+            if step == 0 or step > _FRESH_STEPS:
+                self.decided = 0
 
     def _stops_already(self) -> bool:
         """Whether velocity 0 is wanted, and both wheels are told so with their loops closed."""

@@ -156,6 +156,19 @@ def test_wheels_that_stop_already_need_no_new_order_for_velocity_0(shipped):
     assert not checks.failures
 
 
+def test_a_frame_right_at_150_ms_is_not_judged():
+    target = target_for(load_hex(image_path()), "bytes")
+    first = bytes.fromhex("2dd43ccd1cb6eca93208eb56d3157184bc")
+    second = bytes.fromhex("2dd4fde6a29d52828c23557d6d3ecf5f53")
+    assert [target.run(first + bytes(between) + second) for between in (126, 127, 128)] == [0, 0, 0]
+
+
+def test_a_reset_in_the_middle_of_a_command_is_not_judged(shipped):
+    for waited in range(8):
+        data = b"\x00\x10\x00\x10\x00" + bytes([0x0A, waited]) + b"\x09\x00\x55" * waited + b"\x0f"
+        assert shipped.run(data) == 0, shipped.finding
+
+
 def stop_after_ms(target, waited):
     """When the wheels are told to stop, after the end of a fresh frame, while a frame with a bad CRC comes in then."""
     begun = target.board.log.end
