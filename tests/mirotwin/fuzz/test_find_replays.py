@@ -1,0 +1,73 @@
+"""A find is left as a case: its replay gives the same verdict on both engines and whatever the processor offers."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+from tests import children
+from tests.mutants.build import build
+from tests.mutants.draw import source_files
+from tests.mutants.planted import PLANTED
+from tests.mutants.sdcc import needs_sdcc
+
+from miro_robot.image import load_hex
+from mirotwin.fuzz.confirm import Place, WorldCourt
+from mirotwin.fuzz.target import target_for
+
+MIROTWIN = Path(sys.executable).with_name("mirotwin")
+FINDS = {
+    "takes frames with a bad CRC": (b"\x0c\x09\x01\x00\x10\x00\x20\x00", "accepts_only_sent", 1),
+    "lets go of a chip in the middle of a command": (b"\x05\x00\x01" + bytes(10), "no_fault", 3),
+}
+SPINS = (
+    "motion.c",
+    "    case OPCODE_FILTER:\n",
+    "    case OPCODE_FILTER:\n        lm629_command(0xFF); lm629_select(1); P2 = 0;\n",
+)
+ENVIRONMENTS = [
+    {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-AVX2"},
+    {"NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX"},
+    {"PYTHONHASHSEED": "12345"},
+]
+
+
+def firmware(name):
+    file, right, wrong = SPINS
+    if name in PLANTED:
+        mistake = PLANTED[name]
+        return build({mistake.file: mistake.applied(source_files()[mistake.file])}).image
+    source = source_files()[file]
+    assert source.count(right) == 1
+    return build({file: source.replace(right, wrong)}).image
+
+
+def case_of(name, folder):
+    """The case file of a find, and the image that it is about."""
+    image = load_hex(firmware(name))
+    data, check, _ = FINDS[name]
+    target = target_for(image)
+    assert target.run(data)
+    assert target.finding.check in (check, "moves_only_when_fresh")
+    judged = WorldCourt(Place(image, 3, 0)).confirm(target, data, target.finding)
+    case = folder / "find.stream"
+    case.write_text(judged.case)
+    return case, image.path
+
+
+def replayed(case, image, *options, env=None):
+    command = [MIROTWIN, "replay", case, "--firmware", image, *options]
+    done = children.run(command, capture_output=True, text=True, env=env, cwd=case.parent)
+    return done.returncode, done.stdout, done.stderr
+
+
+@needs_sdcc
+@pytest.mark.parametrize("name", FINDS)
+def test_a_find_replays_to_the_same_verdict_everywhere(name, tmp_path):
+    case, image = case_of(name, tmp_path)
+    first = replayed(case, image, "--engine", "compiled")
+    assert first[0] == FINDS[name][2], first
+    assert "fails as recorded" in first[1] + first[2]
+    assert replayed(case, image, "--engine", "python") == first
+    for change in ENVIRONMENTS:
+        assert replayed(case, image, env={**os.environ, **change}) == first, change
