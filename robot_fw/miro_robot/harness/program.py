@@ -21,7 +21,7 @@ knows nothing of them gets past them. What does not: sending (`harness.py`) and 
     C       DAMAGE          place in the next frame, bits to turn over
     D       CUT             characters that the next frame has
     E       STOP_BIT        place in the next frame of a bad stop bit
-    F       RESET           - the reset pin, and 5 ms to come up
+    F       RESET           - the reset pin, right behind the characters so far, and 5 ms to come up before the pauses
 
 Velocity -32768 is an encoding error, which no host sends: -32767 goes out in its place.
 

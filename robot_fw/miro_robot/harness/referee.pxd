@@ -5,7 +5,7 @@ from miro_robot.board cimport Board
 from miro_robot.event_log cimport EventLog
 from miro_robot.harness.judge cimport Judge
 
-cdef int _NO_FAULT, _LM629, _MAIN_LOOP, _STACK, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS
+cdef int _NO_FAULT, _LM629, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS
 cdef long long _ACTING, _ANSWER, _TOLERANCE, _TESTING, _NEVER, _CHARACTER, _TO_RI, _TO_TI
 cdef long long _EDGE, _FRESH_AGAIN
 cdef int _FRESH_STEPS
@@ -65,7 +65,7 @@ cdef class Referee(Judge):
     @cython.locals(side=int)
     cdef bint _stops_already(self) noexcept
     @cython.locals(place=int, side=int, word=int)
-    cdef bint _read_pair(self) noexcept
+    cdef bint _read_pair(self, bint fresh) noexcept
     @cython.locals(side=int, opcode=int, control=int, backward=bint)
     cdef void _command(self, long long tick, int code, int size, long long high, long long low) noexcept
     @cython.locals(control=int, at=int, value='long long', place=int)

@@ -2,7 +2,7 @@
 
 What belongs here: a quick reading of the rules of protocol/README.md ("Reception", "Freshness and failsafe", "Turns").
 What does not: the verdict. A find counts once the check of the same name fails for it in a world (`mirotwin.checks`,
-which this follows rule by rule, and which tests compare with it).
+which this follows in a shorter form: one frame and one question wait at a time).
 
     RECEIVED --> window of the decoder --> fresh? --> what the wheels have to be told, and until when
     COMMAND of an LM629 --> order to a wheel -----> compared with it
@@ -43,8 +43,6 @@ NAMES = (
     "",
     "no_fault",
     "lm629_protocol",
-    "main_loop_alive",
-    "stack_clear",
     "moves_only_when_fresh",
     "accepts_only_sent",
     "acts_within_ms",
@@ -60,9 +58,7 @@ TOLERANCE_TICKS = TICKS_PER_MS // 2
 TESTING_TICKS = 2 * TICKS_PER_MS
 EDGE_TICKS = TICKS_PER_MS // 5
 
-_NO_FAULT, _LM629, _MAIN_LOOP, _STACK, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS = range(
-    1, 12
-)
+_NO_FAULT, _LM629, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS = range(1, 10)
 _ACTING, _ANSWER, _TOLERANCE, _TESTING = ACTING_TICKS, ANSWER_TICKS, TOLERANCE_TICKS, TESTING_TICKS
 _EDGE, _FRESH_AGAIN, _FRESH_STEPS = EDGE_TICKS, FRESH_AGAIN_TICKS, FRESH_STEPS
 _SILENCES = (FAILSAFE_STOP_TICKS, FAILSAFE_OFF_TICKS)
@@ -268,7 +264,7 @@ class Referee(Judge):
         seq = hdr % _SEQS
         self._ask_whether_decided(seq, tick)
         fresh = self.freshness.judge(seq, tick)
-        team = kind in (_TEAM, _ASK) and self._read_pair()
+        team = kind in (_TEAM, _ASK) and self._read_pair(fresh)
         if fresh:
             self.accepted += 1
             self.fresh_tick = tick
@@ -299,7 +295,7 @@ class Referee(Judge):
                 return False
         return True
 
-    def _read_pair(self) -> bool:
+    def _read_pair(self, fresh: bool) -> bool:
         """What the team frame has for this robot; False if it is not to be acted on."""
         if self.slot >= self.robots:
             return False
@@ -315,7 +311,8 @@ class Referee(Judge):
                 word = _SATURATION
             if word < -_SATURATION:
                 word = -_SATURATION
-            self.wanted[side] = word
+            if fresh:
+                self.wanted[side] = word
             self.pairs[2 * (self.pair_end % _PAIRS) + side] = word
         self.pair_end += 1
         return True

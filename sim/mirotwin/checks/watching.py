@@ -222,7 +222,7 @@ class _Watched:
     def _guarded(self, check: Check, call: Callable[[], T]) -> T:
         try:
             return call()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             place = f"net{self.network.index}/robot{self.robot.slot}"
             what = f"{place}: check {check.name!r} cannot judge: {described(error)}"
             raise PartError(what, "repair the check") from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -36,7 +37,7 @@ from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.confirm import Court, WorldCourt
 from mirotwin.fuzz.confirm import Place as RobotPlace
 from mirotwin.fuzz.corpus import read_corpus
-from mirotwin.fuzz.engine import engine_for
+from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside
 from mirotwin.fuzz.finds import MINIMISE_S, Find, Finds
 from mirotwin.fuzz.reached import Reached
@@ -209,14 +210,34 @@ def _campaign(
         raise BadInput("", "--covering", what, "name a function that an input has to reach")
     folder.make()
     finds = Finds(target, reached, court, folder, sources_of(image, asked.sources), asked.minimise_s)
-    failing = [data for data in inputs if target.run(data)]
-    passing = [data for data in inputs if not target.run(data)]
-    engine, notes = engine_for(spec, passing or [b"\0"], folder, spec.make(), _jobs(asked.jobs), asked.seed)
-    for note in notes:
-        complain(note)
+    failing, passing, silent = _sorted_out(target, inputs)
+    engine: Engine = NoEngine()
+    if passing:
+        engine, notes = engine_for(spec, passing, folder, spec.make(), _jobs(asked.jobs), asked.seed)
+        for note in notes:
+            complain(note)
+    else:
+        complain("every input fails or executes no branch: there is nothing to go on from")
+        asked = msgspec.structs.replace(asked, time_s=0.0)
     campaign = Campaign(engine, finds, folder, expected, covering, _teller(asked.quiet))
-    campaign.begin_with(failing, passing)
+    campaign.begin_with(failing, (*passing, *silent))
     return _run(campaign, image, asked)
+
+
+def _sorted_out(target: Target, inputs: list[bytes]) -> tuple[list[bytes], list[bytes], list[bytes]]:
+    """Those that fail, those that an engine can begin with, and those that execute no branch."""
+    failing: list[bytes] = []
+    passing: list[bytes] = []
+    silent: list[bytes] = []
+    edges = bytearray(target.map_size)
+    target.use_map(edges)
+    for data in inputs:
+        edges[:] = bytes(len(edges))
+        if target.run(data):
+            failing.append(data)
+        else:
+            (passing if any(edges) else silent).append(data)
+    return failing, passing, silent
 
 
 def _run(campaign: Campaign, image: Image, asked: Asked) -> int:
@@ -235,7 +256,11 @@ def _run(campaign: Campaign, image: Image, asked: Asked) -> int:
                 progress.show, INTERRUPTED_S if isinstance(error, KeyboardInterrupt) else 1.0
             )
         except PartError as error:
-            raise BadInput("", "--check", f"{error.what}; the campaign has ended", error.remedy) from None
+            stopped = BadInput("", "--check", f"{error.what}; the campaign has ended", error.remedy)
+        except BadInput as error:  # of the engine: what was found until then is told first
+            stopped = error
+            with suppress(BadInput, PartError):
+                left = campaign.finish(progress.show, INTERRUPTED_S)
     ended = Ended(left=left, complete=stopped is None)
     code = report(campaign, image, asked.out, asked.covering, ended, asked.quiet)
     if stopped is not None:

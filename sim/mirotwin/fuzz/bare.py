@@ -76,7 +76,14 @@ class BareTarget(HarnessTarget):
         self._wrong = ""
 
     def _repaired(self, body: bytes) -> bytes:
-        return body if self.protocol is None else self.protocol.repair(body, self.program.frames - 1)
+        """The characters of a frame. Raises BadInput where the wire format fails itself."""
+        if self.protocol is None:
+            return body
+        try:
+            return bytes(memoryview(self.protocol.repair(body, self.program.frames - 1)))
+        except (Exception, SystemExit) as error:
+            what = f"repair() of {type(self.protocol).__name__} raised {type(error).__name__}: {error}"
+            raise BadInput("", "--protocol", what, "let it return bytes for any body") from error
 
     def run(self, data: Any) -> int:
         ended = self.play(data)

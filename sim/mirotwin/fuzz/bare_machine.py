@@ -19,6 +19,7 @@ from mirotwin.fuzz.exchange import Character, Exchange, Memory
 
 BOOT_MS = 200
 _SLICE = 20_000  # cycles
+_CLOCK_CYCLES = 65_536  # after which every timer has overflowed
 _LATEST = 1 << 50
 _FASTEST = 32  # ticks a bit, of the fastest receiver there is
 BAUD = "--baud"
@@ -69,6 +70,8 @@ class BareProcessor:
             if self.cpu.run(min(end, self.cpu.cycles + _SLICE)) == ASLEEP:
                 break
         self.cpu.stop_asleep = 0
+        if not self.cpu.peripherals.bit_ticks():  # the timer that clocks the serial port has to overflow once
+            self.cpu.run(self.cpu.cycles + _CLOCK_CYCLES)
         self.begin_tick = 12 * self.cpu.cycles
         if self.bus.fault_kind:
             what = f"comes up with a fault: {self.fault()}"

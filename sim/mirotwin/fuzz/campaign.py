@@ -14,12 +14,14 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from mirotwin.fuzz.engine import Engine
+from miro_exact.bad_input import BadInput
+from mirotwin.fuzz.engine import Engine, NoProgress, Progress
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.finds import Find, Finds
 
@@ -68,6 +70,7 @@ class Campaign:
         tell: Callable[[Find], None] = lambda find: None,
     ) -> None:
         self.engine = engine
+        self._progress: Progress = NoProgress()
         self.finds = finds
         self.folder = folder
         self.expected = expected
@@ -127,7 +130,10 @@ class Campaign:
         return (self._stopped_s or time.monotonic()) - self._began_s
 
     def status(self) -> Status:
-        progress = self.engine.progress()
+        """How far it is; of an engine that has ended with an error, how far it was when last asked."""
+        with suppress(BadInput):
+            self._progress = self.engine.progress()
+        progress = self._progress
         return Status(
             self.run_s,
             progress.executions,

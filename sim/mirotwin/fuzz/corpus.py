@@ -29,6 +29,7 @@ INPUT_BYTES = 8192
 QUEUES = ("corpus", "queue", "*/queue", "engine/*/queue")
 FOREIGN = (
     *(".c", ".h", ".py", ".ihx", ".hex", ".map", ".cdb", ".rst", ".toml", ".json", ".xml", ".yml", ".yaml"),
+    *(".mcap", ".stream"),  # damaged ones: what is whole was recognised by its content
     *(
         ".md",
         ".txt",

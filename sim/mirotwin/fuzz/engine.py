@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
+import msgspec
+
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
@@ -41,6 +43,33 @@ class Engine(Protocol):
     def new_queue(self) -> list[Path]:
         """Inputs that found something new, since the last call."""
         ...
+
+
+class NoProgress(msgspec.Struct, frozen=True):
+    """Of what does nothing."""
+
+    executions: int = 0
+    executions_per_s: float = 0.0
+    edges: int | None = None
+
+
+class NoEngine:
+    """Where there is no input to begin with: it makes up none."""
+
+    def start(self) -> None:
+        """Nothing."""
+
+    def stop(self) -> None:
+        """Nothing."""
+
+    def progress(self) -> NoProgress:
+        return NoProgress()
+
+    def new_crashes(self) -> list[Path]:
+        return []
+
+    def new_queue(self) -> list[Path]:
+        return []
 
 
 def engine_for(

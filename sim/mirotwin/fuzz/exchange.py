@@ -137,7 +137,7 @@ class NamedCheck(msgspec.Struct, frozen=True):
             found = self.function(run)
         except BadInput:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             last = traceback.extract_tb(error.__traceback__)[-1]
             place = f"{Path(last.filename).name}:{last.lineno}"
             what = f"raised {described(error)} at {place}"

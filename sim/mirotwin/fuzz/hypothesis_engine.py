@@ -11,7 +11,7 @@ What belongs here: campaigns with the methods and the folders of `AflRun`. What 
 
 from __future__ import annotations
 
-import signal
+import os
 import subprocess
 import sys
 import time
@@ -39,8 +39,8 @@ class HypothesisRun:
     """A campaign: `jobs` processes, each with a target of its own and a seed of its own.
 
     Arguments as `AflRun` has them; a dictionary is not used, since inputs are made of whole operations. `seed`: of what
-    Hypothesis draws; 0 where none is given. Raises BadInput for Hypothesis that is missing; the methods raise it when a
-    process has ended with an error, with its last line.
+    Hypothesis draws; the system's where none is given. Raises BadInput for Hypothesis that is missing; the methods
+    raise it when a process has ended with an error, with its last line.
     """
 
     def __init__(
@@ -60,7 +60,8 @@ class HypothesisRun:
         self._target_args = list(target_args)
         self._seeds = seeds
         self._folders = [out / f"job{job}" for job in range(jobs)]
-        self._seed = seed or 0
+        self._seed = int.from_bytes(os.urandom(4), "little") if seed is None else seed
+        self._stopped = False
         self._processes: list[subprocess.Popen[bytes]] = []
         self._handed_out: dict[str, dict[Path, None]] = {kind: {} for kind in KINDS}
         self._began_s = 0.0
@@ -85,6 +86,7 @@ class HypothesisRun:
 
     def stop(self) -> None:
         """Ends all processes at once. A second call does nothing."""
+        self._stopped = True
         for process in self._processes:
             process.kill()
         for process in self._processes:
@@ -133,7 +135,7 @@ class HypothesisRun:
 
     def _require_health(self) -> None:
         for process, folder in zip(self._processes, self._folders, strict=False):
-            if process.poll() not in (None, -signal.SIGKILL):
+            if process.poll() is not None and not self._stopped:
                 lines = (folder / _LOG).read_text("utf-8", "replace").strip().splitlines()
                 what = lines[-1] if lines else f"ended with exit code {process.returncode}"
                 raise BadInput("Hypothesis", "", what, f"see {folder / _LOG}")

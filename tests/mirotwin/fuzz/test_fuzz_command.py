@@ -96,15 +96,19 @@ class BrokenJudge(Judge):
 """
 
 
-def test_a_check_that_raises_ends_the_campaign_with_its_name(mirotwin, engines, tmp_path, monkeypatch):
-    parts = {"broken": "broken_check:Broken"}
-    install(tmp_path / "dist", "broken", "1.0", parts, "checks", broken_check=BROKEN)
+@pytest.mark.parametrize("error", ['RuntimeError("oh")', "SystemExit(0)"])
+def test_a_check_that_raises_ends_the_campaign_with_its_name(mirotwin, engines, tmp_path, monkeypatch, error):
+    parts = {"broken": f"broken_check_{len(error)}:Broken"}
+    source = BROKEN.replace('RuntimeError("oh")', error)
+    install(tmp_path / "dist", "broken", "1.0", parts, "checks", **{f"broken_check_{len(error)}": source})
     monkeypatch.syspath_prepend(str(tmp_path / "dist"))
     code, _, err = mirotwin("fuzz", "--time", "20s", "--check", "broken", "--out", tmp_path / "out")
     assert code == 2
     assert "--check: " in err
-    assert "check 'broken' cannot judge: RuntimeError: oh; the campaign has ended; repair the check" in err
+    assert f"check 'broken' cannot judge: {error.partition('(')[0]}: " in err
+    assert "; the campaign has ended; repair the check" in err
     assert engines[0].stopped
+    assert not json.loads((tmp_path / "out" / "summary.json").read_text())["complete"]
 
 
 def test_ctrl_c_ends_it_with_what_was_found(tmp_path):

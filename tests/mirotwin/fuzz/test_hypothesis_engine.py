@@ -139,6 +139,17 @@ def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once
     run.stop()
 
 
+def test_a_process_that_somebody_kills_is_told(tmp_path: Path, seeds: Path) -> None:
+    with HypothesisRun([TOY.text()], seeds, tmp_path / "out", seed=5) as run:
+        for _ in waited(run):
+            if run.progress().executions:
+                break
+        run._processes[0].kill()
+        run._processes[0].wait()
+        with pytest.raises(BadInput, match="Hypothesis"):
+            run.progress()
+
+
 def test_a_target_that_cannot_be_made_ends_the_campaign_with_its_own_line(
     tmp_path: Path, seeds: Path
 ) -> None:

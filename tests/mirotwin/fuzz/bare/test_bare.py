@@ -39,6 +39,25 @@ def test_characters_come_in_at_the_rate_of_the_receiver_and_answers_go_out():
     assert run.begin_tick < run.received[0].tick < run.end_tick
 
 
+def test_firmware_that_sleeps_before_its_timer_has_overflowed_once_is_heard():
+    """TL1 is not preloaded: its first overflow, which starts the serial clock, comes after the first sleep."""
+    slow = SLEEPS.replace("MOV TL1,#0FDh\n", "")
+    assert slow != SLEEPS
+    target = BareTarget(image(slow), "bytes")
+    assert target.run(b"hello") == 0
+    assert target.exchange().sent_bytes == b"hello"
+
+
+def test_a_wire_format_that_fails_itself_is_named():
+    class Broken(Counted, frozen=True, tag="broken"):
+        def repair(self, body, number=None):
+            return "text"
+
+    target = BareTarget(image(SLEEPS), "frames", protocol=Broken())
+    with pytest.raises(BadInput, match=r"--protocol: repair\(\) of Broken raised TypeError"):
+        target.run(b"\x00\x00")
+
+
 def test_a_run_is_over_when_firmware_sleeps_and_has_sent_all_it_had():
     target = BareTarget(image(SLEEPS), "bytes")
     target.run(b"abc")

@@ -22,6 +22,9 @@ def odd(run):
 
 def broken(run):
     return run.nothing
+
+def leaves(run):
+    raise SystemExit(0)
 """
 
 
@@ -43,6 +46,7 @@ def test_a_function_of_a_file(file):
     ("name", "said"),
     [
         ("odd", "returned 5; return None, or what is wrong as text"),
+        ("leaves", "raised SystemExit: 0 at mycheck.py:17; repair the check"),
         (
             "broken",
             "raised AttributeError: 'str' object has no attribute 'nothing' at mycheck.py:14; repair the check",
