@@ -141,8 +141,7 @@ class Harness:
         if self._run(tick):
             return 1
         self._set_reset(1)
-        if self._run(tick + _RESET_TICKS):
-            return 1
+        self._move(tick + _RESET_TICKS)
         self._set_reset(0)
         self.judge.restarted(tick + _RESET_TICKS)
         return 0
@@ -159,13 +158,15 @@ class Harness:
         """To a tick, and lets the judge look. 1: a fault, or the judge has seen enough."""
         if until <= self.now_tick:
             return 0
-        if self.board is not None:
-            stopped = self.board.run(until)
-        else:
-            stopped = self.cpu.run((until + 11) // 12)
-        self.now_tick = until
+        stopped = self._move(until)
         self.judge.look(until)
         return 1 if stopped or self.judge.code else 0
+
+    def _move(self, until: int) -> int:
+        self.now_tick = until
+        if self.board is not None:
+            return self.board.run(until)
+        return self.cpu.run((until + 11) // 12)
 
     def _settle(self, tick: int) -> int:
         """Until the firmware sleeps and the judge waits for nothing."""

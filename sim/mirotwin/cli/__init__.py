@@ -17,7 +17,7 @@ COMMANDS = {
     "calibrate": "Finds a camera's parameters from control points.",
     "track": "Finds robots in pictures of your own, or in recorded ones.",
     "conform": "Tries the protocol's rules on a firmware image.",
-    "fuzz": "Looks for inputs that make a firmware image fail, guided by what it executes.",
+    "fuzz": "Looks for inputs that make a firmware image fail.",
     "test": "Runs scenario files as tests: steps, checks, a verdict each.",
     "replay": "Sends recorded bytes again and compares.",
     "diff": "Compares two recordings.",

@@ -22,6 +22,7 @@ from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.stream_events import Deed
 from miro_protocol.table import FRESH_AGAIN_TICKS, FrameType
 from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.harness.referee import TOLERANCE_TICKS
 from miro_robot.image import Image
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
@@ -93,10 +94,15 @@ class WorldCourt:
         return stream_of(self.place, target.happenings(data))
 
 
+SILENCES = ("failsafe_stop_ms", "motors_off_ms")
+
+
 def expected_of(check: str) -> dict[str, Any]:
-    """The check that tells whether a finding of that name is one, with its defaults."""
+    """The check that tells whether a finding of that name is one; the failsafe's with the referee's tolerance."""
     if check == NEVER_SLEEPS:
         return {"acts_within_ms": True}
+    if check in SILENCES:
+        return {check: {"tolerance_ms": TOLERANCE_TICKS / 24_000}}
     return {check: True} if check in CHECKS.names() else {}
 
 

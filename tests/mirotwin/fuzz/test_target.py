@@ -21,6 +21,7 @@ from miro_robot.harness.referee import NAMES
 from miro_robot.image import load_hex
 from miro_sim.world.world import World
 from mirotwin.checks.watching import Checks
+from mirotwin.fuzz.confirm import expected_of
 from mirotwin.fuzz.target import target_for
 from mirotwin.testing.wanted import silent_scenario
 
@@ -62,7 +63,8 @@ def world_of(target, data, names=()):
         *('network.radio.carrier="on"', f"duration_s={seconds(periods * CONTROL_PERIOD_TICKS) + 1.0}"),
     )
     scenario = silent_scenario(settings)
-    scenario = msgspec.structs.replace(scenario, expect=dict.fromkeys(names, True))
+    expect = {key: value for name in names for key, value in expected_of(name).items()}
+    scenario = msgspec.structs.replace(scenario, expect=expect)
     world = World(scenario, 0, target.image, target.happenings(data))
     checks = Checks(world)
     world.run_to(end_tick)
