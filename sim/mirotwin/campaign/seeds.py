@@ -11,15 +11,16 @@ MOST_SEEDS = 1000
 _LONGEST = 40
 
 
-def seeds_of(text: str) -> range:
-    """First and last seed, both included. ValueError with what is wrong."""
+def seeds_of(text: str, most: int = MOST_SEEDS) -> range:
+    """First and last seed, both included, `most` at most. ValueError with what is wrong."""
     first, _, last = text.partition("-")
     last = last or first
     if not (len(text) <= _LONGEST and first.isdecimal() and last.isdecimal()):
         raise ValueError(f"{text[:_LONGEST]!r} is no range of seeds; write it like 0-49")
     if int(last) > MAX_SEED:
         raise ValueError(f"{text!r}: the largest seed is {MAX_SEED}")
-    found = range(int(first), int(last) + 1)
-    if not 1 <= len(found) <= MOST_SEEDS:
-        raise ValueError(f"{text!r} has {len(found)} seeds; give 1 to {MOST_SEEDS}")
-    return found
+    first_seed, last_seed = int(first), int(last)
+    count = last_seed - first_seed + 1
+    if not 1 <= count <= most:
+        raise ValueError(f"{text!r} has {max(count, 0)} seeds; give 1 to {most}")
+    return range(first_seed, last_seed + 1)

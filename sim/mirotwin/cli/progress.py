@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -20,11 +21,18 @@ PATIENCE_S = 1.0
 
 
 class ProgressBar:
-    """`bar.to(done)` out of `total`. Draws nothing in the first second, nor when stderr is no terminal or closed."""
+    """`bar.to(done)` out of `total`. Draws nothing in the first second, nor when stderr is no terminal or closed.
 
-    def __init__(self, what: str, total: float | None, quiet: bool = False) -> None:
+    `unit`: what is counted ("runs"), where the rate is shown, too; the rate and the time left are those from `begun`.
+    """
+
+    def __init__(
+        self, what: str, total: float | None, quiet: bool = False, unit: str = "", begun: int = 0
+    ) -> None:
         self.what = one_line(what)
         self.total = total
+        self.unit = unit
+        self.begun = begun
         stream = vars(sys)["stderr"]  # None where it is closed
         self._shown = not quiet and stream is not None and stream.isatty()
         self._began_s = time.monotonic()
@@ -47,22 +55,40 @@ class ProgressBar:
         if self._progress is None:
             if time.monotonic() - self._began_s < PATIENCE_S:
                 return
-            self._progress = _bar()
-            self._task = self._progress.add_task(self.what, total=self.total)
+            self._progress = _bar(self._rate if self.unit else None)
+            self._task = self._progress.add_task(self.what, total=self.total, completed=self.begun)
             self._progress.start()
         assert self._task is not None
         self._progress.update(self._task, completed=done)
 
+    def _rate(self, done: float) -> str:
+        """How fast it goes since `begun`, and how long the rest takes at that rate."""
+        passed_s = time.monotonic() - self._began_s
+        per_s = (done - self.begun) / passed_s
+        if self.total is None or per_s <= 0.0:
+            return ""
+        left_s = round((self.total - done) / per_s)
+        hours, minutes, left = left_s // 3600, left_s // 60 % 60, left_s % 60
+        return f"{per_s:.1f} {self.unit}/s, {hours}:{minutes:02}:{left:02} left"
 
-def _bar() -> Progress:
+
+def _bar(rate: Callable[[float], str] | None) -> Progress:
     from rich.console import Console  # loaded when the first bar is drawn: most commands are over before
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn
+    from rich.progress import TextColumn as Words
+    from rich.progress import TimeRemainingColumn as TimeLeft
+    from rich.text import Text
+
+    class Rate(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            assert rate is not None
+            return Text(rate(task.completed))
 
     return Progress(
-        TextColumn("{task.description}", markup=False),
+        Words("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
-        TimeRemainingColumn(),
+        TimeLeft() if rate is None else Rate(),
         console=Console(stderr=True),
         transient=True,
     )

@@ -1,0 +1,92 @@
+"""Workers of a Dask scheduler that is running already.
+
+What belongs here: connecting, and refusing workers that would compute something else. What does not: starting a
+scheduler or workers (`dask scheduler`, `dask worker`), and what workers do (`worker`).
+
+The extra `cluster` brings Dask. Workers need mirotwin in the same version with the same sources; images that are not
+the robot's own have to stand under the same path on each of them. Scenarios travel with the jobs.
+"""
+
+from __future__ import annotations
+
+import logging
+from concurrent.futures import Executor
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from miro_exact.bad_input import BadInput
+from mirotwin.campaign.versions import versions
+from mirotwin.campaign.workers import AHEAD, Workers
+
+PATIENCE_S = 5
+OPTION = "--cluster"
+
+
+class Cluster(Workers):
+    """The workers of the scheduler at `address` (tcp://host:8786). Raises BadInput where it does not answer."""
+
+    option = OPTION
+
+    def __init__(self, address: str, patience_s: float = PATIENCE_S) -> None:
+        super().__init__()
+        self.address = address
+        self.client = _connected(address, patience_s)
+        try:
+            threads = self._check()
+        except BaseException:
+            self.client.close()
+            raise
+        self.ahead = AHEAD * threads
+        self.ended = (_killed_worker(),)
+
+    def start(self) -> Executor:
+        found: Executor = self.client.get_executor(pure=False)
+        return found
+
+    def stop(self, executor: Executor) -> None:
+        executor.shutdown(wait=False)
+
+    def close(self) -> None:
+        self.client.close()
+
+    def _check(self) -> int:
+        """Refuses workers that are not like this process, by name; returns how many jobs they do at once."""
+        workers = self.client.scheduler_info(n_workers=-1)["workers"]
+        if not workers:
+            what = f"the scheduler at {self.address} has no workers"
+            raise BadInput("", OPTION, what, f"start some: dask worker {self.address}")
+        found = self.client.run(versions, on_error="return")
+        for address, theirs in sorted(found.items()):
+            if isinstance(theirs, BaseException):
+                what = f"worker {address} cannot load mirotwin: {theirs}"
+                raise BadInput("", OPTION, what, "install there what runs here")
+            difference = versions().difference(theirs)
+            if difference:
+                raise BadInput(
+                    "", OPTION, f"worker {address} has {difference}", "install there what runs here"
+                )
+        threads = 0
+        for worker in workers.values():
+            threads += int(worker["nthreads"])
+        return threads
+
+
+def _connected(address: str, patience_s: float) -> Any:
+    if find_spec("distributed") is None:
+        raise BadInput("", OPTION, "Dask is not installed", "pip install 'mirotwin[cluster]'")
+    connect: Any = import_module("distributed").Client  # has no types
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it says is said here, in one line
+    try:
+        return connect(address, timeout=patience_s, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        reason = f"{error}".partition("\n")[0] or type(error).__name__
+        what = f"no Dask scheduler answers at {address}: {reason}"
+        raise BadInput("", OPTION, what, "start one (dask scheduler), or leave --cluster out") from None
+
+
+def _killed_worker() -> type[Exception]:
+    """A job whose workers ended, several times."""
+    found: type[Exception] = import_module("distributed.scheduler").KilledWorker
+    return found

@@ -1,0 +1,127 @@
+"""The points of a campaign: every combination of what is varied, the draws, and the seeds, in one order.
+
+What belongs here: factors and their levels, random draws, and which of them run number N has. What does not: the file
+that they come from (`file`), and whether a scenario takes them (`plan`).
+
+    run = ((point * draws) + draw) * seeds + seed        point: the last factor changes first
+
+A run is computed from its number, so a plan of millions takes no memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import msgspec
+
+from miro_exact import dmath
+from miro_exact.rng import Stream
+from mirotwin.campaign.inline import inline
+
+Value = float | int | bool | str
+"""What a column of the results can hold."""
+
+
+class Level(msgspec.Struct, frozen=True):
+    """One of the values of a factor: as its column shows it, and what it sets.
+
+    `settings`: KEY=VALUE, as `--set`. `scenario`, `firmware`: what runs instead of the campaign's own; "" for that.
+    `place`: where the file says it.
+    """
+
+    value: Value
+    settings: tuple[str, ...] = ()
+    scenario: str = ""
+    firmware: str = ""
+    place: str = ""
+
+
+class Factor(msgspec.Struct, frozen=True):
+    """What is varied, and its levels."""
+
+    name: str
+    levels: tuple[Level, ...]
+
+
+class Draw(msgspec.Struct, frozen=True):
+    """A key whose value is drawn: between `low` and `high`, or one of `choices`.
+
+    `scale`: "linear", or "log", where equal ratios are equally likely. `whole`: whole numbers, both ends included.
+    """
+
+    name: str
+    low: float = 0.0
+    high: float = 0.0
+    scale: str = "linear"
+    whole: bool = False
+    choices: tuple[Value, ...] = ()
+
+    def value(self, seed: int, index: int) -> Value:
+        """The draw `index`: a function of the seed, the key and the index alone."""
+        share = Stream(seed, f"campaign {self.name}").uniform(index)
+        if self.choices:
+            return self.choices[int(share * len(self.choices))]
+        if self.whole:
+            return int(self.low) + int(share * (int(self.high) - int(self.low) + 1))
+        if self.scale == "log":
+            low, high = dmath.log(self.low), dmath.log(self.high)
+            return min(max(dmath.exp(low + (high - low) * share), self.low), self.high)
+        return self.low + (self.high - self.low) * share
+
+    def ends(self) -> tuple[Value, ...]:
+        """The values that are tried before anything runs."""
+        if self.choices:
+            return self.choices
+        return (int(self.low), int(self.high)) if self.whole else (self.low, self.high)
+
+    def setting(self, value: Value) -> str:
+        return f"{self.name}={inline(value)}"
+
+
+class Point(msgspec.Struct, frozen=True):
+    """What one run has: the level of each factor, the values drawn, the number of the draw, and the seed."""
+
+    levels: tuple[Level, ...]
+    drawn: tuple[Value, ...]
+    draw: int
+    seed: int
+
+
+class Design(msgspec.Struct, frozen=True):
+    """All runs of a campaign. `draw_count` is 1 where nothing is drawn."""
+
+    first_seed: int
+    seed_count: int
+    factors: tuple[Factor, ...] = ()
+    draws: tuple[Draw, ...] = ()
+    draw_count: int = 1
+    draw_seed: int = 0
+
+    @property
+    def runs(self) -> int:
+        found = self.seed_count * self.draw_count
+        for factor in self.factors:
+            found *= len(factor.levels)
+        return found
+
+    @property
+    def names(self) -> list[str]:
+        """What is varied, in the order of the columns."""
+        return [*(factor.name for factor in self.factors), *(draw.name for draw in self.draws)]
+
+    def point(self, run: int) -> Point:
+        """What run number `run` has, from 0."""
+        rest, seed = divmod(run, self.seed_count)
+        rest, draw = divmod(rest, self.draw_count)
+        levels: list[Level] = []
+        for factor in reversed(self.factors):
+            rest, level = divmod(rest, len(factor.levels))
+            levels.append(factor.levels[level])
+        drawn = tuple(one.value(self.draw_seed, draw) for one in self.draws)
+        return Point(tuple(reversed(levels)), drawn, draw, self.first_seed + seed)
+
+    def settings(self, levels: Sequence[Level], drawn: Sequence[Value]) -> tuple[str, ...]:
+        """What a point sets, in the order of the file."""
+        found = [setting for level in levels for setting in level.settings]
+        found += [draw.setting(value) for draw, value in zip(self.draws, drawn, strict=True)]
+        return tuple(found)

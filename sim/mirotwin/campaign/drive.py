@@ -1,0 +1,139 @@
+"""Has all missing runs of a plan made by an executor, and hands on each outcome as soon as it is there.
+
+What belongs here: how many jobs are handed over, and what becomes of them when a worker ends. What does not: where
+workers come from (`processes`, `cluster`), what they do (`worker`), and where outcomes go (`journal`).
+
+A process that is killed breaks its whole pool. All jobs that the pool had are then made again by a new one, each by
+itself: the one that ends its process twice gets an outcome that says so, and the others go on together.
+"""
+
+from __future__ import annotations
+
+import concurrent.futures as futures
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future
+
+from miro_exact.bad_input import BadInput
+from mirotwin.campaign.worker import Outcome, Work, work
+from mirotwin.campaign.workers import Workers
+
+SPREAD = 4096
+"""Runs between the first one without an outcome and the last one handed over: so many rows wait for their turn."""
+TRIES = 2
+"""So often a job that was under way when a process ended is tried by itself."""
+FRUITLESS = 20
+"""So many executors in a row that end before any run does."""
+
+
+class Drive:
+    """Makes runs. `job`: what is handed over for a run."""
+
+    def __init__(self, job: Callable[[int], Work], workers: Workers) -> None:
+        self.job = job
+        self.workers = workers
+        self._executor: Executor | None = None
+        self._pending: dict[Future[Outcome], int] = {}
+        self._alone: deque[int] = deque()
+        self._tries: dict[int, int] = {}
+        self._fruitless = 0
+
+    def outcomes(self, runs: Iterable[int]) -> Generator[Outcome]:
+        """Each as soon as it is there. Whoever stops asking, or is interrupted, leaves no job behind."""
+        self._runs = iter(runs)
+        self._next = next(self._runs, None)
+        self._executor = self.workers.start()
+        try:
+            while self._hand_over() or self._pending:
+                done, _ = futures.wait(self._pending, return_when=futures.FIRST_COMPLETED)
+                yield from self._take(done)
+        finally:
+            self._close()
+
+    def _hand_over(self) -> bool:
+        """Fills up what is handed over; returns whether anything was."""
+        handed = False
+        while (run := self._choose()) is not None:
+            assert self._executor is not None
+            try:
+                future = self._executor.submit(work, self.job(run))
+            except BrokenExecutor:  # a worker has ended in between: this run is not to blame
+                self._alone.appendleft(run)
+                self._tries.setdefault(run, 0)
+                if self._pending:  # they say so, too
+                    return handed
+                self._restart()
+                continue
+            self._pending[future] = run
+            handed = True
+        return handed
+
+    def _choose(self) -> int | None:
+        """The next run to hand over, None where all have their hands full. One that is suspect goes alone."""
+        if self._alone:
+            return self._alone.popleft() if not self._pending else None
+        if any(run in self._tries for run in self._pending.values()):
+            return None
+        if self._next is None or len(self._pending) >= self.workers.ahead:
+            return None
+        if self._pending and self._next - min(self._pending.values()) >= SPREAD:
+            return None
+        found, self._next = self._next, next(self._runs, None)
+        return found
+
+    def _take(self, done: Iterable[Future[Outcome]]) -> Iterator[Outcome]:
+        lost = []
+        for future in done:
+            run = self._pending.pop(future)
+            try:
+                outcome = future.result()
+            except BrokenExecutor:
+                lost.append(run)
+                continue
+            except self.workers.ended as error:
+                yield Outcome(run, error=f"ended its worker (killed, or out of memory): {error}")
+                continue
+            except futures.CancelledError:
+                raise self._gone() from None
+            if outcome.refused:
+                what = f"has {outcome.refused}"
+                raise BadInput("", f"worker {outcome.where}", what, "install there what runs here")
+            self._tries.pop(run, None)
+            self._fruitless = 0
+            yield outcome
+        if lost:
+            yield from self._broken(lost)
+
+    def _broken(self, lost: list[int]) -> list[Outcome]:
+        """A new executor for the jobs of the one that is broken. Outcomes of those that have had all their tries."""
+        lost = sorted([*lost, *self._pending.values()])
+        self._pending.clear()
+        self._restart()
+        if len(lost) == 1 and self._tries.get(lost[0], 0) >= TRIES:
+            self._tries.pop(lost[0])
+            return [Outcome(lost[0], error="ended the process that ran it (killed, or out of memory)")]
+        for run in lost:
+            self._tries[run] = self._tries.get(run, 0) + 1
+        self._alone.extendleft(reversed(lost))
+        return []
+
+    def _restart(self) -> None:
+        self._fruitless += 1
+        if not self.workers.restarts or self._fruitless > FRUITLESS:
+            raise self._gone()
+        self._close()
+        self._executor = self.workers.start()
+
+    def _close(self) -> None:
+        if self._executor is None:
+            return
+        for future in self._pending:
+            future.cancel()
+        executor, self._executor = self._executor, None
+        self.workers.stop(executor)
+
+    def _gone(self) -> BadInput:
+        what = "workers have ended, and with them what was under way"
+        return BadInput(
+            "", self.workers.option, what, "start them again, and give the same command: it goes on"
+        )

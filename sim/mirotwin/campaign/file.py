@@ -1,0 +1,276 @@
+"""The file of a campaign: which runs it consists of, and what is expected of them.
+
+    scenario = "fig6"                      a built-in scenario, or a path beside this file
+    seeds = "0-99"
+    firmware = "mine.ihx"                  an image beside this file; without it, the robot's own
+    set = { duration_s = 3.0 }             keys of the scenario, for all runs
+    allowed_failed_share = 0.05            so many runs may fail a check before the exit code is 1
+
+    [expect]                               checks, beside those of the scenario
+    tracks_within_cm = 3.0
+
+    [grid]                                 every combination of these values
+    network.radio.bit_error_rate = [0.0, 1e-4, 1e-3]
+    firmware = ["", "mine.ihx"]            images; "" is the robot's own
+
+    [factor.chain]                         a factor whose levels set several keys, as `--set` does
+    paper = []
+    improved = ["network.robot.controller={law = 'body_frame'}", "network.robot.estimator={kind = 'ekf'}"]
+
+    [random]                               so many draws, for each combination of the grid
+    count = 200
+    seed = 0
+    [random.range]
+    host.compute_s = { from = 0.001, to = 0.02 }
+    network.radio.bit_error_rate = { from = 1e-6, to = 1e-3, scale = "log" }
+
+What belongs here: reading that, and what is wrong with it by itself. What does not: whether the scenario has such keys
+(`plan`).
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path, PurePath
+from typing import Annotated, Any, NoReturn
+
+import msgspec
+from msgspec import Meta
+
+from miro_exact.bad_input import BadInput
+from miro_exact.seed import MAX_SEED
+from miro_protocol.toml_text import TEXT_KIB, long_key_line, not_finite
+from miro_sim.inputs import read_input
+from miro_sim.scenario.settings import EXPECT, in_text
+from mirotwin.campaign.design import Design, Draw, Factor, Level, Value
+from mirotwin.campaign.inline import inline
+from mirotwin.campaign.ranges import draw_of, is_range
+from mirotwin.campaign.seeds import seeds_of
+
+MOST_RUNS = 1_000_000_000
+"""More is a mistake in the file."""
+SCENARIO, FIRMWARE = "scenario", "firmware"
+NOT_VARIED = ("name", "title", "network", "step", "expect", "seed")
+"""Keys of a scenario that are no factor by themselves."""
+_TYPES = {
+    "array": "a list",
+    "object": "a table",
+    "str": "a string",
+    "float": "a number",
+    "int": "a whole number",
+}
+
+
+class Random(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """`[random]`."""
+
+    count: Annotated[int, Meta(ge=1, le=MOST_RUNS)]
+    seed: Annotated[int, Meta(ge=0, le=MAX_SEED)] = 0
+    range: dict[str, Any] = {}
+
+
+class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The whole file."""
+
+    scenario: Annotated[str, Meta(min_length=1)]
+    seeds: str | int = 0
+    firmware: str = ""
+    set: dict[str, Any] = {}
+    allowed_failed_share: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
+    expect: dict[str, Any] = {}
+    grid: dict[str, Any] = {}
+    factor: dict[str, dict[str, list[str]]] = {}
+    random: Random | None = None
+
+
+class CampaignFile(msgspec.Struct, frozen=True):
+    """What a file says. `path` names it in errors. Paths in it were made relative to where it stands.
+
+    `settings`: what all runs set, each with the place that says it.
+    """
+
+    path: str
+    scenario: str
+    firmware: str
+    settings: tuple[tuple[str, str], ...]
+    allowed_failed_share: float
+    design: Design
+
+
+def read(path: Path) -> CampaignFile:
+    """The campaign of a file. Raises BadInput with the place of what is wrong."""
+    try:
+        text = read_input(path, TEXT_KIB << 10).decode("utf-8")
+    except FileNotFoundError:
+        raise BadInput(path, "", "there is no such file", "examples/campaign.toml shows one") from None
+    except UnicodeDecodeError:
+        raise BadInput(path, "", "not UTF-8 text", "save the file as UTF-8") from None
+    return parse(text, path)
+
+
+def parse(text: str, path: Path) -> CampaignFile:
+    """The campaign of a text that stands at `path`. Raises BadInput with the place of what is wrong."""
+    return _File(path).campaign(text)
+
+
+class _File:
+    """Reads one file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def refuse(self, place: str, what: str, remedy: str = "") -> NoReturn:
+        raise BadInput(self.path, place, what, remedy)
+
+    def campaign(self, text: str) -> CampaignFile:
+        raw = self._tables(text)
+        try:
+            found = msgspec.convert(raw, Document)
+        except msgspec.ValidationError as error:
+            self._refuse_value(str(error))
+        settings = [(setting, f"set.{setting.partition('=')[0]}") for setting in in_text(found.set)]
+        settings += [
+            (f"{EXPECT}{key}={inline(value)}", f"expect.{key}") for key, value in found.expect.items()
+        ]
+        return CampaignFile(
+            path=str(self.path),
+            scenario=self.beside(found.scenario),
+            firmware=self.image(found.firmware),
+            settings=tuple(settings),
+            allowed_failed_share=found.allowed_failed_share,
+            design=self._design(found),
+        )
+
+    def _tables(self, text: str) -> dict[str, Any]:
+        line = long_key_line(text)
+        if line is not None:
+            raise BadInput(
+                self.path, line, "a key with too many parts", "no key of a scenario has more than 6"
+            )
+        try:
+            raw = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            self.refuse("", f"not TOML: {error}")
+        except (ValueError, RecursionError):
+            self.refuse("", "not TOML: a number too long, or tables too deep")
+        found = not_finite(raw)
+        if found is not None:
+            self.refuse(found[0], f"{found[1]} is not a number that can be used", "give a finite number")
+        return raw
+
+    def _refuse_value(self, message: str) -> NoReturn:
+        """What msgspec found, in the words of the file."""
+        what, _, place = message.partition(" - at `$")
+        place = place.strip("`.")
+        unknown = re.fullmatch(r"Object contains unknown field `(.*)`", what)
+        if unknown:
+            self.refuse(".".join(filter(None, (place, unknown[1]))), "unknown key", "remove it")
+        missing = re.fullmatch(r"Object missing required field `(.*)`", what)
+        if missing:
+            self.refuse(".".join(filter(None, (place, missing[1]))), "this key is missing", "add it")
+        wrong = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", what)
+        if wrong:
+            want = " or ".join(_TYPES.get(name, name) for name in wrong[1].split(" | ") if name != "null")
+            what = f"expected {want}, got {_TYPES.get(wrong[2], wrong[2])}"
+        self.refuse(place, what[:1].lower() + what[1:])
+
+    def beside(self, name: str) -> str:
+        """The path of a scenario that the file names; a name without separator or suffix is a built-in one."""
+        if not (name.endswith(".toml") or "/" in name or "\\" in name):
+            return name
+        return str(PurePath(self.path).parent / name)
+
+    def image(self, name: str) -> str:
+        return str((self.path.parent / name).resolve()) if name else ""
+
+    def _design(self, found: Document) -> Design:
+        try:
+            seeds = seeds_of(str(found.seeds), MOST_RUNS)
+        except ValueError as error:
+            self.refuse("seeds", str(error))
+        factors = [*self._grid(found.grid), *self._factors(found.factor)]
+        draws = self._draws(found.random)
+        design = Design(
+            first_seed=seeds[0],
+            seed_count=len(seeds),
+            factors=tuple(factors),
+            draws=tuple(draws),
+            draw_count=found.random.count if found.random else 1,
+            draw_seed=found.random.seed if found.random else 0,
+        )
+        names = design.names
+        for at, name in enumerate(names):
+            if name in names[:at]:
+                self.refuse(name, "is varied in two ways", "keep one of them")
+        if design.runs > MOST_RUNS:
+            self.refuse("", f"has {design.runs} runs; at most {MOST_RUNS}", "take fewer levels or seeds")
+        return design
+
+    def _grid(self, table: dict[str, Any]) -> Iterator[Factor]:
+        for key, values in _leaves(table, lambda value: not isinstance(value, dict)):
+            place = f"grid.{key}"
+            if key in NOT_VARIED:
+                self.refuse(place, "cannot be varied", "name a key below it, or give seeds = ..")
+            if not isinstance(values, list) or not values:
+                self.refuse(place, f"expected a list of values, got {values!r}", f"write {key} = [..]")
+            levels = [self._level(key, value, f"{place}[{at}]") for at, value in enumerate(values)]
+            if len({repr(level.value) for level in levels}) < len(levels):
+                self.refuse(place, "has a value twice", "a value once is enough: give more seeds")
+            yield Factor(key, _of_one_kind(levels))
+
+    def _level(self, key: str, value: Any, place: str) -> Level:
+        if key not in (SCENARIO, FIRMWARE):
+            shown = value if isinstance(value, Value) else inline(value)
+            return Level(shown, (f"{key}={inline(value)}",), place=place)
+        if not isinstance(value, str):
+            self.refuse(place, f"expected a name or a path, got {value!r}")
+        if key == SCENARIO:
+            return Level(value, scenario=self.beside(value), place=place)
+        return Level(value, firmware=self.image(value) or "own", place=place)
+
+    def _factors(self, table: dict[str, dict[str, list[str]]]) -> Iterator[Factor]:
+        for name, levels in table.items():
+            if not levels:
+                self.refuse(f"factor.{name}", "has no levels", "give each level a list of KEY=VALUE")
+            yield Factor(
+                name,
+                tuple(
+                    Level(level, tuple(settings), place=f"factor.{name}.{level}")
+                    for level, settings in levels.items()
+                ),
+            )
+
+    def _draws(self, random: Random | None) -> list[Draw]:
+        if random is None:
+            return []
+        if not random.range:
+            self.refuse("random.range", "says nothing to draw", "give KEY = { from = .., to = .. }")
+        return [
+            draw_of(key, value, partial(self.refuse, f"random.range.{key}"))
+            for key, value in _leaves(random.range, is_range)
+        ]
+
+
+def _leaves(table: dict[str, Any], ends: Callable[[Any], bool], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Key paths and what stands there; tables inside tables stand for the parts of a path."""
+    for key, value in table.items():
+        if ends(value) or not value:
+            yield f"{above}{key}", value
+        else:
+            yield from _leaves(value, ends, f"{above}{key}.")
+
+
+def _of_one_kind(levels: list[Level]) -> tuple[Level, ...]:
+    """Levels whose values share a column: numbers, truth values, or else text."""
+    kinds = {type(level.value) for level in levels}
+    if len(kinds) == 1:
+        return tuple(levels)
+    if kinds == {int, float}:
+        return tuple(msgspec.structs.replace(level, value=float(level.value)) for level in levels)
+    shown = [level.value if isinstance(level.value, str) else inline(level.value) for level in levels]
+    return tuple(
+        msgspec.structs.replace(level, value=value) for level, value in zip(levels, shown, strict=True)
+    )

@@ -1,0 +1,192 @@
+"""Outcomes while a campaign is under way: a file to which each one is added as soon as it is there.
+
+What belongs here: writing, and reading what a killed process has left. What does not: the finished results (`results`).
+
+    {"mirotwin_campaign":1,"hash":"..","versions":{..},"runs":1000}
+    {"run":0,"verdict":"passed",..}              one line an outcome, in the order in which they came
+
+Each line is handed to the operating system at once, so a process that is killed loses none that it has written; the
+last line may be cut off, and is left out. Once a second the file is written to the disk.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from mirotwin.campaign.versions import Versions
+from mirotwin.campaign.worker import Outcome
+
+FORM = 1
+SYNC_S = 1.0
+_HEAD_BYTES = 1 << 20
+
+
+class Head(msgspec.Struct, frozen=True):
+    """The first line: which campaign the outcomes belong to."""
+
+    mirotwin_campaign: int
+    hash: str
+    versions: Versions
+    runs: int
+
+    def difference(self, other: Head) -> str:
+        """What another campaign has else; "" where it is the same."""
+        if self.mirotwin_campaign != other.mirotwin_campaign:
+            return f"form {other.mirotwin_campaign} of such files instead of {self.mirotwin_campaign}"
+        return self.versions.difference(other.versions) or (
+            "other runs: scenario, keys, seeds, checks or firmware differ" if self.hash != other.hash else ""
+        )
+
+
+def journal_path(results: Path) -> Path:
+    """Where the outcomes of unfinished results stand: noise.part.jsonl for noise.parquet."""
+    return results.with_suffix(".part.jsonl")
+
+
+class Journal:
+    """The outcomes of a campaign, to be added to. `done[run]` is 1 for each run that has one.
+
+    `begin_anew`: what is there is discarded. Raises BadInput for a file of another campaign, or one that is no such
+    file, and if another process writes to it.
+    """
+
+    def __init__(self, path: Path, head: Head, begin_anew: bool = False) -> None:
+        self.path = path
+        self.head = head
+        self.count = 0
+        self.done = bytearray(head.runs)
+        self._synced_s = time.monotonic()
+        self._stream: BinaryIO = path.open("a+b", buffering=0)
+        try:
+            self._lock()
+            if begin_anew:
+                self._stream.truncate(0)
+            self._take_up()
+        except BaseException:
+            self._stream.close()
+            raise
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._stream.close()
+
+    def add(self, outcome: Outcome) -> None:
+        """Writes the outcome of a run; a second one of the same run is left out."""
+        if self.done[outcome.run]:
+            return
+        self._stream.write(msgspec.json.encode(outcome) + b"\n")
+        self._count(outcome.run)
+        now_s = time.monotonic()
+        if now_s - self._synced_s >= SYNC_S:
+            os.fsync(self._stream.fileno())
+            self._synced_s = now_s
+
+    def missing(self) -> Iterator[int]:
+        """Runs without an outcome, from the first one on; what is added meanwhile is not missing."""
+        at = self.done.find(0)
+        while at >= 0:
+            yield at
+            at = self.done.find(0, at + 1)
+
+    def _count(self, run: int) -> None:
+        self.done[run] = 1
+        self.count += 1
+
+    def _take_up(self) -> None:
+        """Reads what an earlier process has left, and cuts off a line that it could not finish."""
+        head, whole = read_head(self.path)
+        if head is None:
+            self._stream.truncate(0)
+            self._stream.write(msgspec.json.encode(self.head) + b"\n")
+            return
+        difference = self.head.difference(head)
+        if difference:
+            what = f"holds the unfinished results of another campaign: {difference}"
+            raise BadInput(self.path, "", what, "choose another file with --out, or begin anew with --force")
+        for outcome, end in outcomes(self.path):
+            if not 0 <= outcome.run < self.head.runs:
+                raise BadInput(
+                    self.path, "", f"has an outcome of run {outcome.run}", "begin anew with --force"
+                )
+            whole = end
+            if not self.done[outcome.run]:
+                self._count(outcome.run)
+        self._stream.truncate(whole)
+
+    def _lock(self) -> None:
+        try:
+            import fcntl
+        except ImportError:  # Windows
+            return
+        try:
+            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            what = "another process is writing to it"
+            raise BadInput(self.path, "", what, "wait, or choose another file with --out") from None
+        except OSError:  # a disk without locks
+            return
+
+
+def read_head(path: Path) -> tuple[Head | None, int]:
+    """The first line and where it ends; None where not even that was written. Raises BadInput for another file."""
+    with path.open("rb") as stream:
+        line = stream.readline(_HEAD_BYTES)
+    if not line.endswith(b"\n") and len(line) < _HEAD_BYTES:
+        if line and not b'{"mirotwin_campaign":'.startswith(line[:21]):
+            raise _no_journal(path)
+        return None, 0
+    try:
+        return msgspec.json.decode(line, type=Head), len(line)
+    except msgspec.DecodeError:
+        raise _no_journal(path) from None
+
+
+def _no_journal(path: Path) -> BadInput:
+    return BadInput(path, "", "is no campaign's file", "choose another file with --out, or take it away")
+
+
+def outcomes(path: Path) -> Iterator[tuple[Outcome, int]]:
+    """Each outcome of the file, and the offset behind it. Raises BadInput for a line that is none."""
+    decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Outcome)
+    with path.open("rb") as stream:
+        end = len(stream.readline())
+        for number, line in enumerate(stream, 2):
+            if not line.endswith(b"\n"):
+                return
+            end += len(line)
+            found: Outcome | None = None
+            with suppress(msgspec.DecodeError):
+                found = decoder.decode(line)
+            if found is None:
+                raise BadInput(path, number, "is no outcome of a run", "begin anew with --force")
+            yield found, end
+
+
+def in_order(path: Path) -> Iterator[Outcome]:
+    """Each run's outcome in the order of the plan; only those are kept that came before their turn."""
+    early: dict[int, Outcome] = {}
+    turn = 0
+    for outcome, _ in outcomes(path):
+        if outcome.run >= turn:
+            early.setdefault(outcome.run, outcome)
+        while turn in early:
+            yield early.pop(turn)
+            turn += 1
+    for run in sorted(early):
+        yield early[run]

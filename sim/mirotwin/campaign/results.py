@@ -1,0 +1,193 @@
+"""Results of a campaign as Parquet files: written at the end in the order of the plan, and read again.
+
+What belongs here: the two files and what they say of themselves. What does not: columns and their types (`columns`),
+outcomes while a campaign is under way (`journal`).
+
+    noise.parquet            every run: the same bytes whichever processes or machines ran it, in whatever order
+    noise.wall.parquet       `run`, `wall_s`: how long each simulation loop took, which differs from time to time
+
+pyarrow is loaded when a file is written or read; it comes with the extra `campaign`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.util import find_spec
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from mirotwin.campaign.columns import CHECK, FIGURES
+from mirotwin.campaign.journal import Head, in_order
+from mirotwin.campaign.plan import Plan
+from mirotwin.campaign.worker import Outcome
+from mirotwin.files.outputs import whole_file
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+ROWS = 10_000
+"""Rows of a group: what is in memory while a file is written."""
+META = b"mirotwin_campaign"
+OPTION = "--out"
+
+
+class About(msgspec.Struct, frozen=True):
+    """What a results file says of itself. `factors`: columns of the design, `drawn`: those of its random part."""
+
+    head: Head
+    campaign: str
+    factors: tuple[str, ...]
+    drawn: tuple[str, ...]
+    checks: tuple[str, ...]
+
+
+def require_arrow() -> None:
+    """Raises BadInput where pyarrow is not installed; does not load it."""
+    if find_spec("pyarrow") is None:
+        raise BadInput("", "pyarrow", "is not installed", "pip install 'mirotwin[campaign]'")
+
+
+def wall_path(results: Path) -> Path:
+    return results.with_suffix(".wall.parquet")
+
+
+def about(plan: Plan, head: Head) -> About:
+    design = plan.design
+    return About(
+        head,
+        Path(plan.file.path).stem,
+        tuple(factor.name for factor in design.factors),
+        tuple(draw.name for draw in design.draws),
+        plan.checks,
+    )
+
+
+def write(plan: Plan, head: Head, journal: Path, results: Path) -> None:
+    """Both files of a campaign whose runs all have an outcome in `journal`. Raises OutputError."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    schema = _schema(plan).with_metadata({META: msgspec.json.encode(about(plan, head))})
+    wall = pa.schema([("run", pa.int64()), ("wall_s", pa.float64())])
+    with (
+        whole_file(wall_path(results), OPTION) as wall_file,
+        whole_file(results, OPTION) as file,
+        pq.ParquetWriter(file, schema, compression="zstd") as rows,
+        pq.ParquetWriter(wall_file, wall, compression="zstd") as walls,
+    ):
+        for group in _groups(in_order(journal)):
+            rows.write_table(_table([_row(plan, one) for one in group], schema))
+            walls.write_table(_table([{"run": one.run, "wall_s": one.wall_s} for one in group], wall))
+
+
+def read(path: str | Path) -> tuple[pa.Table, About]:
+    """The rows of a results file, and what it says of itself. Raises BadInput for any other file."""
+    require_arrow()
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(path)
+    except FileNotFoundError:
+        raise BadInput(path, "", "there is no such file", "give the .parquet file of a campaign") from None
+    except (pa.ArrowException, OSError) as error:
+        reason = f"{error}".partition("\n")[0]
+        raise BadInput(
+            path, "", f"is no Parquet file: {reason}", "give the .parquet file of a campaign"
+        ) from None
+    return table, about_of(path, table.schema.metadata)
+
+
+def counted(path: Path, listed: int) -> dict[str, tuple[int, list[tuple[int, str]]]]:
+    """Verdict -> how many runs have it, and the first ones: number, and what the row says of it."""
+    import pyarrow.parquet as pq
+
+    found: dict[str, tuple[int, list[tuple[int, str]]]] = {}
+    with pq.ParquetFile(path) as file:
+        for batch in file.iter_batches(columns=["run", "verdict", "error", "failure"]):
+            for run, verdict, error, failure in zip(
+                *(column.to_pylist() for column in batch.columns), strict=True
+            ):
+                count, first = found.get(verdict, (0, []))
+                if len(first) < listed:
+                    first.append((run, error or failure))
+                found[verdict] = (count + 1, first)
+    return found
+
+
+def read_about(path: str | Path) -> About:
+    """Only what the file says of itself. Raises BadInput for any other file."""
+    require_arrow()
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return about_of(path, pq.read_schema(path).metadata)
+    except (pa.ArrowException, OSError):
+        raise BadInput(path, "", "is no Parquet file", "choose another file with --out") from None
+
+
+def about_of(path: str | Path, metadata: Mapping[bytes, bytes] | None) -> About:
+    try:
+        return msgspec.json.decode((metadata or {})[META], type=About)
+    except (KeyError, msgspec.DecodeError):
+        what = "is no campaign's results"
+        raise BadInput(
+            path, "", what, "give the .parquet file that `mirotwin campaign` has written"
+        ) from None
+
+
+def _schema(plan: Plan) -> pa.Schema:
+    import pyarrow as pa
+
+    types: dict[type, Any] = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
+    columns: list[tuple[str, Any]] = [("run", pa.int64())]
+    for factor in plan.design.factors:
+        columns.append((factor.name, types[type(factor.levels[0].value)]))
+    for draw in plan.design.draws:
+        columns.append((draw.name, types[_kind(draw.ends())]))
+    if plan.design.draws:
+        columns.append(("draw", pa.int64()))
+    columns.append(("seed", pa.int64()))
+    columns += [(name, pa.string()) for name in ("verdict", "error", "failure", "digest")]
+    columns += [(name, types[kind]) for name, kind in FIGURES.items()]
+    columns += [(CHECK + name, pa.string()) for name in plan.checks]
+    return pa.schema(columns)
+
+
+def _kind(values: Iterable[Any]) -> type:
+    kinds = {type(value) for value in values}
+    if kinds == {int, float}:
+        return float
+    return kinds.pop() if len(kinds) == 1 else str
+
+
+def _row(plan: Plan, outcome: Outcome) -> dict[str, Any]:
+    row: dict[str, Any] = {"run": outcome.run, **plan.varied(outcome.run)}
+    for draw in plan.design.draws:
+        if _kind(draw.ends()) is str:
+            row[draw.name] = f"{row[draw.name]}"
+    row |= {
+        "verdict": outcome.verdict,
+        "error": outcome.error,
+        "failure": outcome.failure,
+        "digest": outcome.digest,
+    }
+    row |= {name: outcome.figures.get(name) for name in FIGURES}
+    return row | {CHECK + name: outcome.checks.get(name) for name in plan.checks}
+
+
+def _table(rows: list[dict[str, Any]], schema: pa.Schema) -> pa.Table:
+    import pyarrow as pa
+
+    columns = [pa.array([row[field.name] for row in rows], field.type) for field in schema]
+    return pa.Table.from_arrays(columns, schema=schema)
+
+
+def _groups(outcomes: Iterator[Outcome]) -> Iterator[list[Outcome]]:
+    while group := list(islice(outcomes, ROWS)):
+        yield group

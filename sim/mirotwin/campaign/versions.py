@@ -1,0 +1,71 @@
+"""What a run's bits depend on besides its job: this program's version and sources, and parts of other distributions.
+
+What belongs here: finding that out, and naming what differs. What does not: the firmware, whose hash a job carries.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from importlib import metadata
+from importlib.util import find_spec
+from pathlib import Path
+
+import msgspec
+
+PACKAGES = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin")
+NOT_OF_RUNS = ("cli", "bridges", "capture", "looking", "reproduce", "starter", "testing")
+"""Rooms of `mirotwin` that no run of a campaign uses."""
+GROUPS = ("mirotwin.laws", "mirotwin.estimators", "mirotwin.references", "mirotwin.checks")
+
+
+class Versions(msgspec.Struct, frozen=True):
+    """`mirotwin`: the version; `code`: hash of its sources; `parts`: distributions that bring laws and so on."""
+
+    mirotwin: str
+    code: str
+    parts: tuple[str, ...] = ()
+
+    def difference(self, other: Versions) -> str:
+        """What another one has else than this, in words; "" where nothing differs."""
+        if self.mirotwin != other.mirotwin:
+            return f"mirotwin {other.mirotwin} instead of {self.mirotwin}"
+        if self.code != other.code:
+            return f"other sources of mirotwin {self.mirotwin} ({other.code} instead of {self.code})"
+        if self.parts != other.parts:
+            return f"{', '.join(other.parts) or 'no'} parts instead of {', '.join(self.parts) or 'none'}"
+        return ""
+
+
+@cache
+def versions() -> Versions:
+    """Those of this process."""
+    try:
+        version = metadata.version("mirotwin")
+    except metadata.PackageNotFoundError:
+        version = "not installed"
+    found = {
+        f"{entry.dist.name} {entry.dist.version}"
+        for group in GROUPS
+        for entry in metadata.entry_points(group=group)
+        if entry.dist is not None
+    }
+    return Versions(version, _code(), tuple(sorted(found)))
+
+
+def _code() -> str:
+    """Twelve digits of the hash over all sources and built-in scenarios that a run may use."""
+    digest = hashlib.sha256()
+    for package in PACKAGES:
+        spec = find_spec(package)
+        assert spec is not None
+        assert spec.origin is not None
+        root = Path(spec.origin).parent
+        files = [path for suffix in ("*.py", "*.pxd", "*.pyx", "*.toml") for path in root.rglob(suffix)]
+        for path in sorted(files, key=lambda path: path.relative_to(root).as_posix()):
+            place = path.relative_to(root)
+            if package == "mirotwin" and place.parts[0] in NOT_OF_RUNS:
+                continue
+            digest.update(f"{package}/{place.as_posix()}\0".encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]

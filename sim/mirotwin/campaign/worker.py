@@ -1,0 +1,109 @@
+"""What a worker gets, does and gives back, wherever it runs: in this process, in another one, on another machine.
+
+What belongs here: the job as it travels, and refusing one that this worker would compute otherwise. What does not: the
+run itself (`single`). Nothing here imports a hot module: a new process reads this file before its engine is chosen.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+from contextlib import suppress
+from functools import cache
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from mirotwin.campaign.versions import Versions, versions
+
+Figure = float | int | bool | str | None
+
+
+class Firmware(msgspec.Struct, frozen=True):
+    """An image by its path ("" for the robot's own), and the hash that its file has to have."""
+
+    path: str
+    sha256: str
+
+
+class Work(msgspec.Struct, frozen=True):
+    """One run: a whole scenario as text, `settings` to make in it, and a seed. `run`: its number in the plan."""
+
+    run: int
+    origin: str
+    text: str
+    settings: tuple[str, ...]
+    seed: int
+    firmware: Firmware
+    engine: str
+    versions: Versions
+
+
+class Outcome(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What came of a run. `verdict`: passed, failed (a check or a step), fault (of the firmware) or error (no run).
+
+    `error`: why there are no figures. `failure`: the first check or step that failed. `checks`: name -> verdict.
+    `wall_s`: the simulation loop. `refused`: by a worker, which `where` names; there is no run then.
+    """
+
+    run: int
+    verdict: str = "error"
+    error: str = ""
+    failure: str = ""
+    digest: str = ""
+    figures: dict[str, Figure] = {}
+    checks: dict[str, str] = {}
+    wall_s: float = 0.0
+    refused: str = ""
+    where: str = ""
+
+
+def work(job: Work) -> Outcome:
+    """Runs a job to its end. Nothing but an outcome comes back, whatever happens to the run."""
+    refused = _refusal(job)
+    if refused:
+        return Outcome(job.run, refused=refused, where=place())
+    from mirotwin.campaign.single import run_single  # loads hot modules
+
+    return run_single(job)
+
+
+def place() -> str:
+    """How a worker is called: its address in a cluster, or host and process."""
+    cluster = sys.modules.get("distributed")  # loaded in a cluster's worker
+    if cluster is not None:
+        with suppress(ValueError):
+            return str(cluster.get_worker().address)
+    return f"{socket.gethostname()} process {os.getpid()}"
+
+
+def _refusal(job: Work) -> str:
+    difference = job.versions.difference(versions())
+    return difference or _engine(job.engine) or _firmware(job.firmware)
+
+
+@cache
+def _engine(name: str) -> str:
+    from miro_exact import engine
+
+    try:
+        engine.select(name)
+    except BadInput as error:
+        return f"{error}"
+    return ""
+
+
+@cache
+def _firmware(wanted: Firmware) -> str:
+    """Why an image cannot be run here; its content does not travel, so it has to be the same file."""
+    from mirotwin.campaign.single import image_of
+
+    try:
+        found = image_of(wanted.path).sha256
+    except (BadInput, OSError) as error:
+        return f"no firmware {wanted.path or 'of its own'}: {error}"
+    if found != wanted.sha256:
+        name = wanted.path or "the robot's own"
+        return f"another firmware ({name}: sha256 {(found or '')[:12]} instead of {wanted.sha256[:12]})"
+    return ""

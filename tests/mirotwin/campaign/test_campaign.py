@@ -1,0 +1,247 @@
+"""A campaign from its file to its results: the same rows whoever runs them, and none is lost."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
+
+from miro_exact.bad_input import BadInput
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.file import load
+from miro_sim.world.world import World
+from mirotwin import campaign
+from mirotwin.campaign import running
+from mirotwin.campaign.journal import journal_path
+from mirotwin.campaign.results import wall_path
+from mirotwin.campaign.workers import Processes
+from mirotwin.report.summary import tracking_of
+from mirotwin.report.track import Tracks
+
+pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """The results of SHORT, made in this process."""
+    path = tmp_path_factory.mktemp("alone") / "short.parquet"
+    campaign.run(plan_of(), path, InThisProcess())
+    return path
+
+
+def test_a_row_says_what_the_run_itself_says(alone):
+    row = rows(alone)[4]
+    settings = ("duration_s=0.3", "network.radio.bit_error_rate=0.01")
+    world, tracks = World(load("fig7", settings).scenario, 4, load_hex(image_path())), Tracks()
+    while not world.finished:
+        tracks.add(world.step())
+    (track,) = tracks.robots.values()
+    tracking, counters = tracking_of(track.errors), world.counters()
+    assert (row["run"], row["seed"], row["network.radio.bit_error_rate"]) == (4, 4, 0.01)
+    assert (row["digest"], row["verdict"], row["error"]) == (tracks.digest, "passed", "")
+    assert (row["rms_position_cm"], row["rms_x_cm"]) == (tracking.rms_position_cm, tracking.rms_x_cm)
+    assert row["frames_accepted"] == counters["link"]["frames_accepted"]
+    assert (row["bit_errors"], row["vision_frames"]) == (
+        counters["link"]["bit_errors"],
+        counters["vision"]["frames"],
+    )
+    assert (row["faults"], row["settled"]) == (0, track.errors[-1].settled)
+    assert row["check.no_fault"] == "passed"
+
+
+def test_results_are_in_the_order_of_the_plan_with_the_last_factor_and_the_seeds_changing_first(alone):
+    found = rows(alone)
+    assert [row["run"] for row in found] == list(range(6))
+    assert [row["network.radio.bit_error_rate"] for row in found] == [0.0] * 3 + [0.01] * 3
+    assert [row["seed"] for row in found] == [3, 4, 5] * 2
+    assert len({row["digest"] for row in found}) == 6
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_processes_write_the_same_bytes(alone, tmp_path, count):
+    path = tmp_path / "short.parquet"
+    tally = campaign.run(plan_of(), path, Processes(count))
+    assert (tally.done, tally.new, tally.runs) == (6, 6, 6)
+    assert path.read_bytes() == alone.read_bytes()
+    assert not journal_path(path).exists()
+
+
+def test_an_executor_of_the_caller_writes_the_same_bytes_and_stays_open(alone, tmp_path):
+    path = tmp_path / "short.parquet"
+    with ThreadPoolExecutor(2) as executor:
+        campaign.run(plan_of(), path, executor)
+        assert executor.submit(len, "ab").result() == 2
+    assert path.read_bytes() == alone.read_bytes()
+
+
+def test_wall_times_are_in_a_file_of_their_own(alone):
+    import pyarrow.parquet as pq
+
+    assert "wall_s" not in campaign.read(alone)[0].column_names
+    walls = pq.read_table(wall_path(alone))
+    assert walls["run"].to_pylist() == list(range(6))
+    assert all(wall_s > 0.0 for wall_s in walls["wall_s"].to_pylist())
+
+
+class Interrupted(Exception):
+    pass
+
+
+@pytest.mark.parametrize("torn", [b"", b'{"run":5,"verd'])
+def test_a_campaign_that_was_broken_off_goes_on_and_makes_no_run_twice(alone, tmp_path, torn):
+    path = tmp_path / "short.parquet"
+
+    def interrupt(tally, outcome):
+        if tally.new == 2:
+            raise Interrupted
+
+    with pytest.raises(Interrupted):
+        campaign.run(plan_of(), path, InThisProcess(), on_outcome=interrupt)
+    assert not path.exists()
+    with journal_path(path).open("ab") as stream:
+        stream.write(torn)
+    tally = campaign.run(plan_of(), path, InThisProcess())
+    assert (tally.done, tally.new) == (6, 4)
+    assert path.read_bytes() == alone.read_bytes()
+
+
+@pytest.mark.parametrize("length", [0, 1, 30, 60])
+def test_a_first_line_that_was_cut_off_is_written_again(alone, tmp_path, length):
+    path = tmp_path / "short.parquet"
+    journal_path(path).write_bytes(
+        b'{"mirotwin_campaign":1,"hash":"0123456789abcdef0123456789abcdef'[:length]
+    )
+    assert campaign.run(plan_of(), path, InThisProcess()).new == 6
+    assert path.read_bytes() == alone.read_bytes()
+
+
+def test_results_that_are_there_are_left_as_they_are(alone):
+    before = alone.stat().st_mtime_ns
+    tally = campaign.run(plan_of(), alone, InThisProcess())
+    assert (tally.done, tally.new, alone.stat().st_mtime_ns) == (6, 0, before)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        SHORT.replace("3-5", "3-6"),
+        SHORT.replace("0.3", "0.4"),
+        SHORT.replace("1e-2", "2e-2"),
+        SHORT + "[expect]\ninside_pitch = true\n",
+        SHORT.replace("fig7", "fig6"),
+    ],
+    ids=["seeds", "setting", "level", "check", "scenario"],
+)
+def test_results_of_another_campaign_are_refused_and_replaced_only_by_force(alone, tmp_path, other):
+    path = tmp_path / "short.parquet"
+    path.write_bytes(alone.read_bytes())
+    with pytest.raises(BadInput, match="holds the results of another campaign: other runs"):
+        campaign.run(plan_of(other), path, InThisProcess())
+    assert path.read_bytes() == alone.read_bytes()
+    if "3-6" in other:
+        campaign.run(plan_of(other), path, InThisProcess(), force=True)
+        assert len(rows(path)) == 8
+
+
+def test_unfinished_results_of_another_campaign_are_refused(tmp_path):
+    path = tmp_path / "short.parquet"
+
+    def interrupt(tally, outcome):
+        raise Interrupted
+
+    with pytest.raises(Interrupted):
+        campaign.run(plan_of(), path, InThisProcess(), on_outcome=interrupt)
+    left = journal_path(path).read_bytes()
+    with pytest.raises(BadInput, match="unfinished results of another campaign"):
+        campaign.run(plan_of(SHORT.replace("3-5", "3-6")), path, InThisProcess())
+    assert journal_path(path).read_bytes() == left
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"text", b"x" * 4000])
+def test_a_file_that_is_no_campaigns_results_is_refused(tmp_path, content):
+    path = tmp_path / "short.parquet"
+    path.write_bytes(content)
+    with pytest.raises(BadInput, match="is no "):
+        campaign.run(plan_of(), path, InThisProcess())
+    assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize("content", [b"text\n", b"{}\n", b'{"run":1}\n{}\n', b"\xff" * 50])
+def test_a_file_that_is_no_campaigns_part_is_refused(tmp_path, content):
+    path = tmp_path / "short.parquet"
+    journal_path(path).write_bytes(content)
+    with pytest.raises(BadInput, match="is no campaign's file"):
+        campaign.run(plan_of(), path, InThisProcess())
+    assert journal_path(path).read_bytes() == content
+
+
+def test_two_processes_do_not_write_to_one_campaign(tmp_path):
+    path = tmp_path / "short.parquet"
+
+    def again(tally, outcome):
+        campaign.run(plan_of(), path, InThisProcess())
+
+    with pytest.raises(BadInput, match="another process is writing to it"):
+        campaign.run(plan_of(), path, InThisProcess(), on_outcome=again)
+
+
+def test_a_run_that_cannot_be_made_is_a_row_with_its_error_and_costs_no_other(tmp_path):
+    text = """
+scenario = "fig7"
+set = { duration_s = 0.1 }
+[grid]
+network.robots = [3, 5]
+network.radio.keyup_s = [0.001, 0.005]
+"""
+    path = tmp_path / "short.parquet"
+    campaign.run(plan_of(text), path, InThisProcess())
+    found = rows(path)
+    assert [row["verdict"] for row in found] == ["passed", "passed", "passed", "error"]
+    assert "do not fit the camera period" in found[3]["error"]
+    assert (found[3]["digest"], found[3]["rms_x_cm"], found[3]["check.no_fault"]) == ("", None, None)
+
+
+def test_ten_million_runs_have_to_be_asked_for(tmp_path):
+    plan = plan_of(SHORT.replace("3-5", "0-4999999"))
+    assert plan.runs == 10_000_000
+    assert plan.work(9_999_999).seed == 4_999_999
+    with pytest.raises(BadInput, match=r"short\.toml: has 10000000 runs"):
+        campaign.run(plan, tmp_path / "short.parquet")
+    assert list(tmp_path.iterdir()) == []
+    running.refuse_many(plan, agreed=True)
+
+
+STEPS = """
+scenario = "silent"
+duration_s = 0.3
+[[step]]
+pause_ms = 40
+[[step]]
+send = "team"
+left_m_s = 0.2
+right_m_s = 0.2
+[[step]]
+expect = "wheels"
+left_m_s = 0.2
+within_ms = WITHIN
+[[step]]
+check = { inside_pitch = true }
+"""
+
+
+@pytest.mark.parametrize(("within_ms", "verdict"), [("60", "passed"), ("0.1", "failed")])
+def test_steps_of_a_scenario_are_done_and_one_that_fails_is_told(tmp_path, within_ms, verdict):
+    (tmp_path / "one.scenario.toml").write_text(STEPS.replace("WITHIN", within_ms))
+    path = tmp_path / "c.parquet"
+    campaign.run(plan_of('scenario = "one.scenario.toml"\n', tmp_path / "c.toml"), path, InThisProcess())
+    (row,) = rows(path)
+    assert row["verdict"] == verdict, row["failure"] + row["error"]
+    assert row["failure"].startswith("step: ") == (verdict == "failed")
+    assert row["check.inside_pitch"] == ("passed" if verdict == "passed" else None)
+    assert row["digest"]
+
+
+def test_without_pyarrow_the_remedy_is_a_line(monkeypatch, tmp_path):
+    monkeypatch.setattr("mirotwin.campaign.results.find_spec", lambda name: None)
+    with pytest.raises(BadInput, match=r"pyarrow: is not installed; pip install 'mirotwin\[campaign\]'"):
+        campaign.run(plan_of(), tmp_path / "short.parquet")

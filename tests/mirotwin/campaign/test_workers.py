@@ -1,0 +1,122 @@
+"""Workers that end, hang behind or are not like this process: a campaign goes on, or ends in a line."""
+
+import os
+import signal
+import threading
+import time
+from concurrent.futures import Executor, Future
+
+import pytest
+from msgspec.structs import replace
+from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
+
+from miro_exact.bad_input import BadInput
+from mirotwin import campaign
+from mirotwin.campaign.drive import Drive
+from mirotwin.campaign.worker import Outcome, work
+from mirotwin.campaign.workers import Processes, Workers
+
+pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """The results of SHORT, made in this process."""
+    path = tmp_path_factory.mktemp("alone") / "short.parquet"
+    campaign.run(plan_of(), path, InThisProcess())
+    return path
+
+
+def killing(job):
+    """Ends its process in run 4, as running out of memory does."""
+    if job.run == 4:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return work(job)
+
+
+def test_a_run_that_ends_its_process_each_time_is_a_row_and_costs_no_other(monkeypatch, tmp_path, alone):
+    monkeypatch.setattr("mirotwin.campaign.drive.work", killing)
+    path = tmp_path / "short.parquet"
+    campaign.run(plan_of(), path, Processes(1))
+    found, whole = rows(path), rows(alone)
+    assert "ended the process that ran it" in found[4]["error"]
+    assert found[4]["verdict"] == "error"
+    assert [*found[:4], *found[5:]] == [*whole[:4], *whole[5:]]
+
+
+def test_a_worker_that_is_killed_in_the_middle_loses_nothing(alone, tmp_path):
+    path = tmp_path / "short.parquet"
+    killed = []
+
+    class Watched(Processes):
+        def start(self):
+            executor = super().start()
+            if not killed:
+
+                def kill():
+                    while not executor._processes:
+                        time.sleep(0.01)
+                    time.sleep(1.0)
+                    process = next(iter(executor._processes.values()))
+                    killed.append(process.pid)
+                    os.kill(process.pid, signal.SIGKILL)
+
+                threading.Thread(target=kill, daemon=True).start()
+            return executor
+
+    text = SHORT.replace("3-5", "0-39")
+    tally = campaign.run(plan_of(text), path, Watched(2))
+    assert killed
+    assert (tally.done, tally.verdicts) == (80, {"passed": 80})
+    whole = {(row["network.radio.bit_error_rate"], row["seed"]): row["digest"] for row in rows(alone)}
+    found = {(row["network.radio.bit_error_rate"], row["seed"]): row["digest"] for row in rows(path)}
+    assert whole.items() <= found.items()
+
+
+def test_workers_that_end_at_once_end_the_campaign_in_a_line(monkeypatch, tmp_path):
+    monkeypatch.setattr("mirotwin.campaign.drive.FRUITLESS", 2)
+
+    class Broken(Processes):
+        def start(self):
+            executor = super().start()
+            executor._broken = "by this test"
+            return executor
+
+    with pytest.raises(BadInput, match="--jobs: workers have ended"):
+        campaign.run(plan_of(), tmp_path / "short.parquet", Broken(1))
+
+
+def test_a_worker_with_another_version_or_firmware_is_refused_by_name(monkeypatch, tmp_path):
+    plan = plan_of()
+    other = replace(plan, versions=replace(plan.versions, mirotwin="0.0.7"))
+    with pytest.raises(BadInput, match=r"worker .* has mirotwin .* instead of 0\.0\.7"):
+        campaign.run(other, tmp_path / "a.parquet", InThisProcess())
+    other = replace(plan, versions=replace(plan.versions, code="0" * 12))
+    with pytest.raises(BadInput, match=r"worker .* has other sources of mirotwin"):
+        campaign.run(other, tmp_path / "b.parquet", InThisProcess())
+    images = {"": replace(plan.images[""], sha256="0" * 64)}
+    with pytest.raises(BadInput, match=r"worker .* has another firmware \(the robot's own: sha256"):
+        campaign.run(replace(plan, images=images), tmp_path / "c.parquet", InThisProcess())
+
+
+def test_at_most_so_many_runs_are_ahead_of_the_first_that_is_missing(monkeypatch):
+    monkeypatch.setattr("mirotwin.campaign.drive.SPREAD", 10)
+    held, handed = Future(), []
+
+    class Holding(Executor):
+        def submit(self, function, run):
+            handed.append(run)
+            if run == 0:
+                return held
+            if run == 9:
+                threading.Timer(0.2, held.set_result, [Outcome(0)]).start()
+            future = Future()
+            future.set_result(Outcome(run))
+            return future
+
+    workers = Workers(Holding())
+    workers.ahead = 4
+    order = [outcome.run for outcome in Drive(lambda run: run, workers).outcomes(range(30))]
+    assert sorted(order) == list(range(30))
+    assert set(order[:9]) == set(range(1, 10))
+    assert order.index(0) == 9
