@@ -28,10 +28,10 @@ class Cluster(Workers):
 
     option = OPTION
 
-    def __init__(self, address: str, patience_s: float = PATIENCE_S) -> None:
+    def __init__(self, address: str) -> None:
         super().__init__()
         self.address = address
-        self.client = _connected(address, patience_s)
+        self.client = _connected(address)
         try:
             threads = self._check()
         except BaseException:
@@ -72,14 +72,14 @@ class Cluster(Workers):
         return threads
 
 
-def _connected(address: str, patience_s: float) -> Any:
+def _connected(address: str) -> Any:
     if find_spec("distributed") is None:
         raise BadInput("", OPTION, "Dask is not installed", "pip install 'mirotwin[cluster]'")
     connect: Any = import_module("distributed").Client  # has no types
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it says is said here, in one line
     try:
-        return connect(address, timeout=patience_s, set_as_default=False)
+        return connect(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         reason = f"{error}".partition("\n")[0] or type(error).__name__
         what = f"no Dask scheduler answers at {address}: {reason}"

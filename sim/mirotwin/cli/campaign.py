@@ -11,6 +11,7 @@ from mirotwin.cli.program import LazyGroup
 
 COMMANDS = {
     "run": "Makes the runs of FILE.toml; `campaign FILE.toml` is short for it.",
+    "show": "Statistics of RESULTS.parquet, alone or against a baseline.",
 }
 
 

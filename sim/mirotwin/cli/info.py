@@ -26,6 +26,8 @@ PACKAGES = (
     "intelhex",
     "pyvcd",
     "tomli-w",
+    "pyarrow",
+    "distributed",
 )
 
 PLAIN_REMEDY = "rebuild with GCC or Clang, and with the Cython of .ci/constraints.txt"

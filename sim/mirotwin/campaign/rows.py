@@ -1,0 +1,136 @@
+"""Rows of a results file as columns of numbers: what statistics are made from.
+
+What belongs here: reading figures out of rows, groups of rows, and pairs of rows that differ in one thing. What does
+not: statistics (`statistics`), and what is better (`comparison`).
+
+Besides the figures of a run there are shares, 1 for a run of which it is true and 0 for another one: `failed`, `fault`,
+`error`, `unsettled` (not within 3 cm and 0.15 rad at the end), and `check.NAME` (that check failed).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from miro_exact.bad_input import BadInput
+from mirotwin.campaign.columns import CHECK, FIGURES
+from mirotwin.campaign.design import Value
+from mirotwin.campaign.inline import inline
+from mirotwin.campaign.results import About, read
+from mirotwin.campaign.statistics import Numbers
+
+VERDICTS = ("failed", "fault", "error")
+UNSETTLED = "unsettled"
+NOT_FIGURES = ("settled",)
+"""Has a share of its own."""
+
+
+class Rows:
+    """The rows of one results file."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        table, about = read(path)
+        self.table = table
+        self.about: About = about
+        self.count: int = table.num_rows
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Columns that say which run a row is, but for the seed."""
+        return (*self.about.factors, *self.about.drawn)
+
+    def metrics(self) -> list[str]:
+        """All that `numbers` knows."""
+        figures = [name for name in FIGURES if name not in NOT_FIGURES]
+        return [*figures, *VERDICTS, UNSETTLED, *(CHECK + name for name in self.about.checks)]
+
+    def check_metric(self, name: str) -> str:
+        """Raises BadInput for a name that is no metric of these rows."""
+        if name not in self.metrics():
+            from miro_sim.scenario.errors import remedy_for_key
+
+            raise BadInput(self.path, "--metric", f"has no {name!r}", remedy_for_key(name, self.metrics()))
+        return name
+
+    def column(self, name: str) -> list[Any]:
+        found: list[Any] = self.table[name].to_pylist()
+        return found
+
+    def numbers(self, name: str) -> Numbers:
+        """One for each row; NaN where a run does not have it."""
+        if name in VERDICTS:
+            return _numbers([verdict == name for verdict in self.column("verdict")])
+        if name == UNSETTLED:
+            return _numbers([None if settled is None else not settled for settled in self.column("settled")])
+        if name.startswith(CHECK):
+            return _numbers([None if one is None else one == "failed" for one in self.column(name)])
+        return _numbers(self.column(name))
+
+    def levels(self, name: str) -> list[Value]:
+        """The values of a factor, in the order of the plan."""
+        return list(dict.fromkeys(self.column(name)))
+
+    def groups(self, by: Sequence[str]) -> dict[tuple[Value, ...], list[int]]:
+        """Values of the factors `by` -> the rows that have them, both in the order of the plan."""
+        for name in by:
+            if name not in self.about.factors:
+                remedy = f"its factors: {', '.join(self.about.factors) or 'none'}"
+                raise BadInput(self.path, "--by", f"has no factor {name!r}", remedy)
+        columns = [self.column(name) for name in by]
+        found: dict[tuple[Value, ...], list[int]] = {}
+        for row in range(self.count):
+            found.setdefault(tuple(column[row] for column in columns), []).append(row)
+        return found
+
+    def keys(self, without: str = "") -> list[Hashable]:
+        """What each row has in common with that of the same run elsewhere: all that is varied, and the seed."""
+        names = sorted(name for name in self.varied if name != without)
+        columns = [self.column(name) for name in (*names, "seed")]
+        return list(zip(*columns, strict=True))
+
+    def two_levels(self, text: str) -> tuple[str, Value, Value]:
+        """FACTOR=A,B, or FACTOR alone where it has two levels. Raises BadInput."""
+        name, equals, values = text.partition("=")
+        if name not in self.about.factors:
+            remedy = f"its factors: {', '.join(self.about.factors) or 'none'}"
+            raise BadInput(self.path, "--compare", f"has no factor {name!r}", remedy)
+        levels = self.levels(name)
+        if not equals and len(levels) == 2:
+            return name, levels[0], levels[1]
+        by_text = {word: level for level in levels for word in (inline(level), f"{level}")}
+        for at in (place for place, char in enumerate(values) if char == ","):
+            first, second = by_text.get(values[:at].strip()), by_text.get(values[at + 1 :].strip())
+            if first is not None and second is not None and first != second:
+                return name, first, second
+        shown = ", ".join(f"{level}" for level in levels)
+        raise BadInput(
+            self.path, "--compare", f"{text!r} names no two levels", f"give {name}=A,B of: {shown}"
+        )
+
+
+def paired(before: Rows, after: Rows) -> list[tuple[int, int]]:
+    """Rows of the same runs in two files. Raises BadInput where there are none."""
+    if sorted(before.varied) != sorted(after.varied):
+        what = f"varies {', '.join(before.varied) or 'nothing'}, not {', '.join(after.varied) or 'nothing'}"
+        raise BadInput(before.path, "", what, "give the results of a campaign with the same factors")
+    places = {key: row for row, key in enumerate(before.keys())}
+    found = [(places[key], row) for row, key in enumerate(after.keys()) if key in places]
+    if not found:
+        what = f"has no run in common with {after.path}"
+        raise BadInput(before.path, "", what, "give results with the same seeds and values")
+    return found
+
+
+def paired_levels(rows: Rows, name: str, first: Value, second: Value) -> list[tuple[int, int]]:
+    """Rows that differ in one factor: those with `first`, and their twins with `second`."""
+    values, keys = rows.column(name), rows.keys(without=name)
+    places = {key: row for row, key in enumerate(keys) if values[row] == first}
+    return [(places[key], row) for row, key in enumerate(keys) if values[row] == second and key in places]
+
+
+def _numbers(values: Sequence[float | bool | None]) -> Numbers:
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)

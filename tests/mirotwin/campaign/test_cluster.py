@@ -1,0 +1,143 @@
+"""A Dask scheduler's workers: the same bytes as everywhere, and who is not like this process is refused by its address."""
+
+import contextlib
+import logging
+import os
+import signal
+import threading
+import time
+
+import pytest
+from click.testing import CliRunner
+from msgspec.structs import replace
+from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of
+
+from miro_exact.bad_input import BadInput
+from mirotwin import campaign
+from mirotwin.campaign import cluster as cluster_module
+from mirotwin.campaign.journal import journal_path
+from mirotwin.campaign.versions import versions
+from mirotwin.cli import main
+
+pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
+distributed = pytest.importorskip("distributed", reason="needs Dask: the extra cluster")
+
+
+@contextlib.contextmanager
+def running(count):
+    """A scheduler with `count` workers, each a process."""
+    with distributed.LocalCluster(
+        n_workers=count,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=None,
+        silence_logs=logging.CRITICAL,
+    ) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def two_workers():
+    with running(2) as found:
+        yield found
+
+
+def test_two_workers_write_the_same_bytes(two_workers, tmp_path):
+    alone, path = tmp_path / "alone.parquet", tmp_path / "short.parquet"
+    campaign.run(plan_of(), alone, InThisProcess())
+    cluster = campaign.Cluster(two_workers.scheduler_address)
+    try:
+        tally = campaign.run(plan_of(), path, cluster)
+    finally:
+        cluster.close()
+    assert (tally.done, tally.new) == (6, 6)
+    assert path.read_bytes() == alone.read_bytes()
+
+
+def test_the_command_hands_its_jobs_to_the_scheduler(two_workers, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.toml").write_text(SHORT)
+    address = two_workers.scheduler_address
+    result = CliRunner().invoke(main, ["campaign", "short.toml", "--cluster", address])
+    assert result.exit_code == 0, result.output
+    assert result.output.startswith("6 runs (6 of them now")
+    here = tmp_path / "here.parquet"
+    campaign.run(campaign.load("short.toml"), here, InThisProcess())
+    assert (tmp_path / "runs/short.parquet").read_bytes() == here.read_bytes()
+
+
+def test_a_worker_that_is_killed_in_the_middle_loses_nothing(tmp_path):
+    text = SHORT.replace("3-5", "0-29")
+    alone, path = tmp_path / "alone.parquet", tmp_path / "short.parquet"
+    campaign.run(plan_of(text), alone, InThisProcess())
+    with running(2) as found:
+        cluster = campaign.Cluster(found.scheduler_address)
+        killed = []
+
+        def kill(tally, outcome):
+            if tally.new == 5:
+                killed.append(cluster.client.submit(os.getpid, pure=False).result())
+                os.kill(killed[0], signal.SIGKILL)
+
+        try:
+            campaign.run(plan_of(text), path, cluster, on_outcome=kill)
+        finally:
+            cluster.close()
+    assert killed
+    assert path.read_bytes() == alone.read_bytes()
+
+
+def test_a_scheduler_that_ends_ends_the_campaign_in_a_line_and_it_goes_on_elsewhere(tmp_path):
+    path = tmp_path / "short.parquet"
+    text = SHORT.replace("3-5", "0-29")
+    with running(1) as found:
+        cluster = campaign.Cluster(found.scheduler_address)
+
+        def end(tally, outcome):
+            if tally.new == 3:
+                threading.Thread(target=found.close, daemon=True).start()
+                time.sleep(0.1)
+
+        with pytest.raises(BadInput, match="--cluster: workers have ended"):
+            campaign.run(plan_of(text), path, cluster, on_outcome=end)
+        cluster.close()
+    there = journal_path(path).read_bytes().count(b"\n") - 1
+    assert there >= 3
+    assert campaign.run(plan_of(text), path, InThisProcess()).new == 60 - there
+
+
+def test_a_worker_with_another_version_is_refused_by_its_address(two_workers, monkeypatch):
+    ours = replace(versions(), mirotwin="0.0.7")
+    monkeypatch.setattr(cluster_module, "versions", lambda: ours)
+    with pytest.raises(BadInput, match=r"--cluster: worker tcp://.* cannot load|worker tcp://"):
+        campaign.Cluster(two_workers.scheduler_address)
+
+
+def test_a_worker_with_another_version_refuses_a_job_by_its_address(two_workers, tmp_path):
+    plan = plan_of()
+    other = replace(plan, versions=replace(plan.versions, code="0" * 12))
+    cluster = campaign.Cluster(two_workers.scheduler_address)
+    try:
+        with pytest.raises(BadInput, match=r"worker tcp://127\.0\.0\.1:\d+: has other sources of mirotwin"):
+            campaign.run(other, tmp_path / "short.parquet", cluster)
+    finally:
+        cluster.close()
+
+
+def test_a_scheduler_without_workers_is_told(tmp_path):
+    with running(0) as found, pytest.raises(BadInput, match="has no workers; start some: dask worker tcp://"):
+        campaign.Cluster(found.scheduler_address)
+
+
+@pytest.mark.parametrize(
+    "address", ["tcp://127.0.0.1:9", "nowhere", "", "tcp://no.such.host.invalid:1", "x://y:1"]
+)
+def test_an_address_where_no_scheduler_answers_is_exit_code_2_with_a_remedy(tmp_path, monkeypatch, address):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cluster_module, "PATIENCE_S", 1)
+    (tmp_path / "short.toml").write_text(SHORT)
+    result = CliRunner().invoke(main, ["campaign", "short.toml", "--cluster", address])
+    assert result.exit_code == 2
+    assert "no Dask scheduler answers at" in result.output
+    assert "start one (dask scheduler), or leave --cluster out" in result.output
+    assert [path.name for path in tmp_path.iterdir()] == ["short.toml"]
