@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from miro_exact.bad_input import BadInput
-from mirotwin.campaign.versions import versions
+from mirotwin.campaign.versions import Versions, versions
 from mirotwin.campaign.workers import AHEAD, Workers
 
 PATIENCE_S = 5
@@ -56,12 +56,13 @@ class Cluster(Workers):
         if not workers:
             what = f"the scheduler at {self.address} has no workers"
             raise BadInput("", OPTION, what, f"start some: dask worker {self.address}")
+        expected = ours()
         found = self.client.run(versions, on_error="return")
         for address, theirs in sorted(found.items()):
             if isinstance(theirs, BaseException):
                 what = f"worker {address} cannot load mirotwin: {theirs}"
                 raise BadInput("", OPTION, what, "install there what runs here")
-            difference = versions().difference(theirs)
+            difference = expected.difference(theirs)
             if difference:
                 raise BadInput(
                     "", OPTION, f"worker {address} has {difference}", "install there what runs here"
@@ -72,6 +73,11 @@ class Cluster(Workers):
         return threads
 
 
+def ours() -> Versions:
+    """What workers have to be like."""
+    return versions()
+
+
 def _connected(address: str) -> Any:
     if find_spec("distributed") is None:
         raise BadInput("", OPTION, "Dask is not installed", "pip install 'mirotwin[cluster]'")
@@ -79,6 +85,8 @@ def _connected(address: str) -> Any:
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it says is said here, in one line
     try:
+        if not address.strip():  # it would start one
+            raise ValueError("the address is empty")
         return connect(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         reason = f"{error}".partition("\n")[0] or type(error).__name__

@@ -22,7 +22,7 @@
     seed = 0
     [random.range]
     host.compute_s = { from = 0.001, to = 0.02 }
-    network.radio.bit_error_rate = { from = 1e-6, to = 1e-3, scale = "log" }
+    network.radio.latency_s = { from = 1e-4, to = 1e-2, scale = "log" }
 
 What belongs here: reading that, and what is wrong with it by itself. What does not: whether the scenario has such keys
 (`plan`).

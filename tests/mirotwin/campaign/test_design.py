@@ -1,0 +1,199 @@
+"""What a campaign file says: its points in their order, its draws, and values as settings write them."""
+
+import contextlib
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.mirotwin.campaign.plans import SHORT, plan_of
+
+from miro_exact.bad_input import BadInput
+from mirotwin import campaign
+from mirotwin.campaign.columns import FIGURES
+from mirotwin.campaign.design import Design, Draw, Factor, Level
+from mirotwin.campaign.file import parse
+from mirotwin.campaign.inline import inline
+from mirotwin.campaign.plan import plan_of as joined
+from mirotwin.campaign.seeds import seeds_of
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "campaign.toml"
+README = Path(campaign.__file__).parent / "README.md"
+
+VALUES = st.recursive(
+    st.booleans()
+    | st.integers(-(10**12), 10**12)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(codec="utf-8"), max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+@given(VALUES)
+def test_a_value_as_a_setting_writes_it_is_read_as_the_same(value):
+    text = inline(value)
+    assert "\n" not in text
+    assert tomllib.loads(f"value = {text}")["value"] == value
+
+
+@given(st.lists(st.integers(1, 4), max_size=3), st.integers(1, 3), st.integers(1, 4), st.data())
+def test_each_run_is_another_combination_in_the_order_of_nested_loops(sizes, draw_count, seed_count, data):
+    factors = tuple(
+        Factor(f"f{at}", tuple(Level(level) for level in range(size))) for at, size in enumerate(sizes)
+    )
+    draws = (Draw("key", 0.0, 1.0),)
+    design = Design(7, seed_count, factors, draws, draw_count, 5)
+    expected = [[]]
+    for size in (*sizes, draw_count, seed_count):
+        expected = [[*one, level] for one in expected for level in range(size)]
+    points = [design.point(run) for run in range(design.runs)]
+    assert [
+        [*(level.value for level in point.levels), point.draw, point.seed - 7] for point in points
+    ] == expected
+    assert all(point.drawn == (draws[0].value(5, point.draw),) for point in points)
+
+
+@pytest.mark.parametrize(
+    ("draw", "holds"),
+    [
+        (Draw("k", 2.0, 5.0), lambda value: 2.0 <= value <= 5.0),
+        (Draw("k", 1e-6, 1e-2, "log"), lambda value: 1e-6 <= value <= 1e-2),
+        (Draw("k", -1.0, 2.0, whole=True), lambda value: value in (-1, 0, 1, 2) and isinstance(value, int)),
+        (Draw("k", choices=("a", "b")), lambda value: value in ("a", "b")),
+    ],
+)
+def test_draws_are_in_their_range_and_reach_all_of_it(draw, holds):
+    values = [draw.value(0, index) for index in range(400)]
+    assert all(map(holds, values))
+    assert values != [draw.value(1, index) for index in range(400)]
+    if draw.whole or draw.choices:
+        assert len(set(values)) == (4 if draw.whole else 2)
+    else:
+        low, high = sorted(values)[20], sorted(values)[379]
+        middle = (draw.low * draw.high) ** 0.5 if draw.scale == "log" else (draw.low + draw.high) / 2
+        assert low < middle < high
+        assert 140 < sum(value < middle for value in values) < 260
+
+
+def test_equal_ratios_are_equally_likely_on_a_log_scale():
+    values = [Draw("k", 1e-6, 1e-2, "log").value(3, index) for index in range(1000)]
+    for low in (1e-6, 1e-5, 1e-4, 1e-3):
+        assert 180 < sum(low <= value < 10 * low for value in values) < 320
+
+
+def test_a_draw_is_shifted_neither_by_another_key_nor_by_more_draws():
+    one = Design(0, 1, draws=(Draw("a", 0.0, 1.0),), draw_count=3)
+    two = Design(0, 1, draws=(Draw("b", 0.0, 9.0), Draw("a", 0.0, 1.0)), draw_count=5)
+    assert [one.point(run).drawn[0] for run in range(3)] == [two.point(run).drawn[1] for run in range(3)]
+
+
+def test_a_drawn_value_gets_into_its_run_and_its_column():
+    plan = plan_of(
+        'scenario = "fig7"\nseeds = "0-1"\n[random]\ncount = 3\n'
+        "[random.range]\nhost.compute_s = { from = 0.001, to = 0.02 }\nhost.word_bits = { from = 9, to = 12, whole = true }\n"
+    )
+    assert plan.runs == 6
+    columns = plan.varied(3)
+    assert columns["draw"] == 1
+    assert columns["seed"] == 1
+    assert plan.work(3).settings == (
+        f"host.compute_s={columns['host.compute_s']!r}",
+        f"host.word_bits={columns['host.word_bits']}",
+    )
+
+
+def test_firmware_and_scenarios_are_factors_too(tmp_path):
+    from miro_robot.firmware import image_path
+
+    (tmp_path / "mine.ihx").write_bytes(image_path().read_bytes())
+    plan = plan_of(
+        'scenario = "fig6"\n[grid]\nscenario = ["fig6", "fig8"]\nfirmware = ["", "mine.ihx"]\n',
+        tmp_path / "c.toml",
+    )
+    works = [plan.work(run) for run in range(4)]
+    assert [work.origin for work in works] == ["fig6", "fig6", "fig8", "fig8"]
+    assert [work.firmware.path for work in works] == ["", str(tmp_path / "mine.ihx")] * 2
+    assert len({work.firmware.sha256 for work in works}) == 1
+    assert plan.varied(1)["firmware"] == "mine.ihx"
+
+
+def test_expectations_of_the_file_are_added_to_those_of_the_scenario():
+    plan = plan_of(SHORT + "[expect]\nsettles_within_s = { within_s = 0.2, position_cm = 2.5 }\n")
+    assert plan.checks[-1] == "settles_within_s"
+    assert "expect.settles_within_s={within_s = 0.2, position_cm = 2.5}" in plan.work(0).settings
+
+
+@pytest.mark.parametrize(
+    ("change", "same"),
+    [
+        (("0.3", "0.30"), True),
+        (("[grid]", "# a comment\n[grid]"), True),
+        (("3-5", "3-4"), False),
+        (("0.3", "0.2"), False),
+        (("[0.0,", "[1e-4,"), False),
+        (("[grid]", "[expect]\ninside_pitch = true\n[grid]"), False),
+    ],
+)
+def test_two_campaigns_are_the_same_when_their_runs_and_checks_are(change, same):
+    assert (plan_of(SHORT.replace(*change)).hash == plan_of().hash) == same
+    assert plan_of(path="elsewhere/other.toml").hash == plan_of().hash
+
+
+def test_the_example_and_the_file_in_the_readme_can_be_run(tmp_path):
+    assert campaign.load(EXAMPLE).runs == 240
+    text = README.read_text().split("```toml\n")[1].split("```")[0].replace('firmware = "mine.ihx"', "")
+    text = text.replace('firmware = ["", "mine.ihx"]', "").replace('scenario = ["fig6", "fig8"]', "")
+    assert campaign.parse(text, tmp_path / "c.toml").runs == 3 * 2 * 200 * 100
+
+
+def test_the_python_of_the_readme_runs(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("pyarrow")
+    monkeypatch.chdir(tmp_path)
+    exec(README.read_text().split("```python\n")[1].split("```")[0], {})
+    assert capsys.readouterr().out.count(",") == 3
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{ from = 2, to = 1 }",
+        "{ from = 0, to = 1, scale = 'log' }",
+        "{ from = 1, to = 2, scale = 'ln' }",
+        "{ from = 0.5, to = 2, whole = true }",
+        "{ from = 1, to = 2, whole = 1 }",
+        "{ from = 1, to = 2, steps = 3 }",
+        "{ from = 1 }",
+        "{ from = 'a', to = 2 }",
+        "{ choose = [] }",
+        "{ choose = [[1]] }",
+        "{ choose = [1], from = 1 }",
+        "{ from = -1.7e308, to = 1.7e308 }",
+        "3",
+        "{}",
+    ],
+)
+def test_what_is_no_range_is_refused_with_its_place(text):
+    document = f'scenario = "fig6"\n[random]\ncount = 1\n[random.range]\nhost.compute_s = {text}\n'
+    with pytest.raises(BadInput, match=r"^c\.toml: random\.range\.host\.compute_s: ") as raised:
+        parse(document, Path("c.toml"))
+    assert "\n" not in str(raised.value)
+
+
+@given(st.text(max_size=80) | st.lists(st.sampled_from(SHORT.split()), max_size=30).map("\n".join))
+def test_any_other_text_is_a_campaign_or_is_refused(text):
+    with contextlib.suppress(BadInput):
+        joined(parse(text, Path("c.toml")))
+
+
+def test_names_of_other_columns_are_no_factors():
+    for name in ("run", "verdict", "check.no_fault", next(iter(FIGURES))):
+        with pytest.raises(BadInput, match="is the name of a column"):
+            plan_of(f'scenario = "fig6"\n[factor."{name}"]\na = []\n')
+
+
+def test_ranges_of_seeds_may_be_as_long_as_is_said():
+    assert len(seeds_of("0-9999999", 10**7)) == 10**7
+    with pytest.raises(ValueError, match="give 1 to 9"):
+        seeds_of("0-9", 9)
