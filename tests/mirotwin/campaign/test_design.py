@@ -92,7 +92,8 @@ def test_a_draw_is_shifted_neither_by_another_key_nor_by_more_draws():
 def test_a_drawn_value_gets_into_its_run_and_its_column():
     plan = plan_of(
         'scenario = "fig7"\nseeds = "0-1"\n[random]\ncount = 3\n'
-        "[random.range]\nhost.compute_s = { from = 0.001, to = 0.02 }\nhost.word_bits = { from = 9, to = 12, whole = true }\n"
+        "[random.range]\nhost.compute_s = { from = 0.001, to = 0.02 }\n"
+        "host.word_bits = { from = 9, to = 12, whole = true }\n"
     )
     assert plan.runs == 6
     columns = plan.varied(3)
