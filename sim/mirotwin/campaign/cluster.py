@@ -52,8 +52,8 @@ class Cluster(Workers):
 
     def _check(self) -> int:
         """Refuses workers that are not like this process, by name; returns how many jobs they do at once."""
-        workers = self.client.scheduler_info(n_workers=-1)["workers"]
-        if not workers:
+        threads_of: dict[str, int] = self.client.nthreads()
+        if not threads_of:
             what = f"the scheduler at {self.address} has no workers"
             raise BadInput("", OPTION, what, f"start some: dask worker {self.address}")
         expected = ours()
@@ -67,10 +67,7 @@ class Cluster(Workers):
                 raise BadInput(
                     "", OPTION, f"worker {address} has {difference}", "install there what runs here"
                 )
-        threads = 0
-        for worker in workers.values():
-            threads += int(worker["nthreads"])
-        return threads
+        return sum(threads_of.values())
 
 
 def ours() -> Versions:

@@ -153,7 +153,7 @@ def read_head(path: Path) -> tuple[Head | None, int]:
         return None, 0
     try:
         return msgspec.json.decode(line, type=Head), len(line)
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, UnicodeDecodeError):
         raise _no_journal(path) from None
 
 
@@ -171,7 +171,7 @@ def outcomes(path: Path) -> Iterator[tuple[Outcome, int]]:
                 return
             end += len(line)
             found: Outcome | None = None
-            with suppress(msgspec.DecodeError):
+            with suppress(msgspec.DecodeError, UnicodeDecodeError):
                 found = decoder.decode(line)
             if found is None:
                 raise BadInput(path, number, "is no outcome of a run", "begin anew with --force")

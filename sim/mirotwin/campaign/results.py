@@ -134,7 +134,7 @@ def read_about(path: str | Path) -> About:
 def about_of(path: str | Path, metadata: Mapping[bytes, bytes] | None) -> About:
     try:
         return msgspec.json.decode((metadata or {})[META], type=About)
-    except (KeyError, msgspec.DecodeError):
+    except (KeyError, msgspec.DecodeError, UnicodeDecodeError):
         what = "is no campaign's results"
         raise BadInput(
             path, "", what, "give the .parquet file that `mirotwin campaign` has written"
@@ -184,7 +184,13 @@ def _row(plan: Plan, outcome: Outcome) -> dict[str, Any]:
 def _table(rows: list[dict[str, Any]], schema: pa.Schema) -> pa.Table:
     import pyarrow as pa
 
-    columns = [pa.array([row[field.name] for row in rows], field.type) for field in schema]
+    columns = []
+    for field in schema:
+        try:
+            columns.append(pa.array([row[field.name] for row in rows], field.type))
+        except (pa.ArrowException, TypeError, OverflowError):
+            what = f"runs {rows[0]['run']} to {rows[-1]['run']} have a value that is no {field.type}"
+            raise BadInput("", field.name, what, "begin anew with --force") from None
     return pa.Table.from_arrays(columns, schema=schema)
 
 

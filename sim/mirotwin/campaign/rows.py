@@ -44,8 +44,9 @@ class Rows:
         return (*self.about.factors, *self.about.drawn)
 
     def metrics(self) -> list[str]:
-        """All that `numbers` knows."""
-        figures = [name for name in FIGURES if name not in NOT_FIGURES]
+        """All that `numbers` knows; results of another version may have fewer."""
+        there = set(self.table.column_names)
+        figures = [name for name in FIGURES if name in there and name not in NOT_FIGURES]
         return [*figures, *VERDICTS, UNSETTLED, *(CHECK + name for name in self.about.checks)]
 
     def check_metric(self, name: str) -> str:
@@ -57,6 +58,9 @@ class Rows:
         return name
 
     def column(self, name: str) -> list[Any]:
+        """The values of a column. Raises BadInput where there is none."""
+        if self.table.column_names.count(name) != 1:
+            raise BadInput(self.path, name, "there is no such column", "run the campaign again")
         found: list[Any] = self.table[name].to_pylist()
         return found
 
@@ -68,7 +72,12 @@ class Rows:
             return _numbers([None if settled is None else not settled for settled in self.column("settled")])
         if name.startswith(CHECK):
             return _numbers([None if one is None else one == "failed" for one in self.column(name)])
-        return _numbers(self.column(name))
+        try:
+            return _numbers(self.column(name))
+        except (TypeError, ValueError) as error:
+            if isinstance(error, BadInput):
+                raise
+            raise BadInput(self.path, name, "holds no numbers", "run the campaign again") from None
 
     def levels(self, name: str) -> list[Value]:
         """The values of a factor, in the order of the plan."""

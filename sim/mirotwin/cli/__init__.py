@@ -13,7 +13,7 @@ COMMANDS = {
     "run": "Runs a scenario and writes its files.",
     "serve": "Offers the robot's radio as PTY, TCP and RFC 2217 ports.",
     "reproduce": "Runs the paper's figures again and writes one page about them.",
-    "campaign": "Runs a scenario thousands of times, varied, and compares the results.",
+    "campaign": "Runs a scenario many times, varied, and compares.",
     "look": "Draws what the camera sees and what the tracker makes of it.",
     "calibrate": "Finds a camera's parameters from control points.",
     "track": "Finds robots in pictures of your own, or in recorded ones.",

@@ -28,7 +28,7 @@ class CampaignGroup(LazyGroup):
     cls=CampaignGroup,
     modules="mirotwin.cli.campaign_",
     commands_about=COMMANDS,
-    short_help="Runs a scenario thousands of times, varied, and compares the results.",
+    short_help="Runs a scenario many times, varied, and compares.",
 )
 def campaign() -> None:
     """Runs a scenario over seeds and values of its keys, and says what came of it.

@@ -39,7 +39,7 @@ class SeedRange(click.ParamType[range]):
             self.fail(str(error), param, ctx)
 
 
-@click.command(short_help="Makes the runs of FILE.toml.")
+@click.command(short_help="Makes the runs of FILE.toml; `campaign FILE.toml` is short for it.")
 @click.argument("file", type=Place(path_type=Path))
 @click.option("--out", type=Place(path_type=Path), help="Results. Default: runs/FILE.parquet.")
 @click.option("--seeds", type=SeedRange(), help="First and last seed, instead of those of the file.")

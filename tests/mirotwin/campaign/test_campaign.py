@@ -175,6 +175,30 @@ def test_a_file_that_is_no_campaigns_part_is_refused(tmp_path, content):
     assert journal_path(path).read_bytes() == content
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (b"\xff\xfe{}\n", "is no outcome of a run"),
+        (b'{"run":"\xff"}\n', "is no outcome of a run"),
+        (b'{"run":6}\n', "has an outcome of run 6"),
+        (b'{"run":5,"figures":{"faults":"none"}}\n', "faults: runs 0 to 5 have a value that is no int64"),
+    ],
+)
+def test_a_line_that_is_no_outcome_is_refused(tmp_path, line, words):
+    path = tmp_path / "short.parquet"
+
+    def interrupt(tally, outcome):
+        raise Interrupted
+
+    with pytest.raises(Interrupted):
+        campaign.run(plan_of(), path, InThisProcess(), on_outcome=interrupt)
+    with journal_path(path).open("ab") as stream:
+        stream.write(line)
+    with pytest.raises(BadInput, match=words):
+        campaign.run(plan_of(), path, InThisProcess())
+    assert not path.exists()
+
+
 def test_two_processes_do_not_write_to_one_campaign(tmp_path):
     path = tmp_path / "short.parquet"
 

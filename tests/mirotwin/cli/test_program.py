@@ -8,6 +8,7 @@ from tests import children
 
 from miro_sim.scenario.file import builtin_text
 from mirotwin.cli import COMMANDS
+from mirotwin.cli.campaign import COMMANDS as CAMPAIGN_COMMANDS
 from mirotwin.cli.fw import COMMANDS as FW_COMMANDS
 
 
@@ -64,6 +65,13 @@ def test_help_loads_click_and_nothing_that_is_slow() -> None:
         "mirotwin.cli",
         "mirotwin.cli.program",
     ]
+
+
+@pytest.mark.parametrize("name", CAMPAIGN_COMMANDS)
+def test_the_list_of_campaign_says_of_a_command_what_it_says_itself(name):
+    command = getattr(import_module(f"mirotwin.cli.campaign_{name}"), name)
+    assert command.get_short_help_str(limit=200) == CAMPAIGN_COMMANDS[name]
+    assert command.name == name
 
 
 @pytest.mark.parametrize("name", FW_COMMANDS)

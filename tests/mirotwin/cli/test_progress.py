@@ -39,3 +39,16 @@ def test_otherwise_nothing_is_drawn(
     monkeypatch: pytest.MonkeyPatch, screen: io.StringIO, patience_s: float, quiet: bool
 ) -> None:
     assert drawn(monkeypatch, screen, patience_s, quiet) == ""
+
+
+def test_what_is_counted_is_shown_with_its_rate_and_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    monkeypatch.setattr(sys, "stderr", screen := Screen())
+    monkeypatch.setattr(progress, "PATIENCE_S", 0.0)
+    now_s = [100.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now_s[0])
+    with ProgressBar("noise.toml", 1000, unit="runs", begun=200) as bar:
+        now_s[0] += 10.0
+        bar.to(240)
+    assert "4.0 runs/s, 0:03:10 left" in screen.getvalue()
