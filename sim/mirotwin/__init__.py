@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from miro_sim.world.events import Event as Event
     from miro_sim.world.waits import WaitExpired as WaitExpired
     from miro_sim.world.world import World as World
+    from mirotwin import campaign as campaign
     from mirotwin import recording as recording
     from mirotwin import replay as replay
     from mirotwin import testing as testing
@@ -62,6 +63,7 @@ _PLACES = {
     "Transmission": "miro_protocol.transmission:Transmission",
     "WaitExpired": "miro_sim.world.waits:WaitExpired",
     "World": "miro_sim.world.world:World",
+    "campaign": "mirotwin.campaign",
     "case_of_checks": "mirotwin.cases.case:case_of_checks",
     "conditions": "miro_sim.world.conditions",
     "frames": "miro_protocol.frames",
@@ -96,6 +98,7 @@ __all__ = [
     "Transmission",
     "WaitExpired",
     "World",
+    "campaign",
     "case_of_checks",
     "conditions",
     "frames",

@@ -111,11 +111,13 @@ class Journal:
     def _take_up(self) -> None:
         """Reads what an earlier process has left, and cuts off a line that it could not finish."""
         head, whole = read_head(self.path)
-        if head is None:
+        difference = "" if head is None else self.head.difference(head)
+        if head is None or (
+            difference and next(outcomes(self.path), None) is None
+        ):  # there is nothing to lose
             self._stream.truncate(0)
             self._stream.write(msgspec.json.encode(self.head) + b"\n")
             return
-        difference = self.head.difference(head)
         if difference:
             what = f"holds the unfinished results of another campaign: {difference}"
             raise BadInput(self.path, "", what, "choose another file with --out, or begin anew with --force")

@@ -66,6 +66,7 @@ def run(
     head = head_of(plan)
     path.parent.mkdir(parents=True, exist_ok=True)
     if not force and complete(path, head):
+        journal_path(path).unlink(missing_ok=True)  # left by a process that ended before it was taken away
         return Tally(plan.runs, plan.runs)
     workers = executor if isinstance(executor, Workers) else Workers(executor) if executor else Processes()
     check_file(path, "--out")

@@ -12,7 +12,7 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin import campaign
 from mirotwin.campaign import running
-from mirotwin.campaign.journal import journal_path
+from mirotwin.campaign.journal import Journal, journal_path
 from mirotwin.campaign.results import wall_path
 from mirotwin.campaign.workers import Processes
 from mirotwin.report.summary import tracking_of
@@ -155,6 +155,13 @@ def test_unfinished_results_of_another_campaign_are_refused(tmp_path):
     with pytest.raises(BadInput, match="unfinished results of another campaign"):
         campaign.run(plan_of(SHORT.replace("3-5", "3-6")), path, InThisProcess())
     assert journal_path(path).read_bytes() == left
+
+
+def test_unfinished_results_without_a_single_outcome_are_in_nobodys_way(tmp_path):
+    path = tmp_path / "short.parquet"
+    other = plan_of(SHORT.replace("3-5", "3-6"))
+    Journal(journal_path(path), running.head_of(other)).close()
+    assert campaign.run(plan_of(), path, InThisProcess()).new == 6
 
 
 @pytest.mark.parametrize("content", [b"", b"PAR1", b"text", b"x" * 4000])

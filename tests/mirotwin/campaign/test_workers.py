@@ -2,14 +2,17 @@
 
 import os
 import signal
+import sys
 import threading
 import time
 from concurrent.futures import Executor, Future
 
 import pytest
 from msgspec.structs import replace
+from tests import children
 from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
 
+from miro_exact import engine
 from miro_exact.bad_input import BadInput
 from mirotwin import campaign
 from mirotwin.campaign.drive import Drive
@@ -97,6 +100,35 @@ def test_a_worker_with_another_version_or_firmware_is_refused_by_name(monkeypatc
     images = {"": replace(plan.images[""], sha256="0" * 64)}
     with pytest.raises(BadInput, match=r"worker .* has another firmware \(the robot's own: sha256"):
         campaign.run(replace(plan, images=images), tmp_path / "c.parquet", InThisProcess())
+
+
+def test_a_worker_loads_no_hot_module_before_its_engine_is_chosen():
+    script = (
+        "import sys, mirotwin.campaign.worker, mirotwin.campaign.processes\n"
+        "from miro_exact import engine\n"
+        "print(sorted(set(engine.install().sources) & set(sys.modules)))"
+    )
+    done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_the_uncompiled_engine_writes_the_same_bytes(tmp_path):
+    (tmp_path / "short.toml").write_text(SHORT.replace("3-5", "3").replace("0.3", "0.07"))
+    command = [
+        sys.executable,
+        "-c",
+        "from mirotwin.entry import main; main()",
+        "campaign",
+        "short.toml",
+        "-q",
+    ]
+    for name in ("compiled", "python"):
+        if name == engine.active() or name == "python":
+            words = [*command, "--jobs", "1", "--engine", name, "--out", f"{name}.parquet"]
+            children.run(words, cwd=tmp_path, check=True)
+    assert (tmp_path / f"{engine.active()}.parquet").read_bytes() == (
+        tmp_path / "python.parquet"
+    ).read_bytes()
 
 
 def test_at_most_so_many_runs_are_ahead_of_the_first_that_is_missing(monkeypatch):
