@@ -19,7 +19,7 @@ from mirotwin.campaign.plan import plan_of as joined
 from mirotwin.campaign.seeds import seeds_of
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "campaign.toml"
-README = Path(campaign.__file__).parent / "README.md"
+README = Path(__file__).parents[3] / "sim" / "mirotwin" / "campaign" / "README.md"
 
 VALUES = st.recursive(
     st.booleans()

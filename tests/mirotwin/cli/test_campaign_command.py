@@ -1,10 +1,12 @@
 """`mirotwin campaign`: what it says, its exit codes, and what it refuses."""
 
+import contextlib
 import json
 import os
 import signal
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -145,17 +147,38 @@ def test_a_run_with_an_error_is_exit_code_2_and_the_others_are_there(here):
     assert len(rows(here / "runs/c.parquet")) == 4
 
 
+def children_of(parent):
+    """Processes that a process has started; none where there is no /proc."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            if int(entry.read_text().rpartition(")")[2].split()[1]) == parent:
+                found.append(int(entry.parent.name))
+    return found
+
+
+def runs(process):
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 def test_a_campaign_that_is_killed_goes_on_and_ends_with_the_same_bytes(here):
     (here / "short.toml").write_text(SHORT.replace("3-5", "0-19"))
     command = [sys.executable, "-c", "from mirotwin.entry import main; main()", "campaign", "short.toml"]
-    process = children.start([*command, "--jobs", "1", "-q"], start_new_session=True)
+    process = children.start([*command, "--jobs", "1", "-q"])
     part = journal_path(here / "runs/short.parquet")
     deadline_s = time.monotonic() + 60
     while not part.exists() or part.read_bytes().count(b"\n") < 4:
         assert time.monotonic() < deadline_s
         time.sleep(0.01)
-    os.killpg(process.pid, signal.SIGKILL)
+    workers = children_of(process.pid)
+    os.kill(process.pid, signal.SIGKILL)
     process.wait()
+    while any(map(runs, workers)):  # they have nobody left to work for
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
     left = part.read_bytes().count(b"\n") - 1
     assert 3 <= left < 40
     result = called("short.toml", "--jobs", 1)
