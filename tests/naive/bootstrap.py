@@ -3,7 +3,7 @@
 What belongs here: plain loops. What does not: anything of `mirotwin.campaign.statistics`, which it is compared with.
 """
 
-import numpy as np
+from miro_exact.rng import Stream
 
 RESAMPLES = 2000
 
@@ -25,10 +25,10 @@ def mean(numbers):
 
 
 def resampled(numbers):
-    """2000 lists of as many numbers, each drawn from 32 bits of Philox."""
-    source = np.random.Philox(key=0)
-    for _ in range(RESAMPLES):
-        words = [int(source.random_raw()) >> 32 for _ in numbers]
+    """2000 lists of as many numbers, each drawn from 32 bits of one stream."""
+    stream = Stream(0, "campaign bootstrap")
+    for number in range(RESAMPLES):
+        words = [stream.u32(number * len(numbers) + at) for at in range(len(numbers))]
         yield [numbers[word * len(numbers) >> 32] for word in words]
 
 

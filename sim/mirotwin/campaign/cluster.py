@@ -67,7 +67,10 @@ class Cluster(Workers):
                 raise BadInput(
                     "", OPTION, f"worker {address} has {difference}", "install there what runs here"
                 )
-        return sum(threads_of.values())
+        threads = 0
+        for count in threads_of.values():
+            threads += count
+        return threads
 
 
 def ours() -> Versions:

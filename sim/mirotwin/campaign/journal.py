@@ -12,7 +12,6 @@ last line may be cut off, and is left out. Once a second the file is written to 
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -23,6 +22,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from mirotwin.campaign.versions import Versions
+from mirotwin.campaign.wall import now_s
 from mirotwin.campaign.worker import Outcome
 
 FORM = 1
@@ -64,7 +64,7 @@ class Journal:
         self.head = head
         self.count = 0
         self.done = bytearray(head.runs)
-        self._synced_s = time.monotonic()
+        self._synced_s = now_s()
         self._stream: BinaryIO = path.open("a+b", buffering=0)
         try:
             self._lock()
@@ -92,10 +92,9 @@ class Journal:
             return
         self._stream.write(msgspec.json.encode(outcome) + b"\n")
         self._count(outcome.run)
-        now_s = time.monotonic()
-        if now_s - self._synced_s >= SYNC_S:
+        if now_s() - self._synced_s >= SYNC_S:
             os.fsync(self._stream.fileno())
-            self._synced_s = now_s
+            self._synced_s = now_s()
 
     def missing(self) -> Iterator[int]:
         """Runs without an outcome, from the first one on; what is added meanwhile is not missing."""

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 
 from miro_exact import engine
+from mirotwin.campaign.wall import end_with_parent
 
 
 def processes(count: int) -> ProcessPoolExecutor:
@@ -42,16 +42,8 @@ def cores() -> int:
 def _begin(chosen: str) -> None:
     """In a new process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     engine.select(chosen)
-
-
-def _end_with_parent() -> None:
-    """A process whose parent was killed would wait for jobs for ever."""
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _nothing() -> None:

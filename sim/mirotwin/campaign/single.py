@@ -8,7 +8,6 @@ A process keeps images, and scenarios with their settings, so that a run costs l
 
 from __future__ import annotations
 
-import time
 from functools import lru_cache
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.campaign.columns import figures_of
+from mirotwin.campaign.wall import now_s
 from mirotwin.campaign.worker import Outcome, Work
 from mirotwin.checks.expect import Place, expectations_of
 from mirotwin.checks.interface import Check
@@ -79,9 +79,9 @@ def _run(job: Work) -> Outcome:
     checks = Checks(world, found.expected)
     player = Player(world, found.steps, job.origin) if found.steps else None
     tracks = Tracks()
-    began_s = time.perf_counter()
+    began_s = now_s()
     _move(world, player, tracks)
-    wall_s = time.perf_counter() - began_s
+    wall_s = now_s() - began_s
     checks.finish()
     summary = summarise(
         scenario=found.scenario.name,

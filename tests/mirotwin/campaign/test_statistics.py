@@ -8,8 +8,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.naive import bootstrap
 
+from miro_exact.rng import Stream
 from mirotwin.campaign.comparison import Difference
-from mirotwin.campaign.statistics import Interval, draws, figures, mean, mean_interval, quantile
+from mirotwin.campaign.statistics import (
+    STREAM,
+    Interval,
+    _words,
+    draws,
+    figures,
+    mean,
+    mean_interval,
+    quantile,
+)
 
 NUMBERS = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=12)
 
@@ -43,6 +53,12 @@ def test_the_median_is_that_of_the_standard_library():
 
 def test_of_no_numbers_there_are_no_figures():
     assert figures(np.array([])) is None
+
+
+@given(st.integers(0, 10**12), st.integers(1, 40))
+def test_words_are_those_of_the_stream(first, count):
+    stream = Stream(0, STREAM)
+    assert _words(first, count).tolist() == [stream.u32(first + at) for at in range(count)]
 
 
 def test_draws_are_the_same_each_time_and_reach_every_place():

@@ -113,7 +113,7 @@ def test_a_worker_loads_no_hot_module_before_its_engine_is_chosen():
 
 
 def test_the_uncompiled_engine_writes_the_same_bytes(tmp_path):
-    (tmp_path / "short.toml").write_text(SHORT.replace("3-5", "3").replace("0.3", "0.07"))
+    (tmp_path / "short.toml").write_text(SHORT.replace("3-5", "3").replace("0.3", "0.04"))
     command = [
         sys.executable,
         "-c",
