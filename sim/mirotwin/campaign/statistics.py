@@ -22,6 +22,8 @@ RESAMPLES = 2000
 LOW, HIGH = 0.025, 0.975
 STREAM = "campaign bootstrap"
 """Of seed 0."""
+BATCH = 100_000
+"""Words that are drawn at once."""
 _TAG = hashlib.sha256(STREAM.encode()).digest()
 _HALF, _WORD = np.uint64(32), np.uint64(0xFFFFFFFF)
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -61,9 +63,10 @@ def mean(numbers: Numbers) -> float:
 
 def draws(size: int, count: int = RESAMPLES) -> Iterator[npt.NDArray[np.int64]]:
     """`count` sets of `size` places from 0 to `size` - 1, each place as likely as any other."""
-    for number in range(count):
-        words = _words(number * size, size)
-        yield (words * np.uint64(size) >> _HALF).astype(np.int64)
+    together = max(1, BATCH // size)
+    for number in range(0, count, together):
+        words = _words(number * size, min(together, count - number) * size)
+        yield from (words * np.uint64(size) >> _HALF).astype(np.int64).reshape(-1, size)
 
 
 def _words(first: int, count: int) -> npt.NDArray[np.uint64]:
