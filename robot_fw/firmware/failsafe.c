@@ -3,7 +3,7 @@
  * What belongs here: Timer 1 as the tick, the 150, 110 and 500 ms of protocol/README.md. What does not: how to stop (motion.c).
  *
  * Every fresh frame restarts Timer 1, so the age does not depend on where the frame fell between two ticks. It counts
- * from the frame's last character, not from the end of its decoding, and it runs ahead by the time that the command to
+ * from the frame's last character, not from when the robot comes to it, and it runs ahead by the time that the command to
  * stop takes: the wheels are told to stop 110 ms after that character, not later.
  */
 
@@ -19,14 +19,9 @@
 #define RELOAD          (65536UL - CYCLES_PER_MS)
 #define AGE_MAX         1000
 
-/* Cycles from a frame's last character to failsafe_fresh(), and from failsafe_tick() to the STT of a stop. */
-#define DECODING_3      2200
-#define DECODING_5      3300
+/* Cycles from failsafe_tick() to the STT of a stop, and from the look at Timer 0 to that at Timer 1. */
 #define STOPPING        600
-/* What the age is when a frame turns out to be fresh: a full millisecond and a part of the next. */
-#define AGE_AT_RESTART  1
-#define FIRST_TICK_3    (65536UL - 2 * CYCLES_PER_MS + DECODING_3 + STOPPING)
-#define FIRST_TICK_5    (65536UL - 2 * CYCLES_PER_MS + DECODING_5 + STOPPING)
+#define LOOKING         100
 
 u16 frames_accepted, frames_stale;
 u8 last_hdr;
@@ -37,26 +32,47 @@ u8 ticks_taken;
 static u16 age;                     /* ms since the last fresh frame, stays at AGE_MAX */
 static __bit heard;                 /* there was one */
 
-static u16 first_tick(void)
+/* What the clock shows `LOOKING + STOPPING` and the decoding after a frame's last character: whole milliseconds, and
+ * what Timer 1 then shows. */
+static u8 spent_ms;
+static u16 spent_from;
+
+/* The time since the last character of the frame that was just found valid. Timer 0 counts from the last character at all
+ * (uart.c); those that came behind the frame follow it without a gap, or nearly so. */
+static void look_back(void)
 {
-    return robots == 3 ? FIRST_TICK_3 : FIRST_TICK_5;
+    u8 behind, high, low;
+    u16 cycles;
+
+    do {
+        behind = rx_count;
+        high = TH0;
+        low = TL0;
+    } while (high != TH0 || behind != rx_count);
+    cycles = (u16)high << 8 | low;
+    cycles += SPACING_MAX + LOOKING + STOPPING;
+    for (behind -= rx_taken; behind; --behind)
+        cycles += SPACING_NOMINAL;
+    spent_ms = 0;
+    for (; cycles >= CYCLES_PER_MS; cycles -= CYCLES_PER_MS)
+        ++spent_ms;
+    spent_from = RELOAD + cycles;
 }
 
 static void restart(void)
 {
-    u16 first = first_tick();
-
     TR1 = 0;
     TF1 = 0;
-    TL1 = first & 0xFF;
-    TH1 = first >> 8;
+    TL1 = spent_from & 0xFF;
+    TH1 = spent_from >> 8;
     ticks_taken = ticks;
-    age = AGE_AT_RESTART;
+    age = spent_ms;
     TR1 = 1;
 }
 
 void failsafe_start(void)
 {
+    spent_from = RELOAD;
     restart();
     ET1 = 1;
 }
@@ -66,7 +82,7 @@ void failsafe_start(void)
 static bool fresh_again(void)
 {
     u8 before, waiting, high, low;
-    u16 whole, first = first_tick();
+    u16 whole;
 
     do {
         before = ticks;
@@ -75,9 +91,10 @@ static bool fresh_again(void)
         high = TH1;
         low = TL1;
     } while (high != TH1 || before != ticks);
-    if (whole != FRESH_AGAIN_MS + AGE_AT_RESTART)
-        return whole > FRESH_AGAIN_MS + AGE_AT_RESTART;
-    return ((u16)high << 8 | low) >= first;
+    whole -= spent_ms;
+    if (whole != FRESH_AGAIN_MS)
+        return whole > FRESH_AGAIN_MS;
+    return ((u16)high << 8 | low) >= spent_from;
 }
 
 /* Whether the valid frame in `body` is fresh; if so it restarts the failsafe. */
@@ -85,6 +102,7 @@ bool failsafe_fresh(void)
 {
     u8 step = (HDR - last_hdr) & SEQ_MASK;
 
+    look_back();
     if (heard && (!step || (step > FRESH_STEPS && !fresh_again()))) {
         ++frames_stale;
         return false;

@@ -143,8 +143,8 @@ def _at_once(host: Host) -> None:
 
 
 def _in_the_window(host: Host) -> None:
-    host.frame(1, 1, bytes([2, 0]))
-    host.tick += 19 * _UART_SAMPLE_TICKS
+    host.frame(1, 1, bytes([0, 0]))
+    host.tick += 28 * _UART_SAMPLE_TICKS
     host.bytes(b"\0")
     host.pause(20)
     host.team(4, 1000, 1000)

@@ -116,11 +116,11 @@ _FRESHNESS = (
     Planted(
         "takes a host back after 160 ms",
         "failsafe.c",
-        """    if (whole != FRESH_AGAIN_MS + AGE_AT_RESTART)
-        return whole > FRESH_AGAIN_MS + AGE_AT_RESTART;
+        """    if (whole != FRESH_AGAIN_MS)
+        return whole > FRESH_AGAIN_MS;
 """,
-        """    if (whole != FRESH_AGAIN_MS + 10 + AGE_AT_RESTART)
-        return whole > FRESH_AGAIN_MS + 10 + AGE_AT_RESTART;
+        """    if (whole != FRESH_AGAIN_MS + 10)
+        return whole > FRESH_AGAIN_MS + 10;
 """,
         "Other numbers become fresh 10 ms late.",
     ),

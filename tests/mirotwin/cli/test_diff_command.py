@@ -10,7 +10,7 @@ import pytest
 from tests.mirotwin.checks.rig import own_image
 from tests.mirotwin.cli.conftest import SHORT, Result
 from tests.mirotwin.cli.test_replay_command import rewritten
-from tests.mirotwin.replay.rig import Planted
+from tests.mirotwin.replay.rig import STOP_AT, Planted
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.firmware import image_path
@@ -46,7 +46,7 @@ def with_stop_after(ms: int) -> str:
     lines = []
     for line in image_path().read_text().splitlines():
         data = bytearray.fromhex(line[1:])
-        at = 0x045E - (data[1] << 8 | data[2])
+        at = STOP_AT - (data[1] << 8 | data[2])
         if data[3] == 0 and 0 <= at < data[0]:
             assert data[4 + at] == 110
             data[4 + at] = ms
@@ -121,7 +121,7 @@ def test_two_firmwares_are_compared_by_hash_byte_and_instruction(
     command = ("diff", tmp_path / "a" / "run.mcap", tmp_path / "b" / "run.mcap", "--compare", "commands")
     code, out, err = mirotwin(*command)
     assert code == 4
-    assert "firmware code, the first of 1 bytes  6Eh at 0x045e in _failsafe_tick+23" in out
+    assert f"firmware code, the first of 1 bytes  6Eh at 0x{STOP_AT:04x} in _failsafe_tick+23" in out
     assert "the first changed instruction that is executed: net0/robot0: A tick " in err
     assert "failsafe.c:" in err
     assert "B tick " in err

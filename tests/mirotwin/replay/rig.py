@@ -29,8 +29,8 @@ radio = { bit_error_rate = 0.0 }
 slot = 1
 reference.kind = "line"
 """
-STOP_AT = 0x045E
-"""The operand of `age == FAILSAFE_STOP_MS` in the robot's own image."""
+STOP_AT = own_image().code.index(b"\x74\x6e", own_image().symbols.names["_failsafe_tick"].address) + 1
+"""The operand of `age == FAILSAFE_STOP_MS` in the robot's own image: MOV A,#110."""
 
 
 @cache
@@ -92,7 +92,7 @@ BUILDS = {
     ),
     "slower": (
         *("telemetry.c", "        return;\n    begin();"),
-        '        return;\n    for (low = 200; low; --low) {\n        __asm__("nop");\n    }\n    begin();',
+        '        return;\n    for (low = 120; low; --low) {\n        __asm__("nop");\n    }\n    begin();',
     ),
 }
 

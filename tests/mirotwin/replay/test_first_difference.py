@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.mirotwin.checks.rig import own_image
 from tests.mirotwin.replay.rig import Planted, planted_world, scenario, world
 
 import mirotwin
@@ -14,6 +15,7 @@ from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
 from mirotwin.replay import first_difference
 
+LAST_LEFT = own_image().symbols.names["_last_left"].address
 BODY = "networks[0].robots[0].board.plant.body"
 
 
@@ -42,11 +44,11 @@ def test_two_runs_of_the_same_never_differ() -> None:
 
 
 def test_a_bit_in_ram_is_named_by_tick_address_and_variable() -> None:
-    found = first_difference(world(), planted_world(1_234_567, flipped(0x2D)))
+    found = first_difference(world(), planted_world(1_234_567, flipped(LAST_LEFT + 1)))
     assert found is not None
     assert (found.tick, found.period) == (1_234_567, 1)
     (field,) = found.fields
-    assert field.path == "networks[0].robots[0].board.cpu.iram[2Dh]"
+    assert field.path == f"networks[0].robots[0].board.cpu.iram[{LAST_LEFT + 1:02X}h]"
     assert field.symbol == "_last_left+1"
     assert field.one ^ field.other == 1
     assert str(found).startswith(
@@ -130,11 +132,15 @@ def test_a_step_that_is_none_is_refused(step: int) -> None:
 
 
 def test_its_json_holds_tick_path_and_both_values() -> None:
-    found = first_difference(world(), planted_world(24_000, flipped(0x2D)))
+    found = first_difference(world(), planted_world(24_000, flipped(LAST_LEFT + 1)))
     assert found is not None
     document: dict[str, Any] = found.as_json()
     assert document["tick"] == 24_000
     assert document["fields"] == [
-        {"path": "networks[0].robots[0].board.cpu.iram[2Dh]", "symbol": "_last_left+1", "values": [0, 1]}
+        {
+            "path": f"networks[0].robots[0].board.cpu.iram[{LAST_LEFT + 1:02X}h]",
+            "symbol": "_last_left+1",
+            "values": [0, 1],
+        }
     ]
     assert isinstance(planted_world(1, flipped(1)), Planted)

@@ -120,3 +120,40 @@ def test_no_wheel_moves_before_the_first_frame() -> None:
     rig = Rig()
     rig.run_ms(700)
     assert rig.told(rig.board.left) == rig.told(rig.board.right) == []
+
+
+ACCELERATION = 2
+LOADING_MS = [i / 10 for i in range(-6, 13)]
+
+
+def loading(place: tuple[int, int]) -> tuple[Rig, int]:
+    """A robot that stops and has an acceleration to load, and the tick at which it begins to do so."""
+    ticks = []
+    for until in (None, 0):
+        rig, _ = driving(place)
+        rig.service(1, place[0], ACCELERATION, 9000)
+        rig.team(2, 0, 0, slot=place[0])
+        if until is None:
+            rig.told(rig.board.left)
+            rig.run_ms(60)
+            ticks = [c.tick for c in rig.told(rig.board.left) if c.opcode == LTRJ]
+    (tick,) = ticks
+    return rig, tick
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("late_ms", LOADING_MS)
+def test_110_ms_count_from_the_character_also_when_the_robot_was_loading(
+    place: tuple[int, int], late_ms: float
+) -> None:
+    rig, tick = loading(place)
+    data = encode(TeamFrame(0, 3, ((1000, 1000),) * place[1]), place[1])
+    end = tick - int(late_ms * MS)
+    rig.send(data, at=end - len(data) * CHARACTER)
+    rig.run_to(end + 4 * MS)
+    assert rig.u16("_frames_accepted") == 4
+    rig.told(rig.board.left)
+    rig.run_to(end + 112 * MS)
+    stop, start, *_ = rig.told(rig.board.left)
+    assert (stop.data, start.opcode) == (STOP, STT)
+    assert 109.7 * MS <= start.tick - end <= 110 * MS
