@@ -145,11 +145,17 @@ def replay_bare_case(path: str, firmware: str | None) -> int:
     return verdict.code
 
 
-def problem_of_bare_case(path: Path, image: Image, checks: tuple[str, ...]) -> str:
-    """Why a case fails on `image`, or the empty string. `checks`: those of --check, for cases that name one of them."""
-    from mirotwin.fuzz.bare_case import check_of_case, replay_bare
+def check_given(path: Path, checks: tuple[str, ...]) -> str | None:
+    """The one of --check that a case names, if any."""
+    from mirotwin.fuzz.bare_case import check_of_case
 
     named = check_of_case(path)
-    given = next((text for text in checks if text.rpartition(":")[2] == named), None)
-    verdict = replay_bare(path, image, given)
+    return next((text for text in checks if text.rpartition(":")[2] == named), None)
+
+
+def problem_of_bare_case(path: Path, image: Image, check: str | None) -> str:
+    """Why a case fails on `image`, or the empty string. `check`: as of --check, for a case that names it."""
+    from mirotwin.fuzz.bare_case import replay_bare
+
+    verdict = replay_bare(path, image, check)
     return verdict.line if verdict.failed else ""

@@ -21,9 +21,9 @@ from miro_robot.image import Image
 from miro_sim.radio.downlink import TransmissionError
 from mirotwin.checks.expect import expectations_of
 from mirotwin.checks.watching import Checks
-from mirotwin.cli.fuzz_bare import is_bare_case, problem_of_bare_case
+from mirotwin.cli.fuzz_bare import check_given, is_bare_case, problem_of_bare_case
 from mirotwin.cli.options import plain_parameters
-from mirotwin.cli.program import DONE, EXPECTATION_FAILED, show_line
+from mirotwin.cli.program import BAD_INPUT, DONE, EXPECTATION_FAILED, complain, show_line
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import Job, load_stream
 
@@ -34,29 +34,43 @@ TOGETHER = ("image", "cases", "engine", "quiet", "bare", "checks")
 
 
 def regress(folder: Path, image: Image, engine: str | None, quiet: bool, checks: tuple[str, ...] = ()) -> int:
-    """Runs all cases of a folder on `image`; returns the exit code: 1 where one fails.
+    """Runs all cases of a folder on `image`; returns the exit code: 1 where one fails, 2 where one cannot be run.
 
     `checks`: those of --check, for cases of a bare processor that name one.
     """
     cases = cases_in(folder)
-    failed = 0
+    failed, unread = 0, 0
+    unused = set(checks)
     with ProgressBar("running cases", len(cases), quiet) as bar:
         lines: list[str] = []
         for done, path in enumerate(cases, 1):
-            if is_bare_case(path):
-                problem = problem_of_bare_case(path, image, checks)
+            try:
+                if is_bare_case(path):
+                    given = check_given(path, checks)
+                    unused.discard(given or "")
+                    problem = problem_of_bare_case(path, image, given)
+                else:
+                    problem = _problem(load_stream(str(path), engine), image, path)
+            except (BadInput, click.ClickException) as error:
+                unread += 1
+                complain(
+                    f"error: {error.format_message() if isinstance(error, click.ClickException) else error}"
+                )
             else:
-                problem = _problem(load_stream(str(path), engine), image, path)
-            failed += bool(problem)
-            lines.append(f"{'FAILED' if problem else 'passed'}  {path}" + (f": {problem}" if problem else ""))
+                failed += bool(problem)
+                verdict = f"FAILED  {path}: {problem}" if problem else f"passed  {path}"
+                lines.append(verdict)
             bar.to(done)
     for line in lines:
         if not quiet or line.startswith("FAILED"):
             show_line(line)
-    show_line(
-        f"{len(cases)} {'case' if len(cases) == 1 else 'cases'}: {len(cases) - failed} passed, {failed} failed"
-    )
-    return EXPECTATION_FAILED if failed else DONE
+    count = f"{len(cases)} {'case' if len(cases) == 1 else 'cases'}"
+    unable = f", {unread} not run" if unread else ""
+    show_line(f"{count}: {len(cases) - failed - unread} passed, {failed} failed{unable}")
+    if unused:
+        remedy = "leave it out, or name the one that the cases have in [expect]"
+        raise BadInput(folder, OPTION, f"no case is judged by --check {sorted(unused)[0]}", remedy)
+    return BAD_INPUT if unread else EXPECTATION_FAILED if failed else DONE
 
 
 def cases_in(folder: Path) -> list[Path]:

@@ -31,11 +31,9 @@ from mirotwin.cases.trace import Trace
 from mirotwin.checks.interface import Failure
 from mirotwin.checks.registry import CHECKS
 from mirotwin.checks.watching import Checks
-from mirotwin.fuzz.target import Finding, Target
+from mirotwin.fuzz.target import NEVER_SLEEPS, Finding, Target
 from mirotwin.testing.wanted import silent_scenario
 
-NEVER_SLEEPS = "never_sleeps"
-"""The finding that the firmware did not go back to sleep. No check has that name: what follows from it is judged."""
 AFTER_TICKS = TICKS_PER_SECOND // 20
 """How long a world goes on behind the input and the find: an answer may take 30 ms, a frame 10 ms."""
 _SETTLED_TICKS = TICKS_PER_SECOND // 100

@@ -19,6 +19,7 @@ is in them.
 
 from __future__ import annotations
 
+import glob
 import os
 import shutil
 from collections.abc import Sequence
@@ -84,6 +85,11 @@ class CampaignFolder:
         path = (self.folder(folder) if folder else self.path) / name
         files.replace(path, data.encode("utf-8", "surrogateescape") if isinstance(data, str) else data)
         return path
+
+    def remove(self, folder: str, name: str) -> None:
+        """Takes away the files of a find."""
+        for path in self.folder(folder).glob(f"{glob.escape(name)}.*"):
+            path.unlink()
 
 
 def check_outside(path: Path, corpus: Path | None) -> None:

@@ -111,7 +111,8 @@ class Finds:
         small = minimise(data, lambda one: self._fails(one, group), Budget(TRIES, self.minimise_s, self.tell))
         counts = self.reached.run(small)
         key = (*group, self.reached.path(counts))
-        if key in self._by_key:
+        known = self._by_key.get(key)
+        if known is not None and known.confirmed:
             self._count(key)
             return None
         again = self._finding(small) or finding
@@ -121,6 +122,11 @@ class Finds:
             if whole.failure is not None:  # smaller, it is only the target's
                 small, judgement, again = data, whole, finding
                 counts = self.reached.run(small)
+        if known is not None:
+            if judgement.failure is None:
+                self._count(key)
+                return None
+            self._take_back(known)
         sizes = (len(data), len(small))
         return self._keep(key, small, again.pc, again.what, judgement, counts, sizes)
 
@@ -154,6 +160,12 @@ class Finds:
     def _fails(self, data: bytes, group: tuple[str, int | None]) -> bool:
         finding = self._finding(data)
         return finding is not None and _group(finding) == group
+
+    def _take_back(self, find: Find) -> None:
+        """A find that was not confirmed, of which another input shows now that it is real."""
+        self.found.remove(find)
+        self.more[find.name] += 1
+        self.folder.remove(find.folder, find.name)
 
     def _count(self, key: tuple[str, int | None, str]) -> None:
         find = self._by_key[key]

@@ -27,6 +27,7 @@ from mirotwin.fuzz.harness_target import MAP_SIZE as MAP_SIZE
 from mirotwin.fuzz.harness_target import HarnessTarget
 
 NEVER_SLEEPS = "never_sleeps"
+"""The finding that the firmware did not go back to sleep. No check has that name: what follows from it is judged."""
 NEVER_SLEEPS_CODE = len(NAMES)
 BOOT_PERIODS = 8
 """Control periods, of 33.4 ms, that firmware may take to turn its serial receiver on."""

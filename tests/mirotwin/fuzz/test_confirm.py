@@ -106,6 +106,19 @@ def test_what_a_world_does_not_find_wrong_is_kept_apart(tmp_path, monkeypatch):
     assert not (tmp_path / "out" / "finds").exists()
 
 
+@needs_sdcc
+def test_an_input_that_a_world_finds_wrong_takes_the_place_of_one_that_it_did_not(tmp_path, monkeypatch):
+    finds = finds_of(planted("takes frames with a bad CRC"), tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr(finds, "court", court(own_image()))
+        finds.take(damaged())
+    find = finds.take(damaged())
+    assert find.confirmed
+    assert (finds.found, finds.more[find.name]) == ([find], 1)
+    assert not list((tmp_path / "out" / "unconfirmed").iterdir())
+    assert len(list((tmp_path / "out" / "finds").iterdir())) == 4
+
+
 def test_a_find_of_a_check_in_python_is_made_small_in_worlds(tmp_path):
     finds = finds_of(own_image(), tmp_path)
     expected = {"wheels_within_m_s": {"limit_m_s": 0.1, "overshoot_m_s": 0.0}}

@@ -180,6 +180,22 @@ def test_a_folder_without_cases_is_refused(mirotwin, tmp_path, make, said):
     assert said in err
 
 
+def test_a_case_that_cannot_be_read_stops_no_other(mirotwin, tmp_path):
+    (tmp_path / "a.stream").write_text("x")
+    (tmp_path / "b.stream").write_text("# mirotwin stream 2\n2400000 > 55\n")
+    code, out, err = mirotwin("fuzz", "--regress", tmp_path)
+    assert code == 2
+    assert f"{tmp_path / 'a.stream'}:1:1: " in err
+    assert out.splitlines()[-1] == "2 cases: 1 passed, 0 failed, 1 not run"
+
+
+def test_a_check_that_no_case_names_is_refused(mirotwin, tmp_path):
+    (tmp_path / "b.stream").write_text("# mirotwin stream 2\n2400000 > 55\n")
+    code, _, err = mirotwin("fuzz", "--regress", tmp_path, "--check", "mine.py:judge")
+    assert code == 2
+    assert "no case is judged by --check mine.py:judge; leave it out" in err
+
+
 def test_options_of_a_campaign_do_not_go_with_saved_cases(mirotwin, tmp_path):
     code, _, err = mirotwin("fuzz", "--regress", tmp_path, "--time", "5s")
     assert code == 2
