@@ -6,11 +6,13 @@ What does not: what is added to a source (`miro_exact.places`), how C is reshape
 about a single module (its types stand in its own `.pxd`).
 
 Every extension is optional: with no C compiler the package installs all the same and runs from source,
-slowly and with the same bits. Each compiled module checks its stamp when it is imported
+slowly and with the same bits. With MIROTWIN_PURE=1 in the environment nothing is compiled, and the wheel is one for
+every machine (py3-none-any). Each compiled module checks its stamp when it is imported
 (`miro_exact.engine`), so one that no longer matches its source is refused.
 """
 
 import importlib.util
+import os
 import sys
 from pathlib import Path
 
@@ -68,6 +70,14 @@ def places(path):
 
 def package_dirs():
     return {name: HERE / root / name for name, root in ROOTS.items()}
+
+
+def pure():
+    """Whether nothing is to be compiled."""
+    wanted = os.environ.get("MIROTWIN_PURE", "")
+    if wanted not in ("", "0", "1"):
+        sys.exit(f"MIROTWIN_PURE={wanted}: give 1 (compile nothing), 0, or unset it")
+    return wanted == "1"
 
 
 def hot_extensions():
@@ -183,4 +193,5 @@ class BuildCarrying(build_py):
 
 
 if __name__ == "__main__":
-    setup(ext_modules=hot_extensions(), cmdclass={"build_ext": BuildHot, "build_py": BuildCarrying})
+    extensions = [] if pure() else hot_extensions()
+    setup(ext_modules=extensions, cmdclass={"build_ext": BuildHot, "build_py": BuildCarrying})

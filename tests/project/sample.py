@@ -10,86 +10,50 @@ Compiling takes minutes; with `--smoke` the wheel is built without, and gets the
 from __future__ import annotations
 
 import argparse
-import os
 import re
-import shutil
 import sys
 import tempfile
 import time
-import venv
 from collections.abc import Sequence
 from pathlib import Path
 
 from tests import children
-from tests.project.lowest import ENGINES, PACKAGE_FOLDERS, ROOT
+from tests.project.clean import Clean, pure_wheel
+from tests.project.lowest import ROOT, copy_tree
 
 MISTAKE = ("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)")
 LINE = re.compile(r"^\s*((?:mirotwin replay|mirotwin test|pytest) .*)$", re.M)
 """What a failing test prints to be run again."""
-PURE = """
-import setuptools
-from setup import BuildCarrying
-setuptools.setup(
-    cmdclass={{"build_py": BuildCarrying}},
-    script_args=[
-        *("-q", "egg_info", "--egg-base", {folder!r}, "build", "--build-base", {build!r}),
-        *("bdist_wheel", "-d", {folder!r}),
-    ],
-)
-"""
 TESTS = ("conform", "scenarios", "pytest")
 
 
-class Sample:
-    """A new environment in `folder`, and the project in it."""
+class Sample(Clean):
+    """A new environment, and the project in it."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
+        super().__init__(folder)
         self.project = folder / "mine"
-        self.bin = folder / "venv" / ("Scripts" if os.name == "nt" else "bin")
-        self.environment = {
-            **{key: value for key, value in os.environ.items() if not key.startswith(("PYTHON", "PYTEST"))},
-            "PATH": f"{self.bin}{os.pathsep}{os.environ['PATH']}",
-        }
-
-    def run(self, *command: str | Path, cwd: Path | None = None) -> tuple[int, str]:
-        """Exit code, and both outputs."""
-        done = children.run(
-            [*map(str, command)],
-            cwd=cwd or self.project,
-            env=self.environment,
-            capture_output=True,
-            text=True,
-        )
-        return done.returncode, done.stdout + done.stderr
-
-    def must(self, *command: str | Path, cwd: Path | None = None) -> str:
-        code, out = self.run(*command, cwd=cwd)
-        if code:
-            raise SystemExit(f"{' '.join(map(str, command))}: exit code {code}\n{out}")
-        return out
 
     def install(self, wheel: Path, smoke: bool) -> None:
-        venv.create(self.folder / "venv", with_pip=True, symlinks=os.name != "nt")
-        self.must("pip", "install", "-q", wheel, "pytest", cwd=self.folder)
+        self.make()
+        self.must("pip", "install", "-q", wheel, "pytest")
         if smoke:
-            where = "import sysconfig; print(sysconfig.get_path('platlib'))"
-            target = Path(self.must("python", "-c", where, cwd=self.folder).strip())
-            for package in PACKAGE_FOLDERS:
-                for path in (one for pattern in ENGINES for one in (ROOT / package).rglob(pattern)):
-                    shutil.copy2(path, target / path.relative_to(ROOT / package))
+            self.copy_engines()
 
     def again(self, out: str) -> list[tuple[int, str]]:
         """The lines in `out` that reproduce a failure, with the exit code that each gives."""
-        return [(self.run("sh", "-c", line)[0], line) for line in dict.fromkeys(LINE.findall(out))]
+        return [
+            (self.run("sh", "-c", line, cwd=self.project)[0], line)
+            for line in dict.fromkeys(LINE.findall(out))
+        ]
 
 
 def built(folder: Path, smoke: bool) -> Path:
     """A wheel of this tree."""
     if smoke:
-        command = [sys.executable, "-c", PURE.format(build=str(folder / "build"), folder=str(folder))]
-    else:
-        command = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(folder), "."]
+        copy_tree(folder / "tree", ())
+        return pure_wheel(folder / "tree", folder / "dist")
+    command = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(folder), "."]
     children.run(command, cwd=ROOT, check=True, capture_output=True)
     (wheel,) = folder.glob("*.whl")
     return wheel
@@ -98,10 +62,10 @@ def built(folder: Path, smoke: bool) -> Path:
 def tried(sample: Sample) -> list[str]:
     """What is wrong: nothing, if the project passes as it is, and each failure of a wrong firmware is reproduced."""
     found = []
-    sample.must("mirotwin", "init", "mine", cwd=sample.folder)
+    sample.must("mirotwin", "init", "mine")
     for test in TESTS:
         begun = time.perf_counter()
-        code, out = sample.run("make", "-s", test)
+        code, out = sample.run("make", "-s", test, cwd=sample.project)
         print(f"make {test}: {time.perf_counter() - begun:.1f} s", flush=True)
         if code:
             found.append(f"make {test} fails:\n{out}")
@@ -110,7 +74,7 @@ def tried(sample: Sample) -> list[str]:
     assert text.count(MISTAKE[1]) == 1
     source.write_text(text.replace(*MISTAKE[1:]), encoding="utf-8")
     for test in TESTS:
-        code, out = sample.run("make", "-s", test)
+        code, out = sample.run("make", "-s", test, cwd=sample.project)
         lines = sample.again(out)
         print(
             f"make {test} with a failsafe of 125 ms: exit code {code}, {len(lines)} lines to reproduce",

@@ -76,6 +76,9 @@ def test_without_a_compiler_the_package_builds_and_gives_the_golden_digest(tree)
     summary = json.loads((tree / "out" / "summary.json").read_text())
     assert summary["engine"] == "python"
     assert summary["digest"] == json.loads(GOLDEN.read_text())["fig6 0.5 s seed 7"]
+    about = python(tree, "-c", "from mirotwin.cli import main; main()", "info")
+    assert about.returncode == 0, about.stderr
+    assert "python (0 of" in about.stdout
 
 
 def test_asking_for_compiled_modules_that_are_not_there_is_an_error_with_a_remedy(tree):

@@ -47,7 +47,7 @@ def version_of(package: str) -> str:
 def info(engine: str | None, firmware: str | None) -> int:
     """Shows versions, the engine, and the firmware image with its hash."""
     active = choose_engine(engine)
-    broken = _broken_modules()
+    broken = _broken_modules(active)
     image = load_image(firmware, named=False)
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="bold")
@@ -82,10 +82,15 @@ def _dispatch() -> str:
     return f"dispatch plain: slower, the same bits; {PLAIN_REMEDY}"
 
 
-def _broken_modules() -> list[str]:
-    """Imports every hot module: what cannot be loaded (a stale one, say) shows here and not in a run."""
+def _broken_modules(active: str) -> list[str]:
+    """Imports every hot module: what cannot be loaded (a stale one, say) shows here and not in a run.
+
+    Uncompiled, a `.pyx` is not used and cannot be imported.
+    """
     found = []
-    for name in engines.install().sources:
+    for name, source in engines.install().sources.items():
+        if active == "python" and source.suffix == ".pyx":
+            continue
         try:
             importlib.import_module(name)
         except ImportError as error:
