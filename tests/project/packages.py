@@ -68,7 +68,7 @@ def objections(clean: Clean, engine: str) -> Iterator[str]:
 
 
 def tried(folder: Path, python: Path, archive: Path, pure: Path, newest: bool) -> Iterator[str]:
-    """Under one Python, in `folder`: the compiled wheel, the pure one; for the newest the archive without a compiler."""
+    """Under one Python: the compiled wheel, the pure one; for the newest the archive without a compiler."""
     compiled = Clean(folder / "compiled")
     compiled.folder.mkdir(parents=True)
     compiled.make(python)
