@@ -30,7 +30,7 @@ from tests.project.lowest import ROOT
 
 LOWEST = 11
 """The lowest 3.x that `requires-python` allows."""
-INSTALLED = ROOT / "tests" / "project" / "installed.py"
+INSTALLED = Path("tests/project/installed.py")
 MINOR = "import sys; print(sys.version_info[0] * 1000 + sys.version_info[1])"
 
 
@@ -58,16 +58,16 @@ def left_out(archive: Path) -> list[str]:
     ]
 
 
-def objections(clean: Clean, engine: str) -> Iterator[str]:
-    """What the installed program does wrong."""
-    code, out = clean.run("python", INSTALLED, "--engine", engine)
+def objections(clean: Clean, tree: Path, engine: str) -> Iterator[str]:
+    """What the installed program does wrong, by the test that the archive has; `tree`: the archive, unpacked."""
+    code, out = clean.run("python", tree / INSTALLED, "--engine", engine)
     if code:
         yield out
     else:
         print(f"  {out.strip()}", flush=True)
 
 
-def tried(folder: Path, python: Path, archive: Path, pure: Path, newest: bool) -> Iterator[str]:
+def tried(folder: Path, tree: Path, python: Path, archive: Path, pure: Path, newest: bool) -> Iterator[str]:
     """Under one Python: the compiled wheel, the pure one; for the newest the archive without a compiler."""
     compiled = Clean(folder / "compiled")
     compiled.folder.mkdir(parents=True)
@@ -77,43 +77,44 @@ def tried(folder: Path, python: Path, archive: Path, pure: Path, newest: bool) -
     (wheel,) = (compiled.folder / "wheel").iterdir()
     print(f"{wheel.name}: built in {time.perf_counter() - begun:.0f} s", flush=True)
     compiled.must("pip", "install", "-q", wheel)
-    yield from objections(compiled, "compiled")
+    yield from objections(compiled, tree, "compiled")
     compiled.must("mirotwin", "run", "fig6")
     slow = Clean(folder / "pure")
     slow.folder.mkdir()
     slow.make(python)
     print(pure.name, flush=True)
     slow.must("pip", "install", "-q", pure)
-    yield from objections(slow, "python")
+    yield from objections(slow, tree, "python")
     if newest:
         print(f"{archive.name}, CC=false", flush=True)
         slow.must("pip", "uninstall", "-q", "-y", "mirotwin")
         slow.must("pip", "install", "-q", archive, more={"CC": "false"})
-        yield from objections(slow, "python")
+        yield from objections(slow, tree, "python")
 
 
-def smoke(folder: Path, pure: Path) -> Iterator[str]:
+def smoke(folder: Path, tree: Path, pure: Path) -> Iterator[str]:
     """The pure wheel under this Python, then with the compiled modules of this tree."""
     clean = Clean(folder)
     clean.make()
     print(pure.name, flush=True)
     clean.must("pip", "install", "-q", pure)
-    yield from objections(clean, "python")
+    yield from objections(clean, tree, "python")
     clean.copy_engines()
-    yield from objections(clean, "compiled")
+    yield from objections(clean, tree, "compiled")
 
 
 def found(folder: Path, chosen: Sequence[Path]) -> Iterator[str]:
     """All that is wrong. `chosen`: the Pythons; none for the short form."""
     archive = source_archive(folder)
     yield from (f"{archive.name} lacks {name}" for name in left_out(archive))
-    pure = pure_wheel(unpacked(archive, folder / "source"), folder / "pure")
+    tree = unpacked(archive, folder / "source")
+    pure = pure_wheel(tree, folder / "pure")
     if not pure.name.endswith("-py3-none-any.whl"):
         yield f"{pure.name} is for some machines only"
     for number, python in enumerate(chosen):
-        yield from tried(folder / str(number), python, archive, pure, python == chosen[-1])
+        yield from tried(folder / str(number), tree, python, archive, pure, python == chosen[-1])
     if not chosen:
-        yield from smoke(folder, pure)
+        yield from smoke(folder, tree, pure)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
