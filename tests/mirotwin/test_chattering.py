@@ -11,11 +11,22 @@ WHEEL = st.integers(-16633, 16633)
 PERIOD_S = naive.PERIOD_S
 
 
-def index(commands):
+def after(commands):
     chattering = Chattering()
     for left, right in commands:
         chattering.add(left, right)
-    return chattering.index(PERIOD_S)
+    return chattering
+
+
+def index(commands):
+    return after(commands).index(PERIOD_S)
+
+
+@given(st.lists(st.tuples(WHEEL, WHEEL), min_size=2, max_size=60))
+def test_the_effort_is_the_mean_size_of_the_commanded_acceleration_of_a_wheel(commands):
+    found = after(commands)
+    assert found.effort(PERIOD_S) == pytest.approx(naive.effort(commands), rel=1e-9, abs=1e-12)
+    assert found.effort(PERIOD_S) >= found.index(PERIOD_S)
 
 
 @given(st.lists(st.tuples(WHEEL, WHEEL), min_size=2, max_size=60))
@@ -45,4 +56,5 @@ def test_a_slow_movement_there_and_back_counts_hardly():
 def test_one_command_says_nothing():
     assert index([]) is None
     assert index([(1, 1)]) is None
+    assert after([(1, 1)]).effort(PERIOD_S) is None
     assert index([(1, 1), (1, 1)]) == 0.0

@@ -41,7 +41,7 @@ KEYS = {
     "link": "frames_sent frames_accepted frames_rejected frames_stale bit_errors",
     "firmware": "sha256 instructions machine_cycles idle_cycles faults",
     "vision": "frames lost dropped repeated wrong swapped",
-    "theory": "disturbance assumption_1 assumption_2 assumption_3 reversals backward_s chattering_m_s2",
+    "theory": "disturbance assumption_1 assumption_2 assumption_3 reversals backward_s chattering_m_s2 effort_m_s2",
 }
 
 

@@ -48,3 +48,9 @@ def chattering(commands):
         window = wheels[start : start + 11]
         total += np.abs(np.diff(window, axis=0)).sum() - np.abs(window[-1] - window[0]).sum()
     return total / 2 / ((len(wheels) - 1) * PERIOD_S)
+
+
+def effort(commands):
+    """Mean size of the change of a wheel's speed, a second."""
+    wheels = np.array(commands, dtype=float) / SPEED
+    return np.abs(np.diff(wheels, axis=0)).mean() / PERIOD_S

@@ -17,6 +17,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, get_args, get_type_hints
 
+from miro_exact.clock import TICKS_PER_SECOND
+from mirotwin.report.seen import Seen
 from mirotwin.report.summary import Firmware, Link, Summary, Tracking, Vision, tracking_of
 from mirotwin.report.theory import Assumption1, Assumption2, Assumption3, Disturbance, Theory
 from mirotwin.report.track import Tracks
@@ -24,6 +26,8 @@ from mirotwin.report.track import Tracks
 OWN = ("run", "draw", "seed", "verdict", "error", "failure", "digest")
 """Names that no factor can have."""
 CHECK = "check."
+SEEN = ("seen_x_cm", "seen_y_cm", "seen_theta_deg", "seen_position_cm")
+"""As `rms_*`, of measurements against the reference at their exposure: the error that the camera shows."""
 _PARTS: tuple[tuple[str, tuple[str, ...], type], ...] = (
     ("", ("tracking",), Tracking),
     ("", ("theory",), Theory),
@@ -50,15 +54,20 @@ FIGURES: Mapping[str, type] = {
     "simulated_s": float,
     "settled": bool,
     "worst_rms_position_cm": float,
+    **dict.fromkeys(SEEN, float),
     **{prefix + name: kind for prefix, _, struct in _PARTS for name, kind in _kinds(struct)},
 }
 """Column -> int, float or bool. `settled`: the first robot is within 3 cm and 0.15 rad at the end.
 `worst_rms_position_cm`: the largest `rms_position_cm` of all robots."""
 
 
-def figures_of(summary: Summary, tracks: Tracks) -> dict[str, Any]:
-    """The figures of one run; None for what it does not have."""
-    found: dict[str, Any] = {"simulated_s": summary.simulated_s, **_over_robots(tracks)}
+def figures_of(summary: Summary, tracks: Tracks, seen: Seen) -> dict[str, Any]:
+    """The figures of one run; None for what it does not have. `seen`: the first robot's."""
+    found: dict[str, Any] = {
+        "simulated_s": summary.simulated_s,
+        **_over_robots(tracks),
+        **_seen(tracks, seen),
+    }
     for prefix, place, struct in _PARTS:
         at: Any = summary
         for name in place:
@@ -66,6 +75,14 @@ def figures_of(summary: Summary, tracks: Tracks) -> dict[str, Any]:
         for name, _ in _kinds(struct):
             found[prefix + name] = None if at is None else getattr(at, name)
     return found
+
+
+def _seen(tracks: Tracks, seen: Seen) -> dict[str, float | None]:
+    everyone = [track.errors for track in tracks.robots.values() if len(track.errors)]
+    if not everyone:
+        return dict.fromkeys(SEEN)
+    found = seen.tracking(everyone[0][-1].tick - TICKS_PER_SECOND)
+    return {name: getattr(found, f"rms_{name.removeprefix('seen_')}") for name in SEEN}
 
 
 def _over_robots(tracks: Tracks) -> dict[str, Any]:

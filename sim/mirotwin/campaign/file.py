@@ -45,6 +45,7 @@ from miro_exact.seed import MAX_SEED
 from miro_protocol.toml_text import TEXT_KIB, long_key_line, not_finite
 from miro_sim.inputs import read_input
 from miro_sim.scenario.settings import EXPECT, in_text
+from mirotwin.campaign import builtin
 from mirotwin.campaign.design import Design, Draw, Factor, Level, Value
 from mirotwin.campaign.inline import inline
 from mirotwin.campaign.ranges import draw_of, is_range
@@ -101,11 +102,15 @@ class CampaignFile(msgspec.Struct, frozen=True):
 
 
 def read(path: Path) -> CampaignFile:
-    """The campaign of a file. Raises BadInput with the place of what is wrong."""
+    """The campaign of a file, or the built-in one of that name. Raises BadInput with the place of what is wrong."""
+    own = None if path.exists() else builtin.place(str(path))
+    if own is not None:
+        return msgspec.structs.replace(parse(own.read_text(encoding="utf-8"), own), path=str(path))
     try:
         text = read_input(path, TEXT_KIB << 10).decode("utf-8")
     except FileNotFoundError:
-        raise BadInput(path, "", "there is no such file", "examples/campaign.toml shows one") from None
+        remedy = f"examples/campaign.toml shows one; built-in: {', '.join(builtin.names())}"
+        raise BadInput(path, "", "there is no such file", remedy) from None
     except UnicodeDecodeError:
         raise BadInput(path, "", "not UTF-8 text", "save the file as UTF-8") from None
     return parse(text, path)

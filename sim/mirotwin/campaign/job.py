@@ -112,13 +112,13 @@ def _run(job: Job) -> Row:
     faults = len([fault for _, _, found in runner.faults_by_robot(world) for fault in found])
     gains = gains_of(text.scenario)
     place, track = next(iter(tracks.robots.items()))
-    return _row(job, tracks.digest, track.errors, seen.errors, theory_of(track.theory, gains[place]), faults)
+    return _row(job, tracks.digest, track.errors, seen, theory_of(track.theory, gains[place]), faults)
 
 
-def _row(job: Job, digest: str, errors: Errors, seen: Errors, theory: Theory | None, faults: int) -> Row:
+def _row(job: Job, digest: str, errors: Errors, seen: Seen, theory: Theory | None, faults: int) -> Row:
     end_tick = errors[-1].tick - TICKS_PER_SECOND
     truth = tracking_of(errors)
-    camera = tracking_of([sample for sample in seen if sample.tick > end_tick])
+    camera = seen.tracking(end_tick)
     return Row(
         label=job.label,
         scenario=job.scenario,

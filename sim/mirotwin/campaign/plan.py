@@ -64,7 +64,7 @@ class Plan(msgspec.Struct, frozen=True):
     def hash(self) -> str:
         """What two campaigns with the same rows have in common, but for the versions."""
         content = (
-            self.file.scenario,
+            self.scenarios[self.file.scenario].text,
             [source.text for _, source in sorted(self.scenarios.items())],
             [image.sha256 for _, image in sorted(self.images.items())],
             self.file.settings,

@@ -27,6 +27,7 @@ from mirotwin.campaign.worker import Outcome, Work
 from mirotwin.checks.expect import Place, expectations_of
 from mirotwin.checks.interface import Check
 from mirotwin.checks.watching import Checks
+from mirotwin.report.seen import Seen
 from mirotwin.report.summary import Expectation, summarise
 from mirotwin.report.theory import gains_of
 from mirotwin.report.track import Tracks
@@ -78,9 +79,9 @@ def _run(job: Work) -> Outcome:
     world = World(found.scenario, job.seed, image)
     checks = Checks(world, found.expected)
     player = Player(world, found.steps, job.origin) if found.steps else None
-    tracks = Tracks()
+    tracks, seen = Tracks(), Seen(found.scenario.camera.delay_frames)
     began_s = now_s()
-    _move(world, player, tracks)
+    _move(world, player, tracks, seen)
     wall_s = now_s() - began_s
     checks.finish()
     summary = summarise(
@@ -101,15 +102,17 @@ def _run(job: Work) -> Outcome:
         verdict="fault" if summary.firmware.faults else "failed" if failure else "passed",
         failure=failure,
         digest=tracks.digest,
-        figures=figures_of(summary, tracks),
+        figures=figures_of(summary, tracks, seen),
         checks={verdict.name: verdict.verdict for verdict in verdicts},
         wall_s=wall_s,
     )
 
 
-def _move(world: World, player: Player | None, tracks: Tracks) -> None:
+def _move(world: World, player: Player | None, tracks: Tracks, seen: Seen) -> None:
     def keep(period: Period) -> None:
         tracks.add(period)
+        if period.robots:
+            seen.add(period.robots[0], period.tick)
 
     if player is None:
         runner.run(world, on_period=keep)

@@ -40,7 +40,7 @@ class SeedRange(click.ParamType[range]):
 
 
 @click.command(short_help="Makes the runs of FILE.toml; `campaign FILE.toml` is short for it.")
-@click.argument("file", type=Place(path_type=Path))
+@click.argument("file", metavar="FILE.toml", type=Place(path_type=Path))
 @click.option("--out", type=Place(path_type=Path), help="Results. Default: runs/FILE.parquet.")
 @click.option("--seeds", type=SeedRange(), help="First and last seed, instead of those of the file.")
 @set_option("A key of the scenario, for all runs, as `mirotwin run` has it; may be repeated.")
@@ -62,7 +62,7 @@ def run(
     yes: bool,
     quiet: bool,
 ) -> int:
-    """Makes the runs of FILE.toml, and writes a row for each to a Parquet file.
+    """Makes the runs of FILE.toml, or of the built-in campaign `bench1`, and writes a row for each to a Parquet file.
 
     A campaign that is broken off goes on when the same command is given again; nothing but the runs under way is lost
     (FILE.part.jsonl). The file is the same whatever ran it, byte for byte; how long the runs took is in

@@ -5,21 +5,25 @@ from __future__ import annotations
 import csv
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import click
 import msgspec
 
+from miro_exact.bad_input import BadInput
 from mirotwin.campaign.execute import in_order
 from mirotwin.campaign.job import Job, Row, run
 from mirotwin.campaign.processes import cores, processes
+from mirotwin.campaign.results import require_arrow
 from mirotwin.campaign.seeds import seeds_of
 from mirotwin.cli.held_signals import Hold, held_signals
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
 from mirotwin.cli.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import OutputFolder, check_new, whole_file
+from mirotwin.reproduce.crate import METADATA, metadata, write_rows
 from mirotwin.reproduce.page import page
 from mirotwin.reproduce.pictures import course, draw
 from mirotwin.reproduce.plan import (
@@ -39,6 +43,7 @@ from mirotwin.reproduce.rows import by_label, middle_seeds
 PAGE = "reproduction.md"
 FOLDER = "reproduction"
 ROWS = "rows.csv"
+TABLE = "rows.parquet"
 AHEAD = 4
 """Jobs for each process that are handed over: enough to keep it busy, few enough to stop soon."""
 
@@ -61,8 +66,19 @@ class Seeds(click.ParamType[range]):
 @click.option(
     "--out",
     type=Place(path_type=Path),
-    default=Path("."),
     help=f"Folder for {PAGE} and {FOLDER}/. Default: here.",
+)
+@click.option(
+    "--deposit",
+    metavar="DIR",
+    type=Place(path_type=Path),
+    help="Instead of --out: a folder for an archive, with all runs as Parquet and a description as RO-Crate 1.1.",
+)
+@click.option(
+    "--date",
+    metavar="YYYY-MM-DD",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Date of publication in that description. Default: today.",
 )
 @click.option("--seeds", type=Seeds(), default="0-49", show_default=True, help="First and last seed.")
 @click.option("--jobs", "count", type=Whole(1, 256), help="Processes. Default: one for each core.")
@@ -70,17 +86,39 @@ class Seeds(click.ParamType[range]):
 @click.option("--force", is_flag=True, help="Replace the files of an earlier reproduction.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar, no last line.")
 def reproduce(
-    out: Path, seeds: range, count: int | None, engine: str | None, force: bool, quiet: bool
+    out: Path | None,
+    deposit: Path | None,
+    date: datetime | None,
+    seeds: range,
+    count: int | None,
+    engine: str | None,
+    force: bool,
+    quiet: bool,
 ) -> int:
     """Runs Figs. 6 to 10 of the paper, and the comparison of its controllers, over all seeds.
 
     Writes reproduction.md (each claim beside what was measured), and in the folder reproduction: five pictures, a row
     for each run, and of each controller and start the recording of the run with the median error. Running it again
     gives the same bytes.
+
+    --deposit writes all of it into one new folder, for an archive: with the rows as Parquet, and size and SHA-256 of
+    each file in ro-crate-metadata.json. The same bytes again, for the same --date.
     """
     choose_engine(engine)
+    if out is not None and deposit is not None:
+        raise click.UsageError("--out and --deposit do not go together.")
+    if date is not None and deposit is None:
+        raise click.UsageError("--date is of a --deposit.")
+    if deposit is not None:
+        require_arrow()
+        _check_deposit(deposit, force)
+    out = deposit or out or Path(".")
+    day = (date or datetime.now()).date().isoformat()
     began_s = time.monotonic()
-    folder = OutputFolder(out / FOLDER, force, [*_pictures(), ROWS, *(group.recording for group in GROUPS)])
+    names = [*_pictures(), ROWS, *(group.recording for group in GROUPS), *([TABLE] if deposit else [])]
+    if deposit is not None:
+        deposit.mkdir(parents=True, exist_ok=True)
+    folder = OutputFolder(out / FOLDER, force, names)
     if (out / FOLDER).is_dir() or (out / PAGE).exists():
         check_new(out / PAGE, "--out", force)
     processors = count or cores()
@@ -93,9 +131,29 @@ def reproduce(
             _draw(start, folder, shown)
         text = page(by_label(found), f"{seeds[0]} to {seeds[-1]}", FOLDER)
         page_path.write_text(text, encoding="utf-8")
+        if deposit is not None:
+            write_rows(found, folder.part(TABLE))
+    if deposit is not None:
+        _describe(deposit, names, f"{seeds[0]} to {seeds[-1]}", day)
     if not quiet:
         show_line(f"{len(found)} runs in {time.monotonic() - began_s:.0f} s: {out / PAGE}")
     return _failures(found)
+
+
+def _check_deposit(path: Path, force: bool) -> None:
+    """Raises BadInput for what is no folder, and for a folder that is not empty unless `force`."""
+    if path.exists() and not path.is_dir():
+        raise BadInput(path, "--deposit", "exists and is not a folder", "choose another folder")
+    if path.is_dir() and not force and (present := sorted(entry.name for entry in path.iterdir())):
+        what = f"the folder is not empty ({', '.join(present[:3])}{', ..' if present[3:] else ''})"
+        raise BadInput(path, "--deposit", what, "choose another one, or replace a deposit in it with --force")
+
+
+def _describe(deposit: Path, names: Sequence[str], seeds: str, day: str) -> None:
+    """The description of what this command has written, and of nothing else that is there."""
+    paths = [deposit / PAGE, *(path for name in names if (path := deposit / FOLDER / name).exists())]
+    with whole_file(deposit / METADATA, "--deposit") as place:
+        place.write_text(metadata(deposit, paths, seeds, day), encoding="utf-8")
 
 
 def _pictures() -> list[str]:

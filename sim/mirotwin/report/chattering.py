@@ -1,4 +1,4 @@
-"""A chattering index: how far wheel speeds that are commanded go back and forth.
+"""What a controller asks of the wheels: its effort, and a chattering index, how far speeds go back and forth.
 
 What belongs here: the definition, for one robot's commands one after the other. What does not: the runs.
 
@@ -6,7 +6,8 @@ The total variation of what a controller puts out, TV = sum |u(k+1) - u(k)|, is 
 (S. Skogestad, J. Process Control 13 (2003) 291, doi:10.1016/S0959-1524(02)00062-8). It counts a turn or a start that
 the path needs as well. So the net motion is taken away: in each window of ten control periods the variation less
 |u(last) - u(first)|. What is left is 0 for speeds that only rise or only fall within a window, twice the swing for
-those that come back. It is added up over the windows, and given for one wheel and second of command: m/s per s.
+those that come back. It is added up over the windows, and given for one wheel and second of command: m/s per s. The
+effort is TV itself, in the same unit: the mean size of the commanded acceleration of a wheel.
 """
 
 from miro_host.wheels import Wheels
@@ -21,7 +22,8 @@ class Chattering:
 
     def __init__(self) -> None:
         self.commands = 0
-        self._back_and_forth = 0  # of the windows that are over
+        self._variation = 0  # of the windows that are over
+        self._back_and_forth = 0  # of the same
         self._path = 0  # of the open window
         self._since = 0
         self._first = (0, 0)
@@ -38,6 +40,7 @@ class Chattering:
         self._last = (left, right)
         self.commands += 1
         if self._since == WINDOW:
+            self._variation += self._path
             self._back_and_forth += self._open()
             self._path, self._since, self._first = 0, 0, self._last
 
@@ -47,7 +50,13 @@ class Chattering:
 
     def index(self, period_s: float) -> float | None:
         """The index in m/s2 for commands that are `period_s` apart; None for less than two of them."""
+        return self._per_wheel_and_second(self._back_and_forth + self._open(), period_s)
+
+    def effort(self, period_s: float) -> float | None:
+        """The total variation in m/s2, in the same way."""
+        return self._per_wheel_and_second(self._variation + self._path, period_s)
+
+    def _per_wheel_and_second(self, total: int, period_s: float) -> float | None:
         if self.commands < 2:
             return None
-        total = self._back_and_forth + self._open()
         return 0.5 * total / _UNITS_PER_M_S / ((self.commands - 1) * period_s)

@@ -14,6 +14,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
 from miro_sim.periods import RobotPeriod
+from mirotwin.report.summary import Tracking, tracking_of
 from mirotwin.report.track import Errors, error_of
 
 LONGEST_FRAMES = 40
@@ -27,6 +28,10 @@ class Seen:
         self.delay_frames = delay_frames
         self.errors = Errors()
         self._references: dict[int, Posture] = {}
+
+    def tracking(self, after_tick: int) -> Tracking:
+        """The figures of what was exposed after a tick."""
+        return tracking_of([sample for sample in self.errors if sample.tick > after_tick])
 
     def add(self, robot: RobotPeriod, tick: int) -> None:
         """Takes over the measurement of the next control period."""

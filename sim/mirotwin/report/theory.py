@@ -73,7 +73,8 @@ class Theory(msgspec.Struct, frozen=True):
     """One robot. Everything is of the truth, which no host knows, at the exposures; times are whole control periods.
 
     `reversals`: changes between forward and backward; `backward_s`: time with v < -1 cm/s. `chattering_m_s2`: how far
-    the commanded wheel speeds go back and forth within a third of a second (`chattering`).
+    the commanded wheel speeds go back and forth within a third of a second; `effort_m_s2`: the mean size of a wheel's
+    commanded acceleration (both: `chattering`).
     """
 
     disturbance: Disturbance | None
@@ -83,6 +84,7 @@ class Theory(msgspec.Struct, frozen=True):
     reversals: int
     backward_s: float
     chattering_m_s2: float | None
+    effort_m_s2: float | None
 
 
 def gains_of(scenario: Scenario) -> Mapping[tuple[int, int], Gains]:
@@ -110,6 +112,7 @@ def theory_of(track: TheoryTrack, gains: Gains) -> Theory | None:
         reversals=track.reversals,
         backward_s=_time_s(track.backward),
         chattering_m_s2=track.chattering.index(PERIOD_S),
+        effort_m_s2=track.chattering.effort(PERIOD_S),
     )
 
 
