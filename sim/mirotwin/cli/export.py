@@ -1,4 +1,4 @@
-"""`mirotwin export`: the characters of a run as a file for other programs."""
+"""`mirotwin export`: the characters of a run, or all of it, as a file for other programs."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from mirotwin.capture.input import STDIN, Input
 from mirotwin.capture.layout import look
 from mirotwin.capture.source import READ_ERRORS, open_source
 from mirotwin.cli.console import show
+from mirotwin.cli.export_foxglove import export_foxglove
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
 from mirotwin.cli.program import BAD_INPUT, DONE, complain
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.files.outputs import check_new, check_not_input, whole_file
 
-TARGETS = ("pcapng", "stream")
+DEFAULTS = {".stream": "stream", ".txt": "stream", ".mcap": "foxglove"}
+TARGETS = ("pcapng", "stream", "foxglove")
 
 
 class Exported:
@@ -56,13 +58,13 @@ class Exported:
             self.failure = error
 
 
-@click.command(short_help="Writes the bytes of a run for Wireshark, or as a stream file.")
+@click.command(short_help="Writes a run for Foxglove, its bytes for Wireshark or as a stream file.")
 @click.argument("file", metavar="FILE|-", type=Place())
 @click.option("--out", required=True, type=Place(), help="File to write, or - for standard output.")
 @click.option(
     "--to",
     type=click.Choice(TARGETS),
-    help="What to write. Default: stream for *.stream and *.txt, else pcapng.",
+    help="What to write. Default: stream for *.stream and *.txt, foxglove for *.mcap, else pcapng.",
 )
 @click.option(
     "--format", type=click.Choice(TIMED), help="Format of FILE. Default: recognized by its first bytes."
@@ -81,7 +83,8 @@ def export(
     quiet: bool,
     engine: str | None,
 ) -> int:
-    """Writes the characters in FILE (a recording, a stream file or a pcapng capture) as pcapng or as a stream file.
+    """Writes the characters in FILE (a recording, a stream file or a pcapng capture) as pcapng or as a stream file, or
+    a recording for Foxglove.
 
     pcapng is for Wireshark and tshark: one packet a transmission (characters without a pause), with virtual time,
     direction, and the network as interface; link type 250 (RTAC serial). `protocol/miro.lua` (or `python -m
@@ -94,14 +97,24 @@ def export(
     A stream file is for `mirotwin replay`, for editors and for git; a capture does not hold stop bits, a stream file
     does. The same input gives the same bytes. Of an input that is cut short, all that could be read is written, and the
     exit code is 2. A run that was broken off (run.part.mcap) is written as far as it goes, with a note.
+
+    For Foxglove, all that is in the recording is written again, with the scene, transforms, log and camera frames that
+    Foxglove draws; examples/foxglove.json is a layout for it:
+
+    \b
+        mirotwin export run.mcap --out foxglove.mcap
     """
     if out != STDIN:
         check_new(Path(out), "--out", force)
         check_not_input(Path(out), "--out", file)
     choose_engine(engine)
-    to = to or ("stream" if Path(out).suffix in (".stream", ".txt") else "pcapng")
+    to = to or DEFAULTS.get(Path(out).suffix, "pcapng")
+    if to == "foxglove" and network is not None:
+        raise click.UsageError("--network does not go with --to foxglove, which writes all networks.")
     with Input(file) as given, ProgressBar("exporting", given.size, quiet) as bar:
         format = format or detect(given.peek())[0]
+        if to == "foxglove":
+            return export_foxglove(given, format, out, quiet)
         if format not in TIMED:
             raise BadInput(
                 given.label, "", f"{NAMES[format]} without times", "give a recording, stream or capture"

@@ -25,7 +25,7 @@ from zlib import crc32
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, McapRecord, Message, Metadata
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema
 
 from miro_exact.bad_input import BadInput
 from mirotwin.recording.writer import MAGIC
@@ -40,6 +40,7 @@ _READ: dict[int, Callable[[ReadDataStream], McapRecord]] = {
     Opcode.ATTACHMENT: Attachment.read,
     Opcode.CHANNEL: Channel.read,
     Opcode.METADATA: Metadata.read,
+    Opcode.SCHEMA: Schema.read,
 }
 _IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 _BAD = (McapError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
@@ -70,7 +71,7 @@ class Readable(Protocol):
 
 
 def records(source: Readable, path: str) -> Iterator[tuple[int, McapRecord]]:
-    """(offset, record) of channels, messages, attachments and metadata; RecordingError where it cannot go on.
+    """(offset, record) of schemas, channels, messages, attachments and metadata; RecordingError where it cannot go on.
 
     `path` names the file in errors.
     """

@@ -1,0 +1,178 @@
+"""Messages of Foxglove's schemas, field for field: those that are written here, in the order of the schemas.
+
+What belongs here: one struct a schema. What does not: the schemas' text (`published`), ways to make the usual shapes
+(`shapes`), and what a run says with them (`derived`). Lengths in m, angles as unit quaternions, colours from 0 to 1.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from miro_exact.clock import nanoseconds
+
+SECOND_NS = 1_000_000_000
+
+
+class Time(msgspec.Struct, frozen=True):
+    """A moment of simulated time, or a length of it."""
+
+    sec: int
+    nsec: int
+
+
+ALWAYS = Time(0, 0)
+"""The lifetime of what stays until it is replaced."""
+
+
+def time_of(tick: int) -> Time:
+    """Simulated time, rounded down to nanoseconds."""
+    return Time(*divmod(nanoseconds(tick), SECOND_NS))
+
+
+class Vector3(msgspec.Struct, frozen=True):
+    x: float
+    y: float
+    z: float
+
+
+class Quaternion(msgspec.Struct, frozen=True):
+    x: float
+    y: float
+    z: float
+    w: float
+
+
+class Pose(msgspec.Struct, frozen=True):
+    position: Vector3
+    orientation: Quaternion
+
+
+class Color(msgspec.Struct, frozen=True):
+    r: float
+    g: float
+    b: float
+    a: float
+
+
+class FrameTransform(msgspec.Struct, frozen=True):
+    """Where the child frame lies in the parent frame."""
+
+    timestamp: Time
+    parent_frame_id: str
+    child_frame_id: str
+    translation: Vector3
+    rotation: Quaternion
+
+
+class FrameTransforms(msgspec.Struct, frozen=True):
+    transforms: tuple[FrameTransform, ...]
+
+
+class CubePrimitive(msgspec.Struct, frozen=True):
+    pose: Pose
+    size: Vector3
+    color: Color
+
+
+class SpherePrimitive(msgspec.Struct, frozen=True):
+    pose: Pose
+    size: Vector3
+    color: Color
+
+
+LINE_STRIP, LINE_LOOP, LINE_LIST = 0, 1, 2
+
+
+class LinePrimitive(msgspec.Struct, frozen=True):
+    """`type`: LINE_STRIP, LINE_LOOP or LINE_LIST."""
+
+    type: int
+    pose: Pose
+    thickness: float
+    scale_invariant: bool
+    points: tuple[Vector3, ...]
+    color: Color
+    colors: tuple[Color, ...] = ()
+    indices: tuple[int, ...] = ()
+
+
+class TriangleListPrimitive(msgspec.Struct, frozen=True):
+    pose: Pose
+    points: tuple[Vector3, ...]
+    color: Color
+    colors: tuple[Color, ...] = ()
+    indices: tuple[int, ...] = ()
+
+
+class TextPrimitive(msgspec.Struct, frozen=True):
+    pose: Pose
+    billboard: bool
+    font_size: float
+    scale_invariant: bool
+    color: Color
+    text: str
+
+
+class SceneEntity(msgspec.Struct, frozen=True, kw_only=True):
+    """Primitives in one frame. It replaces the entity of the same `id` on the same topic."""
+
+    timestamp: Time
+    frame_id: str
+    id: str
+    lifetime: Time = ALWAYS
+    frame_locked: bool = True
+    metadata: tuple[()] = ()
+    arrows: tuple[()] = ()
+    cubes: tuple[CubePrimitive, ...] = ()
+    spheres: tuple[SpherePrimitive, ...] = ()
+    cylinders: tuple[()] = ()
+    lines: tuple[LinePrimitive, ...] = ()
+    triangles: tuple[TriangleListPrimitive, ...] = ()
+    texts: tuple[TextPrimitive, ...] = ()
+    models: tuple[()] = ()
+
+
+class SceneUpdate(msgspec.Struct, frozen=True):
+    deletions: tuple[()]
+    entities: tuple[SceneEntity, ...]
+
+
+class CompressedImage(msgspec.Struct, frozen=True):
+    """`data` in base64 as JSON."""
+
+    timestamp: Time
+    frame_id: str
+    data: bytes
+    format: str
+
+
+class CameraCalibration(msgspec.Struct, frozen=True):
+    """Matrices row by row."""
+
+    timestamp: Time
+    frame_id: str
+    width: int
+    height: int
+    distortion_model: str
+    distortion: tuple[float, ...] = msgspec.field(name="D")
+    intrinsic: tuple[float, ...] = msgspec.field(name="K")
+    rectification: tuple[float, ...] = msgspec.field(name="R")
+    projection: tuple[float, ...] = msgspec.field(name="P")
+
+
+INFO, WARNING, ERROR = 2, 3, 4
+
+
+class Log(msgspec.Struct, frozen=True):
+    """`level`: INFO, WARNING or ERROR. `name`: of whom it tells."""
+
+    timestamp: Time
+    level: int
+    message: str
+    name: str
+    file: str = ""
+    line: int = 0
+
+
+Message = FrameTransforms | SceneUpdate | CompressedImage | CameraCalibration | Log
+"""What is a whole message on a topic."""
