@@ -76,6 +76,20 @@ def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(
     assert recorded() == RECORDED
 
 
+def test_frames_stand_at_the_same_place_whenever_the_recording_was_flushed() -> None:
+    def with_frames(flushed: int) -> bytes:
+        stream = io.BytesIO()
+        with Recorder(stream, SOURCE) as recorder:
+            for period in periods(12):
+                recorder.write_image(0, period.tick, b"png")
+                recorder.write(period)
+                if period.index == flushed:
+                    recorder.flush()
+        return stream.getvalue()
+
+    assert {with_frames(flushed) for flushed in range(12)} == {with_frames(-1)}
+
+
 def test_an_ordinary_mcap_reader_finds_channels_schemas_and_attachments() -> None:
     reader = make_reader(io.BytesIO(RECORDED))
     summary = reader.get_summary()

@@ -23,7 +23,7 @@ COMMANDS = {
     "replay": "Sends recorded bytes again and compares.",
     "diff": "Compares two recordings.",
     "decode": "Decodes captured bytes to frames and damage.",
-    "export": "Writes a run for Foxglove, its bytes for Wireshark or as a stream file.",
+    "export": "Writes a run for Foxglove, Wireshark, or as a stream file.",
     "init": "Begins a project: firmware, tests, scenarios, a workflow for CI.",
     "scenarios": "Lists the built-in scenarios, or shows one.",
     "info": "Shows versions, engine and firmware.",

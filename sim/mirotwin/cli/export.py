@@ -58,7 +58,7 @@ class Exported:
             self.failure = error
 
 
-@click.command(short_help="Writes a run for Foxglove, its bytes for Wireshark or as a stream file.")
+@click.command(short_help="Writes a run for Foxglove, Wireshark, or as a stream file.")
 @click.argument("file", metavar="FILE|-", type=Place())
 @click.option("--out", required=True, type=Place(), help="File to write, or - for standard output.")
 @click.option(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,9 +28,10 @@ from mirotwin.cli.options import (
     plain_parameters,
     set_option,
 )
-from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain
+from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain, show_line
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.run_files import RunFiles
+from mirotwin.cli.run_live_options import live_options
 from mirotwin.cli.run_stops import Stops
 from mirotwin.files.outputs import FILES, OutputFolder
 from mirotwin.recording.source import source_of
@@ -39,6 +41,7 @@ from mirotwin.steps.reading import steps_of
 from mirotwin.steps.running import everything, keep_saved
 
 if TYPE_CHECKING:
+    from mirotwin.cli.run_live import LiveView
     from mirotwin.looking.saved_frames import SavedFrames
     from mirotwin.looking.view import View
 
@@ -88,6 +91,7 @@ if TYPE_CHECKING:
     metavar="FILE.world",
     help="Go on from a saved world of the same scenario, settings, seed and firmware.",
 )
+@live_options
 @click.option("--force", is_flag=True, help="Replace the files of an earlier run in the folders.")
 @click.option(
     "--no-figure", is_flag=True, help="Do not draw figure.png, which takes most of the time of a short run."
@@ -108,6 +112,9 @@ def run(
     save_at: tuple[Time, ...],
     to_tick: Time | None,
     resume: str | None,
+    live: tuple[str, int] | None,
+    pace: float | None,
+    wait: bool,
     force: bool,
     no_figure: bool,
     quiet: bool,
@@ -122,6 +129,9 @@ def run(
 
     A run that is resumed has the bits of one that never stopped. Its recording begins with the first whole control
     period, and holds the saved world.
+
+    With --live, Foxglove shows the run while it goes (Open connection, Foxglove WebSocket, the URL of the first line).
+    Nothing of that changes a bit of the run.
 
     Exit code 1: a step, or a check of --expect or of the scenario's [expect] failed; 3: the firmware did what it must
     not.
@@ -138,6 +148,8 @@ def run(
     folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force, (*FILES, *stops.names))
     if plain_frames and frames is None:
         raise click.UsageError("--plain-frames needs --frames.")
+    if live is None and (pace is not None or wait):
+        raise click.UsageError("--pace and --live-wait need --live.")
     image = load_image(firmware)
     check_symbols(steps, image, text.origin)
 
@@ -153,12 +165,25 @@ def run(
 
         views = views_of(world, text.origin)
     saved = None if frames is None else _saved(frames, views, plain_frames, force)
-    with plain_parameters(text.origin), held_signals() as hold, folder:
+    with plain_parameters(text.origin), held_signals() as hold, ExitStack() as opened, folder:
+        watched = None
+        if live is not None:
+            watched = _live(opened, live, 1.0 if pace is None else pace, wait, world, checks)
         if saved is not None:
             saved.begin(hold)
         recorded = views if record_frames else []
         run_files = RunFiles(
-            folder, source, world, active, hold, checks, text.settings, recorded, player, stops=stops
+            folder,
+            source,
+            world,
+            active,
+            hold,
+            checks,
+            text.settings,
+            recorded,
+            player,
+            stops=stops,
+            live=watched,
         )
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
@@ -179,6 +204,18 @@ def _saved(folder: Path, views: Sequence[View], plain: bool, force: bool) -> Sav
     from mirotwin.looking.saved_frames import SavedFrames
 
     return SavedFrames(FrameFolder(folder, "--frames", force), views, plain)
+
+
+def _live(
+    opened: ExitStack, at: tuple[str, int], pace: float, wait: bool, world: World, checks: Checks
+) -> LiveView:
+    """The server for viewers, which `opened` closes. Raises BadInput where it cannot listen."""
+    from mirotwin.cli.run_live import LiveView
+    from mirotwin.foxglove.server import Server
+
+    server = opened.enter_context(Server(*at, f"{world.scenario.name}-{world.seed}"))
+    show_line(f"live {server.url}")
+    return LiveView(server, world, checks, pace, wait)
 
 
 def report_faults(world: World) -> int:

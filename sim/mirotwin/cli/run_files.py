@@ -35,6 +35,7 @@ from mirotwin.report.track import Tracks
 
 if TYPE_CHECKING:
     from mirotwin.bridges.session import Session
+    from mirotwin.cli.run_live import LiveView
     from mirotwin.cli.run_stops import Stops
     from mirotwin.looking.view import View
     from mirotwin.steps.player import Player
@@ -49,7 +50,7 @@ class RunFiles:
     """Runs `world` and fills `folder`, which is open and in which `hold` holds signals.
 
     The recording gets each frame of `views`. `player` runs a world with steps. A live `session` drives the world, else
-    it runs as fast as it can. `stops`: where it saves the world, and ends.
+    it runs as fast as it can. `stops`: where it saves the world, and ends. `live` is told what is recorded.
     """
 
     def __init__(
@@ -65,6 +66,7 @@ class RunFiles:
         player: Player | None = None,
         session: Session | None = None,
         stops: Stops | None = None,
+        live: LiveView | None = None,
     ) -> None:
         self.folder = folder
         self.source = source
@@ -77,6 +79,7 @@ class RunFiles:
         self.player = player
         self.session = session
         self.stops = stops
+        self.live = live
         self.tracks = Tracks()
         self._wall_s = 0.0
         self._flushed_s = -FLUSH_S
@@ -89,6 +92,8 @@ class RunFiles:
         try:
             self._record(bar)
             self.checks.finish()
+            if self.live is not None:
+                self.live.finish()
             summary = self._summary(complete=True)
             self.folder.part(SUMMARY).write_bytes(to_json(summary))
             if self.tracks.count and title is not None:
@@ -116,15 +121,21 @@ class RunFiles:
     def _simulate(self, recorder: Recorder, bar: ProgressBar) -> None:
         def keep(period: Period) -> None:
             self.tracks.add(period)
-            recorder.write_theories(self.tracks.theories())
+            theories = list(self.tracks.theories())
+            recorder.write_theories(theories)
             now_s = time.monotonic()
             if now_s - self._flushed_s >= FLUSH_S:
                 recorder.flush()
                 self._flushed_s = now_s
             bar.to(self.tracks.count)
+            if self.live is not None:
+                self.live.period(period, theories)
 
         def keep_frame(view: View) -> None:
-            recorder.write_image(view.network, view.tick, view.png(plain=True))
+            png = view.png(plain=True)
+            recorder.write_image(view.network, view.tick, png)
+            if self.live is not None:
+                self.live.frame(view.network, view.tick, png)
 
         for view in self.views:
             view.shows.append(keep_frame)

@@ -38,7 +38,7 @@ Place = tuple[int, int]
 
 
 class ErrorMessage(msgspec.Struct, frozen=True):
-    """`error`: truth against reference at `tick`, the paper's c - r, heading wrapped. `off_pitch`: a corner of it is."""
+    """`error`: truth against reference at `tick`, the paper's c - r, heading wrapped. `off_pitch`: a corner is."""
 
     tick: int
     x_cm: float

@@ -1,4 +1,4 @@
-"""What the tests of Foxglove's topics share: a run with two teams, its export, messages as the MCAP library reads them."""
+"""What the tests of Foxglove's topics share: a run of two teams, its export, and messages as the library reads them."""
 
 from __future__ import annotations
 
