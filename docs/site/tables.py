@@ -1,0 +1,168 @@
+"""Tables that are made from the code when the site is built: keys of scenarios, channels, figures of a campaign.
+
+What belongs here: from structs to Markdown. What does not: where a table stands (a comment in the page says so), and
+links (`pages`).
+
+    <!-- keys: miro_sim.scenario.keys:Scenario -->      a section for each struct of keys
+    <!-- channels -->                                   one for each channel of a recording
+    <!-- figures -->                                    the columns of a results file
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from typing import Any
+
+import msgspec
+from msgspec import inspect as kinds
+
+MARK = re.compile(r"^<!-- (keys: (?P<keys>[\w.]+:\w+)|channels|figures) -->$", re.MULTILINE)
+
+
+def filled(markdown: str) -> str:
+    """The text of a page with its tables."""
+    return MARK.sub(_table, markdown)
+
+
+def _table(found: re.Match[str]) -> str:
+    if found["keys"]:
+        module, _, name = found["keys"].partition(":")
+        return "\n".join(key_sections(getattr(import_module(module), name)))
+    return "\n".join(channel_sections() if found[1] == "channels" else figure_rows())
+
+
+def about(struct: type) -> str:
+    """The docstring, without the signature that msgspec puts in where there is none."""
+    text = inspect.getdoc(struct) or ""
+    return "" if text.startswith(f"{struct.__name__}(") else text
+
+
+# Keys
+
+
+def key_sections(root: type) -> Iterator[str]:
+    """Heading, docstring and table of a struct and of all that its keys hold, each once."""
+    waiting, seen = [("", root)], set()
+    while waiting:
+        path, struct = waiting.pop(0)
+        if struct in seen:
+            continue
+        seen.add(struct)
+        config = struct.__struct_config__
+        tag = f"{config.tag_field} = {config.tag!r}".replace("'", '"') if config.tag is not None else ""
+        place = f"`[{path}]`" if path else "Top of the file"
+        yield f"### {place}{f', `{tag}`' if tag else ''}\n\n{about(struct)}\n"
+        yield "| key | value | default |\n|---|---|---|"
+        for field in kinds.type_info(struct).fields:
+            below = list(structs_in(field.type))
+            name = field.encode_name
+            inside = f"{path}.{name}".lstrip(".")
+            waiting += [(inside, one) for one in below]
+            value = f"table{'s' if len(below) > 1 else ''}, below" if below else value_of(field.type)
+            yield f"| `{name}` | {value} | {default_of(field)} |"
+        yield ""
+
+
+def structs_in(kind: Any) -> Iterator[type]:
+    """The structs of a table, of one of several kinds of table, or of an array of tables."""
+    if isinstance(kind, kinds.Metadata):
+        yield from structs_in(kind.type)
+    elif isinstance(kind, kinds.StructType):
+        yield kind.cls
+    elif isinstance(kind, kinds.UnionType):
+        for one in kind.types:
+            yield from structs_in(one)
+    elif isinstance(kind, kinds.VarTupleType | kinds.ListType):
+        yield from structs_in(kind.item_type)
+
+
+def value_of(kind: Any) -> str:
+    """What a key may hold, in words."""
+    if isinstance(kind, kinds.Metadata):
+        return value_of(kind.type)
+    if isinstance(kind, kinds.FloatType | kinds.IntType):
+        name = "number" if isinstance(kind, kinds.FloatType) else "whole number"
+        bounds = [(">= ", kind.ge), ("> ", kind.gt), ("<= ", kind.le), ("< ", kind.lt)]
+        said = [f"{sign}{bound:g}" for sign, bound in bounds if bound is not None]
+        return f"{name} ({', '.join(said)})" if said else name
+    if isinstance(kind, kinds.LiteralType):
+        return ", ".join(f"`{_toml(value)}`" for value in kind.values)
+    if isinstance(kind, kinds.UnionType):
+        return " or ".join(value_of(one) for one in kind.types if not isinstance(one, kinds.NoneType))
+    simple = {
+        kinds.BoolType: "`true`, `false`",
+        kinds.StrType: "text",
+        kinds.DictType: "table",
+        kinds.VarTupleType: "array",
+        kinds.ListType: "array",
+        kinds.TupleType: "array",
+        kinds.EnumType: "name",
+        kinds.AnyType: "anything",
+    }
+    return simple.get(type(kind), type(kind).__name__)
+
+
+def default_of(field: Any) -> str:
+    if field.required:
+        return "has to be given"
+    value = field.default if field.default is not kinds.NODEFAULT else None
+    if value is None or isinstance(value, msgspec.Struct | dict | tuple | list):
+        return ""
+    return f"`{_toml(value)}`"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else f"{value}"
+
+
+# Channels and figures
+
+
+def channel_sections() -> Iterator[str]:
+    """Heading, docstring and fields of each channel."""
+    from mirotwin.recording import channels
+
+    for name, struct in {**channels.ROBOT_CHANNELS, **channels.OTHER_CHANNELS}.items():
+        text = re.sub(rf"^`/?{re.escape(name)}`[^:]*: ", "", about(struct))
+        yield f"### `{name}`\n\n{text[:1].upper() + text[1:]}\n"
+        yield "| field | type |\n|---|---|"
+        yield from (
+            f"| `{field.encode_name}` | {json_type(field.type)} |" for field in kinds.type_info(struct).fields
+        )
+        yield ""
+
+
+def json_type(kind: Any) -> str:
+    """The type of a field in words of JSON."""
+    if isinstance(kind, kinds.UnionType):
+        return " or ".join(json_type(one) for one in kind.types)
+    if isinstance(kind, kinds.StructType):
+        inner = ", ".join(f"`{field.encode_name}`" for field in kinds.type_info(kind.cls).fields)
+        return f"object: {inner}"
+    if isinstance(kind, kinds.VarTupleType):
+        return f"array of {json_type(kind.item_type)}"
+    words = {
+        kinds.IntType: "integer",
+        kinds.FloatType: "number",
+        kinds.StrType: "text",
+        kinds.BoolType: "true or false",
+        kinds.DictType: "object: numbers by name",
+        kinds.NoneType: "null",
+        kinds.LiteralType: "text",
+        kinds.BytesType: "text, Base64",
+    }
+    return words.get(type(kind), type(kind).__name__)
+
+
+def figure_rows() -> Iterator[str]:
+    """The columns of a results file that are figures."""
+    from mirotwin.campaign.columns import FIGURES
+
+    yield "| column | type |\n|---|---|"
+    for name, kind in FIGURES.items():
+        yield f"| `{name}` | {'true or false' if kind is bool else kind.__name__} |"
