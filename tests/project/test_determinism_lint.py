@@ -20,6 +20,7 @@ EDGE = (
     "sim/mirotwin/cli/",
     "sim/mirotwin/report/figure.py",
     "sim/mirotwin/bridges/pacing.py",
+    "sim/mirotwin/foxglove/server.py",  # who watches a run
     "sim/mirotwin/fuzz/afl/",  # when an engine tries what; each find is run again by itself
     "sim/mirotwin/fuzz/campaign.py",  # what is looked at when
     "sim/mirotwin/fuzz/budget.py",  # how long an input is made smaller
