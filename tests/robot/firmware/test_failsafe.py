@@ -157,3 +157,22 @@ def test_110_ms_count_from_the_character_also_when_the_robot_was_loading(
     stop, start, *_ = rig.told(rig.board.left)
     assert (stop.data, start.opcode) == (STOP, STT)
     assert 109.7 * MS <= start.tick - end <= 110 * MS
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("behind", [1, 2, 5])
+@pytest.mark.parametrize("pause", [0, 600])
+def test_110_ms_count_from_the_frame_also_with_characters_behind_it(
+    place: tuple[int, int], behind: int, pause: int
+) -> None:
+    rig = Rig(*place)
+    data = encode(TeamFrame(0, 0, ((1000, 1000),) * place[1]), place[1])
+    rig.send(data)
+    end = rig.line_free
+    rig.send(bytes(behind), at=end + pause)
+    rig.run_to(end + 10 * MS)
+    rig.told(rig.board.left)
+    rig.run_to(end + 112 * MS)
+    stop, start, *_ = rig.told(rig.board.left)
+    assert (stop.data, start.opcode) == (STOP, STT)
+    assert 109.7 * MS <= start.tick - end <= 110.1 * MS

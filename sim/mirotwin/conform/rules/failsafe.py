@@ -38,6 +38,12 @@ def stop(talk: Talk) -> None:
         talk.wait(3.3)
         stops_behind(talk, make())
         talk.wait(130.0)
+    talk.obeyed(talk.team())
+    talk.wait(3.3)
+    last = talk.team(gap_ms=0.0)
+    talk.characters(bytes(8))  # no robot has looked at the frame when the first of these ends
+    stops_behind(talk, last)
+    talk.wait(130.0)
 
 
 @CHAPTER.rule(
