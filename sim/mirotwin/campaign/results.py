@@ -21,8 +21,9 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from mirotwin.campaign.columns import CHECK, FIGURES
+from mirotwin.campaign.design import Level
 from mirotwin.campaign.journal import Head, in_order
-from mirotwin.campaign.plan import Plan
+from mirotwin.campaign.plan import OWN_IMAGE, Plan
 from mirotwin.campaign.worker import Outcome
 from mirotwin.files.outputs import whole_file
 
@@ -36,13 +37,21 @@ OPTION = "--out"
 
 
 class About(msgspec.Struct, frozen=True):
-    """What a results file says of itself. `factors`: columns of the design, `drawn`: those of its random part."""
+    """What a results file says of itself. `factors`: columns of the design, `drawn`: those of its random part.
+
+    What makes a row again, by names without folders: `scenario`, `firmware`, `settings` of all runs, and the `levels`
+    of each factor. Files of earlier versions do not have it.
+    """
 
     head: Head
     campaign: str
     factors: tuple[str, ...]
     drawn: tuple[str, ...]
     checks: tuple[str, ...]
+    scenario: str = ""
+    firmware: str = ""
+    settings: tuple[str, ...] = ()
+    levels: tuple[tuple[Level, ...], ...] = ()
 
 
 def require_arrow() -> None:
@@ -63,7 +72,22 @@ def about(plan: Plan, head: Head) -> About:
         tuple(factor.name for factor in design.factors),
         tuple(draw.name for draw in design.draws),
         plan.checks,
+        _name(plan.file.scenario),
+        _name(plan.file.firmware),
+        tuple(setting for setting, _ in plan.file.settings),
+        tuple(tuple(map(_elsewhere, factor.levels)) for factor in design.factors),
     )
+
+
+def _elsewhere(level: Level) -> Level:
+    """The level without what is so on this machine only."""
+    names = {"scenario": _name(level.scenario), "firmware": _name(level.firmware)}
+    return msgspec.structs.replace(level, place="", **names)
+
+
+def _name(path: str) -> str:
+    """The robot's own image is named by no path."""
+    return "" if path == OWN_IMAGE else Path(path).name
 
 
 def write(plan: Plan, head: Head, journal: Path, results: Path) -> None:

@@ -14,6 +14,7 @@ COMMANDS = {
     "serve": "Offers the robot's radio as PTY, TCP and RFC 2217 ports.",
     "reproduce": "Runs the paper's figures again and writes one page about them.",
     "campaign": "Runs a scenario many times, varied, and compares.",
+    "report": "Makes one page of a run, a case, a failed test or a campaign.",
     "look": "Draws what the camera sees and what the tracker makes of it.",
     "calibrate": "Finds a camera's parameters from control points.",
     "track": "Finds robots in pictures of your own, or in recorded ones.",

@@ -11,7 +11,7 @@ from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.coverage import counts_of
 from miro_robot.inspect.lcov import Tracefile, add
 from mirotwin.cli.console import show
-from mirotwin.cli.debug import sources_of, sources_option, with_debug_files
+from mirotwin.cli.debug import sources_of, sources_option
 from mirotwin.cli.options import Place
 from mirotwin.cli.subject import Request, look, open_run, subject_options
 from mirotwin.files.outputs import check_new, check_not_input
@@ -22,6 +22,7 @@ from mirotwin.report.firmware_coverage import (
     listing_path,
     read_tracefile,
     table,
+    with_debug_files,
     write,
 )
 

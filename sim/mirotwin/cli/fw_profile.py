@@ -11,8 +11,8 @@ from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.profile import Profile
 from miro_robot.inspect.profile import profile as profile_of
 from mirotwin.cli.console import show
-from mirotwin.cli.debug import with_debug_files
 from mirotwin.cli.subject import Request, image_name, look, open_run, subject_options
+from mirotwin.report.firmware_coverage import with_debug_files
 
 
 @click.command(short_help="Shows where the processor spends its time.")

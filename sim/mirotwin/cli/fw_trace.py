@@ -9,11 +9,11 @@ import click
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.trace import HEADING, Trace
 from mirotwin.cli.code_place import functions_at
-from mirotwin.cli.debug import with_debug_files
 from mirotwin.cli.options import Place
 from mirotwin.cli.program import show_line
 from mirotwin.cli.subject import Request, look, open_run, subject_options
 from mirotwin.files.outputs import check_new, check_not_input, whole_file
+from mirotwin.report.firmware_coverage import with_debug_files
 
 
 @click.command(short_help="Writes each instruction with the registers it changed.")

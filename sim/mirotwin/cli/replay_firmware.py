@@ -16,13 +16,13 @@ from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path, source_folder
 from miro_robot.image import Image, load_hex
 from miro_sim.world.world import World
-from mirotwin.cli.debug import with_debug_files
 from mirotwin.cli.options import Place, load_image, plain_parameters
 from mirotwin.cli.replay_job import Job
 from mirotwin.replay.difference import Difference
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS
 from mirotwin.replay.program import Program
+from mirotwin.report.firmware_coverage import with_debug_files
 
 
 def lines_from_option(command: Callable[..., Any]) -> Callable[..., Any]:

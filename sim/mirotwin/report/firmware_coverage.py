@@ -1,11 +1,12 @@
 """Firmware coverage as a report: what the command line and the pytest plugin make of counts.
 
-What belongs here: paths, the table for people, the files that are added to and written. What does not: the mapping to
-lines (`miro_robot.inspect.coverage`).
+What belongs here: where debug files and sources are looked for, paths, the table for people, the files that are added
+to and written. What does not: the mapping to lines (`miro_robot.inspect.coverage`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -13,7 +14,8 @@ import msgspec
 from rich.table import Table
 
 from miro_exact.bad_input import one_line
-from miro_robot.image import Image
+from miro_robot.firmware import image_path, source_folder
+from miro_robot.image import Image, load_hex
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.coverage import (
     Counts,
@@ -37,6 +39,22 @@ class Report(msgspec.Struct, frozen=True):
     tracefile: Tracefile
     instructions: Share
     listing: str | None
+
+
+def with_debug_files(image: Image) -> Image:
+    """The image as it has debug files: one out of a recording that is the robot's own has that one's."""
+
+    if image.path.is_file():
+        return image
+    own = load_hex(image_path())
+    return own if own.sha256 == image.sha256 else image
+
+
+def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
+    """The folders to look for C files in: those given, the image's own, and the robot's firmware's."""
+
+    own = source_folder()
+    return Sources([*map(Path, given), image.path.parent, *([own] if own else [])])
 
 
 def has_listing(image: Image) -> bool:
