@@ -149,7 +149,10 @@ def _of_case(wanted: Wanted, file: str, job: Job, image: Image) -> Material:
     )
     return Material(
         about=msgspec.structs.replace(
-            about, report=text, verdict="failed" if text and not again.failures else ""
+            about,
+            report=text,
+            name=Path(file).absolute().parent.name if text else "",
+            verdict="failed" if text and not again.failures else "",
         ),
         scenario=job.scenario,
         scenario_text=tomli_w.dumps(tables_of(job.scenario)),

@@ -76,7 +76,7 @@ def run_again(
         while not world.stopped and world.tick < end_tick:
             world.run_to(min(end_tick, (world.index + 1) * CONTROL_PERIOD_TICKS))
             progress(world.tick)
-        over_tick, digest = world.tick, world.digest
+        over_tick = world.tick
         checks.finish()
     finally:
         detach(cpu, counters, activity)
@@ -87,7 +87,7 @@ def run_again(
     return Again(
         periods=periods,
         end_tick=over_tick,
-        digest=digest,
+        digest=world.digest,
         verdicts=checks.verdicts(),
         failures=checks.failures,
         faults=_faults(world),

@@ -32,6 +32,8 @@ OF_PC = ("answer", "reset", "power", "radio")
 RESTARTS = ("reset", "power")
 FATES = ("fresh", "repeated", "damaged", "lost", "open")
 ROBOT_CHARACTER_TICKS = CHARACTER_BITS * ROBOT_BIT_TICKS
+TOGETHER_TICKS = 3 * ROBOT_CHARACTER_TICKS
+"""Characters with a longer pause between them are two noises."""
 SLACK_TICKS = 24_000
 """By so much a frame may arrive before it should: rounding of delays."""
 
@@ -197,15 +199,27 @@ def _fates(
                 damaged[number] = damaged.get(number, 0) + 1
             else:
                 noise.append(tick)
-        if noise:
-            end = noise[-1] + ROBOT_CHARACTER_TICKS
-            marks.append(Mark(lane, "noise", noise[0], end, f"{len(noise)} characters of noise"))
+        for first, last, count in _together(noise):
+            marks.append(Mark(lane, "noise", first, last, f"{count} characters of noise"))
     for number, name in enumerate(named):
         start, end = begins[number] + SLACK_TICKS, ends[number] - SLACK_TICKS
         kind = _fate(frames.get(number), damaged.get(number, 0), end + SLACK_TICKS > over_tick)
         if name or kind not in ("lost", "open"):
-            marks.append(Mark(lane, kind, start, end, f"{name or 'no frame'}: {kind}"))
+            shown = min(end, over_tick) if kind == "open" else end
+            marks.append(Mark(lane, kind, start, shown, f"{name or 'no frame'}: {kind}"))
     return sorted(marks, key=lambda mark: mark.start_tick)
+
+
+def _together(ticks_of: Sequence[int]) -> list[tuple[int, int, int]]:
+    """Begin, end and number of characters that come close to each other."""
+    found: list[tuple[int, int, int]] = []
+    for tick in ticks_of:
+        end = tick + ROBOT_CHARACTER_TICKS
+        if found and tick - found[-1][1] <= TOGETHER_TICKS:
+            found[-1] = (found[-1][0], end, found[-1][2] + 1)
+        else:
+            found.append((tick, end, 1))
+    return found
 
 
 def _fate(fresh: bool | None, damaged: int, at_the_end: bool) -> str:

@@ -25,19 +25,21 @@ PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 MOST_FAILURES = 20
 """So many are marked; the table has more."""
 KIND_COLOURS = {
+    "noise": "noise",
+    "open": "rule",
     "sent": "muted",
     "raw": "measured",
     "fresh": "good",
     "repeated": "repeated",
-    "damaged": "bad",
-    "lost": "lost",
-    "open": "rule",
-    "noise": "noise",
     "answer": "truth",
     "deed": "measured",
+    "damaged": "bad",
+    "lost": "lost",
 }
-"""Kinds of marks in the order of a legend, and their colours."""
-HOLLOW = ("lost",)
+"""Kinds of marks and their colours, in the order in which they are drawn: what went wrong lies on top."""
+HEIGHTS = {"noise": 0.26, "damaged": 0.94, "lost": 0.94}
+"""Of a lane; 0.6 for all others."""
+HOLLOW, WRONG = ("lost",), ("damaged", "lost")
 Figures = dict[str, Any]
 
 
@@ -147,15 +149,9 @@ def _link(marks: Sequence[Mark], times: Any) -> Any:
                 "right": _times([mark.end_tick for mark in found]),
             }
         )
-        bars = made.hbar(
-            y="lane",
-            left="left",
-            right="right",
-            height=0.62,
-            source=source,
-            name=f"link:{kind}",
-            line_width=1.0,
-        )
+        bars = made.hbar(y="lane", left="left", right="right", source=source, name=f"link:{kind}")
+        bars.glyph.height = HEIGHTS.get(kind, 0.6)
+        bars.glyph.line_width = 2.0 if kind in WRONG else 1.0
         alpha = 0.0 if kind in HOLLOW else 1.0
         bars.glyph.fill_alpha = alpha
         tagged(bars.glyph, fill_color=colour, line_color=colour)

@@ -34,7 +34,7 @@ SILENT = "silent"
 
 
 class About(msgspec.Struct, frozen=True):
-    """What the header says. `kind`: run, case or failed test; `file`: its name without folders.
+    """What the header says. `kind`: run, case or failed test; `file`: its name without folders; `name`: of a test.
 
     `notes`: what is to be known before all else, a line each; `report`: the text that a failed test left; `again`:
     commands that give it again.
@@ -49,6 +49,7 @@ class About(msgspec.Struct, frozen=True):
     report: str = ""
     again: Sequence[str] = ()
     verdict: str = ""
+    name: str = ""
 
 
 class Replayed(msgspec.Struct, frozen=True):
@@ -93,6 +94,7 @@ def run_page(material: Material) -> bytes:
         "scenario": scenario.name,
         "scenario_text": material.scenario_text,
         "verdict": _verdict(material),
+        "told": any(value == value for robot in course.robots for value in robot.told_v_m_s),
         "facts": _facts(material, course),
         "course": course,
         "pitch": pitch_of(course),

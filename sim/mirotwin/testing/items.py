@@ -17,6 +17,7 @@ from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_sim.world.waits import WaitExpired
 from mirotwin.testing.left_behind import case_of, clear, folder_of, leave, replay_line, story, test_line
+from mirotwin.testing.page_left import page_of
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.testing.wanted import marked, wanted
@@ -101,7 +102,14 @@ def tell(
     text = story(rig, failures, lines)
     report.sections.append(("mirotwin", text))
     if folder is not None:
-        leave(folder, rig, failures, text, case)
+        leave(
+            folder,
+            rig,
+            failures,
+            text,
+            case,
+            page_of(rig, item.nodeid, caught.value if caught else None, text, lines),
+        )
 
 
 def let_go(item: pytest.Item) -> None:

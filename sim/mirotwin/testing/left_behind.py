@@ -27,7 +27,8 @@ from mirotwin.testing.waiting import WaitFailed, at
 REPORT, SUMMARY = "report.txt", "summary.json"
 CASE, SENT = "case.stream", "sent.stream"
 """A case gives the failure again; where no check can judge it, what was sent gives the run again."""
-FILES = (REPORT, SUMMARY, CASE, SENT)
+PAGE = "report.html"
+FILES = (REPORT, SUMMARY, CASE, SENT, PAGE)
 _NAME_CHARACTERS = 80
 
 
@@ -102,7 +103,9 @@ def replay_line(folder: str, firmware: str | None) -> str:
     return shlex.join(words if firmware is None else [*words, "--firmware", firmware])
 
 
-def leave(folder: Path, rig: Rig, failures: Sequence[Failure], text: str, case: str | None) -> None:
+def leave(
+    folder: Path, rig: Rig, failures: Sequence[Failure], text: str, case: str | None, page: bytes | None
+) -> None:
     """Writes the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     if case is not None:
@@ -110,5 +113,7 @@ def leave(folder: Path, rig: Rig, failures: Sequence[Failure], text: str, case: 
     elif not rig.written:
         write_case(folder / SENT, case_text(rig.world, rig.trace, {}, ""))
     (folder / REPORT).write_text(text + "\n", encoding="utf-8")
+    if page is not None:
+        (folder / PAGE).write_bytes(page)
     summary = {**rig.facts(), "tick": rig.tick, "checks_failed": [str(one) for one in failures]}
     (folder / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")

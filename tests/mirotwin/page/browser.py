@@ -1,0 +1,100 @@
+"""Chromium without a screen, for tests of pages, and the pictures that they are compared with.
+
+What belongs here: starting it, opening a page, taking pictures. What does not: what is tested.
+
+    python -m tests.mirotwin.page.browser          makes the pictures in `pictures/` anew
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from PIL import Image, ImageFilter
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import WebDriverWait
+
+CHROMIUM, CHROMEDRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+PICTURES = Path(__file__).parent / "pictures"
+SMALL = (96, 66)
+OPTIONS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars",
+    "--force-device-scale-factor=1",
+    "--window-size=1400,900",
+)
+PATIENCE_S = 60.0
+SHOWN = 20
+"""Control period of the pictures."""
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM or ""
+    for option in OPTIONS:
+        options.add_argument(option)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(CHROMEDRIVER))
+    try:
+        yield driver
+    finally:
+        driver.quit()
+
+
+def open_page(driver: Any, page: Path, theme: str = "light", width: int = 1400, height: int = 900) -> None:
+    """Opens a page as a reader has it whose system is light or dark, and waits until it is all there."""
+    features = [{"name": "prefers-color-scheme", "value": theme}]
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    driver.get(page.as_uri())
+    WebDriverWait(driver, PATIENCE_S, 0.05).until(
+        lambda one: one.execute_script("return document.body.dataset.ready")
+    )
+
+
+def picture(driver: Any, selector: str) -> Image.Image:
+    """What an element looks like."""
+    element = driver.find_element(By.CSS_SELECTOR, selector)
+    return Image.open(BytesIO(element.screenshot_as_png)).convert("RGB")
+
+
+def small(of: Image.Image) -> Image.Image:
+    """So small that hinting and smoothing do not count."""
+    return of.filter(ImageFilter.GaussianBlur(2)).resize(SMALL, Image.Resampling.BOX)
+
+
+def apart(one: Image.Image, other: Image.Image) -> float:
+    """The mean difference of two pictures of one size, of 255."""
+    pairs = list(zip(one.tobytes(), other.tobytes(), strict=True))
+    return sum(abs(here - there) for here, there in pairs) / len(pairs)
+
+
+def _renew() -> None:
+    from tests.mirotwin.page.conftest import SEED, called
+
+    PICTURES.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory() as name, chromium() as driver:
+        folder = Path(name)
+        options = ["--set", "duration_s=1.5", "--expect", "settles_within_s=0.4"]
+        called("run", "fig6", "--seed", SEED, *options, "--out", folder / "fig6", "--no-figure", "-q")
+        called("report", folder / "fig6", "-o", folder / "fig6.html", "-q")
+        for theme in ("light", "dark"):
+            open_page(driver, folder / "fig6.html", theme)
+            driver.execute_script("run.show(arguments[0])", SHOWN)
+            small(picture(driver, "#field")).save(PICTURES / f"pitch-{theme}.png")
+
+
+if __name__ == "__main__":
+    _renew()
