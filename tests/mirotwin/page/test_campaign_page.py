@@ -16,7 +16,7 @@ from mirotwin.cli import main
 TEXT = """
 scenario = "fig6"
 seeds = "2-11"
-set = { duration_s = 0.1, "expect.tracks_within_cm" = 6.0 }
+set = { duration_s = 0.1, "expect.tracks_within_cm" = 20.0 }
 [grid]
 network.radio.bit_error_rate = [0.0, 1e-3]
 [factor.start]

@@ -148,7 +148,12 @@ def test_a_case_gives_the_verdict_again_by_the_printed_line(mixed: Path, name: s
 
 def test_where_no_check_can_judge_what_was_sent_is_left(mixed: Path) -> None:
     (folder,) = [path for path in (mixed / "left").iterdir() if "misspells_a_function" in path.name]
-    assert sorted(path.name for path in folder.iterdir()) == ["report.txt", "sent.stream", "summary.json"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "report.html",
+        "report.txt",
+        "sent.stream",
+        "summary.json",
+    ]
     assert run(mixed, f"mirotwin replay left/{folder.name}/sent.stream").returncode == 0
 
 
