@@ -40,7 +40,7 @@ def panel(y_label: str, x_range: Any, height: int = 190, x_label: str = "", **mo
     made.background_fill_alpha = made.border_fill_alpha = 0.0
     made.outline_line_color = None
     made.min_border_right = 10
-    made.min_border_left = 52
+    made.min_border_left = 64
     made.min_border_top = 6
     for axis, label in ((made.xaxis[0], x_label), (made.yaxis[0], y_label)):
         _style(axis, label)
