@@ -168,6 +168,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     return files
 
 
+def on_page_content(html: str, **_: Any) -> str:
+    """Takes away what the table of a command's options has as the default of an option that has none."""
+    return html.replace("<code>Sentinel.UNSET</code>", "").replace("<code>()</code>", "")
+
+
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Rewrites the links of one page, and fills in its tables."""
     return relinked(tables.filled(markdown), page.file.src_uri)

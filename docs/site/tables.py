@@ -57,13 +57,23 @@ def key_sections(root: type) -> Iterator[str]:
         yield f"### {place}{f', `{tag}`' if tag else ''}\n\n{about(struct)}\n"
         yield "| key | value | default |\n|---|---|---|"
         for field in kinds.type_info(struct).fields:
-            below = list(structs_in(field.type))
             name = field.encode_name
+            below = list(structs_in(field.type)) or parts_of(name)
             inside = f"{path}.{name}".lstrip(".")
             waiting += [(inside, one) for one in below]
-            value = f"table{'s' if len(below) > 1 else ''}, below" if below else value_of(field.type)
+            value = "table, below" if below else value_of(field.type)
             yield f"| `{name}` | {value} | {default_of(field)} |"
         yield ""
+
+
+def parts_of(key: str) -> list[type]:
+    """The structs of our own laws, estimators and references, if it is the key that names one."""
+    from miro_host.estimators.registry import ESTIMATORS
+    from miro_host.laws.registry import LAWS
+    from miro_host.references.registry import REFERENCES
+
+    registry: Any = {"controller": LAWS, "estimator": ESTIMATORS, "reference": REFERENCES}.get(key)
+    return [registry.find(name) for name in registry.own] if registry is not None else []
 
 
 def structs_in(kind: Any) -> Iterator[type]:

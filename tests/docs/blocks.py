@@ -1,0 +1,122 @@
+"""The code blocks of a document: what each is, and how it is run.
+
+What belongs here: finding blocks and choosing their evaluator, as a parser for sybil. What does not: running a shell
+(`shell`), and what lies in the folder that a document is run in (`sandbox`).
+
+    ```python          is executed; the blocks of a document share their names. One that defines tests goes to pytest
+    ```sh, ```console  each line is run, with `$ ` in front of commands where output is shown
+    indented           the same: GitHub and the site show it like the two above
+    ```toml            is read by what reads such files: scenario, campaign, board, entry points
+    ```c               a whole program: is compiled
+    ```text            is no code
+
+A comment in front of a block says what a reader need not know:
+
+    <!-- not run: REASON -->     it is not run; all of these stand in `test_blocks`
+    <!-- file: NAME -->          its text is written to that file before anything runs
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from markdown_it import MarkdownIt
+from sybil import Document, Example, Region
+from tests.docs import running
+
+ROOT = Path(__file__).parents[2]
+NOT_RUN = re.compile(r"<!-- not run: (.+?) -->", re.DOTALL)
+FILE = re.compile(r"<!-- file: (\S+) -->")
+SHELL = ("sh", "console", "indented")
+LANGUAGES = ("python", "toml", "c", "text", *SHELL)
+COMMAND = re.compile(r"(\$ )?(mirotwin|python3?|pip|pytest) ")
+ELSEWHERE = {
+    ("README.md", "python3 -m venv"): ".ci/run does it",
+    ("README.md", ".venv/bin/pytest"): ".ci/run does it",
+    ("README.md", "pip install"): "needs the package index",
+    ("README.md", "mirotwin fuzz"): "fuzzing goes on for a time",
+    ("README.md", "mirotwin reproduce"): "2100 runs, 5 minutes on two cores",
+    ("README.md", "mirotwin campaign"): "hundreds of runs",
+    ("examples/hil/README.md", "python3 -m venv"): "needs the package index; tests/project/sample.py does it",
+    ("examples/hil/README.md", "mirotwin replay"): "needs a firmware that fails",
+    (
+        "examples/fuzz-slip/README.md",
+        "pip install",
+    ): "needs the package index, and fuzzing goes on for 30 seconds",
+}
+"""Why a block is not run, by document and the begin of its text, where a comment would be in the way of a reader."""
+
+
+class Block(NamedTuple):
+    """One block. `line`: from 1. `not_run`: the reason, or empty. `file`: where its text is written first."""
+
+    language: str
+    text: str
+    line: int
+    not_run: str = ""
+    file: str = ""
+
+
+def blocks_of(text: str, document: str = "") -> Iterator[Block]:
+    """All blocks of a document, those that are no code too."""
+    for block in _blocks(text):
+        here = [(begin, why) for (where, begin), why in ELSEWHERE.items() if where == document]
+        reasons = (why for begin, why in here if block.text.startswith(begin))
+        yield block._replace(not_run=block.not_run or next(reasons, ""))
+
+
+def _blocks(text: str) -> Iterator[Block]:
+    not_run, file = "", ""
+    for token in MarkdownIt().parse(text):
+        if token.type == "html_block":
+            not_run = " ".join(found[1].split()) if (found := NOT_RUN.search(token.content)) else not_run
+            file = found[1] if (found := FILE.search(token.content)) else file
+        elif token.type in ("fence", "code_block"):
+            language = (
+                token.info.split()[0] if token.info else "text" if token.type == "fence" else "indented"
+            )
+            if language == "text" and not token.info and COMMAND.match(token.content):
+                language = "a fence without a language"
+            assert token.map is not None
+            yield Block(language, textwrap.dedent(token.content), token.map[0] + 1, not_run, file)
+            not_run, file = "", ""
+        elif token.type.endswith("_open"):
+            not_run, file = "", ""
+
+
+def parser(document: Document) -> Iterator[Region]:
+    """Sybil's regions: one a block."""
+    starts = [0]
+    for line in document.text.splitlines(keepends=True):
+        starts.append(starts[-1] + len(line))
+    for block in blocks_of(document.text, Path(document.path).relative_to(ROOT).as_posix()):
+        start = starts[block.line - 1]
+        yield Region(start, start + 1, block, evaluator_of(block))
+
+
+def evaluator_of(block: Block) -> Callable[[Example], str | None]:
+    """Who runs it."""
+    if block.not_run or block.language == "text":
+        return nothing
+    if block.language in SHELL:
+        return running.shell
+    return {"python": running.python, "toml": running.toml, "c": running.c}.get(block.language, unknown)
+
+
+def nothing(example: Example) -> None:
+    """For what is not run."""
+
+
+def unknown(example: Example) -> str:
+    return f"a block of {example.parsed.language!r}; say what it is: {', '.join(filter(None, LANGUAGES))}"
+
+
+def write_files(document: Document, folder: Path) -> None:
+    """Writes the blocks that have a file's name."""
+    for example in document.examples():
+        if example.parsed.file:
+            (folder / example.parsed.file).write_text(example.parsed.text, "utf-8")

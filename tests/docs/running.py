@@ -1,0 +1,124 @@
+"""What runs a block of each language, in the folder that the process stands in.
+
+What belongs here: one function a language, which returns what is wrong or None. What does not: finding blocks
+(`blocks`) and single shell commands (`shell`).
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from sybil import Example
+from tests import children
+from tests.docs.shell import Shell, commands_of, fits
+
+from miro_robot.wiring import load_wiring
+from miro_sim.scenario.file import load
+from mirotwin.checks.expect import expectations_of
+from mirotwin.steps.reading import steps_of
+
+TEST = re.compile(r"^def (test_\w+)\(", re.MULTILINE)
+GROUPS = ("laws", "estimators", "references", "checks", "protocols", "bare_checks")
+"""Entry points that another distribution may have."""
+EXIT_CODE = re.compile(r"exit code (\d+)")
+
+
+def shell(example: Example) -> str | None:
+    """Every command; in a block with `$ `, what it prints has to be what stands below it.
+
+    A command whose output is not shown ends with exit code 0, or with the one that a comment behind it names.
+    """
+    where: Shell = example.namespace["__shell__"]
+    for command in commands_of(example.parsed.text):
+        if command.line == "echo $?":
+            if command.output.strip() != f"{where.code}":
+                return f"the exit code of the command before is {where.code}, not {command.output.strip()}"
+            continue
+        printed = where.run(command.line)
+        wanted = int(found[1]) if (found := EXIT_CODE.search(command.line)) else 0
+        if command.output:
+            if not fits(command.output, printed):
+                return f"{command.line}\nprinted\n{printed}\nwhere the document has\n{command.output}"
+        elif where.code != wanted and not command.asked:
+            return f"{command.line}\nended with exit code {where.code}, not {wanted}:\n{printed}"
+    return None
+
+
+def python(example: Example) -> str | None:
+    """Executed in the names of the document; tests are collected by pytest."""
+    source = example.parsed.text
+    names = example.namespace
+    if TEST.search(source):
+        Path("test_block.py").write_text(names["__given__"] + source, "utf-8")
+        command = [
+            *names["__shell__"].python,
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            "test_block.py",
+        ]
+        done = children.run(command, capture_output=True, text=True)
+        return done.stdout + done.stderr if done.returncode else None
+    exec(compile("\n" * example.parsed.line + source, example.path, "exec"), names)
+    return None
+
+
+def toml(example: Example) -> str | None:
+    """Read by the reader of such files."""
+    text = example.parsed.text
+    found = tomllib.loads(text)
+    if "project" in found:
+        groups = [name.removeprefix("mirotwin.") for name in found["project"]["entry-points"]]
+        return f"no such entry points: {groups}" if set(groups) - set(GROUPS) else None
+    if "nets" in found:
+        Path("block.board.toml").write_text(text, "utf-8")
+        load_wiring(Path("block.board.toml"))
+    elif "seeds" in found:
+        from mirotwin import campaign
+
+        campaign.parse(text, "block.toml")
+    elif "scenario" in found or isinstance(found.get("network"), list):
+        _load_scenario(text)
+    else:  # a part of one
+        load("fig6", [f"{key}={_inline(value)}" for key, value in _leaves(found)])
+    return None
+
+
+def _load_scenario(text: str) -> None:
+    name = "block.scenario.toml"
+    Path(name).write_text(text, "utf-8")
+    read = load(name)
+    expectations_of(read.scenario, name)
+    steps_of(read.scenario, name)
+
+
+def _leaves(table: dict[str, Any], inside: str = "") -> list[tuple[str, Any]]:
+    """(path, value) of what holds no further table; a part that is chosen by a key is one value."""
+    found = []
+    for key, value in table.items():
+        if isinstance(value, dict) and not {"law", "kind"} & set(value):
+            found += _leaves(value, f"{inside}{key}.")
+        else:
+            found.append((f"{inside}{key}", value))
+    return found
+
+
+def _inline(value: Any) -> str:
+    import tomli_w
+
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_inline(inner)}" for key, inner in value.items()) + "}"
+    return tomli_w.dumps({"x": value}).partition("=")[2].strip()
+
+
+def c(example: Example) -> str | None:
+    """Compiled for the 8051."""
+    name = example.parsed.file or "block.c"
+    Path(name).write_text(example.parsed.text, "utf-8")
+    done = children.run(["sdcc", "-mmcs51", name], capture_output=True, text=True)
+    return done.stdout + done.stderr if done.returncode else None

@@ -1,0 +1,166 @@
+"""Shell commands of documents. `mirotwin ..` runs in a fork of this process, which has all modules loaded already;
+everything else is given to bash.
+
+What belongs here: from a block's text to commands, running one, and comparing what it printed. What does not: which
+blocks there are.
+
+A fork costs some milliseconds where a new interpreter costs half a second of loading, and there are a hundred commands.
+It has arguments, files, exit code and output as the program has them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import IO, NamedTuple
+
+import click
+from tests import children
+
+from mirotwin.cli import COMMANDS, main
+
+MAY_TAKE_S = 60
+FRESH = ("campaign", "fuzz", "reproduce")
+"""Commands that start processes of their own, which begin with the program's file."""
+OPTIONAL = ("sdcc", "make", "tshark", "afl-showmap")
+"""Programs without which a command is passed over, except in CI (CONTRIBUTING, "Set-up")."""
+
+
+class Command(NamedTuple):
+    """`line` as a shell reads it, `output` as the document shows it, `asked`: the next command is `echo $?`."""
+
+    line: str
+    output: str = ""
+    asked: bool = False
+
+
+def commands_of(text: str) -> Iterator[Command]:
+    """The commands of a block, comment lines left out."""
+    lines = text.replace("\\\n", " ").splitlines()
+    if not any(line.startswith("$ ") for line in lines):
+        yield from (
+            Command(line.strip()) for line in lines if line.strip() and not line.strip().startswith("#")
+        )
+        return
+    places = [index for index, line in enumerate(lines) if line.startswith("$ ")]
+    for index, after in zip(places, [*places[1:], len(lines)], strict=True):
+        asked = after < len(lines) and lines[after] == "$ echo $?"
+        yield Command(lines[index][2:].strip(), "\n".join(lines[index + 1 : after]), asked)
+
+
+def fits(wanted: str, printed: str) -> bool:
+    """Whether this is what a document shows: `..` stands for anything, on a line of its own for any lines."""
+    pattern = r"\n".join(
+        ".*" if line.strip() == ".." else ".*".join(re.escape(part) for part in line.rstrip().split(".."))
+        for line in wanted.splitlines()
+    )
+    plain = "\n".join(line.rstrip() for line in printed.strip().splitlines())
+    return re.fullmatch(pattern, plain, re.DOTALL) is not None
+
+
+class Shell:
+    """Runs commands one after the other. `code`: exit code of the last one. `python`: an interpreter with this tree."""
+
+    def __init__(self, programs: Path) -> None:
+        self.code = 0
+        self.python = [str(programs / "python")]
+        self.environment = {
+            **os.environ,
+            "PATH": f"{programs}{os.pathsep}{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+            "COLUMNS": "200",
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }
+
+    def run(self, line: str) -> str:
+        """What the command printed, on stdout and stderr."""
+        with tempfile.TemporaryFile() as out:
+            words = plain(line)
+            if (
+                line.split()[0] in OPTIONAL
+                and shutil.which(line.split()[0]) is None
+                and not os.environ.get("CI")
+            ):
+                return ""
+            if words is not None and words[0] == "export":
+                self.environment.update(word.split("=", 1) for word in words[1:])
+            elif words is not None and words[0] == "mirotwin" and words[1] not in FRESH:
+                self.code = self._forked(words[1:], out.fileno())
+            else:
+                self.code = self._by_bash(line, out)
+            out.seek(0)
+            return out.read().decode("utf-8", "replace")
+
+    def _by_bash(self, line: str, out: IO[bytes]) -> int:
+        bash = children.start(
+            ["bash", "-c", line],
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=out,
+            env=self.environment,
+            start_new_session=True,
+        )
+        try:
+            return int(bash.wait(MAY_TAKE_S))
+        except subprocess.TimeoutExpired:
+            os.killpg(bash.pid, signal.SIGKILL)
+            bash.wait()
+            raise
+
+    def _forked(self, arguments: list[str], out: int) -> int:
+        load_modules()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        process = children.fork()
+        if process == 0:
+            _become(arguments, out, self.environment)
+        return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+
+
+@cache
+def load_modules() -> None:
+    """Loads what the forks would load, each for itself."""
+    context = click.Context(main)
+    for name in COMMANDS:
+        main.get_command(context, name)
+    import_module("mirotwin.report.figure")
+    import_module("matplotlib.backends.backend_agg")
+
+
+def plain(line: str) -> list[str] | None:
+    """The words of a command, None for one that needs a shell."""
+    lexer = shlex.shlex(line, posix=True, punctuation_chars=True)
+    lexer.commenters = "#"
+    words = list(lexer)
+    return None if any(set(word) <= set("();<>|&") or set(word) & set("*?$`") for word in words) else words
+
+
+def _become(arguments: list[str], out: int, environment: dict[str, str]) -> None:
+    """The rest of a forked process: the program, with its output where it belongs."""
+    code = 70
+    try:
+        signal.alarm(MAY_TAKE_S)
+        null = os.open(os.devnull, os.O_RDONLY)
+        for number, file in ((0, null), (1, out), (2, out)):
+            os.dup2(file, number)
+        sys.stdin = open(0, closefd=False)  # noqa: SIM115
+        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+        sys.stderr = open(2, "w", encoding="utf-8", closefd=False, buffering=1)  # noqa: SIM115
+        os.environ.update(environment)
+        sys.argv = ["mirotwin", *arguments]
+        main(arguments)
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else 0
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
