@@ -161,6 +161,9 @@ FUNCTIONS: dict[str, Callable[[Path], None]] = {
     "protocol/README.md": question,
 }
 
+COMPILED = {*(name for name, put in FUNCTIONS.items() if put is not question), "docs/howto/own-firmware.md"}
+"""Pages that need a compiler for the 8051."""
+
 _SHORT = "mirotwin run fig6 --set duration_s=0.2 --no-figure -q --out"
 _CAMPAIGN = "mirotwin campaign run examples/campaign.toml --seeds 0-1 --set duration_s=0.1 -q --out"
 _CALIBRATE = (

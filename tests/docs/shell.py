@@ -32,7 +32,7 @@ from mirotwin.cli import COMMANDS, main
 MAY_TAKE_S = 60
 FRESH = ("campaign", "fuzz", "reproduce")
 """Commands that start processes of their own, which begin with the program's file."""
-OPTIONAL = ("sdcc", "make", "tshark", "afl-showmap")
+OPTIONAL = ("tshark", "afl-showmap")
 """Programs without which a command is passed over, except in CI (CONTRIBUTING, "Set-up")."""
 
 
