@@ -1,7 +1,11 @@
 """The paper's section V again: verdicts follow from rows, and the page is the same however it was made."""
 
 import csv
+import hashlib
+import json
+from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 
@@ -12,6 +16,7 @@ from mirotwin.reproduce.claims import HOLDS, NOT, PART, findings
 from mirotwin.reproduce.plan import EPSILONS, GROUPS, IMPROVED, PAPER, RETUNED, STARTS, Group, jobs, recorded
 from mirotwin.reproduce.rows import by_label, middle, middle_seeds, never_settled, percentile
 
+DAY = "2026-11-22"
 VALUES = {
     "rms_x_cm": 0.5,
     "rms_y_cm": 0.5,
@@ -120,15 +125,26 @@ def test_seeds_that_are_none_are_refused(seeds):
     assert "--seeds" in result.output
 
 
-def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_again(tmp_path):
-    for folder, processes in ((tmp_path / "a", "1"), (tmp_path / "b", "2")):
-        result = called("--out", folder, "--seeds", "4", "--jobs", processes)
+def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_in_a_deposit(tmp_path):
+    for options in (("--out", tmp_path / "a", "--jobs", "1"), ("--deposit", tmp_path / "b", "--date", DAY)):
+        result = called(*options, "--seeds", "4")
         assert result.exit_code == 0, result.output
     first, second = (
         {path.relative_to(folder): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
         for folder in (tmp_path / "a", tmp_path / "b")
     )
-    assert first == second
+    added = {Path("ro-crate-metadata.json"), Path("reproduction/rows.parquet")}
+    assert second.keys() == first.keys() | added
+    assert all(second[name] == content for name, content in first.items())
+    described = {entity["@id"]: entity for entity in json.loads(second[min(added)])["@graph"]}
+    files = {name.as_posix(): content for name, content in second.items() if name != min(added)}
+    assert {one["@id"] for one in described["./"]["hasPart"]} == files.keys()
+    for name, content in files.items():
+        assert described[name]["sha256"] == hashlib.sha256(content).hexdigest()
+        assert described[name]["contentSize"] == str(len(content))
+    table = pq.read_table(tmp_path / "b/reproduction/rows.parquet")
+    assert table["label"].to_pylist() == [group.label for group in GROUPS]
+    assert table.column_names == list(Row.__struct_fields__)
     names = {path.name for path in first}
     assert {"reproduction.md", "rows.csv", *(f"fig{n}.png" for n in range(6, 11))} <= names
     assert len([name for name in names if name.endswith(".mcap")]) == len(GROUPS)
