@@ -133,11 +133,12 @@ def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_
         {path.relative_to(folder): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
         for folder in (tmp_path / "a", tmp_path / "b")
     )
-    added = {Path("ro-crate-metadata.json"), Path("reproduction/rows.parquet")}
+    crate = Path("ro-crate-metadata.json")
+    added = {crate, Path("reproduction/rows.parquet")}
     assert second.keys() == first.keys() | added
     assert all(second[name] == content for name, content in first.items())
-    described = {entity["@id"]: entity for entity in json.loads(second[min(added)])["@graph"]}
-    files = {name.as_posix(): content for name, content in second.items() if name != min(added)}
+    described = {entity["@id"]: entity for entity in json.loads(second[crate])["@graph"]}
+    files = {name.as_posix(): content for name, content in second.items() if name != crate}
     assert {one["@id"] for one in described["./"]["hasPart"]} == files.keys()
     for name, content in files.items():
         assert described[name]["sha256"] == hashlib.sha256(content).hexdigest()
