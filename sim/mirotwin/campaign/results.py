@@ -25,7 +25,7 @@ from mirotwin.campaign.design import Level
 from mirotwin.campaign.journal import Head, in_order
 from mirotwin.campaign.plan import OWN_IMAGE, Plan
 from mirotwin.campaign.worker import Outcome
-from mirotwin.files.outputs import whole_file
+from mirotwin.files.outputs import OutputError, whole_file
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -103,9 +103,14 @@ def write(plan: Plan, head: Head, journal: Path, results: Path) -> None:
         pq.ParquetWriter(file, schema, compression="zstd") as rows,
         pq.ParquetWriter(wall_file, wall, compression="zstd") as walls,
     ):
+        count = 0
         for group in _groups(in_order(journal)):
+            count += len(group)
             rows.write_table(_table([_row(plan, one) for one in group], schema))
             walls.write_table(_table([{"run": one.run, "wall_s": one.wall_s} for one in group], wall))
+        if count != plan.runs:
+            what = f"has the outcome of {count} of {plan.runs} runs: it was changed while the campaign went"
+            raise OutputError(journal, what, "give the same command again, which makes the runs that are missing")
 
 
 def read(path: str | Path) -> tuple[pa.Table, About]:

@@ -66,6 +66,21 @@ def test_processes_write_the_same_bytes(alone, tmp_path, count):
     assert not journal_path(path).exists()
 
 
+def test_a_journal_that_somebody_cut_short_makes_no_results(tmp_path):
+    path = tmp_path / "short.parquet"
+
+    def cut(tally, outcome):
+        if tally.done == tally.runs:
+            lines = journal_path(path).read_bytes().splitlines(keepends=True)
+            journal_path(path).write_bytes(b"".join(lines[:4]))
+
+    with pytest.raises(BadInput, match="has the outcome of 3 of 6 runs"):
+        campaign.run(plan_of(), path, InThisProcess(), on_outcome=cut)
+    assert not path.exists()
+    assert not wall_path(path).exists()
+    assert campaign.run(plan_of(), path, InThisProcess()).new == 3
+
+
 def test_an_executor_of_the_caller_writes_the_same_bytes_and_stays_open(alone, tmp_path):
     path = tmp_path / "short.parquet"
     with ThreadPoolExecutor(2) as executor:
