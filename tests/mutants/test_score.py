@@ -107,8 +107,8 @@ def test_rules_that_are_tried_again_replace_their_old_verdict_alone() -> None:
 @needs_sdcc
 def test_mutants_of_the_draw_meet_their_fate() -> None:
     wanted = {
-        "protocol.h:128:50:constant:-1": "does not compile",
-        "protocol.h:31:38:constant:30": "same bytes",
+        "protocol.h:34:38:constant:-1": "does not compile",
+        "motion.c:96:28:bitwise:^": "same bytes",
         "motion.c:85:47:shift:>>": "killed",
         "lm629.c:117:27:bitwise:^": "alive",
     }
@@ -117,5 +117,5 @@ def test_mutants_of_the_draw_meet_their_fate() -> None:
     assert {one.id: one.what for one in found} == wanted
     assert {one.id: one.rules for one in found if one.rules} == {"motion.c:85:47:shift:>>": ("P24",)}
     assert [one.error for one in found if one.error] == [
-        "protocol.h:128: error 195: Size of array 'crc_nibble_low' is negative"
+        "decode.h:12: error 195: Size of array 'body' is negative"
     ]

@@ -110,7 +110,9 @@ def write(plan: Plan, head: Head, journal: Path, results: Path) -> None:
             walls.write_table(_table([{"run": one.run, "wall_s": one.wall_s} for one in group], wall))
         if count != plan.runs:
             what = f"has the outcome of {count} of {plan.runs} runs: it was changed while the campaign went"
-            raise OutputError(journal, what, "give the same command again, which makes the runs that are missing")
+            raise OutputError(
+                journal, what, "give the same command again, which makes the runs that are missing"
+            )
 
 
 def read(path: str | Path) -> tuple[pa.Table, About]:

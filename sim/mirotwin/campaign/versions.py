@@ -14,7 +14,7 @@ from pathlib import Path
 import msgspec
 
 PACKAGES = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin")
-NOT_OF_RUNS = ("cli", "bridges", "capture", "looking", "reproduce", "starter", "testing")
+NOT_OF_RUNS = ("cli", "bridges", "capture", "foxglove", "looking", "page", "reproduce", "starter", "testing")
 """Rooms of `mirotwin` that no run of a campaign uses."""
 GROUPS = ("mirotwin.laws", "mirotwin.estimators", "mirotwin.references", "mirotwin.checks")
 
@@ -37,7 +37,6 @@ class Versions(msgspec.Struct, frozen=True):
         return ""
 
 
-@cache
 def versions() -> Versions:
     """Those of this process."""
     try:
@@ -53,6 +52,7 @@ def versions() -> Versions:
     return Versions(version, _code(), tuple(sorted(found)))
 
 
+@cache
 def _code() -> str:
     """Twelve digits of the hash over all sources and built-in scenarios that a run may use."""
     digest = hashlib.sha256()

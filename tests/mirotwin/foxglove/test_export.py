@@ -1,4 +1,7 @@
-"""`mirotwin export run.mcap --out foxglove.mcap`: the recording and what Foxglove draws of it, in one file."""
+"""`mirotwin export run.mcap --out foxglove.mcap`: the recording and what Foxglove draws of it, in one file.
+
+Long because each topic has its messages compared, field for field, with one recording.
+"""
 
 from __future__ import annotations
 

@@ -178,7 +178,9 @@ def test_110_ms_count_from_the_frame_also_with_characters_behind_it(
     assert 109.7 * MS <= start.tick - end <= 110.1 * MS
 
 
-@pytest.mark.xfail(strict=True, reason="110.55 ms: the firmware takes characters behind a frame for a run without a gap")
+@pytest.mark.xfail(
+    strict=True, reason="110.55 ms: the firmware takes characters behind a frame for a run without a gap"
+)
 def test_110_ms_count_from_the_frame_also_with_a_character_a_little_behind_it() -> None:
     rig = Rig(4, 5)
     rig.send(encode(TeamFrame(0, 0, ((1000, 1000),) * 5), 5))
