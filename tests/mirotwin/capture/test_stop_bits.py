@@ -9,6 +9,7 @@ import pytest
 from tests.mirotwin.cli.conftest import Result, mirotwin
 from tests.sim.world.rig import image
 
+from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.events import Received
 from miro_protocol.frames import TelemetryFrame, encode
 from miro_protocol.transmission import UP, Transmission
@@ -56,7 +57,10 @@ def test_the_answers_in_a_recording_are_those_that_the_pc_took(tmp_path: Path, s
     data, answers = recorded(seed)
     path.write_bytes(data)
     found = [row.event for row in listed(path) if isinstance(row.event, Received)]
-    assert [(event.start_tick, event.body) for event in found] == answers
+    assert [event.body for event in found] == [body for _, body in answers]
+    # Behind a bad stop bit in the preamble the PC takes its next start edge a part of a bit later than it was sent.
+    bit = HOST_CHARACTER_TICKS // 10
+    assert all(abs(event.start_tick - tick) < bit for event, (tick, _) in zip(found, answers, strict=True))
     assert answers
     periods = parse(data, "run.mcap").periods
     with Input(str(path)) as given:
