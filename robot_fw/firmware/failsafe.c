@@ -4,7 +4,7 @@
  *
  * Every fresh frame restarts Timer 1, so the age does not depend on where the frame fell between two ticks. It counts
  * from the frame's last character, not from when the robot comes to it, and it runs ahead by the time that the command to
- * stop takes: the wheels are told to stop 110 ms after that character, not later.
+ * stop takes: the wheels are told to stop 110 ms after that character (look_back() says when it is later).
  */
 
 #include "failsafe.h"
@@ -32,13 +32,13 @@ u8 ticks_taken;
 static u16 age;                     /* ms since the last fresh frame, stays at AGE_MAX */
 static __bit heard;                 /* there was one */
 
-/* What the clock shows `LOOKING + STOPPING` and the decoding after a frame's last character: whole milliseconds, and
- * what Timer 1 then shows. */
+/* The age that a frame has when it turns out to be fresh, and the time that a stop takes: whole milliseconds, and what
+ * Timer 1 shows so long after them. */
 static u8 spent_ms;
 static u16 spent_from;
 
-/* The time since the last character of the frame that was just found valid. Timer 0 counts from the last character at all
- * (uart.c); those that came behind the frame follow it without a gap, or nearly so. */
+/* Sets both. Timer 0 counts from the last character at all (uart.c); those behind the frame count as if they had followed
+ * without a gap. Where one begins later, 0.65 ms at most, the frame counts as younger by that much. */
 static void look_back(void)
 {
     u8 behind, high, low;

@@ -21,14 +21,6 @@ from mirotwin.report.track import Tracks
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 
 
-@pytest.fixture(scope="module")
-def alone(tmp_path_factory):
-    """The results of SHORT, made in this process."""
-    path = tmp_path_factory.mktemp("alone") / "short.parquet"
-    campaign.run(plan_of(), path, InThisProcess())
-    return path
-
-
 def test_a_row_says_what_the_run_itself_says(alone):
     row = rows(alone)[4]
     settings = ("duration_s=0.3", "network.radio.bit_error_rate=0.01")

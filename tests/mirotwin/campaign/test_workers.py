@@ -22,14 +22,6 @@ from mirotwin.campaign.workers import Processes, Workers
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 
 
-@pytest.fixture(scope="module")
-def alone(tmp_path_factory):
-    """The results of SHORT, made in this process."""
-    path = tmp_path_factory.mktemp("alone") / "short.parquet"
-    campaign.run(plan_of(), path, InThisProcess())
-    return path
-
-
 def killing(job):
     """Ends its process in run 4, as running out of memory does."""
     if job.run == 4:

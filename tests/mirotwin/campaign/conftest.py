@@ -1,0 +1,14 @@
+"""What the tests of campaigns share: the results of the short one."""
+
+import pytest
+from tests.mirotwin.campaign.plans import InThisProcess, plan_of
+
+from mirotwin import campaign
+
+
+@pytest.fixture(scope="session")
+def alone(tmp_path_factory):
+    """The results of SHORT, made in this process."""
+    path = tmp_path_factory.mktemp("alone") / "short.parquet"
+    campaign.run(plan_of(), path, InThisProcess())
+    return path
