@@ -35,6 +35,7 @@ cdef class Scanner:
     cpdef list feed_columns(self, data, bad_stop, ticks)
     @cython.locals(place=int)
     cpdef int after_load(self) except -1
+    @cython.locals(spacing='long long')
     cdef bint _is_apart(self, long long tick) noexcept
     @cython.locals(flaws=int)
     cdef int _put_symbol(self, int byte, bint bad_stop, long long tick) noexcept

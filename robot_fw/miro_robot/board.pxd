@@ -9,9 +9,9 @@ from miro_robot.probe cimport Probe
 
 
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS
-cdef int _LEFT_CS, _LEFT_RD, _LEFT_WR, _LEFT_PS, _LEFT_RST
-cdef int _RIGHT_CS, _RIGHT_RD, _RIGHT_WR, _RIGHT_PS, _RIGHT_RST
-cdef int _PINS, _WR, _RD, _BEHIND_TICKS
+cdef int _CS, _BOTH_STROBES, _RST
+cdef int _CHIP_PINS, _ALL_PINS, _BOTH_RST
+cdef int _WR, _RD, _BEHIND_TICKS
 cdef int _RESET_PULSE, PORTS
 cdef long long CYCLE_TICKS, FAR
 cdef int _FAULT, _REACHED, _RECEIVED, _SENT
@@ -46,10 +46,9 @@ cdef class Board(Bus):
     cdef readonly BusTiming right_timing
     cdef int on_movx_bus
     cdef int data_bank
+    cdef unsigned short pin_levels[3328]
+    cdef int pin_banks
     cdef int pin_bank[10]
-    cdef int pin_bit[10]
-    cdef int pin_inverted[10]
-    cdef unsigned char pins[10]
     cdef int latches
     cdef int latch_address[8]
     cdef int latch_mask[8]
@@ -67,12 +66,15 @@ cdef class Board(Bus):
     cdef int _rest(self, BusTiming timing, Lm629 chip) except -1
     @cython.locals(stopped=cython.int, horizon=cython.longlong, cpu=Cpu)
     cpdef int run(self, long long until_tick) except -1
-    cdef long long _next_interrupt(self, Lm629 chip) noexcept
+    @cython.final
+    cdef inline long long _next_interrupt(self, Lm629 chip) noexcept
     @cython.locals(now=cython.longlong)
     cpdef int sync(self, long long tick) except -1
     cpdef byte_received(self, int value, int stop, long long tick)
     cpdef byte_sent(self, int value, long long tick)
     cpdef port_written(self, int port, int latch, long long tick)
+    @cython.final
+    @cython.locals(changed=cython.int)
     cdef int _set_pins(self, int port, int levels, long long tick) except -1
     @cython.locals(start=cython.longlong, page=cython.int, heard=bint, index=cython.int, value=cython.int)
     cpdef int movx_read(self, int address, long long tick) except -1
@@ -80,17 +82,27 @@ cdef class Board(Bus):
     cpdef movx_write(self, int address, int value, long long tick)
     cdef int _put_address(self, int address, long long start) except -1
     cpdef fault(self, int kind, int pc, long long tick)
+    @cython.final
     cdef int _drive_bridge(self, long long tick) except -1
+    @cython.final
     @cython.locals(index=cython.int, hi=cython.int, level=cython.int, port=cython.int, mask=cython.int, levels=cython.int)
     cdef int _drive_interrupts(self, long long tick) except -1
-    cdef inline int _level(self, int pin) noexcept
-    @cython.locals(pin=cython.int, pins='unsigned char *', data=cython.int, from_left=cython.int, from_right=cython.int, levels=cython.int)
+    @cython.final
+    @cython.locals(pins=cython.int, index=cython.int, bank=cython.int)
+    cdef inline int _pins(self) noexcept
+    @cython.final
+    cdef inline int _strobes(self, int pins) noexcept
+    @cython.final
+    @cython.locals(pins=cython.int, left=cython.int, right=cython.int, data=cython.int, at_left=cython.int, at_right=cython.int, levels=cython.int)
     cdef int _drive_chips(self, long long tick) except -1
+    @cython.final
     @cython.locals(busy_writes=cython.longlong)
-    cdef int _watch_bus(self, bint both_drive, long long tick) except -1
-    @cython.locals(pins='unsigned char *', one=BusTiming, other=BusTiming, left=cython.int, right=cython.int)
-    cdef int _watch_timing(self, int data, long long tick) except -1
-    cdef bint _reset_is_short(self, Lm629 chip, int level, long long tick) noexcept
+    cdef inline int _watch_bus(self, int both_drive, long long tick) except -1
+    @cython.final
+    @cython.locals(one=BusTiming, other=BusTiming, broken=cython.int, too=cython.int)
+    cdef inline int _watch_timing(self, int left, int right, int data, long long tick) except -1
+    @cython.final
+    cdef inline bint _reset_is_short(self, Lm629 chip, int level, long long tick) noexcept
     @cython.locals(left=cython.int, right=cython.int)
     cdef int _watch_sample(self, long long tick) except -1
     cdef int _timing_fault(self, int limit, long long ticks, long long tick) except -1

@@ -43,22 +43,14 @@ MAIN_LOOP_LIMIT_CYCLES = 20_000
 FAULTS_KEPT = 1000
 """A firmware that faults in a loop must not fill the memory: after so many, faults are counted only."""
 
-_ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS = (
-    8,
-    10,
-    11,
-    12,
-    17,
-    18,
-    19,
-    20,
-)
+_ADDRESS, _RELEASE, _DATA, _STROBE = 8, 10, 11, 12
+_SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS = 17, 18, 19, 20
 """Ticks into a MOVX: Atmel 8051 Hardware Manual (4316E), section 2.6, and the timing table of external data memory in
 the AT89S52 data sheet (1919D), section 28. Neither says when P2 goes back to its latch: rule X2."""
 _WR, _RD = 0x40, 0x80  # pins of P3
-_LEFT_CS, _LEFT_RD, _LEFT_WR, _LEFT_PS, _LEFT_RST = range(5)  # inputs of the two LM629: SIDES by CHIP_INPUTS
-_RIGHT_CS, _RIGHT_RD, _RIGHT_WR, _RIGHT_PS, _RIGHT_RST = range(5, 10)
-_PINS, _NEVER = 10, NEVER_TICK
+# Inputs of an LM629 as bits, in the order of CHIP_INPUTS; those of both chips: the left one's, then the right one's.
+_CS, _BOTH_STROBES, _RST = 0x01, 0x06, 0x10
+_CHIP_PINS, _ALL_PINS, _BOTH_RST, _NEVER = 5, 0x1F, 0x210, NEVER_TICK
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
 _RESET_PULSE, _FAULT, _REACHED, _RECEIVED, _SENT = RESET_PULSE, FAULT, REACHED, RECEIVED, SENT
 RESET_PULSE_TICKS = LIMITS[RESET_PULSE].ticks
@@ -89,9 +81,8 @@ class Board(Bus):
     }
     NOT_STATE = (
         "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
-        "data_bank", "watched", "pin_bank", "pin_bit", "pin_inverted", "hi_port", "hi_bit", "hi_inverted",
-        "hi_count", "hi_side", "hi_seen", "forced", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus",
-        "log", "pins",
+        "data_bank", "watched", "pin_levels", "pin_banks", "pin_bank", "hi_port", "hi_bit", "hi_inverted",
+        "hi_count", "hi_side", "hi_seen", "forced", "stop_on_fault", "faults", "probe", "symbols", "on_movx_bus", "log",
         # the bus is at rest between two instructions: `after_load` sets both to that
         "left_timing", "right_timing",
     )  # fmt: skip
@@ -122,8 +113,8 @@ class Board(Bus):
         self.fault_count = 0
         self.probe: Probe | None = None
         self.busy_writes = 0
-        self.contention = 0
-        self.held = self.forced = 0  # the level of RST; whether pins change by RST or the supply
+        self.contention = self.held = 0
+        self.forced = 0  # pins change by RST or the supply
         self.powered = 1
         self.bus_levels = 0xFF
         self.bank = bytearray([0xFF] * (CONSTANT_BANK + 1))
@@ -138,17 +129,18 @@ class Board(Bus):
         self._drive_interrupts(0)
 
     def _resolve_outputs(self, wiring: Wiring) -> None:
-        """Turns nets into (bank, bit, inverted) per LM629 input, and the external bus into address tables."""
+        """Turns nets into what the levels of a bank put on the LM629's inputs, the external bus into address tables."""
         self.data_bank = wiring.data_bank()
-        self.pin_bank = [0] * 10
-        self.pin_bit = [0] * 10
-        self.pin_inverted = [0] * 10
-        self.pins = bytearray(10)
+        self.pin_levels = [0] * 3328  # 256 of each bank
         self.watched = bytearray(CONSTANT_BANK + 1)
         self.watched[self.data_bank] = 0xFF
-        for index, (side, pin) in enumerate((side, pin) for side in SIDES for pin in CHIP_INPUTS):
-            bank, bit, inverted = wiring.chip_input(side, pin)
-            self.pin_bank[index], self.pin_bit[index], self.pin_inverted[index] = bank, bit, inverted
+        sources = [wiring.chip_input(side, pin) for side in SIDES for pin in CHIP_INPUTS]
+        banks = sorted({bank for bank, _, _ in sources})
+        self.pin_banks = len(banks)
+        self.pin_bank = banks + [0] * (10 - len(banks))
+        for index, (bank, bit, inverted) in enumerate(sources):
+            for levels in range(256):
+                self.pin_levels[256 * bank + levels] |= ((levels >> bit & 1) ^ inverted) << index
             self.watched[bank] |= 1 << bit
         on_p3 = self.watched[3] & (_WR | _RD)
         self.on_movx_bus = 1 if self.watched[0] or self.watched[2] or on_p3 else 0
@@ -380,36 +372,44 @@ class Board(Bus):
         self._set_pins(0, address & 0xFF, start + _ADDRESS)
         self._set_pins(0, 0xFF, start + _RELEASE)
 
-    def _level(self, pin: int) -> int:
-        """Level at an input of an LM629, `_LEFT_CS` to `_RIGHT_RST`."""
-        return (self.bank[self.pin_bank[pin]] >> self.pin_bit[pin] & 1) ^ self.pin_inverted[pin]
+    def _pins(self) -> int:
+        """Levels at the inputs of both LM629, bit per pin."""
+        pins = 0
+        index = 0
+        while index < self.pin_banks:
+            bank = self.pin_bank[index]
+            pins |= self.pin_levels[256 * bank + self.bank[bank]]
+            index += 1
+        return pins
+
+    def _strobes(self, pins: int) -> int:
+        """Whether these levels at an LM629 are a strobe. If none is nor was, it sees PS and data and does nothing."""
+        return 0 if pins & _CS or pins & _BOTH_STROBES == _BOTH_STROBES else 1
 
     def _drive_chips(self, tick: int) -> None:
         """Puts the present levels on both chips' pins, then what they answer on the bus."""
         data = self.bank[self.data_bank]
-        pins = self.pins
-        pin = 0
-        while pin < _PINS:
-            pins[pin] = self._level(pin)
-            pin += 1
-        if not self.powered:
-            pins[_LEFT_RST] = 0
-            pins[_RIGHT_RST] = 0
-        self._watch_timing(data, tick)
-        if pins[_LEFT_RST] != self.left.reset_level:
-            self.left.set_reset(tick, pins[_LEFT_RST])
-        if pins[_RIGHT_RST] != self.right.reset_level:
-            self.right.set_reset(tick, pins[_RIGHT_RST])
-        self.left.set_bus(tick, pins[_LEFT_CS], pins[_LEFT_RD], pins[_LEFT_WR], pins[_LEFT_PS], data)
-        self.right.set_bus(tick, pins[_RIGHT_CS], pins[_RIGHT_RD], pins[_RIGHT_WR], pins[_RIGHT_PS], data)
-        from_left = self.left.data_out(tick)
-        from_right = self.right.data_out(tick)
-        levels = 0xFF
-        if from_left >= 0:
-            levels &= from_left
-        if from_right >= 0:
-            levels &= from_right
-        self._watch_bus(from_left >= 0 and from_right >= 0, tick)
+        pins = self._pins() if self.powered else self._pins() & ~_BOTH_RST
+        left, right = pins & _ALL_PINS, pins >> _CHIP_PINS
+        at_left = self._strobes(left) | self.left.port.writing | self.left.port.reading
+        at_right = self._strobes(right) | self.right.port.writing | self.right.port.reading
+        self._watch_timing(left, right, data, tick)
+        if left >> 4 != self.left.reset_level:
+            self.left.set_reset(tick, left >> 4)
+        if right >> 4 != self.right.reset_level:
+            self.right.set_reset(tick, right >> 4)
+        if at_left or self.left.next_tick <= tick:
+            self.left.set_bus(tick, left & 1, left >> 1 & 1, left >> 2 & 1, left >> 3 & 1, data)
+        else:
+            self.left.port.ps, self.left.port.data = left >> 3 & 1, data
+        if at_right or self.right.next_tick <= tick:
+            self.right.set_bus(tick, right & 1, right >> 1 & 1, right >> 2 & 1, right >> 3 & 1, data)
+        else:
+            self.right.port.ps, self.right.port.data = right >> 3 & 1, data
+        levels = self.left.port.drive if self.left.port.reading else 0xFF
+        if self.right.port.reading:
+            levels &= self.right.port.drive
+        self._watch_bus(self.left.port.reading & self.right.port.reading, tick)
         if levels != self.bus_levels:
             self.bus_levels = levels
             if self.data_bank < PORTS:
@@ -421,7 +421,7 @@ class Board(Bus):
         if self.probe is not None:
             self.probe.moved(tick)
 
-    def _watch_bus(self, both_drive: bool, tick: int) -> None:
+    def _watch_bus(self, both_drive: int, tick: int) -> None:
         """What the firmware must not do to the LM629: write while busy, read two chips at once."""
         busy_writes = self.left.writes_while_busy + self.right.writes_while_busy
         if busy_writes != self.busy_writes:
@@ -429,20 +429,20 @@ class Board(Bus):
             self.fault(FaultKind.LM629_BUSY, self.cpu.at, tick)
         if both_drive and not self.contention:
             self.fault(FaultKind.BUS_CONTENTION, self.cpu.at, tick)
-        self.contention = int(both_drive)
+        self.contention = both_drive
 
-    def _watch_timing(self, data: int, tick: int) -> None:
+    def _watch_timing(self, left: int, right: int, data: int, tick: int) -> None:
         """Checks the timing of both chips; an edge that violates it at both is one fault."""
-        one, other, pins = self.left_timing, self.right_timing, self.pins
-        left = one.pins(tick, pins[_LEFT_CS], pins[_LEFT_RD], pins[_LEFT_WR], pins[_LEFT_PS], data)
-        right = other.pins(tick, pins[_RIGHT_CS], pins[_RIGHT_RD], pins[_RIGHT_WR], pins[_RIGHT_PS], data)
-        if left:
-            self._timing_fault(left, one.ticks, tick)
-        elif right:
-            self._timing_fault(right, other.ticks, tick)
-        if self._reset_is_short(self.left, pins[_LEFT_RST], tick):
+        one, other = self.left_timing, self.right_timing
+        broken = one.pins(tick, left & 1, left >> 1 & 1, left >> 2 & 1, left >> 3 & 1, data)
+        too = other.pins(tick, right & 1, right >> 1 & 1, right >> 2 & 1, right >> 3 & 1, data)
+        if broken:
+            self._timing_fault(broken, one.ticks, tick)
+        elif too:
+            self._timing_fault(too, other.ticks, tick)
+        if self._reset_is_short(self.left, left & _RST, tick):
             self._timing_fault(_RESET_PULSE, tick - self.left.reset_tick, tick)
-        elif self._reset_is_short(self.right, pins[_RIGHT_RST], tick):
+        elif self._reset_is_short(self.right, right & _RST, tick):
             self._timing_fault(_RESET_PULSE, tick - self.right.reset_tick, tick)
 
     def _reset_is_short(self, chip: Lm629, level: int, tick: int) -> bool:

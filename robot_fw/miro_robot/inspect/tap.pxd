@@ -29,7 +29,7 @@ cdef class BoardTap(Probe):
     cpdef long long known(self) except -1
     cpdef moved(self, long long tick)
     cpdef passed(self, long long tick)
-    @cython.locals(board=Board, pin=int)
+    @cython.locals(board=Board, pins=int, pin=int)
     cdef int _look_at_pins(self, long long tick) except -1
     @cython.locals(board=Board, port=int)
     cdef int _look(self, long long tick) except -1

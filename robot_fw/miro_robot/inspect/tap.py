@@ -117,10 +117,11 @@ class BoardTap(Probe):
         """What only the CPU can move: the inputs of the chips, and the bus, which they answer on at once."""
         board = self.board
         self._see(tick, _DATA, board.bank[board.data_bank] & board.bus_levels)
+        pins = board._pins()
         pin = 0
         while pin < _CHIP_PINS:
-            self._see(tick, _SIDE + _CS + pin, board._level(pin))
-            self._see(tick, _SIDE + _PER_SIDE + _CS + pin, board._level(_CHIP_PINS + pin))
+            self._see(tick, _SIDE + _CS + pin, pins >> pin & 1)
+            self._see(tick, _SIDE + _PER_SIDE + _CS + pin, pins >> (_CHIP_PINS + pin) & 1)
             pin += 1
 
     def _look(self, tick: int) -> None:

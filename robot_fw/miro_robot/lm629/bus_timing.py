@@ -87,6 +87,8 @@ class BusTiming:
         """Levels from `tick` on. Returns the first limit that this breaks, or NONE."""
         writing = 1 if cs == 0 and wr == 0 else 0
         reading = 1 if cs == 0 and rd == 0 and wr != 0 else 0
+        if not (writing or reading or self.writing or self.reading):
+            return self._left_alone(tick, ps, data)
         broken = _NONE
         moved = writing != self.writing or reading != self.reading
         if moved and (self.writing or self.reading):
@@ -106,6 +108,19 @@ class BusTiming:
         self.reading = reading
         self.ps = ps
         self.data = data
+        return broken
+
+    def _left_alone(self, tick: int, ps: int, data: int) -> int:
+        """The same where no strobe is on its way and none begins."""
+        broken = _NONE
+        if ps != self.ps:
+            broken = self._short(_PS_HOLD, tick - self.end_tick)
+            self.ps = ps
+            self.ps_tick = tick
+        if data != self.data:
+            broken = broken or self._short(_DATA_HOLD, tick - self.written_tick)
+            self.data = data
+            self.data_tick = tick
         return broken
 
     def sampled(self, tick: int) -> int:

@@ -62,20 +62,29 @@ cdef class Cpu(Executor):
     cdef int end_run(self) except -1
     @cython.locals(now='long long', event='long long')
     cdef int boundary(self) except -1
+    @cython.final
     @cython.locals(peripherals=Peripherals, earliest='long long', source=int)
     cdef int _attend(self, long long now) except -1
+    @cython.final
     cdef int _watch_main_loop(self, long long now) except -1
+    @cython.final
     cdef int _taken_over(self) noexcept
+    @cython.final
     cdef int _enter(self, int source) except -1
+    @cython.final
     cdef int _block(self) except -1
+    @cython.final
     @cython.locals(value=int)
     cdef int register(self, int address, long long cycle) except -1
-    @cython.locals(value=int)
+    @cython.locals(value=int, port=int)
     cdef int write_sfr_bit(self, int address, int mask, int level) except -1
     @cython.locals(folded=int, parity=int)
     cpdef int psw(self) noexcept
+    @cython.final
     cdef int write_psw(self, int value) except -1
+    @cython.final
     cdef int write_pcon(self, int value) except -1
+    @cython.final
     cdef int write_port(self, int port, int value) except -1
     @cython.locals(value=int)
     cdef int movx_read(self, int address) except -1

@@ -73,9 +73,7 @@ class Inspector(Protocol):
 
 
 class Cpu(Executor):
-    """An AT89C52 at 24 MHz. `bus` is what it is soldered to; input is pushed through `set_external` and
-    `rxd`.
-    """
+    """An AT89C52 at 24 MHz. `bus` is what it is soldered to; input is pushed through `set_external` and `rxd`."""
 
     STATE: dict[str, object] = {
         "pcon": ("i", 0, 0xFF),
@@ -87,17 +85,9 @@ class Cpu(Executor):
     }
     NOT_STATE: tuple[str, ...] = (
         *Executor.NOT_STATE,
-        "code_limit",
-        "inspector",
-        "limit",
-        "main_loop_limit",
-        "next_event",
-        "next_mark",
-        "rxd",
-        "stop",
-        "stop_asleep",
-        "txd",
-    )
+        "code_limit", "inspector", "limit", "main_loop_limit", "next_event", "next_mark", "rxd", "stop",
+        "stop_asleep", "txd",
+    )  # fmt: skip
 
     def __init__(self, bus: Bus | None = None) -> None:
         Executor.__init__(self, Bus() if bus is None else bus)
@@ -405,8 +395,13 @@ class Cpu(Executor):
 
     def write_sfr_bit(self, address: int, mask: int, level: int) -> None:
         """Only the one bit changes; the others keep what hardware may have set meanwhile."""
-        value = self.register(address, self.cycles)
-        self.write(address, value | mask if level else value & (0xFF ^ mask))
+        if address & 0xCF == 0x80:
+            port = (address - _P0) >> 4
+            value = self.peripherals.ports.latches[port]
+            self.write_port(port, value | mask if level else value & (0xFF ^ mask))
+        else:
+            value = self.register(address, self.cycles)
+            self.write(address, value | mask if level else value & (0xFF ^ mask))
 
     def write_sfr(self, address: int, value: int) -> None:
         if address == _PSW:
@@ -418,12 +413,13 @@ class Cpu(Executor):
         elif address & 0xCF == 0x80:
             self.write_port((address - _P0) >> 4, value)
         else:
-            self.peripherals.write(address, value, self.cycles)
+            sooner = self.peripherals.write(address, value, self.cycles)
             if address in (_IE, _IP):
                 self.marks = self.marks if self.peripherals.interrupts.in_service else 0
                 self._block()
-            self.next_event = 0
-            self.limit = 0
+            if sooner:
+                self.next_event = 0
+                self.limit = 0
 
     def psw(self) -> int:
         """P is the parity of ACC, whatever was written."""
@@ -442,13 +438,16 @@ class Cpu(Executor):
         """Power-down wins over idle; the AT89C52 leaves it by reset only (data sheet 0313H)."""
         if (value ^ self.pcon) & _SMOD:
             self.peripherals.write_smod(value >> 7, self.cycles)
+            self.next_event = 0
         self.pcon = value & _PCON_BITS
         if value & _PD:
             self.peripherals.freeze(self.cycles)
             self.powered_down = 1
+            self.next_event = 0
         elif value & _IDL:
             self.idle = 1
-        self.next_event = 0
+            if self.stop_asleep:  # an event that has become later must not keep it awake
+                self.next_event = 0
         self.limit = 0
 
     def write_port(self, port: int, value: int) -> None:

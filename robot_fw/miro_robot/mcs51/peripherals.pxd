@@ -10,17 +10,19 @@ from miro_robot.mcs51.uart cimport Uart
 
 cdef long long _NEVER
 cdef int _UNIMPLEMENTED
-cdef int _P0, _P1, _P2, _P3
+cdef int _P0
 cdef int _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1
 cdef int _SCON, _SBUF, _IE, _IP
 cdef int _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2
 cdef int _TF2, _RCLK, _TCLK
 cdef int _S5P2
-cdef int _SERIAL, _TIMER2
-cdef int _REN, _SETTINGS
+cdef int _SERIAL, _TIMER2, _BOTH_TIMERS
+cdef int _TR, _TF, _OF_TIMER0, _OF_TIMER1
+cdef int _REN, _SETTINGS, _RI_TI
 cdef long long _NO_PERIOD
 cdef long long _STOPPED
 
+@cython.final
 cdef class Peripherals:
     cdef Bus bus
     cdef readonly Interrupts interrupts
@@ -45,13 +47,15 @@ cdef class Peripherals:
     cpdef int check_times(self, long long cycle) except -1
     cpdef int freeze(self, long long cycle) except -1
     cpdef int sync(self, long long cycle) except -1
+    cdef int _catch_up(self, long long cycle) except -1
     cpdef int settle(self) except -1
+    cdef int _settle_serial(self) except -1
     @cython.locals(pulse1='long long', pulse2='long long', first='long long', second='long long')
     cdef int _sync_pulsed(self, long long cycle) except -1
     @cython.locals(halved=int, ticks1=int, rx=int, tx=int)
     cdef int _pulse(self, int timer1, int timer2, long long cycle) except -1
     @cython.locals(event='long long', enabled=int, timer=int, flag='long long')
-    cpdef long long next_event(self, long long now) except -1
+    cpdef long long next_event(self, long long now) except *  # Cython 3.2 writes -1 wrongly in a final class
     @cython.locals(tick='long long', received='long long', shifted='long long')
     cdef long long serial_tick(self) noexcept
     cdef int clock_serial(self) except -1
@@ -62,7 +66,7 @@ cdef class Peripherals:
     cdef long long _timer1_tick(self) noexcept
     @cython.locals(cycle='long long')
     cdef int apply_pushes(self, long long now) except -1
-    @cython.locals(p1=int, p3=int, changed1=int, changed3=int)
+    @cython.locals(ports=Ports, p1=int, p3=int, changed1=int, changed3=int)
     cdef int sample_pins(self, long long cycle) except -1
     @cython.locals(p1=int, p3=int, number=int)
     cdef int _inputs_changed(self, int changed1, int changed3, long long cycle) except -1
@@ -70,7 +74,10 @@ cdef class Peripherals:
     @cython.locals(levels=int, tick='long long')
     cpdef int pin_levels(self, int port, long long cycle) except -1
     cpdef int read(self, int address, long long cycle) except -1
+    @cython.locals(sooner=int, hastened=int)
     cpdef int write(self, int address, int value, long long cycle) except -1
+    @cython.locals(timers=Timers, timer=int, started=int)
+    cdef int hastens(self, int address, int value) noexcept
     cdef int writes_flags(self, int value) noexcept
     @cython.locals(both=int)
     cdef int timer1_is_idle_clock(self) noexcept

@@ -33,14 +33,15 @@ from miro_robot.mcs51.uart import STOPPED_TICK, Uart
 
 _NEVER = NEVER_TICK
 _UNIMPLEMENTED = 0xFF  # what an address without a register reads as (C5)
-_P0, _P1, _P2, _P3 = 0x80, 0x90, 0xA0, 0xB0
+_P0 = 0x80
 _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1 = 0x88, 0x89, 0x8A, 0x8B, 0x8C, 0x8D
 _SCON, _SBUF, _IE, _IP = 0x98, 0x99, 0xA8, 0xB8
 _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2 = 0xC8, 0xC9, 0xCA, 0xCB, 0xCC, 0xCD
 _TF2, _RCLK, _TCLK = 0x80, 0x20, 0x10
 _S5P2 = 9  # ticks into the cycle: pins are sampled, timer 1 overflows (U2)
-_SERIAL, _TIMER2 = 0x10, 0x20  # in IE
-_REN, _SETTINGS = 0x10, 0xF0  # in SCON
+_SERIAL, _TIMER2, _BOTH_TIMERS = 0x10, 0x20, 0x0A  # in IE
+_TR, _TF, _OF_TIMER0, _OF_TIMER1 = 0x50, 0xA0, 0x30, 0xC0  # in TCON
+_REN, _SETTINGS, _RI_TI = 0x10, 0xF0, 0x03  # in SCON
 _NO_PERIOD = 1 << 40  # of a clock that stands
 _STOPPED = STOPPED_TICK
 
@@ -103,7 +104,7 @@ class Peripherals:
         self.uart.clear(cycle)
         self.shift.abort()
         self.external.levels = (self.p3 >> 2) & 3  # pins moved on while the oscillator stood
-        self.timers.gates = self.external.levels
+        self.timers.set_gates(self.external.levels)
         self.timer2.up = (self.p1 >> 1) & 1
         self.timer_wait = -1
         self._set_serial_clock()
@@ -120,25 +121,41 @@ class Peripherals:
         """Does everything that happens in cycles below `cycle` and that the core can notice."""
         if not self.frozen:
             self.now = cycle
-            if self.pulsed:
-                self._sync_pulsed(cycle)
-            else:
-                if cycle > self.timer_wait:
-                    self.timers.sync(cycle)
-                    self.timer_wait = self.timers.quiet_until()
-                if not self.timer2.sleeps:
-                    self.timer2.sync(cycle)
-                if 12 * cycle > self.serial_wait:
-                    self.settle()
+            if (
+                cycle > self.timer_wait
+                or 12 * cycle > self.serial_wait
+                or not self.timer2.sleeps
+                or self.pulsed
+            ):
+                self._catch_up(cycle)
+
+    def _catch_up(self, cycle: int) -> None:
+        """Something is due below `cycle`, or may be."""
+        if self.pulsed:
+            self._sync_pulsed(cycle)
+        else:
+            if cycle > self.timer_wait:
+                self.timers.sync(cycle)
+                self.timer_wait = self.timers.quiet_until()
+            if not self.timer2.sleeps:
+                self.timer2.sync(cycle)
+            if 12 * cycle > self.serial_wait:
+                self._settle_serial()
 
     def settle(self) -> None:
         """Brings timers and serial port up to where the rest is."""
         if not self.frozen and not self.pulsed:
             self.timers.sync(self.now)
             self.timer2.sync(self.now)
-            self.uart.sync(12 * self.now)
-            if self.shift.flag:
-                self.shift.sync(12 * self.now)
+            self._settle_serial()
+        else:
+            self.serial_wait = self.serial_tick()
+
+    def _settle_serial(self) -> None:
+        """The serial port alone, whose 16x ticks do not ask for the timers."""
+        self.uart.sync(12 * self.now)
+        if self.shift.flag:
+            self.shift.sync(12 * self.now)
         self.serial_wait = self.serial_tick()
 
     def _sync_pulsed(self, cycle: int) -> None:
@@ -252,8 +269,9 @@ class Peripherals:
 
     def sample_pins(self, cycle: int) -> None:
         """S5P2 of `cycle`: what timers and interrupts see of P1 and P3."""
-        p1 = self.ports.level(1)
-        p3 = self.ports.level(3)
+        ports = self.ports
+        p1 = ports.latches[1] & ports.outside[1]
+        p3 = ports.latches[3] & ports.outside[3]
         changed1 = p1 ^ self.p1
         changed3 = p3 ^ self.p3
         self.p1 = p1
@@ -285,7 +303,7 @@ class Peripherals:
         self.external.sample(number, level, cycle)
         self.sync(cycle + 1)
         self.settle()
-        self.timers.gates = (self.timers.gates & (3 ^ (1 << number))) | (level << number)
+        self.timers.set_gates((self.timers.gates & (3 ^ (1 << number))) | (level << number))
 
     def pin_levels(self, port: int, cycle: int) -> int:
         """The pins of a port at S5P2 of `cycle`, alternate outputs included."""
@@ -308,7 +326,7 @@ class Peripherals:
 
     def read(self, address: int, cycle: int) -> int:
         """A register (port: its latch) with everything below `cycle` done."""
-        if address in (_P0, _P1, _P2, _P3):
+        if address & 0xCF == 0x80:
             return self.ports.latches[(address - _P0) >> 4]
         if address == _IE:
             return self.interrupts.ie
@@ -341,22 +359,45 @@ class Peripherals:
             return (self.timer2.count >> (8 * (address - _TL2))) & 0xFF
         return _UNIMPLEMENTED
 
-    def write(self, address: int, value: int, cycle: int) -> None:
-        """A register that is no port; `cycle` is the first to see it."""
+    def write(self, address: int, value: int, cycle: int) -> int:
+        """A register that is no port; `cycle` is the first to see it. 0 if no event comes sooner by it."""
         self.sync(cycle)
+        sooner = 1
         if address == _IE:
             self.interrupts.ie = value & 0xBF
         elif address == _IP:
             self.interrupts.ip = value & 0x3F
         elif address == _SCON and self.writes_flags(value):
+            sooner = 1 if value & ~self.uart.scon & _RI_TI else 0
             self.uart.write_scon(value, cycle)
-        elif self.timer1_is_idle_clock() and self.write_timer(address, value, cycle):
-            pass
+        elif _TCON <= address <= _TH1 and self.timer1_is_idle_clock():
+            hastened = self.hastens(address, value)
+            sooner = hastened & self.interrupts.ie
+            if address == _TCON and (value ^ self.external.control) & 0x0F:
+                sooner = 1
+            if hastened:
+                self.timer_wait = -1
+            self.write_timer(address, value, cycle)
         else:
             self.settle()
+            self.timer_wait = -1
             if not self.write_timer(address, value, cycle):
                 self.write_serial(address, value, cycle)
             self.clock_serial()
+        return sooner
+
+    def hastens(self, address: int, value: int) -> int:
+        """Which timer's flag may go up or be seen sooner if `value` goes to a register of timers 0 and 1: their bits in
+        IE. Not one that is stopped by it or stands.
+        """
+        timers = self.timers
+        if address == _TMOD or timers.tmod & 3 == 3:
+            return _BOTH_TIMERS
+        if address != _TCON:
+            timer = (address - _TL0) & 1
+            return 2 << (2 * timer) if timers.counting >> timer & 1 else 0
+        started = value & ~timers.control & _TR | (value ^ timers.control) & _TF
+        return (started & _OF_TIMER0 and 2) | (started & _OF_TIMER1 and 8)
 
     def writes_flags(self, value: int) -> int:
         """SCON keeps mode, SM2 and REN: the serial port goes on as it was, and waits for what it waited for."""
@@ -370,12 +411,11 @@ class Peripherals:
     def write_timer(self, address: int, value: int, cycle: int) -> int:
         """A register of timers 0 and 1; 0 if the address is none of them."""
         self.timers.sync(cycle)
-        self.timer_wait = -1
         if address == _TCON:
             self.timers.write_control(value, cycle)
             self.external.write(value, cycle)
         elif address == _TMOD:
-            self.timers.tmod = value
+            self.timers.write_mode(value)
         elif address in (_TL0, _TL1):
             self.timers.tl[address - _TL0] = value
         elif address in (_TH0, _TH1):

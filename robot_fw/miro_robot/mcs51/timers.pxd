@@ -8,20 +8,21 @@ cdef long long _NONE
 @cython.final
 cdef class Timers:
     cdef Interrupts interrupts
-    cdef public int tmod
+    cdef readonly int tmod
     cdef readonly int control
     cdef unsigned char tl[2]
     cdef unsigned char th[2]
-    cdef public int gates
+    cdef readonly int gates
     cdef long long edge_cycle[2]
     cdef readonly long long synced
     cdef readonly long long overflows1
+    cdef readonly int counting
 
     @cython.locals(timer=int)
     cpdef void clear(self, long long cycle) noexcept
-    @cython.locals(part=int)
+    @cython.locals(counting=int)
     cpdef void sync(self, long long cycle) noexcept
-    cdef inline int any_runs(self) noexcept
+    cdef inline void _note_counting(self) noexcept
     @cython.locals(split=int, gated=int)
     cdef inline int enabled(self, int part) noexcept
     cdef inline int mode(self, int timer) noexcept
@@ -39,8 +40,10 @@ cdef class Timers:
     cpdef void fall(self, int timer, long long cycle) noexcept
     @cython.locals(timer=int)
     cpdef void write_control(self, int value, long long cycle) noexcept
+    cdef void write_mode(self, int value) noexcept
+    cdef void set_gates(self, int levels) noexcept
     cpdef void taken(self, int timer, long long cycle) noexcept
-    @cython.locals(first='long long', counts='long long', left='long long', reload='long long', span='long long',
+    @cython.locals(first='long long', counts='long long', value='long long', left='long long', reload='long long', span='long long',
                    overflows='long long')
     cdef void _pass(self, int part, long long cycle) noexcept
     @cython.locals(mode=int)

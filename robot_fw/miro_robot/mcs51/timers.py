@@ -35,7 +35,7 @@ class Timers:
         "synced": TICK,
         "overflows1": TICK,
     }
-    NOT_STATE = ("interrupts",)
+    NOT_STATE = ("interrupts", "counting")  # the latter follows from TMOD, TCON and the gates
 
     def __init__(self, interrupts: Interrupts) -> None:
         self.interrupts = interrupts
@@ -47,6 +47,7 @@ class Timers:
         self.edge_cycle = [-1] * 2  # cycle in which a fall of T0, T1 counts
         self.synced = 0  # everything below this cycle is done
         self.overflows1 = 0  # of timer 1 since reset: the serial port halves them
+        self.counting = 0  # bit per part: whether it counts, on cycles or on a pin
 
     def clear(self, cycle: int) -> None:
         """As after reset in `cycle`."""
@@ -59,20 +60,23 @@ class Timers:
             self.th[timer] = 0
             self.edge_cycle[timer] = _NONE
             self.interrupts.withdraw(1 + 2 * timer, cycle)
+        self._note_counting()
 
     def sync(self, cycle: int) -> None:
         """Counts through all cycles below `cycle`."""
         if cycle <= self.synced:
             return
-        if self.any_runs():
-            for part in range(3):
-                if self.enabled(part):
-                    self._pass(part, cycle)
+        counting = self.counting
+        if counting & 1:
+            self._pass(0, cycle)
+        if counting & 2:
+            self._pass(1, cycle)
+        if counting & 4:
+            self._pass(2, cycle)
         self.synced = cycle
 
-    def any_runs(self) -> int:
-        """0 only if no part counts: both TR are 0, and timer 0 is not split (then timer 1 needs no TR)."""
-        return 1 if self.control & 0x50 or self.tmod & 3 == 3 else 0
+    def _note_counting(self) -> None:
+        self.counting = self.enabled(0) | self.enabled(1) << 1 | self.enabled(2) << 2
 
     def enabled(self, part: int) -> int:
         """Whether it counts, on cycles or on a pin."""
@@ -119,7 +123,7 @@ class Timers:
 
     def next_overflow(self, part: int) -> int:
         """Cycle of the next overflow if nothing changes, or NEVER_TICK. A counter is known one edge ahead only."""
-        if not self.enabled(part):
+        if not self.counting >> part & 1:
             return _NEVER
         left = self.top(part) - self.value(part)
         if self.counts_pin(part):
@@ -128,7 +132,7 @@ class Timers:
 
     def quiet_until(self) -> int:
         """The next cycle in which TF0 or TF1 goes up if nothing changes, or NEVER_TICK."""
-        if not self.any_runs():
+        if not self.counting:
             return _NEVER
         first = self.next_flag(0)
         second = self.next_flag(1)
@@ -149,11 +153,22 @@ class Timers:
     def write_control(self, value: int, cycle: int) -> None:
         """TCON.7:4 is written; `cycle` is the first to see it."""
         self.control = value & 0xF0
+        self._note_counting()
         for timer in range(2):
             if value & (0x20 << (2 * timer)):
                 self.interrupts.ask(1 + 2 * timer, cycle)
             else:
                 self.interrupts.withdraw(1 + 2 * timer, cycle)
+
+    def write_mode(self, value: int) -> None:
+        """TMOD is written, with everything below its cycle done."""
+        self.tmod = value
+        self._note_counting()
+
+    def set_gates(self, levels: int) -> None:
+        """The pins INT1, INT0 as sampled, with everything below the cycle that they act on done."""
+        self.gates = levels
+        self._note_counting()
 
     def taken(self, timer: int, cycle: int) -> None:
         """The CPU vectors: TF is cleared."""
@@ -169,9 +184,10 @@ class Timers:
             if not self.synced <= first < cycle:
                 return
             counts = 1
-        left = self.top(part) - self.value(part)
+        value = self.value(part)
+        left = self.top(part) - value
         if counts < left:
-            self._store(part, self.value(part) + counts)
+            self._store(part, value + counts)
             return
         reload = self.reload(part)
         span = self.top(part) - reload
@@ -207,3 +223,4 @@ class Timers:
     def after_load(self) -> None:
         if self.control & 0x0F:
             raise ValueError(f"TCON.3:0 is {self.control & 0x0F}, which belongs to the external interrupts")
+        self._note_counting()

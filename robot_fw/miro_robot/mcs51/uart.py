@@ -275,12 +275,12 @@ class Uart:
             state = self.rx_count & _COUNTER_BITS
             idle = (_VOTE_FIRST - state) & _COUNTER_BITS if state < _VOTE_FIRST or state > _ACTION else 0
             if idle:
-                within = (tick - 1 - self.rx_next) // self.rx_period + 1
-                if idle > within:
-                    idle = within
+                if self.rx_next + (idle - 1) * self.rx_period >= tick:
+                    idle = (tick - 1 - self.rx_next) // self.rx_period + 1
                 self.rx_count += idle
                 self.rx_next += idle * self.rx_period
-                self.rx_last = self.level(self.rx_next - self.rx_period)
+                if self.rx_next >= tick:  # else what comes next looks anew
+                    self.rx_last = self.level(self.rx_next - self.rx_period)
                 continue
             now = self.rx_next
             self.rx_next = now + self.rx_period

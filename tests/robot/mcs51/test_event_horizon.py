@@ -1,0 +1,103 @@
+"""A CPU that knows when its next event is does the same as one that looks at each instruction.
+
+Restoring a state makes the CPU work out its next event anew. So one CPU runs, another one is put into its own state
+before every instruction, and both must be in the same state in the end.
+"""
+
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from tests.robot.mcs51.asm import assemble
+from tests.robot.mcs51.rig import RecordingBus
+
+from miro_exact.state import restore, snapshot
+from miro_robot.mcs51.cpu import Cpu
+
+BYTE = st.sampled_from([0, 1, 2, 0x7F, 0x80, 0xF0, 0xFA, 0xFD, 0xFE, 0xFF])
+WRITES = st.one_of(
+    st.builds("MOV {},#{}".format, st.sampled_from(["TL0", "TH0", "TL1", "TH1"]), BYTE),
+    st.builds("MOV TMOD,#{}".format, st.sampled_from([0x11, 0x22, 0x21, 0x12, 0x03, 0x20, 0x99, 0x55])),
+    st.builds("MOV IE,#{}".format, st.sampled_from([0x82, 0x88, 0x8A, 0x90, 0x9A, 0xBF, 0x1A])),
+    st.builds("MOV IP,#{}".format, st.sampled_from([0, 2, 8, 0x10, 0x1A])),
+    st.builds(
+        "{} {}".format,
+        st.sampled_from(["SETB", "CLR", "CPL"]),
+        st.sampled_from(["TR0", "TR1", "TF0", "TF1", "IT0", "IE0", "RI", "TI", "EA", "ET0", "ET1", "ES"]),
+    ),
+    st.builds("ANL {},#{}".format, st.sampled_from(["TCON", "SCON"]), BYTE),
+    st.builds("ORL TCON,#{}".format, BYTE),
+    st.builds("MOV SBUF,#{}".format, BYTE),
+    st.builds("{} P3.{}".format, st.sampled_from(["SETB", "CLR", "CPL"]), st.integers(2, 5)),
+    st.sampled_from(
+        ["MOV PCON,#1", "MOV PCON,#80h", "MOV PCON,#0", "NOP", "MUL AB", "MOV A,TL0", "MOV A,TL1"]
+    ),
+)
+BODY = st.lists(WRITES, max_size=4)
+PROGRAM = """
+LJMP main
+ORG 000Bh
+LJMP timer0
+ORG 001Bh
+LJMP timer1
+ORG 0023h
+LJMP serial
+ORG 0040h
+timer0:
+INC 30h
+{0}
+RETI
+timer1:
+INC 31h
+{1}
+RETI
+serial:
+INC 32h
+{2}
+RETI
+main:
+MOV T2CON,#{3}
+MOV RCAP2H,#0FFh
+MOV RCAP2L,#0FDh
+MOV TH2,#0FFh
+MOV TL2,#0FDh
+MOV SCON,#50h
+MOV TMOD,#11h
+MOV TCON,#50h
+MOV IE,#9Ah
+loop:
+{4}
+SJMP loop
+"""
+CYCLES = 400
+
+
+def state_after(code: bytes, levels: list[int], anew: bool) -> bytes:
+    cpu = Cpu(RecordingBus())
+    cpu.load(code)
+    for number, level in enumerate(levels):
+        cpu.rxd.append(12 * 37 * (number + 1), level)
+    if not anew:
+        cpu.run(CYCLES)
+    while cpu.cycles < CYCLES:
+        restore(cpu, snapshot(cpu))
+        cpu.step()
+    return snapshot(cpu)
+
+
+@settings(deadline=None, max_examples=40)
+@given(BODY, BODY, BODY, st.sampled_from([0x34, 0x04, 0x14]), BODY, st.lists(st.integers(0, 1), max_size=12))
+@example(
+    ["CLR TF0"],
+    ["CLR TR1", "MOV TL1,#250", "MOV TH1,#255", "SETB TR1"],
+    ["CLR RI"],
+    0x34,
+    ["MOV PCON,#1"],
+    [0],
+)
+@example(["NOP"], ["CLR TF0", "MOV TL0,#250"], ["CLR TI"], 0x34, ["CLR TF1", "MOV SBUF,#1"], [])
+@example(["NOP"], ["NOP"], ["NOP"], 0x34, ["MOV TH0,#255", "MOV TL0,#254", "NOP", "NOP", "NOP", "NOP"], [])
+def test_it_takes_every_interrupt_when_one_that_looks_at_each_instruction_does(
+    timer0: list[str], timer1: list[str], serial: list[str], t2con: int, loop: list[str], levels: list[int]
+) -> None:
+    parts = ["\n".join(part) for part in (timer0, timer1, serial)]
+    code = assemble(PROGRAM.format(*parts, t2con, "\n".join(loop)))
+    assert state_after(code, levels, anew=False) == state_after(code, levels, anew=True)
