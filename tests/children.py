@@ -6,6 +6,9 @@ A shell that puts a job in the background without job control leaves SIGINT igno
 Children inherit that, and `restore_signals` of `subprocess` does not undo it. Python installs no handler for a SIGINT
 that is ignored: a child that a test interrupts then runs to its end. So the signals are reset in the child, before its
 program begins. The process that runs the tests keeps what it was given.
+
+A child with a `preexec_fn` writes no bytecode: a limit on the length of files would cut it short, and Python takes what
+is left for a whole module's.
 """
 
 from __future__ import annotations
@@ -54,4 +57,6 @@ def _with_reset(named: dict[str, Any]) -> dict[str, Any]:
         if before is not None:
             before()
 
+    if before is not None:
+        named = {**named, "env": {**(named.get("env") or os.environ), "PYTHONDONTWRITEBYTECODE": "1"}}
     return {**named, "preexec_fn": prepare}

@@ -269,6 +269,7 @@ def test_a_recording_of_the_port_replays_to_the_same_digests(miro: Open, tmp_pat
 def test_a_full_disk_is_an_error_of_the_port_and_what_was_recorded_stays(tmp_path: Path) -> None:
     code = (
         "import resource, sys, serial\n"
+        "sys.dont_write_bytecode = True\n"
         "serial.protocol_handler_packages.append('mirotwin.bridges')\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
         "port = serial.serial_for_url(sys.argv[1], timeout=30)\n"
