@@ -1,5 +1,6 @@
 """Workers that end, hang behind or are not like this process: a campaign goes on, or ends in a line."""
 
+import gc
 import os
 import signal
 import sys
@@ -14,6 +15,7 @@ from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
 
 from miro_exact import engine
 from miro_exact.bad_input import BadInput
+from miro_sim.world.world import World
 from mirotwin import campaign
 from mirotwin.campaign.drive import Drive
 from mirotwin.campaign.worker import Outcome, work
@@ -37,6 +39,17 @@ def test_a_run_that_ends_its_process_each_time_is_a_row_and_costs_no_other(monke
     assert "ended the process that ran it" in found[4]["error"]
     assert found[4]["verdict"] == "error"
     assert [*found[:4], *found[5:]] == [*whole[:4], *whole[5:]]
+
+
+def test_a_process_keeps_nothing_of_the_runs_that_it_has_done():
+    def worlds():
+        gc.collect()
+        return len([one for one in gc.get_objects() if isinstance(one, World)])
+
+    before, plan = worlds(), plan_of()
+    for number in range(plan.runs):
+        assert not work(plan.work(number)).error
+    assert worlds() == before
 
 
 def test_a_worker_that_is_killed_in_the_middle_loses_nothing(alone, tmp_path):
