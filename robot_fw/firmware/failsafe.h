@@ -14,6 +14,7 @@ extern volatile u8 ticks;
 extern u8 ticks_taken;
 
 void failsafe_start(void);
+void failsafe_look(void);
 bool failsafe_fresh(void);
 void failsafe_tick(void);
 void failsafe_interrupt(void) __interrupt(TF1_VECTOR);

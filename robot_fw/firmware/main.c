@@ -48,8 +48,11 @@ void main(void)
         if (ticks_taken != ticks)
             failsafe_tick();
         else if (rx_taken != rx_count) {
-            if (decode_character() && failsafe_fresh())
-                act();
+            if (decode_character()) {
+                failsafe_look();
+                if (decode_valid() && failsafe_fresh())
+                    act();
+            }
         } else
             PCON = sleep;
     }

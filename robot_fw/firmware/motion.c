@@ -15,6 +15,7 @@
 #include "filter.h"
 #include "lm629.h"
 #include "protocol.h"
+#include "uart.h"
 
 #define BOOT_TRIES      8
 #define RETRY_TRIES     1   /* while frames come in there is no time for more */
@@ -190,10 +191,11 @@ static bool on_target(u8 chip)
 }
 
 /* Loads a waiting acceleration at standstill. The LM629 refuses an STT with a new acceleration while its profile
- * generator runs, and in velocity mode it always runs; so both must have finished a stop, or be off. */
+ * generator runs, and in velocity mode it always runs; so both must have finished a stop, or be off. Characters go
+ * first: asking the chips each millisecond and testing a frame behind every sync is more than there is time for. */
 void motion_tick(void)
 {
-    if (!acceleration_waits || state == STATE_DRIVING)
+    if (!acceleration_waits || state == STATE_DRIVING || rx_taken != rx_count)
         return;
     if (state == STATE_STOPPED && !(on_target(LEFT) && on_target(RIGHT)))
         return;

@@ -1,6 +1,6 @@
 """What two firmwares do otherwise, seen from outside: on the LM629 bus and on TXD, for the same characters on RXD.
 
-    python -m tests.mutants.difference failsafe.c:103:8:condition:not [--seconds 20] [--seed 0]
+    python -m tests.mutants.difference failsafe.c:71:13:condition:not [--seconds 20] [--seed 0]
 
 What belongs here: running an image under a stimulus and comparing event logs. What does not: which rule a difference
 breaks.

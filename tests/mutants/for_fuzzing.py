@@ -95,8 +95,9 @@ _RECEPTION = (
             ("main.c", "volatile u8 sleep;\n", "volatile u8 sleep;\nstatic u8 most_taken;\n"),
             (
                 "main.c",
-                "                act();\n",
-                """                act();
+                "                    act();\n            }\n",
+                """                    act();
+            }
             while (++taken != rx_waiting);
             left = rx_waiting - taken;
             if (most_taken < taken)

@@ -143,8 +143,8 @@ def _at_once(host: Host) -> None:
 
 
 def _in_the_window(host: Host) -> None:
-    host.frame(1, 1, bytes([0, 0]))
-    host.tick += 28 * _UART_SAMPLE_TICKS
+    host.team(1, 500, 500)
+    host.tick += 140 * _UART_SAMPLE_TICKS
     host.bytes(b"\0")
     host.pause(20)
     host.team(4, 1000, 1000)
@@ -203,7 +203,7 @@ def _stop_while_answering(host: Host) -> None:
 
 def _in_phase_with_the_answer(host: Host) -> None:
     host.team(3, 2000, 2000, ask=True)
-    host.tick += 131 * _UART_SAMPLE_TICKS
+    host.tick += 147 * _UART_SAMPLE_TICKS
     host.team(4, 2000, 2000)
 
 

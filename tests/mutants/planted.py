@@ -72,13 +72,11 @@ _FAILSAFE = (
     Planted(
         "garbage feeds the failsafe",
         "main.c",
-        """            if (decode_character() && failsafe_fresh())
-                act();
+        """            if (decode_character()) {
 """,
         """            if (!decode_character())
                 failsafe_start();
-            else if (failsafe_fresh())
-                act();
+            else {
 """,
         "Any character restarts the failsafe.",
     ),
@@ -145,7 +143,11 @@ void main(void)
 _RECEPTION = (
     Planted(
         "takes frames with a bad CRC",
-        *("decode.c", "if (!take_body(from + RX3_AT_HDR)) {", "take_body(from + RX3_AT_HDR); if (0) {"),
+        *(
+            "decode.c",
+            "if (!take_body(rx_taken - frame_size + RX3_AT_HDR)) {",
+            "take_body(rx_taken - frame_size + RX3_AT_HDR); if (0) {",
+        ),
         "What noise has changed is obeyed.",
     ),
     Planted(
@@ -156,15 +158,15 @@ _RECEPTION = (
     Planted(
         "takes frames of another layout too",
         "decode.c",
-        "    if (!take_body(from + RX3_AT_HDR)) {\n",
+        "    if (!take_body(rx_taken - frame_size + RX3_AT_HDR)) {\n",
         """    robots ^= 3 ^ 5;
-    if (take_body(from + RX3_AT_HDR)) {
+    if (take_body(rx_taken - frame_size + RX3_AT_HDR)) {
         robots ^= 3 ^ 5;
         run = 0;
         return true;
     }
     robots ^= 3 ^ 5;
-    if (!take_body(from + RX3_AT_HDR)) {
+    if (!take_body(rx_taken - frame_size + RX3_AT_HDR)) {
 """,
         "A frame whose CRC began with the layout byte of the other network is valid.",
     ),
@@ -279,7 +281,11 @@ _SERVICE = (
     ),
     Planted(
         "changes the acceleration in motion",
-        *("motion.c", "    if (!acceleration_waits || state == STATE_DRIVING)\n        return;", ""),
+        *(
+            "motion.c",
+            "    if (!acceleration_waits || state == STATE_DRIVING || rx_taken != rx_count)\n        return;",
+            "",
+        ),
         "The LM629 refuses the STT that follows.",
     ),
 )

@@ -52,7 +52,7 @@ cdef class Referee(Judge):
     cdef void _fault(self, long long tick, int kind, int pc) noexcept
     @cython.locals(what=int)
     cdef void _pass(self, long long tick) noexcept
-    @cython.locals(latest='long long')
+    @cython.locals(latest='long long', due='long long')
     cdef void _pass_silence(self, int what, long long tick) noexcept
     @cython.locals(since='long long')
     cdef bint _is_over(self, int what, long long tick) noexcept

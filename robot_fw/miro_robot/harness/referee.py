@@ -231,8 +231,9 @@ class Referee(Judge):
 
     def _pass_silence(self, what: int, tick: int) -> None:
         """A robot that receives characters then may be testing a frame."""
-        latest = self.silence_tick[what] + self.silences[what] + _TOLERANCE
-        if latest - _TESTING <= self.heard_tick <= latest:
+        due = self.silence_tick[what] + self.silences[what]
+        latest = due + _TOLERANCE
+        if due - _TESTING <= self.heard_tick <= latest:
             latest += _TESTING
         if tick > latest:
             if not (self._fulfilled(what, 0) and self._fulfilled(what, 1)):

@@ -135,7 +135,7 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 LENGTHS = (
     ("busy_clocks", 0, 1 << 20),
-    ("reset_clocks", 1, 1 << 20),
+    ("reset_clocks", 1, 1 << 24),
     ("reset_pulse_clocks", 0, 1 << 20),
     ("filter_clocks", 0, 1024),
 )

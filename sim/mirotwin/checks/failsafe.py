@@ -82,6 +82,7 @@ class SilenceJudge(Judge[SilenceCheck]):
         self.in_time = False
         self.acting_ticks = ms_ticks(ACTING_MS)
         self.earliest_ticks = ms_ticks(max(check.after_ms - check.tolerance_ms, 0.0))
+        self.after_ticks = ms_ticks(check.after_ms)
         self.latest_ticks = ms_ticks(check.after_ms + check.tolerance_ms)
         self.testing_ticks = ms_ticks(TESTING_MS)
         self.heard_tick: int | None = None
@@ -125,7 +126,8 @@ class SilenceJudge(Judge[SilenceCheck]):
         if self.fresh_tick is None or tick <= self.fresh_tick + self.latest_ticks:
             return
         latest_tick = self.fresh_tick + self.latest_ticks
-        if self.heard_tick is not None and latest_tick - self.testing_ticks <= self.heard_tick <= latest_tick:
+        testing_tick = self.fresh_tick + self.after_ticks - self.testing_ticks
+        if self.heard_tick is not None and testing_tick <= self.heard_tick <= latest_tick:
             latest_tick += self.testing_ticks
         if tick <= latest_tick:
             return

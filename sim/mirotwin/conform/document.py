@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 
+from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from mirotwin.conform.rule import Air, Rule
 from mirotwin.conform.table import CHAPTERS
 
@@ -22,7 +23,7 @@ def _chapter(title: str, rules: list[Rule]) -> Iterator[str]:
     yield "| rule | name | a robot must | from | tried with |"
     yield "|---|---|---|---|---|"
     for rule in rules:
-        airs = "; ".join(dict.fromkeys(map(_air, rule.airs)))
+        airs = "; ".join(dict.fromkeys(map(_air, rule.airs))) + _chips(rule.lm629)
         yield f"| {rule.id} | {rule.name} | {rule.text.replace('|', chr(92) + '|')} | {_source(rule.source)} | {airs} |"
     yield ""
 
@@ -31,6 +32,15 @@ def _source(source: str) -> str:
     page, _, section = source.partition(", ")
     anchor = "".join(one for one in section.lower().replace(" ", "-") if one.isalnum() or one == "-")
     return f"[{section}](../{page}#{anchor})"
+
+
+def _chips(lm629: Lm629Options) -> str:
+    changed = [
+        f"{name} {getattr(lm629, name)}"
+        for name in ("busy_clocks", "reset_clocks")
+        if getattr(lm629, name) != getattr(DEFAULT_OPTIONS, name)
+    ]
+    return "".join(f", {one}" for one in changed)
 
 
 def _air(air: Air) -> str:

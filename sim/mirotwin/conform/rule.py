@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from miro_robot.faults import FaultKind
+from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 
 if TYPE_CHECKING:
     from mirotwin.conform.talk import Talk
@@ -40,7 +41,8 @@ class Rule(msgspec.Struct, frozen=True):
     """`text` is a sentence with MUST, `source` the page and section that it comes from.
 
     `script` says what the host of a network says and what its robots have to make of it; it is called for each of
-    `airs`. `faults`: kinds of firmware fault that break this rule, in its own trial and in those of others.
+    `airs`. `faults`: kinds of firmware fault that break this rule, in its own trial and in those of others. `lm629`:
+    the chips of its robots.
     """
 
     id: str
@@ -49,6 +51,7 @@ class Rule(msgspec.Struct, frozen=True):
     script: Callable[[Talk], None]
     airs: tuple[Air, ...] = BOTH
     faults: tuple[FaultKind, ...] = ()
+    lm629: Lm629Options = DEFAULT_OPTIONS
 
     @property
     def name(self) -> str:
@@ -70,9 +73,10 @@ class Chapter:
         source: str,
         airs: tuple[Air, ...] = BOTH,
         faults: tuple[FaultKind, ...] = (),
+        lm629: Lm629Options = DEFAULT_OPTIONS,
     ) -> Callable[[Callable[[Talk], None]], Callable[[Talk], None]]:
         def keep(script: Callable[[Talk], None]) -> Callable[[Talk], None]:
-            self.rules.append(Rule(id, text, source, script, airs, faults))
+            self.rules.append(Rule(id, text, source, script, airs, faults, lm629))
             return script
 
         return keep

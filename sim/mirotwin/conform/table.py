@@ -9,7 +9,7 @@ from difflib import get_close_matches
 
 from miro_exact.bad_input import BadInput
 from mirotwin.conform.rule import Chapter, Rule
-from mirotwin.conform.rules import answers, boot, driving, failsafe, fresh, reception, service, sound
+from mirotwin.conform.rules import answers, boot, chips, driving, failsafe, fresh, reception, service, sound
 
 CHAPTERS: tuple[Chapter, ...] = (
     boot.CHAPTER,
@@ -20,6 +20,7 @@ CHAPTERS: tuple[Chapter, ...] = (
     service.CHAPTER,
     answers.CHAPTER,
     sound.CHAPTER,
+    chips.CHAPTER,
 )
 RULES: tuple[Rule, ...] = tuple(rule for chapter in CHAPTERS for rule in chapter.rules)
 _BY_ID = {rule.id: rule for rule in RULES}

@@ -30,6 +30,10 @@ camera = {{ kind = "gaussian", position_error_cm = 0.0, heading_error_deg = 0.0,
 
 [expect]
 conforms_to = "{id}"
+
+[lm629]
+busy_clocks = {lm629.busy_clocks}
+reset_clocks = {lm629.reset_clocks}
 """
 _NETWORK = """
 [[network]]
@@ -79,7 +83,9 @@ def trial_of(rule: Rule) -> Trial:
 
 def _text(rule: Rule, duration_s: float) -> str:
     places = iter(_PLACES)
-    text = _HEAD.format(name=f"conform-{rule.id.lower()}", id=rule.id, duration_s=duration_s)
+    text = _HEAD.format(
+        name=f"conform-{rule.id.lower()}", id=rule.id, duration_s=duration_s, lm629=rule.lm629
+    )
     return text + "".join(_network(air, places) for air in rule.airs)
 
 

@@ -1,6 +1,8 @@
 """Mistakes to plant in the firmware's source, and the rules that each must fail.
 
 What belongs here: the table. What does not: building images (`tests.mirotwin.checks.rig`) and trying them.
+
+Long because it is one table, with a mistake for each rule at least.
 """
 
 from __future__ import annotations
@@ -48,11 +50,11 @@ MISTAKES = {
         "P04",
     ),
     "looks at the first sync byte only": Mistake(
-        *("decode.c", " || rx_character[RX_INDEX(from + 1)] != SYNC_1", ""),
+        *("decode.c", " && rx_character[RX_INDEX(from + 1)] == SYNC_1", ""),
         "P05",
     ),
     "looks at the second sync byte only": Mistake(
-        *("decode.c", "rx_character[RX_INDEX(from)] != SYNC_0 || ", ""),
+        *("decode.c", "rx_character[RX_INDEX(from)] == SYNC_0 && ", ""),
         "P05",
     ),
     "takes the layout of 3 for its own": Mistake(
@@ -69,7 +71,11 @@ MISTAKES = {
         "P07",
     ),
     "takes frames with a bad CRC": Mistake(
-        *("decode.c", "if (!take_body(from + RX3_AT_HDR)) {", "take_body(from + RX3_AT_HDR); if (0) {"),
+        *(
+            "decode.c",
+            "if (!take_body(rx_taken - frame_size + RX3_AT_HDR)) {",
+            "take_body(rx_taken - frame_size + RX3_AT_HDR); if (0) {",
+        ),
         "P07 P08 P30",
     ),
     "does not look at stop bits": Mistake("uart.c", "if (!RB8)", "if (0)", "P09"),
@@ -193,7 +199,11 @@ MISTAKES = {
         "P36",
     ),
     "takes an acceleration in motion": Mistake(
-        *("motion.c", "    if (!acceleration_waits || state == STATE_DRIVING)\n        return;", ""),
+        *(
+            "motion.c",
+            "    if (!acceleration_waits || state == STATE_DRIVING || rx_taken != rx_count)\n        return;",
+            "",
+        ),
         "P37 P51",
     ),
     "stops while an acceleration waits and one wheel stands": Mistake(
@@ -295,5 +305,21 @@ MISTAKES = {
     ),
     "executes A5h": Mistake(
         "main.c", "    EA = 1;", "    __asm\n    .db 0xA5\n    __endasm;\n    EA = 1;", "P54"
+    ),
+    "asks the chips while characters wait": Mistake("motion.c", " || rx_taken != rx_count", "", "P29"),
+    "sets a mask by RSTI": Mistake(
+        "lm629.c", "    lm629_word(0, 0);\n    if", "    lm629_word(0xFF, 0);\n    if", "P02"
+    ),
+    "waits 65 us for a busy chip": Mistake("lm629.c", "BUSY_POLLS      25", "BUSY_POLLS      4", "P57"),
+    "waits 0.85 ms for a chip to come up": Mistake(
+        "lm629.c", "BOOT_POLLS      200", "BOOT_POLLS      50", "P57"
+    ),
+    "says nothing of a chip that does not come up": Mistake(
+        *("telemetry.c", " | (lm629_ready ? 0 : FLAG_INIT_FAILED)", ""),
+        "P58",
+    ),
+    "waits for ever for a chip to come up": Mistake(
+        *("lm629.c", "        if (!--polls)\n            return false;", "        ;"),
+        "P58",
     ),
 }

@@ -184,6 +184,15 @@ def stop_after_ms(target, waited):
     return (stop - frame_end) / 24_000
 
 
+def test_a_stale_frame_under_test_when_the_stop_is_due_may_put_it_off():
+    """It ends 108.4 ms after the last fresh one, and the wheels are told to stop after 110.5 ms."""
+    target = target_for(load_hex(image_path()), robots=5, slot=4)
+    program = bytes(24) + b"\x2c\x79\x03" + bytes(4) + b"\x1b\x17\x17"
+    assert not target.run(program)
+    _, checks = world_of(target, program, JUDGED)
+    assert not checks.failures
+
+
 def test_a_robot_that_tests_a_frame_stops_when_the_test_is_over():
     target = target_for(load_hex(image_path()), robots=5)
     after_ms = [stop_after_ms(target, waited) for waited in range(30)]

@@ -92,7 +92,7 @@ BUILDS = {
     ),
     "slower": (
         *("telemetry.c", "        return;\n    begin();"),
-        '        return;\n    for (low = 120; low; --low) {\n        __asm__("nop");\n    }\n    begin();',
+        '        return;\n    for (low = 130; low; --low) {\n        __asm__("nop");\n    }\n    begin();',
     ),
 }
 

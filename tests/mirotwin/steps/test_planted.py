@@ -63,8 +63,8 @@ def test_a_failsafe_of_125_ms_fails_a_step_and_the_checks_of_the_example(tmp_pat
 
 @needs_sdcc
 def test_firmware_that_takes_damaged_frames_fails_the_other_example(tmp_path: Path) -> None:
-    wrong = "take_body(from + RX3_AT_HDR); if (0) {"
-    image = built("decode.c", "if (!take_body(from + RX3_AT_HDR)) {", wrong)
+    wrong = "take_body(rx_taken - frame_size + RX3_AT_HDR); if (0) {"
+    image = built("decode.c", "if (!take_body(rx_taken - frame_size + RX3_AT_HDR)) {", wrong)
     outcome = run(EXAMPLES / "damage.scenario.toml", image)
     assert outcome.lines[0].startswith("step failed: step 3: never command: tick ")
 

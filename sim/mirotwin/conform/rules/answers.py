@@ -135,6 +135,11 @@ def flags(talk: Talk) -> None:
         for _ in range(frames):
             talk.team()
         _says(talk, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
+    for silence_ms, wanted in ((140.0, Flags.STOPPED), (560.0, both)):
+        for _ in range(2):  # what happened twice is told once
+            talk.team()
+            talk.wait(silence_ms)
+        _says(talk, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
 
 
 def _says(talk: Talk, wanted: str, says: Callable[[Answer, Seen], str], gap_ms: float = 36.0) -> Frame:

@@ -13,7 +13,7 @@ from mirotwin.conform.seen import Seen, in_words
 from mirotwin.conform.talk import BOOTED_MS, Found, Talk, ms
 
 CHAPTER = Chapter("Power-on")
-_RESET = BY_NAME["RESET"].opcode
+_RESET, _RSTI = BY_NAME["RESET"].opcode, BY_NAME["RSTI"].opcode
 
 
 @CHAPTER.rule(
@@ -53,6 +53,12 @@ def reset_together(talk: Talk) -> None:
                 return tick, f"RESET to the {side} one"
         return None
 
+    def other_mask(seen: Seen) -> Found:
+        for one in seen.commands:
+            if one.tick <= first.tick and one.opcode == _RSTI and one.data != bytes(2):
+                return one.tick, f"RSTI {one.data.hex()} to the {one.side} one"
+        return None
+
     def apart(seen: Seen) -> Found:
         for tick, left, right in seen.samples:
             if tick > ms(BOOTED_MS) and NEVER_TICK in (left, right):
@@ -62,6 +68,7 @@ def reset_together(talk: Talk) -> None:
         return None
 
     talk.expect(first.tick, f"status 80h or C0h {BOOTED_MS:g} ms after power-on", shown)
+    talk.expect(first.tick, "RSTI 0000h", other_mask)
     talk.expect(end, "RESET sent to both LM629 or none", alone)
     talk.expect(end, f"both LM629 with the same samples {BOOTED_MS:g} ms after power-on", apart)
 

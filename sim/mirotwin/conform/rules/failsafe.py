@@ -7,6 +7,7 @@ from miro_protocol.table import (
     DEFAULT_ACCELERATION,
     FAILSAFE_OFF_TICKS,
     FAILSAFE_STOP_TICKS,
+    SYNC,
     TICKS_PER_MS,
     Opcode,
 )
@@ -44,6 +45,23 @@ def stop(talk: Talk) -> None:
     talk.characters(bytes(8))  # no robot has looked at the frame when the first of these ends
     stops_behind(talk, last)
     talk.wait(130.0)
+    _stop_of_a_busy_robot(talk)
+
+
+def _stop_of_a_busy_robot(talk: Talk) -> None:
+    """While one wheel still comes to a stop and an acceleration waits for that, syncs in a row before a frame."""
+    slot = talk.air.slots[0]
+    for syncs in (16, 24):
+        for _ in range(8):
+            talk.team(talk.same(slot, 0, 12000))
+        talk.team(talk.same(slot, 0, 12000), gap_ms=2.0)
+        talk.service(slot, Opcode.ACCELERATION, DEFAULT_ACCELERATION.to_bytes(4, "little"), gap_ms=0.0)
+        talk.wait(112.0)
+        talk.characters(SYNC * syncs)
+        last = talk.team(what=f"team frame behind {syncs} syncs", lead=b"")
+        talk.obeyed(last)
+        stops_behind(talk, last)
+        talk.wait(130.0)
 
 
 @CHAPTER.rule(
