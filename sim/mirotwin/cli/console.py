@@ -24,11 +24,12 @@ class _Plain(Console):
 
 
 def show(result: RenderableType) -> None:
-    """Prints a result on stdout; what goes to a file or a pipe is not folded at 80 columns nor padded."""
+    """Prints a result on stdout. No line of text is folded; tables in a file or a pipe are not padded."""
+    whole = isinstance(result, str)  # a path is one word, however long
     if sys.stdout.isatty():
-        _Plain(highlight=False, markup=False).print(result)
+        _Plain(highlight=False, markup=False).print(result, soft_wrap=whole)
         return
     console = _Plain(highlight=False, markup=False, width=PIPE_COLUMNS)
     with console.capture() as capture:
-        console.print(result)
+        console.print(result, soft_wrap=whole)
     click.echo("\n".join(line.rstrip(" ") for line in capture.get().split("\n")), nl=False)
