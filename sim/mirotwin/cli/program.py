@@ -162,11 +162,15 @@ class Program(LazyGroup):
         sys.exit(self._run(args, prog_name or "mirotwin", extra))
 
     def invoke(self, ctx: click.Context) -> Any:
-        """The library would make 1 of a reader that has gone, which here means that an expectation failed."""
+        """The library would make 1 of a reader that has gone, which here means that an expectation failed, and of a
+        file that ends too soon (a module's bytecode that was cut short) the Ctrl-D of a user.
+        """
         try:
             return super().invoke(ctx)
         except BrokenPipeError:
             raise ReaderGone from None
+        except EOFError as error:
+            raise RuntimeError(f"a file ends too soon: {error}") from error
 
     def _run(self, args: Sequence[str] | None, prog_name: str, extra: dict[str, Any]) -> int:
         if vars(sys)["stderr"] is None:  # `2>&-`: the next file to be opened would take its place

@@ -45,6 +45,18 @@ def test_a_run_without_a_figure_writes_the_other_files(mirotwin, tmp_path):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["run.mcap", "summary.json"]
 
 
+def test_a_file_that_ends_too_soon_is_no_interruption(mirotwin, monkeypatch):
+    def cut_short(name):
+        raise EOFError("marshal data too short")
+
+    monkeypatch.setattr("mirotwin.cli.program.import_module", cut_short)
+    code, _, err = mirotwin("scenarios")
+    assert code == 70
+    assert err.startswith(
+        "mirotwin: internal error: RuntimeError: a file ends too soon: marshal data too short"
+    )
+
+
 def test_help_loads_click_and_nothing_that_is_slow() -> None:
     script = (
         "import sys\nfrom mirotwin.cli import main\n"

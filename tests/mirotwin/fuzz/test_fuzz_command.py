@@ -18,9 +18,10 @@ MISTAKE = "takes frames with a bad CRC"
 
 
 def started(tmp_path, *arguments):
-    """The command in a process of its own, with the engine of the tests."""
+    """The command in a process of its own, with the engine of the tests and a line of progress each second."""
     program = (
-        "import mirotwin.cli.fuzz as fuzz\n"
+        "import mirotwin.cli.fuzz as fuzz, mirotwin.cli.fuzz_progress as progress\n"
+        "progress.LINE_S = 1.0\n"
         "from tests.mirotwin.fuzz.random_engine import RandomEngine\n"
         "fuzz.engine_for = lambda spec, inputs, folder, target, jobs, seed: (\n"
         "    RandomEngine(target, list(inputs), folder.folder('engine'), seed), [])\n"
@@ -128,10 +129,10 @@ def test_ctrl_c_ends_it_with_what_was_found(tmp_path):
 
 
 def test_plain_lines_where_stderr_is_no_terminal(tmp_path):
-    process = started(tmp_path, "--time", "12s")
+    process = started(tmp_path, "--time", "3s")
     _, err = process.communicate(timeout=120)
     assert process.returncode == 0
-    line = next(line for line in err.splitlines() if line.startswith("mirotwin: fuzzing miro.ihx: 0:1"))
+    line = next(line for line in err.splitlines() if line.startswith("mirotwin: fuzzing miro.ihx: 0:0"))
     assert line.rpartition(", ")[2].endswith(" left")
     assert "/s, " in line
     assert " edges, no finds" in line
