@@ -95,9 +95,9 @@ def _measure(asked: argparse.Namespace) -> None:
     if unknown := sorted(set(asked.only) - set(names)):
         raise SystemExit(f"there is no mistake {unknown[0]!r}; use one of: {'; '.join(names)}")
     chosen = {name: one for name, one in names.items() if not asked.only or name in asked.only}
-    engines = asked.engines or (["afl"] if asked.planted else list(ENGINES))
+    engines = asked.engines or (["afl", "hypothesis"] if asked.planted else list(ENGINES))
     limit_s = asked.limit or (PLANTED_LIMIT_S if asked.planted else LIMIT_S)
-    for one in wanted(chosen, engines, asked.seeds or (1 if asked.planted else 3), limit_s, table):
+    for one in wanted(chosen, engines, asked.seeds or 3, limit_s, table):
         found = results()
         known = found.trials.get(one.key)
         if known and not asked.again and known.answers(one):

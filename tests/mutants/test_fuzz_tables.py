@@ -54,9 +54,24 @@ def test_firmware_that_does_not_come_up_is_told_with_what_was_said_of_it() -> No
     assert "| pushes for ever | not fuzzed | it comes up with a fault |" in table
 
 
-def test_only_the_first_seed_is_counted() -> None:
+def test_what_was_found_is_counted_seed_by_seed() -> None:
     table = render([trial("afl", 1, None), trial("afl", 2, 3.0), trial("afl", 3, 4.0)])
-    assert "| found with the first seed |  |  | 0 of 1 |" in table
+    assert "| found |  |  | 0 1 1 of 1 |" in table
+    other = msgspec.structs.replace(trial("afl", 1, 3.0).wanted, mistake="waits for standstill")
+    table = render([trial("afl", 1, 3.0), trial("afl", 2, None), Trial(other, None, 70.0)])
+    assert "| found |  |  | 1 of 2, 0 of 1 |" in table
+
+
+def test_planted_mistakes_stand_beside_each_other_by_engine() -> None:
+    def planted(engine: str, seed: int, found_s: float | None) -> Trial:
+        checks = ("no_fault",) if found_s else ()
+        return Trial(
+            Wanted("planted", "swaps the wheels", "", engine, seed, 20.0, "folder"), found_s, 1.0, checks
+        )
+
+    table = render([planted("afl", 1, 1.0), planted("afl", 2, None), planted("hypothesis", 1, None)])
+    assert "| planted mistake | AFL++ | Hypothesis | checks that failed |" in table
+    assert "| swaps the wheels | 1.0 >20 | >20 | `no_fault` |" in table
 
 
 def test_another_part_is_put_between_the_marks() -> None:
