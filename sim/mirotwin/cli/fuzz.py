@@ -49,7 +49,7 @@ from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from mirotwin.testing.wanted import silent_scenario
 
-UNITS_S = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
+UNITS_S = {"": 1.0, "s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
 LONGEST_S = 1e7
 AWAKE_MS = 1000 * AWAKE_TICKS // TICKS_PER_SECOND
 INTERRUPTED_S = 5.0
@@ -64,7 +64,7 @@ class Duration(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         if isinstance(value, float):
             return value
-        found = re.fullmatch(r"([0-9]+(?:\.[0-9]*)?)\s*(s|min|h|)", f"{value}".strip(), re.ASCII)
+        found = re.fullmatch(r"([0-9]+(?:\.[0-9]*)?)\s*(s|min|m|h|)", f"{value}".strip(), re.ASCII)
         time_s = float(found[1]) * UNITS_S[found[2]] if found else 0.0
         if not 0.0 < time_s <= LONGEST_S:
             self.fail(f"{value!r} is not a time, such as 30s, 5min or 2h.", param, ctx)

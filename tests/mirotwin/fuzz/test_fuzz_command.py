@@ -12,6 +12,7 @@ from tests.mutants.build import build
 from tests.mutants.draw import source_files
 
 from miro_protocol import stream
+from mirotwin.cli.fuzz import Duration
 from mirotwin.fuzz.files import CampaignFolder
 
 MISTAKE = "takes frames with a bad CRC"
@@ -30,6 +31,13 @@ def started(tmp_path, *arguments):
     )
     command = [sys.executable, "-c", program, "fuzz", "--out", tmp_path / "out", *arguments]
     return children.start([*map(str, command)], stdout=-1, stderr=-1, text=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "time_s"), [("90", 90.0), ("1.5s", 1.5), ("25min", 1500.0), ("25m", 1500.0), ("2 h", 7200.0)]
+)
+def test_a_time_has_the_units_that_people_write(text, time_s):
+    assert Duration().convert(text, None, None) == time_s
 
 
 @needs_sdcc
