@@ -102,10 +102,11 @@ def _totals(trials: Sequence[Trial], engines: Sequence[str]) -> list[str]:
 
 
 def _total(trials: Sequence[Trial]) -> str:
-    """One number a seed: how many mistakes were found, out of those that were tried with it."""
+    """One number a seed: how many mistakes were found, out of those that were fuzzed with it."""
+    fuzzed = [one for one in trials if not one.refused]
     counts = []
-    for seed in sorted({one.wanted.seed for one in trials}):
-        of_seed = [one for one in trials if one.wanted.seed == seed]
+    for seed in sorted({one.wanted.seed for one in fuzzed}):
+        of_seed = [one for one in fuzzed if one.wanted.seed == seed]
         counts.append((len([one for one in of_seed if one.found_s is not None]), len(of_seed)))
     if len({tried for _, tried in counts}) == 1:
         return " ".join(str(found) for found, _ in counts) + f" of {counts[0][1]}"

@@ -69,9 +69,12 @@ def test_planted_mistakes_stand_beside_each_other_by_engine() -> None:
             Wanted("planted", "swaps the wheels", "", engine, seed, 20.0, "folder"), found_s, 1.0, checks
         )
 
-    table = render([planted("afl", 1, 1.0), planted("afl", 2, None), planted("hypothesis", 1, None)])
+    wanted = Wanted("planted", "pushes for ever", "", "afl", 1, 20.0, "folder")
+    refused = Trial(wanted, 0.0, 0.0, refused="it comes up with a fault")
+    table = render([planted("afl", 1, 1.0), planted("afl", 2, None), planted("hypothesis", 1, None), refused])
     assert "| planted mistake | AFL++ | Hypothesis | checks that failed |" in table
     assert "| swaps the wheels | 1.0 >20 | >20 | `no_fault` |" in table
+    assert "| found | 1 0 of 1 | 0 of 1 |  |" in table
 
 
 def test_another_part_is_put_between_the_marks() -> None:
