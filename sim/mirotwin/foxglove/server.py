@@ -28,6 +28,8 @@ LOGGER = "foxglove"
 """Name of the SDK's logger in Python; who wants to see what it has to say gives it a handler."""
 QUIET_S = 0.2
 """After so long without a new subscription a viewer has all that it wants."""
+LINGER_S = 0.5
+"""The SDK forgets at its end what it has not sent yet, and does not say how much that is."""
 
 
 class Server:
@@ -68,8 +70,12 @@ class Server:
     def __enter__(self) -> Server:
         return self
 
-    def __exit__(self, *error: object) -> None:
-        self._server.stop()
+    def __exit__(self, kind: object, *error: object) -> None:
+        try:
+            if kind is None and any(channel.has_sinks() for channel in self._channels.values()):
+                threading.Event().wait(LINGER_S)
+        finally:
+            self._server.stop()
 
     def open(self, said: Iterable[Said]) -> None:
         """Tells viewers of the topics of these messages, which are sent later."""
