@@ -63,7 +63,7 @@ def _planted(trials: Sequence[Trial]) -> str:
             )
             rows.append((name, *_cells(name, trials, engines), said))
     titles, totals = [TITLES[engine] for engine in engines], _totals(trials, engines)
-    head = "The 50 planted mistakes:\n\n"
+    head = f"The {len(rows)} planted mistakes:\n\n"
     return head + _table(("planted mistake", *titles, "checks that failed"), [*rows, (FOUND, *totals, "")])
 
 

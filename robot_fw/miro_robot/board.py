@@ -383,7 +383,7 @@ class Board(Bus):
         return pins
 
     def _strobes(self, pins: int) -> int:
-        """Whether these levels at an LM629 are a strobe. If none is nor was, it sees PS and data and does nothing."""
+        """1 while CS and RD or WR are low. Without a strobe, now and before, an LM629 notes PS and data only."""
         return 0 if pins & _CS or pins & _BOTH_STROBES == _BOTH_STROBES else 1
 
     def _drive_chips(self, tick: int) -> None:

@@ -387,8 +387,8 @@ class Peripherals:
         return sooner
 
     def hastens(self, address: int, value: int) -> int:
-        """Which timer's flag may go up or be seen sooner if `value` goes to a register of timers 0 and 1: their bits in
-        IE. Not one that is stopped by it or stands.
+        """The timers, as bits of IE, whose flag may go up or be seen sooner by a write to a register of timers 0 and 1.
+        A timer that stands, or that the write stops, is none of them.
         """
         timers = self.timers
         if address == _TMOD or timers.tmod & 3 == 3:

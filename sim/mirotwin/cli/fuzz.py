@@ -64,7 +64,7 @@ class Duration(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         if isinstance(value, float):
             return value
-        found = re.fullmatch(r"([0-9]+(?:\.[0-9]*)?)\s*(s|min|m|h|)", f"{value}".strip(), re.ASCII)
+        found = re.fullmatch(rf"([0-9]+(?:\.[0-9]*)?)\s*({'|'.join(UNITS_S)})", f"{value}".strip(), re.ASCII)
         time_s = float(found[1]) * UNITS_S[found[2]] if found else 0.0
         if not 0.0 < time_s <= LONGEST_S:
             self.fail(f"{value!r} is not a time, such as 30s, 5min or 2h.", param, ctx)

@@ -27,6 +27,13 @@ def fixed():
     return dict(re.findall(r"^\| `(bench1/\w+\.toml)` \|.*\| `([0-9a-f]{12})` \|$", PAGE, re.M))
 
 
+@pytest.mark.parametrize(
+    ("name", "runs"), [("benchmarks/estimators.toml", 360), ("examples/campaign.toml", 240)]
+)
+def test_the_campaign_files_of_the_tree_can_be_run(name, runs):
+    assert load_plan(ROOT / name).runs == runs
+
+
 def test_the_scenarios_are_those_whose_hashes_the_page_has():
     files = sorted((builtin.FOLDER / "bench1").glob("*.toml"))
     now = {f"bench1/{path.name}": hashlib.sha256(path.read_bytes()).hexdigest()[:12] for path in files}
