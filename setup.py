@@ -13,6 +13,7 @@ every machine (py3-none-any). Each compiled module checks its stamp when it is i
 
 import importlib.util
 import os
+import platform
 import sys
 from pathlib import Path
 
@@ -44,10 +45,13 @@ DIRECTIVES = {
     "cdivision": False,  # // and % as Python has them
 }
 # Python's own flags ask for debug information, which takes a quarter of the time; CFLAGS=-g keeps it.
+X86 = ("x86_64", "AMD64", "i686", "i586", "i386", "x86")  # a 32-bit Python may run on a 64-bit processor
 NO_DEBUG = [] if "-g" in os.environ.get("CFLAGS", "") else ["-g0"]
 # No contraction to FMA, no reassociation: the same doubles on every machine.
+# 32-bit x86 would compute in x87 registers, which round twice.
+SSE = ["-msse2", "-mfpmath=sse"] if sys.maxsize < 1 << 32 and platform.machine() in X86 else []
 FLAGS = {
-    "unix": ["-O2", "-ffp-contract=off", "-fno-fast-math", "-w", *NO_DEBUG],
+    "unix": ["-O2", "-ffp-contract=off", "-fno-fast-math", "-w", *SSE, *NO_DEBUG],
     "msvc": ["/O2", "/fp:strict"],
 }
 

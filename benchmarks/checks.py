@@ -2,7 +2,7 @@
 
     python -m benchmarks.checks [--pairs 15] [--scenario fig6]
 
-Measured are the four that are always on (limit: 3 %) and then all of ours, whose judges read every event of the logs.
+Measured are those that are always on (limit: 3 %) and then all of ours, whose judges read every event of the logs.
 Both loops of a pair run in one process, in turn and each period by period (`benchmarks.chain.pair`).
 """
 
@@ -58,7 +58,7 @@ def main() -> None:
     image = load_hex(image_path())
     always = shares(asked.scenario, (), asked.pairs, image)
     everything = shares(asked.scenario, tuple(f"expect.{one}" for one in ALL), asked.pairs, image)
-    for name, found in (("the four that are always on", always), ("all of ours", everything)):
+    for name, found in (("those that are always on", always), ("all of ours", everything)):
         low, _, high = quantiles(found, n=4)
         share = 100 * median(found)
         print(f"{asked.scenario}: {name}: {share:+.1f} % ({100 * low:+.1f} to {100 * high:+.1f})")

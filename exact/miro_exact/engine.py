@@ -37,6 +37,15 @@ class EngineError(BadInput, ImportError):  # type: ignore[misc]  # both have a `
 
 
 @cache
+def check_arithmetic() -> None:
+    """Refuses a Python whose sums are rounded twice, as by the x87 unit of 32-bit x86: its runs have other bits."""
+    big, little = float("1e16"), float("2.9999")  # not literals: the compiler of the source would add them
+    if big + little != float("10000000000000002"):
+        what = "this Python rounds sums of doubles twice (x87 arithmetic), so that runs would have other bits"
+        raise EngineError(what, "use a 64-bit Python, or one that was built with -msse2 -mfpmath=sse")
+
+
+@cache
 def installed_dirs() -> dict[str, Path]:
     """Package name -> folder, for those of our packages that are installed."""
     from importlib.util import find_spec
@@ -100,6 +109,7 @@ class EngineFinder:
         if source is None:
             return None
         if self.engine is None:
+            check_arithmetic()
             self.engine = "python" if self.missing() else "compiled"
         if self.engine == "compiled":
             return None
@@ -132,6 +142,7 @@ def select(engine: str) -> None:
     """
     if engine not in ENGINES:
         raise EngineError(f"unknown engine {engine!r}", f"choose one of {', '.join(ENGINES)}")
+    check_arithmetic()
     finder = install()
     if engine == "compiled" and finder.missing():
         raise EngineError(f"no compiled module for {', '.join(finder.missing())}", REMEDY)

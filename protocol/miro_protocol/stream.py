@@ -18,10 +18,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 
 import msgspec
 
+from miro_exact.inputs import read_input
 from miro_protocol import files, stream_header
 from miro_protocol.stream_error import StreamError as StreamError
 from miro_protocol.stream_events import WHO_CAN, Deed
@@ -134,7 +134,7 @@ def parse(text: str, source: str = "<stream>") -> Stream:
 
 def read(path: str | os.PathLike[str]) -> Stream:
     """Reads a stream file; StreamError, or OSError when it cannot be opened."""
-    return decode(Path(path).read_bytes(), os.fspath(path))
+    return decode(read_input(path), os.fspath(path))
 
 
 def decode(data: bytes, source: str = "<stream>") -> Stream:

@@ -30,7 +30,7 @@ FIRST_LINE = "# mirotwin stream {}"
 VERSIONS = (1, 2)
 RADIO_STATES = ("up", "down", "noise")
 
-_VERSION = re.compile(r"#\s*mirotwin stream\b\s*(.*?)\s*$")
+_VERSION = re.compile(r"#\s*mirotwin stream\b\s*+(.*)")
 _TOKEN = re.compile(r"\S+")
 _TICK = re.compile(r"[0-9]{1,19}")
 _CHARACTER = re.compile(r"([0-9a-fA-F]{2})(!?)")
@@ -121,11 +121,12 @@ class Line:
         found = _VERSION.match(self.text)
         if found is None:
             return 1
-        if found[1] not in map(str, VERSIONS):
-            reason = f"stream version {brief(found[1] or 'missing')}"
+        version = found[1].rstrip()
+        if version not in map(str, VERSIONS):
+            reason = f"stream version {brief(version or 'missing')}"
             remedy = "this program reads versions 1 and 2; use the one that wrote it"
             raise self.error(found.start(1) + 1, reason, remedy)
-        return int(found[1])
+        return int(version)
 
     def parse(self, version: int) -> Entry | None:
         """What the line says, or None for a line that says nothing."""

@@ -26,7 +26,7 @@ from __future__ import annotations
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK
 from miro_robot.event_log import FAULT, REACHED, RECEIVED, SENT, EventLog
-from miro_robot.faults import FaultKind, FirmwareFault
+from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
 from miro_robot.image import Image, Symbols
 from miro_robot.lm629.bus_timing import LIMITS, RESET_PULSE, BusTiming
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
@@ -177,6 +177,7 @@ class Board(Bus):
     def load(self, image: Image) -> None:
         """Puts the firmware into the CPU's flash; its symbols name the places of faults."""
         self.cpu.load(image.code, image.used)
+        self.cpu.bound_stack(*image.symbols.stack())
         self.symbols = image.symbols
 
     # ---- time ----------------------------------------------------------------------------------------------
@@ -462,7 +463,7 @@ class Board(Bus):
 
     def fault(self, kind: int, pc: int, tick: int) -> None:
         """Notes a firmware fault; the run ends after this instruction when the scenario says so."""
-        self._note(kind, pc, tick, "")
+        self._note(kind, pc, tick, self.cpu.stack_said() if kind in STACK_FAULTS else "")
 
     def _note(self, kind: int, pc: int, tick: int, detail: str) -> None:
         if not self.forced:

@@ -24,10 +24,12 @@ class FaultKind(IntEnum):
     MAIN_LOOP_STARVED = 8
 
 
+STACK_FAULTS = (FaultKind.STACK_OVERFLOW, FaultKind.STACK_UNDERFLOW)
+
 DESCRIPTIONS = {
     FaultKind.UNDEFINED_OPCODE: "executed the undefined opcode A5",
-    FaultKind.STACK_OVERFLOW: "pushed past the end of internal RAM (SP FF to 00)",
-    FaultKind.STACK_UNDERFLOW: "popped below the start of internal RAM (SP 00 to FF)",
+    FaultKind.STACK_OVERFLOW: "ran past the end of its stack",
+    FaultKind.STACK_UNDERFLOW: "went below the start of its stack",
     FaultKind.OUTSIDE_IMAGE: "executed outside the loaded image",
     FaultKind.BUS_CONTENTION: "read two LM629 at once: both drove the data bus",
     FaultKind.LM629_BUSY: "wrote to an LM629 while it was busy",

@@ -21,6 +21,7 @@ import msgspec
 from msgspec import Meta
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import BOARD_BYTES, InputError, read_input
 from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, too_long
 
 SIDES = ("left", "right")
@@ -126,7 +127,9 @@ def load_wiring(path: Path | None = None) -> Wiring:
         miro = _miro()
         return msgspec.structs.replace(miro, nets=dict(miro.nets))
     try:
-        text = path.read_text("utf-8")
+        text = read_input(path, BOARD_BYTES).decode()
+    except InputError as error:
+        raise WiringError(str(path), "", f"{error.what}; {error.remedy}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise WiringError(str(path), "", f"{error}") from error
     return _wiring(text, str(path))

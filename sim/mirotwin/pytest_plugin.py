@@ -39,6 +39,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--mirotwin-seed", metavar="N", type=int, help="the seed of all tests")
     group.addoption("--mirotwin-artifacts", metavar="DIR", help=_INI["mirotwin_artifacts"])
     group.addoption("--mirotwin-repeat", metavar="N", type=int, help=_INI["mirotwin_repeat"])
+    group.addoption(
+        "--mirotwin-pages",
+        action="store_true",
+        help="make the page of each failed test, too: some seconds each",
+    )
     for name, what in _INI.items():
         parser.addini(name, what, type="string")
     group.addoption(
@@ -230,7 +235,7 @@ def pytest_runtest_makereport(
 
         if call.when == "call":
             paths = _path(item.config, "firmware"), _path(item.config, "artifacts")
-            items.tell(item, report, call.excinfo, *paths)
+            items.tell(item, report, call.excinfo, *paths, item.config.getoption("--mirotwin-pages"))
         else:
             items.let_go(item)
     return report

@@ -36,10 +36,10 @@ LANGUAGES = ("python", "toml", "c", "text", *SHELL)
 COMMAND = re.compile(r"(\$ )?(mirotwin|python3?|pip|pytest) ")
 ELSEWHERE = {
     ("README.md", "python3 -m venv"): ".ci/run does it",
-    ("README.md", ".venv/bin/pytest"): ".ci/run does it",
+    ("README.md", ".venv/bin/pip"): ".ci/run does it",
     ("README.md", "pip install"): "needs the package index",
     ("README.md", "mirotwin fuzz"): "fuzzing goes on for a time",
-    ("README.md", "mirotwin reproduce"): "2100 runs, 5 minutes on two cores",
+    ("README.md", "mirotwin reproduce"): "2700 runs, 6 minutes on two cores",
     ("README.md", "mirotwin campaign"): "hundreds of runs",
     ("examples/hil/README.md", "python3 -m venv"): "needs the package index; tests/project/sample.py does it",
     ("examples/hil/README.md", "mirotwin replay"): "needs a firmware that fails",

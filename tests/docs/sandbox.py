@@ -164,7 +164,7 @@ COMPILED = {*(name for name, put in FUNCTIONS.items() if put is not question), "
 """Pages that need a compiler for the 8051."""
 
 _SHORT = "mirotwin run fig6 --set duration_s=0.2 --no-figure -q --out"
-_CAMPAIGN = "mirotwin campaign run examples/campaign.toml --seeds 0-1 --set duration_s=0.1 -q --out"
+_CAMPAIGN = "mirotwin campaign run examples/campaign.toml --seeds 0-19 --set duration_s=0.1 -q --out"
 _CALIBRATE = (
     "mirotwin calibrate --scenario fig6 --out made.toml --colours-out colours.toml --points-out points.csv"
 )

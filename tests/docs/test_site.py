@@ -25,6 +25,7 @@ LINK = re.compile(r"\]\(([^()\s#:]+)(?:#[^()\s]*)?\)")
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("mkdocs", reason="needs the extra docs")
     folder = tmp_path_factory.mktemp("site")
     path = os.pathsep.join([str(ROOT), *(str(ROOT / name) for name in sandbox.PACKAGES)])
     done = children.run(

@@ -61,3 +61,18 @@ def test_an_engine_that_was_not_built_is_refused_for_that_reason_whatever_is_in_
     monkeypatch.setattr(engine, "install", lambda: finder)
     with pytest.raises(engine.EngineError, match=r"no compiled module for miro_exact\.rng; reinstall with"):
         engine.select("compiled")
+
+
+def test_arithmetic_that_rounds_twice_is_refused_in_one_line(monkeypatch):
+    class Twice(float):
+        """A double as the x87 unit adds it: to 64 bits first."""
+
+        def __add__(self, other):
+            return 1e16 + 4
+
+    monkeypatch.setattr(engine, "float", Twice, raising=False)
+    engine.check_arithmetic.cache_clear()
+    with pytest.raises(engine.EngineError, match=r"rounds sums of doubles twice .* use a 64-bit Python"):
+        engine.check_arithmetic()
+    monkeypatch.undo()
+    engine.check_arithmetic()

@@ -24,7 +24,7 @@ from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.recording.reader import parse
 from mirotwin.recording.recorder import Recorder, Source
-from mirotwin.report.theory import Gains, Theory, gains_of, theory_of, theory_text
+from mirotwin.report.theory import Gains, Theory, authority, gains_of, theory_of, theory_text
 from mirotwin.report.theory_track import TheoryTrack
 from mirotwin.report.track import Tracks
 
@@ -67,8 +67,8 @@ def theory(run: list[RobotPeriod], gains: Gains = NO_GAINS) -> Theory:
     return found
 
 
-def commanded(v: float, w: float = 0.0) -> Control:
-    return Control(v, w, round(11392.75 * v), round(11392.75 * v), {})
+def commanded(v: float, w: float = 0.0, **inner: float) -> Control:
+    return Control(v, w, round(11392.75 * v), round(11392.75 * v), inner)
 
 
 # f of equation (15).
@@ -104,6 +104,48 @@ def test_a_robot_that_is_a_period_late_has_the_change_of_its_command_as_disturba
     assert found.disturbance is not None
     assert found.disturbance.f1_above_p1 == pytest.approx(2 / 3)
     assert found.disturbance.f2_above_p2 is None
+
+
+SURFACES = st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-0.5, 0.5), SURFACES), min_size=2, max_size=20),
+    st.floats(0.0, 20.0),
+    st.floats(0.01, 2.0),
+)
+def test_inside_a_layer_f_is_measured_against_the_part_of_p_that_is_left(
+    told: list[tuple[float, tuple[float, float]]], p1: float, layer: float
+) -> None:
+    run = [period(HERE, (0.0, 0.0), commanded(v, s1=s1, s2=s2)) for v, (s1, s2) in told]
+    found = theory(run, Gains(p1, None, layer, None)).disturbance
+    assert found is not None
+    f1 = naive.disturbances(run)[:, 0]
+    left = [p1 * min(abs(s1) / layer, 1.0) for _, (s1, _) in told[:-1]]
+    sure = [abs(f) > bound for f, bound in zip(f1, left, strict=True) if abs(abs(f) - bound) > 1e-6]
+    unsure = len(left) - len(sure)
+    assert found.f1_above_authority is not None
+    assert sum(sure) <= round(found.f1_above_authority * len(left)) <= sum(sure) + unsure
+    assert found.f1_above_p1 is not None
+    assert found.f1_above_authority >= found.f1_above_p1
+    assert found.f2_above_authority is None
+
+
+def test_without_a_layer_all_of_p_is_left_wherever_the_surface_is_not_zero() -> None:
+    run = [period(HERE, (0.0, 0.0), commanded(0.001, s1=s1, s2=0.0)) for s1 in (0.01, -0.01, 0.0, 0.0)]
+    found = theory(run, Gains(0.05, None)).disturbance
+    assert found is not None
+    assert (found.f1_above_p1, found.f1_above_authority) == (0.0, 0.0)
+    assert authority(0.01, 0.05, None) == 0.05
+    assert authority(0.0, 0.05, None) == 0.0
+
+
+def test_of_a_law_that_does_not_say_its_surfaces_no_authority_is_known() -> None:
+    run = [period(HERE, (0.0, 0.0), commanded(0.1)) for _ in range(3)]
+    found = theory(run, Gains(0.05, 1.0, 0.1, 0.1)).disturbance
+    assert found is not None
+    assert (found.f1_above_authority, found.f2_above_authority) == (None, None)
 
 
 def test_a_period_without_a_command_has_no_f() -> None:
@@ -203,13 +245,19 @@ def test_the_line_on_the_screen_names_what_does_not_hold() -> None:
         "assumption 3 within 0.1 rad in 2 frames, crossed 1 x; |f1| > P1 in 67 %; |f2| > P2 in 0 %;"
         " backward for 0.03 s"
     )
+    layered = [msgspec.structs.replace(one, control=commanded(0.1, s1=0.001, s2=0.0)) for one in run]
+    assert "|f1| > P1 in 0 % (> P1 |sat(s1)| in 67 %)" in theory_text(
+        theory(layered, Gains(10.0, 1.0, 0.1, 0.1))
+    )
     still = [period(HERE, (0.0, 0.0), commanded(0.0), reference=at) for at in (ORIGIN, HERE, HERE)]
     assert theory_text(theory(still)) == ""
 
 
 def test_the_gains_are_those_of_each_robots_law() -> None:
     scenario = load("fig6").scenario
-    assert gains_of(scenario) == {(0, 0): Gains(0.77, 1.48)}
+    assert gains_of(scenario) == {(0, 0): Gains(0.77, 1.48, 0.4, 0.149)}
+    signs = load("fig6", ['network.robot.controller.switching="sign"']).scenario
+    assert gains_of(signs) == {(0, 0): Gains(0.77, 1.48)}
     other = load("fig6", ['network.robot.controller={law="body_frame"}']).scenario
     assert gains_of(other) == {(0, 0): Gains(None, None)}
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from miro_robot.image import load_hex
-from mirotwin.conform.run import try_all, with_faults
+from mirotwin.conform.run import try_rule, with_faults
 from mirotwin.conform.table import RULES
 
 
@@ -23,11 +23,12 @@ class Judged(msgspec.Struct, frozen=True):
 
 
 def judged(image: Path, tried: tuple[str, ...] = ()) -> Judged:
-    """Tries these rules on an image; () is all of them."""
+    """Tries these rules on an image, each by itself, whatever it presupposes; () is all of them."""
     rules = [rule for rule in RULES if not tried or rule.id in tried]
     begun = time.process_time()
-    outcomes = with_faults(list(try_all(rules, load_hex(image))), rules)
-    broken = tuple(outcome.rule for outcome in outcomes if not outcome.passed)
+    loaded = load_hex(image)
+    outcomes = with_faults([try_rule(rule, loaded) for rule in rules], rules)
+    broken = tuple(outcome.rule for outcome in outcomes if outcome.failures)
     return Judged(broken, time.process_time() - begun)
 
 

@@ -1,6 +1,6 @@
 """The drive in tiny fixed Euler steps, straight from the equations: slow, obvious, no case is solved in closed form.
 
-`NaiveDrive` rolls; `NaiveRoughDrive` may slip, drag its ball, stick and be pushed.
+`NaiveDrive` rolls; `NaiveRoughDrive` may slip, drag its ball, stick, have play in its gears and be pushed.
 """
 
 import math
@@ -42,13 +42,33 @@ def winding_run(params, drive, current, emf, ticks, parts):
     return current, charge
 
 
+class NaiveBridge:
+    """What the inputs have asked for lately: the bridge does what they have asked for long enough."""
+
+    def __init__(self, params):
+        self.delays = {0: round(params.bridge.on_delay_s * 24e6)}
+        self.delays |= dict.fromkeys((-1, 1), round(params.bridge.off_delay_s * 24e6))
+        self.drive = 0
+        self.wanted, self.since = 0, 0
+
+    def ask(self, tick, wanted):
+        self.at(tick)
+        if wanted != self.wanted:
+            self.wanted, self.since = wanted, tick
+
+    def at(self, tick):
+        if self.wanted != self.drive and tick - self.since >= self.delays[self.drive]:
+            self.drive = self.wanted
+        return self.drive
+
+
 class NaiveDrive:
     """x, y, theta, the two shaft speeds (rad/s), angles (rad) and currents (A), all advanced together."""
 
     def __init__(self, params, x=0.0, y=0.0, theta=0.0):
         self.params = params
         self.tick = 0
-        self.drive = [0, 0]
+        self.bridge = [NaiveBridge(params), NaiveBridge(params)]
         self.current = [0.0, 0.0]
         self.speed = [0.0, 0.0]
         self.angle = [0.0, 0.0]
@@ -57,7 +77,7 @@ class NaiveDrive:
 
     def set_bridge(self, tick, side, enable, forward):
         self.advance(tick)
-        self.drive[side] = (1 if forward else -1) if enable else 0
+        self.bridge[side].ask(tick, (1 if forward else -1) if enable else 0)
 
     def advance(self, tick):
         while self.tick < tick:
@@ -68,7 +88,8 @@ class NaiveDrive:
         torque = [0.0, 0.0]
         for side in (0, 1):
             emf = constant * self.speed[side]
-            self.current[side] = winding_step(self.params, self.drive[side], self.current[side], emf, STEP_S)
+            drive = self.bridge[side].at(self.tick)
+            self.current[side] = winding_step(self.params, drive, self.current[side], emf, STEP_S)
             rubbing = max(-1.0, min(1.0, self.speed[side] / CREEP_RAD_S)) * self.params.friction_nm()
             torque[side] = constant * self.current[side] - rubbing
         force = [torque[side] / self.roll[side] for side in (0, 1)]
@@ -116,6 +137,11 @@ class NaiveRoughDrive(NaiveDrive):
         self.force = force
         self.velocity_m_s = [0.0, 0.0]
         self.w = 0.0
+        body = params.chassis
+        self.play = [0.0, 0.0]
+        self.most_play = 0.5 * body.gear_backlash_rad * body.wheel_radius_m
+        self.along = [0.0, 0.0]
+        self.rolling = 0.5 * body.rolling_resistance * body.mass_kg * 9.81 if self.most_play else 0.0
 
     def _forward(self):
         vx, vy = self.velocity_m_s
@@ -132,18 +158,21 @@ class NaiveRoughDrive(NaiveDrive):
         params, body = self.params, self.params.chassis
         weight = body.mass_kg * 9.81
         grip = params.tyre.grip * 0.5 * (1 - params.ball.load_share) * weight
-        along, rest = [0.0, 0.0], [0.0, 0.0]
+        along, rest, rolling = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
         for side in (0, 1):
             hub = self._forward() + (side - 0.5) * body.track_m * self.w
             slip = hub - self.roll[side] * self.speed[side]
-            along[side] = -grip * smooth_sign(slip, SLIP_M_S)
+            along[side] = self._through_the_teeth(side, slip, -grip * smooth_sign(slip, SLIP_M_S))
             rest[side] = math.sqrt(grip**2 - along[side] ** 2)
+            rolling[side] = -self.rolling * smooth_sign(hub, SLIP_M_S)
         sideways = -(rest[0] + rest[1]) * smooth_sign(self._leftward(), SLIP_M_S)
         ball_x, ball_y = self._forward(), self._leftward() - params.ball.behind_m * self.w
         fast = math.hypot(ball_x, ball_y)
         drag = params.ball.friction * params.ball.load_share * weight / max(fast, SLIP_M_S)
         push_n, push_nm = self.force(self.tick)
         self._turn_shafts(along)
+        self.along = along
+        along = [along[0] + rolling[0], along[1] + rolling[1]]
         forward = along[0] + along[1] - drag * ball_x + push_n
         left = sideways - drag * ball_y
         torque = 0.5 * body.track_m * (along[1] - along[0]) + params.ball.behind_m * drag * ball_y + push_nm
@@ -156,13 +185,26 @@ class NaiveRoughDrive(NaiveDrive):
         self.y += self.velocity_m_s[1] * STEP_S
         self.tick += STEP_TICKS
 
+    def _through_the_teeth(self, side, slip, force):
+        """What of a force at the rim goes through the gear: teeth that touch on one side only push."""
+        if self.most_play == 0.0:
+            return force
+        ahead, behind = self.play[side] >= self.most_play, self.play[side] <= -self.most_play
+        if (ahead and force > 0) or (behind and force < 0):
+            return force
+        self.play[side] -= slip * STEP_S
+        return 0.0
+
     def _turn_shafts(self, along):
         constant, ratio = self.params.motor.torque_constant_nm_a, self.params.chassis.stiction_ratio
         for side in (0, 1):
             emf = constant * self.speed[side]
-            self.current[side] = winding_step(self.params, self.drive[side], self.current[side], emf, STEP_S)
+            drive = self.bridge[side].at(self.tick)
+            self.current[side] = winding_step(self.params, drive, self.current[side], emf, STEP_S)
             standing = abs(self.speed[side]) < CREEP_RAD_S
-            most = self.params.friction_nm() * (ratio if standing else 1.0)
+            friction = self.params.friction_nm() - self.rolling * self.roll[side]
+            most = friction * (ratio if standing else 1.0)
+            most += self.params.chassis.gear_load_friction * abs(self.roll[side] * along[side])
             rubbing = most * smooth_sign(self.speed[side], CREEP_RAD_S)
             torque = constant * self.current[side] - rubbing - self.roll[side] * along[side]
             self.speed[side] += torque / self.params.motor.rotor_inertia_kg_m2 * STEP_S

@@ -89,7 +89,7 @@ def install(tree: Path, python: Path, smoke: bool) -> None:
     environment = {**os.environ, "PIP_CONSTRAINT": str(held), "PIP_BUILD_CONSTRAINT": str(held)}
     pip = [str(python), "-m", "pip", "install", "-q"]
     if not smoke:
-        children.run([*pip, "-e", ".[test]"], cwd=tree, env=environment, check=True)
+        children.run([*pip, "-e", ".[develop]"], cwd=tree, env=environment, check=True)
         return
     # What an editable install consists of, without its build: metadata, the way to the packages, the program.
     children.run(

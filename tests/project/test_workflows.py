@@ -25,6 +25,7 @@ def steps(name):
 
 
 def identifiers(platform, architecture):
+    pytest.importorskip("cibuildwheel", reason="needs the extra develop")
     command = ["-m", "cibuildwheel", "--print-build-identifiers", "--platform", platform]
     done = children.run(
         [sys.executable, *command, "--archs", architecture, str(ROOT)], capture_output=True, text=True

@@ -1,34 +1,42 @@
 """The digest of a run, in this process's engine: `python -m tests.sim.digest_of --engine compiled "fig6 0.5 s seed 7"`.
 
 What belongs here: a run named as in `tests/vectors/digests.json`, and nothing that only a full installation has: other
-machines run this file too (`aarch64.py`).
+machines run this file too (`machines.py`).
 """
 
 from __future__ import annotations
 
 import argparse
 import re
+import sys
 from typing import NamedTuple
 
 from miro_exact import engine
 
-_NAME = re.compile(r"(?P<scenario>\S+) (?P<duration_s>[0-9.]+) s seed (?P<seed>[0-9]+)")
+REFUSED = 3
+"""Exit code where this Python or its engine is refused; the reason stands in one line on stderr."""
+
+_NAME = re.compile(
+    r"(?P<scenario>\S+) (?P<duration_s>[0-9.]+) s seed (?P<seed>[0-9]+)(?P<settings>( --set \S+)*)"
+)
 
 
 class Entry(NamedTuple):
-    """A run: a built-in scenario, cut to a duration, with a seed."""
+    """A run: a scenario, with settings, cut to a duration, with a seed."""
 
     scenario: str
     duration_s: float
     seed: int
+    settings: tuple[str, ...]
 
 
 def parse(name: str) -> Entry:
-    """The entry of a name like `fig6 0.5 s seed 7`. Raises ValueError if it is none."""
+    """The entry of a name like `fig6 0.5 s seed 7 --set camera.kind=gaussian`. Raises ValueError if it is none."""
     match = _NAME.fullmatch(name)
     if match is None:
         raise ValueError(f"{name!r} names no run: write it like 'fig6 0.5 s seed 7'")
-    return Entry(match["scenario"], float(match["duration_s"]), int(match["seed"]))
+    settings = tuple(match["settings"].split(" --set ")[1:])
+    return Entry(match["scenario"], float(match["duration_s"]), int(match["seed"]), settings)
 
 
 def digest(name: str) -> str:
@@ -41,9 +49,8 @@ def digest(name: str) -> str:
     from miro_sim.world.world import World
 
     entry = parse(name)
-    scenario = msgspec.structs.replace(
-        scenario_file.load(entry.scenario).scenario, duration_s=entry.duration_s
-    )
+    loaded = scenario_file.load(entry.scenario, entry.settings)
+    scenario = msgspec.structs.replace(loaded.scenario, duration_s=entry.duration_s)
     world = World(scenario, entry.seed, load_hex(image_path()))
     while not world.finished:
         world.step()
@@ -55,7 +62,11 @@ def main() -> None:
     parser.add_argument("name", nargs="+")
     parser.add_argument("--engine", choices=engine.ENGINES, default="compiled")
     options = parser.parse_args()
-    engine.select(options.engine)
+    try:
+        engine.select(options.engine)
+    except engine.EngineError as error:
+        print(error, file=sys.stderr)
+        sys.exit(REFUSED)
     for name in options.name:
         print(digest(name), flush=True)
 

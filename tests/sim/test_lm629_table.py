@@ -54,7 +54,7 @@ def test_another_reading_gives_another_run_and_the_default_one_the_same(tmp_path
             world.step()
         return world.digest
 
-    assert digest("") == digest("busy_clocks = 160")
+    assert digest("") == digest("busy_clocks = 120")
     assert digest("") != digest("busy_clocks = 240")
 
 

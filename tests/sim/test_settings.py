@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -161,11 +162,42 @@ def test_of_several_settings_the_one_that_is_wrong_is_named() -> None:
     assert message.startswith("fig6: --set network.robot.slot=9: 9 is out of range")
 
 
-def test_another_kind_of_table_needs_all_of_it() -> None:
-    message = refusal("network.robot.reference.kind=line", source="fig8")
-    assert message.startswith("fig8: --set network.robot.reference.kind=line: network[0].robot[0].reference.")
-    assert "unknown key; it belongs to the kind that was replaced; set the whole table: " in message
-    assert "--set 'network[0].robot[0].reference={kind = .., ..}'" in message
+@pytest.mark.parametrize(
+    ("setting", "left_out"),
+    [
+        ("camera.kind=gaussian", "calibration, pattern, centroid, window_px, self_calibration"),
+        ("camera.kind=geometric", "centroid, window_px, self_calibration"),
+        ("camera.kind=pixels", ""),
+        (
+            "network.robot.controller.law=kanayama",
+            "gamma1_per_s, gamma2_per_s, q1_per_s, q2_per_s, p1_m_s2, p2_rad_s2, switching, layer_s1_m_s, "
+            "layer_s2_rad_s, layer_theta_rad, layer_derivative, cosine_guard, rho_floor_m",
+        ),
+    ],
+)
+def test_another_kind_drops_the_keys_of_the_old_one_with_a_note(setting: str, left_out: str) -> None:
+    found = load("fig6", [setting])
+    assert found.notes == ((f"--set {setting} leaves out {left_out}",) if left_out else ())
+    assert not [key for key in left_out.split(", ") if key and f"\n{key} =" in found.text]
+
+
+def test_a_key_of_the_old_kind_that_is_set_after_it_is_refused() -> None:
+    message = refusal("network.robot.controller.law=body_frame", "network.robot.controller.switching=sign")
+    assert message.startswith("fig6: --set network.robot.controller.switching=sign: unknown key")
+
+
+def test_a_file_with_another_law_is_two_lines(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text('scenario = "fig6"\nset = { network.robot.controller.law = "body_frame" }\n')
+    assert type(load(str(mine)).scenario.networks[0].robot[0].controller).__name__ == "BodyFrameParameters"
+
+
+def test_a_key_of_a_robot_at_the_top_is_shown_its_place() -> None:
+    message = refusal("controller.law=body_frame")
+    assert message.endswith("controller: unknown key; write --set network.robot.controller.law=body_frame")
+
+
+def test_another_kind_needs_the_keys_that_it_has() -> None:
     whole = "network.robot.reference={kind = 'line', drive_s = 1}"
     assert load("fig8", [whole]).scenario.networks[0].robot[0].reference.name() == "line"
 

@@ -18,6 +18,13 @@ def test_condition_17_is_broken_in_many_frames_of_fig_8_and_the_robot_gets_there
     assert theory.disturbance.f1_largest_m_s2 > 2.0 * theory.disturbance.p1_m_s2
 
 
+def test_on_the_line_of_fig_6_f1_is_below_p1_but_above_what_the_layer_leaves_of_it_in_most_frames():
+    """The robot never leaves the layer of s1, which is 0.4 m/s wide."""
+    f, _ = run("fig6", 3)
+    assert f.disturbance.f1_above_p1 < 0.1
+    assert f.disturbance.f1_above_authority > 0.5
+
+
 def test_sign_functions_chatter_more_than_the_boundary_layers_of_remark_2():
     signs, layers = (run(name, 3)[0] for name in ("fig6, sign functions", "fig6"))
     assert signs.chattering_m_s2 > 2.5 * layers.chattering_m_s2

@@ -55,6 +55,11 @@ def run(name, seed):
     return theory_of(tracks.robots[0, 0].theory, gains_of(text.scenario)[0, 0]), late
 
 
+def of_disturbance(name):
+    """A figure of f."""
+    return lambda theory, _: getattr(theory.disturbance, name)
+
+
 def row(name, seeds):
     """The cells of the table."""
     found = [run(name, seed) for seed in range(seeds)]
@@ -62,15 +67,18 @@ def row(name, seeds):
     def median(value):
         return statistics.median(value(theory, late) for theory, late in found)
 
-    def share(value):
-        return f"{100 * median(value):.0f} %"
+    def shares(*names):
+        """Above the gain / above what the layer leaves of it; a dash for a law that has none."""
+        if getattr(found[0][0].disturbance, names[0]) is None:
+            return "-"
+        return " / ".join(f"{100 * median(of_disturbance(name)):.0f} %" for name in names)
 
     return (
         name,
         f"{median(lambda t, _: t.disturbance.f1_rms_m_s2):.3f} ({median(lambda _, late: late[0]):.3f})",
-        f"{found[0][0].disturbance.p1_m_s2:g}: {share(lambda t, _: t.disturbance.f1_above_p1)}",
+        f"{found[0][0].disturbance.p1_m_s2 or 0:g}: {shares('f1_above_p1', 'f1_above_authority')}",
         f"{median(lambda t, _: t.disturbance.f2_rms_rad_s2):.2f} ({median(lambda _, late: late[1]):.2f})",
-        f"{found[0][0].disturbance.p2_rad_s2:g}: {share(lambda t, _: t.disturbance.f2_above_p2)}",
+        f"{found[0][0].disturbance.p2_rad_s2 or 0:g}: {shares('f2_above_p2', 'f2_above_authority')}",
         f"{median(lambda t, _: t.assumption_3.frames):g} / {median(lambda t, _: t.assumption_3.crossings):g}",
         f"{median(lambda t, _: t.reversals):g} / {median(lambda t, _: t.backward_s):.2f} s",
         f"{median(lambda t, _: t.chattering_m_s2):.3f}",
@@ -85,9 +93,9 @@ def main() -> None:
     for column in (
         "run",
         "f1 m/s2 (a period later)",
-        "P1: |f1| above",
+        "P1: |f1| above / above P1 |sat s1|",
         "f2 rad/s2 (..)",
-        "P2: |f2| above",
+        "P2: |f2| above / above P2 |sat s2|",
         "near / across",
         "reversals / back",
         "chattering m/s2",
@@ -95,7 +103,7 @@ def main() -> None:
         table.add_column(column)
     for name in RUNS:
         table.add_row(*row(name, seeds))
-    Console(width=160).print(table)
+    Console(width=200).print(table)
 
 
 if __name__ == "__main__":

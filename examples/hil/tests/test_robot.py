@@ -1,4 +1,4 @@
-"""What this firmware has to do, beyond what the protocol asks of every robot."""
+"""What every robot has to do."""
 
 from mirotwin import Telemetry, ms
 
@@ -25,9 +25,3 @@ def test_it_is_back_after_a_reset(link, robot, world):
     link.send(velocities={0: (200, 200)})
     world.run_for(ms(5))
     assert robot.wheels.commanded == (200, 200)
-
-
-def test_it_stops_when_its_host_falls_silent(link, robot):
-    link.drive({0: (500, 500)}, ms(200))
-    link.send(velocities={0: (500, 500)})
-    robot.break_at("motion_stop", within=ms(110.5))

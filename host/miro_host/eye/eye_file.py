@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import EYE_BYTES, InputError, read_input
 from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, not_finite, too_long, without_none
 
 T = TypeVar("T", bound=msgspec.Struct)
@@ -30,7 +31,9 @@ def read(path: str | Path, kind: type[T]) -> T:
 def text_of(path: str | Path) -> str:
     """A file's text. Raises EyeError."""
     try:
-        return Path(path).read_text(encoding="utf-8-sig")
+        return read_input(path, EYE_BYTES).decode("utf-8-sig")
+    except InputError as error:
+        raise EyeError(path, "", error.what, error.remedy) from None
     except OSError as error:
         raise EyeError(path, "", f"cannot be read: {error.strerror}", "check path and permissions") from None
     except ValueError:

@@ -66,7 +66,7 @@ class SerialInput:
         "char_end": TICK,
         "polls": TICK,
     }
-    NOT_STATE = ("cpu", "baud", "crystal_hz", "gap_ticks", "live")
+    NOT_STATE = ("seen", "cpu", "baud", "crystal_hz", "gap_ticks", "live")
 
     def __init__(
         self,
@@ -88,6 +88,7 @@ class SerialInput:
         self.live = live
         self.fed = 0  # bytes of the first piece that are on their way or received
         self.tail = b""  # of what the program sent, as long as the text waited for
+        self.seen = 0  # how often a text was seen that was waited for
         self.begin_tick = 0  # the first piece begins; NEVER_TICK until its text was seen
         self.char_end = 0  # tick at which the last character ends
         self.polls = 0  # reads of P3 seen so far
@@ -104,6 +105,7 @@ class SerialInput:
         if self.waiting_for:
             self.tail = (self.tail + bytes([value]))[-len(self.waiting_for) :]
             if self.tail == self.waiting_for:
+                self.seen += 1
                 self.begin_tick = tick + (self.pieces[0].delay_ticks or 0)
 
     @property

@@ -16,7 +16,7 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK, Items, Rows
 from miro_robot.bare.input import Piece, SerialInput
 from miro_robot.bare.pins import PinEvent, PinInput
-from miro_robot.faults import FaultKind, FirmwareFault
+from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import ASLEEP, BREAKPOINT, Cpu
 from miro_robot.mcs51.opcodes import jumps_to_itself
@@ -47,6 +47,7 @@ class BareMachine:
     The rate is the one the receiver is programmed for, or `baud`, which also serves a program that measures its first
     character. `live`: `input.add` may add more at any time. `pins` are put on the ports.
     `output` gets the characters sent. With `code_in_xram`, program and data share one 64 KB space (EA low).
+    The first instruction is at `start`, as after a jump there by a monitor.
     A machine cycle is 12 periods of the crystal, a tick one. Raises ValueError for parameters out of range.
     """
 
@@ -81,6 +82,7 @@ class BareMachine:
         gap_ticks: int = 0,
         live: bool = False,
         pins: tuple[PinEvent, ...] = (),
+        start: int = 0,
     ) -> None:
         if not CRYSTAL_RANGE_HZ[0] <= crystal_hz <= CRYSTAL_RANGE_HZ[1]:
             raise ValueError(
@@ -101,6 +103,8 @@ class BareMachine:
         self.cpu = Cpu(self.bus)
         self.cpu.stop_asleep = 1
         self.cpu.load(image.code, image.used)
+        self.cpu.bound_stack(*image.symbols.stack())
+        self.cpu.pc = start
         if code_in_xram:
             self.bus.fill(image.code)
             self.bus.code_of = self.cpu
@@ -213,7 +217,8 @@ class BareMachine:
     def _faulted(self, kind: int, pc: int, tick: int) -> None:
         if len(self.faults) < _FAULTS_KEPT:
             symbol = self.image.symbols.name_at(pc)
-            self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol))
+            detail = self.cpu.stack_said() if kind in STACK_FAULTS else ""
+            self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol, detail))
         else:
             self.faults_lost += 1
         if self.stop_on_fault:

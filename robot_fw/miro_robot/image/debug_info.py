@@ -9,7 +9,6 @@ without these files has an empty DebugInfo: everything works by address then.
 from __future__ import annotations
 
 import bisect
-import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -107,7 +106,11 @@ class DebugInfo:
 
 
 class Sources:
-    """Where the compiler's file names are found: in `folders`, in this order."""
+    """Where the compiler's file names are found: in `folders`, in this order, and nowhere else.
+
+    A debug file may come from a stranger, and what it names may be shown in a page that is sent on. So only regular
+    files are found that lie in one of the folders, links resolved. A whole path of elsewhere is looked for by its name.
+    """
 
     def __init__(self, folders: Iterable[Path]) -> None:
         self.folders = tuple(folders)
@@ -116,8 +119,9 @@ class Sources:
     def path(self, file: str) -> Path | None:
         """The file, or None where no folder has it."""
         if file not in self._found:
-            places = (folder / file for folder in self.folders)
-            self._found[file] = next((place for place in places if os.path.isfile(place)), None)
+            names = dict.fromkeys((file, _name(file)))
+            places = (_inside(folder, name) for name in names for folder in self.folders)
+            self._found[file] = next((place for place in places if place is not None), None)
         return self._found[file]
 
     def text(self, line: SourceLine) -> str:
@@ -141,6 +145,16 @@ def _cdb_functions(cdb: CdbFile, code: bytes, paths: dict[str, str]) -> Iterator
             yield Function("_" + scope[1], first, end, declared.get(first))
 
 
+def _inside(folder: Path, file: str) -> Path | None:
+    """The regular file of that name in the folder; None where there is none, or it lies elsewhere."""
+    try:
+        place = (folder / file).resolve()
+        there = place.is_relative_to(folder.resolve()) and place.is_file()
+    except (OSError, ValueError, RuntimeError):  # a name that is too long, or has a NUL; a circle of links
+        return None
+    return folder / place.relative_to(folder.resolve()) if there else None
+
+
 def _name(path: str) -> str:
     return path.replace("\\", "/").rpartition("/")[2]
 
@@ -149,11 +163,11 @@ def listings(image: Path, link_map: str) -> Iterator[Path]:
     """The relinked listings of the image's modules: beside the image, or where the linker found the modules."""
     for module in dict.fromkeys([*map_modules(link_map), image.stem]):
         places = (
-            image.parent / f"{_name(module)}.rst",
-            image.parent / f"{module}.rst",
-            Path(f"{module}.rst"),
+            _inside(image.parent, f"{_name(module)}.rst"),
+            _inside(image.parent, f"{module}.rst"),
+            _inside(Path(), f"{module}.rst"),
         )
-        found = next((place for place in places if os.path.isfile(place)), None)
+        found = next((place for place in places if place is not None), None)
         if found is not None:
             yield found
 

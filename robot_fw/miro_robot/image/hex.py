@@ -14,6 +14,7 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import IMAGE_BYTES, InputError, read_input
 from miro_robot.image.evidence import Contradiction, check_cdb, check_map
 from miro_robot.image.symbol_files import Symbol, parse_cdb, parse_map, read_text
 from miro_robot.image.symbols import Symbols
@@ -43,17 +44,45 @@ class Image(msgspec.Struct, frozen=True):
     sha256: str
     symbols: Symbols
 
+    def merged(self, other: Image) -> Image:
+        """Both as one program, called as this one. Raises ImageError where both have a byte at the same address."""
+        mine, theirs = ({at for one in image.used for at in range(*one)} for image in (self, other))
+        both = mine & theirs
+        if both:
+            what = f"has a byte at {min(both):#06x}, as {self.path.name} has"
+            raise ImageError(other.path, 0, what, "link one of them elsewhere")
+        code = bytearray(self.code)
+        for first, end in other.used:
+            code[first:end] = other.code[first:end]
+        used = _joined(sorted((*self.used, *other.used)))
+        names = Symbols(lambda: {**other.symbols.names, **self.symbols.names}, used)
+        sha256 = hashlib.sha256(f"{self.sha256} {other.sha256}".encode()).hexdigest()
+        return Image(self.path, bytes(code), used, self.size + other.size, sha256, names)
+
     def __repr__(self) -> str:
         return f"Image({self.path.name!r}, {self.size} bytes, sha256={self.sha256[:12]})"
+
+
+def _joined(ranges: list[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
+    """Ascending (first, end), with those that follow one another made one."""
+    found: list[tuple[int, int]] = []
+    for first, end in ranges:
+        if found and found[-1][1] == first:
+            found[-1] = found[-1][0], end
+        else:
+            found.append((first, end))
+    return tuple(found)
 
 
 def load_hex(path: str | Path, limit: int = FLASH_BYTES) -> Image:
     """Reads an Intel HEX file whose bytes all lie below `limit`. Raises ImageError."""
     path = Path(path)
     try:
-        content = path.read_bytes()
+        content = read_input(path, IMAGE_BYTES)
     except FileNotFoundError:
         raise ImageError(path, 0, "there is no such file", "build the firmware first") from None
+    except InputError as error:
+        raise ImageError(path, 0, error.what, error.remedy) from None
     except OSError as error:
         raise ImageError(path, 0, f"cannot be read ({error.strerror})", "name a readable file") from None
     return parse_hex(content, path, limit)
@@ -72,7 +101,7 @@ def parse_hex(content: bytes, path: Path, limit: int = FLASH_BYTES) -> Image:
         used=known.used,
         size=known.loaded.count(1),
         sha256=known.sha256,
-        symbols=Symbols(lambda: _names_beside(path, known.code, known.loaded)),
+        symbols=Symbols(lambda: _names_beside(path, known.code, known.loaded), known.used),
     )
 
 

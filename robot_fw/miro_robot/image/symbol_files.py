@@ -15,6 +15,8 @@ from pathlib import Path
 
 import msgspec
 
+from miro_exact.inputs import read_input
+
 _KEPT = 32
 _SPACE = 0x10000  # an address beyond is damage: no memory of the 8051 has it
 _Scope = tuple[str, str]
@@ -78,11 +80,12 @@ class ListedCode(msgspec.Struct, frozen=True):
 
 
 def read_text(path: Path) -> str:
-    """The text of a file beside an image, "" if there is none."""
-    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    """The text of a file beside an image, "" if there is none. Raises InputError for one that is too long."""
+    return read_input(path).decode(errors="replace") if path.is_file() else ""
 
 
-_AREA = re.compile(r"^(\S[\S .]*?)\s+([0-9A-F]{8})\s+([0-9A-F]{8}) = .*bytes \(([A-Z,]+)\)")
+_HEX = re.compile(r"[0-9A-F]{8}")
+_ATTRIBUTES = re.compile(r"bytes \(([A-Z,]+)\)")
 _RECORD = re.compile(r"^([CDB]:)?\s+([0-9A-F]{8})\s+(?:(_\w+)\s|(A\$))")
 
 
@@ -95,11 +98,10 @@ def parse_map(text: str) -> MapFile:
     area = space = ""
     first = end = 0
     for number, line in enumerate(text.splitlines(), start=1):
-        if " = " in line and (head := _AREA.match(line)):
-            area, attributes = head[1], head[4].split(",")
+        if head := _map_area(line):
+            area, first, size, attributes = head
             space = _map_space(area, attributes)
-            first = int(head[2], 16)
-            end = first + int(head[3], 16) if "CODE" in attributes and "REL" in attributes else 0
+            end = first + size if "CODE" in attributes and "REL" in attributes else 0
         elif (line[:1].isspace() or line[1:2] == ":") and (record := _RECORD.match(line)):
             prefix, address = record[1], int(record[2], 16)
             if name := record[3]:
@@ -110,6 +112,16 @@ def parse_map(text: str) -> MapFile:
             elif prefix == "C:" and address < _SPACE:
                 instructions.setdefault(address, number)
     return MapFile(names, tuple(places), tuple(sorted(instructions.items())))
+
+
+def _map_area(line: str) -> tuple[str, int, int, list[str]] | None:
+    """Name, address, size and attributes of an area, where a line is the head of one: `NAME ADDRESS SIZE = ..`."""
+    left, equals, right = line.partition(" = ")
+    fields = left.rsplit(None, 2) if equals and not line[:1].isspace() else []
+    attributes = _ATTRIBUTES.search(right)
+    if len(fields) < 3 or attributes is None or not all(map(_HEX.fullmatch, fields[1:])):
+        return None
+    return fields[0], int(fields[1], 16), int(fields[2], 16), attributes[1].split(",")
 
 
 def _map_space(area: str, attributes: list[str]) -> str:

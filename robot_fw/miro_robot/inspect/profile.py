@@ -10,10 +10,9 @@ import msgspec
 from miro_robot.image import Image
 from miro_robot.inspect.activity import Activity
 from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.stack_depth import StackReader
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.names import INTERRUPTS
-
-_IRAM_TOP = 0xFF
 
 
 class FunctionProfile(msgspec.Struct, frozen=True):
@@ -39,12 +38,20 @@ class InterruptProfile(msgspec.Struct, frozen=True):
 
 
 class StackProfile(msgspec.Struct, frozen=True):
-    """`first`: where the linker begins the stack (None: not known); `highest`: the last byte it reached."""
+    """`first`: where the linker begins the stack (None: not known); `highest`: the last byte it reached.
+
+    `last`: what lies above belongs to others. `free`: bytes between. `at_least`: bytes that the code itself can take,
+    by the functions `deepest`; `unknown`: what of the code could not be followed.
+    """
 
     first: int | None
+    last: int
     highest: int
     highest_tick: int
     free: int
+    at_least: int
+    deepest: list[str]
+    unknown: list[str]
 
 
 class Profile(msgspec.Struct, frozen=True):
@@ -70,7 +77,8 @@ def profile(image: Image, counters: Counters, activity: Activity) -> Profile:
         FunctionProfile(names.place(first), first, counters.executed_at(first), executed, spent)
         for first, (executed, spent) in by_function.items()
     ]
-    start = image.symbols.find("__start__stack")
+    first_address, last = image.symbols.stack()
+    depth = StackReader(image).all()
     return Profile(
         cycles=activity.cycles,
         asleep_cycles=activity.asleep_cycles,
@@ -80,9 +88,13 @@ def profile(image: Image, counters: Counters, activity: Activity) -> Profile:
             InterruptProfile(name, *activity.of_source(source)) for source, name in enumerate(INTERRUPTS)
         ],
         stack=StackProfile(
-            first=start.address if start is not None and start.space == "iram" else None,
+            first=first_address or None,
+            last=last,
             highest=activity.highest_sp,
             highest_tick=activity.highest_sp_tick,
-            free=_IRAM_TOP - activity.highest_sp,
+            free=max(0, last - activity.highest_sp),
+            at_least=depth.size,
+            deepest=[names.place(address) for address in depth.main.path],
+            unknown=sorted(depth.unknown),
         ),
     )

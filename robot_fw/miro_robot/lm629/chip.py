@@ -173,7 +173,7 @@ class Lm629(MotorAxis):
             self._enter_reset(_RESETTING, _SOFTWARE_RESET, (tick + 3 & -4) + self.reset_ticks)
         elif opcode == _PORT12 and self.options.port12_clears:
             self.signals.clear_bits(_OUTPUT_8_BIT)
-        elif opcode == _PORT8:  # without O5 it never finds it cleared
+        elif opcode == _PORT8:
             self.signals.set_bits(_OUTPUT_8_BIT)
         elif opcode != _PORT12:
             self._complain(self.options.unknown_opcode_flags)

@@ -2,6 +2,7 @@
 
 If a measured chip behaves in the other way, set the other reading in a scenario's
 `[lm629]` table or as `Lm629Options(...)`. README.md in this folder explains each rule.
+Page numbers are those of the data sheet SNVS781C.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """
 
     # Bus
-    busy_clocks: int = 160
-    """B1: how long the busy bit stays after a command byte or the second byte of a data word."""
+    busy_clocks: int = 120
+    """B1: how long the busy bit stays after a command byte or the second byte of a data word (p. 12: 15 to 25 us)."""
     busy_judged: Literal["begin", "end"] = "begin"
     """B2: a write is lost if the chip is busy when the strobe begins, or when it ends."""
     command_resets_phase: bool = True
@@ -54,7 +55,7 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     software_reset_busy: bool = True
     """R2: the status byte is 01h while a RESET command runs; False: 00h."""
     reset_disarms_breakpoint: bool = True
-    """R3: no breakpoint after a reset; False: one at 0, which is reached in the first sample (C4h, C0h)."""
+    """R3: no breakpoint after a reset (84h); False: one at 0, which is reached in the first sample (C4h)."""
     reset_restarts_samples: bool = True
     """R4: samples count from the end of the reset; False: they go on in the grid of tick 0."""
     reset_clears_lpes: bool = True
@@ -92,7 +93,7 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     # Filter
     pid_saturates: bool = True
-    """F1: products and their sum stop at +-full scale; False keeps their bottom 16 bits, as printed."""
+    """F1: products and their sum stop at +-full scale (p. 10); False keeps their bottom 16 bits (p. 12)."""
     sum_reading: Literal["term", "sum"] = "term"
     """F2: RDSUM answers the limited product ki * sum, or the limited top 16 bits of the sum itself."""
     sum_rounding: Literal["down", "zero"] = "down"
@@ -113,8 +114,8 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """O3: where in its period the PWM pulse is."""
     off_keeps_sign: bool = False
     """O4: a motor that is switched off keeps the level of its sign pin; False: 0."""
-    port12_clears: bool = False
-    """O5: PORT12 clears bit 8 of the signals register (PORT8 sets it); False: both mean nothing."""
+    port12_clears: bool = True
+    """O5: PORT12 clears bit 8 of the signals register, PORT8 sets it (p. 23); False: both mean nothing."""
 
     # Encoder
     double_step: Literal[0, 2, -2] = 0

@@ -35,6 +35,8 @@ cdef class Core:
     cdef int edge_outer[8]
     cdef int edge_depth
     cdef public int highest_sp
+    cdef readonly int stack_floor
+    cdef readonly int stack_end
 
     cpdef begin_edges(self)
     @cython.final

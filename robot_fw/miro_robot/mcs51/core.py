@@ -43,6 +43,8 @@ class Core:
         "rom",  # the image: constant while it runs, unless code lies in RAM, whose owner then restores it
         "lines",
         "line_of",
+        "stack_floor",  # where the image's map says that the stack is
+        "stack_end",
         "at",
         "start",  # the instruction in progress: snapshots are taken between two
         "limit",
@@ -82,6 +84,8 @@ class Core:
         self.edge_outer = [0] * 8
         self.edge_depth = 0
         self.highest_sp = 0  # of a stack that grew since it was last set
+        self.stack_floor = 0  # SP of an empty stack
+        self.stack_end = 0  # the first address past it: 00 is past FF
 
     def watch_edges(self, edges: memoryview) -> None:
         """Counts from now on how often each edge between two taken branches is passed, in `edges`.
@@ -94,6 +98,16 @@ class Core:
         self.edges = memoryview(edges).cast("B")
         self.edge_mask = size - 1
         self.begin_edges()
+
+    def bound_stack(self, first: int, last: int) -> None:
+        """The stack may use internal RAM from `first` to `last`; all of it unless told. SP leaving it is a fault."""
+        self.stack_floor = max(first - 1, 0)
+        self.stack_end = (last + 1) & 0xFF
+
+    def stack_said(self) -> str:
+        """Where SP is and where the stack may be, for people."""
+        last = (self.stack_end - 1) & 0xFF
+        return f"SP {self.sp:02X}h, its stack is {self.stack_floor + 1:02X}h to {last:02X}h"
 
     def begin_edges(self) -> None:
         """No branch has been taken yet: after the core was put back to another moment."""

@@ -407,7 +407,7 @@ class Cpu(Executor):
         if address == _PSW:
             self.write_psw(value)
         elif address == _SP:
-            self.sp = value
+            self.set_sp(value)
         elif address == _PCON:
             self.write_pcon(value)
         elif address & 0xCF == 0x80:

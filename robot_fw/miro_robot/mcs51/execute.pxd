@@ -6,6 +6,7 @@ cdef int _BREAKPOINT
 cdef int _UNDEFINED_OPCODE
 cdef int _STACK_OVERFLOW
 cdef int _STACK_UNDERFLOW
+cdef int _MOV_DATA
 cdef int _OUTSIDE_IMAGE
 
 cdef class Executor(Core):
@@ -48,8 +49,11 @@ cdef class Executor(Core):
     @cython.final
     cdef inline int claim(self) except -1
     @cython.final
-    @cython.locals(value=int)
+    @cython.locals(value=int, empty=bint)
     cdef inline int pop(self) except -1
+    @cython.final
+    @cython.locals(before=int, end=int, round_the_top=bint)
+    cdef int set_sp(self, int value) except -1
     @cython.final
     @cython.locals(a=int, total=int)
     cdef inline void add(self, int operand, int carry) noexcept

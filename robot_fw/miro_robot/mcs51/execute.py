@@ -23,6 +23,7 @@ _BREAKPOINT = 0x1000  # line that ends a run before its instruction
 _UNDEFINED_OPCODE = int(FaultKind.UNDEFINED_OPCODE)
 _STACK_OVERFLOW = int(FaultKind.STACK_OVERFLOW)
 _STACK_UNDERFLOW = int(FaultKind.STACK_UNDERFLOW)
+_MOV_DATA = 0x75
 _OUTSIDE_IMAGE = int(FaultKind.OUTSIDE_IMAGE)
 
 REACHED, STOPPED, BREAKPOINT, WIRE_FULL = range(4)  # why a run ended
@@ -438,15 +439,33 @@ class Executor(Core):
         self.sp = (self.sp + 1) & 0xFF
         if self.sp > self.highest_sp:
             self.highest_sp = self.sp
-        elif self.sp == 0:
+        if self.sp == self.stack_end:
             self.fault(_STACK_OVERFLOW)
 
     def pop(self) -> int:
         value = self.iram[self.sp]
-        if self.sp == 0:
-            self.fault(_STACK_UNDERFLOW)
+        empty = self.sp == self.stack_floor
         self.sp = (self.sp - 1) & 0xFF
+        if empty:
+            self.fault(_STACK_UNDERFLOW)
         return value
+
+    def set_sp(self, value: int) -> None:
+        """An instruction writes SP. Leaving the stack is a fault, and so is a sum that goes round the top of RAM:
+        a step up by less than half of RAM that ends lower. A number in the instruction (MOV SP,#data) is no sum.
+        """
+        before, self.sp = self.sp, value
+        end = self.stack_end or 0x100
+        if value > self.highest_sp:
+            self.highest_sp = value
+        if self.stack_floor <= before < end:  # else it has not been set up yet, or was outside already
+            round_the_top = (
+                value < before and value - before + 0x100 < 0x80 and self.rom[self.at] != _MOV_DATA
+            )
+            if round_the_top or value >= end:
+                self.fault(_STACK_OVERFLOW)
+            elif value < self.stack_floor:
+                self.fault(_STACK_UNDERFLOW)
 
     # ALU
 

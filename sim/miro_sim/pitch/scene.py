@@ -161,7 +161,7 @@ class Scene:
         stretch = (1 << 24) + slope_x * slope_x + slope_y * slope_y
         distance = (x * x + y * y) * stretch - along * along
         rim = _BALL_UM * _BALL_UM * stretch
-        if distance > rim or _BALL_UM - (along << 12) // stretch < above:
+        if distance > rim or _BALL_UM - along * 4096 // stretch < above:
             return -1
         return 3 - 4 * (distance - 1) // rim if distance > 0 else 3
 

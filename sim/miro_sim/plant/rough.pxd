@@ -5,33 +5,38 @@ from miro_exact.rng cimport Stream
 from miro_sim.plant.chassis cimport Body
 from miro_sim.plant.disturbance cimport DisturbingForce
 
-cdef double TICK_S, ALL_GRIP_N, NEAR
+cdef double TICK_S, PWM_TICKS, ALL_GRIP_N, NEAR
 cdef int SWEEPS, NEWTON_STEPS
 
 cdef class RoughBody(Body):
     cdef readonly DisturbingForce forces
-    cdef readonly double half_track_m, stiction_ratio, grip_n, ball_n, ball_m
+    cdef readonly double half_track_m, stiction_ratio, load_friction, play_m, rolling_n, grip_n, ball_n, ball_m
     cdef readonly double mass_kg, yaw_kg_m2, rotor_kg_m2, hub_per_kg, ball_x_per_kg, ball_y_per_kg
     cdef public double v_m_s, u_m_s, w_rad_s
-    cdef readonly double left_force_n, right_force_n
+    cdef readonly double left_force_n, right_force_n, left_load_n, right_load_n
+    cdef readonly double left_play_m, right_play_m
     cdef double _rub_nms, _push_ns, _ball_x_ns, _ball_y_ns, _ball_z
 
     cpdef int feel(self, long long tick) except -1
     @cython.locals(step_s=double, half_s=double, old_left=double, old_right=double, old_v=double, old_u=double,
-                   old_w=double, most_left=double, most_right=double)
+                   old_w=double, most_left=double, most_right=double, old_left_slip=double, old_right_slip=double,
+                   left_slip=double, right_slip=double, share=double)
     cpdef push(self, double left_nms, double right_nms, int ticks)
+    @cython.locals(most=double, hub=double)
+    cdef int _resist(self, double lever_m, double step_s) except -1
     @cython.locals(squares=double, cosine=double, sine=double, v=double, u=double)
     cdef void _turn_frame(self, double tangent) except *
     @cython.locals(grip=double, axle=double, left_rub=double, right_rub=double, left_push=double, right_push=double,
                    sideways=double, inertia=double, hub=double, before=double, left_stands=cython.bint,
-                   right_stands=cython.bint)
+                   right_stands=cython.bint, left_back=double, left_ahead=double, right_back=double,
+                   right_ahead=double, left_held=cython.bint)
     cdef int _dissipate(self, double most_left, double most_right, double step_s) except -1
     @cython.locals(rest=double)
     cdef double _grip_left_n(self, double along_n) except? -7.5
     cdef int _move(self, double push_ns, double lever_m) except -1
     @cython.locals(inertia=double, free_hub=double, free_shaft=double, slip_per_ns=double, turning=double)
     cdef void _wheel(self, double hub, double shaft, double roll, double rub, double push, double most,
-                    double grip) except *
+                    double back, double ahead) except *
     @cython.locals(x_per_kg=double, y_per_kg=double, free_x=double, free_y=double, x=double, y=double, z=double,
                    length=double, fall=double, more_y=double)
     cdef int _drag(self, double most) except -1

@@ -1,4 +1,4 @@
-"""The robot where `chassis` is too kind: wheels may slip, a ball drags, standing shafts stick, a force pushes.
+"""The robot where `chassis` is too kind: wheels slip, a ball drags, shafts stick, gears have play, a force pushes.
 
 What belongs here: the body with five velocities (two shafts; forward, sideways and turning of the chassis) and the
 friction between them. What does not: the body whose wheels only roll (`chassis`, used while all of this is off), the
@@ -9,8 +9,10 @@ disturbing force as a function of time (`disturbance`), figures (`params`).
 A step turns the velocity into the new heading, adds the impulses of motors and disturbance, and then looks for the
 friction impulses that leave the least kinetic energy (maximum dissipation), each within its bound:
 
-    shaft    friction * time, times the stiction ratio if the shaft stood when the step began
-    contact  grip * load of the wheel * time, along the wheel
+    shaft    friction * time, times the stiction ratio if the shaft stood when the step began; to this comes
+             `gear_load_friction` times the torque through the gear, its mean over about a PWM period before the step
+    contact  grip * load of the wheel * time, along the wheel; nothing while the gear is inside its backlash, and
+             nothing that would pull where the teeth touch on one side
     axle     sideways, both wheels together: what the friction circle leaves beside the force along the wheel, which is
              taken from the step before
     ball     friction * load of the ball * time, in any direction; against its way over the ground
@@ -18,6 +20,10 @@ friction impulses that leave the least kinetic energy (maximum dissipation), eac
 A few sweeps over wheel, wheel, ball and axle; each part is solved exactly while the others hold still, so each lowers
 the energy: friction never drives. What ends inside its bounds ends at exactly zero. A wheel without `grip` has all that
 it needs: it rolls, to rounding. Loads are those of the robot at rest: half each of what the ball does not carry.
+
+Backlash: the wheel has no mass, so while the teeth do not touch it goes with the ground and the shaft turns alone.
+Teeth that touch again do not bounce. They touch at the end of the step in which the play is used up, at most one
+step late.
 """
 
 from __future__ import annotations
@@ -31,6 +37,7 @@ from miro_sim.plant.disturbance import DisturbingForce
 from miro_sim.plant.params import GRAVITY_M_S2, DriveParams
 
 TICK_S = 1.0 / 24e6
+PWM_TICKS = 2048.0
 SWEEPS = 12
 NEWTON_STEPS = 8
 NEAR = 1.0 - 1e-13
@@ -48,9 +55,14 @@ class RoughBody(Body):
         "w_rad_s": _SPEED_M_S,
         "left_force_n": _FORCE_N,
         "right_force_n": _FORCE_N,
+        "left_load_n": _FORCE_N,
+        "right_load_n": _FORCE_N,
+        "left_play_m": ("d", -1e6, 1e6),
+        "right_play_m": ("d", -1e6, 1e6),
     }
     NOT_STATE = (
-        *("forces", "half_track_m", "stiction_ratio", "grip_n", "ball_n", "ball_m"),
+        *("forces", "half_track_m", "stiction_ratio", "load_friction", "play_m", "rolling_n"),
+        *("grip_n", "ball_n", "ball_m"),
         *("mass_kg", "yaw_kg_m2", "rotor_kg_m2", "hub_per_kg", "ball_x_per_kg", "ball_y_per_kg"),
         *("_rub_nms", "_push_ns", "_ball_x_ns", "_ball_y_ns", "_ball_z"),
     )
@@ -66,6 +78,12 @@ class RoughBody(Body):
         )
         self.half_track_m = 0.5 * body.track_m
         self.stiction_ratio = body.stiction_ratio
+        self.load_friction = body.gear_load_friction
+        self.play_m = 0.5 * body.gear_backlash_rad * body.wheel_radius_m  # to either side, at the rim
+        self.rolling_n = 0.0
+        if self.play_m > 0.0:  # the resistance of a wheel that the shaft may leave alone acts on the wheel
+            self.rolling_n = 0.5 * body.rolling_resistance * weight_n
+            self.friction_nm -= self.rolling_n * body.wheel_radius_m / body.gear_ratio
         on_wheel_n = 0.5 * (1.0 - params.ball.load_share) * weight_n
         self.grip_n = ALL_GRIP_N if params.tyre.grip is None else params.tyre.grip * on_wheel_n
         self.ball_n = params.ball.friction * params.ball.load_share * weight_n
@@ -81,6 +99,10 @@ class RoughBody(Body):
         self.w_rad_s = 0.0
         self.left_force_n = 0.0
         self.right_force_n = 0.0
+        self.left_load_n = 0.0  # mean of `left_force_n`, for the friction of the gear
+        self.right_load_n = 0.0
+        self.left_play_m = 0.0  # by how much the shaft is ahead of the middle of its play, at the rim
+        self.right_play_m = 0.0
         self._rub_nms = 0.0
         self._push_ns = 0.0
         self._ball_x_ns = 0.0
@@ -100,19 +122,42 @@ class RoughBody(Body):
         old_v = self.v_m_s
         old_u = self.u_m_s
         old_w = self.w_rad_s
+        old_left_slip, old_right_slip = self.slips_m_s()
         most_left = step_s * self.friction_nm * (self.stiction_ratio if old_left == 0.0 else 1.0)
         most_right = step_s * self.friction_nm * (self.stiction_ratio if old_right == 0.0 else 1.0)
+        if self.load_friction > 0.0:
+            most_left += step_s * self.load_friction * abs(self.left_m_rad * self.left_load_n)
+            most_right += step_s * self.load_friction * abs(self.right_m_rad * self.right_load_n)
         self._turn_frame(0.5 * step_s * old_w)
         self.left_rad_s = old_left + left_nms / self.rotor_kg_m2
         self.right_rad_s = old_right + right_nms / self.rotor_kg_m2
         self.v_m_s = self.v_m_s + step_s * self.forces.force_n / self.mass_kg
         self.w_rad_s = old_w + step_s * self.forces.torque_nm / self.yaw_kg_m2
+        if self.rolling_n > 0.0:
+            self._resist(-self.half_track_m, step_s)
+            self._resist(self.half_track_m, step_s)
         self._dissipate(most_left, most_right, step_s)
+        if self.load_friction > 0.0:
+            share = float(ticks) / PWM_TICKS
+            self.left_load_n += share * (self.left_force_n - self.left_load_n)
+            self.right_load_n += share * (self.right_force_n - self.right_load_n)
+        if self.play_m > 0.0:
+            left_slip, right_slip = self.slips_m_s()
+            if self.left_force_n == 0.0:
+                self.left_play_m -= half_s * (old_left_slip + left_slip)
+            if self.right_force_n == 0.0:
+                self.right_play_m -= half_s * (old_right_slip + right_slip)
         self.turned_left_rad = half_s * (old_left + self.left_rad_s)
         self.turned_right_rad = half_s * (old_right + self.right_rad_s)
         self._glide(
             half_s * (old_v + self.v_m_s), half_s * (old_u + self.u_m_s), half_s * (old_w + self.w_rad_s)
         )
+
+    def _resist(self, lever_m: float, step_s: float) -> None:
+        """Rolling resistance of the wheel at `lever_m` to the right of the middle."""
+        most = self.rolling_n * step_s
+        hub = self.v_m_s + lever_m * self.w_rad_s
+        self._move(min(most, max(-most, -hub / self.hub_per_kg)), lever_m)
 
     def _turn_frame(self, tangent: float) -> None:
         """The velocity over the ground as the axes see it that have turned; a rotation, so energy stays."""
@@ -131,13 +176,19 @@ class RoughBody(Body):
         grip = self.grip_n * step_s
         axle = step_s * (self._grip_left_n(self.left_force_n) + self._grip_left_n(self.right_force_n))
         left_rub = right_rub = left_push = right_push = sideways = 0.0
+        left_back = -grip if self.left_play_m <= -self.play_m else 0.0
+        left_ahead = grip if self.left_play_m >= self.play_m else 0.0
+        right_back = -grip if self.right_play_m <= -self.play_m else 0.0
+        right_ahead = grip if self.right_play_m >= self.play_m else 0.0
         self._ball_x_ns = 0.0
         self._ball_y_ns = 0.0
         self._ball_z = 0.0
         inertia = self.rotor_kg_m2
         for _ in range(SWEEPS):
             hub = self.v_m_s - self.half_track_m * self.w_rad_s
-            self._wheel(hub, self.left_rad_s, self.left_m_rad, left_rub, left_push, most_left, grip)
+            self._wheel(
+                hub, self.left_rad_s, self.left_m_rad, left_rub, left_push, most_left, left_back, left_ahead
+            )
             self._move(self._push_ns - left_push, -self.half_track_m)
             self.left_rad_s += (
                 self._rub_nms - left_rub - self.left_m_rad * (self._push_ns - left_push)
@@ -145,7 +196,16 @@ class RoughBody(Body):
             left_rub = self._rub_nms
             left_push = self._push_ns
             hub = self.v_m_s + self.half_track_m * self.w_rad_s
-            self._wheel(hub, self.right_rad_s, self.right_m_rad, right_rub, right_push, most_right, grip)
+            self._wheel(
+                hub,
+                self.right_rad_s,
+                self.right_m_rad,
+                right_rub,
+                right_push,
+                most_right,
+                right_back,
+                right_ahead,
+            )
             self._move(self._push_ns - right_push, self.half_track_m)
             self.right_rad_s += (
                 self._rub_nms - right_rub - self.right_m_rad * (self._push_ns - right_push)
@@ -167,7 +227,8 @@ class RoughBody(Body):
             self.left_rad_s = 0.0
         if right_stands:
             self.right_rad_s = 0.0
-        if left_stands and right_stands and -grip < left_push < grip and -grip < right_push < grip:
+        left_held = left_stands and left_back < left_push < left_ahead
+        if left_held and right_stands and right_back < right_push < right_ahead:
             self.v_m_s = 0.0
             self.w_rad_s = 0.0
 
@@ -182,29 +243,37 @@ class RoughBody(Body):
         self.w_rad_s = self.w_rad_s + lever_m * push_ns / self.yaw_kg_m2
 
     def _wheel(
-        self, hub: float, shaft: float, roll: float, rub: float, push: float, most: float, grip: float
+        self,
+        hub: float,
+        shaft: float,
+        roll: float,
+        rub: float,
+        push: float,
+        most: float,
+        back: float,
+        ahead: float,
     ) -> None:
         """Friction of a shaft (Nms) and push of its wheel (Ns, on the chassis) that leave the least energy.
 
         `hub` (m/s) and `shaft` (rad/s) are the speeds with the impulses `rub` and `push` so far. A corner, an edge or
-        the inside of the box |rub| <= most, |push| <= grip: where the signs of what is left agree, that is it.
+        the inside of the box |rub| <= most, back <= push <= ahead: where the signs of what is left agree, that is it.
         """
         inertia = self.rotor_kg_m2
         free_hub = hub - self.hub_per_kg * push
         free_shaft = shaft - (rub - roll * push) / inertia
         self._push_ns = -free_hub / self.hub_per_kg
         self._rub_nms = roll * self._push_ns - inertia * free_shaft
-        if -grip <= self._push_ns <= grip and -most <= self._rub_nms <= most:
+        if back <= self._push_ns <= ahead and -most <= self._rub_nms <= most:
             return  # both stand
         slip_per_ns = self.hub_per_kg + roll * roll / inertia
         self._rub_nms = -most if free_shaft >= 0.0 else most
         for _ in range(2):
             turning = free_shaft + self._rub_nms / inertia
-            self._push_ns = min(grip, max(-grip, (roll * turning - free_hub) / slip_per_ns))
+            self._push_ns = min(ahead, max(back, (roll * turning - free_hub) / slip_per_ns))
             if (turning - roll * self._push_ns / inertia) * self._rub_nms <= 0.0:
                 return  # the shaft turns against its friction
             self._rub_nms = -self._rub_nms
-        self._push_ns = grip if free_hub < 0.0 else -grip
+        self._push_ns = ahead if free_hub < 0.0 else back
         self._rub_nms = roll * self._push_ns - inertia * free_shaft
         if -most <= self._rub_nms <= most:
             return  # the shaft stands, the wheel slides

@@ -14,15 +14,15 @@ from typing import Any
 
 import msgspec
 
+from miro_exact.inputs import InputError, read_input
 from miro_protocol.toml_text import TEXT_KIB, not_finite, without_none
-from miro_sim.inputs import InputError, read_input
 from miro_sim.scenario.base import with_base
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.parts import full_message, part_of
 from miro_sim.scenario.places import check_places
 from miro_sim.scenario.profiles import ProfileError, with_profiles
-from miro_sim.scenario.settings import Setting, blamed, make
+from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
 from miro_sim.scenario.text import check_integers, check_size, written
 from miro_sim.scenario.variants import VariantError, with_variant
 
@@ -37,13 +37,14 @@ def nothing_else(scenario: Scenario, origin: str) -> None:
 class ScenarioText(msgspec.Struct, frozen=True):
     """A scenario together with its text, which a recording keeps: as it was read, or as the `settings` left it.
 
-    The text of one that names another (`base`) is that of the whole.
+    The text of one that names another (`base`) is that of the whole. `notes`: what the settings left out, a line each.
     """
 
     origin: str
     text: str
     scenario: Scenario
     settings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def builtin_names() -> list[str]:
@@ -74,10 +75,11 @@ def load(source: str, settings: Sequence[str] = (), also: Also = nothing_else) -
     built-in. `settings` and `also` as `parse` takes them.
     """
     text = source_text(source)
-    raw, scenario, complete = _parsed(text, source, settings, also)
+    notes: list[str] = []
+    raw, scenario, complete = _parsed(text, source, settings, also, notes)
     if settings or not complete:
         text = written(raw, source, settings)
-    return ScenarioText(source, text, scenario, tuple(settings))
+    return ScenarioText(source, text, scenario, tuple(settings), tuple(notes))
 
 
 def source_text(source: str) -> str:
@@ -115,7 +117,7 @@ def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = not
     Raises ScenarioError (and nothing else) naming `origin` and the place.
     Decides the engine, if nothing has yet: where a reference leads is computed by a hot module.
     """
-    return _parsed(text, origin, settings, also)[1]
+    return _parsed(text, origin, settings, also, [])[1]
 
 
 def changed(scenario: Scenario, origin: str, settings: Sequence[str], also: Also = nothing_else) -> Scenario:
@@ -128,14 +130,14 @@ def changed(scenario: Scenario, origin: str, settings: Sequence[str], also: Also
 
 
 def _parsed(
-    text: str, origin: str, settings: Sequence[str], also: Also
+    text: str, origin: str, settings: Sequence[str], also: Also, notes: list[str]
 ) -> tuple[dict[str, Any], Scenario, bool]:
     """The tables with the settings made, the scenario, and whether the text alone says all of it."""
     check_size(text, origin)
     try:
         raw = _tables(text, origin)
         whole, own = with_base(raw, origin, _base_tables)
-        return whole, _checked(whole, origin, settings, also, own), whole is raw
+        return whole, _checked(whole, origin, settings, also, own, notes), whole is raw
     except RecursionError:
         raise _too_deep(origin) from None
 
@@ -173,21 +175,38 @@ def _checked(
     settings: Sequence[str],
     also: Also = nothing_else,
     own: Sequence[Setting] = (),
+    notes: list[str] | None = None,
 ) -> Scenario:
-    """The scenario of these tables; makes the settings in them. `own`: those that its file has made."""
+    """The scenario of these tables; makes the settings in them. `own`: those that its file has made.
+
+    A setting that chooses another kind of something leaves the old kind's keys out, and `notes` say which.
+    """
     made = [*own, *make(raw, settings, origin)]
-    try:
-        _check_finite(raw, origin)
-        check_integers(raw, origin)
-        complete = _with_profiles(_with_variant(raw, origin), origin)
+    dropped: dict[str, list[str]] = {}
+    while True:
         try:
-            scenario = msgspec.convert(complete, Scenario, dec_hook=part_of)
-        except msgspec.ValidationError as error:
-            raise value_error(origin, complete, full_message(error)) from None
-        check_places(scenario, origin)
-        also(scenario, origin)
-    except ScenarioError as error:
-        raise blamed(error, made) from error.__cause__
+            scenario = _converted(raw, origin, also)
+            if notes is not None:
+                notes += [f"{place} leaves out {', '.join(keys)}" for place, keys in dropped.items()]
+            return scenario
+        except ScenarioError as error:
+            found = drop_other_kind(error, made)
+            if found is None:
+                raise blamed(error, made) from error.__cause__
+            dropped.setdefault(found[0], []).append(found[1])
+
+
+def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
+    """The scenario of complete tables. Raises ScenarioError."""
+    _check_finite(raw, origin)
+    check_integers(raw, origin)
+    complete = _with_profiles(_with_variant(raw, origin), origin)
+    try:
+        scenario = msgspec.convert(complete, Scenario, dec_hook=part_of)
+    except msgspec.ValidationError as error:
+        raise value_error(origin, complete, full_message(error)) from None
+    check_places(scenario, origin)
+    also(scenario, origin)
     return scenario
 
 

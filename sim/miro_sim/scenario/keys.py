@@ -52,6 +52,8 @@ class Host(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One robot: its slot on the network, where it starts, what it follows and who steers it.
 
+    `strap`: what its slot pins say, if not its slot.
+
     Start and reference have to lie on the pitch (`places`).
     The start is the start of the reference plus the errors (captions of the paper's Figs. 6 and 8). Each
     wheel's radius is drawn from 1 +- `wheel_radius_mismatch`, once a seed. `reference`,
@@ -61,6 +63,7 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """
 
     slot: Annotated[int, Meta(ge=0, le=4)] = 0
+    strap: Annotated[int, Meta(ge=0, le=7)] | None = None
     start_error_x_cm: PitchCm = 0.0
     start_error_y_cm: PitchCm = 0.0
     start_error_theta_rad: TurnRad = 0.0

@@ -17,6 +17,7 @@ from typing import Any
 import msgspec
 
 from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.keys import Network, Robot
 from miro_sim.scenario.parts import REGISTRIES
 from miro_sim.scenario.profiles import ERROR_KEYS
 from miro_sim.scenario.text import check_size
@@ -34,12 +35,14 @@ class Setting(msgspec.Struct, frozen=True):
 
     `table`: the table that is the setting's as a whole, because the setting made it or chose its kind; or "".
     `option`: who made it: the command line's, or the key of a scenario file that holds settings.
+    `others`: the table itself, where the setting chose another kind than it had; its keys may be those of the old kind.
     """
 
     text: str
     path: str
     table: str = ""
     option: str = OPTION
+    others: Table = msgspec.field(default_factory=dict)
 
     @property
     def place(self) -> str:
@@ -155,11 +158,12 @@ class _Path:
         below = at.get(key)
         if isinstance(value, dict) and isinstance(below, list) and len(below) == 1:
             return self._put_in_list(below, ["0"], value, place)
+        others = at if key in _TAGS and key in at and below != value else {}
         if key in ERROR_KEYS:  # either says the same: the last one holds
             for other in ERROR_KEYS:
                 at.pop(other, None)
         at[key] = value
-        return Setting(self.text, place, path if key in _TAGS else self.table)
+        return Setting(self.text, place, path if key in _TAGS else self.table, others=others)
 
     def _put_in_list(self, at: list[Any], keys: Sequence[str], value: Any, path: str) -> Setting:
         if not keys[0].isdecimal():
@@ -179,6 +183,29 @@ class _Path:
         return Setting(self.text, place, self.table)
 
 
+def drop_other_kind(error: ScenarioError, settings: Sequence[Setting]) -> tuple[str, str] | None:
+    """Takes out the key of this error, if it is of a kind that a setting has replaced; that setting, and the key."""
+    if error.what != "unknown key":
+        return None
+    above, _, key = f"{error.place}".rpartition(".")
+    for number, setting in enumerate(settings):
+        if setting.table != above or key not in setting.others:
+            continue
+        if any(_inside(f"{error.place}", later.path) for later in settings[number + 1 :]):
+            continue  # it was set on purpose
+        del setting.others[key]
+        return setting.place, key
+    return None
+
+
+def _deeper(key: str, setting: Setting) -> str:
+    """Where a key stands that was looked for at the top."""
+    for struct, above in ((Network, "network"), (Robot, "network.robot")):
+        if key in struct.__struct_encode_fields__:
+            return f"write {_option(f'{above}.{setting.text}', setting.option)}"
+    return ""
+
+
 def blamed(error: ScenarioError, settings: Sequence[Setting]) -> ScenarioError:
     """The same error, naming the setting that it concerns; all settings, where the scenario failed with them."""
     if not settings:
@@ -189,10 +216,9 @@ def blamed(error: ScenarioError, settings: Sequence[Setting]) -> ScenarioError:
         made = " ".join(setting.place for setting in settings)
         return ScenarioError(f"{error.path} with {made}", place, error.what, error.remedy)
     setting = concerned[-1]
-    above, _, key = setting.path.rpartition(".")
     remedy = error.remedy
-    if key in _TAGS and error.what == "unknown key":
-        remedy = f"it belongs to the {key} that was replaced; set the whole table: --set '{above}={{{key} = .., ..}}'"
+    if error.what == "unknown key" and place == setting.path.split(".")[0]:
+        remedy = _deeper(place, setting) or remedy
     if not remedy and error.what.startswith("expected a string"):
         remedy = f"to give text, write --set '{setting.text.partition('=')[0]}=\"..\"'"
     what = error.what if place == setting.path else f"{place}: {error.what}"

@@ -27,7 +27,10 @@ DISTURBING_CAMERA = (
 """What a variant takes out of `[camera]`; lens, pattern, window and ball stay, if the kind of camera does."""
 STAYS_IN_RADIO = ("telemetry", "channel")
 DISTURBING_DRIVE = ("tyre", "ball", "disturbance")
-DISTURBING_CHASSIS = ("left_radius_factor", "right_radius_factor", "stiction_ratio")
+DISTURBING_CHASSIS = (
+    *("left_radius_factor", "right_radius_factor", "stiction_ratio"),
+    *("gear_backlash_rad", "gear_load_friction"),
+)
 
 
 class VariantError(BadInput):

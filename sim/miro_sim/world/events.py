@@ -4,7 +4,7 @@ What belongs here: the record, the PC's log, and reading the boards' logs. What 
 (`conditions.py`) and the waiting (`waits.py`).
 
     what        at the tick at which                                          fields
-    sent        the first start bit of a host's transmission leaves           data
+    sent        the first start bit of a host's transmission leaves           data, good_stop (of all characters)
     heard       the PC has sampled the stop bit of a character                value, good_stop
     answer      the PC has sampled the last stop bit of a robot's answer      frame, slot
     received    a robot's serial port sets RI for a character                 value, good_stop
@@ -110,11 +110,14 @@ class HostLog:
         self.kept.extend(symbols)
         self.end += len(symbols)
 
-    def since(self, serial: int) -> Iterator[tuple[int, Event]]:
-        """(serial number, event) of those from `serial` on that are kept."""
+    def since(self, serial: int, heard: bool = True) -> Iterator[tuple[int, Event]]:
+        """(serial number, event) of those from `serial` on that are kept; `heard`: with the characters."""
         for place in range(max(0, serial - self.first), len(self.kept)):
             one = self.kept[place]
-            yield self.first + place, one if isinstance(one, Event) else self._heard(*one)
+            if isinstance(one, Event):
+                yield self.first + place, one
+            elif heard:
+                yield self.first + place, self._heard(*one)
 
     def _heard(self, value: int, good_stop: bool, start_tick: int) -> Event:
         tick = self.known_tick(start_tick)

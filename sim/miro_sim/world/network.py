@@ -26,7 +26,7 @@ from miro_sim.scenario.build import radio_for
 from miro_sim.world.control_noise import NoisyCommands
 from miro_sim.world.deeds import SETTLE_TICKS, Deeds
 from miro_sim.world.events import Event, HostLog, of_deed
-from miro_sim.world.outbox import LONGEST_BYTES, Outbox
+from miro_sim.world.outbox import LATEST_TICK, LONGEST_BYTES, Outbox
 from miro_sim.world.robot import Robot
 from miro_sim.world.sight import PixelSight, Sight, sight_of
 
@@ -152,7 +152,10 @@ class Network:
             self.downlink.send(sent.tick, sent.data, sent.bad_stop)
             self.frames_sent += 1
             self.sent.append(sent)
-            self.log.note(Event(tick=sent.tick, what="sent", network=self.index, data=sent.data))
+            good = not sent.bad_stop
+            self.log.note(
+                Event(tick=sent.tick, what="sent", network=self.index, data=sent.data, good_stop=good)
+            )
 
     def settle(self, rendezvous_tick: int) -> None:
         """All networks have sent: the line is known up to where the robots stop next."""
@@ -167,8 +170,9 @@ class Network:
         earliest = self.earliest_tick(now)
         if not 0 < len(data) <= LONGEST_BYTES:
             raise ValueError(f"net{self.index}: {len(data)} characters; give 1 to {LONGEST_BYTES}")
-        if at_tick is not None and at_tick < earliest:
-            raise ValueError(f"net{self.index}: tick {at_tick} is too early; the earliest is {earliest}")
+        if at_tick is not None and not earliest <= at_tick <= LATEST_TICK:
+            limits = f"the earliest is {earliest}, the latest {LATEST_TICK} (a day)"
+            raise ValueError(f"net{self.index}: tick {at_tick} is out of range; {limits}")
         free_tick = self.downlink.free_tick
         tick = max(earliest, self.outbox.end_tick(free_tick)) if at_tick is None else at_tick
         try:

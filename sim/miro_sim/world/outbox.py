@@ -15,10 +15,13 @@ from typing import NamedTuple
 
 import msgspec
 
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.state import TICK, Rows
 from miro_protocol.transmission import DOWN, Transmission
 
 STATION, INJECTED = 0, 1
+LATEST_TICK = 86_400 * TICKS_PER_SECOND
+"""A day: nothing is announced for a later tick."""
 LONGEST_BYTES = 1 << 20
 """Of one transmission: 18 minutes on the air."""
 

@@ -69,9 +69,8 @@ class Robot:
             )
         except ArithmeticError as error:  # what follows from the parameters divides by zero
             raise DomainError(f"{name}: its drive parameters lead to a value that is not finite") from error
-        self.board = Board(
-            load_wiring(), self.drive, spec.slot, robots, scenario.lm629, scenario.stop_on_fault
-        )
+        strap = spec.slot if spec.strap is None else spec.strap
+        self.board = Board(load_wiring(), self.drive, strap, robots, scenario.lm629, scenario.stop_on_fault)
         self.board.load(image)
         self.marks: tuple[int, ...] = ()
         self.asked: list[tuple[Callable[[Robot], object], str]] = []

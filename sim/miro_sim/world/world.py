@@ -423,6 +423,8 @@ def _total(values: Sequence[int | None]) -> int | None:
 
 def _whole(ticks: int) -> int:
     try:
+        if isinstance(ticks, bool):
+            raise TypeError
         return operator.index(ticks)
     except TypeError:
         raise ValueError(f"{ticks!r} is no whole number of ticks") from None

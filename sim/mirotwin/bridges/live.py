@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.file import Also, ScenarioText, load, nothing_else
+from miro_sim.scenario.file import Also, ScenarioText, builtin_names, load, nothing_else
 from miro_sim.scenario.keys import Scenario
 
 LONGEST_S = 86_400.0
@@ -23,6 +23,8 @@ def live_scenario(source: str, settings: Sequence[str] = (), also: Also = nothin
     the robots' starts, and what the summary compares with. Raises ScenarioError as `scenario.file.load` does, also for
     a reference of one's own that leaves the pitch within a day, and for a scenario with steps.
     """
+    if source in builtin_names():
+        settings = ("expect={}", *settings)  # which its own controller is to fulfil, and nothing steers here
     own = load(source, settings, also)
     if own.scenario.step:
         what = "a live session does no steps"

@@ -14,9 +14,9 @@ from typing import NoReturn
 from serial.serialutil import SerialException
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import check_regular
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
-from miro_sim.inputs import check_regular
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from miro_sim.world.world import World

@@ -133,6 +133,7 @@ class TcpEndpoint(Endpoint):
             return
         found.setblocking(False)
         found.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        _keep_alive(found)
         self._socket = found
         self._input_over_tick = -1
         self._wire = bytearray()
@@ -164,3 +165,16 @@ class TcpEndpoint(Endpoint):
         else:
             self.selector.modify(self._socket, wanted)
         self._watched = wanted
+
+
+def _keep_alive(found: socket.socket) -> None:
+    """A client that vanished without a word is gone after a minute: nobody else could come as long as it is there."""
+    found.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in (
+        ("TCP_KEEPIDLE", 30),
+        ("TCP_KEEPINTVL", 10),
+        ("TCP_KEEPCNT", 3),
+        ("TCP_USER_TIMEOUT", 60_000),  # ms; while an answer is on its way, the kernel does not probe
+    ):
+        if hasattr(socket, name):
+            found.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)

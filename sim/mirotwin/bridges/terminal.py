@@ -27,7 +27,8 @@ class PtyEndpoint(Endpoint):
     """`link`: a symbolic link that is made to it, None for none. Raises BadInput where either cannot be had.
 
     `force`: replaces a link to a terminal; one that leads nowhere is replaced anyway. A session that was killed leaves
-    its link, and the kernel may have given the terminal's number to somebody else.
+    its link, and the kernel may have given the terminal's number to another program. A link that a living session
+    serves is never replaced: that one holds the lock of `.NAME.lock` beside it.
     """
 
     kind = "pty"
@@ -46,6 +47,7 @@ class PtyEndpoint(Endpoint):
         self._make_raw()
         os.close(slave)
         self._link: Path | None = None
+        self._lock: int | None = None
         if link is not None:
             self._make_link(link, force)
         super().__init__(place, self.path if link is None else f"{link}")
@@ -62,11 +64,19 @@ class PtyEndpoint(Endpoint):
 
     def _make_link(self, link: Path, force: bool) -> None:
         try:
+            self._lock = _locked(_lock_of(link))
             if link.is_symlink() and (not link.exists() or (force and _is_terminal(link))):
                 link.unlink()
             link.symlink_to(self.path)
+        except BlockingIOError:
+            os.close(self._master)
+            what, remedy = "another session serves it", "end that one, or choose another link with --pty"
+            raise BadInput(link, "", what, remedy) from None
         except OSError as error:
             os.close(self._master)
+            if self._lock is not None:
+                _lock_of(link).unlink(missing_ok=True)
+            _unlock(self._lock)
             what = "is there already" if isinstance(error, FileExistsError) else f"{error.strerror or error}"
             remedy = "choose another link with --pty, or replace a link to a terminal with --force"
             raise BadInput(link, "", what, remedy) from None
@@ -118,6 +128,9 @@ class PtyEndpoint(Endpoint):
             self.has_gone("is left: the session ends")
         if self._link is not None and self._link.is_symlink() and os.readlink(self._link) == self.path:
             self._link.unlink()
+        if self._link is not None:
+            _lock_of(self._link).unlink(missing_ok=True)
+        _unlock(self._lock)
         os.close(self._master)
 
     def _watch(self, leave: bool = False) -> None:
@@ -137,3 +150,31 @@ class PtyEndpoint(Endpoint):
 
 def _is_terminal(link: Path) -> bool:
     return os.path.dirname(os.readlink(link)) == "/dev/pts"
+
+
+def _lock_of(link: Path) -> Path:
+    return link.with_name(f".{link.name}.lock")
+
+
+def _locked(path: Path) -> int:
+    """The descriptor that holds the lock; it is free once that is closed or the process is gone.
+
+    Raises BlockingIOError where another process has it.
+    """
+    import fcntl
+
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(descriptor)
+            raise
+        if os.fstat(descriptor).st_nlink:
+            return descriptor
+        os.close(descriptor)  # the session that had it removed the file meanwhile
+
+
+def _unlock(descriptor: int | None) -> None:
+    if descriptor is not None:
+        os.close(descriptor)

@@ -14,6 +14,7 @@ from typing import Any
 
 from mirotwin.campaign.inline import inline
 from mirotwin.campaign.results import About
+from mirotwin.files.command_line import command_line, operand
 
 
 def arm_line(about: About, levels: Mapping[str, Any]) -> str:
@@ -27,8 +28,10 @@ def arm_line(about: About, levels: Mapping[str, Any]) -> str:
             return ""
         scenario, firmware = level.scenario or scenario, level.firmware or firmware
         settings += level.settings
-    words = ["mirotwin", "run", scenario, *(["--firmware", firmware] if firmware else [])]
-    return shlex.join([*words, *(word for one in settings for word in ("--set", one))])
+    image = ["--firmware", operand(firmware)] if firmware else []
+    return command_line(
+        "run", operand(scenario), *image, *(word for one in settings for word in ("--set", one))
+    )
 
 
 def drawn_words(about: About, row: Mapping[str, Any]) -> str:

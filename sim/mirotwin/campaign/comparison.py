@@ -3,9 +3,9 @@
 What belongs here: differences with their intervals, and what counts as worse. What does not: finding pairs (`rows`),
 statistics (`statistics`), and words (`cli.campaign_show`).
 
-Runs on the same seed have the same noise, so their difference varies less than either. A figure is worse when the whole
-interval of its mean difference is on the bad side, by more than a tolerance. Errors and firmware faults need no
-statistics: one more is worse.
+Runs on the same seed have the same noise, so their difference varies less than either. A seed with all its pairs is one
+sample, because they share that noise. A figure is worse when the whole interval of its mean difference is on the bad
+side, by more than a tolerance. Errors and firmware faults need no statistics: one more is worse.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 from mirotwin.campaign.rows import Rows
 from mirotwin.campaign.statistics import Interval, mean, mean_interval, quantile
 
-FEWEST = 8
-"""Pairs below which an interval says nothing."""
+FEWEST_FOR_GATE = 20
+"""Seeds below which a comparison fails or passes by the luck of a few."""
 COUNTED = ("error", "fault")
 GATED = ("rms_position_cm", "rms_theta_deg", "settling_s", "unsettled", "failed", *COUNTED)
 """What is judged unless told. A smaller number is better in each."""
@@ -27,14 +27,16 @@ MORE_IS_BETTER = ("frames_accepted", "frames_sent", "simulated_s", "vision_frame
 
 
 class Difference(msgspec.Struct, frozen=True):
-    """A metric in `pairs` pairs: means of the first and the second, and of second minus first with its interval.
+    """A metric in `pairs` pairs of `seeds` seeds: means of both, and of second minus first with its interval.
 
-    `median`: of the differences. `higher`, `lower`: in so many pairs the second is. `interval` is None for fewer than
-    8 pairs.
+    `without`: pairs that are left out, because one of the two runs does not have the metric. `median`: of the
+    differences. `higher`, `lower`: in so many pairs the second is. `interval` is None for fewer than 8 seeds.
     """
 
     metric: str
     pairs: int
+    without: int
+    seeds: int
     first: float
     second: float
     difference: float
@@ -64,14 +66,16 @@ def difference(metric: str, first: Rows, second: Rows, pairs: Sequence[tuple[int
     ours, theirs = ours[both], theirs[both]
     if not len(ours):
         return None
-    apart = theirs - ours
+    apart, seeds = theirs - ours, second.samples()[places[both, 1]]
     return Difference(
         metric=metric,
         pairs=len(apart),
+        without=len(places) - len(apart),
+        seeds=len(np.unique(seeds)),
         first=mean(ours),
         second=mean(theirs),
         difference=mean(apart),
-        interval=mean_interval(apart) if len(apart) >= FEWEST else None,
+        interval=mean_interval(apart, seeds),
         median=quantile(np.sort(apart), 0.5),
         higher=int(np.count_nonzero(apart > 0.0)),
         lower=int(np.count_nonzero(apart < 0.0)),

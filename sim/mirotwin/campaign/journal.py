@@ -21,13 +21,14 @@ from typing import Any, BinaryIO
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import check_regular
 from mirotwin.campaign.versions import Versions
 from mirotwin.campaign.wall import now_s
 from mirotwin.campaign.worker import Outcome
 
 FORM = 1
 SYNC_S = 1.0
-_HEAD_BYTES = 1 << 20
+_LINE_BYTES = 1 << 20
 
 
 class Head(msgspec.Struct, frozen=True):
@@ -65,6 +66,7 @@ class Journal:
         self.count = 0
         self.done = bytearray(head.runs)
         self._synced_s = now_s()
+        check_regular(path)
         self._stream: BinaryIO = path.open("a+b", buffering=0)
         try:
             self._lock()
@@ -147,8 +149,8 @@ class Journal:
 def read_head(path: Path) -> tuple[Head | None, int]:
     """The first line and where it ends; None where not even that was written. Raises BadInput for another file."""
     with path.open("rb") as stream:
-        line = stream.readline(_HEAD_BYTES)
-    if not line.endswith(b"\n") and len(line) < _HEAD_BYTES:
+        line = stream.readline(_LINE_BYTES)
+    if not line.endswith(b"\n") and len(line) < _LINE_BYTES:
         if line and not b'{"mirotwin_campaign":'.startswith(line[:21]):
             raise _no_journal(path)
         return None, 0
@@ -166,8 +168,10 @@ def outcomes(path: Path) -> Iterator[tuple[Outcome, int]]:
     """Each outcome of the file, and the offset behind it. Raises BadInput for a line that is none."""
     decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Outcome)
     with path.open("rb") as stream:
-        end = len(stream.readline())
-        for number, line in enumerate(stream, 2):
+        end = len(stream.readline(_LINE_BYTES))
+        for number, line in enumerate(iter(lambda: stream.readline(_LINE_BYTES), b""), 2):
+            if len(line) == _LINE_BYTES:
+                raise BadInput(path, number, "the line is longer than any outcome", "begin anew with --force")
             if not line.endswith(b"\n"):
                 return
             end += len(line)

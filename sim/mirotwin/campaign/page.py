@@ -113,15 +113,16 @@ def _arms(
 
     verdicts = rows.column("verdict")
     drawn: dict[str, list[Arm]] = {name: [] for name in metrics}
-    columns = {name: rows.numbers(name) for name in metrics}
+    columns, samples = {name: rows.numbers(name) for name in metrics}, rows.samples()
     found = []
     for levels, members in groups.items():
         label = label_of(by, levels)
         of_arm: dict[str, Figures | None] = {}
         for name, column in columns.items():
             numbers = column[np.array(members)]
-            numbers = numbers[~np.isnan(numbers)]
-            of_arm[name] = summary = figures(numbers)
+            there = ~np.isnan(numbers)
+            numbers = numbers[there]
+            of_arm[name] = summary = figures(numbers, samples[np.array(members)][there])
             if summary is not None:
                 drawn[name].append(Arm(label, numbers, summary))
         counted = [verdicts[row] for row in members]

@@ -19,7 +19,7 @@ from miro_exact import engine
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.file import load
+from miro_sim.scenario.file import builtin_names, load
 from miro_sim.scenario.settings import EXPECT, OPTION
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN
 from mirotwin.campaign.design import Design, Level, Value
@@ -133,7 +133,8 @@ def _scenarios(file: CampaignFile) -> dict[str, ScenarioSource]:
     found = {}
     for name, place in _named(file, file.scenario, "scenario"):
         try:
-            found[name] = ScenarioSource(name, load(name).text)
+            own = ("expect={}",) if name in builtin_names() else ()  # a campaign varies what it presupposes
+            found[name] = ScenarioSource(name, load(name, own).text)
         except ScenarioError as error:
             raise BadInput(file.path, place, f"{error}") from None
     return found

@@ -15,6 +15,7 @@ from multiprocessing import get_context
 
 from miro_exact import engine
 from mirotwin.campaign.wall import end_with_parent
+from mirotwin.files.children import safe_path
 
 
 def processes(count: int) -> ProcessPoolExecutor:
@@ -23,10 +24,13 @@ def processes(count: int) -> ProcessPoolExecutor:
     Ctrl-C goes to all processes of a terminal; the first one tells the others to end. They ignore it from their first
     instruction on: what a process ignores, those that it starts ignore too.
     """
-    found = ProcessPoolExecutor(
-        max_workers=count, mp_context=get_context("spawn"), initializer=_begin, initargs=(engine.active(),)
-    )
-    with _ignoring_interrupts():
+    with _ignoring_interrupts(), safe_path():
+        found = ProcessPoolExecutor(
+            max_workers=count,
+            mp_context=get_context("spawn"),
+            initializer=_begin,
+            initargs=(engine.active(),),
+        )
         for _ in range(count):  # each of which starts a process, as long as none is idle
             found.submit(_nothing)
     return found

@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, shortened
+from miro_exact.inputs import check_regular
 from mirotwin.campaign.columns import CHECK, FIGURES
 from mirotwin.campaign.design import Level
 from mirotwin.campaign.journal import Head, in_order
@@ -30,6 +31,11 @@ from mirotwin.files.outputs import OutputError, whole_file
 if TYPE_CHECKING:
     import pyarrow as pa
 
+GIVE = "give the .parquet file of a campaign"
+MOST_ROWS, MOST_COLUMNS, MOST_BYTES, META_BYTES = 5_000_000, 2000, 2 << 30, 64 << 20
+EACH_ROW = {"run": ("int64",), "seed": ("int64",), "verdict": ("string",)}
+"""Columns that no row may lack, with their types."""
+OWN_COLUMNS = frozenset(("run", "seed", "draw", "verdict", "error", "failure", "digest", *FIGURES))
 ROWS = 10_000
 """Rows of a group: what is in memory while a file is written."""
 META = b"mirotwin_campaign"
@@ -121,16 +127,49 @@ def read(path: str | Path) -> tuple[pa.Table, About]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    check_regular(path)
     try:
-        table = pq.read_table(path)
+        with pq.ParquetFile(path, thrift_string_size_limit=META_BYTES) as file:
+            _check_size(path, file.metadata)
+            about = about_of(path, file.schema_arrow.metadata)
+            _check_columns(path, file.schema_arrow, about)
+            table = file.read()
     except FileNotFoundError:
-        raise BadInput(path, "", "there is no such file", "give the .parquet file of a campaign") from None
-    except (pa.ArrowException, OSError) as error:
+        raise BadInput(path, "", "there is no such file", GIVE) from None
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = f"{error}".partition("\n")[0]
-        raise BadInput(
-            path, "", f"is no Parquet file: {reason}", "give the .parquet file of a campaign"
-        ) from None
-    return table, about_of(path, table.schema.metadata)
+        raise BadInput(path, "", f"is no Parquet file: {reason}", GIVE) from None
+    for name in (*about.factors, *about.drawn, *EACH_ROW):
+        if table[name].null_count:
+            raise BadInput(path, f"column {shortened(name)}", "lacks a value in some row", GIVE)
+    return table, about
+
+
+def _check_size(path: str | Path, metadata: Any) -> None:
+    """Before anything is read: a small file may hold many rows, which are many equal ones."""
+    size = 0
+    for at in range(metadata.num_row_groups):
+        size += metadata.row_group(at).total_byte_size
+    if metadata.num_rows > MOST_ROWS:
+        raise BadInput(path, "", f"holds {metadata.num_rows} runs, more than {MOST_ROWS}", GIVE)
+    if metadata.num_columns > MOST_COLUMNS:
+        raise BadInput(path, "", f"has {metadata.num_columns} columns, more than {MOST_COLUMNS}", GIVE)
+    if size > MOST_BYTES:
+        raise BadInput(path, "", f"holds {size >> 20} MiB, more than {MOST_BYTES >> 20}", GIVE)
+
+
+def _check_columns(path: str | Path, schema: Any, about: About) -> None:
+    """What statistics rely on: a seed in each row, and each factor once, with values that can be compared."""
+    kinds = ("int64", "double", "bool", "string")
+    named = (*about.factors, *about.drawn)
+    if len(set(named)) < len(named) or set(named) & OWN_COLUMNS:
+        raise BadInput(path, "", "names a factor twice, or one that is none", GIVE)
+    for name in (*named, *EACH_ROW):
+        places = schema.get_all_field_indices(name)
+        kind = f"{schema.field(places[0]).type}" if len(places) == 1 else None
+        if kind not in EACH_ROW.get(name, kinds):
+            what = "there is no such column" if kind is None else f"holds {kind}"
+            raise BadInput(path, f"column {shortened(name)}", what, GIVE)
 
 
 def counted(path: Path, listed: int) -> dict[str, tuple[int, list[tuple[int, str]]]]:

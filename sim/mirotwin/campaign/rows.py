@@ -20,7 +20,7 @@ from mirotwin.campaign.columns import CHECK, FIGURES
 from mirotwin.campaign.design import Value
 from mirotwin.campaign.inline import inline
 from mirotwin.campaign.results import About, read
-from mirotwin.campaign.statistics import Numbers
+from mirotwin.campaign.statistics import Numbers, Seeds
 
 VERDICTS = ("failed", "fault", "error")
 UNSETTLED = "unsettled"
@@ -78,6 +78,13 @@ class Rows:
             if isinstance(error, BadInput):
                 raise
             raise BadInput(self.path, name, "holds no numbers", "run the campaign again") from None
+
+    def samples(self) -> Seeds:
+        """Which rows stand together as one sample: those of a seed; with a single seed, those of a draw."""
+        seeds = np.array(self.column("seed"), dtype=np.int64)
+        if "draw" in self.table.column_names and len(np.unique(seeds)) == 1:
+            return np.array(self.column("draw"), dtype=np.int64)
+        return seeds
 
     def levels(self, name: str) -> list[Value]:
         """The values of a factor, in the order of the plan."""

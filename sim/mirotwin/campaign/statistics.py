@@ -2,24 +2,36 @@
 
 What belongs here: a column of numbers to its figures. What does not: which rows (`comparison`), and words (`cli`).
 
-Intervals are percentile bootstrap intervals (Efron, "Bootstrap methods: another look at the jackknife", Annals of
-Statistics 7, 1979, doi:10.1214/aos/1176344552): the figure is computed for 2000 sets of the same size, drawn with
-replacement, and the middle 95 % of what comes out is the interval. The draws are those of a stream of `miro_exact.rng`,
-and sums are made in a written order: the same rows give the same digits everywhere.
+Runs with the same seed share its calibration, its wheels and its noise, so they are not independent: a sample is a
+seed with all its runs. The interval of a mean is Student's, with the variance between seeds (Liang and Zeger,
+"Longitudinal data analysis using generalized linear models", Biometrika 73, 1986, doi:10.1093/biomet/73.1.13) and one
+degree of freedom less than there are seeds. The interval of a median is a percentile bootstrap (Efron, "Bootstrap
+methods: another look at the jackknife", Annals of Statistics 7, 1979, doi:10.1214/aos/1176344552): the median of 2000
+sets of as many seeds, drawn with replacement, and the middle of what comes out: 95 % of it for many seeds, more for few
+(Hesterberg, "What teachers should know about the bootstrap", The American Statistician 69, 2015,
+doi:10.1080/00031305.2015.1089789: the expanded percentile interval). How often such intervals hold what they should:
+`python -m benchmarks.intervals`.
+
+The draws are those of a stream of `miro_exact.rng`, and sums are made in a written order: the same rows give the same
+digits everywhere.
 """
 
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from miro_exact import dmath
+
 Numbers = npt.NDArray[np.float64]
+Seeds = npt.NDArray[np.int64]
 RESAMPLES = 2000
-LOW, HIGH = 0.025, 0.975
 STREAM = "campaign bootstrap"
 """Of seed 0."""
 BATCH = 100_000
@@ -27,6 +39,18 @@ BATCH = 100_000
 _TAG = hashlib.sha256(STREAM.encode()).digest()
 _HALF, _WORD = np.uint64(32), np.uint64(0xFFFFFFFF)
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+FEWEST = 8
+"""Seeds below which an interval says nothing."""
+# fmt: off
+_STUDENT = (
+    12.7062, 4.3027, 3.1824, 2.7764, 2.5706, 2.4469, 2.3646, 2.3060, 2.2622, 2.2281,
+    2.2010, 2.1788, 2.1604, 2.1448, 2.1314, 2.1199, 2.1098, 2.1009, 2.0930, 2.0860,
+    2.0796, 2.0739, 2.0687, 2.0639, 2.0595, 2.0555, 2.0518, 2.0484, 2.0452, 2.0423,
+)
+# fmt: on
+"""97.5 % of Student's t is below these, for 1 to 30 degrees of freedom."""
+_STUDENT_FROM_30 = ((30, 2.0423), (40, 2.0211), (60, 2.0003), (120, 1.9799))
+_NORMAL = 1.95996
 
 
 class Interval(msgspec.Struct, frozen=True):
@@ -37,13 +61,17 @@ class Interval(msgspec.Struct, frozen=True):
 
 
 class Figures(msgspec.Struct, frozen=True):
-    """What `count` numbers amount to. `quantiles`: share -> value, as `quantile`."""
+    """What `count` numbers of `seeds` seeds amount to. `quantiles`: share -> value, as `quantile`.
+
+    Intervals are None for fewer than 8 seeds.
+    """
 
     count: int
+    seeds: int
     mean: float
-    mean_interval: Interval
+    mean_interval: Interval | None
     median: float
-    median_interval: Interval
+    median_interval: Interval | None
     quantiles: dict[str, float]
 
 
@@ -91,31 +119,70 @@ def _words(first: int, count: int) -> npt.NDArray[np.uint64]:
     return words[first % 4 : first % 4 + count]
 
 
-def figures(numbers: Numbers) -> Figures | None:
-    """None where there are no numbers."""
+def student(freedom: int) -> float:
+    """The t that 97.5 % are below; above 30 degrees of freedom interpolated in their inverse, to 0.0002."""
+    if freedom <= len(_STUDENT):
+        return _STUDENT[freedom - 1]
+    for (low, at_low), (high, at_high) in pairwise((*_STUDENT_FROM_30, (0, _NORMAL))):
+        if freedom <= high or not high:
+            inverse = 1.0 / high if high else 0.0
+            return at_high + (at_low - at_high) * (1.0 / freedom - inverse) / (1.0 / low - inverse)
+    raise AssertionError(freedom)
+
+
+def figures(numbers: Numbers, seeds: Seeds) -> Figures | None:
+    """`seeds`: of which each number is. None where there are no numbers."""
     if not len(numbers):
         return None
-    ordered = np.sort(numbers)
-    means, medians = [], []
-    for places in draws(len(numbers)):
-        drawn = numbers[places]
-        means.append(mean(drawn))
-        medians.append(quantile(np.sort(drawn), 0.5))
+    order = np.argsort(numbers, kind="stable")
+    ordered = numbers[order]
+    count, of_seed = _numbered(seeds)
     return Figures(
         count=len(numbers),
+        seeds=count,
         mean=mean(numbers),
-        mean_interval=_middle(means),
+        mean_interval=mean_interval(numbers, seeds),
         median=quantile(ordered, 0.5),
-        median_interval=_middle(medians),
+        median_interval=_median_interval(ordered, of_seed[order], count),
         quantiles={f"{share:g}": quantile(ordered, share) for share in QUANTILES},
     )
 
 
-def mean_interval(numbers: Numbers) -> Interval:
-    """The bootstrap interval of the mean alone."""
-    return _middle([mean(numbers[places]) for places in draws(len(numbers))])
+def mean_interval(numbers: Numbers, seeds: Seeds) -> Interval | None:
+    """Of the mean alone, with the variance between seeds. None for fewer than 8 seeds."""
+    count, of_seed = _numbered(seeds)
+    if count < FEWEST:
+        return None
+    middle = mean(numbers)
+    apart = np.zeros(count)
+    np.add.at(apart, of_seed, numbers - middle)
+    variance = count / (count - 1) * float(np.add.accumulate(apart * apart)[-1])
+    reach = student(count - 1) * math.sqrt(variance) / len(numbers)
+    return Interval(middle - reach, middle + reach)
 
 
-def _middle(found: list[float]) -> Interval:
-    ordered = np.sort(np.array(found))
-    return Interval(quantile(ordered, LOW), quantile(ordered, HIGH))
+def _median_interval(ordered: Numbers, of_seed: Seeds, count: int) -> Interval | None:
+    """`ordered`: all numbers; `of_seed`: the seed of each, from 0 to `count` - 1."""
+    if count < FEWEST:
+        return None
+    medians = [
+        quantile(np.repeat(ordered, np.bincount(drawn, minlength=count)[of_seed]), 0.5)
+        for drawn in draws(count)
+    ]
+    found = np.sort(np.array(medians))
+    beyond = _below(-math.sqrt(count / (count - 1)) * student(count - 1))
+    return Interval(quantile(found, beyond), quantile(found, 1.0 - beyond))
+
+
+def _below(deviations: float) -> float:
+    """The share of a normal distribution below a negative number: Abramowitz and Stegun, 26.2.17, to 7.5e-8."""
+    t = 1.0 / (1.0 - 0.2316419 * deviations)
+    series = t * (0.319381530 + t * (-0.356563782 + t * (1.781477937 + t * (-1.821255978 + t * 1.330274429))))
+    return 0.3989422804014327 * dmath.exp(-0.5 * deviations * deviations) * series
+
+
+def _numbered(seeds: Seeds) -> tuple[int, Seeds]:
+    """How many seeds there are, and for each number which one it has, numbered as they first appear."""
+    numbers: dict[int, int] = {}
+    places = [numbers.setdefault(seed, len(numbers)) for seed in seeds.tolist()]
+    return len(numbers), np.array(places, dtype=np.int64)

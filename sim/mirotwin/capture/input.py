@@ -12,7 +12,7 @@ import sys
 from types import TracebackType
 from typing import BinaryIO
 
-from miro_sim.inputs import InputError, check_no_folder
+from miro_exact.inputs import InputError, check_no_folder
 from mirotwin.files.outputs import RECORDING
 
 STDIN = "-"

@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import msgspec
 
+from miro_exact.inputs import InputError
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DOWN, UP, Transmission
-from miro_sim.inputs import InputError
 from mirotwin.capture.source import READ_ERRORS, Source
 
 HEAD_CHARACTERS = 1 << 16

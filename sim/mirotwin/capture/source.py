@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator
 
 import msgspec
 
+from miro_exact.inputs import InputError
 from miro_protocol import pcapng_reader, stream
 from miro_protocol.pcapng_reader import CaptureError
 from miro_protocol.stream import StreamError
 from miro_protocol.transmission import DOWN, Transmission, character_ticks
-from miro_sim.inputs import InputError
 from mirotwin.capture import recorded
 from mirotwin.capture.detect import TIMED
 from mirotwin.capture.hextext import HexError, HexText

@@ -83,7 +83,7 @@ class _AnswerJudge(Judge[Check]):
 
 
 class WithinJudge(_AnswerJudge):
-    """`asked`: the questions that wait for their answers."""
+    """`asked`: the question that waits for its answer. One that comes meanwhile need not be answered."""
 
     def __init__(self, check: AnswersWithin, subject: Subject) -> None:
         super().__init__(check, subject)
@@ -93,7 +93,8 @@ class WithinJudge(_AnswerJudge):
 
     def question(self, frame: Received) -> None:
         self.judged += 1
-        self.asked.append(frame)
+        if not self.asked:
+            self.asked = [frame]
 
     def answer(self, frame: Received) -> None:
         for asked in self.asked:

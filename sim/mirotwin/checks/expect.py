@@ -36,7 +36,7 @@ def struct_of(name: str) -> type[Check]:
 
 
 def expectations_of(scenario: Scenario, origin: str) -> dict[Place, list[Check]]:
-    """The checks of each robot, the four of every run first. Raises ScenarioError with the path of what is wrong."""
+    """The checks of each robot, those that are always on first. Raises ScenarioError with the path of what is wrong."""
     end_tick = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
     for_all = checks_of_table(scenario, origin, "expect", scenario.expect, end_tick)
     found: dict[Place, list[Check]] = {}

@@ -71,6 +71,7 @@ class MotorsOff(SilenceCheck, frozen=True, kw_only=True, tag="motors_off_ms"):
 class SilenceJudge(Judge[SilenceCheck]):
     """`fresh_tick`: end of the last fresh frame, None before the first and once its silence has been judged.
     `in_time`: a wheel was told in time. A wheel that needed no order, because it stood, is no occasion to judge.
+    `late`: (end of the last fresh frame, tick of the failure) of wheels that have not been told yet.
     """
 
     HEARS = ("received", "frame", "command")
@@ -86,6 +87,7 @@ class SilenceJudge(Judge[SilenceCheck]):
         self.latest_ticks = ms_ticks(check.after_ms + check.tolerance_ms)
         self.testing_ticks = ms_ticks(TESTING_MS)
         self.heard_tick: int | None = None
+        self.late: tuple[int, int] | None = None
         self.wanted = (
             f"{check.WANTED} {check.after_ms:g} +- {check.tolerance_ms:g} ms after the last fresh frame"
         )
@@ -97,6 +99,7 @@ class SilenceJudge(Judge[SilenceCheck]):
                 self.heard_tick = event.tick  # what comes when the time is over puts nothing off
         elif event.what == "frame":
             if event.value and event.frame is not None:
+                self._fail_late(event.tick)
                 self.fresh_tick = event.frame.last_tick + HOST_CHARACTER_TICKS
                 self.in_time = False
         else:
@@ -105,6 +108,8 @@ class SilenceJudge(Judge[SilenceCheck]):
     def _command(self, event: Event) -> None:
         unfulfilled = self._unfulfilled()
         order = self.orders.take(event)
+        if not self._unfulfilled():
+            self._fail_late(event.tick)
         if order is None or self.fresh_tick is None or not self.check.fulfilled(order):
             return
         silence = event.tick - self.fresh_tick
@@ -119,8 +124,12 @@ class SilenceJudge(Judge[SilenceCheck]):
 
     def restarted(self, tick: int) -> None:
         self.until(tick)
+        self._fail_late(tick)
         self.fresh_tick = None
         self.orders = Orders()
+
+    def end(self, tick: int) -> None:
+        self._fail_late(tick)
 
     def until(self, tick: int) -> None:
         if self.fresh_tick is None or tick <= self.fresh_tick + self.latest_ticks:
@@ -134,8 +143,24 @@ class SilenceJudge(Judge[SilenceCheck]):
         unfulfilled = self._unfulfilled()
         self.judged += bool(unfulfilled or self.in_time)
         if unfulfilled:
-            self.fail(latest_tick, self.wanted, f"not so: {' and '.join(unfulfilled)}")
+            self.late = (self.fresh_tick, latest_tick)
         self.fresh_tick = None
+
+    def _fail_late(self, tick: int) -> None:
+        """Notes the failure of wheels that are late, when it is known how late: at `tick` they are told, or it is given
+        up to wait.
+        """
+        if self.late is not None:
+            (fresh_tick, latest_tick), self.late = self.late, None
+            found = [self._when(order, fresh_tick, tick) for order in self.orders.last.values()]
+            self.fail(latest_tick, self.wanted, ", ".join(found))
+
+    def _when(self, order: Order, fresh_tick: int, tick: int) -> str:
+        if not self.check.fulfilled(order):
+            return f"{order.side} not within {in_ms(tick - fresh_tick)}"
+        if order.tick <= fresh_tick:
+            return f"{order.side} before that frame"
+        return f"{order.side} at {in_ms(order.tick - fresh_tick)}"
 
     def _unfulfilled(self) -> list[str]:
         return [side for side, order in self.orders.last.items() if not self.check.fulfilled(order)]

@@ -1,4 +1,4 @@
-"""The four checks that are always on: what firmware must not do, by kinds of firmware fault.
+"""What firmware must not do, by kinds of firmware fault: four checks that are always on.
 
 What belongs here: which faults fail which check, and the LM629's own complaint. What does not: finding faults. CPU and
 board do that while they run (`miro_robot.faults`), so these checks cost next to nothing.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from miro_robot.faults import FaultKind, FirmwareFault
+from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
 from miro_robot.lm629.signals import COMMAND_ERROR
 from miro_sim.periods import RobotPeriod
 from mirotwin.checks.interface import Check, Judge, Kind, Subject
@@ -52,9 +52,9 @@ class MainLoopAlive(FaultCheck, frozen=True, kw_only=True, tag="main_loop_alive"
 
 
 class StackClear(FaultCheck, frozen=True, kw_only=True, tag="stack_clear"):
-    """The stack pointer never goes over an end of internal RAM, where the stack runs into data."""
+    """The stack pointer never leaves the stack: what the linker's map gives it, all of internal RAM without a map."""
 
-    KINDS = (FaultKind.STACK_OVERFLOW, FaultKind.STACK_UNDERFLOW)
+    KINDS = STACK_FAULTS
     WANTED = "a stack clear of data"
 
 

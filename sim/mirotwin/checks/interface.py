@@ -30,6 +30,7 @@ import msgspec
 from miro_exact.clock import ticks
 from miro_robot.faults import FirmwareFault
 from miro_sim.periods import RobotPeriod
+from miro_sim.radio.downlink import Downlink
 from miro_sim.world.events import Event
 from miro_sim.world.robot import Robot
 
@@ -59,13 +60,14 @@ class Failure(msgspec.Struct, frozen=True):
 class Subject(msgspec.Struct, frozen=True):
     """The robot that is judged. `robots`: slots of its network; `end_tick`: when the run is over by itself.
 
-    `first_slot`: of the robots that are present in its network.
+    `first_slot`: of the robots that are present in its network; `radio`: from the PC to them.
     """
 
     robot: Robot
     robots: int
     end_tick: int
     first_slot: int = 0
+    radio: Downlink | None = None
 
     @property
     def network(self) -> int:

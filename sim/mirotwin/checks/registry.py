@@ -6,7 +6,7 @@ the checks. No check is imported before it is named.
 
 from miro_host.parts import Registry
 
-ALWAYS_ON = ("no_fault", "lm629_protocol", "main_loop_alive", "stack_clear")
+ALWAYS_ON = ("no_fault", "lm629_protocol", "main_loop_alive", "stack_clear", "acts_at_all")
 
 CHECKS: Registry[object] = Registry(
     "mirotwin.checks",
@@ -18,6 +18,7 @@ CHECKS: Registry[object] = Registry(
         "lm629_protocol": "mirotwin.checks.faults:Lm629Protocol",
         "main_loop_alive": "mirotwin.checks.faults:MainLoopAlive",
         "stack_clear": "mirotwin.checks.faults:StackClear",
+        "acts_at_all": "mirotwin.checks.alive:ActsAtAll",
         "failsafe_stop_ms": "mirotwin.checks.failsafe:FailsafeStop",
         "motors_off_ms": "mirotwin.checks.failsafe:MotorsOff",
         "moves_only_when_fresh": "mirotwin.checks.reception:MovesOnlyWhenFresh",

@@ -126,7 +126,7 @@ class _Watched:
     def __init__(
         self, world: World, network: Network, robot: Robot, checks: Sequence[Check], end_tick: int
     ) -> None:
-        subject = Subject(robot, network.spec.robots, end_tick, network.robots[0].slot)
+        subject = Subject(robot, network.spec.robots, end_tick, network.robots[0].slot, network.downlink)
         self.network = network
         self.robot = robot
         self.judges = [self._guarded(check, partial(check.judge, subject)) for check in checks]
@@ -141,6 +141,7 @@ class _Watched:
             self.hearing = Hearing(network.index, robot.slot, network.spec.robots)
         self.hears_board = any(what not in _FROM_PC for what in self.of_events)
         self.hears_pc = bool(self.of_events)
+        self.hears_characters = "heard" in self.of_events
         self.read_board = robot.board.log.end
         self.read_pc = network.log.end
         self.faults = len(robot.board.faults)
@@ -172,7 +173,9 @@ class _Watched:
         log, pc = self.robot.board.log, self.network.log
         if self.hears_pc:
             self.lost += max(0, pc.first - self.read_pc)
-            self.waiting += [event for _, event in pc.since(self.read_pc) if self._concerns(event)]
+            self.waiting += [
+                event for _, event in pc.since(self.read_pc, self.hears_characters) if self._concerns(event)
+            ]
             self.read_pc = pc.end
         if self.hears_board:
             self.lost += max(0, log.first - self.read_board)

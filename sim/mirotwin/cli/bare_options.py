@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
-from fractions import Fraction
 from typing import Any
 
 import click
@@ -17,13 +16,13 @@ import msgspec
 
 from miro_exact import clock
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import TEXT_BYTES, read_input
 from miro_robot.bare.input import Piece
 from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.bare.pins import PinEvent, read_pins
 from miro_robot.image import Image
-from miro_sim.inputs import TEXT_BYTES, read_input
 from mirotwin.cli.code_place import FLASH_BYTES, SPACE_BYTES, address_of, place_of
-from mirotwin.cli.options import Place, Whole, load_image
+from mirotwin.cli.options import STACK_FROM, STACK_FROM_HELP, Place, Whole, load_image
 from mirotwin.cli.program import (
     DONE,
     EXPECTATION_FAILED,
@@ -31,33 +30,10 @@ from mirotwin.cli.program import (
     LIMIT_REACHED,
     complain,
 )
+from mirotwin.cli.times import Time, TimeType
 
 STDIN = "-"
-UNITS = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 1_000_000)}
-
-
-class Time(msgspec.Struct, frozen=True):
-    """Seconds, or ticks of the crystal; which crystal is known only when all options are."""
-
-    value: Fraction
-    in_ticks: bool
-
-    def ticks(self, crystal_hz: int) -> int:
-        return int(self.value if self.in_ticks else self.value * crystal_hz)
-
-
-class Moment(click.ParamType):  # type: ignore[type-arg, unused-ignore]
-    """Ticks, or a time with its unit (1.5s, 20ms, 100us), as a Time."""
-
-    name = "TIME"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Time:
-        if isinstance(value, Time):
-            return value
-        match = re.fullmatch(r"(\d{1,18}(?:\.\d{1,18})?)(s|ms|us|)", str(value))
-        if match is None or (not match[2] and "." in match[1]):
-            self.fail(f"{value!r} is no time; give ticks, or a number with s, ms or us.", param, ctx)
-        return Time(Fraction(match[1]) * UNITS.get(match[2], 1), not match[2])
+_SCON, _NINE_BITS = 0x98, 0x80
 
 
 class CodeSize(click.ParamType):  # type: ignore[type-arg, unused-ignore]
@@ -88,6 +64,8 @@ class BareRequest(msgspec.Struct, frozen=True):
     code_size: int | None = None
     code_in_xram: bool = False
     crystal: int | None = None
+    stack_from: int | None = None
+    start: str | None = None
     go_on: bool = False
 
     @property
@@ -115,9 +93,9 @@ def bare_options(prefix: str = "") -> Callable[[Callable[..., Any]], Callable[..
         ("--stdin-when", {"metavar": "TEXT", "multiple": True},
          "Send --stdin when the program has sent TEXT. One for each --stdin, or for each but the first."),
         ("--stdin-by-line", {"is_flag": True}, "Send one line of --stdin each time the program has sent TEXT."),
-        ("--stdin-after", {"type": Moment()},
-         "Delay of --stdin after the start, or after its TEXT: ticks, or 200ms, 1.5s."),
-        ("--stdin-gap", {"type": Moment()}, "Shortest pause between two characters of --stdin. Default 0."),
+        ("--stdin-after", {"type": TimeType()},
+         "Delay of --stdin after the start, or after its TEXT, such as 200ms."),
+        ("--stdin-gap", {"type": TimeType()}, "Shortest pause between two characters of --stdin. Default 0."),
         ("--baud", {"type": Whole(50)},
          "Bit rate of --stdin. Default: that of the receiver. Needed by programs that measure the bit rate."),
         ("--pins", {"type": Place(), "metavar": "FILE"},
@@ -128,6 +106,8 @@ def bare_options(prefix: str = "") -> Callable[[Callable[..., Any]], Callable[..
          "EA low: program and data share 64 KB of RAM, so that data may overwrite the program."),
         ("--crystal", {"type": Whole(32_768, 100_000_000), "metavar": "HZ"},
          "Crystal frequency; a tick is one period, a machine cycle 12. Default 24000000."),
+        ("--start", {"metavar": "SYMBOL|ADDRESS"}, "Begin there instead of at 0x0000, as after a jump by a monitor."),
+        ("--stack-from", STACK_FROM, STACK_FROM_HELP),
         ("--go-on", {"is_flag": True}, "Continue after firmware faults; list them at the end, with exit code 3."),
     )  # fmt: skip
 
@@ -151,7 +131,7 @@ def load_bare_image(path: str, request: BareRequest, named: bool = True) -> Imag
             "", "--code-size", "program and data share 64 KB with --code-in-xram", "leave one of the two out"
         )
     limit = SPACE_BYTES if request.code_in_xram else request.code_size or FLASH_BYTES
-    return load_image(path, limit, named)
+    return load_image(path, limit, named, request.stack_from)
 
 
 def target_of(path: str, image: Image, request: BareRequest) -> int | None:
@@ -181,11 +161,25 @@ def make_machine(
             gap_ticks=_ticks(request.stdin_gap, request) or 0,
             live=live,
             pins=pins,
+            start=_start(image, request),
         )
     except ValueError as error:
         raise BadInput(
             "", "", f"--{error}" if str(error).startswith("baud") else f"--pins: {error}"
         ) from None
+
+
+def _start(image: Image, request: BareRequest) -> int:
+    """The first instruction. Raises BadInput for a program that has none there."""
+    start = 0 if request.start is None else address_of(request.start, image, f"{image.path}", "--start")
+    if not any(first <= start < end for first, end in image.used):
+        first = image.used[0][0]
+        place = "the processor starts there" if request.start is None else "--start names it"
+        remedy = (
+            f"give --start {first:#06x}, where it begins, or the monitor that jumps there as a second image"
+        )
+        raise BadInput(image.path, "", f"has no byte at {start:#06x}, and {place}", remedy)
+    return start
 
 
 def report(machine: BareMachine, ended: Ended, request: BareRequest) -> int:
@@ -206,9 +200,12 @@ def report(machine: BareMachine, ended: Ended, request: BareRequest) -> int:
         complain(f"addresses have no names: {machine.image.symbols.problem}")
     waiting = machine.input.waiting_for
     if waiting:
-        complain(
-            f"--stdin-when: {waiting!r} was not seen; {machine.input.left} bytes of --stdin were not sent"
+        seen = (
+            f"was not seen again after {machine.input.seen} times" if machine.input.seen else "was not seen"
         )
+        complain(f"--stdin-when: {waiting!r} {seen}; {machine.input.left} bytes of --stdin were not sent")
+    if request.stdin and machine.cpu.sfr(_SCON) & _NINE_BITS:
+        complain("--stdin: the serial port takes characters of 9 bits; the ninth was 1 in all that were sent")
     changed = machine.changed_code()
     if changed:
         complain(

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import click
 from click.core import ParameterSource
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import check_regular
 from miro_exact.seed import MAX_SEED
 from miro_host.eye import calibration as calibrations
 from miro_host.eye import calibration_kinds as kinds
@@ -19,27 +20,17 @@ from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.colours import classes_of
 from miro_host.eye.fit import ControlPoint, fit, parse_points, read_points
 from miro_host.eye.sample_file import read_samples
-from miro_sim.inputs import check_regular
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.file import load
 from mirotwin.cli.console import show
-from mirotwin.cli.options import Place, Whole, choose_engine, engine_option, set_option
+from mirotwin.cli.options import Number, Place, Whole, choose_engine, engine_option, set_option
+from mirotwin.cli.program import tell_notes
 from mirotwin.files.outputs import OutputError, check_new, check_not_input, whole_file
 
 SHOWN = 20
 """Points in the table; the file has them all."""
 ONLY_SCENARIO = ("seed", "noise_px", "settings", "points_out")
-
-
-class Noise(click.FloatRange):
-    """A range that NaN, which compares with nothing, is not in."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        number = super().convert(value, param, ctx)
-        if number != number:
-            self.fail(f"{value} is not a number.", param, ctx)
-        return number
 
 
 class _Found(NamedTuple):
@@ -67,7 +58,7 @@ class _Found(NamedTuple):
 @click.option("--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Of the points' noise.")
 @click.option(
     "--noise-px",
-    type=Noise(0.0, 10.0),
+    type=Number(0.0, 10.0),
     default=0.3,
     show_default=True,
     help="Standard deviation of a point's u, and of its v: how well somebody finds a mark in the picture.",
@@ -183,6 +174,7 @@ def _of_scenario(
 ) -> _Found:
     """Points, calibration and perhaps colours of a scenario's camera. Raises BadInput for one that sees nothing."""
     text = load(name, settings)
+    tell_notes(text.notes)
     camera = text.scenario.camera
     if not isinstance(camera, SeeingCamera):
         remedy = 'choose kind = "pixels" or "geometric" in [camera]'

@@ -12,12 +12,12 @@ import numpy as np
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput
-from mirotwin.campaign.comparison import FEWEST, GATED, Difference, difference
+from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, Difference, difference
 from mirotwin.campaign.design import Value
 from mirotwin.campaign.rows import VERDICTS, Rows, paired, paired_levels
 from mirotwin.campaign.statistics import Figures, Interval, figures
 from mirotwin.cli.console import show as show_table
-from mirotwin.cli.options import Place
+from mirotwin.cli.options import Number, Place
 from mirotwin.cli.program import DONE, EXPECTATION_FAILED, complain, show_line
 
 SHOWN = ("rms_position_cm", "rms_theta_deg", "settling_s")
@@ -56,7 +56,7 @@ class Group(msgspec.Struct, frozen=True):
 )
 @click.option(
     "--tolerance",
-    type=click.FloatRange(0.0, 1000.0),
+    type=Number(0.0, 1000.0),
     default=0.0,
     show_default=True,
     help="Per cent by which a mean may be worse than the baseline's.",
@@ -98,15 +98,19 @@ def _show(rows: Rows, metrics: Sequence[str], by: Sequence[str], as_json: bool) 
     columns = {name: rows.numbers(name) for name in metrics}
     verdicts = rows.column("verdict")
     groups = rows.groups(by)
-    found = []
+    found, samples = [], rows.samples()
     for levels, members in list(groups.items())[: None if as_json else MOST_GROUPS]:
         numbers = {name: column[np.array(members)] for name, column in columns.items()}
+        seeds = samples[np.array(members)]
         found.append(
             Group(
                 factors=dict(zip(by, levels, strict=True)),
                 runs=len(members),
                 verdicts={name: [verdicts[row] for row in members].count(name) for name in VERDICTS},
-                metrics={name: figures(column[~np.isnan(column)]) for name, column in numbers.items()},
+                metrics={
+                    name: figures(column[~np.isnan(column)], seeds[~np.isnan(column)])
+                    for name, column in numbers.items()
+                },
             )
         )
     if as_json:
@@ -160,9 +164,10 @@ def _against(rows: Rows, path: Path, metrics: Sequence[str], tolerance: float, a
     for name in metrics:
         baseline.check_metric(name)
     pairs = paired(baseline, rows)
-    if len(pairs) < FEWEST:
-        what = f"has only {len(pairs)} runs in common with {rows.path}"
-        raise BadInput(path, "", what, f"at least {FEWEST} are needed to say anything")
+    seeds = len(set(rows.samples()[[second for _, second in pairs]].tolist()))
+    if seeds < FEWEST_FOR_GATE:
+        what = f"has only {seeds} seeds in common with {rows.path}"
+        raise BadInput(path, "", what, f"a gate needs {FEWEST_FOR_GATE}; give both campaigns more seeds")
     found = _differences(baseline, rows, pairs, metrics)
     worse = [one for one in found if one.worse(tolerance)]
     ours, theirs = rows.column("digest"), baseline.column("digest")
@@ -181,9 +186,9 @@ def _against(rows: Rows, path: Path, metrics: Sequence[str], tolerance: float, a
     else:
         show_line(f"{rows.path} against {path}: {len(pairs)} pairs of runs, {same} with the same digest")
         show_table(_differences_table(found, "before", "now"))
-    unpaired = rows.count - len(pairs)
-    if unpaired:
-        complain(f"{unpaired} of {rows.count} runs are not in {path}")
+    for ours_only, where, there in ((rows, rows.path, path), (baseline, path, rows.path)):
+        if unpaired := ours_only.count - len(pairs):
+            complain(f"{unpaired} of {ours_only.count} runs of {where} are not in {there}")
     for one in worse:
         complain(f"worse than {path}: {_sentence(one)}")
     return EXPECTATION_FAILED if worse else DONE
@@ -199,12 +204,16 @@ def _differences(
 def _differences_table(found: Sequence[Difference], first: str, second: str) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("metric")
-    for name in ("pairs", first, second, "difference", "95 % interval", "median", "higher", "lower"):
+    for name in ("pairs", "left out", "seeds", first, second, "difference", "95 % interval", "median"):
+        table.add_column(name, justify="right")
+    for name in ("higher", "lower"):
         table.add_column(name, justify="right")
     for one in found:
         table.add_row(
             one.metric,
             f"{one.pairs}",
+            f"{one.without}",
+            f"{one.seeds}",
             _number(one.first),
             _number(one.second),
             f"{one.difference:+.4g}",
@@ -220,7 +229,8 @@ def _sentence(one: Difference) -> str:
     """What has got worse, by how much, and with which interval."""
     means = f"from {_number(one.first)} to {_number(one.second)}"
     interval = f" (95 % interval {_interval(one.interval)})" if one.interval is not None else ""
-    return f"{one.metric} by {one.difference:+.4g}{interval} in the mean of {one.pairs} pairs, {means}"
+    of = f"{one.pairs} pairs of {one.seeds} seeds"
+    return f"{one.metric} by {one.difference:+.4g}{interval} in the mean of {of}, {means}"
 
 
 def _number(value: float) -> str:

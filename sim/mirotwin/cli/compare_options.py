@@ -7,7 +7,6 @@ the result (`cli/differences.py`).
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -17,8 +16,8 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
-from mirotwin.cli.bare_options import Moment, Time
-from mirotwin.cli.options import Whole
+from mirotwin.cli.options import Number, Whole
+from mirotwin.cli.times import Time, TimeType
 from mirotwin.replay.compare import (
     KINDS,
     WITHIN_COUNTS,
@@ -35,19 +34,6 @@ APPLIES = {
     "within_counts_per_sample": ("wheels",),
 }
 """A tolerance, and the comparisons that have it."""
-
-
-class Number(click.FloatRange):
-    """A number in a range; what is no number is refused in plain words."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        try:
-            finite = math.isfinite(float(value))
-        except ValueError:
-            finite = False
-        if not finite:
-            self.fail(f"{value!r} is not a number.", param, ctx)
-        return super().convert(value, param, ctx)
 
 
 class Asked(msgspec.Struct, frozen=True):
@@ -88,8 +74,8 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
                  help=f"wheels: how far apart in position. Default {WITHIN_COUNTS}."),
     click.option("--within-counts-per-sample", type=Number(0, 1 << 14), metavar="COUNTS",
                  help=f"wheels: how far apart in desired velocity. Default {WITHIN_COUNTS_PER_SAMPLE:g}."),
-    click.option("--from", "from_time", type=Moment(), help="Compare from there on: ticks, or 1.5s, 20ms."),
-    click.option("--to", "to_time", type=Moment(), help="Stop there. Default: the end of the recording."),
+    click.option("--from", "from_time", type=TimeType(), help="Compare from there on, such as 1.5s, 20ms or 48000t."),
+    click.option("--to", "to_time", type=TimeType(), help="Stop there. Default: the end of the recording."),
     click.option("--all-differences", "all_differences", is_flag=True,
                  help="List every difference, not only the first of each channel."),
     click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of tables."),
@@ -121,7 +107,7 @@ def _taken(given: dict[str, Any]) -> Asked:
             whose = " or ".join(f"--compare {each}" for each in APPLIES[name])
             raise BadInput("", _option(name), f"does not apply to --compare {kind}", f"give {whose} with it")
     if end is not None and end <= (start or 0):
-        raise BadInput("", f"--from {start or 0} --to {end}", "the window is empty", "--to must be later")
+        raise BadInput("", f"--from {start or 0}t --to {end}t", "the window is empty", "--to must be later")
     within_ms = tolerances["within_ms"]
     counts, per_sample = tolerances["within_counts"], tolerances["within_counts_per_sample"]
     rule = Rule(

@@ -9,7 +9,7 @@ import msgspec
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput
-from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
+from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.scenario.file import parse as parse_scenario
 from mirotwin.cli.compare_options import Asked, compare_options
 from mirotwin.cli.console import show

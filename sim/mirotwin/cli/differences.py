@@ -49,6 +49,8 @@ def print_firmwares(found: FirmwareDifference, words: tuple[str, str] = WORDS) -
     """Lines on stderr: where two firmwares go apart."""
     if found.changed is not None:
         _print_instruction("the first changed instruction that is executed", found.changed, words)
+    if found.mapped is not None:
+        _print_instruction("the first changed instruction that is executed", found.mapped, words)
     if found.effect is not None and found.effect != found.changed:
         _print_instruction("the states differ for good from here on", found.effect, words)
     if found.effect is not None and found.effect.parted is not None:

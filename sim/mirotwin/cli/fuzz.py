@@ -6,7 +6,6 @@ Long because the command has an option for each thing that a campaign may be ask
 from __future__ import annotations
 
 import os
-import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -36,6 +35,7 @@ from mirotwin.cli.fuzz_regress import refuse_others, regress
 from mirotwin.cli.fuzz_summary import Ended, report
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option, load_image
 from mirotwin.cli.program import Terminated, complain
+from mirotwin.cli.times import WallTime
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.confirm import Court, WorldCourt
 from mirotwin.fuzz.confirm import Place as RobotPlace
@@ -49,26 +49,10 @@ from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from mirotwin.testing.wanted import silent_scenario
 
-UNITS_S = {"": 1.0, "s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
 LONGEST_S = 1e7
 AWAKE_MS = 1000 * AWAKE_TICKS // TICKS_PER_SECOND
 INTERRUPTED_S = 5.0
 """How long inputs are still looked at behind a Ctrl-C."""
-
-
-class Duration(click.ParamType):  # type: ignore[type-arg, unused-ignore]
-    """A wall time with its unit: 30s, 5min, 2h; in seconds without."""
-
-    name = "TIME"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        if isinstance(value, float):
-            return value
-        found = re.fullmatch(rf"([0-9]+(?:\.[0-9]*)?)\s*({'|'.join(UNITS_S)})", f"{value}".strip(), re.ASCII)
-        time_s = float(found[1]) * UNITS_S[found[2]] if found else 0.0
-        if not 0.0 < time_s <= LONGEST_S:
-            self.fail(f"{value!r} is not a time, such as 30s, 5min or 2h.", param, ctx)
-        return time_s
 
 
 class Asked(msgspec.Struct, frozen=True, kw_only=True):
@@ -90,7 +74,12 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
 @click.command(short_help="Looks for inputs that make a firmware image fail.")
 @click.argument("image", metavar="[IMAGE.ihx]", type=Place(), required=False)
 @click.option(
-    "--time", "time_s", type=Duration(), default="1min", show_default=True, help="How long: 30s, 5min, 2h."
+    "--time",
+    "time_s",
+    type=WallTime(LONGEST_S),
+    default="1min",
+    show_default=True,
+    help="How long: 30s, 5min, 2h.",
 )
 @click.option("--jobs", type=Whole(1), help="Processes of the engine. Default: the processors but one.")
 @click.option(
@@ -132,7 +121,7 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
 @click.option(
     "--minimise",
     "minimise_s",
-    type=Duration(),
+    type=WallTime(LONGEST_S),
     default=f"{MINIMISE_S:.0f}s",
     show_default=True,
     help="Longest time for making a find small.",
@@ -213,7 +202,22 @@ def _campaign(
         raise BadInput("", "--covering", what, "name a function that an input has to reach")
     folder.make()
     finds = Finds(target, reached, court, folder, sources_of(image, asked.sources), asked.minimise_s)
-    failing, passing, silent = _sorted_out(target, inputs)
+    with folder.filled():
+        campaign, asked = _begun(spec, asked, finds, folder, expected, covering, _sorted_out(target, inputs))
+        return _run(campaign, image, asked)
+
+
+def _begun(
+    spec: TargetSpec,
+    asked: Asked,
+    finds: Finds,
+    folder: CampaignFolder,
+    expected: dict[str, Any],
+    covering: Covering | None,
+    inputs: tuple[list[bytes], list[bytes], list[bytes]],
+) -> tuple[Campaign, Asked]:
+    """A campaign that has looked at the inputs that fail, pass and execute no branch; how long it may go on."""
+    failing, passing, silent = inputs
     engine: Engine = NoEngine()
     if passing:
         engine, notes = engine_for(spec, passing, folder, spec.make(), _jobs(asked.jobs), asked.seed)
@@ -224,7 +228,7 @@ def _campaign(
         asked = msgspec.structs.replace(asked, time_s=0.0)
     campaign = Campaign(engine, finds, folder, expected, covering, _teller(asked.quiet))
     campaign.begin_with(failing, (*passing, *silent))
-    return _run(campaign, image, asked)
+    return campaign, asked
 
 
 def _sorted_out(target: Target, inputs: list[bytes]) -> tuple[list[bytes], list[bytes], list[bytes]]:

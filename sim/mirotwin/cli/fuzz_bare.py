@@ -17,7 +17,7 @@ from click.core import ParameterSource
 from miro_exact.bad_input import BadInput
 from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.cli.console import show
-from mirotwin.cli.options import load_image
+from mirotwin.cli.options import Whole, load_image
 from mirotwin.cli.program import DIVERGENCE, complain
 from mirotwin.fuzz.spec import TargetSpec
 
@@ -44,11 +44,11 @@ def bare_fuzz_options(command: Command) -> Command:
     """Gives the command these options."""
     words: tuple[tuple[str, dict[str, Any], str], ...] = (
         (_BARE, {"is_flag": True}, "Fuzz IMAGE.ihx on a bare processor instead: any 8051 firmware with a serial port."),
-        ("--crystal", {"type": click.IntRange(32_768, 100_000_000), "metavar": "HZ"},
+        ("--crystal", {"type": Whole(32_768, 100_000_000), "metavar": "HZ"},
          "With --bare: its crystal. Default 24000000."),
-        ("--baud", {"type": click.IntRange(50), "metavar": "RATE"},
+        ("--baud", {"type": Whole(50), "metavar": "RATE"},
          "With --bare: rate on RXD. Default: what the firmware sets."),
-        ("--boot-ms", {"type": click.IntRange(1, 60_000), "metavar": "MS"},
+        ("--boot-ms", {"type": Whole(1, 60_000), "metavar": "MS"},
          "With --bare: time to start up, unless it sleeps earlier. Default 200."),
         ("--protocol", {"metavar": "NAME[:KEY=VALUE,..]"}, "With --bare: the format that makes frames of bodies."),
         ("--check-all", {"is_flag": True}, "With --bare: --check judges each input, not only those that are new."),
@@ -130,14 +130,17 @@ def is_bare_case(path: str | Path) -> bool:
     return stream.read(path).header.bare is not None
 
 
-def replay_bare_case(path: str, firmware: str | None) -> int:
-    """`mirotwin replay` of such a file; the exit code is that of its check. Raises BadInput without --firmware."""
+def replay_bare_case(path: str, firmware: str | None, check: str | None) -> int:
+    """`mirotwin replay` of such a file; the exit code is that of its check. Raises BadInput without --firmware.
+
+    `check`: as of --check, for a case that names one that is in a file.
+    """
     from mirotwin.fuzz.bare_case import replay_bare
 
     if firmware is None:
         remedy = "give --firmware IMAGE.ihx"
         raise BadInput(path, "", "is for a bare processor, which has no firmware of its own", remedy)
-    verdict = replay_bare(path, load_image(firmware, SPACE_BYTES))
+    verdict = replay_bare(path, load_image(firmware, SPACE_BYTES), check)
     if verdict.failed or verdict.code == DIVERGENCE:
         complain(verdict.line)
     else:

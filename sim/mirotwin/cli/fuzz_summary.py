@@ -6,7 +6,6 @@ What belongs here: words, files of the whole campaign, and the exit code. What d
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 
 import msgspec
@@ -18,6 +17,7 @@ from miro_robot.inspect.lcov import Tracefile
 from mirotwin.cli.console import show
 from mirotwin.cli.fuzz_progress import clock, counted
 from mirotwin.cli.program import DONE, EXPECTATION_FAILED, complain, show_line
+from mirotwin.files import command_line
 from mirotwin.fuzz.campaign import Campaign
 from mirotwin.fuzz.finds import Find
 from mirotwin.report.firmware_coverage import table
@@ -97,8 +97,7 @@ def _print_find(find: Find, more: int, out: Path, image: Image) -> None:
 def replay_line(stream: Path, image: Image) -> str:
     """The command that plays it again."""
     own = image.path.resolve() == image_path().resolve()
-    firmware = "" if own else f" --firmware {shlex.quote(str(image.path))}"
-    return f"mirotwin replay {shlex.quote(str(stream))}{firmware}"
+    return command_line.replay_line(stream, None if own else image.path)
 
 
 def _print_covering(campaign: Campaign, symbol: str, image: Image) -> bool:

@@ -11,6 +11,7 @@ COMMANDS = {
     "profile": "Shows where the processor spends its time.",
     "coverage": "Shows which lines of the firmware ran.",
     "vcd": "Writes the wires as a VCD file.",
+    "header": "Writes protocol.h: the numbers of the wire for C.",
 }
 """Name, which is the function's too and ends that of the module, and what `fw --help` says of it."""
 

@@ -77,7 +77,13 @@ def _print(result: Profile, name: str) -> None:
     used = "" if stack.first is None else f"{stack.highest - stack.first + 1} bytes used, "
     show(
         f"stack: {begins}highest {stack.highest:02X}h at tick {stack.highest_tick}: {used}{stack.free} bytes free"
+        + ("" if stack.last == 0xFF else f" below the data at {stack.last + 1:02X}h")
     )
+    unknown = f"; not followed: {', '.join(stack.unknown)}" if stack.unknown else ""
+    show(f"stack by the code: at least {stack.at_least} bytes, in {' > '.join(stack.deepest)}{unknown}")
+    room = stack.last - stack.first + 1 if stack.first is not None else None
+    if room is not None and stack.at_least > room:
+        show(f"the stack has {room} bytes: it can run out by {stack.at_least - room}")
 
 
 def _table(*columns: str) -> Table:

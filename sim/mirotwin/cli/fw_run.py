@@ -25,6 +25,7 @@ from mirotwin.files.outputs import check_file, check_not_input, whole_file
 
 @click.command(short_help="Runs IMAGE.ihx on a bare AT89C52.")
 @click.argument("image", metavar="IMAGE.ihx", type=Place())
+@click.argument("more", metavar="[MORE.ihx]...", type=Place(), nargs=-1)
 @bare_options()
 @click.option(
     "--terminal",
@@ -35,8 +36,12 @@ from mirotwin.files.outputs import check_file, check_not_input, whole_file
     "--dump", type=Place(), metavar="FILE.json", help="Write registers and memories to this file at the end."
 )
 @engine_option
-def run(image: str, terminal: bool, dump: str | None, engine: str | None, **options: Any) -> int:
+def run(
+    image: str, more: tuple[str, ...], terminal: bool, dump: str | None, engine: str | None, **options: Any
+) -> int:
     """Runs IMAGE.ihx on a bare AT89C52; what it sends goes to stdout as it is.
+
+    MORE.ihx are loaded beside it: a program and the monitor that starts it.
 
     Exit codes: 0 --until was reached (or, without it, the firmware ended), 1 the firmware ended before it,
     3 firmware fault, 42 --max-cycles was reached. Ctrl-C (130) leaves on stdout what was sent until then, and
@@ -51,11 +56,13 @@ def run(image: str, terminal: bool, dump: str | None, engine: str | None, **opti
     request = take_bare(options)
     if dump is not None:
         check_file(Path(dump), "--dump")
-        check_not_input(Path(dump), "--dump", image, *request.files)
+        check_not_input(Path(dump), "--dump", image, *more, *request.files)
     if terminal:
         check_terminal(request)
     choose_engine(engine)
     loaded = load_bare_image(image, request, named=False)
+    for one in more:
+        loaded = loaded.merged(load_bare_image(one, request, named=False))
     target = target_of(image, loaded, request)
     out = sys.stdout.buffer
     machine = make_machine(loaded, request, out.write, live=terminal)

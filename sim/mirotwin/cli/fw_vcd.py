@@ -60,7 +60,7 @@ def vcd(request: Request, out: Path, force: bool) -> int:
                 waveform.close()
             except ValueError as error:
                 raise BadInput(
-                    request.subject, f"--from {request.from_tick}", f"{error}", "look earlier"
+                    request.subject, f"--from {request.from_tick}t", f"{error}", "look earlier"
                 ) from None
         with save_staging.open("w", encoding="utf-8", newline="\n") as stream:
             write_save_file(stream, one_line(out.name), waveform.signals)

@@ -23,7 +23,6 @@ PACKAGES = (
     "pillow",
     "pyserial",
     "crcmod-plus",
-    "intelhex",
     "pyvcd",
     "tomli-w",
     "pyarrow",

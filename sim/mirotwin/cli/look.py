@@ -7,12 +7,11 @@ from pathlib import Path
 import click
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds, ticks
+from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_exact.seed import MAX_SEED
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.cli.options import (
-    Moment,
     Place,
     Whole,
     choose_engine,
@@ -23,9 +22,10 @@ from mirotwin.cli.options import (
     refuse_steps,
     set_option,
 )
-from mirotwin.cli.program import DONE, FIRMWARE_FAULT, show_line
+from mirotwin.cli.program import DONE, FIRMWARE_FAULT, show_line, tell_notes
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.run import report_faults
+from mirotwin.cli.times import Time, TimeType
 from mirotwin.files.outputs import check_new, check_not_input, whole_file
 
 
@@ -33,8 +33,7 @@ from mirotwin.files.outputs import check_new, check_not_input, whole_file
 @click.argument("scenario")
 @click.option(
     "--at",
-    "at_s",
-    type=Moment(),
+    type=TimeType(),
     required=True,
     help="Simulated time, such as 1.2s: the frame at or before it.",
 )
@@ -56,7 +55,7 @@ from mirotwin.files.outputs import check_new, check_not_input, whole_file
 @engine_option
 def look(
     scenario: str,
-    at_s: float,
+    at: Time,
     out: Path | None,
     seed: int,
     network: int,
@@ -75,8 +74,9 @@ def look(
     """
     choose_engine(engine)
     text = load(scenario, settings)
+    tell_notes(text.notes)
     refuse_steps(text.scenario, scenario)
-    frame = ticks(at_s) // CONTROL_PERIOD_TICKS
+    frame = at.ticks() // CONTROL_PERIOD_TICKS
     name = text.scenario.name
     out = out or Path(f"{name}-{seed}-net{network}-frame-{frame:06d}.png")
     check_new(out, "--out", force)
@@ -90,7 +90,7 @@ def look(
         view = view_of(world, network, text.origin)
         if frame >= world.periods:
             ends_s = seconds(world.periods * CONTROL_PERIOD_TICKS)
-            raise BadInput(text.origin, f"--at {at_s:g}s", f"the run ends at {ends_s:.3f} s", "look earlier")
+            raise BadInput(text.origin, f"--at {at.text}", f"the run ends at {ends_s:.3f} s", "look earlier")
         with ProgressBar(f"simulating {name}", frame) as bar:
             while world.index < frame and not world.finished:
                 world.step()

@@ -6,6 +6,7 @@ that cannot be simulated. What does not: single commands.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable, Iterator
@@ -14,18 +15,19 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+import msgspec
 
 from miro_exact import engine as engines
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, shortened
 from miro_exact.domain import DomainError
+from miro_exact.inputs import TEXT_BYTES, check_regular
 from miro_host.parts import PartError
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
-from miro_sim.inputs import TEXT_BYTES, check_regular
+from miro_robot.image.symbols import STACK
 from miro_sim.scenario.keys import Scenario
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-LONGEST_S = 1e9
 
 
 class Whole(click.IntRange):
@@ -34,33 +36,35 @@ class Whole(click.IntRange):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
             int(value)
+        except ValueError:  # of more digits than Python reads, too
+            self.fail(f"{shortened(repr(value))} is not a whole number.", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class Number(click.FloatRange):
+    """A number in a range: neither "nan" nor "inf" is one."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            finite = math.isfinite(float(value))
         except ValueError:
-            self.fail(f"{value!r} is not a whole number.", param, ctx)
+            finite = False
+        if not finite:
+            self.fail(f"{shortened(repr(value))} is not a number.", param, ctx)
         return super().convert(value, param, ctx)
 
 
 class Place(click.Path):
-    """A path; the empty string is none."""
+    """A path. The empty string is none, and an option that comes where a path is missing is none either."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == "":
             self.fail("the path is empty.", param, ctx)
+        if ctx is not None and any(
+            value in one.opts for one in ctx.command.params if isinstance(one, click.Option)
+        ):
+            self.fail(f"the path is missing before {value}; a file of this name is ./{value}.", param, ctx)
         return super().convert(value, param, ctx)
-
-
-class Moment(click.types.FloatParamType):
-    """A time in seconds, or with its unit: 1.2, 1.2s, 350ms."""
-
-    name = "time"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        found = re.fullmatch(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*(s|ms|)", f"{value}".strip(), re.ASCII)
-        if found is None:
-            self.fail(f"{value!r} is not a time, such as 1.2s or 350ms.", param, ctx)
-        at_s = float(found[1]) / (1000.0 if found[2] == "ms" else 1.0)
-        if at_s > LONGEST_S:
-            self.fail(f"{value!r} is later than any run.", param, ctx)
-        return at_s
 
 
 def engine_option(command: Command) -> Command:
@@ -75,6 +79,29 @@ def firmware_option(text: str) -> Callable[[Command], Command]:
     return click.option("--firmware", "firmware", metavar="IMAGE.ihx", type=Place(), help=text)
 
 
+class IramAddress(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """An address of internal RAM as 0x07 to 0xff."""
+
+    name = "ADDRESS"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        if isinstance(value, int):
+            return value
+        if not re.fullmatch(r"0[xX][0-9a-fA-F]{1,2}", value):
+            self.fail(
+                f"{shortened(repr(value))} is not an address of internal RAM; give 0x00 to 0xff.", param, ctx
+            )
+        return int(value, 16)
+
+
+STACK_FROM: dict[str, Any] = {"metavar": "ADDRESS", "type": IramAddress()}
+STACK_FROM_HELP = "Where the stack begins (0x..; it ends at 0xff), for an image without a .map."
+
+
+def stack_option(command: Command) -> Command:
+    return click.option("--stack-from", **STACK_FROM, help=STACK_FROM_HELP)(command)
+
+
 def set_option(text: str) -> Callable[[Command], Command]:
     return click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help=text)
 
@@ -86,10 +113,13 @@ def choose_engine(engine: str | None) -> str:
     return engines.active()
 
 
-def load_image(path: str | Path | None, limit: int = 8192, named: bool = True) -> Image:
+def load_image(
+    path: str | Path | None, limit: int = 8192, named: bool = True, stack_from: int | None = None
+) -> Image:
     """The firmware image at `path`, or the robot's own. Raises BadInput for what is no image or does not fit.
 
     `named`: its symbols are needed; the files beside it are read at once, and BadInput is raised for wrong ones.
+    `stack_from`: first address of its stack, which only an image without a linker's map may be given.
     """
 
     if path is not None:
@@ -101,7 +131,15 @@ def load_image(path: str | Path | None, limit: int = 8192, named: bool = True) -
     image = load_hex(image_path() if path is None else Path(path), limit=limit)
     if named:
         _ = image.symbols.names
-    return image
+    return image if stack_from is None else _with_stack(image, stack_from)
+
+
+def _with_stack(image: Image, start: int) -> Image:
+    known = image.symbols.find(STACK)
+    if known is not None:
+        what = f"the .map beside the image begins its stack at {known.address:#04x}"
+        raise BadInput(image.path, "--stack-from", what, "leave the option out, or link with that stack")
+    return msgspec.structs.replace(image, symbols=image.symbols.with_stack(start))
 
 
 def refuse_steps(scenario: Scenario, origin: str) -> None:

@@ -11,8 +11,9 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from difflib import get_close_matches
 from importlib import import_module
 from io import TextIOWrapper
 from itertools import pairwise
@@ -21,7 +22,7 @@ from typing import Any, NoReturn
 
 import click
 
-from miro_exact.bad_input import BadInput, one_line
+from miro_exact.bad_input import BadInput, one_line, shortened
 from miro_exact.engine import EngineError, select
 
 DONE = 0
@@ -62,6 +63,12 @@ class ReaderGone(Exception):
 def complain(message: str) -> None:
     """One line on stderr, whatever the message holds."""
     click.echo(f"mirotwin: {one_line(message)}", err=True)
+
+
+def tell_notes(notes: Iterable[str]) -> None:
+    """What the settings of a scenario left out, on stderr."""
+    for note in notes:
+        complain(f"note: {note}")
 
 
 def show_line(text: str) -> None:
@@ -130,6 +137,18 @@ class LazyGroup(click.Group):
         command = getattr(import_module(self.modules + cmd_name), cmd_name)
         assert isinstance(command, click.Command)
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if self.get_command(ctx, name) is None and not name.startswith("-"):
+            close = get_close_matches(name, self.list_commands(ctx), n=1)
+            hint = (
+                f"did you mean {close[0]}?" if close else f"there are {', '.join(self.list_commands(ctx))}."
+            )
+            ctx.fail(f"No such command {shortened(repr(name))}; {hint}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         if not self.commands_about:

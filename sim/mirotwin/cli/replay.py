@@ -20,7 +20,7 @@ from mirotwin.cli.compare_options import Asked, compare_options
 from mirotwin.cli.console import show
 from mirotwin.cli.debug import checked_sources, sources_option
 from mirotwin.cli.differences import differences_as_json, print_differences, print_firmwares, print_json
-from mirotwin.cli.expectations import expect_option, report_failures
+from mirotwin.cli.expectations import expect_option, expectations_text, report_failures
 from mirotwin.cli.fuzz_bare import is_bare_case, replay_bare_case
 from mirotwin.cli.options import (
     Place,
@@ -30,6 +30,7 @@ from mirotwin.cli.options import (
     firmware_option,
     plain_parameters,
     set_option,
+    stack_option,
 )
 from mirotwin.cli.program import DIVERGENCE, DONE, complain
 from mirotwin.cli.progress import ProgressBar
@@ -41,30 +42,35 @@ from mirotwin.cli.run import report_faults
 from mirotwin.replay.compare import differences
 from mirotwin.replay.difference import Difference
 from mirotwin.replay.firmwares import FirmwareDifference
-from mirotwin.report.summary import expectations_text
 
 
 @click.command(short_help="Sends recorded bytes again and compares.")
 @click.argument("file", type=Place())
 @firmware_option("Image to run instead of the recorded one (of the robot's own, for a text stream).")
+@stack_option
 @lines_from_option
 @sources_option
 @click.option("--seed", type=Whole(0, MAX_SEED), help="Master seed instead of the recorded one.")
 @set_option("A key to set in the recorded scenario (or the default one, for a text stream), as for `run`.")
 @compare_options
 @expect_option
+@click.option(
+    "--check", metavar="FILE.py:FUNCTION", help="The file of the check that a case of --bare names."
+)
 @engine_option
 @click.option("--all", "everything", is_flag=True, help=f"List all frames, not only the first {SHOWN}.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no lists of frames or differences.")
 def replay(
     file: str,
     firmware: str | None,
+    stack_from: int | None,
     lines_from: tuple[str, ...],
     sources: tuple[str, ...],
     seed: int | None,
     settings: tuple[str, ...],
     asked: Asked,
     expected: tuple[str, ...],
+    check: str | None,
     engine: str | None,
     everything: bool,
     quiet: bool,
@@ -81,18 +87,22 @@ def replay(
 
     A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
     1, or 3 for a firmware fault; 0 if other firmware or settings cure it, 4 if it does not fail again without them.
-    A case of `mirotwin fuzz --bare` needs --firmware.
+    A case of `mirotwin fuzz --bare` needs --firmware, and --check if its check is in a file.
 
-    Where the recorded scenario or --expect expects something, that decides: a difference is only told, and the exit
-    code is 1 if a check fails, else 0.
+    Where --expect is given, that decides: a difference is only told, and the exit code is 1 if a check fails, else 0.
+    What the recorded scenario expects is judged too, but a difference goes before it.
 
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
     if is_bare_case(file):
         _check_bare(file, asked, (*settings, *expected), seed)
         choose_engine(engine)
-        return replay_bare_case(file, firmware)
-    job, image = load_job(file, firmware, engine, (*settings, *expected), seed)
+        return replay_bare_case(file, firmware, check)
+    if check is not None:
+        raise BadInput(file, "--check", "is no case of a bare processor", "leave it out")
+    if stack_from is not None and firmware is None:
+        raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
+    job, image = load_job(file, firmware, engine, (*settings, *expected), seed, stack_from)
     if asked.given and not job.recorded:
         raise BadInput(file, asked.given, "a text stream holds nothing to compare with", "leave it out")
     images = load_images(lines_from, job.image)
@@ -125,7 +135,8 @@ def replay(
         show(expectations_text(checks.verdicts()))
     faults = report_faults(world)
     differs = _verdict(job, asked, periods, replayed, found, apart)
-    code = (faults or failed) if judged else (differs or faults or failed)
+    decides = any(".expect." in f".{one}" for one in (*settings, *expected))
+    code = (faults or failed) if decides else (differs or faults or failed)
     if asked.as_json:
         compared = {
             "periods": {"recorded": len(job.recorded), "replayed": len(replayed)},
@@ -166,7 +177,7 @@ def _periods(file: str, job: Job, asked: Asked) -> int | None:
     there = first + len(job.recorded)
     if asked.rule.from_tick >= there * CONTROL_PERIOD_TICKS:
         what = f"the recording ends at tick {there * CONTROL_PERIOD_TICKS}"
-        raise BadInput(file, f"--from {asked.rule.from_tick}", what, "look earlier")
+        raise BadInput(file, f"--from {asked.rule.from_tick}t", what, "look earlier")
     if asked.rule.to_tick is None:
         return there - first
     return min(there, -(-asked.rule.to_tick // CONTROL_PERIOD_TICKS)) - first

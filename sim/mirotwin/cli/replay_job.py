@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_protocol import stream
 from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
-from miro_sim.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.periods import Period
 from miro_sim.scenario.file import changed
 from miro_sim.scenario.file import parse as parse_scenario
@@ -23,6 +23,7 @@ from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.settings import in_text
 from mirotwin.capture.detect import detect
 from mirotwin.capture.input import HEAD_BYTES
+from mirotwin.cases.artifacts import image_beside
 from mirotwin.checks.expect import expectations_of
 from mirotwin.cli.options import choose_engine, load_image
 from mirotwin.cli.program import complain
@@ -92,11 +93,17 @@ class Job(msgspec.Struct, frozen=True):
 
 
 def load_job(
-    file: str, firmware: str | None, engine: str | None, settings: Sequence[str] = (), seed: int | None = None
+    file: str,
+    firmware: str | None,
+    engine: str | None,
+    settings: Sequence[str] = (),
+    seed: int | None = None,
+    stack_from: int | None = None,
 ) -> tuple[Job, Image]:
     """Reads `file` and loads the image that was asked for, recorded, or the robot's own.
 
     `settings`: keys to set in the recorded scenario, or in the default one. `seed`: instead of its own.
+    `stack_from`: where the stack of `firmware` begins.
     """
     check_no_folder(file, RECORDING)
     data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
@@ -109,11 +116,13 @@ def load_job(
             raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
         image = image_of(recording, file) if firmware is None else image_if_any(recording, file)
         job = _job_of_recording(recording, file, settings, image, seed)
-        return job, image if firmware is None and image is not None else load_image(firmware)
+        return job, image if firmware is None and image is not None else load_image(
+            firmware, stack_from=stack_from
+        )
     _refuse_other_formats(data, file)
     given = stream.decode(data, file)
-    image = load_image(firmware)
     header = given.header
+    image = load_image(firmware or image_beside(file, header.firmware_sha256), stack_from=stack_from)
     _check_firmware(header, image, file, firmware)
     reseeded = seed not in (None, header.seed or 0)
     other = header.firmware_sha256 not in (None, image.sha256) or bool(settings) or reseeded

@@ -7,14 +7,14 @@ from pathlib import Path
 import click
 
 from miro_exact.clock import TICKS_PER_SECOND
-from mirotwin.cli.bare_options import Moment, Time
 from mirotwin.cli.debug import checked_sources, sources_option
 from mirotwin.cli.options import Place, engine_option, firmware_option
 from mirotwin.cli.program import DONE, show_line
 from mirotwin.cli.report_subject import Wanted, is_campaign, material_of
+from mirotwin.cli.times import Time, TimeType
 from mirotwin.files.outputs import check_new, check_not_input, whole_file
 from mirotwin.page.bokeh_page import require_bokeh
-from mirotwin.page.document import check_size
+from mirotwin.page.document import check_size, is_page
 from mirotwin.page.run_page import run_page
 
 SMALLER = "leave the camera's frames out with --no-frames, or look at a part with --from and --to"
@@ -27,12 +27,12 @@ FEWER = "give the results of a campaign with fewer runs"
     "-o",
     "--out",
     type=Place(path_type=Path),
-    default="report.html",
-    show_default=True,
-    help="The page to write.",
+    help="The page to write. Default: report.html, which replaces an earlier page.",
 )
-@click.option("--from", "from_tick", type=Moment(), default="0", help="Begin there: ticks, or 1.5s, 20ms.")
-@click.option("--to", "to_tick", type=Moment(), help="End there. Default: the end of the run.")
+@click.option(
+    "--from", "from_tick", type=TimeType(), default="0t", help="Begin there, such as 1.5s, 20ms or 48000t."
+)
+@click.option("--to", "to_tick", type=TimeType(), help="End there. Default: the end of the run.")
 @click.option("--no-frames", is_flag=True, help="Leave out the camera's frames that a run has recorded.")
 @firmware_option("Case, recording: image to run instead of its own; what it does otherwise is on the page.")
 @sources_option
@@ -41,7 +41,7 @@ FEWER = "give the results of a campaign with fewer runs"
 @engine_option
 def report(
     subject: str,
-    out: Path,
+    out: Path | None,
     from_tick: Time,
     to_tick: Time | None,
     no_frames: bool,
@@ -60,6 +60,9 @@ def report(
     A run is made again for its page, with the recorded bytes: the profile of the firmware, its coverage, the fate of
     each frame and the verdicts of the checks come from that, and where it differs from the recording is said.
     """
+    if out is None:
+        out = Path("report.html")
+        force = force or is_page(out)
     check_new(out, "--out", force)
     check_not_input(out, "--out", subject, firmware)
     require_bokeh()

@@ -6,7 +6,6 @@ What belongs here: finding out what a path is, and running it again. What does n
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,26 +14,28 @@ import tomli_w
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.inputs import read_input
 from miro_robot.image import Image
-from miro_sim.inputs import read_input
 from miro_sim.radio.downlink import TransmissionError
+from mirotwin.cases.artifacts import CASE, REPORT, SENT
 from mirotwin.cases.case import tables_of
 from mirotwin.checks.expect import expectations_of
 from mirotwin.cli.fuzz_bare import is_bare_case
 from mirotwin.cli.options import plain_parameters
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import Job, load_job
+from mirotwin.files.command_line import replay_line
 from mirotwin.files.outputs import RECORDING, part_name
 from mirotwin.page.again import Again, run_again
+from mirotwin.page.bokeh_page import require_bokeh
 from mirotwin.page.frames import extras_of
-from mirotwin.page.run_page import About, Material, Replayed
+from mirotwin.page.run_page import About, Material, Replayed, run_page
 from mirotwin.replay.compare import Rule, differences
 from mirotwin.report.firmware_coverage import source_folders
 from mirotwin.report.summary import Summary
 
 RECORDINGS = (RECORDING, part_name(RECORDING))
-CASES = ("case.stream", "sent.stream")
-REPORT = "report.txt"
+CASES = (CASE, SENT)
 SUMMARIES = ("summary.json", "summary.part.json")
 PARQUET = b"PAR1"
 
@@ -69,7 +70,7 @@ def is_campaign(subject: str) -> bool:
 def material_of(wanted: Wanted) -> Material:
     """All that the page is made from. Raises BadInput, and OSError as `open` does."""
     if wanted.to_tick is not None and wanted.to_tick <= wanted.from_tick:
-        place = f"--from {wanted.from_tick} --to {wanted.to_tick}"
+        place = f"--from {wanted.from_tick}t --to {wanted.to_tick}t"
         raise BadInput("", place, "the window is empty", "--to must be later")
     file = _file_of(wanted.subject)
     if is_bare_case(file):
@@ -79,6 +80,13 @@ def material_of(wanted: Wanted) -> Material:
     if job.recorded:
         return _of_recording(wanted, file, job, image)
     return _of_case(wanted, file, job, image)
+
+
+def page_of_failure(folder: str) -> bytes:
+    """The page of what a failure left in `folder`. Raises BadInput, also where the library of pages is missing."""
+    require_bokeh()
+    wanted = Wanted(folder, 0, None, True, None, (), None, True)
+    return run_page(material_of(wanted))
 
 
 def _file_of(subject: str) -> str:
@@ -112,7 +120,7 @@ def _of_recording(wanted: Wanted, file: str, job: Job, image: Image) -> Material
     recorded = [period for period in job.recorded if period.index in wanted.shown]
     if not recorded:
         first, last = job.recorded[0].tick, (job.recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
-        place = f"--from {wanted.from_tick}"
+        place = f"--from {wanted.from_tick}t"
         raise BadInput(file, place, f"the recording goes from tick {first} to {last}", "look within it")
     end_tick = (recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
     again = _again(wanted, file, job, image, end_tick)
@@ -185,8 +193,7 @@ def _about(kind: str, file: str, job: Job, image: Image, notes: Sequence[str], a
 
 
 def _command(wanted: Wanted, file: str) -> str:
-    words = ["mirotwin", "replay", Path(file).name]
-    return shlex.join([*words, "--firmware", Path(wanted.firmware).name] if wanted.firmware else words)
+    return replay_line(Path(file).name, Path(wanted.firmware).name if wanted.firmware else None)
 
 
 def _summary(recording: Path, digest: str) -> Summary | None:

@@ -22,7 +22,7 @@ from mirotwin.cli.held_signals import Hold, held_signals
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
 from mirotwin.cli.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line
 from mirotwin.cli.progress import ProgressBar
-from mirotwin.files.outputs import OutputFolder, check_new, whole_file
+from mirotwin.files.outputs import OutputFolder, check_new, told_when_full, whole_file
 from mirotwin.reproduce.crate import METADATA, metadata, write_rows
 from mirotwin.reproduce.page import page
 from mirotwin.reproduce.pictures import course, draw
@@ -122,7 +122,12 @@ def reproduce(
     if (out / FOLDER).is_dir() or (out / PAGE).exists():
         check_new(out / PAGE, "--out", force)
     processors = count or cores()
-    with held_signals() as hold, folder, whole_file(out / PAGE, "--out") as page_path:
+    with (
+        held_signals() as hold,
+        folder,
+        whole_file(out / PAGE, "--out") as page_path,
+        told_when_full(out / FOLDER, "--out"),
+    ):
         folder.keep = (ROWS,)
         found = _run(jobs(seeds), processors, folder.part(ROWS), hold, quiet)
         shown = middle_seeds(by_label(found))

@@ -15,7 +15,6 @@ from miro_sim.world.world import World
 from mirotwin import runner
 from mirotwin.checks.expect import expectations_of
 from mirotwin.checks.watching import Checks
-from mirotwin.cli.bare_options import Moment, Time
 from mirotwin.cli.expectations import expect_option, report_failures, report_steps
 from mirotwin.cli.held_signals import held_signals
 from mirotwin.cli.options import (
@@ -27,12 +26,14 @@ from mirotwin.cli.options import (
     load_image,
     plain_parameters,
     set_option,
+    stack_option,
 )
-from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain, show_line
+from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain, show_line, tell_notes
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.run_files import RunFiles
 from mirotwin.cli.run_live_options import live_options
 from mirotwin.cli.run_stops import Stops
+from mirotwin.cli.times import Time, TimeType
 from mirotwin.files.outputs import FILES, OutputFolder
 from mirotwin.recording.source import source_of
 from mirotwin.steps.plan import check_symbols
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
 )
 @expect_option
 @firmware_option("Image to run instead of the robot's own.")
+@stack_option
 @engine_option
 @click.option(
     "--record",
@@ -80,11 +82,11 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--save-at",
-    type=Moment(),
+    type=TimeType(),
     multiple=True,
-    help="Save the world there as at-TICK.world: ticks, or 1.5s, 20ms; may be repeated.",
+    help="Save the world there as at-TICK.world, such as 1.5s, 20ms or 48000t; may be repeated.",
 )
-@click.option("--to-tick", type=Moment(), help="End the run there.")
+@click.option("--to", "to_tick", type=TimeType(), help="End the run there.")
 @click.option(
     "--resume",
     type=Place(),
@@ -104,6 +106,7 @@ def run(
     settings: tuple[str, ...],
     expected: tuple[str, ...],
     firmware: str | None,
+    stack_from: int | None,
     engine: str | None,
     record: str,
     frames: Path | None,
@@ -138,19 +141,21 @@ def run(
     """
     active = choose_engine(engine)
     text = load(scenario, (*settings, *expected), everything)
+    tell_notes(text.notes)
     steps = steps_of(text.scenario, text.origin)
     if steps and record == "full":
         raise click.UsageError(f"--record full does not go with the steps of {scenario}.")
     stops = Stops(save_at, to_tick, resume)
     if stops and (steps or record == "full"):
         other = f"the steps of {scenario}" if steps else "--record full"
-        raise click.UsageError(f"--save-at, --resume and --to-tick do not go with {other}.")
-    folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}", force, (*FILES, *stops.names))
+        raise click.UsageError(f"--save-at, --resume and --to do not go with {other}.")
+    default = Path("runs") / f"{text.scenario.name}-{seed}"
+    folder = OutputFolder(out or default, force, (*FILES, *stops.names), ours=out is None)
     if plain_frames and frames is None:
         raise click.UsageError("--plain-frames needs --frames.")
     if live is None and (pace is not None or wait):
         raise click.UsageError("--pace and --live-wait need --live.")
-    image = load_image(firmware)
+    image = load_image(firmware, stack_from=stack_from)
     check_symbols(steps, image, text.origin)
 
     with plain_parameters(text.origin):
@@ -213,7 +218,7 @@ def _live(
     from mirotwin.cli.run_live import LiveView
     from mirotwin.foxglove.server import Server
 
-    server = opened.enter_context(Server(*at, f"{world.scenario.name}-{world.seed}"))
+    server = opened.enter_context(Server(*at, f"{world.scenario.name}-{world.seed}", complain))
     show_line(f"live {server.url}")
     return LiveView(server, world, checks, pace, wait)
 

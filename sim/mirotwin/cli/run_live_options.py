@@ -10,7 +10,9 @@ from typing import Any, TypeVar
 
 import click
 
+from miro_exact.bad_input import shortened
 from mirotwin.bridges.url import FASTEST
+from mirotwin.cli.options import Number
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 HERE = "127.0.0.1"
@@ -29,8 +31,10 @@ class Address(click.ParamType):  # type: ignore[type-arg, unused-ignore]
         if isinstance(value, tuple):
             return value
         host, _, port = f"{value}".rpartition(":")
-        if not (port.isascii() and port.isdecimal()) or int(port) > HIGHEST_PORT:
-            self.fail(f"{value!r} is no HOST:PORT; write --live={DEFAULT}, or --live alone at the end.")
+        if not (port.isascii() and port.isdecimal() and len(port) <= 5) or int(port) > HIGHEST_PORT:
+            self.fail(
+                f"{shortened(repr(value))} is no HOST:PORT; write --live={DEFAULT}, or --live alone at the end."
+            )
         return host.strip("[]") or HERE, int(port)
 
 
@@ -42,7 +46,7 @@ class PaceFactor(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if value == "max":
             return 0.0
-        return click.FloatRange(0.0, FASTEST, min_open=True).convert(value, param, ctx)
+        return Number(0.0, FASTEST, min_open=True).convert(value, param, ctx)
 
 
 def live_options(command: Command) -> Command:

@@ -1,4 +1,4 @@
-"""`mirotwin run --save-at .. --resume .. --to-tick ..`: where a run begins, what it saves, and where it ends.
+"""`mirotwin run --save-at .. --resume .. --to ..`: where a run begins, what it saves, and where it ends.
 
 What belongs here: reading and refusing a saved world, stopping at ticks, and the names of the files. What does not: the
 form of a saved world (`miro_sim.world.saved`), and the files of a run (`run_files`).
@@ -13,9 +13,9 @@ from collections.abc import Sequence
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
-from miro_sim.inputs import RECORDING_BYTES, read_input
+from miro_exact.inputs import WORLD_BYTES, read_input
 from miro_sim.world.world import World
-from mirotwin.cli.bare_options import Time
+from mirotwin.cli.times import Time
 from mirotwin.files.outputs import OutputFolder
 
 SUFFIX = ".world"
@@ -41,7 +41,7 @@ class Stops:
     def begin(self, world: World) -> None:
         """Puts `world` to where the saved one is, and to the end of its control period."""
         if self.resume is not None:
-            saved = read_input(self.resume, RECORDING_BYTES)
+            saved = read_input(self.resume, WORLD_BYTES)
             try:
                 world.load(saved)
             except ValueError as error:
@@ -57,11 +57,11 @@ class Stops:
         end_tick = world.periods * CONTROL_PERIOD_TICKS
         if self.to_tick is not None:
             if not world.tick < self.to_tick <= end_tick:
-                raise _outside(f"--to-tick {self.to_tick}", world.tick, end_tick)
+                raise _outside(f"--to {self.to_tick}t", world.tick, end_tick)
             end_tick = self.to_tick
         for tick in self.save_ticks:
             if not world.tick < tick <= end_tick:
-                raise _outside(f"--save-at {tick}", world.tick, end_tick)
+                raise _outside(f"--save-at {tick}t", world.tick, end_tick)
 
     def move(self, world: World, folder: OutputFolder) -> None:
         """Runs the world to its end, or to `to_tick`."""

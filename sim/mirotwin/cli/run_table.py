@@ -10,9 +10,10 @@ from pathlib import Path
 from rich.table import Table
 
 from mirotwin.cli.console import show
+from mirotwin.cli.expectations import expectations_text
 from mirotwin.report.learnt_calibration import calibration_text
 from mirotwin.report.learnt_wheels import wheels_text
-from mirotwin.report.summary import Summary, expectations_text, off_pitch_text, settling_text, vision_text
+from mirotwin.report.summary import Summary, off_pitch_text, settling_text, vision_text
 from mirotwin.report.theory import theory_text
 from mirotwin.report.track import Tracks
 

@@ -8,7 +8,6 @@ from selectors import DefaultSelector
 
 import click
 
-from miro_exact.clock import ticks
 from miro_exact.seed import MAX_SEED
 from miro_sim.world.world import World
 from mirotwin.bridges.live import LONGEST_S, live_scenario
@@ -22,6 +21,7 @@ from mirotwin.checks.watching import Checks
 from mirotwin.cli.expectations import expect_option, report_failures
 from mirotwin.cli.held_signals import held_signals
 from mirotwin.cli.options import (
+    Number,
     Place,
     Whole,
     choose_engine,
@@ -31,11 +31,12 @@ from mirotwin.cli.options import (
     plain_parameters,
     set_option,
 )
-from mirotwin.cli.program import complain, show_line
+from mirotwin.cli.program import complain, show_line, tell_notes
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.run import report_faults
 from mirotwin.cli.run_files import RunFiles
 from mirotwin.cli.serve_ports import Wanted, open_ports, ports_option
+from mirotwin.cli.times import Time, TimeType
 from mirotwin.files.outputs import FILES, KEPT, RECORDING, OutputFolder
 from mirotwin.recording.source import source_of
 from mirotwin.report.live import Live
@@ -48,16 +49,16 @@ CASE = "case.stream"
 @ports_option
 @click.option(
     "--realtime",
-    type=click.FloatRange(0.0, FASTEST, min_open=True),
+    type=Number(0.0, FASTEST, min_open=True),
     default=1.0,
     show_default=True,
     help="Virtual seconds in a second of the wall clock.",
 )
 @click.option(
     "--duration",
-    type=click.FloatRange(0.0, LONGEST_S, min_open=True),
-    default=LONGEST_S,
-    help="Ends after so many virtual seconds. Default: a day.",
+    type=TimeType(positive=True, longest_s=LONGEST_S),
+    default=f"{LONGEST_S:.0f}s",
+    help="Ends after so much virtual time, such as 30s. Default: a day.",
 )
 @click.option("--once", is_flag=True, help="Ends when a client was there and none is left.")
 @click.option(
@@ -83,7 +84,7 @@ def serve(
     rfc2217: tuple[tuple[int, int], ...],
     host: str,
     realtime: float,
-    duration: float,
+    duration: Time,
     once: bool,
     out: Path | None,
     seed: int,
@@ -107,7 +108,9 @@ def serve(
     """
     active = choose_engine(engine)
     text = live_scenario(scenario, (*settings, *expected), expectations_of)
-    folder = OutputFolder(out or Path("runs") / f"{text.scenario.name}-{seed}-live", force, (*FILES, CASE))
+    tell_notes(text.notes)
+    default = Path("runs") / f"{text.scenario.name}-{seed}-live"
+    folder = OutputFolder(out or default, force, (*FILES, CASE), ours=out is None)
     image = load_image(firmware)
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
@@ -129,7 +132,7 @@ def serve(
         for port in ports:
             show_line(f"{port.kind} {port.where}")
         show_line("serving")
-        session = Session(world, Pace(realtime), selector, ports, tell, ticks(duration), once)
+        session = Session(world, Pace(realtime), selector, ports, tell, duration.ticks(), once)
         run_files = RunFiles(folder, source, world, active, hold, checks, text.settings, session=session)
         try:
             summary = run_files.fill(ProgressBar("serving", None, quiet=True), None)

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import click
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, shortened
 from miro_sim.world.world import World
 from mirotwin.bridges import endpoint
 from mirotwin.bridges.endpoint import Endpoint, Tell
@@ -25,10 +25,11 @@ from mirotwin.bridges.terminal import PtyEndpoint
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 HIGHEST_PORT = 65_535
+LONGEST_NUMBER = 5
 HERE = "127.0.0.1"
 
 
-class Number(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+class PortNumber(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     """NUMBER, or NUMBER@NETWORK; 0 stands for a free port."""
 
     name = "port"
@@ -37,9 +38,10 @@ class Number(click.ParamType):  # type: ignore[type-arg, unused-ignore]
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[int, int]:
         number, at, network = str(value).partition("@")
-        plain = number.isascii() and number.isdecimal() and (not at or _is_number(network))
+        plain = _is_number(number) and (not at or _is_number(network))
         if not plain or int(number) > HIGHEST_PORT:
-            self.fail(f"{value!r} is no port, such as 7000, or 7000@1 for network 1.", param, ctx)
+            what = f"{shortened(repr(value))} is no port, such as 7000, or 7000@1 for network 1."
+            self.fail(what, param, ctx)
         return int(number), int(network or 0)
 
 
@@ -55,8 +57,21 @@ class Link(click.ParamType):  # type: ignore[type-arg, unused-ignore]
         return (path, int(network)) if at and _is_number(network) else (str(value), 0)
 
 
+class Host(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """An address to listen on. The empty one would be all of the machine's."""
+
+    name = "address"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        if not str(value).strip():
+            self.fail(
+                f"the address is empty; {HERE} is this machine, 0.0.0.0 is all its addresses.", param, ctx
+            )
+        return str(value)
+
+
 def _is_number(text: str) -> bool:
-    return text.isascii() and text.isdecimal()
+    return text.isascii() and text.isdecimal() and len(text) <= LONGEST_NUMBER
 
 
 class Wanted(msgspec.Struct, frozen=True):
@@ -73,18 +88,22 @@ def ports_option(command: Command) -> Command:
     """`--pty`, `--tcp`, `--rfc2217`, `--host`."""
     for option in (
         click.option(
-            "--host", default=HERE, show_default=True, help="Address on which TCP ports are opened."
+            "--host",
+            type=Host(),
+            default=HERE,
+            show_default=True,
+            help="Address on which TCP ports are opened.",
         ),
         click.option(
             "--rfc2217",
-            type=Number(),
+            type=PortNumber(),
             multiple=True,
             metavar="PORT",
             help="TCP with telnet negotiation, `rfc2217://` of pyserial. 0: any free port.",
         ),
         click.option(
             "--tcp",
-            type=Number(),
+            type=PortNumber(),
             multiple=True,
             metavar="PORT",
             help="TCP with the bytes as they are, `socket://` of pyserial. 0: any free port.",

@@ -24,8 +24,6 @@ from miro_sim.scenario.file import builtin_names, load
 from miro_sim.world.world import World
 from mirotwin.cli.bare_options import (
     BareRequest,
-    Moment,
-    Time,
     bare_options,
     load_bare_image,
     make_machine,
@@ -44,9 +42,11 @@ from mirotwin.cli.options import (
     refuse_steps,
     set_option,
 )
+from mirotwin.cli.program import tell_notes
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import load_job
 from mirotwin.cli.run import report_faults
+from mirotwin.cli.times import Time, TimeType
 from mirotwin.watched import BareRun, RobotRun, Run, watch
 
 IMAGE_SUFFIXES = (".ihx", ".hex", ".ihex")
@@ -74,8 +74,8 @@ class Request(msgspec.Struct, frozen=True):
 
 _OPTIONS: tuple[Callable[[Any], Any], ...] = (
     click.argument("subject", metavar="SUBJECT", type=Place()),
-    click.option("--from", "from_tick", type=Moment(), default="0", help="Start there: ticks, or 1.5s, 20ms."),
-    click.option("--to", "to_tick", type=Moment(), help="Stop there. Default: the end of the run."),
+    click.option("--from", "from_tick", type=TimeType(), default="0t", help="Start there: 1.5s, 20ms, 48000t."),
+    click.option("--to", "to_tick", type=TimeType(), help="Stop there. Default: the end of the run."),
     click.option("--seed", type=Whole(0, MAX_SEED), help="Scenario: master seed of all noise. Default 0."),
     firmware_option("Scenario, recording, stream: image to run instead of its own."),
     set_option("Scenario, recording, stream: a key to set in its scenario, as for `run`."),
@@ -110,7 +110,7 @@ def open_run(request: Request) -> Run:
     if request.to_tick is not None and request.to_tick <= request.from_tick:
         raise BadInput(
             "",
-            f"--from {request.from_tick} --to {request.to_tick}",
+            f"--from {request.from_tick}t --to {request.to_tick}t",
             "the window is empty",
             "--to must be later",
         )
@@ -121,7 +121,7 @@ def open_run(request: Request) -> Run:
     if run.end_tick is not None and request.from_tick >= run.end_tick:
         raise BadInput(
             request.subject,
-            f"--from {request.from_tick}",
+            f"--from {request.from_tick}t",
             f"the run ends at tick {run.end_tick}",
             "look earlier",
         )
@@ -148,7 +148,7 @@ def look(run: Run, request: Request, *watchers: Watcher, early_ticks: int = 0, l
     if not reached:
         end = run.cpu.cycles * clock.CYCLE_TICKS
         raise BadInput(
-            request.subject, f"--from {request.from_tick}", f"the run ended at tick {end}", "look earlier"
+            request.subject, f"--from {request.from_tick}t", f"the run ended at tick {end}", "look earlier"
         )
     return _verdict(run, request)
 
@@ -183,6 +183,7 @@ def _robot_run(request: Request) -> RobotRun:
     if subject in builtin_names() or subject.endswith(".toml") or not is_path:
         choose_engine(request.engine)
         text = load(subject, request.settings)
+        tell_notes(text.notes)
         refuse_steps(text.scenario, subject)
         image = load_image(request.firmware)
         with plain_parameters(subject):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ import click
 
 from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
+from mirotwin.cases.artifacts import CASE, FIRMWARE, PAGE, replay_line, report_line
 from mirotwin.cli.options import (
     Place,
     Whole,
@@ -25,7 +25,6 @@ from mirotwin.files.outputs import check_file, check_not_input, whole_file
 from mirotwin.report.junit import TestCase, junit_xml
 from mirotwin.steps.collecting import SUFFIX, collect
 from mirotwin.steps.keys import end_ms
-from mirotwin.steps.left_behind import CASE
 from mirotwin.steps.running import Outcome, Verdict, reproduce_line, run_test, stem_of
 
 WORDS = {"passed": "passed", "failed": "FAILED", "fault": "FAULT", "error": "ERROR"}
@@ -56,6 +55,9 @@ CODES: dict[Verdict, int] = {
     metavar="DIR",
     help="Folder for what files leave: worlds that `save` steps keep; of one that fails its case, for `replay`.",
 )
+@click.option(
+    "--pages", is_flag=True, help="With --artifacts: make the page of each failure, as `report` does."
+)
 @click.option("-q", "--quiet", is_flag=True, help="No line for a file that passed.")
 def test(
     paths: tuple[str, ...],
@@ -66,6 +68,7 @@ def test(
     engine: str | None,
     junit: Path | None,
     artifacts: Path | None,
+    pages: bool,
     quiet: bool,
 ) -> int:
     """Runs each *.scenario.toml that is named or lies below DIR: its steps, what it expects, and the checks that are
@@ -75,6 +78,8 @@ def test(
     none. Where several apply: 2, then 3, then 1.
     """
     choose_engine(engine)
+    if pages and artifacts is None:
+        raise click.UsageError("--pages needs --artifacts.")
     files = collect(paths)
     chosen = [file for file in files if word.lower() in file.lower()]
     if not chosen:
@@ -92,14 +97,22 @@ def test(
         outcome = run_test(file, image, seed, settings, artifacts, again)
         times_s.append(time.perf_counter() - began_s)
         outcomes.append(outcome)
-        _show(outcome, quiet, again, firmware)
+        _show(outcome, quiet, again)
+        if pages and outcome.left:
+            _page(outcome.left)
     if junit is not None:
         lines = [reproduce_line(file, seed, firmware, settings) for file in chosen]
         _write_junit(junit, outcomes, times_s, lines)
     return _summary(outcomes)
 
 
-def _show(outcome: Outcome, quiet: bool, again: str, firmware: str | None) -> None:
+def _page(folder: str) -> None:
+    from mirotwin.cli.report_subject import page_of_failure  # loads the pages' library
+
+    (Path(folder) / PAGE).write_bytes(page_of_failure(folder))
+
+
+def _show(outcome: Outcome, quiet: bool, again: str) -> None:
     passed = outcome.verdict == "passed"
     if quiet and passed:
         return
@@ -116,8 +129,8 @@ def _show(outcome: Outcome, quiet: bool, again: str, firmware: str | None) -> No
         show_line(f"    left in {outcome.left}")
         case = Path(outcome.left) / CASE
         if case.exists():
-            image = f" --firmware {shlex.quote(firmware)}" if firmware else ""
-            show_line(f"    mirotwin replay {shlex.quote(str(case))}{image}")
+            show_line(f"    {replay_line(outcome.left, not case.with_name(FIRMWARE).exists())}")
+        show_line(f"    {report_line(outcome.left)}")
     if not passed and outcome.verdict != "error":
         show_line(f"    {again}")
 

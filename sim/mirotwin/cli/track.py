@@ -8,13 +8,13 @@ from typing import Any, get_args
 import click
 import msgspec
 
+from miro_exact.inputs import check_regular
 from miro_host.eye import calibration as calibrations
 from miro_host.eye import eye_file
 from miro_host.eye.colours import ColourClasses
 from miro_host.eye.eye_file import EyeError
 from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
 from miro_host.eye.tracker import CentroidKind, Sighting, Tracker
-from miro_sim.inputs import check_regular
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option
 from mirotwin.cli.program import complain, show_line
 

@@ -20,11 +20,12 @@ def render() -> str:
 
 def _chapter(title: str, rules: list[Rule]) -> Iterator[str]:
     yield f"### {title}\n"
-    yield "| rule | name | a robot must | from | tried with |"
-    yield "|---|---|---|---|---|"
+    yield "| rule | name | a robot must | from | tried with | presupposes |"
+    yield "|---|---|---|---|---|---|"
     for rule in rules:
         airs = "; ".join(dict.fromkeys(map(_air, rule.airs))) + _chips(rule.lm629)
-        yield f"| {rule.id} | {rule.name} | {rule.text.replace('|', chr(92) + '|')} | {_source(rule.source)} | {airs} |"
+        text, before = rule.text.replace("|", chr(92) + "|"), ", ".join(rule.presupposes)
+        yield f"| {rule.id} | {rule.name} | {text} | {_source(rule.source)} | {airs} | {before} |"
     yield ""
 
 
@@ -36,8 +37,8 @@ def _source(source: str) -> str:
 
 def _chips(lm629: Lm629Options) -> str:
     changed = [
-        f"{name} {getattr(lm629, name)}"
-        for name in ("busy_clocks", "reset_clocks")
+        f"{name} {str(getattr(lm629, name)).lower()}"
+        for name in ("busy_clocks", "reset_clocks", "reset_disarms_breakpoint")
         if getattr(lm629, name) != getattr(DEFAULT_OPTIONS, name)
     ]
     return "".join(f", {one}" for one in changed)
@@ -46,6 +47,8 @@ def _chips(lm629: Lm629Options) -> str:
 def _air(air: Air) -> str:
     slots = ", ".join(map(str, air.slots))
     more = ", keyed carrier with noise" if air.keyed else ""
+    if air.strap is not None:
+        more += f", its pins say {air.strap}"
     if air.baud_offset_ppm:
         more += f", host {air.baud_offset_ppm / 10_000:+g} %"
     return f"N = {air.robots}, slot {slots}{more}"

@@ -78,9 +78,7 @@ class RuleJudge(Judge[ConformsTo]):
         self.seen.restarted(tick)
 
     def period(self, record: RobotPeriod, tick: int) -> None:
-        self.seen.periods.append((tick, record))
-        board = self.subject.robot.board
-        self.seen.samples.append((tick, board.left.sample_tick, board.right.sample_tick))
+        self.seen.take_period(tick, record, self.subject.robot.board)
 
     def end(self, tick: int) -> None:
         if self.foreign or (self.to_come and self.to_come[-1].tick < tick):

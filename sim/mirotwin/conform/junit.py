@@ -11,14 +11,19 @@ from xml.etree import ElementTree
 from miro_exact.bad_input import one_line
 from mirotwin.conform.rule import Rule
 from mirotwin.conform.run import Outcome, failure_text
-from mirotwin.conform.table import chapter_of
+from mirotwin.conform.table import chapter_of, find
 
 
 def junit(outcomes: Sequence[Outcome], rules: Sequence[Rule], properties: Mapping[str, str]) -> bytes:
     """One test case a rule, in a suite with these properties."""
-    failed = [outcome for outcome in outcomes if not outcome.passed]
+    verdicts = [outcome.verdict for outcome in outcomes]
     suite = ElementTree.Element(
-        "testsuite", name="mirotwin conform", tests=f"{len(outcomes)}", failures=f"{len(failed)}", errors="0"
+        "testsuite",
+        name="mirotwin conform",
+        tests=f"{len(outcomes)}",
+        failures=f"{verdicts.count('failed')}",
+        errors="0",
+        skipped=f"{verdicts.count('not judged')}",
     )
     shown = ElementTree.SubElement(suite, "properties")
     for name, value in properties.items():
@@ -29,7 +34,10 @@ def junit(outcomes: Sequence[Outcome], rules: Sequence[Rule], properties: Mappin
         case = ElementTree.SubElement(
             suite, "testcase", classname=f"conform.{chapter_of(rule).title}", name=f"{rule.id} {rule.name}"
         )
-        if not outcome.passed:
+        if outcome.cause:
+            because = f"not judged: {outcome.cause} failed, {find(outcome.cause).broken}"
+            ElementTree.SubElement(case, "skipped", message=because)
+        elif outcome.failures:
             lines = [one_line(failure_text(failure)) for failure in outcome.failures]
             failure = ElementTree.SubElement(case, "failure", message=lines[0])
             failure.text = "\n".join([rule.text, f"({rule.source})", *lines])

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
 from miro_sim.world.world import World
@@ -24,19 +23,19 @@ from mirotwin.checks.faults import NoFault
 from mirotwin.checks.interface import Failure
 from mirotwin.checks.watching import Checks
 from mirotwin.conform.judgement import ConformsTo
+from mirotwin.conform.probe import why_lost
 from mirotwin.conform.rule import Rule
-from mirotwin.conform.trial import trial_of
+from mirotwin.conform.table import presupposed
+from mirotwin.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
 
-MOST_FAULTS = 1000
 FAULTS_KEPT = 20
 """Of a robot in a trial."""
-LOOK_TICKS = 24_000
-"""In the first control period faults are counted so often: a fault in each instruction makes 2000 a millisecond."""
 
 
 class Outcome(msgspec.Struct, frozen=True):
     """What came of a rule. `failures`: in the order of time, the first hundred. `faults`: (network, slot, fault) of
     its trial, the first twenty a robot; `fault_count` of all. `cases`: name and text of a file for each failure.
+    `cause`: the rule is not judged, because this one failed. `hint`: what the firmware does instead, if that is known.
     """
 
     rule: str
@@ -44,10 +43,16 @@ class Outcome(msgspec.Struct, frozen=True):
     faults: tuple[tuple[int, int, FirmwareFault], ...] = ()
     fault_count: int = 0
     cases: tuple[tuple[str, str], ...] = ()
+    cause: str = ""
+    hint: str = ""
 
     @property
     def passed(self) -> bool:
-        return not self.failures
+        return not self.failures and not self.cause
+
+    @property
+    def verdict(self) -> str:
+        return "passed" if self.passed else "failed" if self.failures else "not judged"
 
 
 def failure_text(failure: Failure) -> str:
@@ -66,8 +71,7 @@ def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Out
     world = World(trial.scenario, seed, image, trial.script)
     trace = Trace(world)
     checks = Checks(world, {place: [ConformsTo(rule=rule.id)] for place in _places(world)})
-    while not world.finished and _fault_count(world) < MOST_FAULTS:
-        world.run_to(world.tick + (LOOK_TICKS if world.tick < CONTROL_PERIOD_TICKS else CONTROL_PERIOD_TICKS))
+    run_trial(world)
     checks.finish()
     failures = [one for one in checks.failures if not one.fault]
     faults = tuple(
@@ -83,7 +87,7 @@ def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Out
         )
         failures = [Failure("conforms_to", *_places(world)[0], world.tick, wanted, found)]
     cases = _cases(rule, world, trace, failures, faults) if keep else ()
-    return Outcome(rule.id, tuple(failures), faults, _fault_count(world), cases)
+    return Outcome(rule.id, tuple(failures), faults, fault_count(world), cases)
 
 
 def _cases(
@@ -105,33 +109,58 @@ def _cases(
     return tuple(found)
 
 
-def _fault_count(world: World) -> int:
-    count = 0
-    for network in world.networks:
-        for robot in network.robots:
-            count += robot.board.fault_count
-    return count
-
-
 def _places(world: World) -> list[Place]:
     return [(network.index, robot.slot) for network in world.networks for robot in network.robots]
 
 
 def try_all(rules: Sequence[Rule], image: Image, seed: int = 0, keep: bool = False) -> Iterator[Outcome]:
-    """One after the other, as soon as each is known; see `with_faults`."""
+    """Each as soon as it is known, those that others presuppose first; see `with_faults`.
+
+    A rule is not judged where one of `rules` failed that it presupposes: then its trial is not run. Nor is it where the
+    firmware did, before it failed, what another of `rules` forbids: what comes after that says nothing of the rule.
+    """
+    forbidden = {kind: rule.id for rule in rules for kind in rule.faults}
+    causes: dict[str, str] = {}
+    for rule in _presupposed_first(rules):
+        cause = next((causes[one.id] for one in presupposed(rule) if one.id in causes), "")
+        outcome = Outcome(rule.id, (), cause=cause) if cause else try_rule(rule, image, seed, keep)
+        if outcome.failures:
+            cause = next((forbidden[kind] for kind in _before(outcome) if kind in forbidden), "")
+            if cause:
+                outcome = msgspec.structs.replace(outcome, failures=(), cases=outcome.cases[-1:], cause=cause)
+            else:
+                place = (outcome.failures[0].network, image, seed)
+                hint = rule.probe(*place) if rule.probe is not None else why_lost(rule, *place)
+                outcome = msgspec.structs.replace(outcome, hint=hint)
+            causes[rule.id] = cause or rule.id
+        yield outcome
+
+
+def _presupposed_first(rules: Sequence[Rule]) -> list[Rule]:
+    tried = {rule.id: rule for rule in rules}
+    ordered: dict[str, Rule] = {}
     for rule in rules:
-        yield try_rule(rule, image, seed, keep)
+        ordered |= {one.id: tried[one.id] for one in (*presupposed(rule), rule) if one.id in tried}
+    return list(ordered.values())
+
+
+def _before(outcome: Outcome) -> list[FaultKind]:
+    """The kinds of fault that came before the rule failed."""
+    return [fault.kind for _, _, fault in outcome.faults if fault.tick <= outcome.failures[0].tick]
 
 
 def with_faults(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Outcome]:
-    """The outcomes, with the firmware faults of all trials held against the rules that forbid them."""
+    """The outcomes in the order of `rules`, with all trials' firmware faults held against those that forbid them."""
     kinds = {rule.id: rule.faults for rule in rules}
-    return [
-        msgspec.structs.replace(
-            outcome, failures=(*_forbidden(outcomes, kinds[outcome.rule]), *outcome.failures)
-        )
-        for outcome in outcomes
-    ]
+    found = []
+    places = [rule.id for rule in rules]
+    for outcome in sorted(outcomes, key=lambda one: places.index(one.rule)):
+        forbidden = _forbidden(outcomes, kinds[outcome.rule])
+        if forbidden:
+            failures = (*forbidden, *outcome.failures)
+            outcome = msgspec.structs.replace(outcome, failures=failures, cause="")
+        found.append(outcome)
+    return found
 
 
 def _forbidden(outcomes: Sequence[Outcome], kinds: Sequence[FaultKind]) -> list[Failure]:

@@ -15,11 +15,13 @@ import msgspec
 
 from miro_protocol.events import Received
 from miro_protocol.frames import ContentError, TelemetryFrame
+from miro_robot.board import Board
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.periods import Axis, RobotPeriod
 from miro_sim.world.events import SIDES, Event
 from mirotwin.checks.orders import Order, Orders
 
+_RDRP = BY_NAME["RDRP"].opcode
 _LFIL, _UDF = BY_NAME["LFIL"].opcode, BY_NAME["UDF"].opcode
 READING = frozenset(command.opcode for command in BY_NAME.values() if command.words_out)
 """Commands that only read."""
@@ -75,6 +77,11 @@ class Seen:
             assert said is None or isinstance(said, TelemetryFrame)
             self.answers.append(Answer(event.tick, event.frame, said))
 
+    def take_period(self, tick: int, record: RobotPeriod, board: Board) -> None:
+        """The robot as it was at the begin of a control period, and its board as it is now."""
+        self.periods.append((tick, record))
+        self.samples.append((tick, board.left.sample_tick, board.right.sample_tick))
+
     def restarted(self, tick: int) -> None:
         """The processor begins anew: nothing that wheels were told before holds on."""
         self._orders = Orders()
@@ -118,6 +125,14 @@ class Seen:
             if after_tick < event.tick <= until_tick and event.opcode not in READING:
                 yield event
 
+    def read_positions(self, side: str, after_tick: int, until_tick: int) -> list[int]:
+        """The low words of the real positions that the robot read in between."""
+        return [
+            int.from_bytes(one.data[-2:], "big")
+            for one in self.commands
+            if one.opcode == _RDRP and one.side == side and after_tick < one.tick <= until_tick
+        ]
+
     def set_to(self, side: str, tick: int) -> Words | None:
         """The filter words in force at `tick`, None before the first."""
         found = [setting.words for setting in self.filters[side] if setting.tick <= tick]
@@ -136,10 +151,3 @@ class Seen:
             if after_tick < tick <= until_tick:
                 yield tick, SIDES[0], record.left
                 yield tick, SIDES[1], record.right
-
-
-def in_words(order: Order) -> str:
-    """An order for people: `off`, `stop`, or the velocity as the radio carries it."""
-    if order.what != "drive":
-        return f"abrupt {order.what}" if order.abrupt else order.what
-    return f"{order.word}" if order.word is not None else f"{order.velocity / 256:.3f}"

@@ -24,13 +24,26 @@ from typing import TypedDict, Unpack
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
 from miro_protocol.frames import seal
 from miro_protocol.stream_events import Deed, Power, Reset
-from miro_protocol.table import SEQ_MODULUS, TICKS_PER_MS, VELOCITY_SATURATION, FrameType, Opcode, downlink
+from miro_protocol.table import (
+    FAILSAFE_STOP_TICKS,
+    SEQ_MODULUS,
+    TICKS_PER_MS,
+    Format,
+    FrameType,
+    Opcode,
+    downlink,
+)
 from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.lm629.commands import BY_NAME
 from mirotwin.checks.failsafe import ACTING_MS
 from mirotwin.checks.orders import Order
+from mirotwin.conform.hints import characters, cut_off, in_a_row, in_words, no_answer, number, wheels_instead
 from mirotwin.conform.rule import Air
-from mirotwin.conform.seen import Answer, Seen, in_words
+from mirotwin.conform.seen import Answer, Seen
 
+_LTRJ = BY_NAME["LTRJ"].opcode
+_VELOCITY = 0x08
+"""In the low byte of LTRJ's control word: a velocity follows."""
 BOOTED_MS = 40.0
 """A robot is ready for its first frame so long after power-on (a camera frame and a little more). Chosen."""
 ACTING_TICKS = int(ACTING_MS * TICKS_PER_MS)
@@ -43,7 +56,10 @@ Found = tuple[int, str] | None
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Characters on the air. `last_tick`: start bit of the last one; `end_tick`: end of its stop bit."""
+    """Characters on the air. `last_tick`: start bit of the last one; `end_tick`: end of its stop bit.
+
+    `before`: the velocities of the last frame that had some.
+    """
 
     tick: int
     last_tick: int
@@ -51,6 +67,7 @@ class Frame:
     seq: int
     words: Pairs
     what: str
+    before: Pairs = ()
 
     def for_robot(self, slot: int) -> tuple[int, int]:
         """The velocities of a robot, as it has to cut them off."""
@@ -78,6 +95,7 @@ class How(TypedDict, total=False):
     bad_stop: int
     pauses: Mapping[int, float]
     gap_ms: float
+    sealed: Callable[[Format, bytes], bytes]
 
 
 class Talk:
@@ -98,6 +116,7 @@ class Talk:
         self.done: list[Deed] = []
         self.expected: list[Expectation] = []
         self._words = 0
+        self._before: Pairs = ()
 
     # ---- saying --------------------------------------------------------------------------------------------
 
@@ -176,11 +195,12 @@ class Talk:
         Instead of its preamble it may have another `lead`, and another `layout` byte in its CRC. `wrong` turns bits
         over, by place, `bad_stop` is the place of a character with a bad stop bit, and `pauses` (us) come before
         characters: places count from the first sync byte, the preamble's are negative. `gap_ms`: silence after it.
+        `sealed`: another way to seal it.
         """
         seq = (self.seq + step) % SEQ_MODULUS
         self.seq = seq if how.get("fresh", True) else self.seq
         form = replace(self.form, layout=how.get("layout", self.form.layout))
-        sealed = seal(form, bytes([kind * SEQ_MODULUS + seq]) + payload)
+        sealed = how.get("sealed", seal)(form, bytes([kind * SEQ_MODULUS + seq]) + payload)
         body = bytearray(sealed[len(form.lead) :])
         for place, bits in how.get("wrong", {}).items():
             body[place] ^= bits
@@ -189,7 +209,9 @@ class Talk:
         end = self.now
         self.wait(how.get("gap_ms", GAP_MS))
         text = f"{what}, seq {seq}"
-        return Frame(tick, end - self.character_ticks, end, seq, words, text)
+        frame = Frame(tick, end - self.character_ticks, end, seq, words, text, self._before)
+        self._before = words or self._before
+        return frame
 
     def _put(self, data: bytes, first: int, how: How) -> int:
         """Sends characters of which `first` is the first sync byte; returns the tick of the first one."""
@@ -241,8 +263,9 @@ class Talk:
             wanted = frame.for_robot(seen.slot)
             if all(obeys(order, word) for order, word in zip(told, wanted, strict=True)):
                 return None
-            left, right = wanted
-            return deadline, f"{in_words(told[0])}, {in_words(told[1])} and not {left}, {right}"
+            left, right = map(number, wanted)
+            found = f"{in_words(told[0])}, {in_words(told[1])} and not {left}, {right}"
+            return deadline, found + _instead(seen, frame, told)
 
         self.expect(deadline, f"the wheels told as by {frame.what} within {ACTING_MS:g} ms", test, slots)
 
@@ -262,13 +285,16 @@ class Talk:
 
         self.expect(until_tick, wanted, test, slots)
 
-    def untouched(self, frame: Frame, slots: tuple[int, ...] = ()) -> None:
-        """The chips are told nothing at all, only read."""
+    def untouched(self, frame: Frame, slots: tuple[int, ...] = (), since: Frame | None = None) -> None:
+        """The chips are told nothing at all, only read. `since`: the failsafe must not count from that frame."""
         until = frame.end_tick + ACTING_TICKS
 
         def test(seen: Seen) -> Found:
             for event in seen.wrote(frame.tick, until):
-                return event.tick, str(event).partition(" command ")[2]
+                found = str(event).partition(" command ")[2]
+                if since is None or abs(event.tick - since.end_tick - FAILSAFE_STOP_TICKS) > ms(2.0):
+                    return event.tick, found
+                return event.tick, f"{found}: the failsafe counts on from {since.what}"
             return None
 
         self.expect(until, f"{frame.what} not acted on", test, slots)
@@ -286,15 +312,11 @@ class Talk:
         def test(seen: Seen) -> Found:
             found = seen.answers_in(question.last_tick, deadline)
             if not found:
-                spoke = seen.spoke(question.last_tick, deadline)
-                return deadline, "none" if spoke is None else "characters that are no answer"
+                return deadline, _no_answer(seen, question, deadline)
             answer = found[0]
             said = answer.said
             if said is None or (said.slot, said.seq) != (slot, question.seq):
-                who = (
-                    "unknown contents" if said is None else f"one of robot {said.slot} to question {said.seq}"
-                )
-                return answer.tick, who
+                return answer.tick, who(answer)
             what = says(answer, seen) if says is not None else ""
             return (answer.tick, what) if what else None
 
@@ -305,18 +327,59 @@ class Talk:
 
         def test(seen: Seen) -> Found:
             spoke = seen.spoke(after_tick, until_tick)
-            return None if spoke is None else (spoke.tick, f"character {spoke.value:02X}h")
+            if spoke is None:
+                return None
+            heard = in_a_row([one for one in seen.heard if spoke.tick <= one.tick <= until_tick])
+            answer = next(iter(seen.answers_in(spoke.tick, heard[-1].tick)), None)
+            return spoke.tick, characters(heard) + (f": {who(answer)}" if answer is not None else "")
 
         self.expect(until_tick, f"silence: {why}", test)
+
+
+def _instead(seen: Seen, frame: Frame, told: tuple[Order, Order]) -> str:
+    """What the robot made of the frame, where that is plain; else ""."""
+    if max(order.tick for order in told) <= frame.tick:
+        late = _told_late(seen, frame)
+        if late is not None:
+            return f": told so {(late - frame.end_tick) / TICKS_PER_MS:.2f} ms after its end"
+        wrote = seen.wrote(frame.tick, frame.end_tick + ACTING_TICKS)
+        loaded = any(one.opcode == _LTRJ and one.data[1:2] and one.data[1] & _VELOCITY for one in wrote)
+        return ": loaded, but not started (STT)" if loaded else ": nothing was told"
+    what = wheels_instead(told, frame, seen.slot)
+    return f": {what}" if what else ""
+
+
+def _told_late(seen: Seen, frame: Frame) -> int | None:
+    deadline = frame.end_tick + ACTING_TICKS
+    wanted = frame.for_robot(seen.slot)
+    for order in seen.ordered(deadline, deadline + CONTROL_PERIOD_TICKS):
+        if all(map(obeys, seen.both_told(order.tick), wanted)):
+            return order.tick
+    return None
+
+
+def who(answer: Answer) -> str:
+    """Who says it, for people."""
+    said = answer.said
+    return "unknown contents" if said is None else f"an answer of robot {said.slot} to question {said.seq}"
+
+
+def _no_answer(seen: Seen, question: Frame, deadline: int) -> str:
+    heard = [one for one in seen.heard if question.last_tick < one.tick <= deadline]
+    late = next(
+        (one for one in seen.answers_in(deadline, seen.end_tick) if one.frame.seq == question.seq), None
+    )
+    if late is not None and late.frame.start_tick < deadline + CONTROL_PERIOD_TICKS:
+        return f"one that is over {(late.tick - question.end_tick) / TICKS_PER_MS:.2f} ms after the question's end"
+    if not heard:
+        return "no answer"
+    why = no_answer(heard, question.seq)
+    return f"{characters(heard)}: {why}" if why else f"{characters(heard)}, which are no answer"
 
 
 def ms(time_ms: float) -> int:
     """Ticks."""
     return round(time_ms * TICKS_PER_MS)
-
-
-def cut_off(word: int) -> int:
-    return max(-VELOCITY_SATURATION, min(VELOCITY_SATURATION, word))
 
 
 def obeys(order: Order, word: int) -> bool:

@@ -48,18 +48,23 @@ class OutputFolder:
     exception removes the parts, but for those named in `keep`, and leaves complete files as they were. A process that
     is killed leaves all its parts. Raises OutputError for a folder with other content (unless `force`), for one that
     another process writes to, for one that cannot be made, and for a full disk.
+
+    `ours`: the folder is the command's own choice; a finished run that stands there is replaced as by `force`.
     """
 
-    def __init__(self, path: Path, force: bool = False, names: Sequence[str] = FILES) -> None:
+    def __init__(
+        self, path: Path, force: bool = False, names: Sequence[str] = FILES, ours: bool = False
+    ) -> None:
         self.path = path
         self.names = names
         self.keep: Sequence[str] = ()
         self._force = force
+        self._ours = ours
         self._made = False
         self._lock: int | None = None
         if path.is_dir():
             _release(_lock(path))
-        _check(path, force, names)
+        _check(path, force, names, ours)
 
     def part(self, name: str) -> Path:
         """Where to write the file that is to be called `name`."""
@@ -70,7 +75,7 @@ class OutputFolder:
             self._made = not self.path.is_dir()
             self.path.mkdir(parents=True, exist_ok=True)
             self._lock = _lock(self.path)
-            _check(self.path, self._force, self.names)  # another run may have filled it since
+            _check(self.path, self._force, self.names, self._ours)  # another run may have filled it since
             self._remove_parts()
         except OSError as error:
             _release(self._lock)
@@ -142,7 +147,7 @@ def _release(lock: int | None) -> None:
         os.close(lock)
 
 
-def _check(path: Path, force: bool, names: Sequence[str]) -> None:
+def _check(path: Path, force: bool, names: Sequence[str], ours: bool) -> None:
     try:
         present = sorted(os.listdir(path))
     except FileNotFoundError:
@@ -153,7 +158,9 @@ def _check(path: Path, force: bool, names: Sequence[str]) -> None:
     except OSError as error:
         what = "exists and is not a folder" if isinstance(error, NotADirectoryError) else _reason(error)
         raise OutputError(path, what, "choose another folder with --out") from None
-    if present and not force:
+    parts = {part_name(name) for name in names} & set(present)
+    finished = ours and RECORDING in present and not parts
+    if present and not force and not finished:
         raise OutputError(path, _content(present, names), _ways_out(names))
     if not os.access(path, os.W_OK | os.X_OK):
         raise OutputError(path, "the folder cannot be written to", "choose another folder with --out")
@@ -239,6 +246,17 @@ def whole_file(path: Path, option: str) -> Iterator[Path]:
         raise OutputError(path, _reason(error), _make_room("file", option)) from None
     finally:
         staging.unlink(missing_ok=True)
+
+
+@contextmanager
+def told_when_full(path: Path, option: str) -> Iterator[None]:
+    """A full disk becomes an OutputError that names the folder. It occurs on write, where the OSError names no file."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        raise OutputError(path, _reason(error), _make_room("folder", option)) from None
 
 
 def _make_room(kind: str, option: str) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import check_regular
 from miro_protocol.protocol import Damage, Protocol
 from miro_protocol.stream_events import Deed
 from miro_protocol.transmission import Transmission
@@ -21,7 +22,6 @@ from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
 from miro_robot.harness.heard_bus import LONGEST_ANSWER_TICKS, BareJudge
 from miro_robot.harness.program import INPUTS, Program
 from miro_robot.image import SPACE_BYTES, Image, load_hex
-from miro_sim.inputs import check_regular
 from mirotwin.fuzz.bare_machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
 from mirotwin.fuzz.exchange import Exchange, NamedCheck, check_named
 from mirotwin.fuzz.harness_target import HarnessTarget, described

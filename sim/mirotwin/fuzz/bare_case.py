@@ -39,7 +39,7 @@ from mirotwin.checks.interface import Failure
 from mirotwin.fuzz.bare import NO_FAULT
 from mirotwin.fuzz.bare_machine import BareLine
 from mirotwin.fuzz.bare_run import BareRun
-from mirotwin.fuzz.exchange import OPTION, NamedCheck, check_named
+from mirotwin.fuzz.exchange import OPTION, NamedCheck, check_named, installed_check
 from mirotwin.fuzz.target import NEVER_SLEEPS
 
 FAULT_CODE, FAILED_CODE, DIVERGED_CODE = 3, 1, 4
@@ -167,18 +167,19 @@ def _line(case: stream.Stream) -> BareLine:
 
 
 def _check(case: stream.Stream, name: str, given: str | None) -> NamedCheck:
-    """The check that the case names: the one given, or one that is installed."""
+    """The check that the case names: the one given on the command line, or one that is installed."""
+    if given:
+        if (found_name := given.rpartition(":")[2]) != name:
+            what = f"is a case of the check {name!r}, and {OPTION} gives {found_name!r}"
+            raise BadInput(case.source, "header: expect", what, f"give {name}")
+        return check_named(given)
     try:
-        found = check_named(given or name)
+        return installed_check(name)
     except BadInput as error:
-        if given:
-            raise
         what = f"names the check {name!r}, which is not installed"
-        raise BadInput(case.source, "header: expect", what, f"give it: {OPTION} FILE.py:{name}") from error
-    if found.name != name:
-        what = f"is a case of the check {name!r}, and {OPTION} gives {found.name!r}"
-        raise BadInput(case.source, "header: expect", what, f"give {name}")
-    return found
+        own = name.isidentifier()
+        remedy = f"give it: {OPTION} FILE.py:{name}" if own else "a case names a check, and never its file"
+        raise BadInput(case.source, "header: expect", what, remedy) from error
 
 
 def _heard(case: stream.Stream) -> list[Transmission | Deed]:

@@ -16,8 +16,8 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import TEXT_BYTES
 from miro_protocol import stream
-from miro_sim.inputs import TEXT_BYTES
 from mirotwin.capture.detect import TIMED, detect
 from mirotwin.capture.input import Input
 from mirotwin.capture.source import READ_ERRORS, open_source

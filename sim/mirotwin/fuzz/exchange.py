@@ -149,23 +149,31 @@ class NamedCheck(msgspec.Struct, frozen=True):
 
 
 def check_named(text: str) -> NamedCheck:
-    """The check that `FILE.py:FUNCTION`, or the name of an entry point, means. Raises BadInput."""
+    """The check that `FILE.py:FUNCTION` or the name of an entry point means, as a user types it. Raises BadInput.
+
+    The file is run: `text` must come from the command line. `installed_check` takes names that stand in files.
+    """
     path, _, function = text.rpartition(":")
     if path.endswith(".py"):
         return NamedCheck(function, text, _callable(_module(path, text), function, text), True)
-    entries = list(entry_points(group=GROUP, name=text))
+    return installed_check(text)
+
+
+def installed_check(name: str) -> NamedCheck:
+    """The check that an installed distribution has under this name. Raises BadInput."""
+    entries = list(entry_points(group=GROUP, name=name))
     if not entries:
         names = sorted(entry.name for entry in entry_points(group=GROUP))
-        remedy = f"give FILE.py:FUNCTION{''.join(f', {name}' for name in names)}"
-        raise BadInput("", OPTION, f"there is no check {text!r} for a bare processor", remedy)
+        remedy = f"give FILE.py:FUNCTION{''.join(f', {one}' for one in names)}"
+        raise BadInput("", OPTION, f"there is no check {name!r} for a bare processor", remedy)
     try:
         found = entries[0].load()
     except (Exception, SystemExit) as error:
-        what = f"check {text!r} ({entries[0].value}) cannot be imported: {described(error)}"
+        what = f"check {name!r} ({entries[0].value}) cannot be imported: {described(error)}"
         raise BadInput("", OPTION, what, "repair or uninstall it") from error
     if not callable(found):
-        raise BadInput("", OPTION, f"check {text!r} ({entries[0].value}) is no function", "name a function")
-    return NamedCheck(text, text, found, False)
+        raise BadInput("", OPTION, f"check {name!r} ({entries[0].value}) is no function", "name a function")
+    return NamedCheck(name, name, found, False)
 
 
 def _module(path: str, text: str) -> ModuleType:

@@ -22,15 +22,18 @@ from __future__ import annotations
 import glob
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from miro_exact.bad_input import BadInput
 from miro_protocol import files
-from mirotwin.files.outputs import OutputError
+from mirotwin.files.outputs import OutputError, told_when_full
 
 FOLDERS = ("finds", "unconfirmed", "covering", "corpus", "seeds", "engine")
 FILES = ("coverage.info", "coverage.info.lst", "summary.json", "dictionary")
+SCRATCH = ("corpus", "seeds", "engine")
+"""What a campaign that could not end leaves to nobody."""
 OPTION = "--out"
 
 
@@ -85,6 +88,22 @@ class CampaignFolder:
         path = (self.folder(folder) if folder else self.path) / name
         files.replace(path, data.encode("utf-8", "surrogateescape") if isinstance(data, str) else data)
         return path
+
+    @contextmanager
+    def filled(self) -> Iterator[None]:
+        """While the campaign writes there. A full disk is an OutputError, and leaves finds only, or no folder."""
+        try:
+            with told_when_full(self.path, OPTION):
+                yield
+        except OutputError:
+            for name in SCRATCH:
+                shutil.rmtree(self.path / name, ignore_errors=True)
+            for name in FILES:
+                (self.path / name).unlink(missing_ok=True)
+            for path in (*self.path.rglob("*"), self.path):
+                with suppress(OSError):  # a folder with finds in it, or a find
+                    path.rmdir()
+            raise
 
     def remove(self, folder: str, name: str) -> None:
         """Takes away the files of a find."""

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -21,6 +20,7 @@ from pathlib import Path
 from types import TracebackType
 
 from miro_exact.bad_input import BadInput
+from mirotwin.files.children import python_module
 from mirotwin.fuzz.afl.statistics import Progress
 from mirotwin.fuzz.hypothesis_process import KINDS, told
 
@@ -76,7 +76,7 @@ class HypothesisRun:
             with (folder / _LOG).open("wb") as log:
                 self._processes.append(
                     subprocess.Popen(
-                        [sys.executable, "-m", _PROCESS, *what],
+                        python_module(_PROCESS, *what),
                         stdin=subprocess.DEVNULL,
                         stdout=log,
                         stderr=log,

@@ -18,6 +18,7 @@ from pathlib import Path
 from PIL import Image, UnidentifiedImageError
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import PICTURE_BYTES, read_input
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH
 from miro_host.eye.frame import Frame
 
@@ -80,7 +81,7 @@ def png(image: Image.Image) -> bytes:
 def read(path: Path) -> Picture:
     """The picture in a PNG or PPM file. Raises BadInput for another size and for what is no picture."""
     try:
-        data = path.read_bytes()
+        data = read_input(path, PICTURE_BYTES)
     except OSError as error:
         raise BadInput(path, "", f"cannot be read: {error.strerror}", "check path and permissions") from None
     return parse(data, f"{path}")

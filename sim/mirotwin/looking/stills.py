@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CAMERA_FRAME_TICKS
-from miro_sim.inputs import check_regular
+from miro_exact.inputs import check_regular
 from mirotwin.looking import picture
 from mirotwin.looking.picture import SUFFIXES, Picture
 from mirotwin.recording.container import BrokenOff

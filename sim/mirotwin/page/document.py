@@ -18,6 +18,8 @@ from mirotwin.page.bokeh_page import document_json, island, javascript, require_
 MOST_BYTES = 50_000_000
 """Of a page: browsers take more, people and mail do not."""
 ASSETS = Path(__file__).parent / "assets"
+GENERATOR = b'<meta name="generator" content="mirotwin report">'
+"""In the head of every page."""
 
 
 def render(template: str, figures: dict[str, Any], data: bytes, values: dict[str, Any]) -> bytes:
@@ -47,6 +49,14 @@ def render(template: str, figures: dict[str, Any], data: bytes, values: dict[str
         data=Markup(island(data)),
     )
     return text.encode("utf-8", "replace")
+
+
+def is_page(path: Path) -> bool:
+    """Whether the file is one that `render` made."""
+    if not path.is_file():
+        return False
+    with open(path, "rb") as file:
+        return GENERATOR in file.read(2000)
 
 
 def check_size(page: bytes, name: str, remedy: str) -> None:

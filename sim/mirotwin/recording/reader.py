@@ -13,6 +13,7 @@ from typing import Any
 
 import msgspec
 
+from miro_exact.inputs import RECORDING_BYTES, read_input
 from miro_protocol.stream_events import Deed
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
@@ -51,7 +52,7 @@ class Recording(msgspec.Struct, frozen=True):
 
 def read(path: str | Path) -> Recording:
     """Reads a recording, as far as it goes. Raises RecordingError for any other content, OSError as `open` does."""
-    return parse(Path(path).read_bytes(), str(path))
+    return parse(read_input(path, RECORDING_BYTES), str(path))
 
 
 def parse(data: bytes, path: str) -> Recording:

@@ -12,8 +12,11 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from miro_robot.image import Image
+from miro_sim.world.conditions import Reached
+from miro_sim.world.waits import WaitExpired
 from mirotwin.replay.builds import Builds, VariableDifference
 from mirotwin.replay.instructions import InstructionDifference, Stepper
+from mirotwin.replay.moved import Moved, moved
 from mirotwin.replay.program import Program, same_layout
 
 if TYPE_CHECKING:
@@ -24,7 +27,8 @@ Make = Callable[[Image], "World"]
 
 
 class FirmwareDifference(msgspec.Struct, frozen=True):
-    """What two firmwares do otherwise. `changed`, `effect`: of images of the same layout; `variables`: of others.
+    """What two firmwares do otherwise. `changed`, `effect`: of images of the same layout; `mapped`, the first changed
+    instruction by symbols, and `variables`: of others.
 
     `notes`: what was compared, and what is missing.
     """
@@ -33,11 +37,13 @@ class FirmwareDifference(msgspec.Struct, frozen=True):
     effect: InstructionDifference | None
     variables: tuple[VariableDifference, ...]
     notes: tuple[str, ...]
+    mapped: InstructionDifference | None = None
 
     def as_json(self) -> dict[str, Any]:
         return {
             "changed": None if self.changed is None else self.changed.as_json(),
             "effect": None if self.effect is None else self.effect.as_json(),
+            "mapped": None if self.mapped is None else self.mapped.as_json(),
             "variables": [one.as_json() for one in self.variables],
             "notes": list(self.notes),
         }
@@ -59,21 +65,48 @@ def first_instruction(make: Make, one: Program, other: Program, until_tick: int)
         if effect is None:
             notes.insert(0, "the states are the same each millisecond: no instruction has a lasting effect")
         return FirmwareDifference(changed, effect, (), tuple(notes))
+    mapping = moved(one, other)
+    mapped = _first_mapped(worlds(), programs, mapping, until_tick)
     builds = Builds(*worlds(), programs)
     variables = builds.variables(until_tick)
     notes.insert(0, _compared(builds))
+    if mapping.same or mapping.changed:
+        notes.insert(0, f"the code lies at other addresses and was mapped by symbols: {mapping}")
     if variables and not builds.since:
-        notes.insert(1, "when the runs differ no variable does any more; these did for a while before")
-    return FirmwareDifference(None, None, tuple(variables), tuple(notes))
+        notes.append("when the runs differ no variable does any more; these did for a while before")
+    return FirmwareDifference(None, None, tuple(variables), tuple(notes), mapped)
+
+
+def _first_mapped(
+    worlds: tuple[World, World], programs: tuple[Program, Program], mapping: Moved, until_tick: int
+) -> InstructionDifference | None:
+    """The first changed instruction that the first firmware executes, and the one in its place in the second."""
+    one, other = worlds
+    robots = [(network.index, robot.slot) for network in one.networks for robot in network.robots]
+    reached = [Reached(place=at, network=net, slot=slot) for net, slot in robots for at in mapping.places]
+    try:
+        event = one.run_until(reached, until_tick - one.tick) if reached else None
+    except WaitExpired:
+        event = None
+    if event is None:
+        return None
+    there = mapping.places[event.address]
+    place = programs[0].place(event.address, event.tick)
+    try:
+        twin = Reached(place=there, network=event.network, slot=event.slot)
+        tick = other.run_until([twin], until_tick - other.tick).tick
+    except WaitExpired:
+        tick = event.tick
+    return InstructionDifference(event.network, event.slot, place, programs[1].place(there, tick), ())
 
 
 def _compared(builds: Builds) -> str:
-    head = "the code of the two images lies at other addresses, so instructions are not compared one by one"
+    head = "the code of the two images lies at other addresses"
     if not builds.places:
-        return f"{head}; nor are variables: the images have no symbols of internal RAM in common"
+        return f"{head}: variables are not compared: the images have no symbols of internal RAM in common"
     if not builds.looks:
-        return f"{head}; nor are variables: the processors never sleep both at once"
-    return f"{head}; compared were {len(builds.places)} variables by name, whenever both processors slept"
+        return f"{head}: variables are not compared: the processors never sleep both at once"
+    return f"{head}: compared were {len(builds.places)} variables by name, whenever both processors slept"
 
 
 def _missing(programs: tuple[Program, Program]) -> Iterator[str]:

@@ -123,7 +123,7 @@ def _scenario_of_header(scenario: str | dict[str, object], place: str) -> Scenar
     if scenario not in builtin_names():
         remedy = f"give one of {', '.join(builtin_names())}, or a whole scenario as a table"
         raise ScenarioError(place, "", f"{scenario[:40]!r} is no built-in scenario", remedy)
-    return load(scenario).scenario
+    return load(scenario, ["expect={}"]).scenario  # which its own controller is to fulfil
 
 
 def _default_scenario(script: Sequence[Doing], path: str) -> Scenario:
@@ -137,7 +137,8 @@ def _default_scenario(script: Sequence[Doing], path: str) -> Scenario:
         last = max(one.tick for one in script)
         raise BadInput(path, f"tick {last}", "more than a day", "let the stream start near tick 0")
     count = 1 + max(one.network for one in script)
-    base = load(DEFAULT_SCENARIO, ["camera={kind = 'gaussian'}"]).scenario  # nothing steers by it
+    settings = ["camera={kind = 'gaussian'}", "expect={}"]  # nothing steers by it, or is said of it
+    base = load(DEFAULT_SCENARIO, settings).scenario
     model = base.networks[0].robot[0]
     assert isinstance(model.reference, msgspec.Struct)  # parameters of a line
     standing = msgspec.structs.replace(model.reference, drive_s=0.0)  # nothing steers by it

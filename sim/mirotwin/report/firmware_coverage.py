@@ -14,6 +14,7 @@ import msgspec
 from rich.table import Table
 
 from miro_exact.bad_input import one_line
+from miro_exact.inputs import read_input
 from miro_robot.firmware import image_path, source_folder
 from miro_robot.image import Image, load_hex
 from miro_robot.image.debug_info import DebugInfo, Sources
@@ -29,7 +30,6 @@ from miro_robot.inspect.coverage import (
     missed,
 )
 from miro_robot.inspect.lcov import Tracefile, decode, encode
-from miro_sim.inputs import read_input
 from mirotwin.files.outputs import whole_file
 
 

@@ -251,13 +251,6 @@ def off_pitch_text(summary: Summary) -> str:
     return f"off it for {', '.join(left)} (the pitch has no walls here)" if left else ""
 
 
-def expectations_text(expectations: Sequence[Expectation]) -> str:
-    """How many checks passed, and the names of those that did not, for people."""
-    passed = [one.name for one in expectations if one.verdict == "passed"]
-    others = [f"{one.name} {one.verdict}" for one in expectations if one.verdict != "passed"]
-    return ", ".join([f"{len(passed)} of {len(expectations)} checks passed", *others])
-
-
 def vision_text(vision: Vision) -> str:
     """What the cameras saw, for people: what did not happen is left out, but for lost robots."""
     happened = {

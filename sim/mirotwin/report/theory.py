@@ -18,16 +18,22 @@ from mirotwin.report.theory_track import PERIOD_S, Broken, TheoryTrack
 
 
 class Gains(msgspec.Struct, frozen=True):
-    """P_1 in m/s2 and P_2 in rad/s2 of a robot's law; None where it has no such gain."""
+    """P_1 in m/s2 and P_2 in rad/s2 of a robot's law; None where it has no such gain.
+
+    `layer_*`: the widths of the boundary layers of s_1 and s_2; None where sgn switches without one.
+    """
 
     p1_m_s2: float | None = None
     p2_rad_s2: float | None = None
+    layer_s1_m_s: float | None = None
+    layer_s2_rad_s: float | None = None
 
 
 class Disturbance(msgspec.Struct, frozen=True):
     """f of equation (15) over the run's control periods, against the gains of condition (17).
 
-    `*_above_*`: the share of the periods in which |f_i| is greater than P_i; None where the law has no P_i.
+    `*_above_*`: the share of the periods in which |f_i| is greater than P_i, and than the authority, what P_i leaves
+    inside the boundary layer: P_i |sat(s_i / layer_i)|, with s_i as the law saw it. None where the law has no P_i.
     """
 
     f1_rms_m_s2: float
@@ -38,6 +44,8 @@ class Disturbance(msgspec.Struct, frozen=True):
     p2_rad_s2: float | None
     f1_above_p1: float | None
     f2_above_p2: float | None
+    f1_above_authority: float | None
+    f2_above_authority: float | None
 
 
 class Assumption1(msgspec.Struct, frozen=True):
@@ -88,14 +96,21 @@ class Theory(msgspec.Struct, frozen=True):
 
 
 def gains_of(scenario: Scenario) -> Mapping[tuple[int, int], Gains]:
-    """P_1 and P_2 of each robot that the paper's law steers, by network and slot: other laws have other surfaces."""
+    """The gains of each robot that the paper's law steers, by network and slot: other laws have other surfaces."""
     return {
-        (index, robot.slot): Gains(robot.controller.p1_m_s2, robot.controller.p2_rad_s2)
-        if isinstance(robot.controller, PaperGains)
-        else Gains()
+        (index, robot.slot): _gains(robot.controller)
         for index, network in enumerate(scenario.networks)
         for robot in network.robot
     }
+
+
+def _gains(controller: object) -> Gains:
+    if not isinstance(controller, PaperGains):
+        return Gains()
+    if controller.switching == "sign":
+        return Gains(controller.p1_m_s2, controller.p2_rad_s2)
+    layers = controller.layer_s1_m_s, controller.layer_s2_rad_s
+    return Gains(controller.p1_m_s2, controller.p2_rad_s2, *layers)
 
 
 def theory_of(track: TheoryTrack, gains: Gains) -> Theory | None:
@@ -136,6 +151,8 @@ def _disturbance(track: TheoryTrack, gains: Gains) -> Disturbance | None:
         gains.p2_rad_s2,
         _share_above(track.f1_m_s2, gains.p1_m_s2),
         _share_above(track.f2_rad_s2, gains.p2_rad_s2),
+        _share_above_authority(track.f1_m_s2, track.s1_m_s, gains.p1_m_s2, gains.layer_s1_m_s),
+        _share_above_authority(track.f2_rad_s2, track.s2_rad_s, gains.p2_rad_s2, gains.layer_s2_rad_s),
     )
 
 
@@ -154,6 +171,24 @@ def _share_above(values: array[float], bound: float | None) -> float | None:
     return len([1 for value in values if abs(value) > bound]) / len(values)
 
 
+def _share_above_authority(
+    values: array[float], surfaces: array[float], gain: float | None, layer: float | None
+) -> float | None:
+    """None also where the law does not say its surface."""
+    if gain is None or len(surfaces) != len(values):
+        return None
+    pairs = zip(values, surfaces, strict=True)
+    above = [1 for value, surface in pairs if abs(value) > authority(surface, gain, layer)]
+    return len(above) / len(values)
+
+
+def authority(surface: float, gain: float, layer: float | None) -> float:
+    """How large the switching term is: the gain, and less of it inside the layer."""
+    if layer is None:
+        return gain if surface else 0.0
+    return gain * min(1.0, abs(surface) / layer)
+
+
 def theory_text(theory: Theory) -> str:
     """The same in a line for people: what holds is left out, but for condition (17)."""
     parts = []
@@ -166,9 +201,19 @@ def theory_text(theory: Theory) -> str:
         crossed = f", crossed {third.crossings} x" if third.crossings else ""
         parts.append(f"assumption 3 within 0.1 rad in {third.frames} frames{crossed}")
     if f is not None:
-        for name, gain, share in (("|f1| > P1", "P1", f.f1_above_p1), ("|f2| > P2", "P2", f.f2_above_p2)):
-            if share is not None and gain:
-                parts.append(f"{name} in {100.0 * share:.0f} %")
+        for axis, above_gain, above_authority in (
+            ("1", f.f1_above_p1, f.f1_above_authority),
+            ("2", f.f2_above_p2, f.f2_above_authority),
+        ):
+            if above_gain is not None:
+                parts.append(_condition_17(axis, above_gain, above_authority))
     if theory.backward_s:
         parts.append(f"backward for {theory.backward_s:.2f} s")
     return "; ".join(parts)
+
+
+def _condition_17(axis: str, above_gain: float, above_authority: float | None) -> str:
+    text = f"|f{axis}| > P{axis} in {100.0 * above_gain:.0f} %"
+    if above_authority is not None:
+        text += f" (> P{axis} |sat(s{axis})| in {100.0 * above_authority:.0f} %)"
+    return text

@@ -1,7 +1,7 @@
 """The paper's theory along a run: what is noted of each control period while the run is under way.
 
 What belongs here: one robot, period by period, from what a period leaves behind. What does not: what a run amounts to
-(`theory`) and the formulas (`miro_host.theory`). Of each period two numbers are kept; the rest is counted.
+(`theory`) and the formulas (`miro_host.theory`). Of each period f and the surfaces are kept; the rest is counted.
 
 f is that of equation (15), f = z_r' + u - z', over one control period: z_r' + u is the change of the commanded velocity
 by the command that was computed at the period's exposure, after its limits; z' is the change of the true velocity from
@@ -69,6 +69,9 @@ class TheoryTrack:
     def __init__(self) -> None:
         self.f1_m_s2 = array("d")
         self.f2_rad_s2 = array("d")
+        # as the law saw them when it made the command of that f; empty if it does not say them
+        self.s1_m_s = array("d")
+        self.s2_rad_s = array("d")
         self.ranges, self.origin, self.perpendicular = Broken(), Broken(), Broken()  # assumptions 1, 2, 3
         self.seams = 0
         self.nearest_m = self.nearest_rad = 10.0
@@ -81,6 +84,7 @@ class TheoryTrack:
         self._tick = -1
         self._velocity = self._command = (0.0, 0.0)
         self._demand: tuple[float, float] | None = None
+        self._surfaces: tuple[float, float] | None = None
 
     def add(self, robot: RobotPeriod, tick: int) -> None:
         """Takes over what is needed of the next control period."""
@@ -106,6 +110,9 @@ class TheoryTrack:
         f2 = disturbance(self._demand[1], (robot.w_rad_s - w) / PERIOD_S)
         self.f1_m_s2.append(f1)
         self.f2_rad_s2.append(f2)
+        if self._surfaces is not None:
+            self.s1_m_s.append(self._surfaces[0])
+            self.s2_rad_s.append(self._surfaces[1])
         return f1, f2
 
     def _note(self, broken: Broken, tick: int, now: bool) -> bool:
@@ -163,4 +170,6 @@ class TheoryTrack:
         v, w = self._command
         self._demand = (control.v_m_s - v) / PERIOD_S, (control.w_rad_s - w) / PERIOD_S
         self._command = control.v_m_s, control.w_rad_s
+        inner = control.inner
+        self._surfaces = (inner["s1"], inner["s2"]) if "s1" in inner and "s2" in inner else None
         self.chattering.add(control.left, control.right)

@@ -15,16 +15,21 @@ from miro_robot.firmware import source_folder
 _IN_WHEEL = Path(__file__).parent / "files"
 _IN_TREE = Path(__file__).parents[3] / "examples" / "hil"
 FIRMWARE = "firmware"
+OF_FIRMWARE = "tests/test_firmware.py"
+"""What only this firmware passes, because it names a function of it."""
 
 
-def files() -> Iterator[tuple[str, Path]]:
-    """(name in the project, file) of all, in the order of names."""
+def files(firmware: bool = True) -> Iterator[tuple[str, Path]]:
+    """(name in the project, file) of all, in the order of names; with the C sources if `firmware`."""
     folder = _IN_WHEEL if _IN_WHEEL.is_dir() else _IN_TREE
     sources = source_folder()
     if sources is None or not folder.is_dir():
         what = "the sample project is not part of this installation"
         raise BadInput("", "mirotwin init", what, "install mirotwin from a wheel or a checkout")
     found = [(path.relative_to(folder).as_posix(), path) for path in _all(folder)]
+    if not firmware:
+        yield from (one for one in found if one[0] != OF_FIRMWARE)
+        return
     found += [(f"{FIRMWARE}/{path.relative_to(sources).as_posix()}", path) for path in _all(sources)]
     yield from sorted(found)
 
@@ -37,9 +42,9 @@ def _all(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def begin(target: Path) -> list[str]:
+def begin(target: Path, firmware: bool = True) -> list[str]:
     """Writes the project into `target`, which is made, and returns the names. Raises BadInput if one is there."""
-    wanted = list(files())
+    wanted = list(files(firmware))
     if target.exists() and not target.is_dir():
         raise BadInput(target, "", "is no folder", "name one that is new or empty")
     present = [name for name, _ in wanted if (target / name).exists() or (target / name).is_symlink()]

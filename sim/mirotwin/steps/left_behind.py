@@ -1,23 +1,24 @@
 """What a scenario file that failed leaves in its folder: its report, the scenario as a whole, the case of its failure.
 
-What belongs here: the case of a step or check, names, writing. What does not: the form of a case (`mirotwin.cases`).
+What belongs here: the case of a step or check. What does not: the form of a case, and the other files of the folder
+(`mirotwin.cases`).
 
     report.txt        the lines of the verdict, and the command that gives it again
     scenario.toml     the whole scenario with all that was set: `mirotwin run` gives the verdict again
     case.stream       what was sent and done, with the check that failed: `mirotwin replay` does; not where no check can
-                      judge it, as for pins, wheels, places in the program and single fields of an answer
+                      judge it, as for pins, wheels, places in the program and single fields of an answer: there
+                      sent.stream
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 import msgspec
 
 from miro_sim.world.world import World
-from mirotwin.cases.case import case_of_checks, case_text, write_case
+from mirotwin.cases.case import case_of_checks, case_text
 from mirotwin.cases.trace import Trace
 from mirotwin.cases.waits import table_of
 from mirotwin.checks.interface import Failure
@@ -25,8 +26,7 @@ from mirotwin.checks.watching import Checks
 from mirotwin.steps.keys import HoldStep, NeverStep, WaitStep
 from mirotwin.steps.player import Player
 
-REPORT, SCENARIO, CASE = "report.txt", "scenario.toml", "case.stream"
-FILES = (REPORT, SCENARIO, CASE)
+SCENARIO = "scenario.toml"
 
 
 def case_of_step(player: Player, trace: Trace) -> str | None:
@@ -61,20 +61,3 @@ def _judged_again(world: World, trace: Trace, expect: Mapping[str, Any]) -> Fail
 def case_of_run(world: World, trace: Trace, checks: Checks) -> str | None:
     """The case of the first of the run's checks that failed; None where none did."""
     return case_of_checks(world, trace, checks) if checks.failures else None
-
-
-def clear(folder: Path) -> None:
-    """Takes away what an earlier run left there, and nothing else."""
-    for name in FILES:
-        (folder / name).unlink(missing_ok=True)
-    if folder.is_dir() and not any(folder.iterdir()):
-        folder.rmdir()
-
-
-def leave(folder: Path, report: Sequence[str], scenario: str, case: str | None) -> None:
-    """Writes the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / REPORT).write_text("".join(f"{line}\n" for line in report), encoding="utf-8")
-    (folder / SCENARIO).write_text(scenario, encoding="utf-8")
-    if case is not None:
-        write_case(folder / CASE, case)

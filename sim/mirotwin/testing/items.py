@@ -16,7 +16,8 @@ import pytest
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_sim.world.waits import WaitExpired
-from mirotwin.testing.left_behind import case_of, clear, folder_of, leave, replay_line, story, test_line
+from mirotwin.cases.artifacts import PAGE, clear, replay_line, report_line
+from mirotwin.testing.left_behind import SUMMARY, case_of, folder_of, leave_test, story, test_line
 from mirotwin.testing.page_left import page_of
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
@@ -76,6 +77,7 @@ def tell(
     caught: pytest.ExceptionInfo[BaseException] | None,
     firmware: Path | None,
     artifacts: Path | None,
+    pages: bool,
 ) -> None:
     """Puts into a test's report what names its run, and where it failed the story; leaves its folder."""
     rig = item.stash[RIG]
@@ -90,26 +92,25 @@ def tell(
     item.user_properties += list(facts.items())  # JUnit takes them with the report of the teardown
     folder = folder_of(artifacts, item.nodeid) if artifacts is not None else None
     if folder is not None:
-        clear(folder)
+        clear(folder, SUMMARY)
     if not failed:
         return
     lines = [again]
-    case = case_of(rig, failures, caught.value if caught is not None else None)
-    if folder is not None and case is not None:
-        own = rig.wanted.image.path == image_path()
-        image = None if own else _relative(item.config, rig.wanted.image.path.absolute())
-        lines.append(replay_line(str(_relative(item.config, folder)), image))
+    error = caught.value if caught is not None else None
+    case = case_of(rig, failures, error)
+    where = ""
+    if folder is not None:
+        where = str(_relative(item.config, folder))
+        lines += [] if case is None else [replay_line(where, rig.wanted.image.path == image_path())]
     text = story(rig, failures, lines)
+    if folder is not None and not rig.written:
+        text += f"\n{report_line(where)}"
     report.sections.append(("mirotwin", text))
     if folder is not None:
-        leave(
-            folder,
-            rig,
-            failures,
-            text,
-            case,
-            page_of(rig, item.nodeid, caught.value if caught else None, text, lines),
-        )
+        leave_test(folder, rig, failures, text, case)
+        page = page_of(rig, item.nodeid, error, text, lines) if pages else None
+        if page is not None:
+            (folder / PAGE).write_bytes(page)
 
 
 def let_go(item: pytest.Item) -> None:

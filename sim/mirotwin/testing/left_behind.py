@@ -1,7 +1,7 @@
 """What a failed test leaves behind: the lines of its report, and a folder of its own with them as files.
 
-What belongs here: the text, the name of the folder, writing it. What does not: when a test has failed
-(`mirotwin.pytest_plugin`).
+What belongs here: the text, the name of the folder, the summary. What does not: when a test has failed
+(`mirotwin.pytest_plugin`), and the files that every failure leaves (`mirotwin.cases.artifacts`).
 """
 
 from __future__ import annotations
@@ -18,17 +18,14 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_sim.world.world import World
-from mirotwin.cases.case import case_of_checks, case_text, write_case
+from mirotwin.cases.artifacts import leave
+from mirotwin.cases.case import case_of_checks, case_text
 from mirotwin.checks.interface import Failure
 from mirotwin.checks.watching import Checks
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed, at
 
-REPORT, SUMMARY = "report.txt", "summary.json"
-CASE, SENT = "case.stream", "sent.stream"
-"""A case gives the failure again; where no check can judge it, what was sent gives the run again."""
-PAGE = "report.html"
-FILES = (REPORT, SUMMARY, CASE, SENT, PAGE)
+SUMMARY = "summary.json"
 _NAME_CHARACTERS = 80
 
 
@@ -65,14 +62,6 @@ def folder_of(artifacts: Path, nodeid: str) -> Path:
     return artifacts / f"{name}-{hashlib.sha256(nodeid.encode()).hexdigest()[:8]}"
 
 
-def clear(folder: Path) -> None:
-    """Takes away what an earlier session left there, and nothing else."""
-    for name in FILES:
-        (folder / name).unlink(missing_ok=True)
-    if folder.is_dir() and not any(folder.iterdir()):
-        folder.rmdir()
-
-
 def case_of(rig: Rig, failures: Sequence[Failure], caught: BaseException | None) -> str | None:
     """The case of a failed test; None where no check can judge what failed, or its test wrote into a robot's memory."""
     if rig.written:
@@ -97,23 +86,9 @@ def _judged_again(rig: Rig, expect: Mapping[str, Any]) -> Failure | None:
     return next((one for one in checks.failures if one.check in expect), None)
 
 
-def replay_line(folder: str, firmware: str | None) -> str:
-    """The command that gives the verdict of the case in `folder` again."""
-    words = ["mirotwin", "replay", f"{folder}/{CASE}"]
-    return shlex.join(words if firmware is None else [*words, "--firmware", firmware])
-
-
-def leave(
-    folder: Path, rig: Rig, failures: Sequence[Failure], text: str, case: str | None, page: bytes | None
-) -> None:
+def leave_test(folder: Path, rig: Rig, failures: Sequence[Failure], text: str, case: str | None) -> None:
     """Writes the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    if case is not None:
-        write_case(folder / CASE, case)
-    elif not rig.written:
-        write_case(folder / SENT, case_text(rig.world, rig.trace, {}, ""))
-    (folder / REPORT).write_text(text + "\n", encoding="utf-8")
-    if page is not None:
-        (folder / PAGE).write_bytes(page)
+    sent = None if rig.written else case_text(rig.world, rig.trace, {}, "")
     summary = {**rig.facts(), "tick": rig.tick, "checks_failed": [str(one) for one in failures]}
-    (folder / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    others = {SUMMARY: json.dumps(summary, indent=2) + "\n"}
+    leave(folder, text + "\n", case, sent, rig.wanted.image, others)

@@ -11,7 +11,6 @@ runs the smallest failing example last, so that is what stands in the file, then
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
@@ -26,6 +25,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import Image
 from miro_sim.radio import RadioParams
 from mirotwin.cases.case import write_case
+from mirotwin.files.command_line import replay_line
 from mirotwin.testing import shrinking
 from mirotwin.testing.bench import MS, Bench, LinkFailure
 from mirotwin.testing.bench_case import case_of_bench
@@ -147,8 +147,6 @@ class LinkMachine(RuleBasedStateMachine):
         if shrinking.is_last_run() and hasattr(self, "bench"):
             case = case_of_bench(self.bench)
         write_case(file, failure.stream if case is None else case)
-        words = ["mirotwin", "replay", str(file)]
-        if self.image is not None and self.image.path != image_path():
-            words += ["--firmware", str(self.image.path)]
+        image = None if self.image is None or self.image.path == image_path() else self.image.path
         what = "see it with" if case is None else "it fails again by"
-        return f"written to {file}; {what}: {shlex.join(words)}"
+        return f"written to {file}; {what}: {replay_line(file, image)}"

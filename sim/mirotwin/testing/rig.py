@@ -16,7 +16,7 @@ from mirotwin.testing.robot import RobotUnderTest
 from mirotwin.testing.waiting import in_words
 from mirotwin.testing.wanted import Wanted
 
-LAST_EVENTS = 60
+LAST_EVENTS = 240
 LAST_LINES = 12
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from miro_exact.inputs import check_regular
 from miro_robot.firmware import image_path, source_folder
 from miro_robot.image import Image, load_hex
 from miro_robot.image.debug_info import Sources
@@ -22,7 +23,6 @@ from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.coverage import Counts, counts_of, line_share, merged
 from miro_robot.inspect.watcher import Inspector, attach
 from miro_robot.mcs51.cpu import Cpu, on_load
-from miro_sim.inputs import check_regular
 from mirotwin.files.outputs import check_file, check_not_input
 from mirotwin.report import firmware_coverage
 from mirotwin.report.firmware_coverage import Report, table, write

@@ -23,10 +23,10 @@ from typing import Any
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import check_regular
 from miro_exact.seed import MAX_SEED
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
-from miro_sim.inputs import check_regular
 from miro_sim.scenario.file import load, parse
 from miro_sim.scenario.keys import Scenario
 from mirotwin.checks.expect import expectations_of

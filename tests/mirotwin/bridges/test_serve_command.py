@@ -61,7 +61,7 @@ def test_a_signal_leaves_parts_that_replay(
 def test_a_check_that_fails_is_exit_code_1_and_leaves_a_case_that_fails_the_same_way(
     mirotwin: Callable[..., Result], tmp_path: Path
 ) -> None:
-    asked = ("--expect", "frames_accepted_min=150", "--duration", 1)
+    asked = ("--expect", "frames_accepted_min=150", "--duration", "1s")
     with served("fig6", "--tcp", 0, *SETTINGS, *asked, "--out", tmp_path / "out") as session:
         talk(session).close()
         session.wait()
@@ -80,7 +80,7 @@ def test_a_session_that_is_killed_leaves_all_but_the_last_half_second(tmp_path: 
         client.close()
     assert question(0) in sent_bytes(tmp_path / "out/run.part.mcap")
     assert replays(tmp_path / "out/run.part.mcap") > 3
-    again = ("--pty", tmp_path / "radio", "--duration", 0.1, "--force", "--out", tmp_path / "out")
+    again = ("--pty", tmp_path / "radio", "--duration", "0.1s", "--force", "--out", tmp_path / "out")
     with served("fig6", *again) as session:  # its link leads nowhere and is replaced
         session.wait()
     assert session.code == 0
@@ -128,7 +128,7 @@ def test_a_second_client_is_refused_with_a_line(tmp_path: Path) -> None:
 
 
 def test_a_duration_ends_it_whoever_is_there(tmp_path: Path) -> None:
-    with served("fig6", "--duration", "0.5", "--realtime", 4, "--out", tmp_path / "out") as session:
+    with served("fig6", "--duration", "0.5s", "--realtime", 4, "--out", tmp_path / "out") as session:
         session.wait()
     assert session.code == 0
     assert replays(tmp_path / "out/run.mcap") == 15
@@ -159,7 +159,7 @@ def test_the_command_line_replays_a_session(mirotwin: Callable[..., Result], tmp
         (["fig6", "--tcp", "0@1"], "--tcp: there is no network 1; there are 1, from 0 on"),
         (["fig6", "--host", "203.0.113.9", "--tcp", "0"], "--tcp 0: 203.0.113.9: "),
         (["fig6", "--realtime", "0"], "--realtime"),
-        (["fig6", "--duration", "1e9"], "--duration"),
+        (["fig6", "--duration", "1000000000s"], "--duration"),
         (["fig6", "--pty", "/no/such/folder/radio"], "/no/such/folder/radio: No such file or directory"),
     ],
 )

@@ -115,3 +115,14 @@ def test_a_port_that_is_taken_is_bad_input(rig: Rig) -> None:
         TcpEndpoint(rig.place, "127.0.0.1", number)
     with pytest.raises(BadInput, match=r"--rfc2217 0: 203\.0\.113\.9: "):
         Rfc2217Endpoint(rig.place, "203.0.113.9", 0)
+
+
+def test_the_kernel_gives_up_a_client_that_has_vanished_whether_answers_are_on_their_way_or_not(
+    rig: Rig,
+) -> None:
+    port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
+    with connected(port):
+        assert port._socket is not None
+        assert port._socket.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+        if hasattr(socket, "TCP_USER_TIMEOUT"):  # without it, 15 minutes of retransmission
+            assert port._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 60_000

@@ -8,6 +8,7 @@ import pytest
 from tests.mirotwin.bridges.ports import Rig, soon
 
 from miro_exact.bad_input import BadInput
+from mirotwin.bridges import terminal
 from mirotwin.bridges.terminal import PtyEndpoint
 
 
@@ -89,14 +90,41 @@ def test_a_link_is_made_and_removed_and_replaces_only_one_that_leads_nowhere(
     link.symlink_to(tmp_path / "gone")
     port = PtyEndpoint(rig.place, link)
     assert os.readlink(link) == port.path
+    for force in (False, True):
+        with pytest.raises(
+            BadInput, match="radio: another session serves it; end that one, or choose another link"
+        ):
+            PtyEndpoint(rig.place, link, force)
+    assert os.readlink(link) == port.path
+    port.close()
+    assert list(tmp_path.iterdir()) == []
+    link.symlink_to(os.ttyname(os.openpty()[1]))  # as a session that was killed leaves it
     with pytest.raises(BadInput, match="radio: is there already; choose another link with --pty"):
         PtyEndpoint(rig.place, link)
     other = PtyEndpoint(rig.place, link, force=True)
-    port.close()
     assert os.readlink(link) == other.path
     other.close()
-    assert not link.is_symlink()
+    assert list(tmp_path.iterdir()) == []
     link.write_text("years of work")
     with pytest.raises(BadInput, match="is there already"):
         PtyEndpoint(rig.place, link, force=True)
     assert link.read_text() == "years of work"
+
+
+def test_a_lock_whose_file_another_session_has_just_removed_is_taken_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two sessions that began while a third ended had both the lock, of two files of one name."""
+    fcntl = pytest.importorskip("fcntl")
+    path, flock, removed = tmp_path / ".radio.lock", fcntl.flock, []
+
+    def late(descriptor: int, how: int) -> None:
+        if not removed:
+            removed.append(path.unlink())
+        flock(descriptor, how)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    held = terminal._locked(path)
+    with pytest.raises(BlockingIOError):
+        terminal._locked(path)
+    os.close(held)

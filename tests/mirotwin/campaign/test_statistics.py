@@ -2,8 +2,10 @@
 
 import statistics
 
+import mpmath
 import numpy as np
 import pytest
+from benchmarks.intervals import coverage
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.naive import bootstrap
@@ -11,14 +13,15 @@ from tests.naive import bootstrap
 from miro_exact.rng import Stream
 from mirotwin.campaign.comparison import Difference
 from mirotwin.campaign.statistics import (
+    FEWEST,
     STREAM,
     Interval,
     _words,
     draws,
     figures,
     mean,
-    mean_interval,
     quantile,
+    student,
 )
 
 NUMBERS = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=12)
@@ -32,27 +35,51 @@ def test_a_quantile_and_a_mean_are_those_of_the_plain_loops(numbers, share):
 
 
 @settings(max_examples=5, deadline=None)
-@given(NUMBERS)
-def test_intervals_are_those_of_the_plain_loops(numbers):
-    found = figures(np.array(numbers))
-    low, high = bootstrap.interval(numbers, bootstrap.mean)
-    assert found.mean_interval == Interval(low, high) == mean_interval(np.array(numbers))
-    low, high = bootstrap.interval(numbers, lambda drawn: bootstrap.quantile(drawn, 0.5))
-    assert found.median_interval == Interval(low, high)
-    assert (found.count, found.quantiles["0"], found.quantiles["1"]) == (
-        len(numbers),
-        min(numbers),
-        max(numbers),
-    )
+@given(st.lists(st.tuples(st.floats(-1e6, 1e6), st.integers(0, 12)), min_size=8, max_size=30))
+def test_intervals_are_those_of_the_plain_loops(rows):
+    numbers, seeds = [one for one, _ in rows], [seed for _, seed in rows]
+    count = len(set(seeds))
+    found = figures(np.array(numbers), np.array(seeds))
+    assert (found.count, found.seeds) == (len(numbers), count)
+    assert (found.quantiles["0"], found.quantiles["1"]) == (min(numbers), max(numbers))
+    if count < FEWEST:
+        assert found.mean_interval is None
+        assert found.median_interval is None
+        return
+    low, high = bootstrap.mean_interval(numbers, seeds, student(count - 1))
+    assert found.mean_interval == Interval(low, high)
+    low, high = bootstrap.median_interval(numbers, seeds, student(count - 1))
+    spread = max(numbers) - min(numbers)
+    assert found.median_interval.low == pytest.approx(low, abs=1e-4 * spread)
+    assert found.median_interval.high == pytest.approx(high, abs=1e-4 * spread)
+
+
+@pytest.mark.parametrize("freedom", [*range(1, 61), 80, 119, 120, 121, 500, 10_000])
+def test_students_t_is_that_of_the_distribution(freedom):
+    half = mpmath.mpf(freedom) / 2
+    t = mpmath.mpf(student(freedom))
+    above = mpmath.betainc(half, 0.5, 0, freedom / (freedom + t * t), regularized=True) / 2
+    slope = mpmath.beta(half, 0.5) ** -1 / mpmath.sqrt(freedom) * (1 + t * t / freedom) ** (-half - 0.5)
+    assert abs(above - 0.025) / slope < 2e-4
+
+
+def test_runs_of_one_seed_count_as_one_sample():
+    draw = np.random.Generator(np.random.Philox(key=3))
+    numbers, seeds = draw.normal(size=20), np.arange(20)
+    alone = figures(numbers, seeds)
+    five_times = figures(np.repeat(numbers, 5), np.repeat(seeds, 5))
+    assert five_times.median_interval == alone.median_interval
+    assert five_times.mean_interval.low == pytest.approx(alone.mean_interval.low, abs=1e-12)
+    assert five_times.mean_interval.high == pytest.approx(alone.mean_interval.high, abs=1e-12)
 
 
 def test_the_median_is_that_of_the_standard_library():
     numbers = [3.0, 1.0, 4.0, 1.5, 9.0, 2.5]
-    assert figures(np.array(numbers)).median == statistics.median(numbers)
+    assert figures(np.array(numbers), np.arange(6)).median == statistics.median(numbers)
 
 
 def test_of_no_numbers_there_are_no_figures():
-    assert figures(np.array([])) is None
+    assert figures(np.array([]), np.array([], dtype=np.int64)) is None
 
 
 @given(st.integers(0, 10**12), st.integers(1, 40))
@@ -69,20 +96,16 @@ def test_draws_are_the_same_each_time_and_reach_every_place():
     assert abs(shares - 1 / 7).max() < 0.01
 
 
-def test_an_interval_holds_the_mean_of_what_the_numbers_come_from_in_95_of_100_cases():
-    source = np.random.Philox(key=1)
-    held = 0
-    for _ in range(100):
-        numbers = np.array([float(word >> np.uint64(11)) / 2.0**53 for word in source.random_raw(60)])
-        found = mean_interval(numbers)
-        held += found.low <= 0.5 <= found.high
-    assert 88 <= held <= 100
+def test_intervals_hold_what_they_should_where_scenarios_of_a_seed_are_correlated():
+    found = coverage(samples=20, correlation=0.95, trials=1000)
+    assert 0.93 <= found.mean <= 0.97
+    assert found.by_pairs < 0.7
 
 
 def of(metric="rms_position_cm", first=2.0, low=0.1, high=0.3, **more):
     interval = None if low is None else Interval(low, high)
     values = {"higher": 10, "lower": 2, **more}
-    return Difference(metric, 20, first, first + 0.2, 0.2, interval, 0.2, **values)
+    return Difference(metric, 20, 0, 20, first, first + 0.2, 0.2, interval, 0.2, **values)
 
 
 @pytest.mark.parametrize(

@@ -36,9 +36,14 @@ def names(all_: str, one: str = "") -> dict[tuple[int, int], list[str]]:
     }
 
 
-def test_every_run_has_four_checks() -> None:
+def test_every_run_has_the_checks_that_are_always_on() -> None:
     assert names("") == {(0, 0): list(ALWAYS_ON), (0, 2): list(ALWAYS_ON)}
-    assert not says_anything(load("fig6").scenario)
+    assert not says_anything(load("line").scenario)
+
+
+@pytest.mark.parametrize("name", ["fig6", "fig7", "fig8", "fig9", "fig10"])
+def test_the_scenarios_of_the_paper_expect_a_robot_that_accepts_frames_and_tracks(name: str) -> None:
+    assert set(load(name).scenario.expect) == {"frames_accepted_min", "tracks_within_cm"}
 
 
 def test_a_robot_may_expect_otherwise_than_all() -> None:

@@ -189,7 +189,6 @@ def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
             ("--scenario", "fig6", "--points-out", "./out.toml"),
             "out.toml: is the file of --out and of --points-out",
         ),
-        (("--scenario", "fig6", "--set", "camera.kind=gaussian"), "fig6: "),
         (
             ("--scenario", "fig6", "--noise-px", -1),
             "Invalid value for '--noise-px': -1.0 is not in the range",
@@ -213,6 +212,19 @@ def test_what_cannot_be_calibrated_is_refused_and_nothing_is_written(
     assert (code, out) == (2, "")
     assert err.startswith(f"mirotwin: error: {expected}")
     assert (err.count("\n"), names(tmp_path)) == (1, before)
+
+
+def test_a_camera_without_a_lens_is_refused_after_the_note_of_what_its_kind_leaves_out(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    out = tmp_path / "out.toml"
+    code, printed, err = mirotwin(
+        "calibrate", "--scenario", "fig6", "--set", "camera.kind=gaussian", "--out", out
+    )
+    note, error = err.splitlines()
+    assert (code, printed, out.exists()) == (2, "", False)
+    assert note.startswith("mirotwin: note: --set camera.kind=gaussian leaves out calibration")
+    assert error.startswith("mirotwin: error: fig6: camera.kind: this camera has no lens")
 
 
 @pytest.mark.parametrize("kind", ["gaussian", "geometric"])
@@ -245,4 +257,4 @@ def test_noise_that_is_no_number_is_refused(
     given = ("--scenario", short, "--noise-px", "nan", "--out", tmp_path / "camera.toml")
     code, _, err = mirotwin("calibrate", *given)
     assert code == 2
-    assert "nan is not a number" in err
+    assert "'nan' is not a number." in err

@@ -21,7 +21,7 @@ pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 
 FACTORS = """
 scenario = "fig7"
-seeds = "0-9"
+seeds = "0-19"
 set = { duration_s = 0.2 }
 [factor.start]
 near = []
@@ -127,7 +127,7 @@ def test_what_cannot_be_meant_is_refused_in_a_line(here, arguments, words):
 
 
 def test_failed_checks_are_exit_code_1_beyond_the_share_that_may(here):
-    text = FACTORS.replace("0-9", "0-1") + "[expect]\ntracks_within_cm = 50.0\n"
+    text = FACTORS.replace("0-19", "0-1") + "[expect]\ntracks_within_cm = 50.0\n"
     (here / "c.toml").write_text(text)
     result = called("c.toml", "--jobs", 1)
     assert result.exit_code == 1
@@ -209,22 +209,22 @@ def test_statistics_are_shown_for_each_combination_of_factors(results):
     result = called("show", results)
     assert result.exit_code == 0, result.output
     lines = result.output.splitlines()
-    assert lines[0] == f"{results}: 20 runs of short"
+    assert lines[0] == f"{results}: 40 runs of short"
     assert lines[1].split()[:3] == ["start", "runs", "failed"]
     assert [line.split()[0] for line in lines[2::3]] == ["near", "far"]
     document = json.loads(called("show", results, "--json", "--metric", "rms_x_cm").output)
     assert [group["factors"] for group in document["groups"]] == [{"start": "near"}, {"start": "far"}]
     near = sorted(row["rms_x_cm"] for row in rows(results) if row["start"] == "near")
-    assert document["groups"][0]["metrics"]["rms_x_cm"]["median"] == near[4] + (near[5] - near[4]) * 0.5
+    assert document["groups"][0]["metrics"]["rms_x_cm"]["median"] == near[9] + (near[10] - near[9]) * 0.5
 
 
 def test_two_levels_are_compared_on_the_same_seeds(results):
     document = json.loads(called("show", results, "--compare", "start=near,far", "--json").output)
     (found,) = [one for one in document["differences"] if one["metric"] == "rms_position_cm"]
     values = {(row["start"], row["seed"]): row["rms_position_cm"] for row in rows(results)}
-    apart = sorted(values["far", seed] - values["near", seed] for seed in range(10))
-    assert found["pairs"] == 10
-    assert found["median"] == apart[4] + (apart[5] - apart[4]) * 0.5
+    apart = sorted(values["far", seed] - values["near", seed] for seed in range(20))
+    assert (found["pairs"], found["seeds"], found["without"]) == (20, 20, 0)
+    assert found["median"] == apart[9] + (apart[10] - apart[9]) * 0.5
     assert found["interval"]["low"] <= found["difference"] <= found["interval"]["high"]
     assert called("show", results, "--compare", "start").exit_code == 0
     for wrong in ("start=near", "start=near,nowhere", "begin=near,far"):
@@ -234,7 +234,7 @@ def test_two_levels_are_compared_on_the_same_seeds(results):
 def test_nothing_is_worse_than_the_same_results(results):
     result = called("show", results, "--against", results)
     assert result.exit_code == 0, result.output
-    assert "20 pairs of runs, 20 with the same digest" in result.output
+    assert "40 pairs of runs, 40 with the same digest" in result.output
 
 
 def test_what_got_worse_is_one_line_and_exit_code_1(results, tmp_path):
@@ -244,7 +244,7 @@ def test_what_got_worse_is_one_line_and_exit_code_1(results, tmp_path):
     (line,) = [line for line in result.output.splitlines() if line.startswith("mirotwin: worse")]
     assert f"worse than {results}: rms_position_cm by +" in line
     assert " (95 % interval " in line
-    assert " in the mean of 20 pairs, from " in line
+    assert " in the mean of 40 pairs of 20 seeds, from " in line
     assert called("show", worse, "--against", results, "--tolerance", 15).exit_code == 0
     assert called("show", results, "--against", worse).exit_code == 0
 
@@ -260,11 +260,27 @@ def test_one_fault_more_is_worse(results, tmp_path):
     pq.write_table(table.set_column(at, "verdict", pa.array(["fault", *verdicts[1:]])), worse)
     result = called("show", worse, "--against", results)
     assert result.exit_code == 1
-    assert "fault by +0.05" in result.output
+    assert "fault by +0.025" in result.output
+
+
+def test_a_gate_needs_twenty_seeds(results, tmp_path):
+    few = made(tmp_path / "few.parquet", FACTORS.replace("0-19", "0-9"))
+    result = called("show", few, "--against", results)
+    assert result.exit_code == 2
+    assert f"{results}: has only 10 seeds in common with {few}; a gate needs 20; " in result.output
+
+
+def test_pairs_of_which_one_run_lacks_the_figure_are_counted(results, tmp_path):
+    found = iter([None, *[1.0] * 39])
+    lacking = made(tmp_path / "lacking.parquet", FACTORS, rms_theta_deg=lambda _: next(found))
+    document = json.loads(called("show", lacking, "--against", results, "--json").output)
+    without = {one["metric"]: one["without"] for one in document["differences"]}
+    assert without["rms_position_cm"] == 0
+    assert without["rms_theta_deg"] == 1
 
 
 def test_results_without_a_run_in_common_are_refused(results, tmp_path):
-    other = made(tmp_path / "other.parquet", FACTORS.replace("0-9", "10-19"))
+    other = made(tmp_path / "other.parquet", FACTORS.replace("0-19", "20-39"))
     result = called("show", results, "--against", other)
     assert result.exit_code == 2
     assert "has no run in common" in result.output

@@ -43,7 +43,7 @@ def test_a_listing_shows_names_and_sources_escaped(mirotwin: Callable[..., Resul
 def test_no_command_that_looks_on_prints_a_control_code(
     mirotwin: Callable[..., Result], image: Path, command: str
 ) -> None:
-    code, out, err = mirotwin("fw", command, image, "--max-cycles", 20, "--to", 200)
+    code, out, err = mirotwin("fw", command, image, "--max-cycles", 20, "--to", "200t")
     assert code in (0, 42)
     assert plain(out + err)
     assert SHOWN in out or command != "coverage"
@@ -54,7 +54,7 @@ def test_an_lcov_name_with_codes_is_shown_escaped_and_kept_exactly(
 ) -> None:
     info = tmp_path / "fw.info"
     info.write_text(f"TN:\nSF:{NASTY}\nDA:1,1\nend_of_record\n", encoding="utf-8")
-    code, out, _ = mirotwin("fw", "coverage", image, "--to", 200, "--out", info, "--append")
+    code, out, _ = mirotwin("fw", "coverage", image, "--to", "200t", "--out", info, "--append")
     assert code == 0
     assert plain(out)
     assert SHOWN in out
@@ -70,7 +70,7 @@ def test_a_line_end_in_the_name_of_a_file_forges_no_line(
         out = mirotwin(*arguments)[1]
         assert not any(line.startswith("all") for line in out.splitlines())
     vcd = tmp_path / f"{FORGED}.vcd"
-    _, out, _ = mirotwin("fw", "vcd", image, "--to", 2000, "--out", vcd)
+    _, out, _ = mirotwin("fw", "vcd", image, "--to", "2000t", "--out", vcd)
     assert not any(line.startswith("all") for line in out.splitlines())
     assert not any(line.startswith("all") for line in vcd.with_suffix(".gtkw").read_text().splitlines())
 
@@ -89,7 +89,7 @@ def test_a_tracefile_keeps_names_that_are_no_utf_8(
 ) -> None:
     info = tmp_path / "fw.info"
     info.write_bytes(b"TN:\nSF:\xff.c\nDA:1,1\nend_of_record\n")
-    code, out, _ = mirotwin("fw", "coverage", image, "--to", 200, "--out", info, "--append")
+    code, out, _ = mirotwin("fw", "coverage", image, "--to", "200t", "--out", info, "--append")
     assert code == 0
     assert r"\udcff.c" in out
     assert b"SF:\xff.c\n" in info.read_bytes()

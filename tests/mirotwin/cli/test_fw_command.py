@@ -241,7 +241,7 @@ def test_a_time_is_one_of_the_crystal(mirotwin: Callable[..., Result], tmp_path:
         ),
         (("--stdin", "F", "--stdin-by-line"), "--stdin-by-line: has no effect without --stdin-when"),
         (("--stdin", "-", "--stdin", "-"), "--stdin: standard input can be read only once"),
-        (("--stdin", "F", "--stdin-after", "soon"), "'soon' is no time"),
+        (("--stdin", "F", "--stdin-after", "soon"), "'soon' is not a time"),
         (
             ("--stdin", "F", "--baud", "600000", "--crystal", "12000000"),
             "--baud 600000 is outside 50..375000",

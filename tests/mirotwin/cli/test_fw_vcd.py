@@ -217,8 +217,8 @@ def test_what_cannot_be_written_is_refused_and_nothing_is_left(
     refused(vcd(short, "--out", tmp_path / "x.gtkw"), "name of the GTKWave save file")
     refused(vcd(tmp_path / "no.ihx", "--out", out), "there is no such file")
     image = hex_file(tmp_path / "stops.ihx", b"\x00\x80\xfe")
-    refused(vcd(image, "--from", "20s", "--out", out), "--from 480000000: the run ended .*; look earlier")
-    refused(vcd(image, "--from", 24_000, "--out", out), "look earlier")
+    refused(vcd(image, "--from", "20s", "--out", out), "--from 480000000t: the run ended .*; look earlier")
+    refused(vcd(image, "--from", "24000t", "--out", out), "look earlier")
     assert [path.name for path in tmp_path.iterdir()] == ["stops.ihx"]
 
 

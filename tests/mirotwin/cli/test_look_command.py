@@ -45,9 +45,9 @@ def test_the_picture_with_the_overlay_is_enlarged_and_says_what_it_shows(
     with Image.open("short-4-net0-frame-000003.png") as image:
         assert image.size == (960, 744)
     first = Path("short-4-net0-frame-000003.png").read_bytes()
-    assert mirotwin("look", short, "--at", "0.12", "--seed", 4, "--force")[0] == 0
+    assert mirotwin("look", short, "--at", "2880000t", "--seed", 4, "--force")[0] == 0
     assert Path("short-4-net0-frame-000003.png").read_bytes() == first
-    code, _, err = mirotwin("look", short, "--at", "0.12", "--seed", 4)
+    code, _, err = mirotwin("look", short, "--at", "0.12s", "--seed", 4)
     assert (code, "is there already" in err) == (2, True)
 
 
@@ -87,14 +87,21 @@ def test_a_frame_that_the_pc_never_got_is_shown_as_it_was_and_named(short: Path)
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (("--at", "1", *GAUSSIAN), "{short}: camera.kind: this camera renders no pixels; choose kind ="),
-        (("--at", "0.3"), "{short}: --at 0.3s: the run ends at 0.200 s; look earlier"),
-        (("--at", "0.1", "--network", 1), "{short}: --network 1: there is no such network; there is only 0"),
-        (("--at", "soon"), "Invalid value for '--at': 'soon' is not a time, such as 1.2s or 350ms."),
+        (("--at", "1s", *GAUSSIAN), "{short}: camera.kind: this camera renders no pixels; choose kind ="),
+        (("--at", "0.3s"), "{short}: --at 0.3s: the run ends at 0.200 s; look earlier"),
+        (("--at", "0.1s", "--network", 1), "{short}: --network 1: there is no such network; there is only 0"),
+        (
+            ("--at", "soon"),
+            "Invalid value for '--at': 'soon' is not a time; write 2s, 20ms, 341us or 5min, or 48000t for ticks.",
+        ),
         (("--at", "-1"), "Invalid value for '--at': '-1' is not a time"),
         (("--at", "1e3"), "Invalid value for '--at': '1e3' is not a time"),
-        (("--at", "99999999999"), "Invalid value for '--at': '99999999999' is later than any run."),
-        (("--at", "0", "--out", "absent/x.png"), "absent/x.png: there is no folder absent;"),
+        (("--at", "99999999999s"), "Invalid value for '--at': '99999999999s' is too long"),
+        (
+            ("--at", "1.2"),
+            "Invalid value for '--at': '1.2' is not a time; it has no unit: write 1.2s for seconds, 1t for ticks",
+        ),
+        (("--at", "0s", "--out", "absent/x.png"), "absent/x.png: there is no folder absent;"),
         ((), "Missing option '--at'."),
     ],
 )
@@ -119,7 +126,7 @@ def test_a_run_that_a_fault_stops_before_is_not_drawn(
 ) -> None:
     image = hex_file(tmp_path / "faulty.ihx", b"\xa5")
     out = tmp_path / "frame.png"
-    code, _, err = mirotwin("look", short, "--at", "0.1", "--firmware", image, "--out", out)
+    code, _, err = mirotwin("look", short, "--at", "0.1s", "--firmware", image, "--out", out)
     assert (code, out.exists()) == (3, False)
     assert "firmware fault: net0/robot0" in err
 

@@ -181,7 +181,7 @@ def test_looking_changes_no_bit_of_the_world(short: Path) -> None:
     [
         (("fig6", "--from", "2s", "--to", "1s"), "the window is empty; --to must be later"),
         (("fig6", "--from", "7s"), "the run ends at tick"),
-        (("fig6", "--from", "7 s"), "is no time; give ticks"),
+        (("fig6", "--from", "7 sec"), "is not a time; write 2s, 20ms, 341us or 5min, or 48000t for ticks"),
         (("fig6", "--robot", "1"), "no robot in that slot; there is 0"),
         (("fig6", "--network", "1"), "there are 1, numbered from 0"),
         (("fig6", "--until", "main"), "--until does not apply to it"),
@@ -379,7 +379,7 @@ def test_the_cycle_limit_of_an_image_has_its_exit_code(
 ) -> None:
     image = hex_file(tmp_path / "a.ihx", b"\x00\x80\xfd")
     assert mirotwin("fw", "profile", image, "--max-cycles", 10)[0] == 42
-    assert mirotwin("fw", "profile", image, "--to", 100)[0] == 0
+    assert mirotwin("fw", "profile", image, "--to", "100t")[0] == 0
     assert mirotwin("fw", "profile", hex_file(tmp_path / "b.ihx", LOOP), "--max-cycles", 10)[0] == 0
 
 

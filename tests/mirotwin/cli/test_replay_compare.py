@@ -161,7 +161,7 @@ def test_a_window_leaves_the_rest_out(
     assert mirotwin("replay", path, "-q")[0] == 4
     assert mirotwin("replay", path, "-q", "--to", "60ms")[0] == 0
     assert mirotwin("replay", path, "-q", "--from", "80ms")[0] == 0
-    assert mirotwin("replay", path, "-q", "--from", "1601600", "--to", "1601601")[0] == 4
+    assert mirotwin("replay", path, "-q", "--from", "1601600t", "--to", "1601601t")[0] == 4
     _, out, _ = mirotwin("replay", path, "-q", "--to", "60ms")
     assert "in all 2 control periods" in out
 
@@ -262,8 +262,12 @@ def test_a_recording_of_another_format_is_refused_with_the_reason(
         (("--compare", "bytes", "--within-ms", "-1"), "-1.0 is not in the range"),
         (("--compare", "wheels", "--within-counts", "1.5"), "'1.5' is not a whole number"),
         (("--from", "2s", "--to", "1s"), "the window is empty; --to must be later"),
-        (("--to", "0"), "the window is empty"),
-        (("--from", "1h"), "'1h' is no time"),
+        (("--to", "0t"), "the window is empty"),
+        (("--from", "1h"), "the recording ends at tick 4804800; look earlier"),
+        (
+            ("--from", "1"),
+            "'1' is not a time; it has no unit: write 1s for seconds, 1t for ticks of the crystal.",
+        ),
         (("--from", "1s"), "the recording ends at tick 4804800; look earlier"),
         (("--seed", "-1"), "-1 is not in the range"),
         (("--set", "nonsense=1"), "--set nonsense=1: unknown key"),
@@ -295,7 +299,7 @@ def test_lines_come_from_a_recorded_image_alone(
 
 
 @pytest.mark.parametrize(
-    "options", [("--compare", "bytes"), ("--from", "1"), ("--all-differences",), ("--lines-from", "IMAGE")]
+    "options", [("--compare", "bytes"), ("--from", "1t"), ("--all-differences",), ("--lines-from", "IMAGE")]
 )
 def test_a_text_stream_has_nothing_to_compare_with(
     mirotwin: Callable[..., Result], tmp_path: Path, options: tuple[str, ...]

@@ -69,10 +69,26 @@ def test_the_folder_is_named_after_scenario_and_seed(
     monkeypatch.chdir(tmp_path)
     assert mirotwin("run", short, "--seed", 3, "-q")[0] == 0
     assert (tmp_path / "runs" / "short-3" / "run.mcap").exists()
-    code, out, err = mirotwin("run", short, "--seed", 3)
-    assert (code, out) == (2, "")
-    assert err.startswith("mirotwin: error: runs/short-3: the folder is not empty")
-    assert mirotwin("run", short, "--seed", 3, "-q", "--force")[0] == 0
+
+
+def test_a_finished_run_in_the_default_folder_is_replaced_and_nothing_else(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "runs" / "short-0"
+    assert mirotwin("run", short, "-q")[0] == 0
+    (folder / "notes.txt").write_text("mine")
+    assert mirotwin("run", short, "-q", "--no-figure")[0] == 0
+    assert sorted(path.name for path in folder.iterdir()) == ["notes.txt", "run.mcap", "summary.json"]
+    code, _, err = mirotwin("run", short, "-q", "--out", folder)
+    assert (code, "the folder is not empty" in err) == (2, True)
+    (folder / "run.mcap").rename(folder / "run.part.mcap")
+    code, _, err = mirotwin("run", short, "-q")
+    assert (code, "parts of an interrupted command (run.part.mcap)" in err) == (2, True)
+    (folder / "run.part.mcap").unlink()
+    code, _, err = mirotwin("run", short, "-q")
+    assert (code, "the folder is not empty (notes.txt, summary.json)" in err) == (2, True)
+    assert mirotwin("run", short, "-q", "--force")[0] == 0
 
 
 @pytest.mark.parametrize(

@@ -83,6 +83,10 @@ def test_a_folder_with_content_is_left_alone_unless_it_is_to_be_replaced(
             "{short}: camera.kind: this camera renders no pixels; choose kind =",
         ),
         (("--plain-frames",), "--plain-frames needs --frames."),
+        (
+            ("--frames", "--plain-frames"),
+            "Invalid value for '--frames': the path is missing before --plain-frames; a file of this name is ./--plain",
+        ),
         (("--frames", ""), "Invalid value for '--frames': the path is empty."),
     ],
 )

@@ -1,4 +1,4 @@
-"""`mirotwin run --save-at .. --resume .. --to-tick ..`: a run that goes on has the bits of one that never stopped."""
+"""`mirotwin run --save-at .. --resume .. --to ..`: a run that goes on has the bits of one that never stopped."""
 
 import json
 from collections.abc import Callable
@@ -19,7 +19,7 @@ def short(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("at", ["2402400", "2500001", "100ms"])
+@pytest.mark.parametrize("at", ["2402400t", "2500001t", "100ms"])
 def test_a_resumed_run_has_the_digests_of_one_that_never_stopped(
     mirotwin: Callable[..., Result], tmp_path: Path, short: Path, at: str
 ) -> None:
@@ -47,7 +47,7 @@ def test_a_resumed_run_is_not_compared_with_a_whole_one(
 
 
 def test_a_run_ends_where_it_is_told_to(mirotwin: Callable[..., Result], tmp_path: Path, short: Path) -> None:
-    assert mirotwin("run", short, "--out", tmp_path / "a", "--to-tick", "2500000", *QUIET)[0] == 0
+    assert mirotwin("run", short, "--out", tmp_path / "a", "--to", "2500000t", *QUIET)[0] == 0
     summary = json.loads((tmp_path / "a" / "summary.json").read_text())
     assert summary["simulated_s"] == 2_500_000 / 24e6
     assert len(read(tmp_path / "a" / "run.mcap").periods) == 3
@@ -58,19 +58,19 @@ def test_a_run_ends_where_it_is_told_to(mirotwin: Callable[..., Result], tmp_pat
     [
         (
             ("--save-at", "1s"),
-            "--save-at 24000000: the run goes from tick 0 to tick 4804800; give a tick between",
+            "--save-at 24000000t: the run goes from tick 0 to tick 4804800; give a tick between",
         ),
-        (("--to-tick", "0"), "--to-tick 0: the run goes from tick 0 to tick 4804800; give a tick between"),
+        (("--to", "0t"), "--to 0t: the run goes from tick 0 to tick 4804800; give a tick between"),
         (
-            ("--save-at", "2s", "--to-tick", "100ms"),
-            "--save-at 48000000: the run goes from tick 0 to tick 2400000",
+            ("--save-at", "2s", "--to", "100ms"),
+            "--save-at 48000000t: the run goes from tick 0 to tick 2400000",
         ),
         (
             ("--resume", "{saved}", "--seed", "6"),
             "cannot be resumed: the saved world has seed 5, this world has 6",
         ),
         (
-            ("--resume", "{saved}", "--seed", "5", "--save-at", "1000"),
+            ("--resume", "{saved}", "--seed", "5", "--save-at", "1000t"),
             "the run goes from tick 2402400 to tick",
         ),
         (
@@ -78,14 +78,14 @@ def test_a_run_ends_where_it_is_told_to(mirotwin: Callable[..., Result], tmp_pat
             "cannot be resumed: not a saved world, or one of a version of this program",
         ),
         (("--resume", "{saved}.none"), "no such file"),
-        (("--save-at", "soon"), "'soon' is no time; give ticks, or a number with s, ms or us."),
+        (("--save-at", "soon"), "'soon' is not a time; write 2s, 20ms, 341us or 5min, or 48000t for ticks."),
     ],
 )
 def test_what_cannot_be_done_is_refused_and_nothing_is_written(
     mirotwin: Callable[..., Result], tmp_path: Path, short: Path, arguments: tuple[str, ...], what: str
 ) -> None:
     first = tmp_path / "first"
-    mirotwin("run", short, "--out", first, "--seed", 5, "--save-at", "2402400", *QUIET)
+    mirotwin("run", short, "--out", first, "--seed", 5, "--save-at", "2402400t", *QUIET)
     given = [one.format(saved=first / "at-2402400.world", short=short) for one in arguments]
     code, _, err = mirotwin("run", short, "--out", tmp_path / "second", *given, *QUIET)
     assert code == 2
@@ -94,6 +94,6 @@ def test_what_cannot_be_done_is_refused_and_nothing_is_written(
 
 
 def test_full_recordings_do_not_stop(mirotwin: Callable[..., Result], tmp_path: Path, short: Path) -> None:
-    code, _, err = mirotwin("run", short, "--out", tmp_path / "a", "--record", "full", "--to-tick", "1000")
+    code, _, err = mirotwin("run", short, "--out", tmp_path / "a", "--record", "full", "--to", "1000t")
     assert code == 2
     assert "do not go with --record full" in err

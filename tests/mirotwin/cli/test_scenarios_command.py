@@ -1,6 +1,7 @@
 """`mirotwin scenarios`, and how the command line refuses what it is not meant to get."""
 
 import tomllib
+from pathlib import Path
 
 import click
 import pytest
@@ -41,7 +42,9 @@ def test_show_prints_the_file_as_it_stands(name: str) -> None:
         (["run", "fig6", "--seed", "one"], "error: Invalid value for '--seed': 'one' is not a whole number"),
         (["run", "fig6", "--engine", "numba"], "error: Invalid value for '--engine': 'numba' is not one of"),
         (["run"], "error: Missing argument 'SCENARIO'"),
-        (["rnu"], "error: No such command 'rnu'"),
+        (["rnu"], "error: No such command 'rnu'; did you mean run?"),
+        (["fw", "trce"], "error: No such command 'trce'; did you mean trace?"),
+        (["xyz"], "error: No such command 'xyz'; there are run, "),
         (["replay", "absent.mcap"], "error: absent.mcap: No such file or directory"),
     ],
 )
@@ -92,3 +95,15 @@ def test_a_mistake_of_the_program_itself_asks_for_a_report() -> None:
     assert result.exit_code == 70
     assert "ZeroDivisionError" in result.stderr
     assert "report" in result.stderr
+
+
+def test_what_a_setting_leaves_out_is_told_on_stderr(tmp_path: Path) -> None:
+    folder = ("--out", str(tmp_path / "out"), "--no-figure", "-q")
+    code, _, err = mirotwin(
+        "run", "fig6", "--set", "camera.kind=geometric", "--set", "duration_s=0.1", *folder
+    )
+    assert code == 0
+    assert (
+        err
+        == "mirotwin: note: --set camera.kind=geometric leaves out centroid, window_px, self_calibration\n"
+    )

@@ -216,3 +216,14 @@ def test_the_examples_pass_from_a_user_s_folder(mirotwin: Call, folder: Path) ->
     code, out, _ = mirotwin("test", ROOT / "examples" / "hil-steps")
     assert code == 0
     assert out.splitlines()[-1] == "3 passed"
+
+
+def test_pages_are_made_when_they_are_asked_for(mirotwin: Call, folder: Path) -> None:
+    for more, pages in (((), 0), (("--pages",), 1)):
+        assert mirotwin("test", "hil/sub/d.scenario.toml", "--artifacts", "left", *more)[0] == 1
+        found = [
+            path
+            for path in (folder / "left").rglob("report.html")
+            if b"failsafe_stop_ms" in path.read_bytes()
+        ]
+        assert len(found) == pages

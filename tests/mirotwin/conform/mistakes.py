@@ -306,7 +306,7 @@ MISTAKES = {
     "executes A5h": Mistake(
         "main.c", "    EA = 1;", "    __asm\n    .db 0xA5\n    __endasm;\n    EA = 1;", "P54"
     ),
-    "asks the chips while characters wait": Mistake("motion.c", " || rx_taken != rx_count", "", "P29"),
+    "asks the chips while characters wait": Mistake("motion.c", " || rx_taken != rx_count", "", "P30"),
     "sets a mask by RSTI": Mistake(
         "lm629.c", "    lm629_word(0, 0);\n    if", "    lm629_word(0xFF, 0);\n    if", "P02"
     ),
@@ -321,5 +321,33 @@ MISTAKES = {
     "waits for ever for a chip to come up": Mistake(
         *("lm629.c", "        if (!--polls)\n            return false;", "        ;"),
         "P58",
+    ),
+    "tells positions of two samples": Mistake(
+        "telemetry.c",
+        "    put_word(position(LEFT));\n    put_word(position(RIGHT));",
+        "    put(position(LEFT) & 0xFF);\n    put(position(LEFT) >> 8);\n    put_word(position(RIGHT));",
+        "P47",
+    ),
+    "forgets its flags where others are asked": Mistake(
+        "telemetry.c",
+        "    if (seq % robots != slot || tx_busy)\n        return;",
+        "    if (seq % robots != slot || tx_busy) {\n        failsafe_flags = 0;\n        return;\n    }",
+        "P45",
+    ),
+    "waits for ever for a busy chip": Mistake(
+        "lm629.c", "        if (!--polls) {\n", "        if (0) {\n            --polls;\n", "P59"
+    ),
+    "moves in a slot that is not there": Mistake(
+        "motion.c", "    if (slot >= robots)\n        return;\n", "", "P60"
+    ),
+    "hangs after 1000 frames": Mistake(
+        "failsafe.c",
+        "    ++frames_accepted;",
+        "    if (++frames_accepted == 1000)\n        for (;;)\n            ;",
+        "P61",
+    ),
+    "says nothing of power-on": Mistake("motion.c", "    failsafe_flags |= FLAG_MOTORS_OFF;\n", "", "P45"),
+    "lets the age begin again": Mistake(
+        "failsafe.c", "    if (age != AGE_MAX)\n        ++age;", "    ++age;", "P62"
     ),
 }

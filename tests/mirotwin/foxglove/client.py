@@ -9,11 +9,16 @@ nothing for a moment.
 from __future__ import annotations
 
 import struct
+import subprocess
+import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import msgspec
 import websocket
+from tests import children
 
 PROTOCOL = "foxglove.sdk.v1"
 MESSAGE, TIME = 1, 2
@@ -80,3 +85,30 @@ class Viewer:
             self.messages.append((self.channels[number]["topic"], time_ns, data[13:]))
         if data[0] == TIME:
             self.times_ns += struct.unpack_from("<Q", data, 1)
+
+
+PROGRAM = "import sys; import mirotwin.entry as entry; sys.argv[0] = 'mirotwin'; entry.main()"
+
+
+@contextmanager
+def live(*arguments: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """`mirotwin run .. --live` at a free port, and its URL; ended in any case."""
+    words = [
+        sys.executable,
+        "-c",
+        PROGRAM,
+        "run",
+        *map(str, arguments),
+        "--live",
+        "127.0.0.1:0",
+        "--no-figure",
+    ]
+    with children.start(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            assert line.startswith("live ws://127.0.0.1:"), (line, process.stderr and process.stderr.read())
+            yield process, line.split()[1]
+        finally:
+            if process.poll() is None:
+                process.kill()

@@ -9,9 +9,9 @@ from typing import Any
 
 import msgspec
 import pytest
-from foxglove import layouts
 from tests.mirotwin.foxglove.rig import Read
 
+layouts = pytest.importorskip("foxglove.layouts", reason="needs the extra develop")
 LAYOUT = msgspec.json.decode((Path(__file__).parents[3] / "examples" / "foxglove.json").read_bytes())
 PANELS: dict[str, dict[str, Any]] = LAYOUT["configById"]
 CONFIGS = {

@@ -23,6 +23,12 @@ from mirotwin.fuzz.target import target_for
 TOY = TargetSpec(input="bytes", maker="tests.mirotwin.fuzz.toy:toy")
 
 
+@pytest.fixture(autouse=True)
+def importable_toy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes of the engine do not import from the current folder."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+
+
 def kept_after(
     runs: int, seed: int, seeds: tuple[bytes, ...] = ()
 ) -> tuple[list[tuple[str, bytes]], Explorer]:

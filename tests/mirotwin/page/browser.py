@@ -11,17 +11,17 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from PIL import Image, ImageFilter
-from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
-from selenium.webdriver.common.by import By
-from selenium.webdriver.support.ui import WebDriverWait
 
 CHROMIUM, CHROMEDRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+MISSING = (
+    "" if CHROMIUM and CHROMEDRIVER and find_spec("selenium") else "needs chromium, chromedriver and selenium"
+)
 PICTURES = Path(__file__).parent / "pictures"
 SMALL = (96, 66)
 OPTIONS = (
@@ -40,6 +40,9 @@ SHOWN = 20
 
 @contextmanager
 def chromium() -> Iterator[Any]:
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM or ""
     for option in OPTIONS:
@@ -54,6 +57,8 @@ def chromium() -> Iterator[Any]:
 
 def open_page(driver: Any, page: Path, theme: str = "light", width: int = 1400, height: int = 900) -> None:
     """Opens a page as a reader has it whose system is light or dark, and waits until it is all there."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
     features = [{"name": "prefers-color-scheme", "value": theme}]
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
     metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
@@ -66,7 +71,7 @@ def open_page(driver: Any, page: Path, theme: str = "light", width: int = 1400, 
 
 def picture(driver: Any, selector: str) -> Image.Image:
     """What an element looks like."""
-    element = driver.find_element(By.CSS_SELECTOR, selector)
+    element = driver.find_element("css selector", selector)
     return Image.open(BytesIO(element.screenshot_as_png)).convert("RGB")
 
 

@@ -114,7 +114,7 @@ def test_what_is_no_campaign_is_refused(tmp_path):
     assert not (tmp_path / "page.html").exists()
 
 
-@pytest.mark.skipif(not (browser.CHROMIUM and browser.CHROMEDRIVER), reason="needs chromium and chromedriver")
+@pytest.mark.skipif(bool(browser.MISSING), reason=browser.MISSING)
 def test_in_a_browser_a_click_on_a_failed_run_shows_its_command_without_complaint(page):
     with browser.chromium() as driver:
         browser.open_page(driver, page)

@@ -38,7 +38,16 @@ def left(tmp_path_factory):
     folder = tmp_path_factory.mktemp("session")
     (folder / "test_mine.py").write_text(TESTS)
     (folder / "pytest.ini").write_text("[pytest]\n")
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--mirotwin-artifacts=left"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "--mirotwin-artifacts=left",
+        "--mirotwin-pages",
+    ]
     done = children.run(command, cwd=folder, capture_output=True, text=True)
     assert "4 failed, 1 passed" in done.stdout
     names = ("an_answer_that_does_not_come", "a_check", "a_comparison", "one_that_writes", "one_that_passes")
@@ -97,3 +106,16 @@ def test_a_case_by_itself_has_one_too_and_says_when_it_is_cured(left, tmp_path):
     assert called("report", case, "-o", page, "-q", "--force") == (0, "")
     assert "does not fail any more. Recorded: wheels_within_m_s" in page.read_text()
     assert "<strong>passed</strong>" in page.read_text()
+
+
+def test_without_the_option_no_page_is_made_and_the_report_names_the_line_for_it(tmp_path):
+    (tmp_path / "test_mine.py").write_text(TESTS)
+    (tmp_path / "pytest.ini").write_text("[pytest]\n")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--mirotwin-artifacts=left"]
+    done = children.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert list((tmp_path / "left").rglob("report.html")) == []
+    lines = [line for line in done.stdout.splitlines() if line.startswith("page: mirotwin report left/")]
+    assert len(lines) == 3  # not of the test that wrote into memory
+    page = tmp_path / "page.html"
+    assert called("report", tmp_path / lines[0].split()[-1], "-o", page, "-q") == (0, "")
+    assert '<p class="kind">failed test</p>' in page.read_text()

@@ -7,14 +7,16 @@ import time
 
 import pytest
 from PIL import Image, ImageStat
-from selenium.webdriver.common.by import By
-from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.support.ui import Select
 from tests.mirotwin.page import browser
 from tests.mirotwin.page.browser import PICTURES, SHOWN, apart, chromium, open_page, picture, small
 
 from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.recording.reader import read
+
+pytest.importorskip("selenium", reason=browser.MISSING)
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import Select
 
 pytestmark = pytest.mark.skipif(
     not (browser.CHROMIUM and browser.CHROMEDRIVER), reason="needs chromium and chromedriver"

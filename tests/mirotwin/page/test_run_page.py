@@ -67,7 +67,7 @@ def test_the_header_says_what_ran_and_its_verdict(markup, fig6):
         summary["firmware"]["sha256"][:12],
         summary["digest"][:12],
         "failed",
-        "1 of 5 checks failed",
+        f"1 of {len(summary['expectations'])} checks failed",
         f"{summary['tracking']['rms_position_cm']:.2f} cm",
     ):
         assert said in markup.text
@@ -186,6 +186,23 @@ def test_a_page_that_is_there_is_replaced_by_force_only(fig6, tmp_path, mirotwin
     assert page.stat().st_size > 1_000_000
 
 
+def test_a_page_in_the_default_place_is_replaced_and_anything_else_there_is_not(
+    fig6, tmp_path, mirotwin, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert mirotwin("report", fig6, "-q") == (0, "")
+    assert mirotwin("report", fig6, "-q") == (0, "")
+    (tmp_path / "report.html").write_text("mine")
+    code, said = mirotwin("report", fig6, "-q")
+    assert code == 2
+    assert "report.html: is there already" in said
+
+
+def test_a_page_says_what_is_missing_without_javascript(fig6, tmp_path, mirotwin):
+    assert mirotwin("report", fig6, "-o", tmp_path / "page.html", "-q") == (0, "")
+    assert "<noscript>" in (tmp_path / "page.html").read_text()
+
+
 def test_a_page_that_is_too_large_is_refused_and_the_remedy_works(two, tmp_path, mirotwin, monkeypatch):
     page = tmp_path / "large.html"
     assert mirotwin("report", two, "-o", page, "--no-frames", "-q") == (0, "")
@@ -210,7 +227,7 @@ def test_the_limit_is_50_mb():
         (["empty"], "empty: holds neither run.mcap nor case.stream; give a run's folder"),
         (["text.txt"], "text.txt:1:1: 'hello' is not a tick"),
         (["gone.parquet"], "gone.parquet: there is no such file"),
-        (["fig6", "--from", "9s"], "--from 216000000: the recording goes from tick 0 to"),
+        (["fig6", "--from", "9s"], "--from 216000000t: the recording goes from tick 0 to"),
         (["fig6", "--from", "1s", "--to", "1s"], "the window is empty; --to must be later"),
         (["fig6", "--sources", "gone"], "there is no such folder"),
         (["fig6", "--firmware", "text.txt"], "text.txt"),

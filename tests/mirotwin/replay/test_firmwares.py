@@ -11,6 +11,7 @@ from tests.mutants.draw import SOURCE
 from miro_robot.image import Image, Symbols
 from mirotwin.replay.compare import Rule, differences
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
+from mirotwin.replay.moved import moved
 from mirotwin.replay.program import Program, changed_instructions, same_layout
 from mirotwin.replay.sequences import characters
 from mirotwin.replay.variables import extents, name_of_byte
@@ -172,3 +173,30 @@ def test_where_the_last_variable_ends_is_not_guessed() -> None:
     stackless = msgspec.structs.replace(own, symbols=Symbols(names), path=Path("nowhere/a.ihx"))
     last = max((at.address, name) for name, at in names.items() if at.space == "iram")
     assert extents(stackless)[last[1]] == (last[0], 1)
+
+
+@needs_sdcc
+def test_a_build_whose_code_moved_is_mapped_by_symbols_and_the_changed_instruction_is_named(
+    images: dict[str, tuple[Image, Path]],
+) -> None:
+    image, folder = images["late and moved"]
+    found = apart(image, folder)
+    assert found.mapped is not None
+    one, other = found.mapped.one, found.mapped.other
+    assert one.symbol.startswith("_failsafe_tick+")
+    assert other.symbol.startswith("_failsafe_tick+")
+    assert (one.text, other.text) == ("MOV A,#6Eh", "MOV A,_ticks")
+    assert one.source == "if (age == FAILSAFE_STOP_MS) {"
+    assert other.source == "if (age == FAILSAFE_STOP_MS + 15 + (ticks & 0)) {"
+    assert "mapped by symbols" in found.notes[0]
+    assert "changed: _failsafe_tick" in found.notes[0]
+
+
+@needs_sdcc
+def test_code_that_only_moved_counts_as_the_same(images: dict[str, tuple[Image, Path]]) -> None:
+    image, folder = images["slower"]
+    map_ = moved(Program(own_image(), [SOURCE]), Program(image, [folder]))
+    assert len(map_.same) > 30
+    assert set(map_.places)
+    assert {own_image().symbols.name_at(at) for at in map_.places} == set(map_.changed)
+    assert [name for name in map_.changed if not name.startswith("_telemetry")] == []

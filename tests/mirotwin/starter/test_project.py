@@ -1,11 +1,17 @@
 """`mirotwin init`: a project with all its files, or nothing."""
 
+import os
+import shutil
+import sys
 from collections.abc import Callable
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from tests import children
 from tests.mirotwin.cli.conftest import Result, mirotwin
 
+from miro_robot.firmware import image_path
 from mirotwin.starter import project
 
 __all__ = ["mirotwin"]
@@ -60,3 +66,47 @@ def test_an_installation_without_the_files_says_so(
     code, _, err = mirotwin("init", tmp_path / "a")
     assert code == 2
     assert "not part of this installation" in err
+
+
+def test_without_firmware_there_are_no_c_sources_and_no_test_that_names_one(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    code, out, err = mirotwin("init", "--without-firmware", tmp_path / "mine")
+    assert (code, err) == (0, "")
+    assert tree(tmp_path / "mine") == {
+        name
+        for name, _ in project.files()
+        if not name.startswith("firmware/") and name != "tests/test_firmware.py"
+    }
+    assert "SDCC" not in out
+
+
+@pytest.mark.parametrize("image", [(), (f"IMAGE={image_path()}",)], ids=["the robot's own", "an image"])
+def test_a_project_without_firmware_passes_its_tests_without_a_c_compiler(
+    mirotwin: Callable[..., Result], tmp_path: Path, image: tuple[str, ...]
+) -> None:
+    make = shutil.which("make")
+    if make is None:
+        pytest.skip("needs make")
+    mirotwin("init", "--without-firmware", tmp_path / "mine")
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    for name in ("mkdir", "sh"):
+        (programs / name).symlink_to(shutil.which(name) or name)
+    path = os.pathsep.join((str(Path(sys.executable).parent), str(programs)))
+    done = children.run(
+        [make, "scenarios", "pytest", *image],
+        cwd=tmp_path / "mine",
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "mine/build/scenarios.xml").is_file()
+    assert (tmp_path / "mine/build/pytest.xml").is_file()
+
+
+def test_what_a_project_requires_is_this_version_with_what_its_pages_need() -> None:
+    (requirements,) = (path for name, path in project.files() if name == "requirements.txt")
+    minor = ".".join(metadata.version("mirotwin").split(".")[:2])
+    assert f"mirotwin[report]~={minor}.0" in requirements.read_text("utf-8").splitlines()

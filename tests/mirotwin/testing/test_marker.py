@@ -8,6 +8,7 @@ import pytest
 from tests.mirotwin.testing.rigs import HERE
 
 from miro_exact.bad_input import BadInput
+from mirotwin.checks.registry import ALWAYS_ON
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.wanted import marked, wanted
 
@@ -54,7 +55,10 @@ def test_the_innermost_marker_holds_and_settings_and_expectations_add_up() -> No
     assert found.expect == {"inside_pitch": True, "frames_accepted_min": 1}
     made = wanted(found, HERE, None, 0)
     assert (made.scenario.duration_s, made.scenario.networks[0].robots) == (2, 5)
-    assert [check.name for check in made.expected[0, 0]][4:] == ["inside_pitch", "frames_accepted_min"]
+    assert [check.name for check in made.expected[0, 0]][len(ALWAYS_ON) :] == [
+        "inside_pitch",
+        "frames_accepted_min",
+    ]
 
 
 def test_a_table_as_scenario_changes_keys_of_the_silent_one() -> None:

@@ -149,7 +149,6 @@ def test_a_case_gives_the_verdict_again_by_the_printed_line(mixed: Path, name: s
 def test_where_no_check_can_judge_what_was_sent_is_left(mixed: Path) -> None:
     (folder,) = [path for path in (mixed / "left").iterdir() if "misspells_a_function" in path.name]
     assert sorted(path.name for path in folder.iterdir()) == [
-        "report.html",
         "report.txt",
         "sent.stream",
         "summary.json",
@@ -165,3 +164,18 @@ def test_a_folder_of_a_test_that_passes_now_is_cleared(tmp_path: Path) -> None:
     done = session(tmp_path, "--mirotwin-artifacts=left", tests=tests.format("True"))
     assert done.returncode == 0
     assert [path.name for path in folder.iterdir()] == ["notes.txt"]
+
+
+def test_the_last_events_are_frames_and_what_is_none_is_characters(tmp_path: Path) -> None:
+    tests = """
+def test_talks(link):
+    link.poll(slot=0)
+    link.expect(Telemetry, within=ms(80))
+    link.send(bytes([0x55, 0x44]))
+    link.expect(Telemetry, within=ms(80))
+"""
+    out = session(tmp_path, tests=tests).stdout
+    assert "net0/robot0: received team_ask seq=0 0: +0/+0 1: +0/+0 2: +0/+0 (tick " in out
+    assert "net0/robot0: transmitted telemetry seq=0 slot=0 flags=10h accepted=1 rejected=0 (tick " in out
+    assert "net0/robot0: received 55 44 (from tick " in out
+    assert "55 55" not in out

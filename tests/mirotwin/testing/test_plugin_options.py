@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from tests.mirotwin.checks.rig import built_in, needs_sdcc
 from tests.mirotwin.testing.sessions import run, session
 
 from miro_robot.firmware import image_path
+from mirotwin.cases.artifacts import image_beside
 
 MANY = """
 @pytest.mark.mirotwin(scenario={"network.radio.bit_error_rate": 0.01})
@@ -130,11 +132,13 @@ def test_the_same_by_a_check(link, world):
     assert "motion_stop was not reached within 111 ms" in failed.stdout
     (line, _) = re.findall(r"^  (pytest .*)$", failed.stdout, re.MULTILINE)
     (replay,) = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
-    assert replay.endswith("/case.stream --firmware bad/out/miro.ihx")
+    left = re.search("left/[^/]+/firmware.ihx", replay)
+    assert left is not None
+    assert replay.endswith(f"/case.stream --firmware {left[0]}")
     replayed = run(tmp_path, replay)
     assert replayed.returncode == 1
     assert "fails as recorded: failsafe_stop_ms" in replayed.stderr
-    cured = run(tmp_path, replay.replace("bad/out/miro.ihx", str(image_path())))
+    cured = run(tmp_path, replay.replace(left[0], str(image_path())))
     assert cured.returncode == 0
     assert line.endswith("--mirotwin-seed 0 --mirotwin-firmware bad/out/miro.ihx")
     again = run(tmp_path, line)
@@ -166,3 +170,39 @@ def test_it(world):
     out = session(tmp_path, "test_mine.py", tests=tests).stdout
     assert "1 error" in out
     assert "has 1 steps, which a test in Python does not do" in out
+
+
+def test_a_folder_of_artifacts_replays_where_the_image_is_gone(tmp_path: Path) -> None:
+    (tmp_path / "session").mkdir()
+    for suffix in (".ihx", ".map", ".cdb"):
+        shutil.copy(image_path().with_suffix(suffix), tmp_path / "session" / f"mine{suffix}")
+    tests = """
+@pytest.mark.mirotwin(expect={"frames_accepted_min": 9})
+def test_counts(link):
+    link.drive({0: (500, 500)}, ms(100))
+"""
+    options = ["--mirotwin-firmware", "mine.ihx", "--mirotwin-artifacts=left"]
+    failed = session(tmp_path / "session", *options, tests=tests)
+    (line,) = re.findall(r"^  (mirotwin .*)$", failed.stdout, re.MULTILINE)
+    shutil.move(tmp_path / "session" / "left", tmp_path / "elsewhere" / "left")
+    shutil.rmtree(tmp_path / "session")
+    (folder,) = (tmp_path / "elsewhere" / "left").iterdir()
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "case.stream",
+        "firmware.cdb",
+        "firmware.ihx",
+        "firmware.map",
+        "report.txt",
+        "summary.json",
+    ]
+    for command in (line, f"mirotwin replay {folder / 'case.stream'}"):
+        done = run(tmp_path / "elsewhere", command)
+        assert done.returncode == 1, done.stderr
+        assert "fails as recorded: frames_accepted_min" in done.stderr
+
+
+def test_an_image_beside_a_case_that_is_another_one_is_not_taken(tmp_path: Path) -> None:
+    (tmp_path / "case.stream").write_text("")
+    (tmp_path / "firmware.ihx").write_text(":00000001FF\n")
+    assert image_beside(tmp_path / "case.stream", "00" * 32) is None
+    assert image_beside(tmp_path / "case.stream", None) is None

@@ -33,15 +33,15 @@ CASES = {
     ),
     "a push into the last byte and one more": (
         START + "MOV SP,#0FEh\nPUSH ACC\nguilty:\nPUSH ACC",
-        (FaultKind.STACK_OVERFLOW, 8 * CYCLE, 0x35, ""),  # 4 x 2 cycles
+        (FaultKind.STACK_OVERFLOW, 8 * CYCLE, 0x35, "SP 00h, its stack is 01h to FFh"),  # 4 x 2 cycles
     ),
     "a call whose return address goes round": (
         START + "MOV SP,#0FEh\nguilty:\nACALL main",
-        (FaultKind.STACK_OVERFLOW, 6 * CYCLE, 0x33, ""),
+        (FaultKind.STACK_OVERFLOW, 6 * CYCLE, 0x33, "SP 00h, its stack is 01h to FFh"),
     ),
     "a return with nothing on the stack": (
         START + "MOV SP,#00h\nguilty:\nRET",
-        (FaultKind.STACK_UNDERFLOW, 6 * CYCLE, 0x33, ""),
+        (FaultKind.STACK_UNDERFLOW, 6 * CYCLE, 0x33, "SP FFh, its stack is 01h to FFh"),
     ),
     "running off the end": (
         START + "NOP\nguilty:",
@@ -246,7 +246,7 @@ def test_the_strobes_of_a_movx_reach_the_chip_that_is_addressed():
     rises = 2585 * CYCLE + 18
     assert board.left.commands == [(rises, 0x02, b"")]
     assert board.right.commands == []
-    assert board.left.status_at(rises + 639) & 1 == 1
+    assert board.left.status_at(rises + 479) & 1 == 1
     assert board.cpu.peek_iram(0x40) == 1
     board = board_with(READ, raw_movx_wiring(), stop_on_fault=False)
     board.run(3 * MS)

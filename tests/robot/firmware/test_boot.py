@@ -90,6 +90,15 @@ def test_a_chip_may_be_busy_for_100_us_and_not_for_1_ms(busy_clocks: int, works:
     assert (rig.told(rig.board.left)[-1:] != []) == works
 
 
+def test_chips_that_show_c4h_after_a_reset_are_taken_at_the_first_try() -> None:
+    rig = Rig(options=Lm629Options(reset_disarms_breakpoint=False), boot=False)
+    rig.run_to(100 * MS)
+    levels = [latch & RESET_PINS for _, port, latch in rig.board.writes if port == 2]
+    assert sum(1 for before, after in pairwise(levels) if after and not before) == 1
+    rig.team(0, 5000, 5000)
+    assert rig.told(rig.board.left)
+
+
 def test_chips_that_stop_answering_are_reset_and_set_up_again() -> None:
     rig = Rig()
     rig.service(0, 0, 1, 11, 22, 33, 44)

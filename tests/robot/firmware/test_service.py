@@ -3,6 +3,9 @@
 import pytest
 from tests.robot.firmware.rig import MS, SAMPLE, Command, Rig
 
+from miro_protocol.frames import seal
+from miro_protocol.table import downlink
+
 STT, UDF, LFIL, LTRJ, RDSIGS = 0x01, 0x04, 0x1E, 0x1F, 0x0C
 PING, FILTER, ACCELERATION = 0, 1, 2
 STOP = bytes.fromhex("0400")
@@ -93,3 +96,67 @@ def test_an_acceleration_waits_through_the_failsafe_too(rig: Rig) -> None:
     assert rig.board.left.desired_velocity % 3000 == 0
     assert not rig.board.left.status & 0x02
     assert start < rig.now < start + 50 * MS
+
+
+def unchecked(rig: Rig, seq: int, opcode: int, data: bytes) -> None:
+    """A service frame that `encode` would refuse."""
+    body = bytes([1 << 6 | seq, 1, opcode]) + data
+    rig.frame(seal(downlink(3), body.ljust(1 + downlink(3).payload_size, b"\0")))
+
+
+def test_gains_above_32767_reach_the_chips_as_they_came_and_they_keep_15_bits(rig: Rig) -> None:
+    unchecked(rig, 1, FILTER, bytes.fromhex("ffff 0180 ffff ffff"))
+    (load, update) = settings_of(rig.told(rig.board.left))
+    assert (load, update) == ((LFIL, bytes.fromhex("030f ffff 8001 ffff ffff")), (UDF, b""))
+    rig.run_ms(2)
+    assert (rig.board.left.pid.kp, rig.board.left.pid.ki) == (0x7FFF, 1)
+
+
+def test_an_acceleration_above_30_bits_reaches_the_chips_as_it_came_and_they_keep_30_bits(rig: Rig) -> None:
+    unchecked(rig, 1, ACCELERATION, (0xC0000000 + 3000).to_bytes(4, "little"))
+    assert settings_of(rig.told(rig.board.left)) == [(LTRJ, bytes.fromhex("0020 c0000bb8"))]
+    rig.team(2, 8000, 8000, slot=1)
+    rig.run_to(rig.told(rig.board.left)[-1].tick + 10 * SAMPLE)
+    steps, rest = divmod(rig.board.left.desired_velocity, 3000)
+    assert (rest, 9 <= steps <= 10) == (0, True)
+
+
+def test_with_acceleration_0_wheels_stay_at_rest_until_another_one_comes(rig: Rig) -> None:
+    unchecked(rig, 1, ACCELERATION, bytes(4))
+    rig.team(2, 8000, 8000, slot=1)
+    rig.run_ms(50)
+    assert rig.board.left.desired_velocity == 0
+    rig.service(3, 1, ACCELERATION, 3000)
+    for seq in range(4, 8):
+        rig.team(seq, 0, 0, slot=1)
+    rig.team(8, 8000, 8000, slot=1)
+    rig.run_ms(20)
+    assert rig.board.left.desired_velocity > 0
+    assert not rig.board.left.status & 0x02
+
+
+@pytest.mark.parametrize(("silence_ms", "status"), [(150, 0), (550, 0x80)], ids=["stopped", "off"])
+def test_a_ping_after_the_failsafe_does_not_set_the_wheels_in_motion_again(
+    rig: Rig, silence_ms: float, status: int
+) -> None:
+    rig.team(0, 1000, 1000, slot=1)
+    rig.run_ms(silence_ms)
+    rig.told(rig.board.left)
+    rig.service(1, 1, PING)
+    rig.run_ms(100)
+    assert rig.told(rig.board.left) == []
+    assert rig.board.left.desired_velocity == 0
+    assert rig.board.left.status & 0x80 == status
+
+
+def test_a_robot_whose_slot_is_not_below_n_takes_settings_for_that_slot() -> None:
+    rig = Rig(slot=7)
+    body = bytes([1 << 6 | 1, 7, FILTER]) + bytes(range(8))
+    rig.frame(seal(downlink(3), body.ljust(13, b"\0")))
+    assert [command.opcode for command in rig.told(rig.board.left)] == [LFIL, UDF]
+
+
+def test_a_velocity_of_minus_32768_is_cut_off_like_others(rig: Rig) -> None:
+    body = bytes([1]) + bytes(4) + bytes.fromhex("0080 0080") + bytes(4)
+    rig.frame(seal(downlink(3), body))
+    assert rig.i16("_last_left") == rig.i16("_last_right") == -16633

@@ -3,10 +3,10 @@
 from itertools import pairwise
 
 import pytest
-from tests.robot.firmware.rig import Rig
+from tests.robot.firmware.rig import CHARACTER, Rig
 
 from miro_protocol.decoder import Received, TelemetryDecoder
-from miro_protocol.frames import TelemetryFrame
+from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.table import Flags
 
 
@@ -79,3 +79,39 @@ def test_it_hears_the_next_frame_while_it_answers() -> None:
     assert len(answers(rig)) == 1
     assert rig.counters == (3, 0, 0)
     assert rig.i16("_last_left") == 102
+
+
+def test_a_question_that_comes_while_it_answers_is_obeyed_and_counted_and_not_answered() -> None:
+    rig = Rig()
+    rig.run_to(rig.send(encode(TeamFrame(3, 0, ((100, 100),) * 3), 3)) + CHARACTER)
+    rig.frame(encode(TeamFrame(3, 3, ((200, 200),) * 3), 3)[6:], settle_ms=50)  # without preamble: 17.7 ms
+    assert [answer.seq for answer in answers(rig)] == [0]
+    assert rig.i16("_last_left") == 200
+    rig.team(6, 0, 0, ask=True)
+    rig.run_ms(25)
+    assert [(answer.seq, answer.accepted) for answer in answers(rig)] == [(0, 1), (6, 3)]
+
+
+@pytest.mark.parametrize(
+    ("waited_ms", "flags"),
+    [(20, Flags.MOTORS_OFF), (150, Flags.MOTORS_OFF | Flags.STOPPED)],
+)
+def test_the_first_answer_says_that_motors_were_off_and_whether_110_ms_passed(
+    waited_ms: int, flags: int
+) -> None:
+    rig = Rig()
+    rig.run_ms(waited_ms)
+    rig.team(0, 0, 0, ask=True)
+    rig.run_ms(25)
+    assert [answer.flags for answer in answers(rig)] == [flags]
+
+
+@pytest.mark.parametrize(("slot", "n"), [(3, 3), (7, 3), (5, 5)])
+def test_a_robot_whose_slot_is_not_below_n_hears_and_never_answers_or_moves(slot: int, n: int) -> None:
+    rig = Rig(slot, n)
+    for seq in range(2 * n):
+        rig.team(seq, 100, 100, ask=True)
+        rig.run_ms(25)
+    assert rig.sent() == []
+    assert rig.counters == (2 * n, 0, 0)
+    assert [rig.told(chip) for chip in (rig.board.left, rig.board.right)] == [[], []]

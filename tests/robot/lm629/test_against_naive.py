@@ -116,7 +116,7 @@ POLITE = (
     *("sample", "find_index", "cross", "pass_breakpoint"),
 )
 LENGTHS = {
-    "busy_clocks": [160, 160, 0, 33],
+    "busy_clocks": [120, 160, 0, 33],
     "reset_clocks": [6144, 50],
     "reset_pulse_clocks": [8],
     "filter_clocks": [8, 8, 1, 0],

@@ -254,11 +254,25 @@ def test_trajectory_complete_comes_though_the_encoder_never_moves():
     assert bench.ask("RDRP") == 0
 
 
-def test_the_ports_of_the_lm628_mean_nothing():
+def test_the_port_commands_of_the_lm628_move_bit_8_and_no_pin():
+    """SNVS781C p. 23: PORT12 clears the bit, PORT8 sets it; there is no exception for the LM629."""
+    bench = moving(position=1000)
+    bench.filter(kp=10)
+    bench.sample(30)
+    driven = (bench.chip.sign, bench.chip.pwm_magnitude)
+    assert driven != (0, 0)
+    for command, bit in (("PORT12", 0), ("PORT8", 0x0100)):
+        bench.command(command)
+        assert bench.signals() & 0x0100 == bit
+        assert (bench.chip.sign, bench.chip.pwm_magnitude) == driven
+
+
+def test_a_reset_selects_the_8_bit_output_again():
     bench = Bench.running()
     bench.command("PORT12")
-    bench.command("PORT8")
-    assert bench.signals() == 0x0180
+    bench.command("RESET")
+    bench.wait(30000)
+    assert bench.signals() & 0x0100
 
 
 # ------------------------------------------------------------------------------- flags and interrupts

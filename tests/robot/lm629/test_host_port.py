@@ -7,7 +7,7 @@ from miro_exact.state import snapshot
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.options import Lm629Options
 
-BUSY = 640
+BUSY = 480
 
 
 def test_the_reset_handshake_shows_00_then_84_then_80():
@@ -37,7 +37,7 @@ def test_the_chip_is_dead_until_its_first_reset_and_after_a_pulse_that_was_too_s
     assert bench.status() == 0x84
 
 
-def test_busy_lasts_160_clocks_after_a_command_byte_and_after_the_second_byte_of_a_word():
+def test_busy_lasts_120_clocks_after_a_command_byte_and_after_the_second_byte_of_a_word():
     bench = Bench.running()
     bench.ready()
 

@@ -332,7 +332,7 @@ def counts_of_a_short_state(bench: Bench) -> int:
 
 Reading = tuple[str, object, Callable[[Bench], object], object, object]
 READINGS: tuple[Reading, ...] = (
-    ("busy_clocks", 33, busy_ticks, 640 - 24, 132 - 24),
+    ("busy_clocks", 160, busy_ticks, 480 - 24, 640 - 24),
     ("busy_judged", "end", lost_writes, 1, 0),
     ("command_resets_phase", False, mask_after_one_byte, 0x3E, 0x34),
     ("command_resets_phase", False, threshold_after_one_byte, 0x7FFF, 0x1234),
@@ -384,7 +384,7 @@ READINGS: tuple[Reading, ...] = (
     ("sign_of_negative", 0, drive(-26, kp=10), (1, 2), (0, 2)),
     ("pulse_at", "end", first_edges, [(0, 1), (16, 0)], [(0, 0), (2032, 1)]),
     ("off_keeps_sign", True, sign_when_switched_off, 0, 1),
-    ("port12_clears", True, eight_bit_output, 0x0100, 0),
+    ("port12_clears", False, eight_bit_output, 0, 0x0100),
     ("double_step", 2, both_phases_at_once, 0, 2),
     ("double_step", -2, both_phases_at_once, 0, -2),
     ("filter_clocks", 4, counts_of_a_short_state, 0, 2),

@@ -80,6 +80,28 @@ def test_products_may_be_read_as_their_bottom_16_bits():
     assert loop(kp=0x0870, saturates=False).step(0x7FFF) == 0xF790 - 0x10000
 
 
+def error_after_a_jam(saturates: bool) -> int:
+    """Counts that the motor is behind its desired position, a second after something held it for 0.1 s.
+
+    A motor of first order with the robot's filter, at two thirds of its top speed.
+    """
+    pid = loop(kp=400, ki=40, kd=3000, il=2000, ds=3, saturates=saturates)
+    desired = real = speed = 0.0
+    for sample in range(3600):
+        held = 300 <= sample < 600
+        drive = pid.step(int(desired) - int(real))
+        speed = 0.0 if held else speed + (6.0 * drive / 32768 - speed) / 60
+        desired += 4.0 if sample > 60 else sample / 15
+        real += speed
+    return int(desired - real)
+
+
+def test_a_motor_that_was_held_catches_up_with_its_desired_position():
+    """SNVS781C p. 10 says so; with products that wrap (p. 12) it stays behind."""
+    assert abs(error_after_a_jam(saturates=True)) < 100
+    assert error_after_a_jam(saturates=False) > 1000
+
+
 COEFFICIENT = st.integers(0, 300) | st.integers(0, 0x7FFF)
 
 

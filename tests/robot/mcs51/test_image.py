@@ -71,7 +71,7 @@ def test_a_damaged_image_is_refused_by_line(tmp_path, lines, line, reason):
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     with pytest.raises(ImageError, match="there is no such file; build the firmware first"):
         load_hex(tmp_path / "none.ihx")
-    with pytest.raises(ImageError, match="cannot be read"):
+    with pytest.raises(ImageError, match="is a folder; name a file in it"):
         load_hex(tmp_path)
 
 
@@ -104,7 +104,7 @@ L:Fa$local$0$0:9B
 
 
 def test_symbols_come_from_the_map_and_the_debug_file_beside_the_image(tmp_path):
-    path = written(tmp_path, record(0, b"\x00"), END)
+    path = written(tmp_path, *(record(at, bytes(16)) for at in range(0, 0x210, 16)), END)
     path.with_suffix(".map").write_text(MAP)
     path.with_suffix(".cdb").write_text(CDB)
     symbols = load_hex(path).symbols

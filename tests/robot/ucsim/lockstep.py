@@ -108,7 +108,7 @@ def main() -> int:
             totals = [total + count for total, count in zip(totals, outcome.opcodes, strict=True)]
             if outcome.difference:
                 differing += 1
-                print(f"walk {outcome.seed}: {outcome.difference}")
+                print(f"walk {outcome.seed}: {outcome.difference}", flush=True)
             print(f"\r{done} of {walks} walks ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     rarest = min(range(256), key=lambda opcode: totals[opcode])

@@ -43,8 +43,12 @@ def version() -> str:
     return children.run(["s51", "-V"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
 
 
-def run(code: bytes, commands: Iterable[str]) -> bytes:
-    """Starts the simulator on a code image at address 0, executes `commands`, returns all it printed."""
+def run(code: bytes, commands: Iterable[str], heard: Path | None = None) -> bytes:
+    """Starts the simulator on a code image at address 0, executes `commands`, returns all it printed.
+
+    `heard`: file for what the program sends.
+    """
+    serial = [] if heard is None else ["-S", f"uart=0,out={heard}"]
     with tempfile.TemporaryDirectory() as folder:
         image = Path(folder, "image.ihx")
         image.write_text(intel_hex(code))
@@ -53,7 +57,7 @@ def run(code: bytes, commands: Iterable[str]) -> bytes:
         printed = Path(folder, "printed")
         with printed.open("wb") as sink:  # it writes byte by byte: a pipe would wake its reader each time
             children.run(
-                ["s51", "-t", "C52", "-b", "-q", "-P", str(image)],
+                ["s51", "-t", "C52", "-b", "-q", "-P", *serial, str(image)],
                 input=f'exec "{script}"\nquit\n'.encode(),
                 stdout=sink,
                 stderr=subprocess.STDOUT,

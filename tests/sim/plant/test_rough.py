@@ -27,6 +27,11 @@ KINDS = {
     "ball": DriveParams(ball=BALL),
     "ball in front": DriveParams(ball=RollingBall(friction=0.5, behind_m=-0.035)),
     "stiction": DriveParams(chassis=Chassis(stiction_ratio=2.5)),
+    "play": DriveParams(chassis=Chassis(gear_backlash_rad=0.02)),
+    "load friction": DriveParams(chassis=Chassis(gear_load_friction=0.25)),
+    "slip, play and load friction": DriveParams(
+        tyre=Tyre(grip=0.5), chassis=Chassis(gear_backlash_rad=0.05, gear_load_friction=0.3)
+    ),
     "all": ALL,
 }
 ROLLING = DriveParams(tyre=Tyre(grip=10.0), ball=RollingBall(load_share=0.0))
@@ -75,13 +80,13 @@ def test_a_robot_that_stands_stays_exactly_where_it_is(kind):
     params = KINDS[kind]
     one = RoughBody(params, 0.3, -0.1, 1.0)
     before = values(one)
-    most = params.friction_nm() * 2048 / 24e6
+    most = one.friction_nm * 2048 / 24e6
     for push in (0.0, 0.5 * most, -0.99 * most):
         one.push(push, -push, 2048)
         one.push(push, push, 2048)
     after = values(one)
     moved = {name for name in before if after[name] != before[name]}
-    assert not moved - {"left_force_n", "right_force_n"}
+    assert not moved - {"left_force_n", "right_force_n", "left_load_n", "right_load_n"}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -106,7 +111,7 @@ def test_with_all_grip_that_it_needs_it_goes_as_the_body_that_only_rolls(magnitu
     assert drive.left_encoder.position == pytest.approx(plain.left_encoder.position, rel=1e-3)
 
 
-@pytest.mark.parametrize("kind", ["slip", "ice", "all"])
+@pytest.mark.parametrize("kind", ["slip", "ice", "all", "slip, play and load friction"])
 def test_tiny_euler_steps_go_the_same_way(kind):
     params = KINDS[kind]
     drive, naive = DifferentialDrive(params), NaiveRoughDrive(params)
@@ -230,13 +235,14 @@ def test_a_standing_shaft_holds_more_and_a_turning_one_rubs_as_before(ratio, tic
 @settings(deadline=None, max_examples=30)
 @given(SPEEDS, SPEEDS, WAYS, TURNS, IMPULSES, IMPULSES)
 def test_left_and_right_are_mirror_images(kind, left, right, v, w, push_left, push_right):
-    """To what the sweeps leave, which take the left wheel first: most where the ball stands."""
+    """To what is left by taking the left wheel first: in the sweeps, and in the resistance of wheels with play."""
+    near = 1e-3 if "play" in kind else 1e-5
     one, other = moving(KINDS[kind], left, right, v, 0.1, w), moving(KINDS[kind], right, left, v, -0.1, -w)
     one.push(push_left, push_right, 2048)
     other.push(push_right, push_left, 2048)
     assert one.left_rad_s == pytest.approx(other.right_rad_s, abs=1e-3)
     assert (one.v_m_s, one.u_m_s, one.w_rad_s) == pytest.approx(
-        (other.v_m_s, -other.u_m_s, -other.w_rad_s), abs=1e-5
+        (other.v_m_s, -other.u_m_s, -other.w_rad_s), abs=near
     )
 
 
@@ -283,7 +289,9 @@ def rough_trace():
     params = DriveParams(
         tyre=Tyre(grip=0.25),
         ball=BALL,
-        chassis=Chassis(stiction_ratio=1.5, left_radius_factor=0.985),
+        chassis=Chassis(
+            stiction_ratio=1.5, left_radius_factor=0.985, gear_backlash_rad=0.02, gear_load_friction=0.2
+        ),
         disturbance=Disturbance(force_n=0.1, sine_torque_nm=0.01, noise_force_n=0.2, period_s=0.05),
     )
     return trace(lambda: DifferentialDrive(params, 0.1, 0.2, -1.0), 60)
@@ -298,3 +306,47 @@ def test_the_body_in_use_and_its_uncompiled_source_give_the_same_bits():
         cwd=Path(__file__).parents[3],
     )
     assert rough_trace() == done.stdout.splitlines()
+
+
+def test_inside_the_backlash_the_shaft_turns_alone_and_then_takes_the_wheel_along():
+    """0.1 rad at the wheel are 0.8 rad of the shaft, which stands in the middle at first."""
+    one = moving(DriveParams(chassis=Chassis(gear_backlash_rad=0.1)))
+    turned = 0.0
+    for _ in range(300):
+        one.push(1e-7, 1e-7, 2048)
+        turned += one.turned_left_rad if one.v_m_s == 0.0 else 0.0
+    assert turned == pytest.approx(0.4, abs=0.01)
+    assert one.v_m_s > 0.02
+    assert one.slips_m_s() == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+def test_a_shaft_that_reverses_goes_through_all_the_backlash_before_the_wheel_follows():
+    one = moving(DriveParams(chassis=Chassis(gear_backlash_rad=0.1, rolling_resistance=0.0)))
+    for _ in range(300):
+        one.push(1e-7, 1e-7, 2048)
+    forward_m_s, turned = one.v_m_s, 0.0
+    for _ in range(300):
+        one.push(-1e-7, -1e-7, 2048)
+        if one.v_m_s == forward_m_s:
+            turned += one.turned_left_rad - forward_m_s / one.left_m_rad * 2048 / 24e6
+    assert turned == pytest.approx(-0.8, abs=0.02)
+    assert one.v_m_s < 0.9 * forward_m_s
+
+
+def test_load_friction_takes_its_share_of_the_torque_that_accelerates_the_robot():
+    """The chassis gets F = (T - friction - share r F - J a / r) / r from the motor's torque T."""
+    params = DriveParams(chassis=Chassis(gear_load_friction=0.25))
+    one = moving(params)
+    step_s, torque_nm = 2048 / 24e6, 5e-3
+    for _ in range(20):
+        before = one.v_m_s
+        one.push(torque_nm * step_s, torque_nm * step_s, 2048)
+    roll, mass = one.left_m_rad, 0.25
+    expected = (torque_nm - params.friction_nm()) / (1.25 * roll * mass + 2.7e-7 / roll)
+    assert (one.v_m_s - before) / step_s == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize(("key", "value"), [("gear_backlash_rad", 0.21), ("gear_load_friction", -0.1)])
+def test_play_and_load_friction_beyond_what_gears_have_are_refused(key, value):
+    with pytest.raises(ValueError, match=f"{key} must be"):
+        Chassis(**{key: value})

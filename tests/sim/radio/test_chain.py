@@ -1,5 +1,7 @@
 """The two-state chain: the textbook's one, whatever one asks it first; and the fading that it stands for."""
 
+import math
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -9,6 +11,7 @@ from tests.sim.radio.strategies import chains, seeds
 from miro_sim.radio import ChainParams
 from miro_sim.radio.chain import Chain
 from miro_sim.scenario import profiles
+from miro_sim.scenario.file import load
 
 SECONDS = 100
 SLOTS = 9600 * SECONDS
@@ -64,6 +67,28 @@ def test_a_fading_profile_is_as_often_and_as_long_below_as_rayleighs_crossings(
         abs(sum(frames) / len(frames) - chance) < 4 * (2 * chance / leave / 320 / len(frames)) ** 0.5 + 0.002
     )
     assert chance == pytest.approx(hit, rel=0.1, abs=0.001)
+
+
+@pytest.mark.parametrize("margin_db", [5, 10, 15, 20, 30])
+@pytest.mark.parametrize(("ending", "speed_m_s"), [("", 1.46), ("_slow", 0.2)])
+def test_the_chances_of_a_fading_profile_are_rayleighs_at_its_speed(margin_db, ending, speed_m_s):
+    """Crossing rate sqrt(2 pi) f r exp(-r^2), mean fade (exp(r^2) - 1) / (sqrt(2 pi) f r), with f the Doppler shift."""
+    bursts = profiles.keys_of(f"fade{margin_db}{ending}")["bursts"]
+    power = 10 ** (-margin_db / 10)
+    crossings_hz = math.sqrt(2 * math.pi * power) * speed_m_s * 433.92e6 / 299_792_458
+    assert bursts["good_to_bad"] == pytest.approx(crossings_hz / 9600, rel=0.03)
+    assert bursts["bad_to_good"] == pytest.approx(crossings_hz / (math.exp(power) - 1) / 9600, rel=0.03)
+
+
+def test_at_the_speed_of_the_figures_a_mean_fade_stops_a_robot_and_at_the_largest_speed_it_does_not():
+    """Which is after 110 ms without a fresh frame."""
+    fast, slow = (
+        1000 / profiles.keys_of(name)["bursts"]["bad_to_good"] / 9600 for name in ("fade15", "fade15_slow")
+    )
+    assert fast < 110 < slow
+    assert slow / fast == pytest.approx(1.46 / 0.2, rel=0.03)
+    for name in ("fig6", "fig7", "fig8", "fig9", "fig10"):
+        assert load(name).scenario.networks[0].robot[0].reference.speed_m_s == 0.2
 
 
 def test_a_chain_shows_what_it_is():

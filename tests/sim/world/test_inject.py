@@ -103,10 +103,29 @@ def test_the_earliest_tick_is_kept_and_the_one_before_refused():
     earliest = world.earliest_tick()
     assert earliest == 1_000_000 + 120 + KEYUP_TICKS
     with pytest.raises(
-        ValueError, match=f"net0: tick {earliest - 1} is too early; the earliest is {earliest}"
+        ValueError, match=f"net0: tick {earliest - 1} is out of range; the earliest is {earliest}"
     ):
         world.inject(FRAME, at_tick=earliest - 1)
     assert world.inject(FRAME, at_tick=earliest) == earliest
+
+
+@pytest.mark.parametrize("tick", [2_073_600_000_001, 1 << 62, 1 << 63, 10**30])
+def test_a_tick_after_a_day_is_refused(tick):
+    with pytest.raises(ValueError, match=f"net0: tick {tick} is out of range; .* the latest 2073600000000"):
+        silent().inject(FRAME, at_tick=tick)
+
+
+@pytest.mark.parametrize("tick", [-1, -(1 << 63)])
+def test_a_negative_tick_is_refused_with_the_range(tick):
+    with pytest.raises(ValueError, match="the earliest is 24120, the latest 2073600000000"):
+        silent().inject(FRAME, at_tick=tick)
+
+
+@pytest.mark.parametrize("tick", [True, False, 1e6, float("nan"), "1000000"])
+def test_what_is_no_whole_number_is_no_tick(tick):
+    for act in (lambda: silent().inject(FRAME, at_tick=tick), lambda: silent().run_to(tick)):
+        with pytest.raises(ValueError, match="is no whole number of ticks"):
+            act()
 
 
 def test_without_a_tick_characters_queue_behind_each_other():

@@ -7,17 +7,34 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
 
-from miro_protocol.table import SEQ_MODULUS, SYNC, TELEMETRY, Flags, Opcode
-from miro_protocol.transmission import follows
+from miro_exact.clock import TICKS_PER_SECOND
+from miro_protocol.table import (
+    BITS_PER_CHARACTER,
+    ROBOT_BIT_TICKS,
+    SEQ_MODULUS,
+    SYNC,
+    TELEMETRY,
+    Flags,
+    Opcode,
+)
 from miro_sim.periods import RobotPeriod
+from miro_sim.world.events import Event
+from mirotwin.conform.hints import characters, in_a_row, no_answer, number
 from mirotwin.conform.rule import BOTH, THREE, Air, Chapter
 from mirotwin.conform.rules import FRAME, FRESHNESS, RECEPTION, TURNS
 from mirotwin.conform.seen import Answer, Seen
 from mirotwin.conform.talk import Found, Frame, Talk, ms, over_by
 
 CHAPTER = Chapter("Answers")
+BAUD = TICKS_PER_SECOND / ROBOT_BIT_TICKS
+BAUD_TOLERANCE = 0.01
+"""A timer's reload that is off by one makes 1.3 %. Chosen."""
+_HEAD = TELEMETRY.lead + SYNC
+
+
+_AT_SPEED = 40
+"""Questions while a wheel goes 50 counts in a sample: a carry falls into some of them."""
 
 
 @CHAPTER.rule(
@@ -25,52 +42,68 @@ CHAPTER = Chapter("Answers")
     "The robot in slot seq mod N MUST answer a fresh frame of type 3, with that frame's seq and its own slot, and the"
     " answer MUST be over before the next question can be: 33.37 ms after it.",
     TURNS,
-    airs=(Air(3, (0, 1, 2)), Air(5, (0, 1, 2, 3, 4))),
+    airs=(*BOTH, Air(3, (0, 1, 2)), Air(5, (0, 1, 2, 3, 4))),
+    presupposes=("P42",),
+    broken="a question is not answered in turn",
 )
 def in_turn(talk: Talk) -> None:
     talk.seq = 59
     for _ in range(10):  # over the wrap of seq, where some robot's turn comes early
         question = talk.team(ask=True, what="question", gap_ms=36.0)
-        talk.answered(question, question.seq % talk.n)
+        asked = question.seq % talk.n
+        if asked in talk.air.slots:
+            talk.answered(question, asked)
+        else:
+            talk.silent(question.last_tick, over_by(question), f"{question.what} is for robot {asked}")
 
 
 @CHAPTER.rule(
     "P42",
-    "An answer MUST be 19 characters without a pause: 55h four times, FFh, 2Dh D4h, HDR to CRC whitened, CRC with the"
-    " layout byte 1Eh.",
+    "An answer MUST be 19 characters without a pause, at 9615 baud +- 1 %: 55h four times, FFh, 2Dh D4h, HDR to CRC"
+    " whitened, CRC with the layout byte 1Eh.",
     FRAME,
+    presupposes=("P16",),
+    broken="an answer is not well formed",
 )
 def form(talk: Talk) -> None:
-    for _ in range(3):
-        question = talk.ask(talk.air.slots[0], gap_ms=36.0)
-        talk.answered(question, talk.air.slots[0])
-        _formed(talk, question)
+    for _ in range(3 * talk.n):  # whoever it takes itself for
+        _formed(talk, talk.team(ask=True, what="question", gap_ms=36.0))
+    end = talk.now
+
+    def any_heard(seen: Seen) -> Found:
+        return None if seen.heard else (end, "none")
+
+    talk.expect(end, f"an answer to some of {3 * talk.n} questions in a row", any_heard)
 
 
 def _formed(talk: Talk, question: Frame, then_more: bool = False) -> None:
-    """`then_more`: another answer may follow at once."""
-    deadline = over_by(question)
-    head = TELEMETRY.lead + SYNC
+    """What is said then, if anything, is formed as an answer. `then_more`: another one may follow at once."""
+    until = question.end_tick + ms(56.0)
 
     def test(seen: Seen) -> Found:
-        heard = [one for one in seen.heard if question.last_tick < one.tick <= deadline]
-        if then_more:
-            heard = heard[: TELEMETRY.wire_size]
-        if len(heard) != TELEMETRY.wire_size:
-            return deadline, f"{len(heard)} characters"
-        found = bytes(one.value for one in heard)[: len(head)]
-        if found != head:
-            return heard[len(head) - 1].tick, found.hex(" ")
-        for before, one in pairwise(heard):
-            if not follows(before.tick, one.tick) or not one.good_stop:
-                spacing_us = (one.tick - before.tick) / 24
-                return (
-                    one.tick,
-                    f"{spacing_us:.0f} us between two, stop bit {'good' if one.good_stop else 'bad'}",
-                )
-        return None
+        heard = [one for one in seen.heard if question.last_tick < one.tick <= until]
+        heard = heard[: TELEMETRY.wire_size] if then_more else list(in_a_row(heard))
+        what = _badly_formed(heard, question, seen) if heard else ""
+        return (heard[-1].tick, f"{characters(heard)}: {what}") if what else None
 
-    talk.expect(deadline, f"19 characters without a pause, {head.hex(' ')} first", test, (talk.air.slots[0],))
+    wanted = f"an answer of 19 characters without a pause, {_HEAD.hex(' ')} first, at 9615 baud"
+    talk.expect(until, wanted, test, (talk.air.slots[0],))
+
+
+def _badly_formed(heard: list[Event], question: Frame, seen: Seen) -> str:
+    if len(heard) != TELEMETRY.wire_size:
+        return f"{len(heard)} without a pause"
+    found = bytes(one.value for one in heard)[: len(_HEAD)]
+    if found != _HEAD:
+        return f"{found.hex(' ')} first"
+    if not all(one.good_stop for one in heard):
+        return "a bad stop bit"
+    baud = BITS_PER_CHARACTER * TICKS_PER_SECOND * (len(heard) - 1) / (heard[-1].tick - heard[0].tick)
+    if abs(baud - BAUD) > BAUD_TOLERANCE * BAUD:
+        return f"{baud:.0f} baud"
+    if not seen.answers_in(heard[0].tick - 1, heard[-1].tick):
+        return no_answer(heard, question.seq)
+    return ""
 
 
 @CHAPTER.rule(
@@ -78,6 +111,8 @@ def _formed(talk: Talk, question: Frame, then_more: bool = False) -> None:
     "A robot MUST speak only when it is asked: not on type 0 and 1, not on questions to others, nor on those that are"
     " not fresh or not valid.",
     TURNS,
+    presupposes=("P07", "P09", "P20", "P41"),
+    broken="a robot speaks unasked",
 )
 def unasked(talk: Talk) -> None:
     slot = talk.air.slots[0]
@@ -105,6 +140,7 @@ def unasked(talk: Talk) -> None:
     "P44",
     "A robot MUST hear the next frame while it answers, and what it hears MUST NOT disturb its answer.",
     TURNS,
+    presupposes=("P04", "P41"),
 )
 def full_duplex(talk: Talk) -> None:
     slot = talk.air.slots[0]
@@ -123,10 +159,11 @@ def full_duplex(talk: Talk) -> None:
     "The flags MUST say whether since the last answer the robot stopped (08h, 110 ms) and put its motors off (10h,"
     " 500 ms), and an answer MUST clear them; all other flags are 0.",
     FRAME,
+    presupposes=("P32", "P43"),
 )
 def flags(talk: Talk) -> None:
     both = Flags.STOPPED | Flags.MOTORS_OFF
-    talk.answered(talk.ask(talk.air.slots[0], gap_ms=36.0), talk.air.slots[0])  # its flags tell of power-on
+    _says(talk, f"flags {int(Flags.MOTORS_OFF):02X}h of power-on", partial(_flagged, Flags.MOTORS_OFF))
     for silence_ms, frames, wanted in (
         *((0.0, 0, 0), (0.0, 2, 0), (140.0, 0, Flags.STOPPED), (0.0, 0, 0), (520.0, 0, both), (0.0, 0, 0)),
         *((200.0, 3, Flags.STOPPED), (0.0, 3, 0), (600.0, 2, both), (0.0, 0, 0)),
@@ -135,6 +172,17 @@ def flags(talk: Talk) -> None:
         for _ in range(frames):
             talk.team()
         _says(talk, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
+    talk.wait(140.0)
+    talk.ask_nobody()
+    _says(
+        talk, f"flags {int(Flags.STOPPED):02X}h, which no answer has told,", partial(_flagged, Flags.STOPPED)
+    )
+    talk.wait(140.0)
+    question = talk.ask(talk.air.slots[0], gap_ms=0.0)
+    first = f"flags {int(Flags.STOPPED):02X}h in the answer to {question.what}, the first of two in a row"
+    talk.answered(question, talk.air.slots[0], first, partial(_flagged, Flags.STOPPED))
+    talk.ask(talk.air.slots[0], lead=b"", gap_ms=40.0)
+    _says(talk, "flags 00h", partial(_flagged, 0))
     for silence_ms, wanted in ((140.0, Flags.STOPPED), (560.0, both)):
         for _ in range(2):  # what happened twice is told once
             talk.team()
@@ -157,6 +205,7 @@ def _flagged(wanted: int, answer: Answer, seen: Seen) -> str:
     "P46",
     "The status bytes MUST be those of the left and of the right LM629.",
     FRAME,
+    presupposes=("P35", "P41"),
 )
 def status(talk: Talk) -> None:
     talk.team()
@@ -186,12 +235,14 @@ def _status(answer: Answer, seen: Seen) -> str:
     said = answer.said
     assert said is not None
     before, after = _around(answer, seen)
-    for side, one, other, found in (
-        ("left", before.left.status, after.left.status, said.status_left),
-        ("right", before.right.status, after.right.status, said.status_right),
+    left, right = (before.left.status, after.left.status), (before.right.status, after.right.status)
+    for side, (one, other), others, found in (
+        ("left", left, right, said.status_left),
+        ("right", right, left, said.status_right),
     ):
         if one == other != found:
-            return f"{found:02X}h and not {one:02X}h of the {side} one"
+            more = ": that is the other one's" if others == (found, found) else ""
+            return f"{found:02X}h and not {one:02X}h of the {side} one{more}"
     return ""
 
 
@@ -207,12 +258,25 @@ def _around(answer: Answer, seen: Seen) -> tuple[RobotPeriod, RobotPeriod]:
     "P47",
     "The positions MUST be the low 16 bits of the real positions of both wheels, as they are when the robot answers.",
     FRAME,
+    presupposes=("P35", "P41"),
+    broken="positions in answers are wrong",
 )
 def positions(talk: Talk) -> None:
     slot = talk.air.slots[0]
     for _ in range(10):  # beyond 65536 counts, one wheel forward and one backward
         talk.team(talk.same(slot, 13000, -12000), gap_ms=50.0)
     _says(talk, "the real positions", _positions)
+    for _ in range(_AT_SPEED):
+        question = talk.team(
+            talk.same(slot, 13000, -12000),
+            ask=True,
+            step=_step_to(talk, slot),
+            what="question at speed",
+            gap_ms=36.0,
+        )
+        talk.answered(
+            question, slot, f"positions of one sample each in the answer to {question.what}", _read_at_once
+        )
     talk.team(talk.same(slot, 0, 0), gap_ms=60.0)
     for _ in range(6):
         talk.team(talk.same(slot, 0, 0), gap_ms=60.0)
@@ -240,14 +304,38 @@ def _positions(answer: Answer, seen: Seen) -> str:
     said = answer.said
     assert said is not None
     before, after = _around(answer, seen)
-    for side, one, other, found in (
-        ("left", before.left.real_position, after.left.real_position, said.position_left),
-        ("right", before.right.real_position, after.right.real_position, said.position_right),
+    left = (before.left.real_position, after.left.real_position)
+    right = (before.right.real_position, after.right.real_position)
+    for side, ends, others, found in (
+        ("left", left, right, said.position_left),
+        ("right", right, left, said.position_right),
     ):
-        low, high = min(one, other) - 2, max(one, other) + 2
-        if (found - low) & 0xFFFF > high - low:
-            return f"{found} of the {side} wheel, which went from {one & 0xFFFF} to {other & 0xFFFF}"
+        if not _within(found, ends):
+            one, other = (number(end & 0xFFFF) for end in ends)
+            where = f"{number(found)} of the {side} wheel, which went from {one} to {other}"
+            if _within(found >> 8 | (found & 0xFF) << 8, ends):
+                return f"{where}: its bytes are exchanged"
+            return f"{where}: that is the other wheel's" if _within(found, others) else where
     return ""
+
+
+def _read_at_once(answer: Answer, seen: Seen) -> str:
+    """Each position is the low word of what one RDRP read; a robot that reads no RDRP is not judged by this."""
+    said = answer.said
+    assert said is not None
+    for side, found in (("left", said.position_left), ("right", said.position_right)):
+        read = seen.read_positions(side, answer.frame.start_tick - ms(14.0), answer.tick)
+        if read and found not in read:
+            where = f"{number(found)} of the {side} wheel, of which {', '.join(map(number, read))} was read"
+            mixed = any(found in (one & 0xFF00 | other & 0xFF, one) for one in read for other in read)
+            return f"{where}: its bytes are of two samples" if mixed else where
+    return _positions(answer, seen)
+
+
+def _within(position: int, ends: tuple[int, int]) -> bool:
+    """Whether these 16 bits are a position between the ends, or two counts beyond."""
+    low, high = min(ends) - 2, max(ends) + 2
+    return (position - low) & 0xFFFF <= high - low
 
 
 @CHAPTER.rule(
@@ -256,12 +344,13 @@ def _positions(answer: Answer, seen: Seen) -> str:
     " frame counts.",
     FRAME,
     airs=THREE,
+    presupposes=("P17", "P34", "P40", "P41"),
 )
 def accepted(talk: Talk) -> None:
     count = 0
 
     def counted(wanted: int) -> None:
-        _says(talk, f"accepted {wanted % 256}", partial(_counts, "accepted", wanted))
+        _says(talk, f"accepted {number(wanted % 256, 2)}", partial(_counts, "accepted", wanted))
 
     for rows, gap_ms in ((5, 12.0), (122, 0.0), (128, 0.0), (3, 12.0)):
         for _ in range(rows):
@@ -279,7 +368,7 @@ def accepted(talk: Talk) -> None:
 def _counts(name: str, wanted: int, answer: Answer, seen: Seen) -> str:
     assert answer.said is not None
     found = int(getattr(answer.said, name))
-    return "" if found == wanted % 256 else f"{found}"
+    return "" if found == wanted % 256 else number(found, 2)
 
 
 @CHAPTER.rule(
@@ -288,13 +377,14 @@ def _counts(name: str, wanted: int, answer: Answer, seen: Seen) -> str:
     " 256; nothing else counts.",
     RECEPTION,
     airs=BOTH,
+    presupposes=("P06", "P13", "P41"),
 )
 def rejected(talk: Talk) -> None:
     count = 0
     size = talk.form.size
 
     def counted() -> None:
-        _says(talk, f"rejected {count % 256}", partial(_counts, "rejected", count))
+        _says(talk, f"rejected {number(count % 256, 2)}", partial(_counts, "rejected", count))
 
     counted()
     for how in ({size - 1: 1}, {2: 0x80}, {size // 2: 0x18}):
@@ -321,6 +411,7 @@ def rejected(talk: Talk) -> None:
     "A robot MUST answer the first question after a silence too: failsafe and motors off change nothing in it.",
     FRESHNESS,
     airs=THREE,
+    presupposes=("P41",),
 )
 def after_silence(talk: Talk) -> None:
     slot = talk.air.slots[0]

@@ -7,9 +7,10 @@ from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.commands import BY_NAME
 from miro_robot.lm629.signals import MOTOR_OFF
 from miro_sim.world.events import SIDES
+from mirotwin.conform.hints import in_words
 from mirotwin.conform.rule import Chapter
 from mirotwin.conform.rules import POWER_ON
-from mirotwin.conform.seen import Seen, in_words
+from mirotwin.conform.seen import Seen
 from mirotwin.conform.talk import BOOTED_MS, Found, Talk, ms
 
 CHAPTER = Chapter("Power-on")
@@ -20,6 +21,8 @@ _RESET, _RSTI = BY_NAME["RESET"].opcode, BY_NAME["RSTI"].opcode
     "P01",
     "From power-on until the first fresh team frame both motors MUST be off, however long that takes.",
     POWER_ON,
+    presupposes=("P24",),
+    broken="a motor is on before the first team frame",
 )
 def motors_off(talk: Talk) -> None:
     talk.wait(600.0)
@@ -33,6 +36,7 @@ def motors_off(talk: Talk) -> None:
     "Both LM629 MUST leave reset together, and RESET (00h) MUST never be sent to one alone: their samples coincide;"
     " RSTI 0000h follows, and both show 80h or C0h.",
     POWER_ON,
+    presupposes=("P03",),
 )
 def reset_together(talk: Talk) -> None:
     talk.wait(60.0)
@@ -77,8 +81,11 @@ def reset_together(talk: Talk) -> None:
     "P03",
     f"A robot MUST be ready {BOOTED_MS:g} ms after power-on: it acts on a frame that begins then.",
     POWER_ON,
+    presupposes=("P24",),
+    broken="it is not ready 40 ms after power-on",
 )
 def ready(talk: Talk) -> None:
+    talk.seq = 0  # P19 has other numbers
     talk.obeyed(talk.team())
 
 

@@ -7,13 +7,20 @@ from typing import Unpack
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.table import VELOCITY_SATURATION
 from miro_robot.lm629.chip import SAMPLE_TICKS
+from miro_robot.lm629.commands import BY_NAME
 from mirotwin.checks.failsafe import ACTING_MS
+from mirotwin.conform.probe import why_deaf
 from mirotwin.conform.rule import Air, Chapter
 from mirotwin.conform.rules import FIRMWARE, FRAME, TURNS
 from mirotwin.conform.seen import Seen
 from mirotwin.conform.talk import ACTING_TICKS, Found, Frame, How, Talk, ms
 
 CHAPTER = Chapter("Velocities")
+_LTRJ = BY_NAME["LTRJ"].opcode
+_ACCELERATION = 0x20
+"""Bit of LTRJ's control word: an acceleration follows."""
+_ANY_BOOT_MS = 260.0
+"""More than that of P03, which presupposes P24."""
 
 
 @CHAPTER.rule(
@@ -21,6 +28,7 @@ CHAPTER = Chapter("Velocities")
     "In a network of 3, each robot MUST take the velocities of its own slot.",
     FRAME,
     airs=(Air(3, (0, 1, 2)),),
+    presupposes=("P19",),
 )
 def own_slot_of_three(talk: Talk) -> None:
     for _ in range(4):
@@ -32,6 +40,7 @@ def own_slot_of_three(talk: Talk) -> None:
     "In a network of 5, each robot MUST take the velocities of its own slot.",
     FRAME,
     airs=(Air(5, (0, 1, 2, 3, 4)),),
+    presupposes=("P19",),
 )
 def own_slot_of_five(talk: Talk) -> None:
     for _ in range(4):
@@ -42,10 +51,16 @@ def own_slot_of_five(talk: Talk) -> None:
     "P24",
     f"On a fresh frame of type 0 or 3 both LM629 MUST be told the velocities within {ACTING_MS:g} ms of its end.",
     FRAME,
+    broken="a plain team frame is not obeyed",
+    probe=why_deaf,
 )
 def both_types(talk: Talk) -> None:
+    talk.wait(_ANY_BOOT_MS)
+    after = ""
     for ask in (False, True, True, False):
-        talk.obeyed(talk.team(ask=ask))
+        what = "question" if ask else "team frame"
+        talk.obeyed(talk.team(ask=ask, what=what + after))
+        after = f" after a {what}"
 
 
 @CHAPTER.rule(
@@ -53,6 +68,7 @@ def both_types(talk: Talk) -> None:
     "Velocities MUST be taken as they are: 16 bits, low byte first, two's complement, left before right, 1/256 count"
     " per sample, none rounded.",
     FRAME,
+    presupposes=("P19",),
 )
 def words(talk: Talk) -> None:
     pairs = [
@@ -74,6 +90,7 @@ def words(talk: Talk) -> None:
     "P26",
     f"Velocities beyond +-{VELOCITY_SATURATION} MUST be cut off there, and those within MUST not.",
     FRAME,
+    presupposes=("P19",),
 )
 def saturation(talk: Talk) -> None:
     limit = VELOCITY_SATURATION
@@ -102,6 +119,7 @@ def _only(talk: Talk, left: int, right: int, **how: Unpack[How]) -> Frame:
     "P27",
     "Both wheels MUST get their velocities in one LM629 sample, and likewise stop and go off.",
     FIRMWARE,
+    presupposes=("P32",),
 )
 def one_sample(talk: Talk) -> None:
     frames = [talk.team(gap_ms=12.0 + 0.11 * count) for count in range(12)]
@@ -131,6 +149,8 @@ def _together(talk: Talk, after_tick: int, until_tick: int, what: str) -> None:
     "P28",
     "Between frames the wheels MUST keep their velocities.",
     TURNS,
+    presupposes=("P19",),
+    broken="velocities are not kept between frames",
 )
 def kept(talk: Talk) -> None:
     for sign in (1, -1, 1):
@@ -138,6 +158,19 @@ def kept(talk: Talk) -> None:
         talk.obeyed(frame)
         talk.unchanged(frame.end_tick + ACTING_TICKS, talk.now, f"velocities kept behind {frame.what}")
         _reached(talk, frame)
+
+
+def _why_not_reached(seen: Seen, tick: int) -> str:
+    told = seen.both_told(tick)
+    if not all(order.moves for order in told):
+        return ""
+    if not all(order.acceleration for order in told):
+        return ": an acceleration of 0 is loaded"
+    begun = next(order.tick for order in seen.ordered(0, tick) if order.moves)
+    for one in seen.wrote(begun, tick):
+        if one.opcode == _LTRJ and one.data[1] & _ACCELERATION:
+            return f": at tick {one.tick} an acceleration was loaded in motion, {one.side} LTRJ {one.data.hex(' ')}"
+    return ""
 
 
 def _reached(talk: Talk, frame: Frame) -> None:
@@ -149,7 +182,7 @@ def _reached(talk: Talk, frame: Frame) -> None:
         for tick, record in seen.periods:
             found = (record.left.desired_velocity / 256, record.right.desired_velocity / 256)
             if after_tick <= tick <= until_tick and found != wanted:
-                return tick, f"{found[0]:g}, {found[1]:g}"
+                return tick, f"{found[0]:g}, {found[1]:g}{_why_not_reached(seen, tick)}"
         return None
 
     assert until_tick - after_tick > CONTROL_PERIOD_TICKS

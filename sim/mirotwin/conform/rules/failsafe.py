@@ -14,9 +14,10 @@ from miro_protocol.table import (
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.signals import MOTOR_OFF
 from miro_sim.world.events import SIDES
+from mirotwin.conform.hints import in_words
 from mirotwin.conform.rule import Chapter
 from mirotwin.conform.rules import FRESHNESS, WHEELS
-from mirotwin.conform.seen import Seen, in_words
+from mirotwin.conform.seen import Seen
 from mirotwin.conform.talk import ACTING_TICKS, Found, Frame, Talk, ms
 
 CHAPTER = Chapter("Failsafe")
@@ -32,13 +33,35 @@ _COUNTED = (
     "P29",
     f"110 ms after the last fresh frame both wheels MUST be told to stop. {_COUNTED}.",
     FRESHNESS,
+    presupposes=("P28",),
+    broken="the wheels are not told to stop 110 ms after the last frame",
 )
 def stop(talk: Talk) -> None:
-    for make in (talk.team, talk.team, talk.ask_nobody, talk.ping, talk.of_type_2):
+    for make in (talk.team, talk.team, talk.ask_nobody):
         talk.obeyed(talk.team())
         talk.wait(3.3)
         stops_behind(talk, make())
         talk.wait(130.0)
+
+
+@CHAPTER.rule(
+    "P30",
+    "Frames that are not fresh, or not valid, and characters that are no frame MUST NOT put off the failsafe.",
+    FRESHNESS,
+    presupposes=("P06", "P13", "P20", "P32", "P37"),
+    broken="the failsafe is put off",
+)
+def not_put_off(talk: Talk) -> None:
+    last = talk.team()
+    talk.obeyed(last)
+    for count in range(16):
+        talk.team(step=0, fresh=False, lead=b"", gap_ms=0.0)
+        talk.team(fresh=False, lead=b"", gap_ms=0.0, wrong={4: 1})
+        if count == 0:  # 150 ms later it would be fresh
+            talk.team(step=40, fresh=False, lead=b"", gap_ms=0.0)
+    stops_behind(talk, last)
+    off_behind(talk, last)
+    talk.wait_until(max(talk.now, last.end_tick + ms(530.0)))
     talk.obeyed(talk.team())
     talk.wait(3.3)
     last = talk.team(gap_ms=0.0)
@@ -65,29 +88,12 @@ def _stop_of_a_busy_robot(talk: Talk) -> None:
 
 
 @CHAPTER.rule(
-    "P30",
-    "Frames that are not fresh, or not valid, MUST NOT put off the failsafe.",
-    FRESHNESS,
-)
-def not_put_off(talk: Talk) -> None:
-    last = talk.team()
-    talk.obeyed(last)
-    for count in range(16):
-        talk.team(step=0, fresh=False, lead=b"", gap_ms=0.0)
-        talk.team(fresh=False, lead=b"", gap_ms=0.0, wrong={4: 1})
-        if count == 0:  # 150 ms later it would be fresh
-            talk.team(step=40, fresh=False, lead=b"", gap_ms=0.0)
-    stops_behind(talk, last)
-    off_behind(talk, last)
-    talk.wait_until(max(talk.now, last.end_tick + ms(530.0)))
-    talk.obeyed(talk.team())
-
-
-@CHAPTER.rule(
     "P31",
     "The failsafe's stop MUST be smooth, with the acceleration in force: 5973 (6 m/s2) until a service frame sets"
     " another.",
     FRESHNESS,
+    presupposes=("P29", "P36"),
+    broken="the failsafe's stop is not as it has to be",
 )
 def smooth(talk: Talk) -> None:
     for acceleration in (DEFAULT_ACCELERATION, 3000):
@@ -146,12 +152,14 @@ def _stays_closed(talk: Talk, last: Frame, until_tick: int) -> None:
     "P32",
     f"500 ms after the last fresh frame both motors MUST be off. {_COUNTED}.",
     FRESHNESS,
+    presupposes=("P31", "P34"),
+    broken="the motors are not off 500 ms after the last frame",
 )
 def off(talk: Talk) -> None:
     talk.obeyed(talk.team())
     last = talk.ping()
     off_behind(talk, last)
-    talk.wait_until(last.end_tick + ms(540.0))
+    talk.wait_until(last.end_tick + ms(700.0))
 
     def driven(seen: Seen) -> Found:
         for tick, side, chip in seen.chips(last.end_tick + ms(501.0), talk_end):
@@ -167,6 +175,7 @@ def off(talk: Talk) -> None:
     "P33",
     "After a failsafe stop and after motors off the next fresh team frame MUST be obeyed, with both motors on.",
     WHEELS,
+    presupposes=("P28",),
 )
 def back(talk: Talk) -> None:
     for silence_ms in (150.0, 600.0, 900.0, 120.0):
@@ -188,9 +197,10 @@ def _turning(talk: Talk, frame: Frame) -> None:
         for side, moved, word in zip(SIDES, (left, right), frame.for_robot(seen.slot), strict=True):
             nominal = word * CONTROL_PERIOD_TICKS / SAMPLE_TICKS / 256
             if abs(moved - nominal) > abs(nominal) / 2:
+                why = "" if seen.set_to(side, until) else ": no filter was loaded into its LM629 (LFIL, UDF)"
                 return (
                     until,
-                    f"{moved} counts of the {side} one in a camera frame and not about {nominal:.0f}",
+                    f"{moved} counts of the {side} one in a camera frame and not about {nominal:.0f}{why}",
                 )
         return None
 
@@ -219,9 +229,22 @@ def _in_time(talk: Talk, last: Frame, after_ticks: int, what: str, wanted: str) 
         for side in SIDES:
             if done(seen, side, earliest):
                 early = seen.told(side, earliest).tick
+                if early <= last.tick:
+                    return (
+                        latest,
+                        f"the {side} one told {in_words(seen.told(side, earliest))} before it already",
+                    )
                 return early, f"the {side} one {in_ms(early - last.end_tick)} after its end"
-        late = [side for side in SIDES if not done(seen, side, latest)]
-        return (latest, f"not so by then: {' and '.join(late)}") if late else None
+        if all(done(seen, side, latest) for side in SIDES):
+            return None
+        return latest, ", ".join(when(seen, side) for side in SIDES)
+
+    def when(seen: Seen, side: str) -> str:
+        after = [order.tick for order in seen.orders[side] if order.tick > last.end_tick]
+        tick = next((one for one in after if done(seen, side, one)), None)
+        if tick is None:
+            return f"{side} not within {in_ms(seen.end_tick - last.end_tick)}"
+        return f"{side} at {in_ms(tick - last.end_tick)}"
 
     window = f"{in_ms(earliest - last.end_tick)} to {in_ms(latest - last.end_tick)}"
     talk.expect(latest, f"{wanted} {window} after the end of {last.what}", test)

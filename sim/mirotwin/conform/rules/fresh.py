@@ -17,6 +17,8 @@ NEAR_MS = 0.3
     "P16",
     f"A valid frame MUST be fresh if its seq is 1 to {FRESH_STEPS} steps (mod 64) past that of the last fresh one.",
     FRESHNESS,
+    presupposes=("P28",),
+    broken="a frame 1 to 8 steps on is not obeyed",
 )
 def steps(talk: Talk) -> None:
     talk.seq = 30 + 20 * talk.network
@@ -30,6 +32,8 @@ def steps(talk: Talk) -> None:
     f"A valid frame with the same seq as the last fresh one, or {FRESH_STEPS + 1} to 63 steps past it within 150 ms,"
     " MUST NOT be acted on.",
     FRESHNESS,
+    presupposes=("P04", "P16"),
+    broken="a frame that is not fresh is acted on",
 )
 def stale(talk: Talk) -> None:
     every = range(FRESH_STEPS + 1, SEQ_MODULUS) if talk.n == 3 else (9, 10, 16, 24, 32, 40, 48, 56, 62, 63)
@@ -47,6 +51,7 @@ def stale(talk: Talk) -> None:
     f" it none but 1 to {FRESH_STEPS} steps on. Times run from last character to last character; within {NEAR_MS:g} ms"
     " of the limit either is right.",
     FRESHNESS,
+    presupposes=("P30",),
 )
 def again(talk: Talk) -> None:
     for step in (20, 63, 9):
@@ -71,6 +76,8 @@ def again(talk: Talk) -> None:
     "The first valid frame after power-on MUST be fresh, whatever its seq.",
     FRESHNESS,
     airs=(Air(3, (1,)), Air(5, (3,)), Air(3, (2,)), Air(3, (0,))),
+    presupposes=("P03",),
+    broken="the first frame is not obeyed, whatever its seq",
 )
 def first(talk: Talk) -> None:
     talk.seq = (0, 40, 63, 1)[talk.network]
@@ -82,6 +89,8 @@ def first(talk: Talk) -> None:
     "P20",
     "A host that repeats one frame MUST never become fresh again, not after 150 ms either.",
     FRESHNESS,
+    presupposes=("P17", "P29"),
+    broken="a repeated frame is acted on",
 )
 def repeated(talk: Talk) -> None:
     talk.obeyed(talk.team())
@@ -96,6 +105,8 @@ def repeated(talk: Talk) -> None:
     "One counter MUST serve all types: a frame with the seq of the last fresh one is not fresh, whatever the type of"
     " either.",
     FRESHNESS,
+    presupposes=("P17", "P34"),
+    broken="not one counter serves all types",
 )
 def one_counter(talk: Talk) -> None:
     talk.obeyed(talk.team())

@@ -29,15 +29,17 @@ def refused(talk: Talk, ways: Iterable[tuple[str, How]], in_a_row: int = 0) -> N
     Some follow each other without a pause, as many as are over before the failsafe comes.
     """
     in_a_row = in_a_row or (3 if talk.n == 3 else 2)
+    before = ""
     for count, (what, how) in enumerate(ways):
         if count % in_a_row == 0:
             if count:
                 talk.wait(ACTING_TICKS / 24_000 + 2.0)
-            talk.obeyed(talk.team(lead=b"\xff"))
+            talk.obeyed(talk.team(lead=b"\xff", what=f"team frame{before}"))
+        before = f" after a {what}"
         damaged: How = {"lead": b"", "fresh": False, "gap_ms": 0.0, **how}
         talk.ignored(talk.team(what=what, **damaged))
     talk.wait(ACTING_TICKS / 24_000 + 2.0)
-    talk.obeyed(talk.team(lead=b"\xff"))
+    talk.obeyed(talk.team(lead=b"\xff", what=f"team frame{before}"))
 
 
 @CHAPTER.rule(
@@ -45,6 +47,8 @@ def refused(talk: Talk, ways: Iterable[tuple[str, How]], in_a_row: int = 0) -> N
     "A frame MUST be found by its sync: without preamble, and whatever characters, bad stop bits or pauses come before"
     " the sync.",
     RECEPTION,
+    presupposes=("P28",),
+    broken="a frame is not found by its sync alone",
 )
 def preamble(talk: Talk) -> None:
     ways: tuple[tuple[str, How], ...] = (
@@ -61,7 +65,12 @@ def preamble(talk: Talk) -> None:
         talk.obeyed(talk.team(what=f"team frame {what}", **how))
 
 
-@CHAPTER.rule("P05", "A frame with any wrong bit in its sync MUST be refused.", RECEPTION)
+@CHAPTER.rule(
+    "P05",
+    "A frame with any wrong bit in its sync MUST be refused.",
+    RECEPTION,
+    presupposes=("P04",),
+)
 def sync(talk: Talk) -> None:
     refused(
         talk,
@@ -77,13 +86,21 @@ def sync(talk: Talk) -> None:
     "P06",
     "The CRC MUST begin with the layout byte 10h | N: a frame of another layout is refused.",
     VERSIONS,
+    presupposes=("P07",),
+    broken="a frame of another layout is taken",
 )
 def layout(talk: Talk) -> None:
     others = (LAYOUT_TEAM | (8 - talk.n), TELEMETRY.layout, 0x20 | talk.n, LAYOUT_TEAM, 0x00, 0xFF)
     refused(talk, ((f"frame of layout {byte:02X}h", How(layout=byte)) for byte in others))
 
 
-@CHAPTER.rule("P07", "All 16 bits of the CRC MUST count: a frame with a wrong CRC is refused.", RECEPTION)
+@CHAPTER.rule(
+    "P07",
+    "All 16 bits of the CRC MUST count: a frame with a wrong CRC is refused.",
+    RECEPTION,
+    presupposes=("P04",),
+    broken="a wrong CRC is not handled as it has to be",
+)
 def crc(talk: Talk) -> None:
     low = talk.form.size - 2
     refused(
@@ -103,7 +120,12 @@ def leaving(register: int) -> int:
     return register
 
 
-@CHAPTER.rule("P08", "Frames with 1 to 4 wrong bits in HDR..CRC MUST be refused.", WHY)
+@CHAPTER.rule(
+    "P08",
+    "Frames with 1 to 4 wrong bits in HDR..CRC MUST be refused.",
+    WHY,
+    presupposes=("P07",),
+)
 def wrong_bits(talk: Talk) -> None:
     refused(talk, _wrong_bits(talk))
 
@@ -131,7 +153,13 @@ def _wrong_bits(talk: Talk) -> Iterator[tuple[str, How]]:
             )
 
 
-@CHAPTER.rule("P09", "A frame with a bad stop bit in any of its F characters MUST be refused.", RECEPTION)
+@CHAPTER.rule(
+    "P09",
+    "A frame with a bad stop bit in any of its F characters MUST be refused.",
+    RECEPTION,
+    presupposes=("P04",),
+    broken="a bad stop bit is not handled as it has to be",
+)
 def stop_bits(talk: Talk) -> None:
     refused(
         talk,
@@ -143,6 +171,8 @@ def stop_bits(talk: Talk) -> None:
     "P10",
     f"A frame with a pause of {LONGEST_US:g} us or more between any two of its F characters MUST be refused.",
     RECEPTION,
+    presupposes=("P04",),
+    broken="a pause within a frame is not handled as it has to be",
 )
 def long_pauses(talk: Talk) -> None:
     short = [(at, LONGEST_US) for at in range(1, talk.form.size)]
@@ -159,11 +189,13 @@ def long_pauses(talk: Talk) -> None:
     " serial port is 2.5 % too fast or 1.5 % too slow: the spacings are within 1040 +- 50 us.",
     RECEPTION,
     airs=(*BOTH, Air(3, (0,), baud_offset_ppm=25_000), Air(5, (4,), baud_offset_ppm=-15_000)),
+    presupposes=("P04",),
 )
 def short_pauses(talk: Talk) -> None:
+    offset = talk.air.baud_offset_ppm
     for _ in range(3):
-        talk.obeyed(talk.team())
-    if not talk.air.baud_offset_ppm:
+        talk.obeyed(talk.team(what=f"team frame of a host {offset / 10_000:+g} %" if offset else ""))
+    if not offset:
         places = range(1, talk.form.size)
         everywhere = dict.fromkeys(places, SHORTEST_US)
         talk.obeyed(
@@ -178,6 +210,7 @@ def short_pauses(talk: Talk) -> None:
     "P12",
     "A valid frame MUST empty the window: none of its characters is part of another frame.",
     RECEPTION,
+    presupposes=("P14", "P16"),
 )
 def emptied(talk: Talk) -> None:
     for spoilt in (False, True):
@@ -234,6 +267,8 @@ def _payload(words: Iterable[tuple[int, int]]) -> bytes:
     "P13",
     "The first undamaged frame MUST be taken, whatever garbage came right before it.",
     RECEPTION,
+    presupposes=("P09", "P10", "P14"),
+    broken="a frame right behind garbage is lost",
 )
 def garbage(talk: Talk) -> None:
     noise = bytes(int(_CHANCE.uniform(9000 + at) * 256) for at in range(300))
@@ -271,6 +306,8 @@ def garbage(talk: Talk) -> None:
     "P14",
     "A window with a wrong CRC MUST cost no frame: a sync in front of a frame is no reason to lose it.",
     RECEPTION,
+    presupposes=("P07",),
+    broken="a frame behind a false sync is lost",
 )
 def false_syncs(talk: Talk) -> None:
     for length in range(2, talk.form.size, 3):
@@ -283,6 +320,7 @@ def false_syncs(talk: Talk) -> None:
     "Between keyed frames, RXD shows slicer noise: the first frame with its preamble MUST be taken all the same.",
     FRAME,
     airs=(Air(3, (1,), keyed=True), Air(5, (3,), keyed=True)),
+    presupposes=("P13",),
 )
 def slicer_noise(talk: Talk) -> None:
     for count in range(8):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from miro_protocol.table import DEFAULT_ACCELERATION, Opcode
 from miro_sim.world.events import SIDES
+from mirotwin.conform.hints import number
 from mirotwin.conform.rule import Air, Chapter
 from mirotwin.conform.rules import FIRMWARE, FRAME, RECEPTION, VERSIONS
 from mirotwin.conform.rules.failsafe import stops_behind
@@ -26,13 +27,15 @@ def _acceleration(value: int) -> bytes:
     "P34",
     "A service frame MUST count as fresh and leave the velocities as they are: a ping does nothing else.",
     FRAME,
+    presupposes=("P29",),
+    broken="a ping does not do what it has to",
 )
 def ping(talk: Talk) -> None:
     frame = talk.team()
     talk.obeyed(frame)
     for _ in range(5):
         last = talk.ping(gap_ms=60.0)
-        talk.untouched(last)
+        talk.untouched(last, since=frame)
     talk.unchanged(frame.end_tick + ACTING_TICKS, talk.now, "velocities kept while service frames come")
     stops_behind(talk, last)
     talk.wait(70.0)
@@ -42,6 +45,8 @@ def ping(talk: Talk) -> None:
     "P35",
     "Opcode 1 MUST load kp, ki, kd and il into both LM629 and put them in force, at rest and in motion.",
     FRAME,
+    presupposes=("P21",),
+    broken="filter words are not loaded as they have to be",
 )
 def filter_words(talk: Talk) -> None:
     slot = talk.air.slots[0]
@@ -69,7 +74,7 @@ def _filter_taken(talk: Talk, frame: Frame, words: Words) -> None:
 
 
 def _listed(words: Words | None) -> str:
-    return "none" if words is None else ", ".join(map(str, words))
+    return "none" if words is None else ", ".join(map(number, words))
 
 
 @CHAPTER.rule(
@@ -77,6 +82,8 @@ def _listed(words: Words | None) -> str:
     "Opcode 2 MUST set the acceleration of both wheels, all 32 bits of it; at rest it is in force from the next"
     " velocities on.",
     FRAME,
+    presupposes=("P21",),
+    broken="an acceleration is not set as it has to be",
 )
 def acceleration(talk: Talk) -> None:
     for value in (0x0102_0304, 0x3FFF_FFFF, 0x0001_2345, 4000):
@@ -90,6 +97,8 @@ def acceleration(talk: Talk) -> None:
     "P37",
     "An acceleration that comes in motion MUST wait until the wheels stand: velocities go on with the one before.",
     FIRMWARE,
+    presupposes=("P31", "P41"),
+    broken="an acceleration in motion does not wait",
 )
 def acceleration_waits(talk: Talk) -> None:
     slot = talk.air.slots[0]
@@ -130,10 +139,10 @@ def _driven_with(talk: Talk, frame: Frame, value: int) -> None:
     def test(seen: Seen) -> Found:
         for order in seen.both_told(deadline):
             if order.acceleration != value:
-                return deadline, f"{order.acceleration} in the {order.side} one"
+                return deadline, f"{number(order.acceleration, 8)} in the {order.side} one"
         return None
 
-    talk.expect(deadline, f"acceleration {value} in force with {frame.what}", test)
+    talk.expect(deadline, f"acceleration {number(value, 8)} in force with {frame.what}", test)
 
 
 @CHAPTER.rule(
@@ -141,6 +150,7 @@ def _driven_with(talk: Talk, frame: Frame, value: int) -> None:
     "A setting MUST be made by the addressed robot alone.",
     FRAME,
     airs=(Air(3, (0, 1, 2)), Air(5, (0, 4))),
+    presupposes=("P35", "P36"),
 )
 def addressed(talk: Talk) -> None:
     words = (300, 30, 2500, 1500)
@@ -174,6 +184,7 @@ def _only_of(talk: Talk, frame: Frame, slot: int, words: Words) -> None:
     "P39",
     "A service frame with an unknown opcode MUST be valid and count as fresh, and nothing in it be acted on.",
     VERSIONS,
+    presupposes=("P31",),
 )
 def unknown_opcode(talk: Talk) -> None:
     slot = talk.air.slots[0]
@@ -185,7 +196,7 @@ def unknown_opcode(talk: Talk) -> None:
     talk.obeyed(frame)
     for opcode in (3, 4, 0x7F, 0x81, 0xFF):
         last = talk.service(slot, opcode, bytes(range(1, 9)), f"service frame, opcode {opcode}", gap_ms=50.0)
-        talk.untouched(last)
+        talk.untouched(last, since=frame)
     talk.unchanged(frame.end_tick + ACTING_TICKS, talk.now, "velocities kept")
     stops_behind(talk, last)
     talk.wait(150.0)
@@ -196,13 +207,15 @@ def unknown_opcode(talk: Talk) -> None:
     "P40",
     "A frame of type 2 from a host MUST be valid and count as fresh, and nothing in it be acted on or answered.",
     RECEPTION,
+    presupposes=("P29",),
+    broken="a frame of type 2 is not handled as it has to be",
 )
 def type_2(talk: Talk) -> None:
     frame = talk.team()
     talk.obeyed(frame)
     for _ in range(3 * talk.n):  # each number asks another robot
         last = talk.of_type_2(gap_ms=40.0)
-        talk.untouched(last)
+        talk.untouched(last, since=frame)
     talk.silent(frame.end_tick + ms(25.0), talk.now, "frames of type 2 ask nobody")
     stops_behind(talk, last)
     talk.wait(80.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from miro_protocol.table import SYNC, Opcode
-from miro_robot.faults import FaultKind
+from miro_robot.faults import STACK_FAULTS, FaultKind
 from miro_robot.lm629.signals import COMMAND_ERROR
 from mirotwin.conform.rule import Chapter
 from mirotwin.conform.rules import FAULTS, POWER_ON
@@ -33,6 +33,8 @@ def nothing_refused(talk: Talk) -> None:
     " and no command that they refuse.",
     FAULTS,
     faults=(FaultKind.BUS_CONTENTION, FaultKind.LM629_BUSY, FaultKind.LM629_TIMING),
+    presupposes=("P52",),
+    broken="LM629s are not used as their data sheet says",
 )
 def lm629(talk: Talk) -> None:
     load(talk)
@@ -44,6 +46,8 @@ def lm629(talk: Talk) -> None:
     "Interrupts MUST leave the main loop time: never all of 10 ms, whatever comes over the air.",
     FAULTS,
     faults=(FaultKind.MAIN_LOOP_STARVED,),
+    presupposes=("P13", "P16", "P36"),
+    broken="interrupts leave the main loop no time, or frames are lost under load",
 )
 def main_loop(talk: Talk) -> None:
     load(talk)
@@ -51,9 +55,11 @@ def main_loop(talk: Talk) -> None:
 
 @CHAPTER.rule(
     "P53",
-    "The stack MUST stay within internal RAM.",
+    "The stack MUST stay clear of data and within internal RAM.",
     FAULTS,
-    faults=(FaultKind.STACK_OVERFLOW, FaultKind.STACK_UNDERFLOW),
+    faults=STACK_FAULTS,
+    presupposes=("P52",),
+    broken="the stack runs into data, or leaves internal RAM",
 )
 def stack(talk: Talk) -> None:
     load(talk)
@@ -64,6 +70,8 @@ def stack(talk: Talk) -> None:
     "The processor MUST execute defined instructions of its own image alone.",
     FAULTS,
     faults=(FaultKind.UNDEFINED_OPCODE, FaultKind.OUTSIDE_IMAGE),
+    presupposes=("P52",),
+    broken="it executes what is no code of its own",
 )
 def own_code(talk: Talk) -> None:
     load(talk)
@@ -74,6 +82,8 @@ def own_code(talk: Talk) -> None:
     f"A reset of the processor MUST do no harm, whenever it comes: {BOOTED_MS:g} ms after it both motors are off, and"
     " the first frame is taken as after power-on.",
     POWER_ON,
+    presupposes=("P01", "P41"),
+    broken="a reset of the processor does harm",
 )
 def reset_pin(talk: Talk) -> None:
     slot = talk.air.slots[0]
@@ -98,6 +108,7 @@ def reset_pin(talk: Talk) -> None:
     "P56",
     "A robot that is switched off and on MUST begin as from power-on, wherever it was.",
     POWER_ON,
+    presupposes=("P55",),
 )
 def supply(talk: Talk) -> None:
     slot = talk.air.slots[0]

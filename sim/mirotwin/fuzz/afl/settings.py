@@ -13,6 +13,7 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from mirotwin.files.children import python_module
 
 PROGRAM = "afl-fuzz"
 LONGEST_BYTES = 1024
@@ -82,7 +83,7 @@ class Call(msgspec.Struct, frozen=True):
         beside = str(self.out / name)
         if "@@" in beside:
             raise BadInput(self.out, "", "afl-fuzz puts the name of a file for @@", "choose another folder")
-        server = [sys.executable, "-m", "mirotwin.fuzz.afl.serve", *self.target, beside]
+        server = python_module("mirotwin.fuzz.afl.serve", *self.target, beside)
         return [shutil.which(PROGRAM) or PROGRAM, *options, "--", *server]
 
 

@@ -24,7 +24,7 @@ def test_one_job_is_not_distributed_and_several_are() -> None:
     assert main[main.index("-M") + 1] == "main"
     assert other[other.index("-S") + 1] == "job1"
     assert [line[line.index("-s") + 1] for line in (main, other)] == ["7", "8"]
-    server = [sys.executable, "-m", "mirotwin.fuzz.afl.serve", "{}"]
+    server = [sys.executable, "-P", "-m", "mirotwin.fuzz.afl.serve", "{}"]
     assert alone[alone.index("--") + 1 :] == [*server, "out/default"]
     assert alone[alone.index("-x") + 1] == "words"
     assert alone[alone.index("-V") + 1] == "60"

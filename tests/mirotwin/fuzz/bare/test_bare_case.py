@@ -88,6 +88,20 @@ def test_a_case_of_a_check_needs_that_check(tmp_path):
         replay_bare(path, image(SLEEPS), f"{file}:short")
 
 
+def test_a_case_runs_no_program_that_it_names(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "evil.py").write_text("open('was_run', 'w')\ndef f(run):\n    return None\n")
+    path = case(tmp_path, b"abc", check=CHECK)
+    honest = path.read_text()
+    for name in ("evil.py:f", f"{tmp_path}/evil.py:f", "./evil.py:f", "evil:f", "evil"):
+        path.write_text(honest.replace("too_long = true", f'"{name}" = true'))
+        with pytest.raises(BadInput, match="which is not installed"):
+            replay_bare(path, image(SLEEPS))
+        with pytest.raises(BadInput, match="and --check gives 'f'"):
+            replay_bare(path, image(SLEEPS), f"{tmp_path}/evil.py:f")
+        assert not (tmp_path / "was_run").exists()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -79,6 +79,8 @@ def test_a_check_looks_at_what_is_new_or_at_everything(mirotwin, engines, hexes,
     folder = str(case.parent)
     code, out, _ = mirotwin("fuzz", hexes["polls"], "--regress", folder, "--check", check)
     assert (code, "FAILED" in out) == (1, True)
+    code, _, err = mirotwin("replay", str(case), "--firmware", hexes["polls"], "--check", check)
+    assert (code, err.startswith("mirotwin: fails as recorded: never_q")) == (1, True)
     code, _, err = mirotwin("replay", str(case), "--firmware", hexes["polls"])
     assert code == 2
     assert "names the check 'never_q', which is not installed; give it: --check FILE.py:never_q" in err

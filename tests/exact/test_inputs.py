@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from miro_sim.inputs import InputError, check_regular, read_input
+from miro_exact.inputs import InputError, check_regular, read_input
 
 
 def test_a_file_up_to_the_limit_is_read(tmp_path: Path) -> None:

@@ -1,0 +1,90 @@
+"""Reads an input file whole; refuses devices, pipes that may never end, and files larger than any valid one.
+
+What belongs here: the checks before and while a file is read, and how large each kind of file may be. What does not:
+what is in it. Every file that a stranger may have made is read through here.
+"""
+
+import os
+import stat
+
+from miro_exact.bad_input import BadInput
+
+TEXT_BYTES = 64 << 20
+"""For what is written by hand or by a tool chain: scenarios, symbol files, listings, streams, serial input."""
+IMAGE_BYTES = 4 << 20
+"""Intel HEX: 64 KB of code with one byte a record is 1 MB."""
+BOARD_BYTES = EYE_BYTES = 1 << 20
+PICTURE_BYTES = 4 << 20
+"""320 x 240 pixels of 48 bits are 0.5 MB."""
+WORLD_BYTES = 64 << 20
+RECORDING_BYTES = 1 << 30
+CHUNK_BYTES = 1 << 20
+_OF_PROCESSES = ("/dev/", "/proc/self/fd/")
+"""Where a shell puts the pipe of `<(command)`."""
+
+
+class InputError(BadInput):
+    """A file that is not read: `path`, what, remedy."""
+
+    def __init__(self, path: str, what: str, remedy: str) -> None:
+        super().__init__(path, "", what, remedy)
+
+
+def check_no_folder(path: str | os.PathLike[str], likely: str = "") -> None:
+    """Refuses a folder; if it has a file called `likely`, that is what was probably meant."""
+    if os.path.isdir(path):
+        meant = os.path.join(path, likely)
+        hint = f", such as {meant}" if os.path.isfile(meant) else ""
+        raise InputError(str(path), "is a folder", f"name a file in it{hint}")
+
+
+def check_regular(path: str | os.PathLike[str]) -> None:
+    """Refuses what is there and is no regular file: what is read twice cannot come through a pipe."""
+    check_no_folder(path)
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise InputError(str(path), "is not a regular file", "copy the content to a file first")
+
+
+def read_input(
+    path: str | os.PathLike[str], limit: int = TEXT_BYTES, prefix: bytes = b"", prefix_limit: int = 0
+) -> bytes:
+    """The content of a file or pipe of at most `limit` bytes, or `prefix_limit` if it begins with `prefix`.
+
+    Raises InputError for folders, devices (but the null device, which is empty), pipes with a name of their own and
+    longer ones, OSError as `open` does.
+    """
+    check_no_folder(path)
+    _check_ends(path)
+    with open(path, "rb") as file:
+        state = os.fstat(file.fileno())
+        data = bytearray(file.read(min(CHUNK_BYTES, limit + 1)))
+        if prefix and data.startswith(prefix):
+            limit = prefix_limit
+        if stat.S_ISREG(state.st_mode) and state.st_size > limit:
+            raise _too_long(path, limit)
+        while len(data) <= limit and (more := file.read(CHUNK_BYTES)):
+            data += more
+    if len(data) > limit:
+        raise _too_long(path, limit)
+    return bytes(data)
+
+
+def _check_ends(path: str | os.PathLike[str]) -> None:
+    """Refuses what reading may never come to the end of, before it is opened: opening a pipe waits for its writer."""
+    try:
+        mode = os.stat(path).st_mode
+    except OSError:
+        return  # `open` says what is wrong
+    if (stat.S_ISCHR(mode) or stat.S_ISBLK(mode)) and not _is_null(path):
+        raise InputError(str(path), "is a device", "name a file or a pipe")
+    if stat.S_ISFIFO(mode) and not os.fspath(path).startswith(_OF_PROCESSES):
+        raise InputError(str(path), "is a named pipe, which may never end", "give a file, or <(COMMAND)")
+
+
+def _too_long(path: str | os.PathLike[str], limit: int) -> InputError:
+    size = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
+    return InputError(str(path), f"holds more than {size}", "is this the right file?")
+
+
+def _is_null(path: str | os.PathLike[str]) -> bool:
+    return os.path.samefile(path, os.devnull)

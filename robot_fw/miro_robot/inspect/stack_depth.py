@@ -1,0 +1,164 @@
+"""How deep the stack of an image goes at least, read from its code alone.
+
+    reset ──► start-up ──► main ──► function ──► function        calls: 2 bytes each, PUSH, room for local variables
+    interrupt ──► routine ──► function                           comes on top of wherever the others are
+
+What belongs here: following the code. What does not: what a run really used (`activity`), and where the stack may be
+(`image.symbols`).
+
+Each instruction that can be reached has the height of the stack above its function's entry, the largest of all ways
+to it. What cannot be told from the code is named (`unknown`): jumps by a table, recursion, and SP set in a way that
+SDCC does not use. So the result is a lower bound.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from miro_robot.image import Image
+from miro_robot.mcs51.opcodes import LENGTH, goes_on, is_call, is_conditional, target
+
+_SP = 0x81
+_RETI, _JMP_TABLE, _SJMP = 0x32, 0x73, 0x80
+_PUSH, _POP, _INC, _DEC, _MOV_DATA, _MOV_DIRECT = 0xC0, 0xD0, 0x05, 0x15, 0x75, 0x85
+_FRAME = (0xE5, _SP, 0x24, -1, 0xF5, _SP)  # MOV A,SP; ADD A,#n; MOV SP,A
+_WRITES = {0x05, 0x15, 0x42, 0x43, 0x52, 0x53, 0x62, 0x63, 0x75, 0x85, 0xC5, 0xD0, 0xD5, 0xF5}
+_VECTORS = tuple(range(0x03, 0x2C, 8))
+_CALL_BYTES = 2
+
+
+class Depth(msgspec.Struct, frozen=True):
+    """Bytes above a function's entry, by the deepest way: addresses of the functions on it, and what is unknown."""
+
+    size: int
+    path: tuple[int, ...]
+    unknown: frozenset[str] = frozenset()
+
+
+class StackDepth(msgspec.Struct, frozen=True):
+    """`main`: from reset on; `interrupt`: the deepest routine, None where the image has none."""
+
+    main: Depth
+    interrupt: Depth | None
+
+    @property
+    def size(self) -> int:
+        """At least so many bytes, with the deepest interrupt at the deepest place."""
+        return self.main.size + (self.interrupt.size + _CALL_BYTES if self.interrupt else 0)
+
+    @property
+    def unknown(self) -> frozenset[str]:
+        return self.main.unknown | (self.interrupt.unknown if self.interrupt else frozenset())
+
+
+class _At(msgspec.Struct, frozen=True):
+    """`height` above the entry; `frame`: the height that the frame pointer holds, -1 for none."""
+
+    height: int
+    frame: int = -1
+
+
+class StackReader:
+    """Reads depths from the code of an image. `heights(entry)`: instruction -> bytes above the function's entry."""
+
+    def __init__(self, image: Image) -> None:
+        self.code = image.code
+        self.used = image.used
+        self._known: dict[int, Depth] = {}
+        self._under_way: list[int] = []
+
+    def all(self) -> StackDepth:
+        """Of the whole image."""
+        interrupts = [self.depth(at) for at in _VECTORS if self._loaded(at) and self._is_vector(at)]
+        deepest = max(interrupts, key=lambda one: one.size, default=None)
+        return StackDepth(self.depth(0), deepest)
+
+    def depth(self, entry: int) -> Depth:
+        """Of the function that begins there, with all that it calls."""
+        if entry in self._known:
+            return self._known[entry]
+        if entry in self._under_way:
+            return Depth(0, (entry,), frozenset(("recursion",)))
+        self._under_way.append(entry)
+        best, unknown = Depth(0, (entry,)), set[str]()
+        path: tuple[int, ...]
+        heights, odd = self._walk(entry)
+        unknown |= odd
+        for address, height in heights.items():
+            size, path = height, (entry,)
+            to = target(self.code, address)
+            if to is not None and is_call(self.code[address]):
+                callee = self.depth(to)
+                unknown |= callee.unknown
+                size, path = height + _CALL_BYTES + callee.size, (entry, *callee.path)
+            elif self.code[address] == _PUSH:
+                size += 1
+            if size > best.size:
+                best = Depth(size, path)
+        self._under_way.pop()
+        found = Depth(best.size, best.path, frozenset(unknown))
+        if "recursion" not in unknown or not self._under_way:
+            self._known[entry] = found
+        return found
+
+    def heights(self, entry: int) -> dict[int, int]:
+        """Bytes above the entry, return address not counted, before each instruction of that function."""
+        return self._walk(entry)[0]
+
+    def _walk(self, entry: int) -> tuple[dict[int, int], set[str]]:
+        reached: dict[int, _At] = {}
+        unknown: set[str] = set()
+        waiting = [(entry, _At(0))]
+        while waiting:
+            address, at = waiting.pop()
+            if not self._loaded(address) or (address in reached and reached[address].height >= at.height):
+                continue
+            reached[address] = at
+            size, after, odd = self._after(address, at)
+            unknown |= odd
+            opcode = self.code[address]
+            if goes_on(opcode):
+                waiting.append((address + size, after))
+            to = self._branch(address)
+            if to is not None:
+                waiting.append((to, after))
+            if opcode == _JMP_TABLE:
+                unknown.add("a jump by a table")
+        return {address: at.height for address, at in reached.items()}, unknown
+
+    def _after(self, address: int, at: _At) -> tuple[int, _At, set[str]]:
+        """Bytes of code taken, what holds behind them, and what could not be told."""
+        code = self.code[address : address + 6].ljust(6, b"\0")
+        opcode, size, height = code[0], LENGTH[code[0]], at.height
+        if all(want in (-1, byte) for want, byte in zip(_FRAME, code, strict=True)):
+            return 6, _At(height + (code[3] ^ 0x80) - 0x80, at.frame), set()
+        if opcode == _MOV_DIRECT and code[1] == _SP:  # 85 source destination: the frame pointer is SP
+            return size, _At(height, height), set()
+        if opcode == _PUSH:
+            return size, _At(height + 1, at.frame), set()
+        if opcode == _POP and code[1] != _SP:
+            return size, _At(height - 1, at.frame), set()
+        if not (opcode in _WRITES and _SP in code[1:size]):
+            return size, at, set()
+        if opcode == _MOV_DATA:
+            return size, _At(0), set()
+        if opcode in (_INC, _DEC):
+            return size, _At(height + (1 if opcode == _INC else -1), at.frame), set()
+        if opcode == _MOV_DIRECT and at.frame >= 0:
+            return size, _At(at.frame, at.frame), set()
+        return size, at, {"SP set by a value that is not known"}
+
+    def _branch(self, address: int) -> int | None:
+        """Where a jump goes; None for what is none, and for calls."""
+        opcode = self.code[address]
+        if opcode == _SJMP or is_conditional(opcode):
+            size = LENGTH[opcode]
+            return (address + size + (self.code[address + size - 1] ^ 0x80) - 0x80) & 0xFFFF
+        return None if is_call(opcode) else target(self.code, address)
+
+    def _is_vector(self, address: int) -> bool:
+        """Whether code begins there by itself: not what runs into it from the vector before."""
+        return self.code[address] in (0x02, 0x01, 0x21, 0x41, 0x61, 0x81, 0xA1, 0xC1, 0xE1, _RETI)
+
+    def _loaded(self, address: int) -> bool:
+        return any(first <= address < end for first, end in self.used)

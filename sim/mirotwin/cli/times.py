@@ -1,0 +1,90 @@
+"""Times on the command line: 2s, 20ms, 341us, 5min, or 48000t, which are ticks of the crystal.
+
+What belongs here: the one spelling of a time, for all commands. What does not: how late is too late for a command.
+"""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from typing import Any
+
+import click
+import msgspec
+
+from miro_exact.bad_input import shortened
+from miro_exact.clock import TICKS_PER_SECOND
+
+UNITS_S = {
+    "h": Fraction(3600),
+    "min": Fraction(60),
+    "s": Fraction(1),
+    "ms": Fraction(1, 1000),
+    "us": Fraction(1, 1_000_000),
+}
+TICKS = "t"
+SHAPE = re.compile(r"([0-9]{1,18}(?:\.[0-9]{0,18})?|\.[0-9]{1,18}) *([a-z]*)", re.ASCII | re.IGNORECASE)
+LONGEST_S = 10**9
+"""Longer than any run."""
+
+
+class Time(msgspec.Struct, frozen=True):
+    """Seconds, or ticks of the crystal; which crystal is known only when all options are."""
+
+    text: str
+    value: Fraction
+    in_ticks: bool
+
+    def ticks(self, crystal_hz: int = TICKS_PER_SECOND) -> int:
+        return int(self.value if self.in_ticks else self.value * crystal_hz)
+
+    def seconds(self, crystal_hz: int = TICKS_PER_SECOND) -> float:
+        return float(self.value / crystal_hz if self.in_ticks else self.value)
+
+
+class TimeType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """A time with its unit, as a Time: at most `longest_s`, and more than zero where `positive`.
+
+    A time of the wall clock (`on_wall`) has no ticks.
+    """
+
+    name = "TIME"
+
+    def __init__(self, positive: bool = False, longest_s: float = LONGEST_S, on_wall: bool = False) -> None:
+        self.positive = positive
+        self.longest_s = longest_s
+        self.on_wall = on_wall
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Time:
+        if isinstance(value, Time):
+            return value
+        said = shortened(repr(value))
+        found = SHAPE.fullmatch(str(value).strip())
+        if found is None or not self._is_unit(found[1], found[2]):
+            self.fail(f"{said} is not a time; {self._remedy(found)}.", param, ctx)
+        time = Time(str(value).strip(), Fraction(found[1]) * UNITS_S.get(found[2], 1), found[2] == TICKS)
+        if self.positive and not time.value:
+            self.fail(f"{said} is no time at all; give more than zero.", param, ctx)
+        if time.seconds() > self.longest_s:
+            self.fail(f"{said} is too long; the longest is {self.longest_s:.0f}s.", param, ctx)
+        return time
+
+    def _is_unit(self, number: str, unit: str) -> bool:
+        return unit in UNITS_S or (unit == TICKS and not self.on_wall and "." not in number)
+
+    def _remedy(self, found: re.Match[str] | None) -> str:
+        if found is None or found[2]:
+            return "write 2s, 20ms, 341us or 5min" + ("" if self.on_wall else ", or 48000t for ticks")
+        number = found[1]
+        ticks = "" if self.on_wall else f", {number.partition('.')[0] or 0}t for ticks of the crystal"
+        return f"it has no unit: write {number}s for seconds{ticks}"
+
+
+class WallTime(TimeType):
+    """A time of the wall clock, in seconds."""
+
+    def __init__(self, longest_s: float) -> None:
+        super().__init__(positive=True, longest_s=longest_s, on_wall=True)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return value if isinstance(value, float) else super().convert(value, param, ctx).seconds()

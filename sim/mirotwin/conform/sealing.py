@@ -1,0 +1,145 @@
+"""Usual mistakes in CRC and whitening: how a frame looks to a robot that makes one of them.
+
+What belongs here: the table of mistakes, and frames sealed with one. What does not: trying them on a robot (`probe`)
+and the right way (`miro_protocol.frames`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product, zip_longest
+
+import msgspec
+
+from miro_protocol.crc import INITIAL, POLYNOMIAL, XOR_OUT
+from miro_protocol.table import LAYOUT_TEAM, SYNC, TELEMETRY, Format
+from miro_protocol.whitening import LENGTH, STRING
+
+
+class Sealing(msgspec.Struct, frozen=True, kw_only=True):
+    """A way to seal a frame. `layout`: None is the right byte, -1 leaves it out. `over_sent`: the CRC covers whitened
+    bytes. `plain_crc`: it is not whitened itself.
+    """
+
+    polynomial: int = POLYNOMIAL
+    start: int = INITIAL
+    end: int = XOR_OUT
+    reflected: bool = True
+    layout: int | None = None
+    high_first: bool = False
+    over_sent: bool = False
+    plain_crc: bool = False
+    string: bytes = STRING
+    sync: bytes = SYNC
+
+    def seal(self, form: Format, body: bytes) -> bytes:
+        """All characters of the frame around `body` (HDR and payload in clear)."""
+        sent = self._whitened(body, 0)
+        layout = form.layout if self.layout is None else self.layout
+        covered = (b"" if layout < 0 else bytes([layout])) + (sent if self.over_sent else body)
+        check = self._crc(covered).to_bytes(2, "big" if self.high_first else "little")
+        return form.lead + self.sync + sent + (check if self.plain_crc else self._whitened(check, len(body)))
+
+    def opened(self, form: Format, characters: bytes) -> bytes | None:
+        """HDR and payload in clear of the characters from the sync on; None where this way does not seal so."""
+        body = self._whitened(characters[len(form.sync) : -2], 0)
+        return body if self.seal(form, body) == form.lead + characters else None
+
+    def _whitened(self, data: bytes, place: int) -> bytes:
+        string = self.string[place : place + len(data)]
+        return bytes(one ^ other for one, other in zip_longest(data, string, fillvalue=0))
+
+    def _crc(self, data: bytes) -> int:
+        register = _turned(self.start, 16) if self.reflected else self.start
+        for byte in data:
+            register ^= (_turned(byte, 8) if self.reflected else byte) << 8
+            for _ in range(8):
+                register = register << 1 ^ (0x10000 | self.polynomial if register & 0x8000 else 0)
+        return (_turned(register, 16) if self.reflected else register) ^ self.end
+
+
+def _turned(value: int, bits: int) -> int:
+    """The last bit first."""
+    return int(f"{value:0{bits}b}"[::-1], 2)
+
+
+def _pn9(register: int = 0x1FF, tap: int = 5) -> bytes:
+    """As many bytes of a PN9 sequence as there are in the whitening string."""
+    out = bytearray()
+    for _ in range(LENGTH):
+        byte = 0
+        for bit in range(8):
+            byte |= (register & 1) << bit
+            register = register >> 1 | ((register ^ register >> tap) & 1) << 8
+        out.append(byte)
+    return bytes(out)
+
+
+def _checks() -> Iterator[tuple[str, Sealing]]:
+    """Every mixture of the usual mistakes in a CRC, those with one mistake first."""
+    polynomials = {POLYNOMIAL: "", _turned(POLYNOMIAL, 16): "polynomial AC9Ah and not 5935h turned over"}
+    polynomials |= {other: f"polynomial {other:04X}h" for other in (0x1021, 0x8005, 0x3D65)}
+    found = []
+    for polynomial, reflected, start, end, layout, high_first in product(
+        polynomials, (True, False), (INITIAL, 0), (XOR_OUT, 0), (None, -1), (False, True)
+    ):
+        mistakes = [
+            polynomials[polynomial],
+            "" if reflected else "the high bit first",
+            "" if start else "0000h and not FFFFh at the start",
+            "" if end else "no XOR with FFFFh at the end",
+            "" if layout is None else "no layout byte",
+            "high byte sent first" if high_first else "",
+        ]
+        named = [one for one in mistakes if one]
+        sealing = Sealing(
+            polynomial=polynomial,
+            start=start,
+            end=end,
+            reflected=reflected,
+            layout=layout,
+            high_first=high_first,
+        )
+        if named:
+            found.append((len(named), f"another CRC ({', '.join(named)})", sealing))
+    for _, what, sealing in sorted(found, key=lambda one: one[0]):
+        yield what, sealing
+
+
+MISTAKES = {
+    "no whitening": Sealing(string=b""),
+    "whitening that begins with the second byte of its string": Sealing(string=STRING[1:]),
+    "whitening that begins with the sync": Sealing(string=STRING[2:]),
+    "whitening with the high bit of each byte first": Sealing(
+        string=bytes(_turned(byte, 8) for byte in STRING)
+    ),
+    "whitening that repeats its first byte FFh": Sealing(string=STRING[:1] * LENGTH),
+    "whitening with x^9 + x^4 + 1": Sealing(string=_pn9(tap=4)),
+    **{
+        f"whitening that begins with register {seed:03X}h and not 1FFh": Sealing(string=_pn9(seed))
+        for seed in (0x001, 0x100, 0x0FF, 0x1FE, 0x055, 0x0AA, 0x155, 0x1AA)
+    },
+    **{
+        f"sync {sync.hex(' ').upper()}": Sealing(sync=sync)
+        for sync in (b"\xd4\x2d", b"\x2d\x2d", b"\xd4\xd4")
+    },
+    **{
+        f"a CRC that begins with layout byte {byte:02X}h": Sealing(layout=byte)
+        for byte in (TELEMETRY.layout, LAYOUT_TEAM, LAYOUT_TEAM | 3, LAYOUT_TEAM | 5, 3, 5)
+    },
+    "a CRC that covers the whitened bytes": Sealing(over_sent=True),
+    "a CRC that covers the whitened bytes and is not whitened": Sealing(over_sent=True, plain_crc=True),
+    "a CRC that is not whitened": Sealing(plain_crc=True),
+    **dict(_checks()),
+}
+"""By what such a frame has, in words that follow `a frame with ..`. Whitening first: a robot that takes a wrong HDR for
+good refuses the numbers that follow."""
+
+
+def mistake_in(form: Format, characters: bytes, begins: int) -> str:
+    """The mistake with which these characters, from the sync on, are a frame whose HDR is `begins`; or ""."""
+    for what, sealing in MISTAKES.items():
+        body = sealing.opened(form, characters)
+        if body is not None and body[0] == begins:
+            return what
+    return ""

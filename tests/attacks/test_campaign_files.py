@@ -1,0 +1,114 @@
+"""What a campaign finds beside its results: a stranger's journal, clocks that jump."""
+
+import os
+import random
+import sys
+import time
+
+import pytest
+from tests.attacks import times
+from tests.mirotwin.campaign.plans import InThisProcess, plan_of, rows
+
+from miro_exact.bad_input import BadInput
+from mirotwin import campaign
+from mirotwin.campaign import journal, wall
+from mirotwin.campaign.journal import journal_path
+
+pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    path = tmp_path_factory.mktemp("whole") / "short.parquet"
+    campaign.run(plan_of(), path, InThisProcess())
+    return path
+
+
+class Ends(InThisProcess):
+    """Breaks the campaign off after four runs."""
+
+    def __init__(self):
+        self.left = 4
+
+    def submit(self, function, /, *arguments, **named):
+        self.left -= 1
+        if self.left < 0:
+            raise KeyboardInterrupt
+        return super().submit(function, *arguments, **named)
+
+
+@pytest.fixture(scope="module")
+def unfinished(tmp_path_factory):
+    """The journal of a campaign that was broken off."""
+    path = tmp_path_factory.mktemp("unfinished") / "short.parquet"
+    with pytest.raises(KeyboardInterrupt):
+        campaign.run(plan_of(), path, Ends())
+    return journal_path(path).read_bytes()
+
+
+def changed(data, chance):
+    """The journal with a few bytes, lines or pieces of it changed."""
+    data = bytearray(data)
+    for _ in range(chance.randint(1, 4)):
+        at = chance.randrange(len(data) + 1)
+        kind = chance.randrange(5)
+        if kind == 0 and at < len(data):
+            data[at] ^= 1 << chance.randrange(8)
+        elif kind == 1:
+            del data[at : at + chance.randint(1, 200)]
+        elif kind == 2:
+            data[at:at] = chance.choice(
+                [b"\n", b"\xff", b"\0", b"9" * 400, b"[" * 9000, b"-", b'"', b"1e999"]
+            )
+        elif kind == 3:
+            lines = bytes(data).splitlines(keepends=True)
+            chance.shuffle(lines)
+            data = bytearray(b"".join(lines))
+        else:
+            data += data[at:]
+    return bytes(data)
+
+
+def test_a_journal_that_was_changed_is_refused_or_gives_results_of_these_runs(whole, unfinished, tmp_path):
+    chance, names = random.Random(3), set(rows(whole)[0])
+    for number in range(times(20)):
+        path = tmp_path / f"{number}.parquet"
+        journal_path(path).write_bytes(changed(unfinished, chance))
+        refusal = ""
+        try:
+            campaign.run(plan_of(), path, InThisProcess())
+        except BadInput as error:
+            refusal = str(error)
+        if refusal:
+            assert refusal.startswith(f"{journal_path(path)}")
+        else:
+            found = rows(path)
+            assert [row["seed"] for row in found] == [row["seed"] for row in rows(whole)]
+            assert set(found[0]) == names
+
+
+def test_a_line_without_end_in_a_journal_is_refused(unfinished, tmp_path):
+    path = tmp_path / "a.parquet"
+    journal_path(path).write_bytes(unfinished + b'{"run": ' + b"1" * (3 << 20))
+    with pytest.raises(BadInput, match="longer than any outcome"):
+        campaign.run(plan_of(), path, InThisProcess())
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no named pipes")
+def test_a_journal_that_is_a_named_pipe_is_refused(tmp_path):
+    path = tmp_path / "a.parquet"
+    os.mkfifo(journal_path(path))
+    with pytest.raises(BadInput, match=r"a\.part\.jsonl"):
+        campaign.run(plan_of(), path, InThisProcess())
+
+
+@pytest.mark.parametrize("jump_s", [-86_400.0, 86_400.0, 1e12])
+def test_a_wall_clock_that_jumps_changes_no_byte(whole, tmp_path, monkeypatch, jump_s):
+    began_s = time.monotonic()
+    calls = iter(range(1 << 30))
+    for module in (wall, journal, campaign.drive):
+        if hasattr(module, "now_s"):
+            monkeypatch.setattr(module, "now_s", lambda: began_s + next(calls) % 3 * jump_s)
+    path = tmp_path / "short.parquet"
+    campaign.run(plan_of(), path, InThisProcess())
+    assert path.read_bytes() == whole.read_bytes()

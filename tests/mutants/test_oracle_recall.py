@@ -1,0 +1,76 @@
+"""How many of the checks' failures the fuzzer's fast oracle sees: counted on some mistakes, and the table."""
+
+import pytest
+from benchmarks import oracle_recall
+from benchmarks.oracle_recall import BEGIN, END, PAGE, Row, judged, render, replaced, sessions, shipped
+from tests.mutants.build import build
+from tests.mutants.draw import source_files
+from tests.mutants.for_fuzzing import FOR_FUZZING
+from tests.mutants.planted import PLANTED
+from tests.mutants.sdcc import needs_sdcc
+
+from miro_robot.image import load_hex
+
+
+def test_the_sessions_are_the_same_every_time_and_all_differ() -> None:
+    assert sessions() == sessions()
+    assert len(set(sessions())) == len(sessions()) > 60
+
+
+def test_the_shipped_firmware_fails_neither_by_the_oracle_nor_by_the_checks() -> None:
+    assert judged("none", shipped().image, sessions()[::6]) == Row("none")
+
+
+@needs_sdcc
+@pytest.mark.parametrize("name", ["stops 15 ms late", "never answers"])
+def test_the_oracle_fails_the_sessions_that_the_checks_fail(name: str) -> None:
+    one = PLANTED[name]
+    image = load_hex(build({one.file: one.applied(source_files()[one.file])}).image)
+    row = judged(name, image, sessions()[:8])
+    assert row.found
+    assert (row.missed, row.extra) == (0, 0)
+
+
+@needs_sdcc
+def test_a_failure_that_the_oracle_does_not_see_is_counted_with_its_check(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Blind:
+        """A target whose oracle finds nothing."""
+
+        code = 0
+        finding = None
+
+        def __init__(self, *arguments: object) -> None:
+            self.seeing = oracle_recall.RobotTarget(*arguments)  # type: ignore[arg-type]
+
+        def run(self, data: bytes) -> int:
+            self.seeing.run(data)
+            return 0
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self.seeing, name)
+
+    one = PLANTED["never answers"]
+    image = load_hex(build({one.file: one.applied(source_files()[one.file])}).image)
+    shipped()
+    monkeypatch.setattr(oracle_recall, "target_for", Blind)
+    row = judged("never answers", image, sessions()[:4])
+    assert row.missed == row.checks["answers_within_ms"] > 0
+    assert (row.found, row.extra) == (0, 0)
+
+
+def test_the_table_gives_recall_over_all_sessions_and_what_was_missed() -> None:
+    text = render([Row("a", 3, 1, 2, {"no_fault": 1}), Row("b", refused="comes up with a fault"), Row("c")])
+    assert "fails 3 of the 4 sessions that the checks fail (75.0 %), and 2 that they do not" in text
+    assert "Of 1 mistakes that some session shows to the checks it finds 1. In 0" in text
+    assert "| a | 3 | 1 | 2 | `no_fault` 1 |" in text
+    assert "| b | not fuzzed | not fuzzed | not fuzzed |  |" in text
+
+
+def test_the_page_has_every_mistake_once() -> None:
+    page = PAGE.read_text("utf-8")
+    part = page.split(BEGIN)[1].split(END)[0]
+    assert replaced(page, part) == page
+    names = [line.split(" | ")[0].removeprefix("| ") for line in part.splitlines() if line.startswith("| ")]
+    assert names[2:] == ["none: the shipped firmware", *dict.fromkeys([*PLANTED, *FOR_FUZZING])]

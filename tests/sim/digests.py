@@ -1,0 +1,81 @@
+"""The runs whose bits are frozen: `python -m tests.sim.digests` says which differ, `--write` puts the new digests down.
+
+Every built-in scenario, every kind of camera and picture noise, every profile of the radio, both variants, every
+disturbance, and two teams: at full length with seed 7, beside a short run for engines and machines that are slow.
+
+What belongs here: which runs. What does not: making one (`digest_of`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from importlib import resources
+from pathlib import Path
+
+from benchmarks.disturbances import CASES
+from tests import children
+from tests.sim.digest_of import digest
+
+from miro_sim.scenario.file import load
+from miro_sim.scenario.profiles import profiles
+
+ROOT = Path(__file__).parents[2]
+GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
+SHORT = "fig6 0.5 s seed 7"
+TWO_TEAMS = "examples/two_teams.toml"
+CAMERAS = (
+    'camera={kind="gaussian"}',
+    'camera={kind="geometric",calibration="1997"}',
+    'camera={kind="geometric",calibration="none"}',
+    'camera={kind="pixels",calibration="none"}',
+)
+
+
+def names() -> Iterator[str]:
+    """Of all runs, the short one first."""
+    yield SHORT
+    builtin = resources.files("miro_sim.scenario") / "builtin"
+    for name in sorted(
+        one.name.removesuffix(".toml") for one in builtin.iterdir() if one.name.endswith(".toml")
+    ):
+        yield _name(name)
+    yield _name(TWO_TEAMS)
+    for camera in CAMERAS:
+        yield _name("fig6", camera)
+    for profile in profiles():
+        yield _name("fig6", f'network.radio={{profile="{profile}"}}')
+    for variant in ("ideal", "realistic"):
+        yield _name("fig8", f"variant={variant}")
+    for case in CASES[1:]:
+        yield _name("fig6", "variant=ideal", *case.settings)
+
+
+def _name(scenario: str, *settings: str) -> str:
+    duration_s = load(str(ROOT / scenario) if "/" in scenario else scenario).scenario.duration_s
+    return f"{scenario} {duration_s:g} s seed 7" + "".join(
+        f" --set {one.replace(' ', '')}" for one in settings
+    )
+
+
+def main() -> int:
+    """Prints the names of those that differ; exit code 1 if there are some."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--write", action="store_true", help="for a change of bits that is meant")
+    write = parser.parse_args().write
+    golden = json.loads(GOLDEN.read_text())
+    wanted = list(names())
+    with ProcessPoolExecutor(initializer=children.reset_signals) as pool:
+        found = dict(zip(wanted, pool.map(digest, wanted), strict=True))
+    differing = [name for name in {**golden, **found} if golden.get(name) != found.get(name)]
+    for name in differing:
+        print(name)
+    if write:
+        GOLDEN.write_text(json.dumps(found, indent=1) + "\n")
+    return 1 if differing and not write else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

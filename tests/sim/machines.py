@@ -1,0 +1,271 @@
+"""The same bits on another family of processors: `python -m tests.sim.machines s390x`.
+
+What belongs here: a twin of the installation for another machine in `build/NAME`, made and run on this one, and the
+comparison of its digests with `tests/vectors/digests.json`. What a run is stands in `digest_of.py`.
+
+    apt-get (own lists, nothing installed) -> root/   Python of Debian for that machine, its C library and headers
+    pip                                    -> site/   what `miro_sim.world` imports: wheels, or built from source
+    setup.py build with the cross compiler -> O2/lib/ the packages with their hot modules for that machine
+    qemu-s390x-static root/usr/bin/python3.11 -m tests.sim.digest_of "fig6 0.5 s seed 7"
+
+Needs Debian 12 with `qemu-user-static` and the machine's cross compiler; the command names what is missing. Delete
+`build/NAME` to start again; otherwise only what changed is compiled again.
+
+A Python that rounds sums twice (x87 arithmetic, Debian's for i386) must refuse the run in one line. Any digest but
+the golden one is a failure.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from tests import children
+from tests.sim.digest_of import REFUSED, parse
+
+from miro_exact import engine
+
+ROOT = Path(__file__).parents[2]
+GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
+VERSION = "3.11"  # of Debian 12's Python
+DEBS = (
+    *(f"{package}{VERSION}-minimal" for package in ("python", "libpython")),
+    *(f"libpython{VERSION}-{part}" for part in ("stdlib", "dev")),
+    *("libc6", "libgcc-s1", "zlib1g", "libexpat1"),
+)
+PACKAGES = {"msgspec": "msgspec", "crcmod-plus": "crcmod", "intelhex": "intelhex"}
+"""Name on the package index -> folder. What `miro_sim.world` imports."""
+
+
+class Missing(Exception):
+    """Something that this machine lacks, with the remedy."""
+
+
+class Refused(Exception):
+    """The other machine's Python refused the run; its line."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A family of processors. `wheels`: the tag of its wheels, "" if what has C is built here from its source."""
+
+    name: str
+    debian: str
+    triplet: str
+    libc: str
+    wheels: str = ""
+
+    @cached_property
+    def folder(self) -> Path:
+        """Where its installation is made."""
+        return ROOT / "build" / self.name
+
+    @property
+    def compiler(self) -> str:
+        return f"{self.triplet}-gcc"
+
+    @property
+    def emulator(self) -> str:
+        return f"qemu-{self.name}-static"
+
+    @property
+    def multiarch(self) -> str:
+        """Debian's name of its library folder."""
+        return self.triplet.replace("i686", "i386")
+
+    @property
+    def tools(self) -> dict[str, str]:
+        """Program -> Debian packages that bring it."""
+        return {
+            self.compiler: f"gcc-{self.triplet} {self.libc}",
+            self.emulator: "qemu-user-static",
+            "apt-get": "apt",
+            "dpkg": "dpkg",
+        }
+
+
+MACHINES = {
+    machine.name: machine
+    for machine in (
+        Machine(
+            "aarch64", "arm64", "aarch64-linux-gnu", "libc6-dev-arm64-cross", wheels="manylinux2014_aarch64"
+        ),
+        Machine("s390x", "s390x", "s390x-linux-gnu", "libc6-dev-s390x-cross"),
+        Machine("i386", "i386", "i686-linux-gnu", "libc6-dev-i386-cross"),
+    )
+}
+
+
+def check_tools(machine: Machine) -> None:
+    """Raises Missing if a tool is not there."""
+    missing = [packages for tool, packages in machine.tools.items() if shutil.which(tool) is None]
+    if missing:
+        raise Missing(f"apt-get install {' '.join(missing)}")
+
+
+def install_python(machine: Machine) -> None:
+    """Debian's Python for that machine into root/, by packages that are unpacked and not installed."""
+    root = machine.folder / "root"
+    if (root / "usr" / "bin" / f"python{VERSION}").exists():
+        return
+    state = machine.folder / "apt"
+    for part in ("lists/partial", "cache/archives/partial", "debs"):
+        (state / part).mkdir(parents=True, exist_ok=True)
+    settings = {
+        "APT::Architecture": machine.debian,
+        "APT::Architectures": machine.debian,
+        "APT::Sandbox::User": "",
+        "Dir::State::Lists": state / "lists",
+        "Dir::State::status": "/dev/null",
+        "Dir::Cache": state / "cache",
+    }
+    options = [word for name, value in settings.items() for word in ("-o", f"{name}={value}")]
+    with suppress(Missing):  # one list of several may be broken; the download says whether it is needed
+        run(["apt-get", *options, "-qq", "update"])
+    run(["apt-get", *options, "-qq", "download", *DEBS], cwd=state / "debs")
+    for deb in sorted((state / "debs").glob("*.deb")):
+        run(["dpkg", "-x", str(deb), str(root)])
+
+
+def cross_compiler(machine: Machine, folder: Path, level: str) -> dict[str, str]:
+    """The environment in which setuptools compiles for that machine, with `level` of optimising (O0, O2)."""
+    headers = machine.folder / "root" / "usr" / "include"
+    folder.mkdir(parents=True, exist_ok=True)
+    compiler = folder / "cc"  # headers go before the options of setuptools, the level after them
+    flags = f"-I{headers}/python{VERSION} -I{headers}"
+    compiler.write_text(f'#!/bin/sh\nexec {machine.compiler} {flags} "$@" -{level} -g0\n')
+    compiler.chmod(0o755)
+    return {
+        "CC": str(compiler),
+        "LDSHARED": f"{machine.compiler} -shared",
+        "SETUPTOOLS_EXT_SUFFIX": f".cpython-{VERSION.replace('.', '')}-{machine.multiarch}.so",
+    }
+
+
+def install_packages(machine: Machine) -> None:
+    """What the world imports into site/: wheels of that machine, or built here from their sources."""
+    site = machine.folder / "site"
+    if all((site / folder).exists() for folder in PACKAGES.values()):
+        return
+    quiet = ["-q", "--no-warn-conflicts", "--disable-pip-version-check"]
+    command = [sys.executable, "-m", "pip", "install", *quiet, "--no-deps", "--target", str(site)]
+    if machine.wheels:
+        platform = ["--platform", machine.wheels, "--only-binary", ":all:", "--python-version", VERSION]
+        run([*command, *platform, *PACKAGES])
+        return
+    sources = ["--no-cache-dir", "--no-binary", "msgspec,crcmod-plus"]
+    run([*command, *sources, *PACKAGES], env=cross_compiler(machine, machine.folder / "packages", "O2"))
+
+
+def build(machine: Machine, level: str) -> Path:
+    """The packages, their hot modules translated by Cython here and compiled with `level`.
+
+    Returns where they are.
+    """
+    base = machine.folder / level
+    where = ["--build-base", str(base), "--build-lib", str(base / "lib")]
+    run([sys.executable, "setup.py", "-q", "build", *where], env=cross_compiler(machine, base, level))
+    return base / "lib"
+
+
+def copy(machine: Machine) -> Path:
+    """The packages as sources, for the uncompiled engine. Returns where they are."""
+    lib = machine.folder / "python" / "lib"
+    run([sys.executable, "setup.py", "-q", "build_py", "--build-lib", str(lib)])
+    return lib
+
+
+def digests(machine: Machine, lib: Path, names: Sequence[str], which: str) -> list[str]:
+    """Of the runs so named, by a processor of that machine with the packages in `lib`. Raises Refused."""
+    root = machine.folder / "root"
+    python = [str(root / "usr" / "bin" / f"python{VERSION}"), "-m", "tests.sim.digest_of"]
+    command = [machine.emulator, "-L", str(root), *python, "--engine", which, *names]
+    path = os.pathsep.join((str(lib), str(machine.folder / "site")))
+    return run(command, env={"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}).split()
+
+
+def run(command: Sequence[str], cwd: Path = ROOT, env: dict[str, str] | None = None) -> str:
+    """What it prints. Raises Refused, or Missing with the end of its complaint if it fails."""
+    done = children.run(command, cwd=cwd, env={**os.environ, **(env or {})}, capture_output=True, text=True)
+    if done.returncode == REFUSED:
+        raise Refused(done.stderr.strip())
+    if done.returncode:
+        end = "\n".join((done.stderr or done.stdout).splitlines()[-20:])
+        raise Missing(f"{' '.join(command[:3])} .. failed with {done.returncode}:\n{end}")
+    return done.stdout
+
+
+def prepare(machine: Machine, which: str, level: str) -> Path:
+    """Its whole installation, for the engine `which`. Returns where the packages are."""
+    check_tools(machine)
+    install_python(machine)
+    install_packages(machine)
+    return copy(machine) if which == "python" else build(machine, level)
+
+
+def arguments() -> argparse.Namespace:
+    """Those of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("machine", choices=MACHINES)
+    parser.add_argument("--engine", choices=engine.ENGINES, default="compiled")
+    parser.add_argument(
+        "--beside", action="append", default=[], metavar="NAME",
+        help="also this run, compared with this machine's own digest; like 'fig8 6 s seed 3'; repeatable",
+    )  # fmt: skip
+    parser.add_argument("--quick", action="store_true", help="-O0")
+    parser.add_argument(
+        "--whole-runs", action="store_true", help="all runs of the table, not only the shortest"
+    )
+    options = parser.parse_args()
+    try:
+        for name in options.beside:
+            parse(name)
+    except ValueError as error:
+        parser.error(str(error))
+    return options
+
+
+def wanted(options: argparse.Namespace) -> dict[str, str]:
+    """Name of a run -> digest that it must have."""
+    golden: dict[str, str] = json.loads(GOLDEN.read_text())
+    if not options.whole_runs:
+        shortest = min(golden, key=lambda name: parse(name).duration_s)
+        golden = {shortest: golden[shortest]}
+    command = [sys.executable, "-m", "tests.sim.digest_of", "--engine", options.engine]
+    return golden | {name: run([*command, name]).strip() for name in options.beside}
+
+
+def main() -> int:
+    """Prints a line for each run; exit code 1 if a digest differs, 2 if something is missing."""
+    options = arguments()
+    machine = MACHINES[options.machine]
+    begin = time.monotonic()
+    try:
+        lib = prepare(machine, options.engine, "O0" if options.quick else "O2")
+        built = time.monotonic()
+        expected = wanted(options)
+        found = digests(machine, lib, list(expected), options.engine)
+    except Refused as refused:
+        print(f"{machine.name}, {options.engine}: refused: {refused}")
+        return 0
+    except Missing as error:
+        print(f"{machine.name}: {error}", file=sys.stderr)
+        return 2
+    for name, digest in zip(expected, found, strict=True):
+        print(f"{name}: {digest} {'equal' if digest == expected[name] else 'DIFFERS from ' + expected[name]}")
+    times = f"built in {built - begin:.0f} s, ran in {time.monotonic() - built:.0f} s"
+    print(f"{machine.name}, {options.engine}: {times}")
+    return 0 if found == list(expected.values()) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

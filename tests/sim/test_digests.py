@@ -1,0 +1,21 @@
+"""Every scenario, camera, radio and disturbance gives the bits that it gave when they were frozen."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from tests.sim import digests
+from tests.sim.digest_of import digest
+
+GOLDEN: dict[str, str] = json.loads(digests.GOLDEN.read_text())
+
+
+def test_the_table_has_a_run_of_everything_and_no_other() -> None:
+    assert list(GOLDEN) == list(digests.names())
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_a_run_has_its_bits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(digests.ROOT)
+    assert digest(name) == GOLDEN[name]
