@@ -120,6 +120,7 @@ def main() -> int:
         while counts[EQUAL] + counts["different"] < options.programs:
             some = range(seed, seed + min(64, options.programs))
             seed = some.stop
+            print(f"{dict(counts)}, {time.monotonic() - begin:.0f} s", file=sys.stderr)
             for one, what in executor.map(tried, some):
                 counts[what if what in (EQUAL, LEFT_OUT) else "different"] += 1
                 if what not in (EQUAL, LEFT_OUT):

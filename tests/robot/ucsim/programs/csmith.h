@@ -23,6 +23,8 @@ static void transparent(uint32_t value)
     put(crc32_context);
 }
 
+#define printf(...) ((void)0) /* of indices, behind a flag that is 0 */
+
 #define transparent_crc(value, name, flag) transparent((uint32_t)(value))
 
 static void crc32_gentab(void)
