@@ -42,8 +42,8 @@ DEBS = (
     *(f"libpython{VERSION}-{part}" for part in ("stdlib", "dev")),
     *("libc6", "libgcc-s1", "zlib1g", "libexpat1"),
 )
-PACKAGES = {"msgspec": "msgspec", "crcmod-plus": "crcmod", "intelhex": "intelhex"}
-"""Name on the package index -> folder. What `miro_sim.world` imports."""
+PACKAGES = {"msgspec": "msgspec", "crcmod-plus": "crcmod", "tomli-w": "tomli_w"}
+"""Name on the package index -> folder. What `miro_sim.world` and scenarios with settings import."""
 
 
 class Missing(Exception):
