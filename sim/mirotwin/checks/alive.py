@@ -80,14 +80,19 @@ class _Wheel:
         self.position: int | None = None
 
     def look(self, axis: Axis, word: int | None) -> None:
-        self.told = any(opcode == _STT for _, opcode, _ in axis.commands)
-        self.driven = bool(axis.pwm_magnitude) or self.position not in (None, axis.real_position)
+        self.told = False
+        for _, opcode, _ in axis.commands:
+            if opcode == _STT:
+                self.told = True
+                break
+        position = axis.real_position
+        self.driven = axis.pwm_magnitude != 0 or (position != self.position and self.position is not None)
         if self.told:
             self.asked = word
             self.untold = 0
         if self.driven:
             self.undriven = 0
-        self.position = axis.real_position
+        self.position = position
 
     def ask(self, word: int) -> None:
         if self.asked is None:
@@ -179,6 +184,8 @@ class AliveJudge(Judge[ActsAtAll]):
         if tick != self.reset_tick:
             self.resets.append(tick)
             self.reset_tick = tick
+        if self.turned and not self.resets:
+            return
         due = [one for one in self.resets if one <= now]
         del self.resets[: len(due)]
         commands = (*record.left.commands, *record.right.commands)
