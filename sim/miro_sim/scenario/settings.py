@@ -28,6 +28,8 @@ EXPECT = "expect."
 OPTION = "--set"
 _TAGS = {registry.key for registry in REGISTRIES.values()}
 """Keys that say which other keys a table has."""
+_DEFAULTS = {registry.default for registry in REGISTRIES.values() if registry.default}
+"""What they say where they are missing."""
 
 
 class Setting(msgspec.Struct, frozen=True):
@@ -59,7 +61,12 @@ def _option(text: str, option: str) -> str:
     """A setting as it is written on the command line, where `--expect` stands for `--set expect.`, or in a file."""
     if option != OPTION:
         return f"{option}.{text}"
-    return f"--expect {text.removeprefix(EXPECT)}" if text.startswith(EXPECT) else f"{OPTION} {text}"
+    return " ".join(option_words(text))
+
+
+def option_words(text: str) -> tuple[str, str]:
+    """Option and value of a setting on the command line."""
+    return ("--expect", text.removeprefix(EXPECT)) if text.startswith(EXPECT) else (OPTION, text)
 
 
 def _inside(path: str, above: str) -> bool:
@@ -158,7 +165,7 @@ class _Path:
         below = at.get(key)
         if isinstance(value, dict) and isinstance(below, list) and len(below) == 1:
             return self._put_in_list(below, ["0"], value, place)
-        others = at if key in _TAGS and key in at and below != value else {}
+        others = at if key in _TAGS and _another_kind(at, key, value) else {}
         if key in ERROR_KEYS:  # either says the same: the last one holds
             for other in ERROR_KEYS:
                 at.pop(other, None)
@@ -181,6 +188,11 @@ class _Path:
             return self.put(at[number], rest, value, place)
         at[number] = value
         return Setting(self.text, place, self.table)
+
+
+def _another_kind(table: Table, key: str, value: Any) -> bool:
+    """Whether this table has been of another kind than `value`; one that does not say its kind has the default."""
+    return table[key] != value if key in table else value not in _DEFAULTS
 
 
 def drop_other_kind(error: ScenarioError, settings: Sequence[Setting]) -> tuple[str, str] | None:

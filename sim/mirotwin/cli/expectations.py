@@ -24,8 +24,13 @@ LINES = 5
 """Failures of one check that are listed."""
 
 
+def as_setting(text: str) -> str:
+    """`--expect KEY=VALUE` as the setting that it stands for; a KEY alone is a check with its defaults."""
+    return f"{EXPECT}{text}" if "=" in text else f"{EXPECT}{text}=true"
+
+
 def _as_settings(ctx: click.Context, param: click.Parameter, given: Sequence[str]) -> tuple[str, ...]:
-    return tuple(EXPECT + text for text in given)
+    return tuple(map(as_setting, given))
 
 
 def expect_option(command: Command) -> Command:
@@ -33,7 +38,7 @@ def expect_option(command: Command) -> Command:
     return click.option(
         "--expect",
         "expected",
-        metavar="KEY=VALUE",
+        metavar="KEY[=VALUE]",
         multiple=True,
         callback=_as_settings,
         help="A check of the run: a key of the scenario's [expect], such as tracks_within_cm=3; may be repeated. Exit"

@@ -264,6 +264,7 @@ def _run(campaign: Campaign, image: Image, asked: Asked) -> int:
             )
         except PartError as error:
             stopped = BadInput("", "--check", f"{error.what}; the campaign has ended", error.remedy)
+            stopped.__cause__ = error
         except BadInput as error:  # of the engine: what was found until then is told first
             stopped = error
             with suppress(BadInput, PartError):

@@ -24,6 +24,7 @@ import click
 
 from miro_exact.bad_input import BadInput, one_line, shortened
 from miro_exact.engine import EngineError, select
+from mirotwin.files.tracebacks import show_traceback
 
 DONE = 0
 EXPECTATION_FAILED = 1
@@ -215,6 +216,7 @@ class Program(LazyGroup):
             complain(f"error: {error.format_message()}")
             return BAD_INPUT
         except BadInput as error:
+            show_traceback(error)
             complain(f"error: {error}")
             return BAD_INPUT
         except (ReaderGone, BrokenPipeError):

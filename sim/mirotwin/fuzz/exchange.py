@@ -19,7 +19,6 @@ It is named as `mycheck.py:level_is_kept`, or, where a distribution has it, by a
 from __future__ import annotations
 
 import importlib.util
-import traceback
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -29,7 +28,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_host.parts import described
+from miro_host.raised import at_place, defined_at, raised
 from miro_robot.faults import FirmwareFault
 from miro_robot.harness.heard_bus import HeardBus
 from miro_robot.image import Image
@@ -138,13 +137,11 @@ class NamedCheck(msgspec.Struct, frozen=True):
         except BadInput:
             raise
         except (Exception, SystemExit) as error:
-            last = traceback.extract_tb(error.__traceback__)[-1]
-            place = f"{Path(last.filename).name}:{last.lineno}"
-            what = f"raised {described(error)} at {place}"
+            what = f"raised {raised(error)}"
             raise BadInput("", f"{OPTION} {self.text}", what, "repair the check") from error
         if found is None or isinstance(found, str):
             return None if found is None else " ".join(found.split()) or "failed"
-        what = f"returned {found!r:.40}"
+        what = at_place(f"returned {found!r:.40}", defined_at(self.function))
         raise BadInput("", f"{OPTION} {self.text}", what, "return None, or what is wrong as text")
 
 
@@ -169,7 +166,7 @@ def installed_check(name: str) -> NamedCheck:
     try:
         found = entries[0].load()
     except (Exception, SystemExit) as error:
-        what = f"check {name!r} ({entries[0].value}) cannot be imported: {described(error)}"
+        what = f"check {name!r} ({entries[0].value}) cannot be imported: {raised(error)}"
         raise BadInput("", OPTION, what, "repair or uninstall it") from error
     if not callable(found):
         raise BadInput("", OPTION, f"check {name!r} ({entries[0].value}) is no function", "name a function")
@@ -186,7 +183,7 @@ def _module(path: str, text: str) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
-        raise BadInput(path, OPTION, f"cannot be run: {described(error)}", "repair it") from error
+        raise BadInput(path, OPTION, f"cannot be run: {raised(error)}", "repair it") from error
     return module
 
 
