@@ -31,7 +31,7 @@ def raised(error: BaseException) -> str:
 
 def at_place(what: str, place: str) -> str:
     """`what` with the place, if that is known."""
-    return f"{what} at {place}" if place else what
+    return f"{what} ({place})" if place else what
 
 
 def raised_at(error: BaseException) -> str:

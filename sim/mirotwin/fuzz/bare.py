@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
-from miro_host.raised import raised
+from miro_host.raised import at_place, defined_at, raised_at
+from miro_host.raised import described as described_error
 from miro_protocol.protocol import Damage, Frame, Protocol
 from miro_protocol.stream_events import Deed
 from miro_protocol.transmission import Transmission
@@ -84,7 +85,7 @@ class BareTarget(HarnessTarget):
         protocol = self.protocol
         if protocol is None:
             return body
-        return _asked("repair", lambda: bytes(memoryview(protocol.repair(body, self.program.frames - 1))))
+        return _asked(protocol.repair, lambda: bytes(memoryview(protocol.repair(body, self.program.frames - 1))))
 
     def run(self, data: Any) -> int:
         ended = self.play(data)
@@ -146,7 +147,7 @@ class BareTarget(HarnessTarget):
         protocol = self.protocol
         if protocol is None or not isinstance(one, Transmission):
             return described(one)
-        said = _asked("decode", lambda: [_shown(part) for part in protocol.decode(one.data)])
+        said = _asked(protocol.decode, lambda: [_shown(part) for part in protocol.decode(one.data)])
         return f"{described(one)}  # {'; '.join(said)}"
 
     def seeds(self) -> list[bytes]:
@@ -154,7 +155,7 @@ class BareTarget(HarnessTarget):
         protocol = self.protocol
         samples: tuple[bytes, ...] = (b"\0", b"A", bytes(range(8)))
         if protocol is not None:
-            samples = _asked("samples", lambda: tuple(map(bytes, map(memoryview, protocol.samples()))))
+            samples = _asked(protocol.samples, lambda: tuple(bytes(memoryview(body)) for body in protocol.samples()))
         if self.input == "bytes":
             each = [self._repaired_sample(body) for body in samples]
         else:
@@ -165,19 +166,20 @@ class BareTarget(HarnessTarget):
         protocol = self.protocol
         if protocol is None:
             return body
-        return _asked("repair", lambda: bytes(memoryview(protocol.repair(body))))
+        return _asked(protocol.repair, lambda: bytes(memoryview(protocol.repair(body))))
 
     def __repr__(self) -> str:
         return f"BareTarget({self.image.path}, input={self.input!r}, {self.line})"
 
 
-def _asked(method: str, call: Callable[[], T]) -> T:
+def _asked(method: Callable[..., object], call: Callable[[], T]) -> T:
     """What a protocol's method gives. Raises BadInput where it fails itself."""
     try:
         return call()
     except (Exception, SystemExit) as error:
-        remedy = f"let `{method}` do what miro_protocol.protocol says"
-        raise BadInput("", "--protocol", f"`{method}` raised {raised(error)}", remedy) from error
+        name = method.__name__
+        what = at_place(f"`{name}` failed: {described_error(error)}", raised_at(error) or defined_at(method))
+        raise BadInput("", "--protocol", what, f"let `{name}` do what miro_protocol.protocol says") from error
 
 
 def _shown(part: Frame | Damage) -> str:

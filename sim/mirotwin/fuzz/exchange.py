@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
+from difflib import get_close_matches
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
@@ -37,7 +38,7 @@ from miro_robot.image.variables import Variable, Variables, find_variable
 from miro_robot.inspect.values import bytes_at
 from miro_robot.mcs51.cpu import Cpu
 
-OPTION = "--check"
+OPTION = "--expect"
 GROUP = "mirotwin.bare_checks"
 
 
@@ -161,7 +162,7 @@ def installed_check(name: str) -> NamedCheck:
     entries = list(entry_points(group=GROUP, name=name))
     if not entries:
         names = sorted(entry.name for entry in entry_points(group=GROUP))
-        remedy = f"give FILE.py:FUNCTION{''.join(f', {one}' for one in names)}"
+        remedy = f"{_nearest(name, names)}give FILE.py:FUNCTION{''.join(f', {one}' for one in names)}"
         raise BadInput("", OPTION, f"there is no check {name!r} for a bare processor", remedy)
     try:
         found = entries[0].load()
@@ -187,6 +188,11 @@ def _module(path: str, text: str) -> ModuleType:
     return module
 
 
+def _nearest(name: str, names: list[str]) -> str:
+    close = get_close_matches(name, names, n=1)
+    return f"did you mean {close[0]}? " if close else ""
+
+
 def _callable(module: ModuleType, name: str, text: str) -> Check:
     found: Check | None = getattr(module, name, None)
     if callable(found):
@@ -194,5 +200,5 @@ def _callable(module: ModuleType, name: str, text: str) -> Check:
     names = [
         key for key, value in vars(module).items() if callable(value) and value.__module__ == module.__name__
     ]
-    choices = f"it has {', '.join(names)}" if names else "it has none"
+    choices = f"{_nearest(name, names)}it has {', '.join(names)}" if names else "it has none"
     raise BadInput(text.rpartition(":")[0], OPTION, f"there is no function {name!r}", choices)
