@@ -199,7 +199,7 @@ def _checked(
         except ScenarioError as error:
             found = drop_other_kind(error, made)
             if found is None:
-                raise blamed(error, made) from error.__cause__
+                raise blamed(error, made, raw) from error.__cause__
             dropped.setdefault(found[0], []).append(found[1])
 
 

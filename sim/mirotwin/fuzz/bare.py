@@ -85,7 +85,9 @@ class BareTarget(HarnessTarget):
         protocol = self.protocol
         if protocol is None:
             return body
-        return _asked(protocol.repair, lambda: bytes(memoryview(protocol.repair(body, self.program.frames - 1))))
+        return _asked(
+            protocol.repair, lambda: bytes(memoryview(protocol.repair(body, self.program.frames - 1)))
+        )
 
     def run(self, data: Any) -> int:
         ended = self.play(data)
@@ -155,7 +157,9 @@ class BareTarget(HarnessTarget):
         protocol = self.protocol
         samples: tuple[bytes, ...] = (b"\0", b"A", bytes(range(8)))
         if protocol is not None:
-            samples = _asked(protocol.samples, lambda: tuple(bytes(memoryview(body)) for body in protocol.samples()))
+            samples = _asked(
+                protocol.samples, lambda: tuple(bytes(memoryview(body)) for body in protocol.samples())
+            )
         if self.input == "bytes":
             each = [self._repaired_sample(body) for body in samples]
         else:
