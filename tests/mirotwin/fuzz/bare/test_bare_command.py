@@ -1,5 +1,7 @@
 """`mirotwin fuzz --bare`, and cases of a bare processor on the command line."""
 
+import shlex
+
 import pytest
 from intelhex import IntelHex
 from tests.mirotwin.cli.conftest import mirotwin as mirotwin
@@ -72,10 +74,13 @@ def test_a_check_looks_at_what_is_new_or_at_everything(mirotwin, engines, hexes,
     for number, more in enumerate(((), ("--expect-all",))):
         out_folder = tmp_path / f"out{number}"
         options = ("--input", "bytes", "--corpus", inputs, "--expect", check, "--out", str(out_folder), *more)
-        code, _, err = campaign(mirotwin, tmp_path, hexes["polls"], *options)
+        code, out, err = campaign(mirotwin, tmp_path, hexes["polls"], *options)
         assert code == 1
         assert "it heard a q" in err
         case = next((out_folder / "finds").glob("never_q-*.stream"))
+        again = next(line for line in out.splitlines() if line.startswith(f"    mirotwin replay {case}"))
+        assert again.endswith(f" --expect {check}")
+        assert mirotwin(*shlex.split(again)[1:])[2].startswith("mirotwin: fails as recorded: never_q")
     folder = str(case.parent)
     code, out, _ = mirotwin("fuzz", hexes["polls"], "--regress", folder, "--expect", check)
     assert (code, "FAILED" in out) == (1, True)
