@@ -24,7 +24,6 @@ import click
 
 from miro_exact.bad_input import BadInput, one_line, shortened
 from miro_exact.engine import EngineError, select
-from mirotwin.files.tracebacks import show_traceback
 
 DONE = 0
 EXPECTATION_FAILED = 1
@@ -216,6 +215,8 @@ class Program(LazyGroup):
             complain(f"error: {error.format_message()}")
             return BAD_INPUT
         except BadInput as error:
+            from mirotwin.files.tracebacks import show_traceback  # only an error needs it
+
             show_traceback(error)
             complain(f"error: {error}")
             return BAD_INPUT
