@@ -1,4 +1,4 @@
-"""What the dimmer must keep to, whatever it is sent: checks for `mirotwin fuzz --check`.
+"""What the dimmer must keep to, whatever it is sent: checks for `mirotwin fuzz --expect`.
 
 What belongs here: what is wrong about a run. What does not: the wire format (`slip_protocol.py`).
 """

@@ -19,6 +19,7 @@ from importlib import import_module
 from typing import Any, Generic, TypeVar
 
 from miro_exact.bad_input import BadInput
+from miro_host.raised import raised
 
 Part = TypeVar("Part")
 
@@ -81,7 +82,7 @@ class Registry(Generic[Part]):
         try:
             found = entries[0].load()
         except (Exception, SystemExit) as error:
-            what = f"{self.word} {name!r} ({place}) cannot be imported: {described(error)}"
+            what = f"{self.word} {name!r} ({place}) cannot be imported: {raised(error)}"
             raise PartError(what, f"repair or uninstall {sources[0]}") from error
         return self._checked(found, name, place)
 
@@ -114,9 +115,3 @@ def _loaded(place: str) -> Any:
 
 def _source(entry: Any) -> str:
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist is not None else "an unknown distribution"
-
-
-def described(error: BaseException) -> str:
-    """Type and message of an exception in one line."""
-    text = f"{error}".strip().partition("\n")[0]
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__

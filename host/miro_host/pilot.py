@@ -22,8 +22,9 @@ from miro_host.estimators.interface import DEAD_S, Estimate, Estimator, Estimato
 from miro_host.estimators.none import NoEstimator
 from miro_host.integrator import Integrator
 from miro_host.laws.interface import NOTHING, Accelerations, Answer, Law, LawInput, Velocities
-from miro_host.parts import PartError, described
+from miro_host.parts import PartError
 from miro_host.posture import Posture
+from miro_host.raised import at_place, defined_at, described, raised_at
 from miro_host.references.interface import Trajectory
 from miro_host.wheels import Wheels
 
@@ -145,7 +146,7 @@ class Pilot:
             self.estimator.check_memory()
         except PartError:  # of the reference, which the part may have asked
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise _failure("estimator", self.estimator, error) from error
         return estimate
 
@@ -157,7 +158,7 @@ class Pilot:
             self.law.check_memory()
         except PartError:  # of the reference, which the part may have asked
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise _failure("law", self.law, error) from error
         return answer
 
@@ -184,10 +185,12 @@ class Pilot:
         )
 
 
-def _failure(word: str, part: Law[Any] | Estimator[Any], error: Exception) -> PartError:
+def _failure(word: str, part: Law[Any] | Estimator[Any], error: BaseException) -> PartError:
     """What to raise for what a part raised: its name and the reason in one line."""
     known = type(error) in (ValueError, DomainError)
-    what = f"{word} {part.parameters.name()!r} failed: {error if known else described(error)}"
+    reason = str(error) if known else described(error)
+    place = raised_at(error) or defined_at(part.step)
+    what = f"{word} {part.parameters.name()!r} failed: {at_place(reason, place)}"
     if isinstance(error, DomainError):
         return PartError(what, "the parameters are far outside those of a real robot")
     return PartError(what, f"mend the {word} or its parameters")

@@ -119,9 +119,9 @@ def test_the_command_of_its_page_finds_both_and_nothing_in_the_mended_one(images
             "--bare",
             "--crystal",
             CRYSTAL_HZ,
-            "--check",
+            "--expect",
             CHECK,
-            "--check-all",
+            "--expect-all",
             "--corpus",
             EXAMPLE / "finds",
         ]

@@ -226,7 +226,7 @@ class Broken(Law[Parameters]):
         ("refuse", "controller.how: refuse is refused"),
         (
             "construct",
-            "net0/robot0: tick 0 (0.000000 s): law 'broken' cannot be made: RuntimeError: no model file; mend the law",
+            "net0/robot0: tick 0 (0.000000 s): law 'broken' cannot be made: RuntimeError: no model file (",
         ),
         (
             "nan",

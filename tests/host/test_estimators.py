@@ -120,7 +120,10 @@ class Answering(Estimator[Odd]):
 )
 def test_an_estimator_that_fails_is_named(answer, reason):
     one = Pilot(Line(), Gains().law(), estimator=Odd(answer).estimator())
-    with pytest.raises(PartError, match=f"estimator 'odd' failed: .*{reason}; mend the estimator"):
+    with pytest.raises(
+        PartError,
+        match=rf"estimator 'odd' failed: .*{reason} \(.*:\d+ in Answering.step\); mend the estimator",
+    ):
         one.update(HERE, 0.0)
 
 

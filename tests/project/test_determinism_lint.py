@@ -27,6 +27,7 @@ EDGE = (
     "sim/mirotwin/fuzz/hypothesis_engine.py",  # how far an engine is, and since when
     "sim/mirotwin/fuzz/hypothesis_process.py",
     "sim/mirotwin/campaign/wall.py",
+    "sim/mirotwin/files/tracebacks.py",  # how much is shown of an error
     "sim/mirotwin/files/children.py",  # from where processes import
 )
 # Frames and chips are integers from end to end, so the order of a sum cannot matter.

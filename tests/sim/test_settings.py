@@ -12,9 +12,11 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from tests.naive.tables import scalar_places
 
+from miro_host.laws.registry import LAWS
 from miro_sim.scenario.file import ScenarioError, builtin_text, changed, load, parse
 from miro_sim.scenario.text import written
 
+TWO_TEAMS = Path(__file__).parents[2] / "examples" / "two_teams.toml"
 FIG6 = load("fig6").scenario
 TABLES = {name: tomllib.loads(builtin_text(name)) for name in ("fig6", "fig8")}
 SCALARS = [(name, *place) for name, table in TABLES.items() for place in scalar_places(table)]
@@ -234,3 +236,52 @@ def test_any_setting_is_made_or_refused_in_one_line(setting: str) -> None:
     else:
         assert "--set " in refused
         assert refused.isprintable()
+
+
+LAWS_OF_OURS = LAWS.names()
+
+
+@pytest.mark.parametrize("law", LAWS_OF_OURS)
+@pytest.mark.parametrize("other", LAWS_OF_OURS)
+def test_any_law_takes_the_place_of_any_other(law: str, other: str) -> None:
+    key = "network.robot.controller.law"
+    text = load("fig6", [f"{key}={law}"]).text
+    assert parse(text, "written.toml", [f"{key}={other}"]).networks[0].robot[0].controller.name() == other
+    unnamed = text.replace('law = "yang_kim"\n', "")  # the default need not be named
+    assert parse(unnamed, "written.toml", [f"{key}={other}"]).networks[0].robot[0].controller.name() == other
+
+
+@pytest.mark.parametrize("source", ["fig6", str(TWO_TEAMS)])
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "law=body_frame",
+        "controller.law=body_frame",
+        "controller=body_frame",
+        "robot.controller.law=body_frame",
+        "estimator.kind=ekf",
+        "estimator=ekf",
+        "camera=gaussian",
+        "network.0.controller.law=kanayama",
+        "network.0.robot.0.law=kanayama",
+        "network.0.robot.0.controller=kanayama",
+    ],
+)
+def test_what_an_error_advises_to_write_is_accepted(source: str, setting: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load(source, [setting])
+    advised = caught.value.remedy.removeprefix("write --set ")
+    assert advised != caught.value.remedy
+    load(source, [advised])
+
+
+def test_the_advice_keeps_the_network_and_the_robot_that_were_named() -> None:
+    said = refusal("network.1.robot.1.law=kanayama", source=str(TWO_TEAMS))
+    assert said.endswith("write --set network.1.robot.1.controller.law=kanayama")
+
+
+def test_a_setting_does_not_leave_out_its_own_key() -> None:
+    assert "kind=gaussian: unknown key; keys here: name," in refusal("kind=gaussian")
+    assert "controller.kind=gaussian: unknown key; keys here: law," in refusal(
+        "network.robot.controller.kind=gaussian"
+    )

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 
 import msgspec
 
-from miro_host.parts import PartError, described
+from miro_host.parts import PartError
+from miro_host.raised import at_place, defined_at, described, raised_at
 from miro_host.references.interface import Reference, Trajectory
 
 
@@ -29,12 +30,15 @@ class CheckedReference:
         """The reference at `t_s`. Raises PartError."""
         try:
             found = self.trajectory.at(t_s)
+            if not isinstance(found, Reference):
+                raise ValueError(f"`at` returned {found!r:.40}, which is no Reference")
             for value in _numbers(found):
                 if type(value) is not float or not math.isfinite(value):
                     raise ValueError(f"it returned {found!r}; all must be finite floats")
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             reason = str(error) if type(error) is ValueError else described(error)
-            what = f"reference {self.name!r} failed at {t_s:.6f} s: {reason}"
+            place = raised_at(error) or defined_at(getattr(self.trajectory, "at", None))
+            what = f"reference {self.name!r} failed at {t_s:.6f} s: {at_place(reason, place)}"
             raise PartError(what, "mend the reference or its parameters") from error
         return found
 

@@ -20,8 +20,9 @@ from miro_host.eye import calibration_kinds as kinds
 from miro_host.eye.calibration import Calibration
 from miro_host.integrator import integrator_of
 from miro_host.laws.interface import LawParameters
-from miro_host.parts import PartError, described
+from miro_host.parts import PartError
 from miro_host.pilot import Pilot
+from miro_host.raised import at_place, defined_at, raised
 from miro_host.references.checked import CheckedReference
 from miro_host.references.interface import ReferenceParameters, Trajectory
 from miro_host.references.registry import REFERENCES
@@ -41,7 +42,9 @@ def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
     parameters = robot.reference
     assert isinstance(parameters, ReferenceParameters)
     name = parameters.name()
-    trajectory = _made("reference", name, lambda: parameters.trajectory(duration_s))
+    trajectory = _made(
+        "reference", name, lambda: _a_part(parameters.trajectory(duration_s), "at", parameters.trajectory)
+    )
     return trajectory if name in REFERENCES.own else CheckedReference(trajectory, name)
 
 
@@ -57,8 +60,8 @@ def pilot_for(robot: sc.Robot, reference: Trajectory, host: sc.Host, dead_s: flo
     chosen, controller = robot.estimator, robot.controller
     assert isinstance(chosen, EstimatorParameters)
     assert isinstance(controller, LawParameters)
-    estimator = _made("estimator", chosen.name(), lambda: _remembering(chosen.estimator()))
-    law = _made("law", controller.name(), lambda: _remembering(controller.law()))
+    estimator = _made("estimator", chosen.name(), lambda: _remembering(chosen.estimator(), chosen.estimator))
+    law = _made("law", controller.name(), lambda: _remembering(controller.law(), controller.law))
     period_s = seconds(CONTROL_PERIOD_TICKS)
     return Pilot(
         reference,
@@ -71,9 +74,17 @@ def pilot_for(robot: sc.Robot, reference: Trajectory, host: sc.Host, dead_s: flo
     )
 
 
-def _remembering(part: Any) -> Any:
+def _remembering(part: Any, maker: Any) -> Any:
     """The part itself, once its memory was found to be as declared."""
-    part.check_memory()
+    _a_part(part, "check_memory", maker).check_memory()
+    return part
+
+
+def _a_part(part: Any, method: str, maker: Any) -> Any:
+    """What `maker` returned, which has to have this method. Raises PartError."""
+    if not hasattr(part, method):
+        what = f"`{maker.__name__}` returned {part!r:.40}"
+        raise PartError(at_place(what, defined_at(maker)), f"return an object with the method `{method}`")
     return part
 
 
@@ -81,8 +92,10 @@ def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
     """A new part; whatever goes wrong with it is a PartError that names it."""
     try:
         return make()
-    except Exception as error:
-        what = f"{word} {name!r} cannot be made: {described(error)}"
+    except PartError as error:
+        raise PartError(f"{word} {name!r} cannot be made: {error.what}", error.remedy) from error
+    except (Exception, SystemExit) as error:
+        what = f"{word} {name!r} cannot be made: {raised(error)}"
         raise PartError(what, f"mend the {word} or its parameters") from error
 
 

@@ -19,7 +19,7 @@ from miro_protocol.toml_text import TEXT_KIB, not_finite, without_none
 from miro_sim.scenario.base import with_base
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
-from miro_sim.scenario.parts import full_message, part_of
+from miro_sim.scenario.parts import cause_of, full_message, part_of
 from miro_sim.scenario.places import check_places
 from miro_sim.scenario.profiles import ProfileError, with_profiles
 from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
@@ -109,6 +109,13 @@ def decode(raw: bytes, origin: str) -> str:
         raise ScenarioError(origin, f"line {line}", "not UTF-8 text", "save the file as UTF-8") from None
 
 
+def parse_noted(text: str, origin: str, settings: Sequence[str] = ()) -> tuple[Scenario, tuple[str, ...]]:
+    """As `parse`, with what the settings left out, a line each."""
+    notes: list[str] = []
+    _, scenario, _ = _parsed(text, origin, settings, nothing_else, notes)
+    return scenario, tuple(notes)
+
+
 def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = nothing_else) -> Scenario:
     """TOML text to a Scenario, after the `settings` (`KEY=VALUE`, see `settings`) were made in it.
 
@@ -192,7 +199,7 @@ def _checked(
         except ScenarioError as error:
             found = drop_other_kind(error, made)
             if found is None:
-                raise blamed(error, made) from error.__cause__
+                raise blamed(error, made, raw) from error.__cause__
             dropped.setdefault(found[0], []).append(found[1])
 
 
@@ -204,7 +211,7 @@ def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
     try:
         scenario = msgspec.convert(complete, Scenario, dec_hook=part_of)
     except msgspec.ValidationError as error:
-        raise value_error(origin, complete, full_message(error)) from None
+        raise value_error(origin, complete, full_message(error)) from cause_of(error)
     check_places(scenario, origin)
     also(scenario, origin)
     return scenario

@@ -11,7 +11,8 @@ import msgspec
 
 from miro_host.estimators.registry import ESTIMATORS, AnyEstimator
 from miro_host.laws.registry import LAWS, Controller
-from miro_host.parts import PartError, Registry, described
+from miro_host.parts import PartError, Registry
+from miro_host.raised import raised
 from miro_host.references.registry import REFERENCES, AnyReference
 
 REGISTRIES: dict[type, Registry[Any]] = {
@@ -35,9 +36,9 @@ def part_of(kind: type, table: object) -> object:
     except msgspec.ValidationError as error:
         raise PartTableError(full_message(error)) from None
     except PartError as error:
-        raise PartTableError(f"{error} - at `$.{registry.key}`") from None
-    except Exception as error:  # from the part's own check of its parameters
-        what = f"{registry.word} {keys.get(registry.key)!r} cannot check its parameters: {described(error)}"
+        raise PartTableError(f"{error} - at `$.{registry.key}`") from error
+    except (Exception, SystemExit) as error:  # from the part's own check of its parameters
+        what = f"{registry.word} {keys.get(registry.key)!r} cannot check its parameters: {raised(error)}"
         raise PartTableError(what) from error
 
 
@@ -51,6 +52,11 @@ def struct_of(registry: Registry[Any], keys: dict[str, Any]) -> type[msgspec.Str
         raise msgspec.ValidationError(f"{error} - at `$.{registry.key}`") from None
     found: type[msgspec.Struct] = registry.find(name)
     return found
+
+
+def cause_of(error: msgspec.ValidationError) -> BaseException | None:
+    """What a part raised while its table was read, if one did."""
+    return error.__cause__.__cause__ if isinstance(error.__cause__, PartTableError) else None
 
 
 def full_message(error: msgspec.ValidationError) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 
 import msgspec
 
+from miro_host.laws.registry import LAWS
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.keys import Network, Robot
 from miro_sim.scenario.parts import REGISTRIES
@@ -28,6 +29,10 @@ EXPECT = "expect."
 OPTION = "--set"
 _TAGS = {registry.key for registry in REGISTRIES.values()}
 """Keys that say which other keys a table has."""
+TABLES = {"camera": "kind", "controller": "law", "estimator": "kind", "reference": "kind"}
+"""Tables of several kinds, and the key that says which."""
+_DEFAULTS = {registry.default for registry in REGISTRIES.values() if registry.default}
+"""What they say where they are missing."""
 
 
 class Setting(msgspec.Struct, frozen=True):
@@ -59,7 +64,12 @@ def _option(text: str, option: str) -> str:
     """A setting as it is written on the command line, where `--expect` stands for `--set expect.`, or in a file."""
     if option != OPTION:
         return f"{option}.{text}"
-    return f"--expect {text.removeprefix(EXPECT)}" if text.startswith(EXPECT) else f"{OPTION} {text}"
+    return " ".join(option_words(text))
+
+
+def option_words(text: str) -> tuple[str, str]:
+    """Option and value of a setting on the command line."""
+    return ("--expect", text.removeprefix(EXPECT)) if text.startswith(EXPECT) else (OPTION, text)
 
 
 def _inside(path: str, above: str) -> bool:
@@ -158,7 +168,7 @@ class _Path:
         below = at.get(key)
         if isinstance(value, dict) and isinstance(below, list) and len(below) == 1:
             return self._put_in_list(below, ["0"], value, place)
-        others = at if key in _TAGS and key in at and below != value else {}
+        others = at if key in _TAGS and _another_kind(at, key, value) else {}
         if key in ERROR_KEYS:  # either says the same: the last one holds
             for other in ERROR_KEYS:
                 at.pop(other, None)
@@ -183,13 +193,18 @@ class _Path:
         return Setting(self.text, place, self.table)
 
 
+def _another_kind(table: Table, key: str, value: Any) -> bool:
+    """Whether this table has been of another kind than `value`; one that does not say its kind has the default."""
+    return table[key] != value if key in table else value not in _DEFAULTS
+
+
 def drop_other_kind(error: ScenarioError, settings: Sequence[Setting]) -> tuple[str, str] | None:
     """Takes out the key of this error, if it is of a kind that a setting has replaced; that setting, and the key."""
     if error.what != "unknown key":
         return None
     above, _, key = f"{error.place}".rpartition(".")
     for number, setting in enumerate(settings):
-        if setting.table != above or key not in setting.others:
+        if setting.table != above or key not in setting.others or setting.path == f"{error.place}":
             continue
         if any(_inside(f"{error.place}", later.path) for later in settings[number + 1 :]):
             continue  # it was set on purpose
@@ -198,16 +213,54 @@ def drop_other_kind(error: ScenarioError, settings: Sequence[Setting]) -> tuple[
     return None
 
 
-def _deeper(key: str, setting: Setting) -> str:
-    """Where a key stands that was looked for at the top."""
-    for struct, above in ((Network, "network"), (Robot, "network.robot")):
-        if key in struct.__struct_encode_fields__:
-            return f"write {_option(f'{above}.{setting.text}', setting.option)}"
-    return ""
+def _deeper(place: str, setting: Setting, raw: Table) -> str:
+    """Where a key stands that was looked for too far above: at the top, in a network or in a robot."""
+    key = place.rpartition(".")[2]
+    found = re.search(rf"(?:^|\.){re.escape(key)}([.=\[].*)", setting.text, re.DOTALL)
+    if found is None or not re.fullmatch(r"(network\[\d+\]\.)?(robot\[\d+\]\.)?[^.\[\]]+", place):
+        return ""
+    network, robot = _robot_near(place, raw)
+    rest = _with_tag(key, found[1])
+    if key == "robot":
+        path = robot if not re.match(r"\.\d|\[", rest) else f"{network}.robot"
+    elif key == LAWS.key:
+        path = f"{robot}.controller.{key}"
+    elif key in Robot.__struct_encode_fields__:
+        path = f"{robot}.{key}"
+    elif key in Network.__struct_encode_fields__:
+        path = f"{network}.{key}"
+    else:
+        return ""
+    return f"write {_option(path + rest, setting.option)}"
 
 
-def blamed(error: ScenarioError, settings: Sequence[Setting]) -> ScenarioError:
-    """The same error, naming the setting that it concerns; all settings, where the scenario failed with them."""
+def _with_tag(key: str, rest: str) -> str:
+    """What follows a key in a setting; a name that was given for a whole table chooses the table's kind."""
+    value = rest.removeprefix("=").strip("\"' ")
+    return (
+        f".{TABLES[key]}={value}" if key in TABLES and rest.startswith("=") and value.isidentifier() else rest
+    )
+
+
+def _robot_near(place: str, raw: Table) -> tuple[str, str]:
+    """The paths of the network and of the robot that a place is in, else of the first one; an index for one of many."""
+    paths = []
+    named = dict(re.findall(r"(network|robot)\[(\d+)\]", place))
+    at: Any = raw
+    for key in ("network", "robot"):
+        entries = at.get(key) if isinstance(at, dict) else None
+        entries = entries if isinstance(entries, list) else []
+        index = int(named.get(key, 0))
+        paths.append(f"{key}.{index}" if len(entries) > 1 else key)
+        at = entries[index] if index < len(entries) else {}
+    return paths[0], ".".join(paths)
+
+
+def blamed(error: ScenarioError, settings: Sequence[Setting], raw: Table) -> ScenarioError:
+    """The same error, naming the setting that it concerns; all settings, where the scenario failed with them.
+
+    `raw`: the tables in which they were made.
+    """
     if not settings:
         return error
     place = f"{error.place}"
@@ -217,9 +270,13 @@ def blamed(error: ScenarioError, settings: Sequence[Setting]) -> ScenarioError:
         return ScenarioError(f"{error.path} with {made}", place, error.what, error.remedy)
     setting = concerned[-1]
     remedy = error.remedy
-    if error.what == "unknown key" and place == setting.path.split(".")[0]:
-        remedy = _deeper(place, setting) or remedy
+    if error.what == "unknown key" and _inside(setting.path, place):
+        remedy = _deeper(place, setting, raw) or remedy
+    key, _, value = setting.text.partition("=")
+    tagged = _with_tag(place.rpartition(".")[2], f"={value}")
+    if place == setting.path and error.what.startswith("expected a table") and tagged[0] == ".":
+        remedy = f"write {_option(key + tagged, setting.option)}"
     if not remedy and error.what.startswith("expected a string"):
-        remedy = f"to give text, write --set '{setting.text.partition('=')[0]}=\"..\"'"
+        remedy = f"to give text, write --set '{key}=\"..\"'"
     what = error.what if place == setting.path else f"{place}: {error.what}"
     return ScenarioError(f"{error.path}", setting.place, what, remedy)

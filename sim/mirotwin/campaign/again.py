@@ -12,6 +12,7 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from miro_sim.scenario.settings import option_words
 from mirotwin.campaign.inline import inline
 from mirotwin.campaign.results import About
 from mirotwin.files.command_line import command_line, operand
@@ -30,7 +31,7 @@ def arm_line(about: About, levels: Mapping[str, Any]) -> str:
         settings += level.settings
     image = ["--firmware", operand(firmware)] if firmware else []
     return command_line(
-        "run", operand(scenario), *image, *(word for one in settings for word in ("--set", one))
+        "run", operand(scenario), *image, *(word for one in settings for word in option_words(one))
     )
 
 

@@ -20,7 +20,7 @@ from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, load
-from miro_sim.scenario.settings import EXPECT, OPTION
+from miro_sim.scenario.settings import EXPECT, OPTION, option_words
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN
 from mirotwin.campaign.design import Design, Level, Value
 from mirotwin.campaign.file import CampaignFile, parse, read
@@ -43,7 +43,7 @@ class ScenarioSource(msgspec.Struct, frozen=True):
 class Plan(msgspec.Struct, frozen=True):
     """A campaign that can be run. `scenarios`, `images`: by the names and paths that the file uses.
 
-    `checks`: names of all checks, in the order in which they are met.
+    `checks`: names of all checks, in the order in which they are met. `notes`: what settings left out, a line each.
     """
 
     file: CampaignFile
@@ -51,6 +51,7 @@ class Plan(msgspec.Struct, frozen=True):
     images: Mapping[str, Firmware]
     checks: tuple[str, ...]
     versions: Versions
+    notes: tuple[str, ...] = ()
 
     @property
     def design(self) -> Design:
@@ -120,13 +121,14 @@ def parse_plan(text: str, path: str | Path, settings: Sequence[str] = ()) -> Pla
 
 def plan_of(file: CampaignFile, settings: Sequence[str] = ()) -> Plan:
     """Looks at everything that the runs need. Raises BadInput with the place in the file."""
-    made = tuple((text, f"{OPTION} {text}") for text in settings)
+    made = tuple((text, " ".join(option_words(text))) for text in settings)
     file = msgspec.structs.replace(file, settings=(*file.settings, *made))
     for name in file.design.names:
         if name in OWN or name in FIGURES or name.startswith(CHECK):
             raise BadInput(file.path, name, "is the name of a column of the results", "choose another name")
     plan = Plan(file, _scenarios(file), _images(file), (), versions())
-    return msgspec.structs.replace(plan, checks=tuple(_tried(plan)))
+    tried = _Tried(plan)
+    return msgspec.structs.replace(plan, checks=tuple(tried.checks), notes=tuple(tried.notes))
 
 
 def _scenarios(file: CampaignFile) -> dict[str, ScenarioSource]:
@@ -163,42 +165,61 @@ def _named(file: CampaignFile, default: str, kind: str) -> Iterator[tuple[str, s
                 yield name, level.place
 
 
-def _tried(plan: Plan) -> list[str]:
-    """Tries each level once; returns the names of all checks. Raises BadInput with the place in the file."""
-    design = plan.design
-    first = [factor.levels[0] for factor in design.factors]
-    drawn = [draw.ends()[0] for draw in design.draws]
-    found: dict[str, None] = {}
-    _try(plan, first, drawn, found)
-    for at, factor in enumerate(design.factors):
-        for level in factor.levels[1:]:
-            _try(plan, [*first[:at], level, *first[at + 1 :]], drawn, found)
-    for at, draw in enumerate(design.draws):
-        for value in draw.ends()[1:]:
-            _try(plan, first, [*drawn[:at], value, *drawn[at + 1 :]], found)
-    return list(found)
+class _Tried:
+    """Each level, tried once: the names of all `checks`, and what settings left out. Raises BadInput with the place."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.checks: dict[str, None] = {}
+        self.notes: dict[str, None] = {}
+        design = plan.design
+        first = [factor.levels[0] for factor in design.factors]
+        drawn = [draw.ends()[0] for draw in design.draws]
+        self._try(first, drawn)
+        for at, factor in enumerate(design.factors):
+            for level in factor.levels[1:]:
+                self._try([*first[:at], level, *first[at + 1 :]], drawn)
+        for at, draw in enumerate(design.draws):
+            for value in draw.ends()[1:]:
+                self._try(first, [*drawn[:at], value, *drawn[at + 1 :]])
+
+    def _try(self, levels: Sequence[Level], drawn: Sequence[Value]) -> None:
+        job = self.plan._work(0, levels, drawn, self.plan.design.first_seed)
+        try:
+            ready = prepared(job.origin, job.text, job.settings)
+            check_symbols(ready.steps, image_of(job.firmware.path), job.origin)
+        except BadInput as error:
+            raise _placed(self.plan, levels, drawn, error) from error.__cause__
+        for checks in ready.expected.values():
+            self.checks |= dict.fromkeys(check.name for check in checks)
+        for step in ready.steps:
+            if isinstance(step, CheckStep):
+                self.checks |= dict.fromkeys(check.name for check in step.checks)
+        places = _places(self.plan, levels, drawn)
+        self.notes |= dict.fromkeys(_placed_note(self.plan, places, note) for note in ready.notes)
 
 
-def _try(plan: Plan, levels: Sequence[Level], drawn: Sequence[Value], found: dict[str, None]) -> None:
-    job = plan._work(0, levels, drawn, plan.design.first_seed)
-    try:
-        ready = prepared(job.origin, job.text, job.settings)
-        check_symbols(ready.steps, image_of(job.firmware.path), job.origin)
-    except BadInput as error:
-        raise _placed(plan, levels, drawn, error) from None
-    for checks in ready.expected.values():
-        found |= dict.fromkeys(check.name for check in checks)
-    for step in ready.steps:
-        if isinstance(step, CheckStep):
-            found |= dict.fromkeys(check.name for check in step.checks)
-
-
-def _placed(plan: Plan, levels: Sequence[Level], drawn: Sequence[Value], error: BadInput) -> BadInput:
-    """The same error at the place of the campaign file that made it; the whole line where no single place did."""
+def _places(plan: Plan, levels: Sequence[Level], drawn: Sequence[Value]) -> dict[str, str]:
+    """What says each setting of a run: a place in the campaign's file, or an option."""
     places = dict(plan.file.settings)
     places |= {setting: level.place for level in levels for setting in level.settings}
     for draw, value in zip(plan.design.draws, drawn, strict=True):
         places[draw.setting(value)] = f"random.range.{draw.name}"
+    return places
+
+
+def _placed_note(plan: Plan, places: dict[str, str], note: str) -> str:
+    """The same note at the place of the campaign's file that made the setting."""
+    for setting, place in places.items():
+        head = f"{OPTION} {setting} "
+        if note.startswith(head) and not place.startswith(OPTION):
+            return f"{plan.file.path}: {place}: {setting} {note.removeprefix(head)}"
+    return note
+
+
+def _placed(plan: Plan, levels: Sequence[Level], drawn: Sequence[Value], error: BadInput) -> BadInput:
+    """The same error at the place of the campaign file that made it; the whole line where no single place did."""
+    places = _places(plan, levels, drawn)
     text = f"{error.place}".removeprefix(f"{OPTION} ")
     if f"{error.place}".startswith("--expect "):
         text = EXPECT + f"{error.place}".removeprefix("--expect ")

@@ -17,7 +17,7 @@ from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from miro_sim.periods import Period
-from miro_sim.scenario.file import parse
+from miro_sim.scenario.file import parse_noted
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
 from mirotwin import runner
@@ -27,6 +27,7 @@ from mirotwin.campaign.worker import Outcome, Work
 from mirotwin.checks.expect import Place, expectations_of
 from mirotwin.checks.interface import Check
 from mirotwin.checks.watching import Checks
+from mirotwin.files.tracebacks import show_traceback
 from mirotwin.report.seen import Seen
 from mirotwin.report.summary import Expectation, summarise
 from mirotwin.report.theory import gains_of
@@ -38,11 +39,12 @@ from mirotwin.steps.reading import steps_of
 
 
 class Prepared(msgspec.Struct, frozen=True):
-    """A scenario with its settings made, what it expects, and its steps."""
+    """A scenario with its settings made, what it expects, its steps, and what the settings left out."""
 
     scenario: Scenario
     expected: dict[Place, list[Check]]
     steps: list[Step]
+    notes: tuple[str, ...] = ()
 
 
 @lru_cache(maxsize=16)
@@ -56,8 +58,9 @@ def image_of(path: str) -> Image:
 @lru_cache(maxsize=64)
 def prepared(origin: str, text: str, settings: tuple[str, ...]) -> Prepared:
     """Raises BadInput for a scenario that cannot be run with these settings."""
-    scenario = parse(text, origin, settings)
-    return Prepared(scenario, expectations_of(scenario, origin), steps_of(scenario, origin))
+    scenario, notes = parse_noted(text, origin, settings)
+    expected, steps = expectations_of(scenario, origin), steps_of(scenario, origin)
+    return Prepared(scenario, expected, steps, notes)
 
 
 def run_single(job: Work) -> Outcome:
@@ -65,6 +68,7 @@ def run_single(job: Work) -> Outcome:
     try:
         return _run(job)
     except BadInput as error:
+        show_traceback(error)
         return Outcome(job.run, error=f"{error}")
     except ValueError as error:  # numbers with which nothing can be computed, a part that fails
         return Outcome(job.run, error=f"cannot be run: {error}")

@@ -20,10 +20,12 @@ from typing import Any, cast
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
-from miro_host.parts import PartError, described
+from miro_host.parts import PartError
+from miro_host.raised import raised
 from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
 from mirotwin.checks.interface import Check
+from mirotwin.checks.judges import problem_of_class
 from mirotwin.checks.registry import ALWAYS_ON, CHECKS
 
 Place = tuple[int, int]
@@ -65,11 +67,22 @@ def checks_of_table(
             struct = struct_of(name)
         except PartError as error:
             raise _no_check(origin, place, name, error) from error.__cause__
+        if problem := problem_of_class(struct):
+            raise ScenarioError(origin, place, problem, "repair the check")
         found[name] = check = _check(scenario, origin, place, struct, name, value)
-        objection = "" if check is None else check.objection(end_tick)
+        objection = "" if check is None else _objection(check, origin, place, end_tick)
         if objection:
             raise ScenarioError(origin, place, objection, "give an earlier time, or a longer duration_s")
     return found
+
+
+def _objection(check: Check, origin: str, place: str, end_tick: int) -> str:
+    try:
+        return check.objection(end_tick)
+    except (Exception, SystemExit) as error:
+        raise ScenarioError(
+            origin, place, f"`objection` raised {raised(error)}", "repair the check"
+        ) from error
 
 
 def _no_check(origin: str, place: str, name: str, error: PartError) -> ScenarioError:
@@ -97,8 +110,8 @@ def _check(
         return msgspec.convert({**given, "check": name}, struct)
     except msgspec.ValidationError as error:
         raise _wrong(scenario, origin, place, struct, value, str(error)) from None
-    except Exception as error:  # from the check's own look at its parameters
-        raise ScenarioError(origin, place, f"cannot check its parameters: {described(error)}") from error
+    except (Exception, SystemExit) as error:  # from the check's own look at its parameters
+        raise ScenarioError(origin, place, f"cannot check its parameters: {raised(error)}") from error
 
 
 def _wrong(

@@ -35,6 +35,11 @@ from miro_sim.world.events import Event
 from miro_sim.world.robot import Robot
 
 Kind = Literal["safety", "liveness"]
+EVENTS = (
+    *("sent", "heard", "answer", "received", "transmitted", "frame", "damaged", "command", "fault"),
+    *("reset", "power", "radio", "touch"),
+)
+"""What a judge can hear: the kinds that `HEARS` may name."""
 TICKS_PER_MS = 24_000
 KEPT = 100
 """Failures of a judge that are kept; the others are only counted."""
@@ -109,7 +114,7 @@ class Judge(Generic[C_co]):
     """Judges one robot by one check. `failures`: the first hundred; `failed`: how many there were."""
 
     HEARS: ClassVar[tuple[str, ...]] = ()
-    """Kinds of event that `event` gets: `Event.what` of the robot and of its network's PC. `frame` is a valid frame at
+    """Kinds of event that `event` gets, of `EVENTS`: of the robot and of its network's PC. `frame` is a valid frame at
     the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
 
     def __init__(self, check: C_co, subject: Subject) -> None:
@@ -120,7 +125,9 @@ class Judge(Generic[C_co]):
         self.judged = 0
 
     def fail(self, tick: int, wanted: str, found: str, fault: bool = False) -> None:
-        """Notes a failure at `tick`."""
+        """Notes a failure at `tick`. Raises TypeError for a tick that is not an int."""
+        if not isinstance(tick, int):
+            raise TypeError(f"fail() needs the tick as an int, got {tick!r:.40}")
         self.failed += 1
         if len(self.failures) < KEPT:
             place = (self.subject.network, self.subject.slot)

@@ -23,7 +23,8 @@ from operator import attrgetter
 from typing import Any, TypeVar
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_host.parts import PartError, described
+from miro_host.parts import PartError
+from miro_host.raised import raised
 from miro_sim.periods import Period
 from miro_sim.world.events import Event, of_board
 from miro_sim.world.network import Network
@@ -32,6 +33,7 @@ from miro_sim.world.world import World
 from mirotwin.checks.expect import Place, expectations_of
 from mirotwin.checks.hearing import Hearing
 from mirotwin.checks.interface import Check, Failure, Judge, Subject
+from mirotwin.checks.judges import checked_judge
 from mirotwin.report.summary import Expectation, FirstFailure
 
 T = TypeVar("T")
@@ -129,7 +131,7 @@ class _Watched:
         subject = Subject(robot, network.spec.robots, end_tick, network.robots[0].slot, network.downlink)
         self.network = network
         self.robot = robot
-        self.judges = [self._guarded(check, partial(check.judge, subject)) for check in checks]
+        self.judges = [self._guarded(check, partial(checked_judge, check, subject)) for check in checks]
         self.of_periods = [judge for judge in self.judges if type(judge).period is not Judge.period]
         self.of_times = [judge for judge in self.judges if type(judge).until is not Judge.until]
         self.of_events: dict[str, list[Judge[Any]]] = {}
@@ -225,10 +227,13 @@ class _Watched:
     def _guarded(self, check: Check, call: Callable[[], T]) -> T:
         try:
             return call()
+        except PartError as error:
+            raise PartError(f"{self._named(check)}: {error.what}", error.remedy) from error
         except (Exception, SystemExit) as error:
-            place = f"net{self.network.index}/robot{self.robot.slot}"
-            what = f"{place}: check {check.name!r} cannot judge: {described(error)}"
-            raise PartError(what, "repair the check") from error
+            raise PartError(f"{self._named(check)}: {raised(error)}", "repair the check") from error
+
+    def _named(self, check: Check) -> str:
+        return f"net{self.network.index}/robot{self.robot.slot}: check {check.name!r} cannot judge"
 
 
 def _verdict(name: str, judges: Sequence[Judge[Any]], lost: bool) -> Expectation:

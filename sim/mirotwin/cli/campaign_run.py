@@ -19,8 +19,17 @@ from mirotwin.campaign.running import Tally
 from mirotwin.campaign.seeds import seeds_of
 from mirotwin.campaign.worker import Outcome
 from mirotwin.campaign.workers import Processes, Workers
+from mirotwin.cli.expectations import expect_option
 from mirotwin.cli.options import Place, Whole, choose_engine, engine_option, set_option
-from mirotwin.cli.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, complain, show_line
+from mirotwin.cli.program import (
+    BAD_INPUT,
+    DONE,
+    EXPECTATION_FAILED,
+    FIRMWARE_FAULT,
+    complain,
+    show_line,
+    tell_notes,
+)
 from mirotwin.cli.progress import ProgressBar
 
 LINES = 5
@@ -44,6 +53,7 @@ class SeedRange(click.ParamType[range]):
 @click.option("--out", type=Place(path_type=Path), help="Results. Default: runs/FILE.parquet.")
 @click.option("--seeds", type=SeedRange(), help="First and last seed, instead of those of the file.")
 @set_option("A key of the scenario, for all runs, as `mirotwin run` has it; may be repeated.")
+@expect_option
 @click.option("--jobs", type=Whole(1, 256), help="Processes. Default: one for each core.")
 @click.option("--cluster", metavar="ADDRESS", help="A Dask scheduler whose workers run it: tcp://host:8786.")
 @engine_option
@@ -55,6 +65,7 @@ def run(
     out: Path | None,
     seeds: range | None,
     settings: tuple[str, ...],
+    expected: tuple[str, ...],
     jobs: int | None,
     cluster: str | None,
     engine: str | None,
@@ -75,7 +86,8 @@ def run(
     if jobs is not None and cluster is not None:
         raise click.UsageError("--jobs and --cluster do not go together.")
     require_arrow()
-    plan = load_plan(file, settings)
+    plan = load_plan(file, (*settings, *expected))
+    tell_notes(plan.notes)
     if seeds is not None:
         plan = _with_seeds(plan, seeds)
     results = out or Path("runs") / f"{file.stem}.parquet"
@@ -156,5 +168,10 @@ def _judge(plan: Plan, results: Path) -> int:
 
 
 def _list(verdict: str, first: Sequence[tuple[int, str]]) -> None:
+    """One line for each text; of those that repeat it, only their numbers."""
+    runs: dict[str, list[int]] = {}
     for run, text in first:
-        complain(f"{verdict}: run {run}: {text}" if text else f"{verdict}: run {run}")
+        runs.setdefault(text, []).append(run)
+    for text, numbers in runs.items():
+        which = f"run{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
+        complain(f"{verdict}: {which}: {text}" if text else f"{verdict}: {which}")

@@ -24,20 +24,52 @@ LINES = 5
 """Failures of one check that are listed."""
 
 
+def is_in_file(text: str) -> bool:
+    """Whether `--expect` names a function in a file: FILE.py:FUNCTION."""
+    path, _, function = text.rpartition(":")
+    return path.endswith(".py") and function.isidentifier()
+
+
+def refuse_files(given: Sequence[str]) -> None:
+    """Raises UsageError for a check in a file: only firmware on a bare processor is judged by one."""
+    for text in given:
+        if is_in_file(text):
+            what = "a check in a file is for firmware on a bare processor"
+            remedy = "a check of a run is in an installed distribution, and named by its key"
+            raise click.UsageError(f"--expect {text}: {what}; {remedy}.")
+
+
+def as_setting(text: str) -> str:
+    """`--expect KEY=VALUE` as the setting that it stands for; a KEY alone is a check with its defaults."""
+    return f"{EXPECT}{text}" if "=" in text else f"{EXPECT}{text}=true"
+
+
 def _as_settings(ctx: click.Context, param: click.Parameter, given: Sequence[str]) -> tuple[str, ...]:
-    return tuple(EXPECT + text for text in given)
+    refuse_files(given)
+    return tuple(map(as_setting, given))
 
 
 def expect_option(command: Command) -> Command:
     """Gives the command the expectations as settings."""
+    return _option(command, _as_settings)
+
+
+def plain_expect_option(command: Command) -> Command:
+    """The same as they were typed, for a command that also plays cases of a bare processor."""
+    return _option(
+        command, None, " For a case of a bare processor: FILE.py:FUNCTION, if its check is in a file."
+    )
+
+
+def _option(command: Command, callback: Callable[..., Any] | None, more: str = "") -> Command:
     return click.option(
         "--expect",
         "expected",
-        metavar="KEY=VALUE",
+        metavar="KEY[=VALUE]",
         multiple=True,
-        callback=_as_settings,
+        callback=callback,
         help="A check of the run: a key of the scenario's [expect], such as tracks_within_cm=3; may be repeated. Exit"
-        " code 1 when one fails.",
+        " code 1 when one fails." + more,
     )(command)
 
 

@@ -19,8 +19,10 @@ from miro_exact.seed import MAX_SEED
 from miro_host.parts import PartError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import Image
+from miro_sim.scenario.file import changed
 from mirotwin.checks.expect import expectations_of
 from mirotwin.cli.debug import sources_of, sources_option
+from mirotwin.cli.expectations import as_setting, refuse_files
 from mirotwin.cli.fuzz_bare import (
     BareAsked,
     bare_court,
@@ -97,11 +99,12 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
     help="Folder of recordings, stream files, captures and inputs of earlier campaigns to begin with.",
 )
 @click.option(
-    "--check",
+    "--expect",
     "checks",
-    metavar="NAME[=VALUE]",
+    metavar="KEY[=VALUE]",
     multiple=True,
-    help="A check that judges each input that found something new, as in [expect]; may be repeated.",
+    help="A check that judges each input that found something new, as for `run`; may be repeated. With --bare: a check"
+    " by its name, or FILE.py:FUNCTION.",
 )
 @click.option(
     "--covering", metavar="SYMBOL", help="Look for an input that reaches this function, and end with it."
@@ -263,12 +266,13 @@ def _run(campaign: Campaign, image: Image, asked: Asked) -> int:
                 progress.show, INTERRUPTED_S if isinstance(error, KeyboardInterrupt) else 1.0
             )
         except PartError as error:
-            stopped = BadInput("", "--check", f"{error.what}; the campaign has ended", error.remedy)
+            stopped = BadInput("", "--expect", f"{error.what}; the campaign has ended", error.remedy)
+            stopped.__cause__ = error
         except BadInput as error:  # of the engine: what was found until then is told first
             stopped = error
             with suppress(BadInput, PartError):
                 left = campaign.finish(progress.show, INTERRUPTED_S)
-    ended = Ended(left=left, complete=stopped is None)
+    ended = Ended(left=left, complete=stopped is None, checks=asked.checks)
     code = report(campaign, image, asked.out, asked.covering, ended, asked.quiet)
     if stopped is not None:
         raise stopped
@@ -284,13 +288,12 @@ def _teller(quiet: bool) -> Any:
 
 
 def _expected(checks: tuple[str, ...]) -> dict[str, Any]:
-    """The checks of --check as a table. Raises BadInput for one that there is not, or with wrong parameters."""
+    """The checks of --expect as a table. Raises BadInput for one that there is not, or with wrong parameters."""
     if not checks:
         return {}
-    settings = tuple(f"expect.{text}" if "=" in text else f"expect.{text}=true" for text in checks)
-    scenario = silent_scenario(settings)
-    expectations_of(scenario, "--check")
-    return dict(scenario.expect)
+    refuse_files(checks)
+    settings = [as_setting(text) for text in checks]
+    return dict(changed(silent_scenario(()), "fuzz", settings, expectations_of).expect)
 
 
 def _covering(symbol: str | None, image: Image) -> Covering | None:

@@ -37,7 +37,7 @@ class BareAsked(msgspec.Struct, frozen=True, kw_only=True):
     baud: int | None
     boot_ms: int | None
     protocol: str | None
-    check_all: bool
+    expect_all: bool
 
 
 def bare_fuzz_options(command: Command) -> Command:
@@ -51,7 +51,7 @@ def bare_fuzz_options(command: Command) -> Command:
         ("--boot-ms", {"type": Whole(1, 60_000), "metavar": "MS"},
          "With --bare: time to start up, unless it sleeps earlier. Default 200."),
         ("--protocol", {"metavar": "NAME[:KEY=VALUE,..]"}, "With --bare: the format that makes frames of bodies."),
-        ("--check-all", {"is_flag": True}, "With --bare: --check judges each input, not only those that are new."),
+        ("--expect-all", {"is_flag": True}, "With --bare: --expect judges each input, not only those that are new."),
     )  # fmt: skip
     for name, settings, text in reversed(words):
         command = click.option(name, help=text, **settings)(command)
@@ -84,16 +84,16 @@ def bare_spec(
 ) -> TargetSpec:
     """What the processes of the engine run."""
     if len(checks) > 1:
-        raise click.UsageError(f"{_BARE} takes one --check.")
-    if asked.check_all and not checks:
-        raise click.UsageError("--check-all needs a --check.")
+        raise click.UsageError(f"{_BARE} takes one --expect.")
+    if asked.expect_all and not checks:
+        raise click.UsageError("--expect-all needs an --expect.")
     parameters = {"crystal_hz": asked.crystal, "boot_ms": asked.boot_ms}
     return TargetSpec(
         board="bare",
         image=image,
         input=kind,
         protocol=asked.protocol or "",
-        check=checks[0] if asked.check_all else "",
+        check=checks[0] if asked.expect_all else "",
         baud=asked.baud or 0,
         parameters={name: value for name, value in parameters.items() if value is not None},
         engine=engine,
@@ -130,17 +130,19 @@ def is_bare_case(path: str | Path) -> bool:
     return stream.read(path).header.bare is not None
 
 
-def replay_bare_case(path: str, firmware: str | None, check: str | None) -> int:
+def replay_bare_case(path: str, firmware: str | None, checks: tuple[str, ...]) -> int:
     """`mirotwin replay` of such a file; the exit code is that of its check. Raises BadInput without --firmware.
 
-    `check`: as of --check, for a case that names one that is in a file.
+    `checks`: those of --expect, at most one, for a case that names one that is in a file.
     """
     from mirotwin.fuzz.bare_case import replay_bare
 
     if firmware is None:
         remedy = "give --firmware IMAGE.ihx"
         raise BadInput(path, "", "is for a bare processor, which has no firmware of its own", remedy)
-    verdict = replay_bare(path, load_image(firmware, SPACE_BYTES), check)
+    if len(checks) > 1:
+        raise BadInput(path, "--expect", "a case of a bare processor has one check", "give one")
+    verdict = replay_bare(path, load_image(firmware, SPACE_BYTES), checks[0] if checks else None)
     if verdict.failed or verdict.code == DIVERGENCE:
         complain(verdict.line)
     else:
@@ -149,7 +151,7 @@ def replay_bare_case(path: str, firmware: str | None, check: str | None) -> int:
 
 
 def check_given(path: Path, checks: tuple[str, ...]) -> str | None:
-    """The one of --check that a case names, if any."""
+    """The one of --expect that a case names, if any."""
     from mirotwin.fuzz.bare_case import check_of_case
 
     named = check_of_case(path)
@@ -157,7 +159,7 @@ def check_given(path: Path, checks: tuple[str, ...]) -> str | None:
 
 
 def problem_of_bare_case(path: Path, image: Image, check: str | None) -> str:
-    """Why a case fails on `image`, or the empty string. `check`: as of --check, for a case that names it."""
+    """Why a case fails on `image`, or the empty string. `check`: as of --expect, for a case that names it."""
     from mirotwin.fuzz.bare_case import replay_bare
 
     verdict = replay_bare(path, image, check)

@@ -37,7 +37,7 @@ TOGETHER = ("image", "cases", "engine", "quiet", "bare", "checks")
 def regress(folder: Path, image: Image, engine: str | None, quiet: bool, checks: tuple[str, ...] = ()) -> int:
     """Runs all cases of a folder on `image`; returns the exit code: 1 where one fails, 2 where one cannot be run.
 
-    `checks`: those of --check, for cases of a bare processor that name one.
+    `checks`: those of --expect, for cases of a bare processor that name one.
     """
     cases = cases_in(folder)
     failed, unread = 0, 0
@@ -70,7 +70,7 @@ def regress(folder: Path, image: Image, engine: str | None, quiet: bool, checks:
     show_line(f"{count}: {len(cases) - failed - unread} passed, {failed} failed{unable}")
     if unused:
         remedy = "leave it out, or name the one that the cases have in [expect]"
-        raise BadInput(folder, OPTION, f"no case is judged by --check {sorted(unused)[0]}", remedy)
+        raise BadInput(folder, OPTION, f"no case is judged by --expect {sorted(unused)[0]}", remedy)
     return BAD_INPUT if unread else EXPECTATION_FAILED if failed else DONE
 
 

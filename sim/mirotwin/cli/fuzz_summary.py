@@ -6,6 +6,7 @@ What belongs here: words, files of the whole campaign, and the exit code. What d
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -15,6 +16,7 @@ from miro_robot.image import Image
 from miro_robot.inspect.coverage import branch_share, line_share
 from miro_robot.inspect.lcov import Tracefile
 from mirotwin.cli.console import show
+from mirotwin.cli.expectations import is_in_file
 from mirotwin.cli.fuzz_progress import clock, counted
 from mirotwin.cli.program import DONE, EXPECTATION_FAILED, complain, show_line
 from mirotwin.files import command_line
@@ -27,10 +29,14 @@ SUMMARY = "summary.json"
 
 
 class Ended(msgspec.Struct, frozen=True):
-    """`left`: inputs that were not looked at; `complete`: whether it came to the end of its time."""
+    """`left`: inputs that were not looked at; `complete`: whether it came to the end of its time.
+
+    `checks`: those of --expect.
+    """
 
     left: int
     complete: bool
+    checks: tuple[str, ...] = ()
 
 
 def report(
@@ -58,7 +64,7 @@ def report(
         show_line(f"{', '.join(campaign.expected)}: judged {counted(campaign.judged, 'input')}")
     if finds.unrepeated:
         complain(f"{counted(finds.unrepeated, 'input')} that the engine saw failing did not fail again")
-    _print_finds(campaign, out, image)
+    _print_finds(campaign, out, image, ended.checks)
     if not quiet:
         show_line(f"written to {out}")
     missed = covering is not None and _print_covering(campaign, covering, image)
@@ -72,32 +78,35 @@ def never_reached(tracefile: Tracefile) -> list[str]:
     )
 
 
-def _print_finds(campaign: Campaign, out: Path, image: Image) -> None:
+def _print_finds(campaign: Campaign, out: Path, image: Image, checks: Sequence[str]) -> None:
     finds = campaign.finds
     show_line(counted(len(finds.confirmed), "find"))
     for find in finds.confirmed:
-        _print_find(find, finds.more[find.name], out, image)
+        _print_find(find, finds.more[find.name], out, image, checks)
     if finds.unconfirmed:
         show_line(
             f"{len(finds.unconfirmed)} not confirmed: wrong on the target, right in a World; kept in"
             f" {out / 'unconfirmed'}"
         )
         for find in finds.unconfirmed:
-            _print_find(find, finds.more[find.name], out, image)
+            _print_find(find, finds.more[find.name], out, image, checks)
 
 
-def _print_find(find: Find, more: int, out: Path, image: Image) -> None:
+def _print_find(find: Find, more: int, out: Path, image: Image, checks: Sequence[str]) -> None:
     where = f" in {find.function}" if find.function else ""
     again = f"; {counted(more, 'more input')}" if more else ""
     before, after = find.sizes
     show_line(f"  {find.name}{where}: {find.verdict} ({after} bytes, found with {before}{again})")
-    show_line(f"    {replay_line(out / find.folder / f'{find.name}.stream', image)}")
+    in_file = next(
+        (text for text in checks if is_in_file(text) and text.rpartition(":")[2] == find.check), ""
+    )
+    show_line(f"    {replay_line(out / find.folder / f'{find.name}.stream', image, in_file)}")
 
 
-def replay_line(stream: Path, image: Image) -> str:
-    """The command that plays it again."""
+def replay_line(stream: Path, image: Image, in_file: str = "") -> str:
+    """The command that plays it again. `in_file`: the check of a case that is in a file, which no case names."""
     own = image.path.resolve() == image_path().resolve()
-    return command_line.replay_line(stream, None if own else image.path)
+    return command_line.replay_line(stream, None if own else image.path, in_file)
 
 
 def _print_covering(campaign: Campaign, symbol: str, image: Image) -> bool:

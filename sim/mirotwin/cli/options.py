@@ -161,4 +161,4 @@ def plain_parameters(label: str, done: str = "run") -> Iterator[None]:
         what = f"cannot be {done}: {error}; the parameters are far outside those of a real robot"
         raise BadInput(label, "", what) from None
     except PartError as error:
-        raise BadInput(label, "", f"cannot be {done}: {error.what}", error.remedy) from None
+        raise BadInput(label, "", f"cannot be {done}: {error.what}", error.remedy) from error

@@ -215,6 +215,9 @@ class Program(LazyGroup):
             complain(f"error: {error.format_message()}")
             return BAD_INPUT
         except BadInput as error:
+            from mirotwin.files.tracebacks import show_traceback  # only an error needs it
+
+            show_traceback(error)
             complain(f"error: {error}")
             return BAD_INPUT
         except (ReaderGone, BrokenPipeError):

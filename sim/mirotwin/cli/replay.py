@@ -20,7 +20,13 @@ from mirotwin.cli.compare_options import Asked, compare_options
 from mirotwin.cli.console import show
 from mirotwin.cli.debug import checked_sources, sources_option
 from mirotwin.cli.differences import differences_as_json, print_differences, print_firmwares, print_json
-from mirotwin.cli.expectations import expect_option, expectations_text, report_failures
+from mirotwin.cli.expectations import (
+    as_setting,
+    expectations_text,
+    plain_expect_option,
+    refuse_files,
+    report_failures,
+)
 from mirotwin.cli.fuzz_bare import is_bare_case, replay_bare_case
 from mirotwin.cli.options import (
     Place,
@@ -53,10 +59,7 @@ from mirotwin.replay.firmwares import FirmwareDifference
 @click.option("--seed", type=Whole(0, MAX_SEED), help="Master seed instead of the recorded one.")
 @set_option("A key to set in the recorded scenario (or the default one, for a text stream), as for `run`.")
 @compare_options
-@expect_option
-@click.option(
-    "--check", metavar="FILE.py:FUNCTION", help="The file of the check that a case of --bare names."
-)
+@plain_expect_option
 @engine_option
 @click.option("--all", "everything", is_flag=True, help=f"List all frames, not only the first {SHOWN}.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no lists of frames or differences.")
@@ -70,7 +73,6 @@ def replay(
     settings: tuple[str, ...],
     asked: Asked,
     expected: tuple[str, ...],
-    check: str | None,
     engine: str | None,
     everything: bool,
     quiet: bool,
@@ -87,7 +89,7 @@ def replay(
 
     A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
     1, or 3 for a firmware fault; 0 if other firmware or settings cure it, 4 if it does not fail again without them.
-    A case of `mirotwin fuzz --bare` needs --firmware, and --check if its check is in a file.
+    A case of `mirotwin fuzz --bare` needs --firmware, and --expect FILE.py:FUNCTION if its check is in a file.
 
     Where --expect is given, that decides: a difference is only told, and the exit code is 1 if a check fails, else 0.
     What the recorded scenario expects is judged too, but a difference goes before it.
@@ -95,14 +97,14 @@ def replay(
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
     if is_bare_case(file):
-        _check_bare(file, asked, (*settings, *expected), seed)
+        _check_bare(file, asked, settings, seed)
         choose_engine(engine)
-        return replay_bare_case(file, firmware, check)
-    if check is not None:
-        raise BadInput(file, "--check", "is no case of a bare processor", "leave it out")
+        return replay_bare_case(file, firmware, expected)
+    refuse_files(expected)
+    settings = (*settings, *map(as_setting, expected))
     if stack_from is not None and firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
-    job, image = load_job(file, firmware, engine, (*settings, *expected), seed, stack_from)
+    job, image = load_job(file, firmware, engine, settings, seed, stack_from)
     if asked.given and not job.recorded:
         raise BadInput(file, asked.given, "a text stream holds nothing to compare with", "leave it out")
     images = load_images(lines_from, job.image)
@@ -135,7 +137,7 @@ def replay(
         show(expectations_text(checks.verdicts()))
     faults = report_faults(world)
     differs = _verdict(job, asked, periods, replayed, found, apart)
-    decides = any(".expect." in f".{one}" for one in (*settings, *expected))
+    decides = any(".expect." in f".{one}" for one in settings)
     code = (faults or failed) if decides else (differs or faults or failed)
     if asked.as_json:
         compared = {
@@ -163,7 +165,7 @@ def _check_case(file: str, asked: Asked) -> None:
 
 def _check_bare(file: str, asked: Asked, settings: tuple[str, ...], seed: int | None) -> None:
     """Raises BadInput for options that need the robot's world."""
-    given = asked.given or ("--seed" if seed is not None else "--set and --expect" if settings else "")
+    given = asked.given or ("--seed" if seed is not None else "--set" if settings else "")
     if given:
         raise BadInput(file, given, "is not for a case of a bare processor", "leave it out")
 

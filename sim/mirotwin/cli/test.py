@@ -11,6 +11,7 @@ import click
 from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
 from mirotwin.cases.artifacts import CASE, FIRMWARE, PAGE, replay_line, report_line
+from mirotwin.cli.expectations import expect_option
 from mirotwin.cli.options import (
     Place,
     Whole,
@@ -20,7 +21,7 @@ from mirotwin.cli.options import (
     load_image,
     set_option,
 )
-from mirotwin.cli.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, show_line
+from mirotwin.cli.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, show_line, tell_notes
 from mirotwin.files.outputs import check_file, check_not_input, whole_file
 from mirotwin.report.junit import TestCase, junit_xml
 from mirotwin.steps.collecting import SUFFIX, collect
@@ -44,6 +45,7 @@ CODES: dict[Verdict, int] = {
     "--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Master seed of all noise."
 )
 @set_option("A key to set in each scenario, as for `run`; may be repeated.")
+@expect_option
 @firmware_option("Image to run instead of the robot's own.")
 @engine_option
 @click.option(
@@ -64,6 +66,7 @@ def test(
     word: str,
     seed: int,
     settings: tuple[str, ...],
+    expected: tuple[str, ...],
     firmware: str | None,
     engine: str | None,
     junit: Path | None,
@@ -89,6 +92,8 @@ def test(
         check_file(junit, "--junit")
         check_not_input(junit, "--junit", *chosen)
     image = load_image(firmware)
+    settings = (*settings, *expected)
+    left_out: dict[str, None] = {}
     outcomes: list[Outcome] = []
     times_s: list[float] = []
     for file in chosen:
@@ -97,6 +102,8 @@ def test(
         outcome = run_test(file, image, seed, settings, artifacts, again)
         times_s.append(time.perf_counter() - began_s)
         outcomes.append(outcome)
+        tell_notes(note for note in outcome.left_out if note not in left_out)
+        left_out |= dict.fromkeys(outcome.left_out)
         _show(outcome, quiet, again)
         if pages and outcome.left:
             _page(outcome.left)

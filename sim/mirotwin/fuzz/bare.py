@@ -9,12 +9,15 @@ for ever, 10 ms (at 24 MHz) after the last character.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
-from miro_protocol.protocol import Damage, Protocol
+from miro_host.raised import at_place, defined_at, raised_at
+from miro_host.raised import described as described_error
+from miro_protocol.protocol import Damage, Frame, Protocol
 from miro_protocol.stream_events import Deed
 from miro_protocol.transmission import Transmission
 from miro_robot.bare.machine import CRYSTAL_HZ
@@ -36,6 +39,8 @@ NO_FAULT_CODE, NEVER_SLEEPS_CODE, CHECK_CODE = 1, 2, 3
 MOST_OF_A_BODY = 32
 """Bytes of a body in a seed; the harness's program has a form for longer ones, which a fuzzer finds."""
 _BITS = 10
+
+T = TypeVar("T")
 
 
 class BareTarget(HarnessTarget):
@@ -77,13 +82,12 @@ class BareTarget(HarnessTarget):
 
     def _repaired(self, body: bytes) -> bytes:
         """The characters of a frame. Raises BadInput where the wire format fails itself."""
-        if self.protocol is None:
+        protocol = self.protocol
+        if protocol is None:
             return body
-        try:
-            return bytes(memoryview(self.protocol.repair(body, self.program.frames - 1)))
-        except (Exception, SystemExit) as error:
-            what = f"repair() of {type(self.protocol).__name__} raised {type(error).__name__}: {error}"
-            raise BadInput("", "--protocol", what, "let it return bytes for any body") from error
+        return _asked(
+            protocol.repair, lambda: bytes(memoryview(protocol.repair(body, self.program.frames - 1)))
+        )
 
     def run(self, data: Any) -> int:
         ended = self.play(data)
@@ -142,25 +146,48 @@ class BareTarget(HarnessTarget):
         return "\n".join(self._line(one) for one in self.happenings(data))
 
     def _line(self, one: Transmission | Deed) -> str:
-        if self.protocol is None or not isinstance(one, Transmission):
+        protocol = self.protocol
+        if protocol is None or not isinstance(one, Transmission):
             return described(one)
-        said = [
-            f"damage ({part.reason})" if isinstance(part, Damage) else f"frame {part.body.hex(' ')}"
-            for part in self.protocol.decode(one.data)
-        ]
+        said = _asked(protocol.decode, lambda: [_shown(part) for part in protocol.decode(one.data)])
         return f"{described(one)}  # {'; '.join(said)}"
 
     def seeds(self) -> list[bytes]:
         """Inputs to begin with: the protocol's samples, one by one and all together."""
-        samples = (b"\0", b"A", bytes(range(8))) if self.protocol is None else self.protocol.samples()
+        protocol = self.protocol
+        samples: tuple[bytes, ...] = (b"\0", b"A", bytes(range(8)))
+        if protocol is not None:
+            samples = _asked(
+                protocol.samples, lambda: tuple(bytes(memoryview(body)) for body in protocol.samples())
+            )
         if self.input == "bytes":
-            each = [body if self.protocol is None else self.protocol.repair(body) for body in samples]
+            each = [self._repaired_sample(body) for body in samples]
         else:
             each = [frame_input(body, self.input) for body in samples]
         return list(dict.fromkeys([*each, b"".join(each)]))
 
+    def _repaired_sample(self, body: bytes) -> bytes:
+        protocol = self.protocol
+        if protocol is None:
+            return body
+        return _asked(protocol.repair, lambda: bytes(memoryview(protocol.repair(body))))
+
     def __repr__(self) -> str:
         return f"BareTarget({self.image.path}, input={self.input!r}, {self.line})"
+
+
+def _asked(method: Callable[..., object], call: Callable[[], T]) -> T:
+    """What a protocol's method gives. Raises BadInput where it fails itself."""
+    try:
+        return call()
+    except (Exception, SystemExit) as error:
+        name = method.__name__
+        what = at_place(f"`{name}` failed: {described_error(error)}", raised_at(error) or defined_at(method))
+        raise BadInput("", "--protocol", what, f"let `{name}` do what miro_protocol.protocol says") from error
+
+
+def _shown(part: Frame | Damage) -> str:
+    return f"damage ({part.reason})" if isinstance(part, Damage) else f"frame {part.body.hex(' ')}"
 
 
 def frame_input(body: bytes, input: str) -> bytes:

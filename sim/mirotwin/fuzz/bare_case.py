@@ -114,7 +114,7 @@ def check_of_case(path: str | Path) -> str:
 
 
 def replay_bare(path: str | Path, image: Image, check: str | None = None) -> Verdict:
-    """Plays a case on `image`, from power-on. `check`: as of --check, where the case names one that is in a file.
+    """Plays a case on `image`, from power-on. `check`: as of --expect, where the case names one that is in a file.
 
     Raises BadInput for what is no such case.
     """

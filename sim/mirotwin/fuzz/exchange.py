@@ -19,8 +19,8 @@ It is named as `mycheck.py:level_is_kept`, or, where a distribution has it, by a
 from __future__ import annotations
 
 import importlib.util
-import traceback
 from collections.abc import Callable
+from difflib import get_close_matches
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_host.parts import described
+from miro_host.raised import at_place, defined_at, raised
 from miro_robot.faults import FirmwareFault
 from miro_robot.harness.heard_bus import HeardBus
 from miro_robot.image import Image
@@ -38,7 +38,7 @@ from miro_robot.image.variables import Variable, Variables, find_variable
 from miro_robot.inspect.values import bytes_at
 from miro_robot.mcs51.cpu import Cpu
 
-OPTION = "--check"
+OPTION = "--expect"
 GROUP = "mirotwin.bare_checks"
 
 
@@ -138,13 +138,11 @@ class NamedCheck(msgspec.Struct, frozen=True):
         except BadInput:
             raise
         except (Exception, SystemExit) as error:
-            last = traceback.extract_tb(error.__traceback__)[-1]
-            place = f"{Path(last.filename).name}:{last.lineno}"
-            what = f"raised {described(error)} at {place}"
+            what = f"raised {raised(error)}"
             raise BadInput("", f"{OPTION} {self.text}", what, "repair the check") from error
         if found is None or isinstance(found, str):
             return None if found is None else " ".join(found.split()) or "failed"
-        what = f"returned {found!r:.40}"
+        what = at_place(f"returned {found!r:.40}", defined_at(self.function))
         raise BadInput("", f"{OPTION} {self.text}", what, "return None, or what is wrong as text")
 
 
@@ -164,12 +162,12 @@ def installed_check(name: str) -> NamedCheck:
     entries = list(entry_points(group=GROUP, name=name))
     if not entries:
         names = sorted(entry.name for entry in entry_points(group=GROUP))
-        remedy = f"give FILE.py:FUNCTION{''.join(f', {one}' for one in names)}"
+        remedy = f"{_nearest(name, names)}give FILE.py:FUNCTION{''.join(f', {one}' for one in names)}"
         raise BadInput("", OPTION, f"there is no check {name!r} for a bare processor", remedy)
     try:
         found = entries[0].load()
     except (Exception, SystemExit) as error:
-        what = f"check {name!r} ({entries[0].value}) cannot be imported: {described(error)}"
+        what = f"check {name!r} ({entries[0].value}) cannot be imported: {raised(error)}"
         raise BadInput("", OPTION, what, "repair or uninstall it") from error
     if not callable(found):
         raise BadInput("", OPTION, f"check {name!r} ({entries[0].value}) is no function", "name a function")
@@ -186,8 +184,13 @@ def _module(path: str, text: str) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
-        raise BadInput(path, OPTION, f"cannot be run: {described(error)}", "repair it") from error
+        raise BadInput(path, OPTION, f"cannot be run: {raised(error)}", "repair it") from error
     return module
+
+
+def _nearest(name: str, names: list[str]) -> str:
+    close = get_close_matches(name, names, n=1)
+    return f"did you mean {close[0]}? " if close else ""
 
 
 def _callable(module: ModuleType, name: str, text: str) -> Check:
@@ -197,5 +200,5 @@ def _callable(module: ModuleType, name: str, text: str) -> Check:
     names = [
         key for key, value in vars(module).items() if callable(value) and value.__module__ == module.__name__
     ]
-    choices = f"it has {', '.join(names)}" if names else "it has none"
+    choices = f"{_nearest(name, names)}it has {', '.join(names)}" if names else "it has none"
     raise BadInput(text.rpartition(":")[0], OPTION, f"there is no function {name!r}", choices)

@@ -12,6 +12,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_host.parts import PartError, Registry
+from miro_host.raised import raised
 from miro_protocol.protocol import Protocol
 
 OPTION = "--protocol"
@@ -30,7 +31,7 @@ def protocol_named(text: str) -> Protocol:
     try:
         found = PROTOCOLS.find(name)
     except PartError as error:
-        raise BadInput("", OPTION, error.what, error.remedy) from None
+        raise BadInput("", OPTION, error.what, error.remedy) from error
     try:
         given = tomllib.loads(f"given = {{{parameters}}}")["given"]
     except tomllib.TOMLDecodeError:
@@ -41,3 +42,6 @@ def protocol_named(text: str) -> Protocol:
     except msgspec.ValidationError as error:
         keys = ", ".join(field.name for field in msgspec.structs.fields(found)) or "no parameters"
         raise BadInput("", OPTION, f"{text}: {error}", f"{name} has {keys}") from None
+    except (Exception, SystemExit) as error:  # from the protocol's own check of its parameters
+        what = f"{text}: cannot check its parameters: {raised(error)}"
+        raise BadInput("", OPTION, what, "repair the protocol") from error

@@ -19,6 +19,7 @@ from miro_host.parts import PartError
 from miro_robot.image import Image
 from miro_sim.scenario.file import ScenarioText, load
 from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.settings import option_words
 from miro_sim.world.world import World
 from mirotwin.cases.artifacts import clear, leave, report_line
 from mirotwin.cases.case import case_text
@@ -28,6 +29,7 @@ from mirotwin.checks.registry import ALWAYS_ON
 from mirotwin.checks.watching import Checks
 from mirotwin.files.command_line import command_line, operand
 from mirotwin.files.outputs import whole_file
+from mirotwin.files.tracebacks import show_traceback
 from mirotwin.steps.left_behind import SCENARIO, case_of_run, case_of_step
 from mirotwin.steps.plan import check_symbols
 from mirotwin.steps.player import Player
@@ -42,6 +44,7 @@ class Outcome(msgspec.Struct, frozen=True):
     """What came of a file. `lines`: each failure as one line, none where it passed; `notes`: what else there is to say.
 
     `error`: it could not be run. `done` of `steps`; `tick`: where the run ended. `left`: the folder with its case.
+    `left_out`: what settings left out of the scenario, a line each.
     """
 
     path: str
@@ -55,13 +58,14 @@ class Outcome(msgspec.Struct, frozen=True):
     digest: str = ""
     firmware_sha256: str = ""
     left: str = ""
+    left_out: tuple[str, ...] = ()
 
 
 def reproduce_line(path: str, seed: int, firmware: str | None, settings: Sequence[str]) -> str:
     """The command that gives the verdict again."""
     words = ["--firmware", operand(firmware)] if firmware else []
     for setting in settings:
-        words += ["--set", setting]
+        words += option_words(setting)
     return command_line("test", operand(path), "--seed", f"{seed}", *words)
 
 
@@ -95,12 +99,14 @@ def run_test(
             clear(folder, SCENARIO)
         return _run(path, image, seed, settings, folder, again)
     except (DomainError, PartError) as error:
+        show_traceback(error)
         what = f"cannot be run: {error}"
         return Outcome(path, "error", (f"{BadInput(path, '', what)}",), seed=seed)
     except OSError as error:
         what = f"cannot leave anything in {folder}: {error.strerror or error}"
         return Outcome(path, "error", (f"{BadInput(path, '', what)}",), seed=seed)
     except BadInput as error:
+        show_traceback(error)
         return Outcome(path, "error", (f"{error}",), seed=seed)
 
 
@@ -142,6 +148,7 @@ def _run(
         digest=world.digest,
         firmware_sha256=image.sha256 or "",
         left=str(folder) if folder is not None and lines else "",
+        left_out=text.notes,
     )
 
 

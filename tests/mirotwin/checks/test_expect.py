@@ -165,8 +165,13 @@ class SlowJudge(Judge):
 
 
 class Loud(Check, frozen=True, kw_only=True, tag="loud"):
+    KIND = "safety"
+
     def __post_init__(self):
         raise RuntimeError("too loud")
+
+    def judge(self, subject):
+        return SlowJudge(self, subject)
 '''
 
 

@@ -139,7 +139,8 @@ def test_what_a_check_raises_is_told_with_robot_and_name() -> None:
     Checks(world, {(0, 1): [Raising()]})
     send(world, [team(1, 10, 10)])
     with pytest.raises(
-        PartError, match=r"^net0/robot1: check 'raising' cannot judge: KeyError: 'speed'; repair"
+        PartError,
+        match=r"^net0/robot1: check 'raising' cannot judge: KeyError: 'speed' \(.*:\d+ in RaisingJudge.event\)",
     ):
         world.run_to(10_000_000)
 

@@ -131,7 +131,7 @@ def test_failed_checks_are_exit_code_1_beyond_the_share_that_may(here):
     (here / "c.toml").write_text(text)
     result = called("c.toml", "--jobs", 1)
     assert result.exit_code == 1
-    assert "failed: run 0: tracks_within_cm" in result.output
+    assert "failed: runs 0, 1: tracks_within_cm" in result.output
     (here / "c.toml").write_text(f"allowed_failed_share = 1.0\n{text}")
     assert called("c.toml", "--jobs", 1, "--force").exit_code == 0
 

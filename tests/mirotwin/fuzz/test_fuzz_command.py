@@ -75,7 +75,7 @@ def test_a_function_that_no_input_reaches_is_said(mirotwin, engines, tmp_path):
 
 
 def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
-    arguments = ("--check", "wheels_within_m_s={limit_m_s=0.01, overshoot_m_s=0.0}", "--minimise", "1s")
+    arguments = ("--expect", "wheels_within_m_s={limit_m_s=0.01, overshoot_m_s=0.0}", "--minimise", "1s")
     code, out, _ = mirotwin("fuzz", "--time", "3s", *arguments, "--out", tmp_path / "out")
     assert code == 1
     assert "wheels_within_m_s: judged " in out
@@ -102,9 +102,9 @@ def test_a_check_that_raises_ends_the_campaign_with_its_name(mirotwin, engines, 
     source = BROKEN.replace('RuntimeError("oh")', error)
     install(tmp_path / "dist", "broken", "1.0", parts, "checks", **{f"broken_check_{len(error)}": source})
     monkeypatch.syspath_prepend(str(tmp_path / "dist"))
-    code, _, err = mirotwin("fuzz", "--time", "20s", "--check", "broken", "--out", tmp_path / "out")
+    code, _, err = mirotwin("fuzz", "--time", "20s", "--expect", "broken", "--out", tmp_path / "out")
     assert code == 2
-    assert "--check: " in err
+    assert "--expect: " in err
     assert f"check 'broken' cannot judge: {error.partition('(')[0]}: " in err
     assert "; the campaign has ended; repair the check" in err
     assert engines[0].stopped
@@ -148,8 +148,8 @@ def test_plain_lines_where_stderr_is_no_terminal(tmp_path):
         (["--jobs", "0"], "--jobs"),
         (["--slot", "3"], "--slot 3 does not exist among 3 robots; give 0 to 2."),
         (["--covering", "motion_of"], "there is no such function; did you mean "),
-        (["--check", "no_fualt"], "there is no such check; did you mean no_fault?"),
-        (["--check", "settles_within_s"], "within_s is missing"),
+        (["--expect", "no_fualt"], "there is no such check; did you mean no_fault?"),
+        (["--expect", "settles_within_s"], "within_s is missing"),
         (["--input", "words"], "--input"),
         (["nowhere.ihx"], "nowhere.ihx: there is no such file"),
         (["--corpus", "nowhere"], "nowhere: --corpus: there is no such folder"),

@@ -59,9 +59,9 @@ def test_a_case_that_cannot_be_read_stops_no_other(mirotwin, tmp_path):
 
 def test_a_check_that_no_case_names_is_refused(mirotwin, tmp_path):
     (tmp_path / "b.stream").write_text("# mirotwin stream 2\n2400000 > 55\n")
-    code, _, err = mirotwin("fuzz", "--regress", tmp_path, "--check", "mine.py:judge")
+    code, _, err = mirotwin("fuzz", "--regress", tmp_path, "--expect", "mine.py:judge")
     assert code == 2
-    assert "no case is judged by --check mine.py:judge; leave it out" in err
+    assert "no case is judged by --expect mine.py:judge; leave it out" in err
 
 
 def test_options_of_a_campaign_do_not_go_with_saved_cases(mirotwin, tmp_path):

@@ -80,11 +80,11 @@ def test_a_case_of_a_check_needs_that_check(tmp_path):
     assert (again.code, again.line.partition(":")[0]) == (1, "fails as recorded")
     assert again.line.endswith("3 are too many")
     with pytest.raises(
-        BadInput, match="names the check 'too_long', which is not installed; give it: --check "
+        BadInput, match="names the check 'too_long', which is not installed; give it: --expect "
     ):
         replay_bare(path, image(SLEEPS))
     file.write_text(WRONG)
-    with pytest.raises(BadInput, match="is a case of the check 'too_long', and --check gives 'short'"):
+    with pytest.raises(BadInput, match="is a case of the check 'too_long', and --expect gives 'short'"):
         replay_bare(path, image(SLEEPS), f"{file}:short")
 
 
@@ -97,7 +97,7 @@ def test_a_case_runs_no_program_that_it_names(tmp_path, monkeypatch):
         path.write_text(honest.replace("too_long = true", f'"{name}" = true'))
         with pytest.raises(BadInput, match="which is not installed"):
             replay_bare(path, image(SLEEPS))
-        with pytest.raises(BadInput, match="and --check gives 'f'"):
+        with pytest.raises(BadInput, match="and --expect gives 'f'"):
             replay_bare(path, image(SLEEPS), f"{tmp_path}/evil.py:f")
         assert not (tmp_path / "was_run").exists()
 

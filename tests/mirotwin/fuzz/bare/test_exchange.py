@@ -45,19 +45,19 @@ def test_a_function_of_a_file(file):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("odd", "returned 5; return None, or what is wrong as text"),
-        ("leaves", "raised SystemExit: 0 at mycheck.py:17; repair the check"),
+        ("odd", "returned 5 ({file}:10 in odd); return None, or what is wrong as text"),
+        ("leaves", "raised SystemExit: 0 ({file}:17 in leaves); repair the check"),
         (
             "broken",
-            "raised AttributeError: 'str' object has no attribute 'nothing' at mycheck.py:14; repair the check",
+            "raised AttributeError: 'str' object has no attribute 'nothing' ({file}:14 in broken); repair the check",
         ),
     ],
 )
 def test_a_check_that_fails_itself_says_where(file, name, said):
     with pytest.raises(BadInput) as caught:
         check_named(f"{file}:{name}").judge("text")
-    assert str(caught.value).endswith(said)
-    assert f"--check {file}:{name}" in str(caught.value)
+    assert str(caught.value).endswith(said.format(file=file))
+    assert f"--expect {file}:{name}" in str(caught.value)
 
 
 def test_what_is_no_check_is_refused(file, tmp_path):
@@ -71,7 +71,7 @@ def test_what_is_no_check_is_refused(file, tmp_path):
             check_named(text)
         assert said in str(caught.value)
     file.write_text("raise RuntimeError('no')")
-    with pytest.raises(BadInput, match="cannot be run: RuntimeError: no; repair it"):
+    with pytest.raises(BadInput, match=r"cannot be run: RuntimeError: no \(.*mycheck.py:1\); repair it"):
         check_named(f"{file}:quiet")
 
 

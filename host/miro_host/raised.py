@@ -1,0 +1,83 @@
+"""Where a plug-in went wrong: file, line and function, for the line that tells the error.
+
+What belongs here: reading a traceback, and where a function is defined. What does not: who calls a plug-in, and which
+error it becomes (`parts.PartError`).
+
+Our own code calls the plug-in and may be called by it, so neither end of a traceback is what its author looks for. That
+is the innermost line in the file in which the plug-in's code begins.
+"""
+
+from __future__ import annotations
+
+import os
+from types import CodeType, FrameType
+from typing import Any
+
+OURS = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin")
+_STANDARD = os.path.dirname(os.__file__) + os.sep
+_INSTALLED = ("site-packages", "dist-packages")
+
+
+def described(error: BaseException) -> str:
+    """Type and message of an exception in one line."""
+    text = f"{error}".strip().partition("\n")[0]
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def raised(error: BaseException) -> str:
+    """Type, message and place of what a plug-in raised, in one line."""
+    return at_place(described(error), raised_at(error))
+
+
+def at_place(what: str, place: str) -> str:
+    """`what` with the place, if that is known."""
+    return f"{what} ({place})" if place else what
+
+
+def raised_at(error: BaseException) -> str:
+    """`FILE:LINE in FUNCTION` of the plug-in's code that raised it; "" where none of that was running."""
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{_shown(error.filename)}:{error.lineno}"
+    found, file = "", ""
+    trace = error.__traceback__
+    while trace is not None:
+        code = trace.tb_frame.f_code
+        if not file and _foreign(trace.tb_frame):
+            file = code.co_filename
+        if file and code.co_filename == file:
+            found = _place(code, trace.tb_lineno)
+        trace = trace.tb_next
+    return found
+
+
+def defined_at(function: Any) -> str:
+    """`FILE:LINE in FUNCTION` of a plug-in's function or method; "" for ours, and for what is not Python."""
+    function = getattr(function, "__func__", function)
+    code = getattr(function, "__code__", None)
+    if not isinstance(code, CodeType) or _is_ours(getattr(function, "__module__", "")):
+        return ""
+    return _place(code, code.co_firstlineno)
+
+
+def _foreign(frame: FrameType) -> bool:
+    """Whether it is neither our code nor Python's."""
+    if _is_ours(frame.f_globals.get("__name__", "")):
+        return False
+    file = frame.f_code.co_filename
+    standard = file.startswith(_STANDARD) and not any(part in file for part in _INSTALLED)
+    return not standard and not file.startswith("<frozen ")
+
+
+def _is_ours(module: Any) -> bool:
+    return isinstance(module, str) and module.partition(".")[0] in OURS
+
+
+def _place(code: CodeType, line: int) -> str:
+    name = code.co_qualname
+    return f"{_shown(code.co_filename)}:{line}" + ("" if name == "<module>" else f" in {name}")
+
+
+def _shown(file: str) -> str:
+    """The path from here, if the file is below."""
+    here = os.path.join(os.getcwd(), "")
+    return file.removeprefix(here)

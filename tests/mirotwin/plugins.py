@@ -1,0 +1,214 @@
+"""Plug-ins that tests install: one of each kind that goes wrong in one way, and checks that do what they should.
+
+What belongs here: their sources and their installing. What does not: what is said of them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.host.distribution import install
+
+CHECKS = '''
+from mirotwin.checks.interface import Check, Judge
+
+
+class Raises(Check, frozen=True, kw_only=True, tag="raises"):
+    KIND = "safety"
+
+    def judge(self, subject):
+        return RaisesJudge(self, subject)
+
+
+class RaisesJudge(Judge):
+    def period(self, record, tick):
+        self.helper()
+
+    def helper(self):
+        raise RuntimeError("oh")
+
+
+class GivesNone(Check, frozen=True, kw_only=True, tag="gives_none"):
+    KIND = "safety"
+
+    def judge(self, subject):
+        RaisesJudge(self, subject)
+
+
+class Hears(Check, frozen=True, kw_only=True, tag="hears_wrong"):
+    KIND = "safety"
+
+    def judge(self, subject):
+        return HearsJudge(self, subject)
+
+
+class HearsJudge(Judge):
+    HEARS = ("comand",)
+
+
+class HearsText(Check, frozen=True, kw_only=True, tag="hears_text"):
+    KIND = "safety"
+
+    def judge(self, subject):
+        return HearsTextJudge(self, subject)
+
+
+class HearsTextJudge(Judge):
+    HEARS = "command"
+
+
+class NoSuper(Check, frozen=True, kw_only=True, tag="no_super"):
+    KIND = "safety"
+
+    def judge(self, subject):
+        return NoSuperJudge(self, subject)
+
+
+class NoSuperJudge(Judge):
+    def __init__(self, check, subject):
+        pass
+
+
+class NoKind(Check, frozen=True, kw_only=True, tag="no_kind"):
+    def judge(self, subject):
+        return RaisesJudge(self, subject)
+
+
+class Objects(Check, frozen=True, kw_only=True, tag="objects"):
+    KIND = "safety"
+
+    def objection(self, end_tick):
+        return 1 // 0
+
+    def judge(self, subject):
+        return RaisesJudge(self, subject)
+
+
+class Leaves(Check, frozen=True, kw_only=True, tag="leaves"):
+    KIND = "safety"
+
+    def __post_init__(self):
+        raise SystemExit(0)
+
+    def judge(self, subject):
+        return RaisesJudge(self, subject)
+
+
+class FloatTick(Check, frozen=True, kw_only=True, tag="float_tick"):
+    KIND = "safety"
+
+    def judge(self, subject):
+        return FloatTickJudge(self, subject)
+
+
+class FloatTickJudge(Judge):
+    def period(self, record, tick):
+        self.fail(tick / 2, "one thing", "another")
+
+
+class Still(Check, frozen=True, kw_only=True, tag="stands_still"):
+    """The wheels are told nothing but to stop."""
+
+    KIND = "safety"
+
+    def judge(self, subject):
+        return StillJudge(self, subject)
+
+
+class StillJudge(Judge):
+    HEARS = ("frame",)
+
+    def event(self, event):
+        self.judged += 1
+        self.fail(event.tick, "no frame", "one")
+'''
+LAWS = """
+from miro_host.laws.interface import Law, LawParameters, Velocities
+
+
+class Raises(LawParameters, frozen=True, tag="law_raises"):
+    def law(self):
+        return RaisesLaw(self)
+
+
+class RaisesLaw(Law):
+    def step(self, given):
+        return {}["speed"]
+
+
+class Nothing(LawParameters, frozen=True, tag="law_none"):
+    def law(self):
+        return None
+
+
+class NoNumber(LawParameters, frozen=True, tag="law_nan"):
+    def law(self):
+        return NoNumberLaw(self)
+
+
+class NoNumberLaw(Law):
+    def step(self, given):
+        return Velocities(float("nan"), 0.0)
+
+
+class Refuses(LawParameters, frozen=True, tag="law_refuses"):
+    def __post_init__(self):
+        raise KeyError("x")
+"""
+REFERENCES = """
+from miro_host.references.interface import ReferenceParameters
+
+
+class Raises(ReferenceParameters, frozen=True, tag="reference_raises"):
+    def trajectory(self, duration_s):
+        return RaisesPath()
+
+
+class RaisesPath:
+    def at(self, t_s):
+        return 1 / 0
+
+
+class Nothing(ReferenceParameters, frozen=True, tag="reference_none"):
+    def trajectory(self, duration_s):
+        return None
+"""
+ESTIMATORS = """
+from miro_host.estimators.interface import Estimator, EstimatorParameters
+
+
+class Raises(EstimatorParameters, frozen=True, tag="estimator_raises"):
+    def estimator(self):
+        return RaisesEstimator(self)
+
+
+class RaisesEstimator(Estimator):
+    def step(self, given):
+        return given.nothing
+"""
+SYNTAX = "def f(:\n"
+_CHECKS = {
+    "raises": "Raises", "gives_none": "GivesNone", "hears_wrong": "Hears", "hears_text": "HearsText",
+    "no_super": "NoSuper", "no_kind": "NoKind", "objects": "Objects", "leaves": "Leaves",
+    "float_tick": "FloatTick", "stands_still": "Still", "absent": "Absent",
+}  # fmt: skip
+_LAWS = {"law_raises": "Raises", "law_none": "Nothing", "law_nan": "NoNumber", "law_refuses": "Refuses"}
+_REFERENCES = {"reference_raises": "Raises", "reference_none": "Nothing"}
+
+
+def install_all(site: Path) -> None:
+    """All of them in a folder, which then has to be on the path."""
+    checks = {name: f"plugged_checks:{value}" for name, value in _CHECKS.items()}
+    checks["syntax"] = "plugged_syntax:Anything"
+    install(site, "plugged-checks", "1.0", checks, "checks", plugged_checks=CHECKS, plugged_syntax=SYNTAX)
+    laws = {name: f"plugged_laws:{value}" for name, value in _LAWS.items()}
+    install(site, "plugged-laws", "1.0", laws, "laws", plugged_laws=LAWS)
+    references = {name: f"plugged_references:{value}" for name, value in _REFERENCES.items()}
+    install(site, "plugged-references", "1.0", references, "references", plugged_references=REFERENCES)
+    estimators = {"estimator_raises": "plugged_estimators:Raises"}
+    install(site, "plugged-estimators", "1.0", estimators, "estimators", plugged_estimators=ESTIMATORS)
+
+
+def line_of(source: str, text: str) -> int:
+    """The number of the first line that holds this."""
+    return 1 + next(at for at, line in enumerate(source.splitlines()) if text in line)
