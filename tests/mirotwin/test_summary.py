@@ -17,6 +17,7 @@ from mirotwin.report.figure import draw
 from mirotwin.report.summary import (
     Summary,
     off_pitch_text,
+    rms_name,
     settling_text,
     summarise,
     to_json,
@@ -88,6 +89,19 @@ def test_rms_is_taken_over_the_last_second_only() -> None:
     tracking = tracking_of(run)
     assert (tracking.rms_x_cm, tracking.rms_y_cm, tracking.rms_position_cm) == (3.0, 4.0, 5.0)
     assert tracking.rms_theta_deg == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("first", "count", "text"),
+    [
+        (0, 30, "rms of the last second"),
+        (0, 29, "rms (0.00 s to 0.97 s)"),
+        (24, 6, "rms (0.80 s to 1.00 s)"),
+        (24, 156, "rms of the last second"),
+    ],
+)
+def test_rms_over_less_than_a_second_says_what_time_it_covers(first: int, count: int, text: str) -> None:
+    assert rms_name(samples(*[(0.0, 0.0, 0.0)] * (first + count))[first:]) == text
 
 
 @pytest.mark.parametrize(

@@ -131,7 +131,7 @@ def run(
     The steps of a scenario (`[[step]]`) are done, as by `mirotwin test`.
 
     A run that is resumed has the bits of one that never stopped. Its recording begins with the first whole control
-    period, and holds the saved world.
+    period, and holds the saved world. Its errors and checks cover the time from there.
 
     With --live, Foxglove shows the run while it goes (Open connection, Foxglove WebSocket, the URL of the first line).
     Nothing of that changes a bit of the run.

@@ -167,6 +167,7 @@ class RunFiles:
             engine=self.engine,
             tracks=self.tracks,
             simulated_ticks=self.world.tick,
+            resumed_ticks=0 if self.stops is None else self.stops.begin_tick,
             wall_s=self._wall_s,
             counters=self.world.counters(),
             firmware_sha256=self.source.firmware_sha256,

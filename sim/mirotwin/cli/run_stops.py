@@ -32,6 +32,7 @@ class Stops:
         self.to_tick = None if to_tick is None else _tick(to_tick)
         self.resume = resume
         self.resumed = b""
+        self.begin_tick = 0
 
     @property
     def names(self) -> list[str]:
@@ -49,7 +50,7 @@ class Stops:
                 raise BadInput(self.resume, "", f"cannot be resumed: {error}", remedy) from None
             if world.in_period:
                 world.run_to(world.period_end)
-            self.resumed = world.save()
+            self.resumed, self.begin_tick = world.save(), world.tick
             _forget_commands(world)
         self._check(world)
 

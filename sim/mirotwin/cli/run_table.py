@@ -13,7 +13,7 @@ from mirotwin.cli.console import show
 from mirotwin.cli.expectations import expectations_text
 from mirotwin.report.learnt_calibration import calibration_text
 from mirotwin.report.learnt_wheels import wheels_text
-from mirotwin.report.summary import Summary, off_pitch_text, settling_text, vision_text
+from mirotwin.report.summary import Summary, off_pitch_text, rms_name, settling_text, vision_text
 from mirotwin.report.theory import theory_text
 from mirotwin.report.track import Tracks
 
@@ -26,17 +26,21 @@ def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
     table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
     if summary.set:
         table.add_row("set", " ".join(summary.set))
+    began = f"{summary.resumed_s:.2f} s to " if summary.resumed_s is not None else ""
     table.add_row(
         "time",
-        f"{summary.simulated_s:.2f} s in {summary.wall_s:.2f} s ({summary.realtime_factor:.1f} x real time, "
+        f"{began}{summary.simulated_s:.2f} s in {summary.wall_s:.2f} s ({summary.realtime_factor:.1f} x real time, "
         f"engine {summary.engine})",
     )
+    if summary.resumed_s is not None:
+        covered = "errors, theory and checks from there; camera, link and firmware from 0 s"
+        table.add_row("resumed", f"at {summary.resumed_s:.2f} s: {covered}")
     if tracking.rms_position_cm is not None:
-        settled = settling_text(next(iter(tracks.robots.values())).errors)
+        errors = next(iter(tracks.robots.values())).errors
         table.add_row(
             "tracking",
-            f"rms of the last second {tracking.rms_position_cm:.2f} cm "
-            f"(x {tracking.rms_x_cm:.2f}, y {tracking.rms_y_cm:.2f}), {tracking.rms_theta_deg:.2f} deg; {settled}",
+            f"{rms_name(errors)} {tracking.rms_position_cm:.2f} cm (x {tracking.rms_x_cm:.2f}, "
+            f"y {tracking.rms_y_cm:.2f}), {tracking.rms_theta_deg:.2f} deg; {settling_text(errors)}",
         )
     theory = theory_text(summary.theory) if summary.theory is not None else ""
     if theory:

@@ -26,7 +26,7 @@ from mirotwin.page.frames import CameraFrame, Extras
 from mirotwin.page.link import Mark, lanes_of
 from mirotwin.page.pitch import pitch_of
 from mirotwin.replay.difference import Difference, first_per_channel
-from mirotwin.report.summary import Steps, settling_text, tracking_of
+from mirotwin.report.summary import Steps, rms_name, settling_text, tracking_of
 
 FIRST = 200
 """Failures of checks, and differences, that are listed."""
@@ -149,7 +149,7 @@ def _facts(material: Material, course: Course) -> list[tuple[str, str, str]]:
         if robot.steered:
             found = tracking_of(robot.errors)
             rms = f"{found.rms_position_cm:.2f} cm, {found.rms_theta_deg:.2f}\u00b0"
-            facts.append(("rms of the last second", rms, f"of {robot.name}, position and heading"))
+            facts.append((rms_name(robot.errors), rms, f"of {robot.name}, position and heading"))
             facts.append(("settling", settling_text(robot.errors), "within 3 cm and 0.15 rad"))
     return facts
 

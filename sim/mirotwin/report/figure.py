@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from miro_exact.clock import seconds
-from mirotwin.report.summary import settling_text, tracking_of
+from mirotwin.report.summary import rms_name, settling_text, tracking_of
 from mirotwin.report.track import SETTLED_CM, SETTLED_RAD, Errors, ErrorSample, Line, Place, Track, Tracks
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def _margins(heights: Sequence[float], height: float) -> dict[str, float]:
 
 def _heading(scenario: str, seed: int, title: str, errors: Sequence[ErrorSample]) -> str:
     tracking = tracking_of(errors)
-    rms = f"rms of the last second {tracking.rms_position_cm:.2f} cm, {tracking.rms_theta_deg:.2f} degrees"
+    rms = f"{rms_name(errors)} {tracking.rms_position_cm:.2f} cm, {tracking.rms_theta_deg:.2f} degrees"
     first = f"{scenario}, seed {seed}" + (f": {_plain(title)}" if title else "")
     return f"{first}\n{rms}; {settling_text(errors)}"
 

@@ -125,10 +125,12 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
 
     `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is
     written only where it is false: the run was broken off, and all figures are of the part before; `reason` says why,
-    if a part of the scenario failed (which one, of which robot, when). `set`: the keys of the scenario that were set on
-    the command line (`KEY=VALUE`), only where there were some. `calibrations`: of hosts that learn how their cameras
-    hang, `wheels`: of robots whose estimator learns their wheels. `expectations`: the checks of the run, also those
-    that are always on. `live`: how a live session was paced, and what passed through its ports.
+    if a part of the scenario failed (which one, of which robot, when). `resumed_s` is written only for a run that went
+    on from a saved world: tracking, theory and expectations cover the time from there, counters the time from 0.
+    `set`: the keys of the scenario that were set on the command line (`KEY=VALUE`), only where there were some.
+    `calibrations`: of hosts that learn how their cameras hang, `wheels`: of robots whose estimator learns their wheels.
+    `expectations`: the checks of the run, also those that are always on. `live`: how a live session was paced, and what
+    passed through its ports.
     """
 
     scenario: str
@@ -148,6 +150,7 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     robots: tuple[RobotTracking, ...] = ()
     complete: bool = True
     reason: str = ""
+    resumed_s: float | None = None
     set: tuple[str, ...] = ()
     expectations: tuple[Expectation, ...] = ()
     live: Live | None = None
@@ -158,7 +161,7 @@ def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
     """The figures of one robot; None throughout when there is no sample."""
     if not samples:
         return Tracking(None, None, None, None, None, None)
-    last = [sample for sample in samples if sample.tick > samples[-1].tick - TICKS_PER_SECOND]
+    last = _last_second(samples)
     return Tracking(
         rms_x_cm=_rms([sample.x_cm for sample in last]),
         rms_y_cm=_rms([sample.y_cm for sample in last]),
@@ -167,6 +170,19 @@ def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
         settling_s=_settling_s(samples),
         off_pitch_s=seconds(CONTROL_PERIOD_TICKS * len([sample for sample in samples if sample.off_pitch])),
     )
+
+
+def rms_name(samples: Sequence[ErrorSample]) -> str:
+    """What `rms_*` of these samples are, for people: with the times, where they cover less than a second."""
+    last = _last_second(samples)
+    from_tick, to_tick = last[0].tick, last[-1].tick + CONTROL_PERIOD_TICKS
+    if to_tick - from_tick >= TICKS_PER_SECOND:
+        return "rms of the last second"
+    return f"rms ({seconds(from_tick):.2f} s to {seconds(to_tick):.2f} s)"
+
+
+def _last_second(samples: Sequence[ErrorSample]) -> Sequence[ErrorSample]:
+    return [sample for sample in samples if sample.tick > samples[-1].tick - TICKS_PER_SECOND]
 
 
 def _rms(values: Sequence[float]) -> float:
@@ -198,6 +214,7 @@ def summarise(
     engine: str,
     tracks: Tracks,
     simulated_ticks: int,
+    resumed_ticks: int = 0,
     wall_s: float,
     counters: Mapping[str, Mapping[str, Any]],
     firmware_sha256: str,
@@ -222,7 +239,7 @@ def summarise(
         digest=tracks.digest,
         simulated_s=seconds(simulated_ticks),
         wall_s=wall_s,
-        realtime_factor=seconds(simulated_ticks) / wall_s if wall_s > 0.0 else 0.0,
+        realtime_factor=seconds(simulated_ticks - resumed_ticks) / wall_s if wall_s > 0.0 else 0.0,
         tracking=everyone[0].tracking if everyone else tracking_of([]),
         link=Link(**counters["link"]),
         firmware=Firmware(sha256=firmware_sha256, **counters["firmware"]),
@@ -233,6 +250,7 @@ def summarise(
         robots=everyone if len(everyone) > 1 else (),
         complete=complete,
         reason=reason,
+        resumed_s=seconds(resumed_ticks) if resumed_ticks else None,
         set=settings,
         expectations=expectations,
         steps=steps,

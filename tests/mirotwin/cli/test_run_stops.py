@@ -35,6 +35,37 @@ def test_a_resumed_run_has_the_digests_of_one_that_never_stopped(
     assert (code, err) == (0, "")
 
 
+@pytest.mark.parametrize("to", ["4000000t", "4004000t", "4804800t"])
+def test_a_resumed_run_that_is_told_where_to_end_has_the_digest_of_an_unbroken_one(
+    mirotwin: Callable[..., Result], tmp_path: Path, short: Path, to: str
+) -> None:
+    whole, rest = tmp_path / "whole", tmp_path / "rest"
+    mirotwin("run", short, "--out", whole, "--save-at", "100ms", "--to", to, *QUIET)
+    saved = whole / "at-2400000.world"
+    assert mirotwin("run", short, "--out", rest, "--resume", saved, "--to", to, *QUIET)[0] == 0
+    digests = [json.loads((run / "summary.json").read_text())["digest"] for run in (whole, rest)]
+    assert digests[0] == digests[1]
+    code, _, err = mirotwin("replay", rest / "run.mcap", "-q")
+    assert (code, err) == (0, "")
+
+
+def test_figures_of_a_resumed_run_say_what_time_they_cover(
+    mirotwin: Callable[..., Result], tmp_path: Path, short: Path
+) -> None:
+    whole, rest = tmp_path / "whole", tmp_path / "rest"
+    _, table, _ = mirotwin("run", short, "--out", whole, "--save-at", "100ms", "--no-figure")
+    assert "rms (0.00 s to 0.20 s)" in table
+    assert "resumed  " not in table
+    saved = whole / "at-2400000.world"
+    _, table, _ = mirotwin("run", short, "--out", rest, "--resume", saved, "--no-figure")
+    assert "rms (0.10 s to 0.20 s)" in table
+    assert "0.10 s to 0.20 s in " in table
+    assert "resumed   at 0.10 s" in table
+    summary = json.loads((rest / "summary.json").read_text())
+    assert summary["resumed_s"] == 2_402_400 / 24e6
+    assert summary["realtime_factor"] == (summary["simulated_s"] - summary["resumed_s"]) / summary["wall_s"]
+
+
 def test_a_resumed_run_is_not_compared_with_a_whole_one(
     mirotwin: Callable[..., Result], tmp_path: Path, short: Path
 ) -> None:
