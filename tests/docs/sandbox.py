@@ -26,6 +26,14 @@ DEBUG_FILES = (".ihx", ".map", ".cdb", ".rst")
 LATE = "stops 15 ms late"
 
 
+FIRST_USE = (
+    "README.md",
+    "docs/start.md",
+    *(f"docs/howto/{path.name}" for path in sorted((ROOT / "docs/howto").glob("*.md"))),
+)
+"""What a newcomer follows from the first line, in an empty folder; in this order, in one folder, too."""
+
+
 def documents() -> list[str]:
     """Every document of the tree, by its path."""
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md"]
