@@ -38,12 +38,7 @@ SHELL = ("sh", "console", "indented")
 LANGUAGES = ("python", "toml", "c", "text", *SHELL)
 COMMAND = re.compile(r"(\$ )?(mirotwin|python3?|pip|pytest) ")
 ELSEWHERE = {
-    ("README.md", "python3 -m venv"): ".ci/run does it",
-    ("README.md", ".venv/bin/pip"): ".ci/run does it",
-    ("README.md", "pip install"): "needs the package index",
-    ("README.md", "mirotwin fuzz"): "fuzzing goes on for a time",
-    ("README.md", "mirotwin reproduce"): "2700 runs, 6 minutes on two cores",
-    ("README.md", "mirotwin campaign"): "hundreds of runs",
+    ("README.md", "python3 -m venv"): "it compiles for minutes; `tests.docs.first_use` installs so",
     ("examples/hil/README.md", "python3 -m venv"): "needs the package index; tests/project/sample.py does it",
     ("examples/hil/README.md", "mirotwin replay"): "needs a firmware that fails",
     (
@@ -51,7 +46,12 @@ ELSEWHERE = {
         "pip install",
     ): "needs the package index, and fuzzing goes on for 30 seconds",
 }
-"""Why a block is not run, by document and the begin of its text, where a comment would be in the way of a reader."""
+"""Why a block is not run, by document and the start of its text, where a comment would be in the way of a reader."""
+SLOW_ELSEWHERE = {
+    ("README.md", "mirotwin fuzz"): "30 seconds",
+    ("README.md", "mirotwin examples campaign"): "240 runs",
+}
+"""The same for blocks that only `tests.docs.first_use` runs."""
 
 
 class Block(NamedTuple):
@@ -68,9 +68,15 @@ class Block(NamedTuple):
 def blocks_of(text: str, document: str = "") -> Iterator[Block]:
     """All blocks of a document, those that are no code too."""
     for block in _blocks(text):
-        here = [(begin, why) for (where, begin), why in ELSEWHERE.items() if where == document]
-        reasons = (why for begin, why in here if block.text.startswith(begin))
-        yield block._replace(not_run=block.not_run or next(reasons, ""))
+        not_run = block.not_run or _reason(ELSEWHERE, document, block.text)
+        yield block._replace(
+            not_run=not_run, slow=block.slow or _reason(SLOW_ELSEWHERE, document, block.text)
+        )
+
+
+def _reason(table: dict[tuple[str, str], str], document: str, text: str) -> str:
+    found = (why for (where, start), why in table.items() if where == document and text.startswith(start))
+    return next(found, "")
 
 
 def _blocks(text: str) -> Iterator[Block]:
