@@ -174,8 +174,9 @@ class BuildHot(build_ext):
         return hot
 
 
-CARRIED = {"robot_fw/firmware": "miro_robot/firmware/source", "examples/hil": "mirotwin/starter/files"}
-"""Folders outside of the packages that a wheel carries, and where: `mirotwin init` writes them."""
+CARRIED = {"robot_fw/firmware": "miro_robot/firmware/source", "examples": "mirotwin/starter/examples"}
+"""Folders outside of the packages that a wheel carries, and where: `mirotwin init` and `examples` write them."""
+LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache"}
 
 
 class BuildCarrying(build_py):
@@ -196,9 +197,8 @@ class BuildCarrying(build_py):
         for folder, place in CARRIED.items():
             for path in sorted((HERE / folder).rglob("*")):
                 inner = path.relative_to(HERE / folder)
-                if path.is_file() and not {"build", "runs", "__pycache__", ".pytest_cache"} & set(
-                    inner.parts
-                ):
+                left_behind = any(part in LEFT_BEHIND or part.endswith(".egg-info") for part in inner.parts)
+                if path.is_file() and not left_behind:
                     yield path, Path(self.build_lib) / place / inner
 
 

@@ -13,7 +13,9 @@ What belongs here: finding blocks and choosing their evaluator, as a parser for 
 A comment in front of a block says what a reader need not know:
 
     <!-- not run: REASON -->     it is not run; all of these stand in `test_blocks`
-    <!-- file: NAME -->          its text is written to that file before anything runs
+    <!-- slow: REASON -->        only `python -m tests.docs.first_use` runs it
+    <!-- file: NAME -->          its text is written to that file: before anything runs, and on the pages that a
+                                 newcomer follows (`sandbox.FIRST_USE`) when the reader comes to it
 """
 
 from __future__ import annotations
@@ -30,17 +32,13 @@ from tests.docs import running
 
 ROOT = Path(__file__).parents[2]
 NOT_RUN = re.compile(r"<!-- not run: (.+?) -->", re.DOTALL)
+SLOW = re.compile(r"<!-- slow: (.+?) -->", re.DOTALL)
 FILE = re.compile(r"<!-- file: (\S+) -->")
 SHELL = ("sh", "console", "indented")
 LANGUAGES = ("python", "toml", "c", "text", *SHELL)
 COMMAND = re.compile(r"(\$ )?(mirotwin|python3?|pip|pytest) ")
 ELSEWHERE = {
-    ("README.md", "python3 -m venv"): ".ci/run does it",
-    ("README.md", ".venv/bin/pip"): ".ci/run does it",
-    ("README.md", "pip install"): "needs the package index",
-    ("README.md", "mirotwin fuzz"): "fuzzing goes on for a time",
-    ("README.md", "mirotwin reproduce"): "2700 runs, 6 minutes on two cores",
-    ("README.md", "mirotwin campaign"): "hundreds of runs",
+    ("README.md", "python3 -m venv"): "it compiles for minutes; `tests.docs.first_use` installs so",
     ("examples/hil/README.md", "python3 -m venv"): "needs the package index; tests/project/sample.py does it",
     ("examples/hil/README.md", "mirotwin replay"): "needs a firmware that fails",
     (
@@ -48,32 +46,45 @@ ELSEWHERE = {
         "pip install",
     ): "needs the package index, and fuzzing goes on for 30 seconds",
 }
-"""Why a block is not run, by document and the begin of its text, where a comment would be in the way of a reader."""
+"""Why a block is not run, by document and the start of its text, where a comment would be in the way of a reader."""
+SLOW_ELSEWHERE = {
+    ("README.md", "mirotwin fuzz"): "30 seconds",
+    ("README.md", "mirotwin examples campaign"): "240 runs",
+}
+"""The same for blocks that only `tests.docs.first_use` runs."""
 
 
 class Block(NamedTuple):
-    """One block. `line`: from 1. `not_run`: the reason, or empty. `file`: where its text is written first."""
+    """One block. `line`: from 1. `not_run`, `slow`: the reason, or empty. `file`: where its text is written."""
 
     language: str
     text: str
     line: int
     not_run: str = ""
     file: str = ""
+    slow: str = ""
 
 
 def blocks_of(text: str, document: str = "") -> Iterator[Block]:
     """All blocks of a document, those that are no code too."""
     for block in _blocks(text):
-        here = [(begin, why) for (where, begin), why in ELSEWHERE.items() if where == document]
-        reasons = (why for begin, why in here if block.text.startswith(begin))
-        yield block._replace(not_run=block.not_run or next(reasons, ""))
+        not_run = block.not_run or _reason(ELSEWHERE, document, block.text)
+        yield block._replace(
+            not_run=not_run, slow=block.slow or _reason(SLOW_ELSEWHERE, document, block.text)
+        )
+
+
+def _reason(table: dict[tuple[str, str], str], document: str, text: str) -> str:
+    found = (why for (where, start), why in table.items() if where == document and text.startswith(start))
+    return next(found, "")
 
 
 def _blocks(text: str) -> Iterator[Block]:
-    not_run, file = "", ""
+    not_run, file, slow = "", "", ""
     for token in MarkdownIt().parse(text):
         if token.type == "html_block":
             not_run = " ".join(found[1].split()) if (found := NOT_RUN.search(token.content)) else not_run
+            slow = " ".join(found[1].split()) if (found := SLOW.search(token.content)) else slow
             file = found[1] if (found := FILE.search(token.content)) else file
         elif token.type in ("fence", "code_block"):
             language = (
@@ -82,10 +93,10 @@ def _blocks(text: str) -> Iterator[Block]:
             if language == "text" and not token.info and COMMAND.match(token.content):
                 language = "a fence without a language"
             assert token.map is not None
-            yield Block(language, textwrap.dedent(token.content), token.map[0] + 1, not_run, file)
-            not_run, file = "", ""
+            yield Block(language, textwrap.dedent(token.content), token.map[0] + 1, not_run, file, slow)
+            not_run, file, slow = "", "", ""
         elif token.type.endswith("_open"):
-            not_run, file = "", ""
+            not_run, file, slow = "", "", ""
 
 
 def parser(document: Document) -> Iterator[Region]:
@@ -100,7 +111,7 @@ def parser(document: Document) -> Iterator[Region]:
 
 def evaluator_of(block: Block) -> Callable[[Example], str | None]:
     """Who runs it."""
-    if block.not_run or block.language == "text":
+    if block.not_run or block.slow or block.language == "text":
         return nothing
     if block.language in SHELL:
         return running.shell

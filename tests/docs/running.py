@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,24 +28,27 @@ EXIT_CODE = re.compile(r"exit code (\d+)")
 
 
 def shell(example: Example) -> str | None:
-    """Every command; in a block with `$ `, what it prints has to be what stands below it.
+    """The first command that is refused, or prints something else."""
+    return next(refused(example.namespace["__shell__"], example.parsed.text), None)
 
-    A command whose output is not shown ends with exit code 0, or with the one that a comment behind it names.
+
+def refused(where: Shell, text: str) -> Iterator[str]:
+    """Every command of a block; in one with `$ `, what it prints has to be what stands below it.
+
+    A command whose output is not shown ends with exit code 0, or with the one that a comment after it names.
     """
-    where: Shell = example.namespace["__shell__"]
-    for command in commands_of(example.parsed.text):
+    for command in commands_of(text):
         if command.line == "echo $?":
             if command.output.strip() != f"{where.code}":
-                return f"the exit code of the command before is {where.code}, not {command.output.strip()}"
+                yield f"the exit code of the command before is {where.code}, not {command.output.strip()}"
             continue
         printed = where.run(command.line)
         wanted = int(found[1]) if (found := EXIT_CODE.search(command.line)) else 0
         if command.output:
             if not fits(command.output, printed):
-                return f"{command.line}\nprinted\n{printed}\nwhere the document has\n{command.output}"
+                yield f"{command.line}\nprinted\n{printed}\nwhere the document has\n{command.output}"
         elif where.code != wanted and not command.asked:
-            return f"{command.line}\nended with exit code {where.code}, not {wanted}:\n{printed}"
-    return None
+            yield f"{command.line}\nended with exit code {where.code}, not {wanted}:\n{printed}"
 
 
 def python(example: Example) -> str | None:

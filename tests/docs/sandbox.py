@@ -1,7 +1,7 @@
 """The folder that a document's blocks run in: what a reader has who comes to that page.
 
-What belongs here: a firmware, the examples, what `pip install ./examples/..` would have installed, and what single
-pages need besides. What does not: running.
+What belongs here: the examples, what `pip install ./..` of them would have installed, and what single
+pages need besides; nothing on the pages that a newcomer follows (`FIRST_USE`). What does not: running.
 """
 
 from __future__ import annotations
@@ -19,11 +19,20 @@ from tests.mutants import build
 from tests.mutants.planted import PLANTED
 
 from miro_robot.firmware import image_path, source_folder
+from mirotwin.starter import examples, writing
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("exact", "protocol", "robot_fw", "host", "sim")
 DEBUG_FILES = (".ihx", ".map", ".cdb", ".rst")
 LATE = "stops 15 ms late"
+
+
+FIRST_USE = (
+    "README.md",
+    "docs/start.md",
+    *(f"docs/howto/{path.name}" for path in sorted((ROOT / "docs/howto").glob("*.md"))),
+)
+"""What a newcomer follows from the first line, in an empty folder; in this order, in one folder, too."""
 
 
 def documents() -> list[str]:
@@ -34,12 +43,15 @@ def documents() -> list[str]:
 
 
 def prepare(folder: Path, document: str) -> tuple[Path, Path]:
-    """Fills `folder` for a document; returns the folders of programs and of what is installed."""
-    for name in ("mine.ihx", "build/mine.ihx", "build/miro.ihx", "fixed.ihx"):
-        copy_image(image_path(), folder / name)
-    copy_examples(folder)
-    (folder / "protocol").symlink_to(ROOT / "protocol")
-    (folder / "robot_fw").symlink_to(ROOT / "robot_fw")
+    """Fills `folder` for a document, unless it is one for newcomers; returns the folders of programs and of what is
+    installed.
+    """
+    if document not in FIRST_USE:
+        for name in ("build/mine.ihx", "build/miro.ihx", "fixed.ihx"):
+            copy_image(image_path(), folder / name)
+        copy_examples(folder)
+        (folder / "protocol").symlink_to(ROOT / "protocol")
+        (folder / "robot_fw").symlink_to(ROOT / "robot_fw")
     hidden = folder.parent / "installed"
     put_parts(hidden)
     FUNCTIONS.get(document, lambda folder: None)(folder)
@@ -54,11 +66,8 @@ def copy_image(image: Path, target: Path) -> None:
 
 
 def copy_examples(folder: Path) -> None:
-    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "examples"]
-    done = children.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    for name in filter(None, done.stdout.split("\0")):
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / name, folder / name)
+    for name in examples.EXAMPLES:
+        writing.write(folder, examples.files(name), "", force=True)
 
 
 def put_parts(hidden: Path) -> None:
@@ -83,7 +92,9 @@ def put_parts(hidden: Path) -> None:
 
 
 def programs(folder: Path, hidden: Path) -> Path:
-    """`mirotwin`, `python` and `pytest` for commands that bash runs, with the packages of this tree."""
+    """`mirotwin`, `python` and `pytest` for commands that bash runs, with the packages of this tree; `pip` installs
+    nothing, but wants the folder that it is told.
+    """
     folder.mkdir()
     path = os.pathsep.join([*(str(ROOT / name) for name in PACKAGES), str(ROOT), str(hidden)])
     run = "-c 'from mirotwin.entry import main; main()'"
@@ -91,6 +102,8 @@ def programs(folder: Path, hidden: Path) -> Path:
         script = f'#!/bin/sh\nPYTHONPATH="{path}" exec "{sys.executable}" {what} "$@"\n'
         (folder / name).write_text(script)
         (folder / name).chmod(stat.S_IRWXU)
+    (folder / "pip").write_text('#!/bin/sh\ncase "$2" in ./*) test -f "$2/pyproject.toml";; esac\n')
+    (folder / "pip").chmod(stat.S_IRWXU)
     return folder
 
 
@@ -121,7 +134,7 @@ def late_case(folder: Path) -> None:
 
 def dimmer(folder: Path) -> None:
     """The firmware of examples/fuzz-slip, with its finds beside it; `mine.ihx` is the one that is right."""
-    example = folder / "examples" / "fuzz-slip"
+    example = folder / "fuzz-slip"
     children.run(["make", "-s"], cwd=example, check=True, capture_output=True)
     shutil.rmtree(folder / "build")
     shutil.copytree(example / "build", folder / "build")
@@ -154,7 +167,6 @@ FUNCTIONS: dict[str, Callable[[Path], None]] = {
     "sim/mirotwin/cases/README.md": late_case,
     "docs/fuzz-any-8051.md": dimmer,
     "examples/fuzz-slip/README.md": dimmer,
-    "docs/howto/fuzz.md": regression("finds"),
     "sim/mirotwin/fuzz/README.md": regression("tests/cases"),
     "sim/mirotwin/fuzz/afl/README.md": question,
     "protocol/README.md": question,
@@ -164,16 +176,11 @@ COMPILED = {*(name for name, put in FUNCTIONS.items() if put is not question), "
 """Pages that need a compiler for the 8051."""
 
 _SHORT = "mirotwin run fig6 --set duration_s=0.2 --no-figure -q --out"
-_CAMPAIGN = "mirotwin campaign run examples/campaign.toml --seeds 0-19 --set duration_s=0.1 -q --out"
-_CALIBRATE = (
-    "mirotwin calibrate --scenario fig6 --out made.toml --colours-out colours.toml --points-out points.csv"
-)
+_CAMPAIGN = "mirotwin campaign run campaign.toml --seeds 0-19 --set duration_s=0.1 -q --out"
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "docs/formats/parquet.md": (f"{_CAMPAIGN} runs/short.parquet || true",),
     "docs/formats/stream.md": (f"{_SHORT} runs/fig6-0",),
-    "docs/howto/campaign.md": ("mirotwin campaign short.toml -q --out baseline.parquet",),
-    "docs/howto/own-camera.md": (_CALIBRATE, f"{_SHORT} runs/frames --frames pictures --plain-frames"),
     "docs/reference/fixtures.md": ("mirotwin init mine",),
     "protocol/README.md": (f"{_SHORT} first", "mv first/run.mcap ."),
     "sim/mirotwin/campaign/README.md": (

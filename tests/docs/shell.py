@@ -18,7 +18,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -30,6 +30,7 @@ from tests import children
 from mirotwin.cli import COMMANDS, main
 
 MAY_TAKE_S = 60
+SLOW_MAY_TAKE_S = 600
 FRESH = ("campaign", "fuzz", "reproduce")
 """Commands that start processes of their own, which begin with the program's file."""
 OPTIONAL = ("tshark", "afl-showmap")
@@ -100,7 +101,7 @@ class Shell:
             out.seek(0)
             return out.read().decode("utf-8", "replace")
 
-    def _by_bash(self, line: str, out: IO[bytes]) -> int:
+    def _by_bash(self, line: str, out: IO[bytes], may_take_s: float = MAY_TAKE_S) -> int:
         bash = children.start(
             ["bash", "-c", line],
             stdin=subprocess.DEVNULL,
@@ -110,7 +111,7 @@ class Shell:
             start_new_session=True,
         )
         try:
-            return int(bash.wait(MAY_TAKE_S))
+            return int(bash.wait(may_take_s))
         except subprocess.TimeoutExpired:
             os.killpg(bash.pid, signal.SIGKILL)
             bash.wait()
@@ -124,6 +125,20 @@ class Shell:
         if process == 0:
             _become(arguments, out, self.environment)
         return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+
+
+class Literal(Shell):
+    """Gives every line to bash, with the programs of an environment that something was installed in."""
+
+    def __init__(self, environment: Mapping[str, str]) -> None:
+        self.code = 0
+        self.environment = {**environment, "COLUMNS": "200"}
+
+    def run(self, line: str) -> str:
+        with tempfile.TemporaryFile() as out:
+            self.code = self._by_bash(line, out, SLOW_MAY_TAKE_S)
+            out.seek(0)
+            return out.read().decode("utf-8", "replace")
 
 
 @cache

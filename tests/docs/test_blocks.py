@@ -44,12 +44,16 @@ def test_the_blocks_of(document: str, tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     shell = Shell(programs)
     parsed.namespace.update(__name__="__main__", __shell__=shell, __given__=GIVEN.get(document, ""))
-    blocks.write_files(parsed, folder)
+    newcomer = document in sandbox.FIRST_USE
+    if not newcomer:
+        blocks.write_files(parsed, folder)
     wrong = []
     for command in sandbox.COMMANDS.get(document, ()):
         printed = shell.run(command)
         assert shell.code == 0, f"{command}: {printed}"
     for example in parsed:
+        if newcomer and example.parsed.file:
+            (folder / example.parsed.file).write_text(example.parsed.text, "utf-8")
         try:
             example.evaluate()
         except SybilFailure as failure:
@@ -60,18 +64,15 @@ def test_the_blocks_of(document: str, tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 NOT_RUN = {
-    "CONTRIBUTING.md": 2,
+    "CONTRIBUTING.md": 3,
     "docs/benchmark.md": 4,
     "docs/disturbances.md": 2,
     "docs/formats/corpus.md": 1,
     "docs/fuzz-any-8051.md": 1,
     "docs/fuzzing.md": 1,
     "docs/gains.md": 1,
-    "docs/howto/ci.md": 2,
-    "docs/howto/fuzz.md": 2,
-    "docs/howto/own-protocol.md": 1,
     "docs/howto/reproduce.md": 2,
-    "docs/index.md": 3,
+    "docs/index.md": 1,
     "docs/mutants.md": 1,
     "docs/start.md": 1,
     "docs/theory.md": 1,

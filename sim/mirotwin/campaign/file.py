@@ -109,7 +109,7 @@ def read(path: Path) -> CampaignFile:
     try:
         text = read_input(path, TEXT_KIB << 10).decode("utf-8")
     except FileNotFoundError:
-        remedy = f"examples/campaign.toml shows one; built-in: {', '.join(builtin.names())}"
+        remedy = f"`mirotwin examples campaign` writes one; built-in: {', '.join(builtin.names())}"
         raise BadInput(path, "", "there is no such file", remedy) from None
     except UnicodeDecodeError:
         raise BadInput(path, "", "not UTF-8 text", "save the file as UTF-8") from None

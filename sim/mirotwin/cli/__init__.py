@@ -26,6 +26,7 @@ COMMANDS = {
     "decode": "Decodes captured bytes to frames and damage.",
     "export": "Writes a run for Foxglove, Wireshark, or as a stream file.",
     "init": "Begins a project: firmware, tests, scenarios, a workflow for CI.",
+    "examples": "Lists the examples, or writes one into a folder.",
     "scenarios": "Lists the built-in scenarios, or shows one.",
     "info": "Shows versions, engine and firmware.",
     "fw": "Firmware: run on the bare processor, disassemble, trace, profile.",

@@ -33,5 +33,5 @@ class CampaignGroup(LazyGroup):
 def campaign() -> None:
     """Runs a scenario over seeds and values of its keys, and says what came of it.
 
-    FILE.toml says which runs: sim/mirotwin/campaign/README.md has its keys, examples/campaign.toml is one.
+    FILE.toml says which runs; `mirotwin examples campaign` writes one.
     """

@@ -99,7 +99,7 @@ def export(
     exit code is 2. A run that was broken off (run.part.mcap) is written as far as it goes, with a note.
 
     For Foxglove, all that is in the recording is written again, with the scene, transforms, log and camera frames that
-    Foxglove draws; examples/foxglove.json is a layout for it:
+    Foxglove draws; `mirotwin examples foxglove` writes a layout for it:
 
     \b
         mirotwin export run.mcap --out foxglove.mcap

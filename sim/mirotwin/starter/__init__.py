@@ -1,1 +1,1 @@
-"""A sample project: the firmware of a robot with its tests. Its files are `examples/hil`, and in a wheel here."""
+"""What a user begins with: a sample project, and the examples of the pages. Their files are in `examples/`, or here."""

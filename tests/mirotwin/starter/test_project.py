@@ -110,3 +110,14 @@ def test_what_a_project_requires_is_this_version_with_what_its_pages_need() -> N
     (requirements,) = (path for name, path in project.files() if name == "requirements.txt")
     minor = ".".join(metadata.version("mirotwin").split(".")[:2])
     assert f"mirotwin[report]~={minor}.0" in requirements.read_text("utf-8").splitlines()
+
+
+def test_writing_it_again_is_no_mistake_while_nothing_was_changed(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    mirotwin("init", tmp_path / "mine")
+    assert mirotwin("init", tmp_path / "mine")[0] == 0
+    (tmp_path / "mine/firmware/main.c").write_text("")
+    code, _, err = mirotwin("init", tmp_path / "mine")
+    assert (code, "holds firmware/main.c already" in err) == (2, True)
+    assert (tmp_path / "mine/firmware/main.c").read_text() == ""
