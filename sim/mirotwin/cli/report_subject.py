@@ -158,7 +158,7 @@ def _of_case(wanted: Wanted, file: str, job: Job, image: Image) -> Material:
     again = _again(wanted, file, job, image, min(ends, default=None))
     report = Path(file).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
-    notes = [*([_played_with(image, "case")] if job.case.other else []), *_said(job, again)]
+    notes = [*([_played_with(image, "case")] if job.case.changed else []), *_said(job, again)]
     about = _about("failed test" if text else "case", file, job, image, notes, _command(wanted, file))
     return Material(
         about=msgspec.structs.replace(
