@@ -1,7 +1,7 @@
 """Brings documents from outside of `docs/` into the site, and makes their links work there.
 
 What belongs here: which documents, and where links lead. What does not: texts, and the order of the pages
-(`mkdocs.yml`).
+(`properdocs.yml`).
 
 Documents link as they lie in the tree, so that they can be read there: `../../../README.md`, `statistics.py`. In the
 site
@@ -11,7 +11,7 @@ site
     a folder without a README.md                   is a page that shows its files
     README.md of the tree                          is the home page
 
-A link into nowhere stays as it is, and `mkdocs build --strict` fails by it.
+A link into nowhere stays as it is, and `properdocs build --strict` fails by it.
 """
 
 from __future__ import annotations
@@ -24,12 +24,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
-from mkdocs.structure.pages import Page
+from properdocs.config.defaults import ProperDocsConfig
+from properdocs.structure.files import File, Files
+from properdocs.structure.pages import Page
 
 sys.path[:0] = [str(Path(__file__).parent)]
-import tables  # noqa: E402 (beside this file, which mkdocs loads by its path)
+import howtos  # noqa: E402 (beside this file, which properdocs loads by its path)
+import release  # noqa: E402
+import tables  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
 DOCS = "docs"
@@ -51,11 +53,12 @@ def tracked() -> list[str]:
 
 
 def outside(names: list[str]) -> list[str]:
-    """Documents that are brought in: READMEs of folders, and CONTRIBUTING."""
+    """Documents that are brought in: READMEs of folders, CHANGELOG and CONTRIBUTING."""
     return [
         name
         for name in names
-        if (name.endswith("/README.md") and not name.startswith(f"{DOCS}/")) or name == "CONTRIBUTING.md"
+        if (name.endswith("/README.md") and not name.startswith(f"{DOCS}/"))
+        or name in ("CHANGELOG.md", "CONTRIBUTING.md")
     ]
 
 
@@ -150,7 +153,13 @@ def shown(path: str) -> str:
     return "\n".join(parts)
 
 
-def on_files(files: Files, config: MkDocsConfig) -> Files:
+def on_config(config: ProperDocsConfig) -> ProperDocsConfig:
+    """Says which version the site is of."""
+    release.describe(config)
+    return config
+
+
+def on_files(files: Files, config: ProperDocsConfig) -> Files:
     """Adds the documents, then what they link to."""
     pages = {path.src_uri: path.content_string for path in files.documentation_pages()}
     for name, site_path in _tree.documents.items():
@@ -175,4 +184,12 @@ def on_page_content(html: str, **_: Any) -> str:
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     """Rewrites the links of one page, and fills in its tables."""
-    return relinked(tables.filled(markdown), page.file.src_uri)
+    here = page.file.src_uri
+    if here == howtos.INDEX:
+        markdown = howtos.with_first_sentences(markdown, ROOT / origin(here))
+    return relinked(tables.filled(markdown), here)
+
+
+def on_post_build(config: ProperDocsConfig, **_: Any) -> None:
+    """Puts the source beside the pages, where it has no address."""
+    release.write_archive(config)

@@ -1,4 +1,4 @@
-"""The documentation site builds without a warning, has every command and every public name, and needs no network."""
+"""The documentation site builds without a warning, has all commands and public names, needs no network, no server."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ import html
 import os
 import re
 import sys
+import tarfile
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from tests import children
 from tests.docs import sandbox
+from tests.mirotwin.page import browser
 
 import mirotwin
 from mirotwin.cli import COMMANDS
@@ -20,18 +23,19 @@ from mirotwin.cli.fw import COMMANDS as FW
 
 ROOT = sandbox.ROOT
 FETCHED = re.compile(r"""<(?:script|img|iframe|link)\b[^>]*?(?:src|href)=["']?(https?:)?//[^"'\s>]+""")
+VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
 LINK = re.compile(r"\]\(([^()\s#:]+)(?:#[^()\s]*)?\)")
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    pytest.importorskip("mkdocs", reason="needs the extra docs")
+    pytest.importorskip("properdocs", reason="needs the extra docs")
     folder = tmp_path_factory.mktemp("site")
     path = os.pathsep.join([str(ROOT), *(str(ROOT / name) for name in sandbox.PACKAGES)])
     done = children.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", folder],
+        [sys.executable, "-m", "properdocs", "build", "--strict", "--site-dir", folder],
         cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": path, "NO_MKDOCS_2_WARNING": "1", "PYTHONDONTWRITEBYTECODE": "1"},
+        env={**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"},
         capture_output=True,
         text=True,
     )
@@ -104,3 +108,81 @@ def test_links_lead_to_files_of_the_tree(document: str) -> None:
     text = re.sub(r"```.*?```|`[^`\n]*`", "", (ROOT / document).read_text("utf-8"), flags=re.DOTALL)
     folder = (ROOT / document).parent
     assert not [target for target in LINK.findall(text) if not (folder / target).exists()]
+
+
+def words(markup: str) -> str:
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", markup)).split())
+
+
+def test_every_page_says_its_version_and_licence(site: Path) -> None:
+    for name, text in pages(site):
+        footer = re.search(r'<div class="md-copyright">.*?</div>', text, re.DOTALL)
+        header = re.search(r'<div class="md-header__source">.*?</a>', text, re.DOTALL)
+        assert footer, name
+        assert words(footer[0]).startswith(f"Mirotwin {VERSION}"), name
+        assert "MIT licence" in footer[0], name
+        assert header is None or VERSION in words(header[0]), name
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="an archive of the source is made of a commit")
+def test_without_an_address_the_source_is_an_archive_beside_the_pages(site: Path) -> None:
+    with tarfile.open(site / f"mirotwin-{VERSION}.tar.gz") as archive:
+        names = set(archive.getnames())
+    assert {f"mirotwin-{VERSION}/README.md", f"mirotwin-{VERSION}/setup.py"} <= names
+    for page, archive_link in (("index", ""), ("howto/ci", "../"), ("sim/mirotwin/page/index", "../../../")):
+        text = (site / f"{page}.html").read_text("utf-8")
+        assert f'<a href="{archive_link}mirotwin-{VERSION}.tar.gz"' in text
+
+
+def test_programs_that_make_documents_are_not_published(site: Path) -> None:
+    assert not (site / "film").exists()
+    assert not list(site.rglob("*.py"))
+    assert not (site / "site/theme").exists()
+
+
+def test_the_index_of_how_tos_has_each_with_its_first_sentence(site: Path) -> None:
+    nav = (
+        (ROOT / "properdocs.yml").read_text("utf-8").partition("- How to:\n")[2].partition("  - Files:\n")[0]
+    )
+    leaves = [leaf for leaf in re.findall(r": (\S+)\.md$", nav, re.MULTILINE) if leaf != "howto/index"]
+    table = re.search(r"<tbody>.*?</tbody>", (site / "howto/index.html").read_text("utf-8"), re.DOTALL)
+    assert table
+    rows = [re.findall(r"<td>(.*?)</td>", row, re.DOTALL) for row in table[0].split("</tr>") if "<td>" in row]
+    wanted = {f"{os.path.relpath(leaf, 'howto')}.html".replace("README", "index") for leaf in leaves}
+    targets = [re.search(r'href="([^"]+)"', row[1]) for row in rows]
+    assert {found[1] for found in targets if found} == wanted
+    for row, found in zip(rows, targets, strict=True):
+        assert found
+        sentence = words(row[2])
+        assert re.fullmatch(r"[A-Z].*\.", sentence), sentence
+        page = words((site / "howto" / found[1]).read_text("utf-8"))
+        assert re.sub(r"\W", "", sentence) in re.sub(r"\W", "", page)
+
+
+@pytest.mark.skipif(bool(browser.MISSING), reason=browser.MISSING)
+def test_search_works_in_a_page_that_is_opened_from_a_disk(site: Path) -> None:
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    with browser.chromium() as driver:
+        driver.get((site / "howto/index.html").as_uri())
+        driver.execute_script("document.querySelector('input[name=query]').focus()")
+        driver.find_element("css selector", "input[name=query]").send_keys("Wireshark dissector")
+        found = WebDriverWait(driver, browser.PATIENCE_S, 0.1).until(
+            lambda one: one.find_elements("css selector", ".md-search-result__link")
+        )
+        assert "/protocol/index.html" in found[0].get_attribute("href")
+        assert [one for one in driver.get_log("browser") if one["level"] not in ("INFO", "DEBUG")] == []
+
+
+@pytest.mark.skipif(bool(browser.MISSING), reason=browser.MISSING)
+@pytest.mark.parametrize("width", [360, 1280])
+def test_pages_of_the_site_are_no_wider_than_their_window(site: Path, width: int) -> None:
+    metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
+    with browser.chromium() as driver:
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        wide = []
+        for page in ("index", "howto/index", "reference/cli", "formats/scenario", "fidelity"):
+            driver.get((site / f"{page}.html").as_uri())
+            if driver.execute_script("return document.documentElement.scrollWidth") > width:
+                wide.append(page)
+    assert not wide

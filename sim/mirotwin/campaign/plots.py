@@ -10,21 +10,29 @@ time.
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
 import msgspec
 import numpy as np
-from bokeh.models import ColumnDataSource, DataRange1d, FactorRange, Span
+from bokeh.models import ColumnDataSource, DataRange1d, FactorRange, Range1d, Span
 
 from mirotwin.campaign.comparison import Difference
 from mirotwin.campaign.statistics import Figures, Numbers
-from mirotwin.page.axes import panel, tagged
+from mirotwin.page.axes import at_least, panel, tagged
 
 MOST_DOTS = 1500
 """Of an arm; of more runs every second one is drawn, or every third, and so on."""
 ROW = 34
+LINE = 15
+"""Height of a line of a label that does not fit into one."""
+WIDEST = 22
+"""Characters of a label in one line, so that a telephone has room for what is drawn."""
 GOLDEN = 0.6180339887498949
+LEAST = {"rms_position_cm": 0.01, "rms_theta_deg": 0.01, "settling_s": 0.05}
+"""The least that an axis spans, by what a metric is shown and known to; of a difference it is LEAST_PERCENT."""
+LEAST_PERCENT = 0.1
 
 
 class Arm(msgspec.Struct, frozen=True):
@@ -44,9 +52,10 @@ class Apart(msgspec.Struct, frozen=True):
 
 def spread(metric: str, arms: Sequence[Arm]) -> Any:
     """A row for each arm, over one range."""
-    labels = [arm.label for arm in arms]
-    made = _rows(metric, labels, labels)
-    _dots(made, [(arm.label, arm.numbers) for arm in arms])
+    labels = [wrapped(arm.label) for arm in arms]
+    made = _rows(metric, labels)
+    _dots(made, [(label, arm.numbers) for label, arm in zip(labels, arms, strict=True)])
+    _widen(made, LEAST[metric], *(arm.numbers for arm in arms))
     quantiles = [arm.figures.quantiles for arm in arms]
     source = ColumnDataSource(
         {
@@ -71,10 +80,12 @@ def apart(found: Sequence[Apart]) -> Any:
     """Differences in per cent of the first one's mean: each pair a dot, the mean with its interval."""
     shown = [one for one in found if one.difference.first and one.difference.interval is not None]
     labels = [one.difference.metric for one in shown]
-    made = _rows("difference, % of the first's mean", labels, labels)
+    made = _rows("difference, % of the first's mean", labels)
     made.add_layout(tagged(Span(location=0.0, dimension="height", line_width=1.2), line_color="ink"))
     scale = [100.0 / abs(one.difference.first) for one in shown]
-    _dots(made, [(label, one.numbers * by) for label, one, by in zip(labels, shown, scale, strict=True)])
+    numbers = [one.numbers * by for one, by in zip(shown, scale, strict=True)]
+    _dots(made, list(zip(labels, numbers, strict=True)))
+    _widen(made, LEAST_PERCENT, [0.0], *numbers)
     intervals = [one.difference.interval for one in shown if one.difference.interval is not None]
     source = ColumnDataSource(
         {
@@ -93,16 +104,26 @@ def apart(found: Sequence[Apart]) -> Any:
     return made
 
 
-def _rows(x_label: str, labels: Sequence[str], rows: Sequence[str]) -> Any:
+def wrapped(label: str) -> str:
+    """In lines that are no longer than WIDEST."""
+    return "\n".join(textwrap.wrap(label, WIDEST)) or label
+
+
+def _widen(made: Any, least: float, *columns: Any) -> None:
+    if (ends := at_least(least, *columns)) is not None:
+        made.x_range = Range1d(*ends)
+
+
+def _rows(x_label: str, rows: Sequence[str]) -> Any:
     made = panel(
         "",
         DataRange1d(range_padding=0.04),
-        height=64 + ROW * len(rows),
+        height=64 + len(rows) * max(ROW, LINE * max(row.count("\n") + 1 for row in rows)),
         x_label=x_label,
         y_range=FactorRange(factors=list(reversed(rows))),
     )
-    longest = max((len(label) for label in labels), default=0)
-    made.min_border_left = min(260, 24 + 6 * longest)
+    longest = max(len(line) for row in rows for line in row.split("\n"))
+    made.min_border_left = 24 + 6 * longest
     made.ygrid[0].visible = False
     made.xgrid[0].visible = True
     return made

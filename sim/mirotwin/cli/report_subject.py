@@ -28,7 +28,7 @@ from mirotwin.files.command_line import replay_line
 from mirotwin.files.outputs import RECORDING, part_name
 from mirotwin.page.again import Again, run_again
 from mirotwin.page.bokeh_page import require_bokeh
-from mirotwin.page.frames import extras_of
+from mirotwin.page.frames import Extras, extras_of
 from mirotwin.page.run_page import About, Material, Replayed, run_page
 from mirotwin.replay.compare import Rule, differences
 from mirotwin.report.firmware_coverage import source_folders
@@ -124,17 +124,23 @@ def _of_recording(wanted: Wanted, file: str, job: Job, image: Image) -> Material
         raise BadInput(file, place, f"the recording goes from tick {first} to {last}", "look within it")
     end_tick = (recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
     again = _again(wanted, file, job, image, end_tick)
+    other = job.image is None or job.image.code != image.code
     extras = extras_of(file, recorded[0].tick, end_tick, wanted.frames)
     summary = _summary(Path(file), job.recorded[-1].digest)
-    notes = [
-        f"This run was broken off: the page shows the {len(recorded)} control periods that were recorded."
-    ]
-    other = job.image is not None and job.image.code != image.code
+    notes = []
+    if extras.broken_off:
+        notes.append(
+            f"This run was broken off: the page shows the {len(recorded)} control periods that were recorded."
+        )
+    if other:
+        recorded = [period for period in again.periods if period.index in wanted.shown]
+        extras = Extras(broken_off=extras.broken_off)  # frames and samples are of the recorded robot
+        notes.append(_played_with(image, "recording", job.image))
     what = f"Another firmware ({image.path.name})" if other else "This page's own run of it"
     # the state of a controller is not computed again, so that digests of states say nothing here
     found = differences(job.recorded[: len(again.periods)], again.periods, Rule(to_tick=end_tick))
     return Material(
-        about=_about("run", file, job, image, notes if extras.broken_off else (), _command(wanted, file)),
+        about=_about("run", file, job, image, notes, _command(wanted, file)),
         scenario=job.scenario,
         scenario_text=tomli_w.dumps(tables_of(job.scenario)),
         periods=recorded,
@@ -152,9 +158,8 @@ def _of_case(wanted: Wanted, file: str, job: Job, image: Image) -> Material:
     again = _again(wanted, file, job, image, min(ends, default=None))
     report = Path(file).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
-    about = _about(
-        "failed test" if text else "case", file, job, image, _said(job, again), _command(wanted, file)
-    )
+    notes = [*([_played_with(image, "case")] if job.case.changed else []), *_said(job, again)]
+    about = _about("failed test" if text else "case", file, job, image, notes, _command(wanted, file))
     return Material(
         about=msgspec.structs.replace(
             about,
@@ -168,6 +173,15 @@ def _of_case(wanted: Wanted, file: str, job: Job, image: Image) -> Material:
         again=again,
         sources=source_folders(image, wanted.sources),
         shown=wanted.shown,
+    )
+
+
+def _played_with(image: Image, kind: str, recorded: Image | None = None) -> str:
+    """That the page is of another firmware than what was recorded."""
+    own = f" ({recorded.sha256[:12]})" if recorded is not None and recorded.sha256 else ""
+    return (
+        f"Played with another firmware, {image.path.name} ({(image.sha256 or '')[:12]}), than the {kind}'s{own}."
+        f" Pitch, figures and checks show what it did with the bytes of the {kind}."
     )
 
 

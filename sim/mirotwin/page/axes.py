@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from bokeh.models import BoxZoomTool, PanTool, Range1d, ResetTool, Span, WheelZoomTool
+import numpy as np
+from bokeh.models import BoxZoomTool, NoOverlap, PanTool, Range1d, ResetTool, Span, WheelZoomTool
 from bokeh.plotting import figure
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Liberation Sans', sans-serif"
@@ -47,6 +48,7 @@ def panel(y_label: str, x_range: Any, height: int = 190, x_label: str = "", **mo
     for grid in (made.xgrid[0], made.ygrid[0]):
         grid.tags = ["grid_line_color=grid"]
     made.xgrid[0].visible = False
+    made.xaxis[0].major_label_policy = NoOverlap(min_distance=8)  # in a narrow window
     if hasattr(made.yaxis[0].ticker, "desired_num_ticks"):  # not for lanes
         made.yaxis[0].ticker.desired_num_ticks = 5
     return made
@@ -72,6 +74,16 @@ def time_range(times_s: list[float], period_s: float) -> Range1d:
     """From the first period to the end of the last one, and no further by any tool."""
     first, last = (times_s[0], times_s[-1] + period_s) if times_s else (0.0, 1.0)
     return Range1d(start=first, end=last, bounds=(first, last), min_interval=period_s / 8)
+
+
+def at_least(span: float, *columns: Any) -> tuple[float, float] | None:
+    """Ends of an axis that is `span` wide, where the numbers vary by less: an axis never shows rounding noise."""
+    found = np.concatenate([np.asarray(one, dtype=np.float64) for one in columns])
+    found = found[np.isfinite(found)]
+    if not found.size or found.max() - found.min() >= span:
+        return None
+    middle = (found.max() + found.min()) / 2.0
+    return float(middle - span / 2.0), float(middle + span / 2.0)
 
 
 def tagged(model: Any, **colours: str) -> Any:

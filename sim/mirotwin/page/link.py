@@ -170,7 +170,7 @@ def _said(frame: Received, robots: int) -> str:
 
 def _sent(sent: Transmission, named: str) -> Mark:
     end = sent.tick + len(sent.data) * HOST_CHARACTER_TICKS
-    text = named or f"{len(sent.data)} characters"
+    text = named or _characters(len(sent.data))
     return Mark(f"net{sent.network} PC sends", "sent" if named else "raw", sent.tick, end, text)
 
 
@@ -200,7 +200,7 @@ def _fates(
             else:
                 noise.append(tick)
         for first, last, count in _together(noise):
-            marks.append(Mark(lane, "noise", first, last, f"{count} characters of noise"))
+            marks.append(Mark(lane, "noise", first, last, f"{_characters(count)} of noise"))
     for number, name in enumerate(named):
         start, end = begins[number] + SLACK_TICKS, ends[number] - SLACK_TICKS
         kind = _fate(frames.get(number), damaged.get(number, 0), end + SLACK_TICKS > over_tick)
@@ -239,7 +239,9 @@ def _answers(heard: Sequence[Transmission], events: Sequence[Event], network: in
         within = [event for event in answers if one.tick <= event.tick <= end + SLACK_TICKS]
         enough = len(one.data) >= TELEMETRY.wire_size // 2
         kind = "answer" if within else "damaged" if enough else "noise"
-        who = ", ".join(_answer(event) for event in within) or f"{len(one.data)} characters, no valid answer"
+        who = (
+            ", ".join(_answer(event) for event in within) or f"{_characters(len(one.data))}, no valid answer"
+        )
         marks.append(Mark(f"net{network} PC hears", kind, one.tick, end, who))
     return marks
 
@@ -251,3 +253,7 @@ def _answer(event: Event) -> str:
 def _deed(event: Event) -> Mark:
     lane = f"net{event.network} done to it"
     return Mark(lane, "deed", event.tick, event.tick + HOST_CHARACTER_TICKS, f"{event}".partition(": ")[2])
+
+
+def _characters(count: int) -> str:
+    return f"{count} character" if count == 1 else f"{count} characters"

@@ -16,7 +16,7 @@ import numpy as np
 from bokeh.models import BoxAnnotation, ColumnDataSource, FactorRange
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
-from mirotwin.page.axes import add_cursor, add_failures, panel, tagged, time_range
+from mirotwin.page.axes import add_cursor, add_failures, at_least, panel, tagged, time_range
 from mirotwin.page.course import SIDES, Course, RobotCourse
 from mirotwin.page.link import Mark, lanes_of
 from mirotwin.report.track import SETTLED_CM, SETTLED_RAD
@@ -39,6 +39,8 @@ KIND_COLOURS = {
 """Kinds of marks and their colours, in the order in which they are drawn: what went wrong lies on top."""
 HEIGHTS = {"noise": 0.26, "damaged": 0.94, "lost": 0.94}
 """Of a lane; 0.6 for all others."""
+LEAST_M_S, LEAST_RAD_S = 0.01, 0.1
+"""The least that an axis of speeds spans: some forty steps of the encoder over a control period, at the wheel."""
 HOLLOW, WRONG = ("lost",), ("damaged", "lost")
 Figures = dict[str, Any]
 
@@ -50,8 +52,8 @@ def figures_of(course: Course, marks: Sequence[Mark], failure_ticks: Sequence[in
     if any(robot.steered for robot in course.robots):
         made["plot-position"] = _errors(course, times, "position error [cm]", SETTLED_CM, _position)
         made["plot-heading"] = _errors(course, times, "heading error [rad]", SETTLED_RAD, _heading)
-    made["plot-v"] = _speeds(course, times, "v [m/s]", "v_m_s")
-    made["plot-w"] = _speeds(course, times, "\u03c9 [rad/s]", "w_rad_s")
+    made["plot-v"] = _speeds(course, times, "v [m/s]", "v_m_s", LEAST_M_S)
+    made["plot-w"] = _speeds(course, times, "\u03c9 [rad/s]", "w_rad_s", LEAST_RAD_S)
     for side in SIDES:
         made[f"plot-{side}"] = _wheel(course, times, side)
     if marks:
@@ -94,7 +96,7 @@ def _errors(course: Course, times: Any, label: str, band: float, value_of: Calla
     return made
 
 
-def _speeds(course: Course, times: Any, label: str, name: str) -> Any:
+def _speeds(course: Course, times: Any, label: str, name: str, least: float) -> Any:
     made = panel(label, times, x_label="t [s]")
     for number, robot in enumerate(course.robots):
         found = {"t": _of_course(course), "truth": _array(robot, name), "told": _array(robot, f"told_{name}")}
@@ -102,6 +104,7 @@ def _speeds(course: Course, times: Any, label: str, name: str) -> Any:
         told = made.step("t", "told", source=source, mode="after", line_width=1.4)
         _of_robot(told, number, line_color="told")
         _of_robot(made.line("t", "truth", source=source, line_width=1.8), number, line_color="truth")
+        _widen(made, number, course, least, found["truth"], found["told"])
     return made
 
 
@@ -123,7 +126,16 @@ def _wheel(course: Course, times: Any, side: str) -> Any:
         _of_robot(made.line("t", "profile", source=profile, line_width=1.6), number, line_color="profile")
         actual = made.line("t", "actual", source=source, line_width=1.6)
         _of_robot(actual, number, line_color="truth")
+        _widen(made, number, course, LEAST_M_S, found["told"], found["actual"], of_profile[1])
     return made
+
+
+def _widen(made: Any, number: int, course: Course, least: float, *columns: Any) -> None:
+    """Makes the axis of one robot span `least` where its numbers vary by less: by two points that nobody sees."""
+    if (ends := at_least(least, *columns)) is not None:
+        source = ColumnDataSource({"t": [course.times_s[0]] * 2, "value": list(ends)})
+        points = made.scatter("t", "value", source=source, size=0, line_color=None, fill_alpha=0.0)
+        _of_robot(points, number)
 
 
 def _link(marks: Sequence[Mark], times: Any) -> Any:

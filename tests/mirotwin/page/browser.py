@@ -69,6 +69,56 @@ def open_page(driver: Any, page: Path, theme: str = "light", width: int = 1400, 
     )
 
 
+FOCUSED = """
+let one = document.activeElement;
+while (one.shadowRoot?.activeElement) one = one.shadowRoot.activeElement;
+if (one === document.body) return null;
+one.scrollIntoView({ block: "center", behavior: "instant" });
+const parts = (text) => text.match(/[\\d.]+/g).map(Number);
+const shade = (text) => {
+  const scale = text.startsWith("color(") ? 1 : 255;
+  const [r, g, b] = parts(text.replace("color(srgb", "")).slice(0, 3).map((value) => value / scale)
+    .map((value) => (value <= 0.04045 ? value / 12.92 : ((value + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+};
+const style = getComputedStyle(one), ring = one.getBoundingClientRect();
+const grown = parseFloat(style.outlineWidth) + parseFloat(style.outlineOffset);
+const up = (node) => node.parentElement ?? node.getRootNode().host;
+let back = null, cut = false;
+for (let node = parseFloat(style.outlineOffset) < 0 ? one : up(one); node; node = up(node)) {
+  const its = getComputedStyle(node), box = node.getBoundingClientRect();
+  const alpha = parts(its.backgroundColor)[3] ?? 1;
+  if (back === null && alpha > 0.5) back = its.backgroundColor;
+  if (node !== one && node !== document.body && node !== document.documentElement && its.overflowX !== "visible")
+    cut ||= ring.left - grown < box.left - 0.5 || ring.top - grown < box.top - 0.5
+      || ring.bottom + grown > box.bottom + 0.5;
+}
+const [high, low] = [shade(style.outlineColor), shade(back)].sort((a, b) => b - a);
+return { name: one.outerHTML.slice(0, 90), at: [ring.left, ring.top + scrollY].map(Math.round),
+         style: style.outlineStyle, width: parseFloat(style.outlineWidth),
+         contrast: (high + 0.05) / (low + 0.05), cut };
+"""
+"""What the ring around the element with the focus looks like."""
+
+
+def rings(driver: Any) -> list[dict[str, Any]]:
+    """The ring of each element that the tabulator key reaches, from the top of the page to its end."""
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    driver.execute_script(
+        "document.activeElement.blur(); scrollTo(0, 0); getSelection().collapse(document.body, 0)"
+    )
+    found: list[dict[str, Any]] = []
+    for _ in range(200):
+        ActionChains(driver).send_keys(Keys.TAB).perform()
+        ring = driver.execute_script(FOCUSED)
+        if ring is None or ring in found:
+            break
+        found.append(ring)
+    return found
+
+
 def picture(driver: Any, selector: str) -> Image.Image:
     """What an element looks like."""
     element = driver.find_element("css selector", selector)

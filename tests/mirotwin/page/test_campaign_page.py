@@ -3,6 +3,7 @@
 import json
 import shlex
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from tests.mirotwin.campaign.plans import InThisProcess, plan_of
@@ -127,4 +128,49 @@ def test_in_a_browser_a_click_on_a_failed_run_shows_its_command_without_complain
         assert after != before or button.text == "0"
         assert "--set network.robot.start_error_x_cm=40.0" in after
         assert [one for one in driver.get_log("browser") if one["level"] not in ("INFO", "DEBUG")] == []
-        assert driver.execute_script("return document.documentElement.scrollWidth") == 1400
+        for width in (360, 600, 1400):
+            browser.open_page(driver, page, width=width)
+            assert driver.execute_script("return document.documentElement.scrollWidth") == width
+            wide = driver.execute_script(
+                "return [...document.querySelectorAll('table')].filter((one) => !one.closest('.scroll')).length"
+            )
+            assert wide == 0
+            frames = driver.execute_script(
+                "return Object.values(plots.figures).map((one) =>"
+                " [...Bokeh.index].find((view) => view.model === one).frame.bbox.width)"
+            )
+            assert min(frames) > 100, "names of arms leave no room for what is drawn"
+
+
+@pytest.mark.skipif(bool(browser.MISSING), reason=browser.MISSING)
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_keyboards_focus_is_seen_on_every_control(page, theme):
+    with browser.chromium() as driver:
+        browser.open_page(driver, page, theme, width=360)
+        found = browser.rings(driver)
+    assert 'id="run"' in " ".join(ring["name"] for ring in found)
+    assert [one for one in found if one["contrast"] < 3 or one["width"] < 2 or one["style"] != "solid"] == []
+    assert [one["name"] for one in found if one["cut"]] == []
+
+
+def test_a_campaign_says_what_is_missing_without_javascript(page):
+    assert "need\nJavaScript, which is switched off" in page.read_text()
+
+
+def test_axes_do_not_show_rounding_noise():
+    from mirotwin.campaign.plots import LEAST, Arm, spread
+    from mirotwin.campaign.statistics import figures
+
+    numbers = np.array([1.0, 1.0 + 2e-16, 1.0 - 1e-16, 1.0])
+    for metric, least in LEAST.items():
+        ends = spread(metric, [Arm("all", numbers, figures(numbers, np.arange(4)))]).x_range
+        assert ends.end - ends.start == pytest.approx(least)
+        assert ends.start < 1.0 < ends.end
+
+
+def test_long_names_of_arms_are_wrapped():
+    from mirotwin.campaign.plots import wrapped
+
+    lines = wrapped("bit_error_rate 0.001, far away, and turned a quarter to the left").split("\n")
+    assert lines == ["bit_error_rate 0.001,", "far away, and turned a", "quarter to the left"]
+    assert wrapped("near") == "near"

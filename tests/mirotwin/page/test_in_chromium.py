@@ -8,7 +8,7 @@ import time
 import pytest
 from PIL import Image, ImageStat
 from tests.mirotwin.page import browser
-from tests.mirotwin.page.browser import PICTURES, SHOWN, apart, chromium, open_page, picture, small
+from tests.mirotwin.page.browser import PICTURES, SHOWN, apart, chromium, open_page, picture, rings, small
 
 from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.recording.reader import read
@@ -190,6 +190,33 @@ def test_everything_that_can_be_operated_has_a_name(page):
     assert nameless == []
 
 
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("width", [360, 1400])
+def test_the_keyboards_focus_is_seen_on_every_control(driver, fig6_page, theme, width):
+    open_page(driver, fig6_page, theme, width)
+    found = rings(driver)
+    names = " ".join(ring["name"] for ring in found)
+    for control in ('href="#checks"', 'id="theme"', 'class="jump"', "<summary>", 'id="play"', 'id="time"'):
+        assert control in names
+    assert "bk-" not in names, "a figure has nothing to do for the keyboard"
+    hardly = [ring for ring in found if ring["contrast"] < 3 or ring["width"] < 2 or ring["style"] != "solid"]
+    assert hardly == []
+    assert [ring["name"] for ring in found if ring["cut"]] == []
+
+
+def test_without_javascript_the_numbers_are_there_and_what_needs_it_is_not(driver, fig6_page):
+    driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    try:
+        driver.get(fig6_page.as_uri())
+        said = driver.find_element(By.TAG_NAME, "body").text
+        shown = [driver.find_element(By.CSS_SELECTOR, one).is_displayed() for one in (".transport", "#theme")]
+    finally:
+        driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+    assert "need JavaScript, which is switched off" in " ".join(said.split())
+    assert "settles_within_s" in said
+    assert shown == [False, False]
+
+
 # Colours
 
 
@@ -244,7 +271,7 @@ def test_nothing_is_asked_of_the_network(opened, fig6_page):
     assert [url for url in asked if not url.startswith(("data:", fig6_page.as_uri()))] == []
 
 
-@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("width", [360, 600, 1400])
 def test_the_page_is_no_wider_than_its_window(driver, fig6_page, width):
     open_page(driver, fig6_page, width=width)
     assert driver.execute_script("return document.documentElement.scrollWidth") == width

@@ -1,15 +1,23 @@
 """`mirotwin report` of runs and cases: what a page says, that it is the same each time, and what is refused."""
 
+import base64
+import hashlib
 import json
 import re
 import shutil
+import struct
 import sys
+from array import array
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 from tests import children
 
 from mirotwin.page import bokeh_page, document
+from mirotwin.page.axes import at_least
+from mirotwin.page.course import Course, RobotCourse
+from mirotwin.page.plots import LEAST_M_S, LEAST_RAD_S, figures_of
 
 ADDRESS = re.compile(r"(?:https?|wss?|ftp|file):", re.IGNORECASE)
 
@@ -141,23 +149,86 @@ def test_a_window_leaves_out_the_rest(fig6, tmp_path, mirotwin):
     assert all(ticks[0] <= mark[0] < ticks[-1] + 800800 for mark in data["marks"])
 
 
-def test_another_firmware_shows_where_it_goes_apart(fig6, tmp_path, mirotwin):
-    from miro_robot.firmware import image_path
-
-    lines = image_path().read_text().splitlines()
+@pytest.fixture(scope="module")
+def other(folder):
+    """An image whose robot does nothing."""
     from intelhex import IntelHex
 
+    from miro_robot.firmware import image_path
+
     image = IntelHex(str(image_path()))
-    image[0] = 0x80  # SJMP to itself: a robot that does nothing
+    image[0] = 0x80  # SJMP to itself
     image[1] = 0xFE
-    other = tmp_path / "other.ihx"
-    image.write_hex_file(str(other))
-    assert other.read_text().splitlines() != lines
-    page = tmp_path / "other.html"
+    path = folder / "other.ihx"
+    image.write_hex_file(str(path))
+    return path
+
+
+@pytest.fixture(scope="module")
+def other_page(folder, fig6, other, mirotwin):
+    page = folder / "other.html"
     assert mirotwin("report", fig6, "-o", page, "--firmware", other, "-q")[0] == 0
-    said = Markup(page).text
+    return page
+
+
+def test_another_firmware_shows_where_it_goes_apart(other_page):
+    said = Markup(other_page).text
     assert "Another firmware (other.ihx) differs in control period" in said
     assert "Coverage of the listing" in said
+
+
+def test_a_page_says_at_its_head_that_another_firmware_played(other_page, fig6, other, fig6_page):
+    recorded = json.loads((fig6 / "summary.json").read_text())["firmware"]["sha256"]
+    played = hashlib.sha256(other.read_bytes()).hexdigest()
+    head = Markup(other_page).text.partition("Errors Truth against reference")[0]
+    assert f"Played with another firmware, other.ihx ({played[:12]}), than the recording's" in head
+    assert f"({recorded[:12]})" in head
+    assert "another firmware" not in Markup(fig6_page).text
+
+
+def test_the_path_and_the_digest_are_those_of_the_firmware_that_played(other_page, fig6):
+    found = Markup(other_page)
+    data = json.loads(next(one for one in found.scripts if one.startswith('{"first"')))
+    xs = struct.unpack(f"<{len(data['ticks'])}d", base64.b64decode(data["robots"][0]["truth"][0]))
+    assert set(xs) == {xs[0]}, "a robot that does nothing stands still"
+    recorded = json.loads((fig6 / "summary.json").read_text())["digest"][:12]
+    assert recorded not in found.text
+
+
+def test_a_case_of_another_firmware_says_so(fig6, other, tmp_path, mirotwin):
+    case, page = tmp_path / "mine.stream", tmp_path / "case.html"
+    own = json.loads((fig6 / "summary.json").read_text())["firmware"]["sha256"]
+    case.write_text(f'# mirotwin stream 2\n#: firmware_sha256 = "{own}"\n1000 > 55\n')
+    assert mirotwin("report", case, "-o", page, "--firmware", other, "-q")[0] == 0
+    assert "Played with another firmware, other.ihx" in Markup(page).text
+    assert mirotwin("report", case, "-o", page, "-q", "--force")[0] == 0
+    assert "another firmware" not in Markup(page).text
+
+
+def test_an_axis_never_shows_rounding_noise():
+    noise = array("d", [0.2, 0.2 + 3e-17, 0.2 - 3e-17])
+    ticks = [number * 800800 for number in range(3)]
+    robot = RobotCourse((0, 0), False, 0)
+    nothing = array("d", [float("nan")] * 3)
+    robot.v_m_s = robot.w_rad_s = noise
+    robot.told_v_m_s = robot.told_w_rad_s = nothing
+    for wheel in robot.wheels.values():
+        wheel.told, wheel.profile, wheel.actual = nothing, noise, noise
+    made = figures_of(Course(0, ticks, [robot]), [], [])
+    for name, least in (("v", LEAST_M_S), ("w", LEAST_RAD_S), ("left", LEAST_M_S), ("right", LEAST_M_S)):
+        drawn = [
+            renderer.data_source.data[renderer.glyph.y]
+            for renderer in made[f"plot-{name}"].renderers
+            if renderer.glyph.y in renderer.data_source.data
+        ]
+        everything = np.concatenate([np.asarray(one) for one in drawn])
+        assert np.nanmax(everything) - np.nanmin(everything) == pytest.approx(least)
+
+
+def test_an_axis_of_what_varies_is_left_alone():
+    assert at_least(0.01, [0.0, 0.02, float("nan")]) is None
+    assert at_least(0.01, [float("nan")], []) is None
+    assert at_least(0.01, [1.0], [1.002]) == pytest.approx((0.996, 1.006))
 
 
 def test_texts_of_others_are_text(tmp_path, mirotwin):

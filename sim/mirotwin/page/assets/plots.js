@@ -18,6 +18,14 @@
     }
   };
 
+  // To the keyboard a figure is a picture: none of its keys does anything here, and its focus can hardly be seen.
+  const passOver = (root) => {
+    for (const one of root.querySelectorAll("*")) {
+      if (one.shadowRoot) passOver(one.shadowRoot);
+      if (one.getAttribute("tabindex") === "0") one.tabIndex = -1;
+    }
+  };
+
   const embed = async () => {
     await Bokeh.embed.embed_items(saved.docs, saved.items);
     const [doc] = Bokeh.documents;
@@ -26,6 +34,7 @@
     plots.cursors = plots.models.filter((model) => model.tags.includes("cursor"));
     for (const [id, name] of Object.entries(saved.items[0].roots)) plots.figures[name] = doc.get_model_by_id(id);
     plots.paint();
+    document.querySelectorAll(".plot").forEach(passOver);
   };
 
   plots.ready = embed();

@@ -100,7 +100,7 @@
     slider.value = `${index}`;
     const said = `${time.toFixed(3)} s`;
     slider.setAttribute("aria-valuetext", `${said}, control period ${data.first + index}`);
-    byId("clock").textContent = `${said} · ${data.first + index}`;
+    byId("clock").textContent = `${said} · period ${data.first + index}`;
     tell(index);
     tellLink(tick);
     showCamera(tick);
