@@ -14,6 +14,8 @@ from types import CodeType, FrameType
 from typing import Any
 
 OURS = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin")
+_LOADERS = ("importlib_metadata",)
+"""What loads plug-ins in place of Python's own module of metadata, once somebody has imported it."""
 _STANDARD = os.path.dirname(os.__file__) + os.sep
 _INSTALLED = ("site-packages", "dist-packages")
 
@@ -61,7 +63,8 @@ def defined_at(function: Any) -> str:
 
 def _foreign(frame: FrameType) -> bool:
     """Whether it is neither our code nor Python's."""
-    if _is_ours(frame.f_globals.get("__name__", "")):
+    module = frame.f_globals.get("__name__", "")
+    if _is_ours(module) or module.partition(".")[0] in _LOADERS:
         return False
     file = frame.f_code.co_filename
     standard = file.startswith(_STANDARD) and not any(part in file for part in _INSTALLED)

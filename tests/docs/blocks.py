@@ -39,6 +39,7 @@ LANGUAGES = ("python", "toml", "c", "text", *SHELL)
 COMMAND = re.compile(r"(\$ )?(mirotwin|python3?|pip|pytest) ")
 ELSEWHERE = {
     ("README.md", "python3 -m venv"): "it compiles for minutes; `tests.docs.first_use` installs so",
+    ("README.md", ".venv/bin/pip"): ".ci/run does it",
     ("examples/hil/README.md", "python3 -m venv"): "needs the package index; tests/project/sample.py does it",
     ("examples/hil/README.md", "mirotwin replay"): "needs a firmware that fails",
     (
