@@ -43,7 +43,7 @@ from mirotwin.fuzz.confirm import Court, WorldCourt
 from mirotwin.fuzz.confirm import Place as RobotPlace
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
-from mirotwin.fuzz.files import CampaignFolder, check_outside
+from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
 from mirotwin.fuzz.finds import MINIMISE_S, Find, Finds
 from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.seeds import seeds
@@ -118,7 +118,7 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
     "--out",
     type=Place(path_type=Path),
     metavar="DIR",
-    help="Folder for what it leaves. Default: runs/fuzz-IMAGE.",
+    help="Folder for what it leaves. Default: runs/fuzz-IMAGE, with -2, -3, .. after an earlier campaign.",
 )
 @click.option("--force", is_flag=True, help="Replace an earlier campaign in --out.")
 @click.option(
@@ -169,7 +169,7 @@ def fuzz(
             f"--slot {slot} does not exist among {robots} robots; give 0 to {int(robots) - 1}."
         )
     default = Path("runs") / f"fuzz-{firmware.path.stem}"
-    asked = Asked(out=out or default, **given)
+    asked = Asked(out=out or (default if given["force"] else unused(default)), **given)
     if bare.bare:
         return _bare_campaign(image or "", kind, active, firmware, asked, bare)
     spec = TargetSpec(image=image or "", input=kind, robots=int(robots), slot=slot, engine=active)

@@ -111,6 +111,15 @@ class CampaignFolder:
             path.unlink()
 
 
+def unused(path: Path) -> Path:
+    """`path`, or the first of `path-2`, `path-3`, .. with nothing in it: what an earlier campaign found is not lost."""
+    number, free = 1, path
+    while free.is_dir() and any(free.iterdir()):
+        number += 1
+        free = path.with_name(f"{path.name}-{number}")
+    return free
+
+
 def check_outside(path: Path, corpus: Path | None) -> None:
     """Refuses a corpus that the campaign would take away. Raises BadInput."""
     if corpus is not None and path.exists() and corpus.resolve().is_relative_to(path.resolve()):

@@ -11,7 +11,7 @@ from tests.mirotwin.checks.rig import needs_sdcc, own_image
 from tests.mutants.build import build
 from tests.mutants.draw import source_files
 
-from mirotwin.fuzz.files import CampaignFolder
+from mirotwin.fuzz.files import CampaignFolder, unused
 
 MISTAKE = "takes frames with a bad CRC"
 
@@ -232,3 +232,14 @@ def test_a_campaign_folder_that_cannot_be_made_is_refused(tmp_path):
     (tmp_path / "file").write_text("x")
     with pytest.raises(ValueError, match="not a folder"):
         CampaignFolder(tmp_path / "file")
+
+
+def test_a_campaign_in_the_default_place_takes_a_new_folder_beside_the_earlier_ones(tmp_path):
+    place = tmp_path / "fuzz-mine"
+    assert unused(place) == place
+    place.mkdir()
+    assert unused(place) == place
+    (place / "corpus").mkdir()
+    assert unused(place) == tmp_path / "fuzz-mine-2"
+    (tmp_path / "fuzz-mine-2" / "corpus").mkdir(parents=True)
+    assert unused(place) == tmp_path / "fuzz-mine-3"
