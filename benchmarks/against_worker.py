@@ -25,7 +25,7 @@ MANY = 200
 WARM_PERIODS = 30
 
 NEW = {
-    "runner": "mirotwin.runner",
+    "runner": "mirotwin.rerun.runner",
     "recording": "mirotwin.recording.recorder",
     "scenario": "miro_sim.scenario.file",
     "world": "miro_sim.world.world",

@@ -23,7 +23,6 @@ from statistics import median
 from typing import NamedTuple
 
 from benchmarks.figures import range_of_seeds
-
 from miro_host.posture import Posture
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
@@ -31,7 +30,7 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.campaign.execute import in_order
 from mirotwin.campaign.processes import cores, processes
-from mirotwin.report.track import SETTLED_CM, SETTLED_RAD
+from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
 
 LAST_SECOND = 30
 FIGURES = ("fig6", "fig8")

@@ -27,8 +27,8 @@ from miro_sim.world.world import World
 from mirotwin.campaign.execute import in_order
 from mirotwin.campaign.processes import cores, processes
 from mirotwin.campaign.seeds import seeds_of
+from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import tracking_of
-from mirotwin.report.track import Tracks
 
 BACKWARDS_M_S = -0.01
 HEAD = f"{'scenario':12} {'runs':>4}  {'rms position: median 95 % worst':32} {'x':>7} {'y':>7}"

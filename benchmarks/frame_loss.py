@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.interval import wilson
-
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.rng import Stream
 from miro_protocol.decoder import Decoder, Received

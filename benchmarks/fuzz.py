@@ -15,13 +15,12 @@ from collections.abc import Callable
 from functools import partial
 from statistics import median
 
-from tests.robot.ucsim import s51
-
 from miro_exact import engine
 from miro_exact.rng import Stream
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from mirotwin.fuzz.target import RobotTarget, target_for
+from tests.robot.ucsim import s51
 
 CALLS = 400
 RANDOM = 64

@@ -14,7 +14,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from benchmarks.fuzz import classes
-
 from miro_exact import engine
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex

@@ -18,6 +18,7 @@ import os
 from collections.abc import Iterator, Mapping
 
 import msgspec
+
 from benchmarks.fuzz_time_tables import PAGE, render, replaced
 from benchmarks.fuzz_time_trial import ENGINES, Trial, Wanted, measured
 from tests.mutants.build import CACHE, build

@@ -20,10 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from benchmarks.processor_time import of_descendants
-from tests.mutants.build import CACHE, IMAGE
-from tests.mutants.heard import Input, verdicts
 
+from benchmarks.processor_time import of_descendants
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
@@ -33,6 +31,8 @@ from mirotwin.fuzz.hypothesis_engine import HypothesisRun
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
+from tests.mutants.build import CACHE, IMAGE
+from tests.mutants.heard import Input, verdicts
 
 ENGINES = ("afl", "hypothesis", "link")
 LOOK_S = 0.2

@@ -33,7 +33,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.figures import range_of_seeds
-
 from miro_exact.dmath import exp, log, wrap_pi
 from miro_exact.rng import Stream
 from miro_host.posture import Posture
@@ -42,9 +41,9 @@ from miro_robot.image import Image, load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.campaign.processes import cores, processes
-from mirotwin.report.track import SETTLED_CM, SETTLED_RAD
-from mirotwin.reproduce.claims import number as shown
-from mirotwin.reproduce.plan import STARTS, Start
+from mirotwin.campaign.reproduce.claims import number as shown
+from mirotwin.campaign.reproduce.plan import STARTS, Start
+from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
 
 SEED = 1999
 SEARCH = range(2000, 2005)

@@ -18,7 +18,6 @@ from statistics import median
 from typing import NamedTuple
 
 from benchmarks.figures import range_of_seeds
-
 from miro_exact.rng import Stream
 from miro_host.posture import Posture
 from miro_robot.firmware import image_path
@@ -29,8 +28,8 @@ from miro_sim.scenario.build import reference_for
 from miro_sim.world.world import World
 from mirotwin.campaign.execute import in_order
 from mirotwin.campaign.processes import cores, processes
+from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import tracking_of
-from mirotwin.report.track import Tracks
 
 ANYWHERE_M = 10.0
 WHITE = 'camera={kind="gaussian"}'

@@ -33,7 +33,7 @@ from miro_sim.world.events import Event, of_board
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
-from mirotwin.looking.view import View, view_of
+from mirotwin.camera.view import View, view_of
 
 SCENARIO, SEED = "fig6", 0
 FRAME = 32

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from benchmarks.one_frame import FRAME, SCENARIO, SEED, Way
-
 from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_host.posture import Posture
 from miro_protocol.frames import TeamFrame

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib.style
-from benchmarks.one_frame import Way
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from PIL import Image
 
+from benchmarks.one_frame import Way
 from mirotwin.report.figure import COLOURS, STYLE
 
 LEFT, RIGHT, DARK = COLOURS[0], COLOURS[1], "#333333"

@@ -23,8 +23,6 @@ from statistics import geometric_mean
 from typing import NamedTuple
 
 from benchmarks.realtime import ratio
-from tests.robot.ucsim import s51
-
 from miro_exact import engine
 from miro_exact.clock import NEVER_TICK
 from miro_robot.board import Board
@@ -34,6 +32,7 @@ from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
 from miro_robot.mcs51.xram import XramBus
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
+from tests.robot.ucsim import s51
 
 PROGRAMS = ("crc", "arithmetic", "mix")
 FOLDER = Path(__file__).with_name("programs")

@@ -1,7 +1,7 @@
 """A check of one's own: the robot never turns faster than so.
 
-What belongs here: the parameters and the judge. `mirotwin.checks.interface` says what a judge may be told: besides
-control periods, as here, events of the logs and firmware faults.
+What belongs here: the parameters and the judge. `mirotwin.verify.checks.interface` says what a judge may be told:
+besides control periods, as here, events of the logs and firmware faults.
 """
 
 from typing import Annotated, ClassVar
@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from msgspec import Meta
 
 from miro_sim.periods import RobotPeriod
-from mirotwin.checks.interface import Check, Judge, Kind, Subject
+from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject
 
 
 class TurnsAtMost(Check, frozen=True, kw_only=True, tag="turns_at_most_rad_s"):

@@ -6,13 +6,13 @@ import sys
 import time
 
 import pytest
-from tests.attacks import times
-from tests.mirotwin.campaign.plans import InThisProcess, plan_of, rows
 
 from miro_exact.bad_input import BadInput
 from mirotwin import campaign
 from mirotwin.campaign import journal, wall
 from mirotwin.campaign.journal import journal_path
+from tests.attacks import times
+from tests.mirotwin.campaign.plans import InThisProcess, plan_of, rows
 
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 

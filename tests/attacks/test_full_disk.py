@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from tests import children
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")

@@ -5,12 +5,12 @@ import sys
 
 import pytest
 from intelhex import IntelHex
+
+from mirotwin.fuzz.afl.settings import missing
+from mirotwin.shell.children import python_module
 from tests import children
 from tests.mirotwin.fuzz.bare.firmwares import POLLS
 from tests.robot.mcs51.asm import assemble
-
-from mirotwin.files.children import python_module
-from mirotwin.fuzz.afl.settings import missing
 
 OTHERS = (
     "msgspec",

@@ -4,8 +4,8 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from mirotwin.cli import main
-from mirotwin.cli.options import Number, Whole
+from mirotwin.commands import main
+from mirotwin.shell.options import Number, Whole
 
 WRONG = ("nan", "inf", "-inf", "1e999", "9" * 5000, "-" + "9" * 5000, "0x10", "")
 ONLY_NUMBERS = (click.types.FloatParamType, click.types.IntParamType)

@@ -9,12 +9,12 @@ import time
 
 import pytest
 import websocket
-from tests.mirotwin.cli.conftest import SHORT
-from tests.mirotwin.foxglove.client import live as live_run
 
-from mirotwin.foxglove import derived, server
-from mirotwin.foxglove.messages import ALWAYS, INFO, Log
-from mirotwin.foxglove.server import MOST_CONNECTIONS, PROTOCOLS, Server
+from mirotwin.report.foxglove import derived, server
+from mirotwin.report.foxglove.messages import ALWAYS, INFO, Log
+from mirotwin.report.foxglove.server import MOST_CONNECTIONS, PROTOCOLS, Server
+from tests.mirotwin.conftest import SHORT
+from tests.mirotwin.report.foxglove.client import live as live_run
 
 HERE = "127.0.0.1"
 PATIENCE_S = 10.0

@@ -7,16 +7,16 @@ import time
 from pathlib import Path
 
 import pytest
-from tests import children
-from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of
 
 from miro_exact.bad_input import BadInput
 from miro_protocol import stream
 from miro_robot.image.symbol_files import parse_cdb, parse_listing, parse_map
 from mirotwin import campaign
+from mirotwin.camera import picture
 from mirotwin.campaign.again import arm_line
 from mirotwin.campaign.rows import Rows
-from mirotwin.looking import picture
+from tests import children
+from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of
 
 SPARSE_BYTES = 2 << 30
 MEMORY_BYTES = 1 << 30

@@ -28,6 +28,7 @@ from typing import NamedTuple
 
 from markdown_it import MarkdownIt
 from sybil import Document, Example, Region
+
 from tests.docs import running
 
 ROOT = Path(__file__).parents[2]

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from sybil import Example
-from tests import children
-from tests.docs.shell import Shell, commands_of, fits
 
 from miro_robot.wiring import load_wiring
 from miro_sim.scenario.file import load
-from mirotwin.checks.expect import expectations_of
-from mirotwin.steps.reading import steps_of
+from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.steps.reading import steps_of
+from tests import children
+from tests.docs.shell import Shell, commands_of, fits
 
 TEST = re.compile(r"^def (test_\w+)\(", re.MULTILINE)
 GROUPS = ("laws", "estimators", "references", "checks", "protocols", "bare_checks")

@@ -13,13 +13,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from miro_robot.firmware import image_path, source_folder
+from mirotwin.testing.starter import examples, writing
 from tests import children
 from tests.host.distribution import install
 from tests.mutants import build
 from tests.mutants.planted import PLANTED
-
-from miro_robot.firmware import image_path, source_folder
-from mirotwin.starter import examples, writing
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("exact", "protocol", "robot_fw", "host", "sim")
@@ -128,7 +127,7 @@ def late_case(folder: Path) -> None:
     """The case that the page's own block in Python writes, of that firmware."""
     late(folder)
     copy_image(folder / "late.ihx", folder / "build" / "miro.ihx")
-    page = (ROOT / "sim/mirotwin/cases/README.md").read_text("utf-8")
+    page = (ROOT / "mirotwin/verify/cases/README.md").read_text("utf-8")
     exec(page.split("```python\n")[1].partition("```")[0], {})
 
 
@@ -162,13 +161,13 @@ def question(folder: Path) -> None:
 
 FUNCTIONS: dict[str, Callable[[Path], None]] = {
     "docs/conformance.md": late,
-    "sim/mirotwin/replay/README.md": late,
-    "sim/mirotwin/steps/README.md": late,
-    "sim/mirotwin/cases/README.md": late_case,
+    "mirotwin/replay/README.md": late,
+    "mirotwin/verify/steps/README.md": late,
+    "mirotwin/verify/cases/README.md": late_case,
     "docs/fuzz-any-8051.md": dimmer,
     "examples/fuzz-slip/README.md": dimmer,
-    "sim/mirotwin/fuzz/README.md": regression("tests/cases"),
-    "sim/mirotwin/fuzz/afl/README.md": question,
+    "mirotwin/fuzz/README.md": regression("tests/cases"),
+    "mirotwin/fuzz/afl/README.md": question,
     "protocol/README.md": question,
 }
 
@@ -183,11 +182,11 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "docs/formats/stream.md": (f"{_SHORT} runs/fig6-0",),
     "docs/reference/fixtures.md": ("mirotwin init mine",),
     "protocol/README.md": (f"{_SHORT} first", "mv first/run.mcap ."),
-    "sim/mirotwin/campaign/README.md": (
+    "mirotwin/campaign/README.md": (
         f"{_CAMPAIGN} runs/campaign.parquet || true",
         "cp runs/campaign.parquet baseline.parquet",
     ),
-    "sim/mirotwin/testing/README.md": (
+    "mirotwin/testing/README.md": (
         f"{_SHORT} first",
         "mirotwin export first/run.mcap --out link-failure.stream",
     ),

@@ -25,9 +25,9 @@ from pathlib import Path
 from typing import IO, NamedTuple
 
 import click
-from tests import children
 
-from mirotwin.cli import COMMANDS, main
+from mirotwin.commands import COMMANDS, main
+from tests import children
 
 MAY_TAKE_S = 60
 SLOW_MAY_TAKE_S = 600

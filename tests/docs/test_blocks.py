@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from sybil import Sybil
 from sybil.example import SybilFailure
+
 from tests.docs import blocks, running, sandbox
 from tests.docs.shell import Shell, commands_of, fits, plain
 from tests.mutants import build
@@ -80,12 +81,12 @@ NOT_RUN = {
     "examples/hil/README.md": 2,
     "robot_fw/README.md": 2,
     "robot_fw/miro_robot/inspect/README.md": 2,
-    "sim/mirotwin/bridges/README.md": 3,
-    "sim/mirotwin/campaign/README.md": 1,
-    "sim/mirotwin/foxglove/README.md": 1,
-    "sim/mirotwin/fuzz/README.md": 2,
-    "sim/mirotwin/fuzz/afl/README.md": 1,
-    "sim/mirotwin/testing/README.md": 1,
+    "mirotwin/ports/README.md": 3,
+    "mirotwin/campaign/README.md": 1,
+    "mirotwin/report/foxglove/README.md": 1,
+    "mirotwin/fuzz/README.md": 2,
+    "mirotwin/fuzz/afl/README.md": 1,
+    "mirotwin/testing/README.md": 1,
     "tests/fuzz/README.md": 1,
 }
 """Blocks that are not run, by document: each has its reason in a comment in front of it, or in `blocks.ELSEWHERE`, as
@@ -107,7 +108,7 @@ def test_documents_are_found_and_have_blocks() -> None:
         "README.md",
         "docs/start.md",
         "host/README.md",
-        "sim/mirotwin/testing/README.md",
+        "mirotwin/testing/README.md",
     }
     assert kinds["python"] > 20
     assert kinds["sh"] + kinds["console"] + kinds["indented"] > 60

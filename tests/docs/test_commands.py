@@ -6,9 +6,9 @@ import re
 
 import click
 import pytest
-from tests.docs import sandbox
 
-from mirotwin.cli import main
+from mirotwin.commands import main
+from tests.docs import sandbox
 
 COMMAND = re.compile(r"`(?:\.\. \\?\| )?mirotwin ([a-z][^`\n]*)`")
 OPTION = re.compile(r"(?<![\w-])--?[a-z][a-z0-9-]*")

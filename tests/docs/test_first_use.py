@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+
 from tests.docs import first_use, sandbox
 from tests.docs.shell import Literal
 

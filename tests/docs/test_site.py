@@ -12,14 +12,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests import children
-from tests.docs import sandbox
-from tests.mirotwin.page import browser
 
 import mirotwin
-from mirotwin.cli import COMMANDS
-from mirotwin.cli.campaign import COMMANDS as CAMPAIGN
-from mirotwin.cli.fw import COMMANDS as FW
+from mirotwin.campaign.campaign_command import COMMANDS as CAMPAIGN
+from mirotwin.commands import COMMANDS
+from mirotwin.firmware.fw_command import COMMANDS as FW
+from tests import children
+from tests.docs import sandbox
+from tests.mirotwin.report.page import browser
 
 ROOT = sandbox.ROOT
 FETCHED = re.compile(r"""<(?:script|img|iframe|link)\b[^>]*?(?:src|href)=["']?(https?:)?//[^"'\s>]+""")
@@ -129,7 +129,11 @@ def test_without_an_address_the_source_is_an_archive_beside_the_pages(site: Path
     with tarfile.open(site / f"mirotwin-{VERSION}.tar.gz") as archive:
         names = set(archive.getnames())
     assert {f"mirotwin-{VERSION}/README.md", f"mirotwin-{VERSION}/setup.py"} <= names
-    for page, archive_link in (("index", ""), ("howto/ci", "../"), ("sim/mirotwin/page/index", "../../../")):
+    for page, archive_link in (
+        ("index", ""),
+        ("howto/ci", "../"),
+        ("mirotwin/report/page/index", "../../../"),
+    ):
         text = (site / f"{page}.html").read_text("utf-8")
         assert f'<a href="{archive_link}mirotwin-{VERSION}.tar.gz"' in text
 

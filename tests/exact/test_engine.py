@@ -3,9 +3,9 @@
 import sys
 
 import pytest
-from tests import children
 
 from miro_exact import engine, hot_modules
+from tests import children
 
 
 def test_a_stamp_that_is_not_the_sources_hash_is_refused_with_a_remedy():

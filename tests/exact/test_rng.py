@@ -8,10 +8,10 @@ import mpmath
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive import rng as naive
 
 from miro_exact import rng
 from miro_exact.rng import HALF_NORMAL, Stream, philox4x32
+from tests.naive import rng as naive
 
 seeds = st.integers(0, 2**63 - 1)
 indices = st.one_of(st.integers(0, 1000), st.integers(0, 2**56 - 1))

@@ -6,10 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from tests import children
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "checks"
-PROGRAM = "from mirotwin.cli import main; main()"
+PROGRAM = "from mirotwin.commands import main; main()"
 
 
 @pytest.fixture(scope="module")

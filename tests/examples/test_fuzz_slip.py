@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests import children
-from tests.mutants.sdcc import needs_sdcc
 
 from miro_protocol.protocol import Damage, Frame
 from miro_robot.image import load_hex
+from tests import children
+from tests.mutants.sdcc import needs_sdcc
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fuzz-slip"
 CRYSTAL_HZ = 11_059_200

@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests import children
-from tests.host.distribution import install
 
 from miro_exact import engine as engines
 from mirotwin.recording.reader import read
+from tests import children
+from tests.host.distribution import install
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "laws"
 MIROTWIN = Path(sys.executable).with_name("mirotwin")

@@ -6,7 +6,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
-from mirotwin.looking.view import views_of
+from mirotwin.camera.view import views_of
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "two_teams.toml"
 

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from tests import children
 from tests.fuzz import campaign
 from tests.fuzz.catalogue import TARGETS

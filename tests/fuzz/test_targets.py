@@ -1,6 +1,7 @@
 """The short form of `python -m tests.fuzz`: each kept input, and a moment of changes by chance."""
 
 import pytest
+
 from tests.fuzz import corpus, mutation
 from tests.fuzz.catalogue import TARGETS
 from tests.fuzz.target import Draws, Run, Target, pieces, refused

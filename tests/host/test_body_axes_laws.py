@@ -9,8 +9,6 @@ import msgspec
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.host.driving import apart, drive, starts
-from tests.naive import host_laws as naive
 
 from miro_exact.state import restore, snapshot, values
 from miro_host.laws.body_frame import BodyFrame, BodyFrameParameters
@@ -25,6 +23,8 @@ from miro_host.references.arc import Arc
 from miro_host.references.interface import Reference
 from miro_host.references.line import Line
 from miro_host.references.ramp import Ramp
+from tests.host.driving import apart, drive, starts
+from tests.naive import host_laws as naive
 
 ALL = [BodyFrameParameters, KanayamaParameters, DynamicFeedbackParameters]
 HERE = Posture(0.0, 0.0, 0.0)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.host.followed_robot import DELAY_S, Loop, P, Robot, rims, truths, velocities
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.state import restore, snapshot
@@ -18,6 +17,7 @@ from miro_host.laws.yang_kim import Gains
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
 from miro_host.references.line import Line
+from tests.host.followed_robot import DELAY_S, Loop, P, Robot, rims, truths, velocities
 
 
 def apart_m(estimate, truth):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.host.followed_robot import Loop, Robot, truths
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import restore, snapshot
@@ -14,6 +13,7 @@ from miro_host.ear import TURN, Heard
 from miro_host.estimators.ekf import EkfParameters
 from miro_host.estimators.ekf_telemetry import EkfTelemetryParameters
 from miro_host.eye.track import Sighting
+from tests.host.followed_robot import Loop, Robot, truths
 
 P = EkfTelemetryParameters()
 WITHOUT = EkfParameters(rim_noise_m_s=P.rim_noise_m_s)

@@ -7,9 +7,6 @@ import msgspec
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.host.driving import apart, drive
-from tests.naive import host_laws as naive
-from tests.naive.host_ideal_loop import drive_at_velocities
 
 from miro_exact.state import restore, snapshot, values
 from miro_host.laws.epsilon_tracking import (
@@ -26,6 +23,9 @@ from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import Line
+from tests.host.driving import apart, drive
+from tests.naive import host_laws as naive
+from tests.naive.host_ideal_loop import drive_at_velocities
 
 SETS = [THEORY, ILLUSTRATIVE, RETUNED]
 NAMES = ["theory", "illustrative", "retuned"]

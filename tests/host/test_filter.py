@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests import children
-from tests.host import filter_bits
-from tests.naive import kalman
 
 from miro_exact import engine
 from miro_host.estimators.filter import Filter
 from miro_host.estimators.motion import Motion
 from miro_host.pilot import PERIOD_S
+from tests import children
+from tests.host import filter_bits
+from tests.naive import kalman
 
 SIZE = 9
 """All that the filter can estimate."""

@@ -6,7 +6,6 @@ import struct
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.host.own_laws import Leaky, LeakyParameters, Wrong, WrongParameters
 
 from miro_exact.state import restore, snapshot, values
 from miro_host.ear import Heard
@@ -17,6 +16,7 @@ from miro_host.parts import PartError
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
 from miro_host.references.line import Line
+from tests.host.own_laws import Leaky, LeakyParameters, Wrong, WrongParameters
 
 HERE = Posture(0.07, 0.02, -0.38)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)

@@ -4,12 +4,12 @@ import importlib.metadata
 import sys
 
 import pytest
-from tests import children
-from tests.host.distribution import install
 
 from miro_host.laws.registry import LAWS
 from miro_host.laws.yang_kim import Gains
 from miro_host.parts import PartError
+from tests import children
+from tests.host.distribution import install
 
 OWN = ["yang_kim", "body_frame", "kanayama", "dynamic_feedback", "epsilon_tracking"]
 GOOD = """

@@ -6,12 +6,12 @@ import msgspec
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.naive import host_control as naive
 
 from miro_host.laws.yang_kim import Gains, YangKim, curvature_term, saturation, sign
 from miro_host.posture import Posture
 from miro_host.references.arc import Arc
 from miro_host.references.line import Line
+from tests.naive import host_control as naive
 
 SATURATING = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69)
 SLOPED = Gains(1.7, 3.0, 0.53, 0.72, 0.19, 0.69, layer_theta_rad=0.4, layer_derivative=True)

@@ -25,11 +25,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from click.testing import CliRunner
-from tests.mirotwin.cli.conftest import SHORT
 
 from miro_robot.firmware import image_path
 from miro_sim.scenario.file import builtin_text
-from mirotwin.cli import main
+from mirotwin.commands import main
+from tests.mirotwin.conftest import SHORT
 
 ALLOWED = (0, 1, 2, 3, 4, 42)
 SLOW_S = 5.0

@@ -10,7 +10,7 @@ from pathlib import Path
 from tests.host.distribution import install
 
 CHECKS = '''
-from mirotwin.checks.interface import Check, Judge
+from mirotwin.verify.checks.interface import Check, Judge
 
 
 class Raises(Check, frozen=True, kw_only=True, tag="raises"):

@@ -3,9 +3,9 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.naive import theory_terms as naive
 
 from mirotwin.report.chattering import Chattering
+from tests.naive import theory_terms as naive
 
 WHEEL = st.integers(-16633, 16633)
 PERIOD_S = naive.PERIOD_S

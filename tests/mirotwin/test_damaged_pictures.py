@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from miro_exact.bad_input import BadInput
-from mirotwin.looking.picture import parse, png
+from mirotwin.camera.picture import parse, png
 
 WHOLE = png(Image.new("RGB", (320, 240), (30, 60, 90)))
 BEHIND_HEAD, BEFORE_END = 33, len(WHOLE) - 12

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mirotwin.files.outputs import OutputError, OutputFolder, check_file, check_new, whole_file
+from mirotwin.shell.outputs import OutputError, OutputFolder, check_file, check_new, whole_file
 
 
 def write_run(folder: OutputFolder, text: str = "new") -> None:

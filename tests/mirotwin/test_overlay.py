@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 import pytest
-from tests.host.eye.scenes import FRAME, tracker
-from tests.naive.painted_frame import PaintedFrame, PaintedRobot
 
 from miro_host.eye.notes import Notes
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
-from mirotwin.looking import overlay
-from mirotwin.looking.overlay import INK, LOST, SCALE, Box, draw
-from mirotwin.looking.picture import Picture, taken
+from mirotwin.camera import overlay
+from mirotwin.camera.overlay import INK, LOST, SCALE, Box, draw
+from mirotwin.camera.picture import Picture, taken
+from tests.host.eye.scenes import FRAME, tracker
+from tests.naive.painted_frame import PaintedFrame, PaintedRobot
 
 ROBOTS = [
     PaintedRobot(Posture(0.3, 0.3, 0.4), "yellow", 0),

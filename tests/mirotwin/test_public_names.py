@@ -3,9 +3,9 @@
 import sys
 
 import pytest
-from tests import children
 
 import mirotwin
+from tests import children
 
 
 @pytest.mark.parametrize("name", mirotwin.__all__)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from tests import children
 
 TESTS = """
@@ -72,7 +73,7 @@ def pytest_runtestloop(session):
         raise RuntimeError("a plugin's own")
 """
 COUNTS = """
-from mirotwin.report import firmware_coverage
+from mirotwin.firmware import coverage_files as firmware_coverage
 
 collect = firmware_coverage.collect
 

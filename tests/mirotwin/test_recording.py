@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
-from tests.mirotwin.synthetic import periods
 
 from miro_protocol.stream_events import Power, RadioState, Reset
 from miro_sim.periods import Control
@@ -28,6 +27,7 @@ from mirotwin.recording.container import RecordingError, records
 from mirotwin.recording.reader import parse, read
 from mirotwin.recording.recorder import Recorder, Source
 from mirotwin.recording.writer import MAGIC
+from tests.mirotwin.synthetic import periods
 
 SOURCE = Source(
     scenario_name="fig6",

@@ -6,7 +6,6 @@ import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.mirotwin.synthetic import periods
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, TICKS_PER_SECOND
@@ -15,15 +14,11 @@ from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis, Period
 from miro_sim.scenario.places import check_places
-from mirotwin.capture.frame_list import frame_lines
-from mirotwin.replay.compare import differences
-from mirotwin.replay.difference import Difference
-from mirotwin.replay.script import (
-    robots_of_stream,
-    scenario_of_stream,
-    script_of,
-    script_of_stream,
-)
+from mirotwin.recording.capture.frame_list import frame_lines
+from mirotwin.recording.compare import differences
+from mirotwin.recording.difference import Difference
+from mirotwin.rerun.script import robots_of_stream, scenario_of_stream, script_of, script_of_stream
+from tests.mirotwin.synthetic import periods
 
 *BEFORE, PERIOD = periods(4, [(0, 0), (1, 2)])
 

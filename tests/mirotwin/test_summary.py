@@ -9,10 +9,10 @@ import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.mirotwin.synthetic import periods
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_sim.periods import Control, Period
+from mirotwin.recording.track import ErrorSample, Tracks, error_of, wrapped
 from mirotwin.report.figure import draw
 from mirotwin.report.summary import (
     Summary,
@@ -23,7 +23,7 @@ from mirotwin.report.summary import (
     to_json,
     tracking_of,
 )
-from mirotwin.report.track import ErrorSample, Tracks, error_of, wrapped
+from tests.mirotwin.synthetic import periods
 
 COUNTERS = {
     "link": {

@@ -10,9 +10,6 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
-from tests.mirotwin.mutated_files import without_sums
-from tests.mirotwin.synthetic import periods, robot
-from tests.naive import theory_terms as naive
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.posture import Posture
@@ -21,12 +18,15 @@ from miro_robot.image import load_hex
 from miro_sim.periods import Control, RobotPeriod
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
-from mirotwin import runner
 from mirotwin.recording.reader import parse
 from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.theory_track import TheoryTrack
+from mirotwin.recording.track import Tracks
 from mirotwin.report.theory import Gains, Theory, authority, gains_of, theory_of, theory_text
-from mirotwin.report.theory_track import TheoryTrack
-from mirotwin.report.track import Tracks
+from mirotwin.rerun import runner
+from tests.mirotwin.mutated_files import without_sums
+from tests.mirotwin.synthetic import periods, robot
+from tests.naive import theory_terms as naive
 
 PERIOD_S = naive.PERIOD_S
 PLACES = st.builds(Posture, st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-12.0, 12.0))

@@ -19,10 +19,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
-from tests.mutants.build import build, shipped
-from tests.mutants.draw import mutants_of, source_files
-from tests.mutants.planted import PLANTED
-from tests.mutants.stimulus import Host
 
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_protocol.table import TELEMETRY
@@ -33,6 +29,10 @@ from miro_sim.periods import Period
 from miro_sim.scenario.file import parse
 from miro_sim.world.events import Event, of_board
 from miro_sim.world.world import World
+from tests.mutants.build import build, shipped
+from tests.mutants.draw import mutants_of, source_files
+from tests.mutants.planted import PLANTED
+from tests.mutants.stimulus import Host
 
 NETWORKS = ((3, 1), (5, 4))
 """(robots, slot that is there)"""

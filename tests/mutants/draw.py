@@ -14,9 +14,8 @@ from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
 
-from tests.mutants.operators import OPERATORS, Change, changes
-
 from miro_exact.rng import Stream
+from tests.mutants.operators import OPERATORS, Change, changes
 
 SOURCE = Path(__file__).parents[2] / "robot_fw" / "firmware"
 SEED = 1997

@@ -19,8 +19,8 @@ from miro_robot.image import Image
 from miro_robot.lm629.options import DEFAULT_OPTIONS
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
-from mirotwin.checks.expect import expectations_of
-from mirotwin.checks.watching import Checks
+from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.watching import Checks
 
 FORMAT = downlink(3)
 LEAD = len(FORMAT.lead)

@@ -11,8 +11,8 @@ from pathlib import Path
 import msgspec
 
 from miro_robot.image import load_hex
-from mirotwin.conform.run import try_rule, with_faults
-from mirotwin.conform.table import RULES
+from mirotwin.verify.conform.run import try_rule, with_faults
+from mirotwin.verify.conform.table import RULES
 
 
 class Judged(msgspec.Struct, frozen=True):

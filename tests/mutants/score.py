@@ -4,7 +4,7 @@
     python -m tests.mutants.score --rules P37 P55
 
 What belongs here: building and judging the mutants of a draw on all processors, and what came of each. What does not:
-the draw (`draw`), rules (`mirotwin.conform`), the page (`document`).
+the draw (`draw`), rules (`mirotwin.verify.conform`), the page (`document`).
 
 The score is the share of killed ones among those that were drawn, without those that do not compile, those whose image
 has the bytes of the shipped one, and those that conform as `survivors.toml` has it: they are equivalent, or do what the
@@ -24,13 +24,13 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import msgspec
+
+from mirotwin.campaign.execute import in_order
+from mirotwin.campaign.processes import cores, processes
 from tests.mutants.build import CACHE, build, shipped
 from tests.mutants.draw import COUNT, SEED, drawn, mutants_of, source_files
 from tests.mutants.planted import PLANTED
 from tests.mutants.survivors import Survivor, survivors
-
-from mirotwin.campaign.execute import in_order
-from mirotwin.campaign.processes import cores, processes
 
 SCORE = CACHE / "score.json"
 LEAST_SHARE = 0.95

@@ -1,6 +1,7 @@
 """The mark of tests that build firmware."""
 
 import pytest
+
 from tests.mutants.build import compiler
 
 needs_sdcc = pytest.mark.skipif(

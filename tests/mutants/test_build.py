@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import pytest
+
+from miro_robot.firmware import image_path
 from tests import children
 from tests.mutants.build import SOURCE, build, shipped
 from tests.mutants.draw import source_files
 from tests.mutants.sdcc import needs_sdcc
-
-from miro_robot.firmware import image_path
 
 pytestmark = needs_sdcc
 SOURCES = source_files()

@@ -5,6 +5,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from tests.mutants.c_tokens import tokens, words
 from tests.mutants.draw import source_files
 

@@ -3,12 +3,12 @@
 from itertools import pairwise
 
 import pytest
+
+from miro_protocol.transmission import follows
 from tests.mutants.build import shipped
 from tests.mutants.difference import difference, image_of, seen_of
 from tests.mutants.sdcc import needs_sdcc
 from tests.mutants.stimulus import Host
-
-from miro_protocol.transmission import follows
 
 MS = 24_000
 SECONDS = 1.5

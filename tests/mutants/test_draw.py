@@ -5,6 +5,7 @@ from fractions import Fraction
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from tests.mutants.draw import COUNT, SEED, drawn, mutants_of, source_files
 
 SOURCES = source_files()

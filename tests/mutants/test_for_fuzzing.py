@@ -3,16 +3,16 @@
 from functools import cache
 
 import pytest
+
+from miro_robot.firmware import image_path
+from miro_robot.image import Image, load_hex
+from miro_robot.lm629.options import DEFAULT_OPTIONS
 from tests.mutants.build import build, shipped
 from tests.mutants.draw import source_files
 from tests.mutants.for_fuzzing import FOR_FUZZING
 from tests.mutants.heard import INPUTS, SLOW_CHIPS, input_for, verdicts
 from tests.mutants.planted import PLANTED
 from tests.mutants.sdcc import needs_sdcc
-
-from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
-from miro_robot.lm629.options import DEFAULT_OPTIONS
 
 SOURCES = source_files()
 

@@ -1,6 +1,7 @@
 """The tables of docs/fuzzing.md: what a trial becomes, and that the page has each mistake as it is now."""
 
 import msgspec
+
 from benchmarks.fuzz_time_tables import BEGIN, END, PAGE, render, replaced
 from benchmarks.fuzz_time_trial import Trial, Wanted
 from benchmarks.processor_time import of_descendants

@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from tests.mutants.c_tokens import words
 from tests.mutants.draw import mutants_of, source_files
 from tests.mutants.operators import OPERATORS, changes

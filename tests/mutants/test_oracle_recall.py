@@ -1,15 +1,15 @@
 """How many of the checks' failures the fuzzer's fast oracle sees: counted on some mistakes, and the table."""
 
 import pytest
+
 from benchmarks import oracle_recall
 from benchmarks.oracle_recall import BEGIN, END, PAGE, Row, judged, render, replaced, sessions, shipped
+from miro_robot.image import load_hex
 from tests.mutants.build import build
 from tests.mutants.draw import source_files
 from tests.mutants.for_fuzzing import FOR_FUZZING
 from tests.mutants.planted import PLANTED
 from tests.mutants.sdcc import needs_sdcc
-
-from miro_robot.image import load_hex
 
 
 def test_the_sessions_are_the_same_every_time_and_all_differ() -> None:

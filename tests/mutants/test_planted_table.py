@@ -1,6 +1,7 @@
 """Every planted mistake can be planted into the present source, builds, is no other mistake, and breaks a rule."""
 
 import pytest
+
 from tests.mutants.build import build
 from tests.mutants.draw import source_files
 from tests.mutants.judge import judged

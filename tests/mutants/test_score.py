@@ -1,6 +1,7 @@
 """The score counts what could be killed, and says what is not as it has to be."""
 
 import pytest
+
 from tests.mutants.document import BEGIN, END, PAGE, render, replaced
 from tests.mutants.draw import COUNT, SEED, drawn, mutants_of, source_files
 from tests.mutants.planted import PLANTED

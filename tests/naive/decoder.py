@@ -3,9 +3,8 @@
 Nothing of the decoder under test is used but the event types; CRC and whitening are the bitwise twins.
 """
 
-from tests.naive.crc import crc16, pn9
-
 from miro_protocol.decoder import Damaged, Reason, Received
+from tests.naive.crc import crc16, pn9
 
 SYNC = b"\x2d\xd4"
 WHITE = pn9(31)

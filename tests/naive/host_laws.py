@@ -5,6 +5,7 @@ taken numerically along the motion. Nothing is shared with the code under test.
 """
 
 from mpmath import cos, diff, expj, mp, mpc, mpf, sin, sqrt
+
 from tests.naive.host_control import sgn as switched
 from tests.naive.host_control import wrapped
 

@@ -8,6 +8,7 @@ import bisect
 import math
 
 from mpmath import atan, atan2, cos, diff, hypot, lu_solve, matrix, mp, mpf, pi, sin
+
 from tests.naive.host_control import path_length, wrapped
 
 mp.dps = 40

@@ -10,10 +10,9 @@ import math
 from collections.abc import Callable, Generator
 from fractions import Fraction
 
+from miro_robot.lm629.options import Lm629Options
 from tests.naive.lm629_encoder import NaiveEncoder
 from tests.naive.lm629_parts import HIGH_WORD_READS, LSB, NaivePid, between, modular, profile_speed
-
-from miro_robot.lm629.options import Lm629Options
 
 Words = Generator[None, int, None]
 INTERRUPTS = range(1, 7)

@@ -12,9 +12,8 @@ from fractions import Fraction
 from functools import cache
 from typing import NamedTuple
 
-from tests.naive import rng
-
 from miro_sim.radio import ChainParams, RadioParams, SlicerParams
+from tests.naive import rng
 
 Sent = list[tuple[int, bytes] | tuple[int, bytes, tuple[int, ...]]]
 """(tick of the first start bit at the transmitter, bytes, indices of those with a bad stop bit, if any)."""

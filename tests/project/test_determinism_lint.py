@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from tests.project.determinism_lint import lint
 
 ROOT = Path(__file__).parents[2]
@@ -12,23 +13,23 @@ PACKAGES = (
     "robot_fw/miro_robot",
     "host/miro_host",
     "sim/miro_sim",
-    "sim/mirotwin",
+    "mirotwin",
 )
 
 # The edge: what people see of a run, never what the run is made of.
 EDGE = (
-    "sim/mirotwin/cli/",
-    "sim/mirotwin/report/figure.py",
-    "sim/mirotwin/bridges/pacing.py",
-    "sim/mirotwin/foxglove/server.py",  # who watches a run
-    "sim/mirotwin/fuzz/afl/",  # when an engine tries what; each find is run again by itself
-    "sim/mirotwin/fuzz/campaign.py",  # what is looked at when
-    "sim/mirotwin/fuzz/budget.py",  # how long an input is made smaller
-    "sim/mirotwin/fuzz/hypothesis_engine.py",  # how far an engine is, and since when
-    "sim/mirotwin/fuzz/hypothesis_process.py",
-    "sim/mirotwin/campaign/wall.py",
-    "sim/mirotwin/files/tracebacks.py",  # how much is shown of an error
-    "sim/mirotwin/files/children.py",  # from where processes import
+    "mirotwin/",
+    "mirotwin/report/figure.py",
+    "mirotwin/rerun/pacing.py",
+    "mirotwin/report/foxglove/server.py",  # who watches a run
+    "mirotwin/fuzz/afl/",  # when an engine tries what; each find is run again by itself
+    "mirotwin/fuzz/campaign.py",  # what is looked at when
+    "mirotwin/fuzz/budget.py",  # how long an input is made smaller
+    "mirotwin/fuzz/hypothesis_engine.py",  # how far an engine is, and since when
+    "mirotwin/fuzz/hypothesis_process.py",
+    "mirotwin/campaign/wall.py",
+    "mirotwin/shell/tracebacks.py",  # how much is shown of an error
+    "mirotwin/shell/children.py",  # from where processes import
 )
 # Frames and chips are integers from end to end, so the order of a sum cannot matter.
 INTEGERS_ONLY = ("protocol/miro_protocol/", "robot_fw/miro_robot/")

@@ -4,6 +4,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 
 import pytest
+
 from docs.film.__main__ import COLUMNS, COMMANDS, ROWS, TARGET
 from docs.film.picture import PROMPT
 from docs.film.terminal import Run, _lines, recorded, text_of

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from tests import children
 
 ROOT = Path(__file__).parents[2]
@@ -25,7 +26,7 @@ def test_the_tree_passes(command):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-FOLDERS = ("exact", "protocol", "robot_fw", "host", "sim", "benchmarks", "examples", "tests")
+FOLDERS = ("exact", "protocol", "robot_fw", "host", "sim", "mirotwin", "benchmarks", "examples", "tests")
 SOURCES = sorted(
     path
     for folder in FOLDERS

@@ -12,10 +12,10 @@ from importlib import resources
 from pathlib import Path
 
 import pytest
-from tests import children
 
 from miro_exact import engine, hot_modules
 from miro_robot.mcs51 import opcodes
+from tests import children
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
@@ -62,7 +62,7 @@ def run_short(tree, *options):
     (tree / "short.toml").write_text("\n".join(lines))
     return python(
         tree,
-        *("-c", "from mirotwin.cli import main; main()"),
+        *("-c", "from mirotwin.commands import main; main()"),
         *("run", "short.toml", "--seed", "7", "--out", "out", "--quiet", *options),
     )
 
@@ -76,7 +76,7 @@ def test_without_a_compiler_the_package_builds_and_gives_the_golden_digest(tree)
     summary = json.loads((tree / "out" / "summary.json").read_text())
     assert summary["engine"] == "python"
     assert summary["digest"] == json.loads(GOLDEN.read_text())["fig6 0.5 s seed 7"]
-    about = python(tree, "-c", "from mirotwin.cli import main; main()", "info")
+    about = python(tree, "-c", "from mirotwin.commands import main; main()", "info")
     assert about.returncode == 0, about.stderr
     assert "python (0 of" in about.stdout
 

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+
 from tests.project import lowest
 
 ROOT = Path(__file__).parents[2]

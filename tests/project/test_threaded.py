@@ -11,13 +11,13 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tests import children
 
 from miro_exact import engine, hot_modules
 from miro_exact.threaded import threaded
+from tests import children
 
 ROOT = Path(__file__).parents[2]
-info = importlib.import_module("mirotwin.cli.info")  # the package has the command under this name
+info = importlib.import_module("mirotwin.shell.info_command")  # the package has the command under this name
 PROGRAM = """
 #include <stdio.h>
 #define unlikely(x) __builtin_expect(!!(x), 0)

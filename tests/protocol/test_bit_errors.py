@@ -4,11 +4,11 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from benchmarks.line import decode_lines, line_bits, random_frames, receive
-from benchmarks.weights import covered_bits, syndromes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.line import decode_lines, line_bits, random_frames, receive
+from benchmarks.weights import covered_bits, syndromes
 from miro_protocol.decoder import Received, WindowDecoder
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.strategies import host_frames, telemetry_frames

@@ -3,9 +3,9 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive import crc as naive
 
 from miro_protocol import crc, whitening
+from tests.naive import crc as naive
 
 LITERAL = bytes.fromhex(
     "FF E1 1D 9A ED 85 33 24 EA 7A D2 39 70 97 57 0A 54 7D 2D D8 6D 0D BA 8F 67 59 C7 A2 BF 34 CA"

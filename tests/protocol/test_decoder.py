@@ -5,7 +5,6 @@ from itertools import pairwise
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from tests.naive.decoder import NaiveDecoder
 
 from miro_exact.state import restore, snapshot, values
 from miro_protocol import decoder as module
@@ -14,6 +13,7 @@ from miro_protocol.decoder import Damaged, Decoder, Reason, Received, WindowDeco
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.strategies import Heard, damaged_streams, team_frames, valid_streams
 from miro_protocol.whitening import whiten
+from tests.naive.decoder import NaiveDecoder
 
 FRAMES = {n: encode(TeamFrame(0, 7, ((100, -100),) * n), n) for n in (3, 5)}
 LEAD = b"\x55" * 5 + b"\xff"

@@ -7,13 +7,13 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tests import children
 
 from miro_protocol import dissector
 from miro_protocol.decoder import Damaged, Decoder, Received
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
 from miro_protocol.pcapng import write
 from miro_protocol.transmission import Transmission
+from tests import children
 
 SCRIPT = Path(__file__).parents[2] / "protocol/miro.lua"
 TEAM = TeamFrame(3, 7, ((100, -100), (0, 1), (-32767, 32767)))

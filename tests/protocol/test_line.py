@@ -5,11 +5,11 @@ from itertools import pairwise
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive.mcs51_uart import NaiveUart
 
 from miro_exact.state import restore, snapshot
 from miro_protocol.line import LineReceiver, bits_of, edges_of
 from miro_protocol.table import HOST_BIT_TICKS, ROBOT_BIT_TICKS
+from tests.naive.mcs51_uart import NaiveUart
 
 levels = st.lists(st.integers(0, 1), max_size=80)
 

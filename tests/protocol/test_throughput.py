@@ -4,8 +4,8 @@ CPU time, best of a few: `python -m benchmarks.codec` measures properly and besi
 """
 
 import pytest
-from benchmarks.codec import best_time, own_jobs
 
+from benchmarks.codec import best_time, own_jobs
 from miro_exact import engine
 
 SLOWEST_MB_S = 20

@@ -7,11 +7,11 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+
 from benchmarks.interval import clopper_pearson
 from benchmarks.line import decode_lines, line_bits, random_frames, receive
 from benchmarks.undetected import crc_only, noise, on_the_line
 from benchmarks.weights import undetected_probability
-
 from miro_protocol.table import DOWNLINK, TELEMETRY
 
 FORMATS = (*DOWNLINK.values(), TELEMETRY)

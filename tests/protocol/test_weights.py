@@ -5,8 +5,8 @@ from math import comb
 
 import numpy as np
 import pytest
-from benchmarks import weights
 
+from benchmarks import weights
 from miro_protocol.table import DOWNLINK, TELEMETRY, Format
 
 FORMATS = pytest.mark.parametrize("form", [*DOWNLINK.values(), TELEMETRY], ids=lambda form: form.name)

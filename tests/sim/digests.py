@@ -16,11 +16,10 @@ from importlib import resources
 from pathlib import Path
 
 from benchmarks.disturbances import CASES
-from tests import children
-from tests.sim.digest_of import digest
-
 from miro_sim.scenario.file import load
 from miro_sim.scenario.profiles import profiles
+from tests import children
+from tests.sim.digest_of import digest
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"

@@ -17,9 +17,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from tests import children
-
 from miro_exact import engine
+from tests import children
 
 STRIDE_TICKS = 100_003
 """Between checkpoints, 4 ms: eight a control period, and never at the same place of one."""

@@ -29,10 +29,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from miro_exact import engine
 from tests import children
 from tests.sim.digest_of import REFUSED, parse
-
-from miro_exact import engine
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests import children
 
 from miro_exact import engine
 from miro_exact.clock import CONTROL_PERIOD_TICKS
@@ -15,6 +14,7 @@ from miro_robot.image import load_hex
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario.profiles import profiles
 from miro_sim.world.world import World
+from tests import children
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 GOLDEN = Path(__file__).parents[1] / "vectors" / "digests.json"

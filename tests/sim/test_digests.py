@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+
 from tests.sim import digests
 from tests.sim.digest_of import digest
 

@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 import pytest
-from benchmarks import disturbances
 
+from benchmarks import disturbances
 from miro_sim.scenario.file import load
 
 PAGE = Path(__file__).parents[2] / "docs/disturbances.md"

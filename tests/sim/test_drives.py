@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from miro_sim.scenario.file import ScenarioError, parse
-from mirotwin.cli import main
+from mirotwin.commands import main
 
 TEXT = """
 name = "drive"

@@ -1,9 +1,9 @@
 """Compiled and uncompiled side by side on the real firmware, over a million instructions."""
 
 import pytest
-from tests.sim.engines import Checkpoint, compare, lockstep
 
 from miro_exact import engine
+from tests.sim.engines import Checkpoint, compare, lockstep
 
 LINES = [Checkpoint(0, 100_003 * n, 500 * n, n, 2 * n, 3 * n, f"{n:064x}").line() + "\n" for n in range(5)]
 

@@ -5,8 +5,8 @@
 
 import msgspec
 import pytest
-from benchmarks.figures import Outcome, outcomes, row
 
+from benchmarks.figures import Outcome, outcomes, row
 from miro_host.laws.epsilon_tracking import ILLUSTRATIVE, RETUNED, THEORY, EpsilonTrackingParameters
 from miro_host.references.arc import ArcRef
 from miro_host.references.line import LineRef

@@ -3,11 +3,11 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from benchmarks import gains
-from benchmarks.gains import FAMILIES, FIGURES, PATHS, Budget, Drive, Outcome, Search, Task
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks import gains
+from benchmarks.gains import FAMILIES, FIGURES, PATHS, Budget, Drive, Outcome, Search, Task
 from miro_sim.scenario.file import load
 
 SMALL = Budget(explored=6, generations=2, children=4)

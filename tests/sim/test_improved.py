@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from benchmarks import chain, improved
 
+from benchmarks import chain, improved
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.pitch import ground

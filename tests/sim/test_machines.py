@@ -7,11 +7,11 @@ import sys
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
+from miro_exact import engine
 from tests import children
 from tests.sim import digest_of
 from tests.sim.machines import GOLDEN, MACHINES, ROOT, Missing, Refused, check_tools, run
-
-from miro_exact import engine
 
 
 @pytest.mark.skipif(

@@ -5,8 +5,6 @@ import struct
 
 import msgspec
 import pytest
-from tests.host.own_laws import LeakyParameters, WrongParameters
-from tests.sim.mutated_worlds import with_field
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.state import snapshot
@@ -18,6 +16,8 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import load, parse
 from miro_sim.world.world import World
+from tests.host.own_laws import LeakyParameters, WrongParameters
+from tests.sim.mutated_worlds import with_field
 
 PERIODS = 24
 NOTHING_HEARD = struct.pack("<q4B2q2B", -1, 0, 0, 0, 0, 0, 0, 0, 0)

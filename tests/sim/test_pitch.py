@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from tests.host.distribution import install
 
 from miro_host.posture import Posture
 from miro_sim.pitch import ground as pitch
 from miro_sim.scenario.build import reference_for
 from miro_sim.scenario.file import ScenarioError, builtin_names, load, parse
+from tests.host.distribution import install
 
 TEXT = """
 name = "place"

@@ -17,7 +17,7 @@ from miro_sim.scenario.build import radio_for
 from miro_sim.scenario.file import ScenarioError, parse
 from miro_sim.scenario.radio_keys import Bursts, Radio
 from miro_sim.world.world import World
-from mirotwin.cli import main
+from mirotwin.commands import main
 
 README = Path(__file__).parents[2] / "sim/miro_sim/radio/README.md"
 IMAGE = load_hex(image_path())

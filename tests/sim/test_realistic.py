@@ -9,8 +9,8 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
+from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import tracking_of
-from mirotwin.report.track import Tracks
 
 SEEDS = range(10)
 

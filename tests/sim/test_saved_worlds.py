@@ -4,9 +4,9 @@ import hashlib
 import struct
 
 import pytest
-from tests.sim.mutated_worlds import changed_bytes, changed_values, fresh, saved_worlds, with_field
 
 from miro_sim.world.saved import opened, sealed
+from tests.sim.mutated_worlds import changed_bytes, changed_values, fresh, saved_worlds, with_field
 
 
 @pytest.fixture(scope="module")

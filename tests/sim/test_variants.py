@@ -12,7 +12,7 @@ from miro_sim.scenario.camera_keys import GaussianCamera, PixelCamera
 from miro_sim.scenario.file import ScenarioError, load, parse
 from miro_sim.scenario.keys import Host
 from miro_sim.world.world import World
-from mirotwin.cli import main
+from mirotwin.commands import main
 
 SMALL = """
 name = "small"

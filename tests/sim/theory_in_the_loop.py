@@ -18,9 +18,9 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
+from mirotwin.recording.theory_track import PERIOD_S
+from mirotwin.recording.track import Tracks
 from mirotwin.report.theory import gains_of, theory_of
-from mirotwin.report.theory_track import PERIOD_S
-from mirotwin.report.track import Tracks
 
 CONTROLLER = "network.robot.controller"
 BODY = [f'{CONTROLLER}={{law="body_frame"}}', 'network.robot.estimator={kind="predict"}']

@@ -2,12 +2,12 @@
 
 import pytest
 from click.testing import CliRunner
+from mirotwin.cli import main
 from msgspec import ValidationError
-from tests.vectors.paths import MCS51
 
 from miro_robot.mcs51.opcodes import CYCLES, LENGTH
 from miro_robot.mcs51.vectors import DISCARD, FETCH, LATCH, READ, TABLE, WRITE, Bench, State, decode
-from mirotwin.cli import main
+from tests.vectors.paths import MCS51
 
 NAMES = [f"{opcode:02x}.json" for opcode in range(256)]
 MOVX = {0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3}

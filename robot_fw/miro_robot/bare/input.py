@@ -1,7 +1,7 @@
 """What comes in on RXD of the bare machine: bytes from a file or a keyboard, as a person at a terminal would send them.
 
 What belongs here: when the next character is sent, and its edges. What does not: the options of the command
-line (`mirotwin.cli`), and other pins (`pins.py`).
+line (`mirotwin.commands`), and other pins (`pins.py`).
 
 The order of things: a piece of input begins when its condition is met (a text seen on the program's output, a time).
 Each character then waits until the one before is over, the gap has passed and the program listens: its receiver is on

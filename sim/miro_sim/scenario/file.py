@@ -119,7 +119,7 @@ def parse_noted(text: str, origin: str, settings: Sequence[str] = ()) -> tuple[S
 def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = nothing_else) -> Scenario:
     """TOML text to a Scenario, after the `settings` (`KEY=VALUE`, see `settings`) were made in it.
 
-    `also` checks what this package does not know: what `mirotwin.checks` makes of `[expect]`.
+    `also` checks what this package does not know: what `mirotwin.verify.checks` makes of `[expect]`.
 
     Raises ScenarioError (and nothing else) naming `origin` and the place.
     Decides the engine, if nothing has yet: where a reference leads is computed by a hot module.

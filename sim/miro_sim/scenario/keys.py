@@ -143,8 +143,8 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     `lm629` turns readings of the chips' undocumented corners (`robot_fw/miro_robot/lm629/README.md`).
 
     `expect` says what is expected of every robot: a key a check. It is handed on as it is to who judges the run
-    (`mirotwin.checks`), because a world does not depend on what is expected of it. So is `step`, what is done during
-    the run (`mirotwin.steps`): a world does what it is told.
+    (`mirotwin.verify.checks`), because a world does not depend on what is expected of it. So is `step`, what is done
+    during the run (`mirotwin.verify.steps`): a world does what it is told.
     """
 
     name: Name

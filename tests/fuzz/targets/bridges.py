@@ -35,13 +35,13 @@ class _Radio:
 def _place(radio: _Radio, told: list[str]) -> Any:
     from selectors import DefaultSelector
 
-    from mirotwin.bridges.endpoint import Place
+    from mirotwin.ports.endpoint import Place
 
     return Place(radio, DefaultSelector(), told.append)  # type: ignore[arg-type]
 
 
 def _negotiation() -> Run:
-    from mirotwin.bridges.rfc2217 import LONGEST_SUBOPTION, Rfc2217Endpoint
+    from mirotwin.ports.rfc2217 import LONGEST_SUBOPTION, Rfc2217Endpoint
 
     told: list[str] = []
     whole, parts, other = (Rfc2217Endpoint(_place(_Radio(), told), "127.0.0.1", 0) for _ in range(3))
@@ -167,9 +167,9 @@ class _TerminalClient:
 
 
 def _sockets(kind: str) -> Run:
-    from mirotwin.bridges.rfc2217 import Rfc2217Endpoint
-    from mirotwin.bridges.sockets import TcpEndpoint
-    from mirotwin.bridges.terminal import PtyEndpoint
+    from mirotwin.ports.rfc2217 import Rfc2217Endpoint
+    from mirotwin.ports.sockets import TcpEndpoint
+    from mirotwin.ports.terminal import PtyEndpoint
 
     def run(data: bytes) -> str:
         radio, told = _Radio(), []

@@ -69,7 +69,7 @@ def _pcapng() -> Run:
 
 
 def _hex_text() -> Run:
-    from mirotwin.capture.hextext import HexError, HexText
+    from mirotwin.recording.capture.hextext import HexError, HexText
 
     def read(parts: list[bytes]) -> tuple[bytes, str]:
         text, found = HexText("fuzz.txt"), b""
@@ -94,12 +94,12 @@ def _hex_text() -> Run:
 
 def _capture() -> Run:
     from miro_exact.bad_input import BadInput
-    from mirotwin.capture import convert, render
-    from mirotwin.capture.detect import FORMATS, detect
-    from mirotwin.capture.input import Input
-    from mirotwin.capture.layout import robots_in
-    from mirotwin.capture.rows import rows
-    from mirotwin.capture.source import READ_ERRORS, open_source
+    from mirotwin.recording.capture import convert, render
+    from mirotwin.recording.capture.detect import FORMATS, detect
+    from mirotwin.recording.capture.input import Input
+    from mirotwin.recording.capture.layout import robots_in
+    from mirotwin.recording.capture.rows import rows
+    from mirotwin.recording.capture.source import READ_ERRORS, open_source
 
     def run(data: bytes) -> str:
         forced, data = (data[0], data[1:]) if data else (0, b"")

@@ -30,7 +30,7 @@ def _with_sums(png: bytes) -> bytes:
 
 def _picture() -> Run:
     from miro_exact.bad_input import BadInput
-    from mirotwin.looking.picture import Picture, parse, png
+    from mirotwin.camera.picture import Picture, parse, png
 
     def read(data: bytes) -> str:
         with warnings.catch_warnings():
@@ -135,7 +135,7 @@ def _tracker() -> Run:
     from miro_host.eye.colours import ColourClasses
     from miro_host.eye.patterns import PATTERNS
     from miro_host.eye.tracker import Tracker
-    from mirotwin.looking.picture import Picture
+    from mirotwin.camera.picture import Picture
 
     classes = eye_file.parse(_colours_toml().decode(), ColourClasses, "colours")
     paints = [bytes((int(mean.y), int(mean.cb), int(mean.cr))) for mean in classes.colours.values()]
@@ -196,7 +196,7 @@ def _calibration_seeds() -> list[bytes]:
 
 def _points_seeds() -> list[bytes]:
     from miro_host.eye.camera_parameters import CameraParameters
-    from mirotwin.looking import marks
+    from mirotwin.camera import marks
 
     lines = marks.text(CameraParameters(), 0.1, 3).splitlines()
     some = [lines[0], *lines[1 :: max(1, len(lines) // 24)]]
@@ -212,7 +212,7 @@ def _samples_seeds() -> list[bytes]:
 def _picture_seeds() -> list[bytes]:
     from PIL import Image
 
-    from mirotwin.looking.picture import png
+    from mirotwin.camera.picture import png
 
     image = Image.new("RGB", (_WIDTH, _HEIGHT), (30, 60, 90))
     small = Image.new("L", (8, 8))

@@ -95,8 +95,6 @@ def _built(data: bytes, begin: bytes) -> bytes:
 
 def _begin() -> bytes:
     """What a reader wants at the beginning of a recording."""
-    from tests.mirotwin.mutated_files import ECHO, hex_records
-
     from mirotwin.recording.recorder import (
         FIRMWARE_ATTACHMENT,
         FORMAT,
@@ -105,6 +103,7 @@ def _begin() -> bytes:
         SCENARIO_ATTACHMENT,
         SYMBOLS_ATTACHMENT,
     )
+    from tests.mirotwin.mutated_files import ECHO, hex_records
 
     names = (SCENARIO_ATTACHMENT, FIRMWARE_ATTACHMENT, SYMBOLS_ATTACHMENT, RESUMED_ATTACHMENT)
     assert tuple(name.encode() for name in names) == _NAMES[:4], names
@@ -120,11 +119,11 @@ def _begin() -> bytes:
 
 def _recording() -> Run:
     from miro_exact.bad_input import BadInput
-    from mirotwin.capture.input import Input
-    from mirotwin.capture.recorded import transmissions, transmissions_of
-    from mirotwin.cli.replay_job import load_job
+    from mirotwin.recording.capture.input import Input
+    from mirotwin.recording.capture.recorded import transmissions, transmissions_of
     from mirotwin.recording.container import RecordingError
     from mirotwin.recording.reader import parse
+    from mirotwin.rerun.job import load_job
 
     begin = _begin()
     path = folder() / "fuzz.mcap"
@@ -172,10 +171,10 @@ def _seeds() -> list[bytes]:
 
     from click.testing import CliRunner
     from mcap.records import Channel, Message
-    from tests.mirotwin.cli.conftest import SHORT
 
-    from mirotwin.cli import main
+    from mirotwin.commands import main
     from mirotwin.recording.container import records
+    from tests.mirotwin.conftest import SHORT
 
     scenario = folder() / "seed.toml"
     scenario.write_text(SHORT)

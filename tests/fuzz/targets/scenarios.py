@@ -17,8 +17,8 @@ def _scenario() -> Run:
     from miro_sim.scenario.errors import ScenarioError
     from miro_sim.scenario.file import decode, of_table, parse
     from miro_sim.scenario.keys import without_expectations
-    from mirotwin.cases.case import tables_of
-    from mirotwin.steps.running import everything
+    from mirotwin.verify.cases.case import tables_of
+    from mirotwin.verify.steps.running import everything
 
     def run(data: bytes) -> str:
         try:
@@ -38,11 +38,10 @@ def _scenario() -> Run:
 
 
 def _settings() -> Run:
-    from tests.mirotwin.cli.conftest import SHORT
-
     from miro_sim.scenario.errors import ScenarioError
     from miro_sim.scenario.file import parse
-    from mirotwin.steps.running import everything
+    from mirotwin.verify.steps.running import everything
+    from tests.mirotwin.conftest import SHORT
 
     def run(data: bytes) -> str:
         settings = data.decode("utf-8", "surrogateescape").split("\n")
@@ -93,7 +92,7 @@ def _case() -> Run:
 
     from miro_exact.bad_input import BadInput
     from miro_exact.domain import DomainError
-    from mirotwin.cli.replay_job import load_job
+    from mirotwin.rerun.job import load_job
 
     def run(data: bytes) -> str:
         path = folder() / "fuzz.stream"
@@ -120,7 +119,7 @@ def _url() -> Run:
     from urllib.parse import quote
 
     from miro_exact.bad_input import BadInput
-    from mirotwin.bridges.url import parse_url
+    from mirotwin.ports.url import parse_url
 
     def run(data: bytes) -> str:
         text = data.decode("utf-8", "replace")
@@ -140,7 +139,7 @@ def _url() -> Run:
 
 
 def scenario_seeds() -> list[bytes]:
-    from tests.mirotwin.cli.conftest import SHORT
+    from tests.mirotwin.conftest import SHORT
     from tests.mirotwin.mutated_files import STEPS
 
     expects = """name = "one"

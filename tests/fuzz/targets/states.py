@@ -86,10 +86,9 @@ class _World:
 
 
 def _world(profile: str) -> Run:
-    from tests.sim.mutated_worlds import saved_worlds
-
     from miro_exact.clock import CONTROL_PERIOD_TICKS
     from miro_sim.world.saved import opened
+    from tests.sim.mutated_worlds import saved_worlds
 
     identity = _World(profile).world.identity()
     states = [opened(saved, identity) for saved in saved_worlds(profile)]
@@ -172,12 +171,11 @@ def _board() -> Run:
 
 
 def _bare() -> Run:
-    from tests.mirotwin.mutated_files import ECHO, hex_records
-
     from miro_robot.bare.input import Piece
     from miro_robot.bare.machine import BareMachine
     from miro_robot.bare.pins import PinEvent
     from miro_robot.image import load_hex
+    from tests.mirotwin.mutated_files import ECHO, hex_records
 
     path = folder() / "state.ihx"
     path.write_bytes(hex_records(ECHO))

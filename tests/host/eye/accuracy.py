@@ -9,11 +9,11 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from tests.host.eye.scenes import FRAME, beside, drawn, errors, tracker
-from tests.naive.painted_frame import PAINTS, PaintedFrame, PaintedRobot, sampled
 
 from miro_host.eye.colours import classes_of
 from miro_host.eye.track import Sighting
+from tests.host.eye.scenes import FRAME, beside, drawn, errors, tracker
+from tests.naive.painted_frame import PAINTS, PaintedFrame, PaintedRobot, sampled
 
 FLOORS = {"green": (15, 60, 35), "grey": (40, 40, 40)}
 

@@ -15,8 +15,6 @@ from miro_exact import engine
 if __name__ == "__main__":
     engine.select(sys.argv[1])
 
-from tests.naive.painted_frame import PaintedFrame, PaintedRobot, sampled
-
 from miro_exact.dmath import sincos, wrap_pi
 from miro_exact.rng import Stream
 from miro_exact.state import snapshot
@@ -26,6 +24,7 @@ from miro_host.eye.colours import classes_of
 from miro_host.eye.track import Sighting
 from miro_host.eye.tracker import Tracker
 from miro_host.posture import Posture
+from tests.naive.painted_frame import PaintedFrame, PaintedRobot, sampled
 
 FRAME = 800_800
 CAMERA = CameraParameters()

@@ -1,12 +1,12 @@
 """Colour classes: from samples to means, from means to the table."""
 
 import pytest
-from tests.naive.painted_frame import PAINTS, sampled, ycbcr
 
 from miro_host.eye import eye_file
 from miro_host.eye.colours import CLASS_OF, ColourClasses, ColourMean, classes_of
 from miro_host.eye.eye_file import EyeError
 from miro_host.eye.patterns import COLOURS
+from tests.naive.painted_frame import PAINTS, sampled, ycbcr
 
 CLASSES = classes_of(sampled())
 

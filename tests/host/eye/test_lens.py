@@ -3,10 +3,10 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.example_count import examples
 
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.lens import Lens
+from tests.example_count import examples
 
 cameras = st.builds(
     CameraParameters,

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.example_count import examples
-from tests.naive import regions as naive
 
 from miro_host.eye import lens
 from miro_host.eye.regions import TABLE_SIZE, Regions
+from tests.example_count import examples
+from tests.naive import regions as naive
 
 
 def uncompiled():

@@ -4,10 +4,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from tests import children
-from tests.host.eye import scenes
-from tests.host.eye.scenes import CAMERA, FRAME, beside, drawn, errors, tracker
-from tests.naive.painted_frame import PAINTS, PaintedFrame, PaintedRobot, sampled
 
 from miro_exact import engine
 from miro_exact.state import restore, snapshot
@@ -16,6 +12,10 @@ from miro_host.eye.colours import classes_of
 from miro_host.eye.eye_file import EyeError
 from miro_host.eye.track import Sighting, Track
 from miro_host.posture import Posture
+from tests import children
+from tests.host.eye import scenes
+from tests.host.eye.scenes import CAMERA, FRAME, beside, drawn, errors, tracker
+from tests.naive.painted_frame import PAINTS, PaintedFrame, PaintedRobot, sampled
 
 MIDDLE = Posture(0.5, 0.35, 0.4)
 

@@ -5,8 +5,6 @@ import math
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.host.references.numbers import numbers
-from tests.naive import host_control, host_paths
 
 from miro_host.references.arc import Arc, ArcRef
 from miro_host.references.interface import Paced
@@ -14,6 +12,8 @@ from miro_host.references.line import Line, LineRef
 from miro_host.references.polar import with_polar_form
 from miro_host.references.ramp import Ramp
 from miro_host.references.sine import Sine, SineRef
+from tests.host.references.numbers import numbers
+from tests.naive import host_control, host_paths
 
 ANGLES = st.floats(-3.1, 3.1)
 PLACES = st.floats(-1.0, 1.0)

@@ -5,7 +5,6 @@ import sys
 
 import msgspec
 import pytest
-from tests.host.distribution import install
 
 from miro_host.parts import PartError
 from miro_host.references.arc import Arc, ArcRef
@@ -13,6 +12,7 @@ from miro_host.references.checked import CheckedReference
 from miro_host.references.line import Line, LineRef
 from miro_host.references.registry import REFERENCES
 from miro_sim.scenario.file import parse
+from tests.host.distribution import install
 
 TURN = """
 from miro_host.references.line import Line

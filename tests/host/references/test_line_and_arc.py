@@ -5,12 +5,12 @@ import math
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.host.references.numbers import numbers
-from tests.naive import host_control as naive
 
 from miro_host.references.arc import Arc
 from miro_host.references.line import Line
 from miro_host.references.ramp import Ramp
+from tests.host.references.numbers import numbers
+from tests.naive import host_control as naive
 
 ANGLES = st.floats(-3.1, 3.1)
 

@@ -6,14 +6,14 @@ from itertools import pairwise
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.host.references.numbers import numbers
-from tests.naive import host_paths as naive
 
 from miro_host.pilot import PERIOD_S
 from miro_host.references.headings import headings
 from miro_host.references.speeds import Bounds
 from miro_host.references.spline import spline
 from miro_host.references.waypoints import CELLS, Waypoint, Waypoints, WaypointsRef
+from tests.host.references.numbers import numbers
+from tests.naive import host_paths as naive
 
 POINTS = st.lists(st.tuples(st.floats(0.0, 1.1), st.floats(0.0, 0.7)), min_size=2, max_size=6)
 HEADINGS = st.lists(st.none() | st.floats(-3.1, 3.1), min_size=6, max_size=6)

@@ -11,15 +11,15 @@ from itertools import pairwise
 
 from rich.console import Console
 from rich.table import Table
-from tests.host.theory import ideal
-from tests.host.theory.ideal import PRINTED, ROBOT, STARTS, beside, paper_law
-from tests.host.theory.layer import NO_GUARD, rising
 
 from miro_host.posture import Posture
 from miro_host.references.line import Line
 from miro_host.theory import stability
 from miro_host.theory.assumptions import HALF_PI, across
 from miro_host.theory.simulation import Simulation
+from tests.host.theory import ideal
+from tests.host.theory.ideal import PRINTED, ROBOT, STARTS, beside, paper_law
+from tests.host.theory.layer import NO_GUARD, rising
 
 
 def figures():

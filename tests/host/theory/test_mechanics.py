@@ -5,7 +5,6 @@ import math
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from tests.host.theory.ideal import ROBOT
 
 from miro_host.theory import matrices
 from miro_host.theory.mechanics import (
@@ -19,6 +18,7 @@ from miro_host.theory.mechanics import (
     residual,
 )
 from miro_host.theory.unicycle import Body, cartesian, cartesian_rates, inertia, polar, polar_rates
+from tests.host.theory.ideal import ROBOT
 
 BODIES = st.builds(
     Body,

@@ -4,8 +4,6 @@ import math
 from itertools import pairwise
 
 import pytest
-from tests.host.theory.ideal import LITERAL, ROBOT, beside, paper_law
-from tests.naive.host_ideal_loop import drive
 
 from miro_host.integrator import Limits
 from miro_host.laws.yang_kim import YangKim
@@ -15,6 +13,8 @@ from miro_host.references.line import Line
 from miro_host.theory import computed_torque
 from miro_host.theory.simulation import Simulation
 from miro_host.theory.unicycle import Body, inertia
+from tests.host.theory.ideal import LITERAL, ROBOT, beside, paper_law
+from tests.naive.host_ideal_loop import drive
 
 
 def swaying(t, posture, v, w):

@@ -5,8 +5,6 @@ import math
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from tests.host.theory.ideal import PRINTED
-from tests.host.theory.layer import NO_GUARD, rates, rising, states
 
 from miro_host.laws.yang_kim import YangKim, sign
 from miro_host.posture import Posture
@@ -14,6 +12,8 @@ from miro_host.references.arc import Arc
 from miro_host.references.line import Line
 from miro_host.theory import stability
 from miro_host.theory.assumptions import HALF_PI, across, radius
+from tests.host.theory.ideal import PRINTED
+from tests.host.theory.layer import NO_GUARD, rates, rising, states
 
 PATHS = st.sampled_from([Line(), Line(heading_rad=2.2), Arc(), Arc(heading_rad=-2.9, curvature_per_m=0.8)])
 POSTURES = st.builds(Posture, st.floats(-1.2, 1.2), st.floats(-0.9, 0.9), st.floats(-3.14, 3.14))

@@ -7,6 +7,12 @@ import math
 from itertools import pairwise
 
 import pytest
+
+from miro_host.posture import Posture
+from miro_host.references.arc import Arc
+from miro_host.references.line import Line
+from miro_host.theory import stability
+from miro_host.theory.simulation import Simulation
 from tests.host.theory.ideal import (
     PRINTED,
     ROBOT,
@@ -18,12 +24,6 @@ from tests.host.theory.ideal import (
     paper_law,
     random_starts,
 )
-
-from miro_host.posture import Posture
-from miro_host.references.arc import Arc
-from miro_host.references.line import Line
-from miro_host.theory import stability
-from miro_host.theory.simulation import Simulation
 
 ERRORS = [(Line(), (0.07, 0.10, -0.38)), (Arc(), (0.05, -0.06, 0.5)), (Arc(), (0.06, 0.04, -0.3))]
 

@@ -5,11 +5,11 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.host.theory.ideal import ROBOT
-from tests.host.theory.test_mechanics import BODIES
 
 from miro_host.theory import computed_torque
 from miro_host.theory.unicycle import Body, inertia
+from tests.host.theory.ideal import ROBOT
+from tests.host.theory.test_mechanics import BODIES
 
 DEMANDS = st.lists(st.floats(-50.0, 50.0), min_size=2, max_size=2)
 DISTURBANCES = st.lists(st.floats(-0.05, 0.05), min_size=2, max_size=2)

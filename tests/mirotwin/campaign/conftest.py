@@ -1,9 +1,9 @@
 """What the tests of campaigns share: the results of the short one."""
 
 import pytest
-from tests.mirotwin.campaign.plans import InThisProcess, plan_of
 
 from mirotwin import campaign
+from tests.mirotwin.campaign.plans import InThisProcess, plan_of
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ from mirotwin.campaign import builtin
 from mirotwin.campaign.job import Job, run
 from mirotwin.campaign.plan import load_plan
 from mirotwin.campaign.rows import Rows
-from mirotwin.cli import main
+from mirotwin.commands import main
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "benchmark.md").read_text(encoding="utf-8")

@@ -3,7 +3,6 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
 
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
@@ -15,8 +14,9 @@ from mirotwin.campaign import running
 from mirotwin.campaign.journal import Journal, journal_path
 from mirotwin.campaign.results import wall_path
 from mirotwin.campaign.workers import Processes
+from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import tracking_of
-from mirotwin.report.track import Tracks
+from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
 
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 

@@ -10,14 +10,14 @@ import time
 import pytest
 from click.testing import CliRunner
 from msgspec.structs import replace
-from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of
 
 from miro_exact.bad_input import BadInput
 from mirotwin import campaign
 from mirotwin.campaign import cluster as cluster_module
 from mirotwin.campaign.journal import journal_path
 from mirotwin.campaign.versions import versions
-from mirotwin.cli import main
+from mirotwin.commands import main
+from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of
 
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 distributed = pytest.importorskip("distributed", reason="needs Dask: the extra cluster")

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.mirotwin.campaign.plans import SHORT, plan_of
 
 from miro_exact.bad_input import BadInput
 from mirotwin import campaign
@@ -17,6 +16,7 @@ from mirotwin.campaign.file import parse
 from mirotwin.campaign.inline import inline
 from mirotwin.campaign.plan import plan_of as joined
 from mirotwin.campaign.seeds import seeds_of
+from tests.mirotwin.campaign.plans import SHORT, plan_of
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "campaign.toml"
 README = Path(__file__).parents[3] / "sim" / "mirotwin" / "campaign" / "README.md"

@@ -21,8 +21,8 @@ from mirotwin.campaign.job import Job, Row, run
 from mirotwin.campaign.processes import processes
 from mirotwin.campaign.seeds import seeds_of
 from mirotwin.recording.reader import read
+from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import tracking_of
-from mirotwin.report.track import Tracks
 
 SHORT = "duration_s=1.0"
 

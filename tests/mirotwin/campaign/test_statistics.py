@@ -5,11 +5,10 @@ import statistics
 import mpmath
 import numpy as np
 import pytest
-from benchmarks.intervals import coverage
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive import bootstrap
 
+from benchmarks.intervals import coverage
 from miro_exact.rng import Stream
 from mirotwin.campaign.comparison import Difference
 from mirotwin.campaign.statistics import (
@@ -23,6 +22,7 @@ from mirotwin.campaign.statistics import (
     quantile,
     student,
 )
+from tests.naive import bootstrap
 
 NUMBERS = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=12)
 

@@ -10,8 +10,6 @@ from concurrent.futures import Executor, Future
 
 import pytest
 from msgspec.structs import replace
-from tests import children
-from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
 
 from miro_exact import engine
 from miro_exact.bad_input import BadInput
@@ -20,6 +18,8 @@ from mirotwin import campaign
 from mirotwin.campaign.drive import Drive
 from mirotwin.campaign.worker import Outcome, work
 from mirotwin.campaign.workers import Processes, Workers
+from tests import children
+from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
 
 pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
 

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.mirotwin.cli.conftest import finished as finished
-from tests.mirotwin.cli.conftest import mirotwin as mirotwin
-from tests.mirotwin.cli.conftest import short as short
-from tests.mirotwin.fuzz.random_engine import RandomEngine
 
 from miro_robot.image import Image
+from tests.mirotwin.conftest import finished as finished
+from tests.mirotwin.conftest import mirotwin as mirotwin
+from tests.mirotwin.conftest import short as short
+from tests.mirotwin.fuzz.random_engine import RandomEngine
 
 
 @pytest.fixture
@@ -21,14 +21,14 @@ def engines(monkeypatch: pytest.MonkeyPatch) -> list[RandomEngine]:
         made.append(RandomEngine(target, list(inputs), folder.folder("engine"), seed))
         return made[-1], []
 
-    monkeypatch.setattr("mirotwin.cli.fuzz.engine_for", engine_for)
+    monkeypatch.setattr("mirotwin.fuzz.fuzz_command.engine_for", engine_for)
     return made
 
 
 @pytest.fixture
 def built() -> Callable[[str], Path]:
     """The image of the firmware with a planted mistake, by its name."""
-    from tests.mirotwin.checks.rig import planted
+    from tests.mirotwin.verify.checks.rig import planted
 
     def find(name: str) -> Path:
         image: Image = planted(name)

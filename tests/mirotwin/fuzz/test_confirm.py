@@ -1,18 +1,18 @@
 """A find counts once a World says so, and what is left of it gives the verdict again."""
 
 import pytest
-from tests.mirotwin.checks.rig import needs_sdcc, own_image, planted
 
 from miro_protocol import stream
 from miro_robot.harness.referee import NAMES
 from miro_robot.image.debug_info import Sources
-from mirotwin.checks.registry import CHECKS
 from mirotwin.fuzz.confirm import NEVER_SLEEPS, Place, WorldCourt, expected_of, judge
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.finds import Finds
 from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import Finding, target_for
+from mirotwin.verify.checks.registry import CHECKS
+from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image, planted
 
 
 def court(image):

@@ -5,15 +5,15 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from miro_robot.image import load_hex
+from mirotwin.fuzz.confirm import Place, WorldCourt
+from mirotwin.fuzz.target import target_for
 from tests import children
 from tests.mutants.build import build
 from tests.mutants.draw import source_files
 from tests.mutants.planted import PLANTED
 from tests.mutants.sdcc import needs_sdcc
-
-from miro_robot.image import load_hex
-from mirotwin.fuzz.confirm import Place, WorldCourt
-from mirotwin.fuzz.target import target_for
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 FINDS = {

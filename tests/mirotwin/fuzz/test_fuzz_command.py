@@ -5,13 +5,13 @@ import signal
 import sys
 
 import pytest
-from tests import children
-from tests.host.distribution import install
-from tests.mirotwin.checks.rig import needs_sdcc, own_image
-from tests.mutants.build import build
-from tests.mutants.draw import source_files
 
 from mirotwin.fuzz.files import CampaignFolder, unused
+from tests import children
+from tests.host.distribution import install
+from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
+from tests.mutants.build import build
+from tests.mutants.draw import source_files
 
 MISTAKE = "takes frames with a bad CRC"
 
@@ -19,7 +19,7 @@ MISTAKE = "takes frames with a bad CRC"
 def started(tmp_path, *arguments):
     """The command in a process of its own, with the engine of the tests and a line of progress each second."""
     program = (
-        "import mirotwin.cli.fuzz as fuzz, mirotwin.cli.fuzz_progress as progress\n"
+        "import mirotwin.fuzz.fuzz_command as fuzz, mirotwin.fuzz.fuzz_progress as progress\n"
         "progress.LINE_S = 1.0\n"
         "from tests.mirotwin.fuzz.random_engine import RandomEngine\n"
         "fuzz.engine_for = lambda spec, inputs, folder, target, jobs, seed: (\n"
@@ -83,7 +83,7 @@ def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
 
 
 BROKEN = """
-from mirotwin.checks.interface import Check, Judge
+from mirotwin.verify.checks.interface import Check, Judge
 
 class Broken(Check, frozen=True, kw_only=True, tag="broken"):
     KIND = "safety"

@@ -1,9 +1,9 @@
 """`mirotwin fuzz --regress`: saved cases, run again as a project's CI does."""
 
 import pytest
-from tests.mirotwin.checks.rig import needs_sdcc
 
 from miro_protocol import stream
+from tests.mirotwin.verify.checks.rig import needs_sdcc
 
 MISTAKE = "takes frames with a bad CRC"
 

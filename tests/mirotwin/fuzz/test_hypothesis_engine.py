@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.mirotwin.fuzz.toy import Toy
 
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
@@ -19,6 +18,7 @@ from mirotwin.fuzz.hypothesis_inputs import inputs
 from mirotwin.fuzz.hypothesis_search import Explorer, explore
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import target_for
+from tests.mirotwin.fuzz.toy import Toy
 
 TOY = TargetSpec(input="bytes", maker="tests.mirotwin.fuzz.toy:toy")
 

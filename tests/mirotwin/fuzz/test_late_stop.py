@@ -1,10 +1,9 @@
 """A test of a frame that puts the stop off does so however many characters come before it is over."""
 
-from tests.mutants.heard import verdicts
-
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from mirotwin.fuzz.target import target_for
+from tests.mutants.heard import verdicts
 
 
 def test_characters_behind_the_tested_frame_do_not_end_the_time_that_its_test_has() -> None:

@@ -1,11 +1,10 @@
 """What inputs reach, and the path that tells finds apart."""
 
-from tests.mirotwin.checks.rig import own_image
-
 from mirotwin.fuzz.inputs import input_of
 from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.seeds import seeds, sent, talks
 from mirotwin.fuzz.target import target_for
+from tests.mirotwin.verify.checks.rig import own_image
 
 
 def made():

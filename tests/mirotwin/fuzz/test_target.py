@@ -6,12 +6,6 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests import children
-from tests.mirotwin.fuzz import target_digest
-from tests.mutants import planted
-from tests.mutants.build import build
-from tests.mutants.draw import source_files
-from tests.mutants.sdcc import needs_sdcc
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
@@ -20,10 +14,16 @@ from miro_robot.firmware import image_path
 from miro_robot.harness.referee import NAMES
 from miro_robot.image import load_hex
 from miro_sim.world.world import World
-from mirotwin.checks.watching import Checks
 from mirotwin.fuzz.confirm import expected_of
 from mirotwin.fuzz.target import target_for
-from mirotwin.testing.wanted import silent_scenario
+from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.wanted import silent_scenario
+from tests import children
+from tests.mirotwin.fuzz import target_digest
+from tests.mutants import planted
+from tests.mutants.build import build
+from tests.mutants.draw import source_files
+from tests.mutants.sdcc import needs_sdcc
 
 JUDGED = [
     name

@@ -7,7 +7,6 @@ from functools import cache
 from pathlib import Path
 
 import msgspec
-from tests.mirotwin.checks.rig import built_in, own_image, team
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.frames import encode
@@ -17,6 +16,7 @@ from miro_sim.periods import Period
 from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
+from tests.mirotwin.verify.checks.rig import built_in, own_image, team
 
 TEXT = """
 name = "pair"

@@ -8,15 +8,10 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from mirotwin.cli import main
-from mirotwin.replay.compare import (
-    KINDS,
-    WITHIN_COUNTS,
-    WITHIN_COUNTS_PER_SAMPLE,
-    WITHIN_TICKS,
-)
+from mirotwin.commands import main
+from mirotwin.recording.compare import KINDS, WITHIN_COUNTS, WITHIN_COUNTS_PER_SAMPLE, WITHIN_TICKS
 
-PAGE = (Path(__file__).parents[3] / "sim/mirotwin/replay/README.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "mirotwin/replay/README.md").read_text(encoding="utf-8")
 
 
 def test_the_example_in_python_prints_what_the_page_says(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,17 +4,17 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from tests.mirotwin.checks.rig import needs_sdcc, own_image
-from tests.mirotwin.replay.rig import STOP_AT, built, periods, with_byte, world
-from tests.mutants.draw import SOURCE
 
 from miro_robot.image import Image, Symbols
-from mirotwin.replay.compare import Rule, differences
+from mirotwin.recording.compare import Rule, differences
+from mirotwin.recording.sequences import characters
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.moved import moved
 from mirotwin.replay.program import Program, changed_instructions, same_layout
-from mirotwin.replay.sequences import characters
 from mirotwin.replay.variables import extents, name_of_byte
+from tests.mirotwin.replay.rig import STOP_AT, built, periods, with_byte, world
+from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
+from tests.mutants.draw import SOURCE
 
 END = 9_600_000
 

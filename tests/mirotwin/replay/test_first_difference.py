@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.mirotwin.checks.rig import own_image
-from tests.mirotwin.replay.rig import Planted, planted_world, scenario, world
 
 import mirotwin
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
 from mirotwin.replay import first_difference
+from tests.mirotwin.replay.rig import Planted, planted_world, scenario, world
+from tests.mirotwin.verify.checks.rig import own_image
 
 LAST_LEFT = own_image().symbols.names["_last_left"].address
 BODY = "networks[0].robots[0].board.plant.body"

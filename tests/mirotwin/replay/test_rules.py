@@ -7,15 +7,15 @@ import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.mirotwin.synthetic import periods
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.stream_events import Power, RadioState, Reset
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
-from mirotwin.replay.compare import Difference, Rule, differences
-from mirotwin.replay.difference import first_per_channel
-from mirotwin.replay.sequences import SAME_TICKS, Happening, unlike
+from mirotwin.recording.compare import Difference, Rule, differences
+from mirotwin.recording.difference import first_per_channel
+from mirotwin.recording.sequences import SAME_TICKS, Happening, unlike
+from tests.mirotwin.synthetic import periods
 
 RUN = list(periods(6, [(0, 0), (0, 2)]))
 MS = 24_000

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mirotwin.testing.rig import Rig
-from mirotwin.testing.wanted import marked, wanted
+from mirotwin.verify.wanted import marked, wanted
 
 HERE = Path(__file__).parent
 

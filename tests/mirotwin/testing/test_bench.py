@@ -5,8 +5,6 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from tests.mirotwin.cli.conftest import Result, mirotwin
-from tests.mirotwin.testing.noise import listen
 
 from miro_protocol import stream
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame
@@ -16,6 +14,8 @@ from miro_robot.mcs51.line import Line
 from miro_sim.radio import RadioParams
 from mirotwin.testing.air import Air, Trouble
 from mirotwin.testing.bench import MS, Bench, LinkFailure
+from tests.mirotwin.conftest import Result, mirotwin
+from tests.mirotwin.testing.noise import listen
 
 __all__ = ["mirotwin"]
 NOISY = RadioParams.of(bit_error_rate=3e-3)

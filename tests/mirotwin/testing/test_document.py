@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from tests.mirotwin.testing.sessions import session
 
 from miro_robot.firmware import image_path
+from tests.mirotwin.testing.sessions import session
 
-PAGE = Path(__file__).parents[3] / "sim/mirotwin/testing/README.md"
+PAGE = Path(__file__).parents[3] / "mirotwin/testing/README.md"
 PLUGIN, BENCH, MACHINE = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 
 

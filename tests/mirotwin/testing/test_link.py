@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
-from tests.mirotwin.testing.rigs import rig
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import ms
 from miro_protocol.frames import TeamFrame, TelemetryFrame
 from miro_sim.world import conditions
 from mirotwin.testing.waiting import WaitFailed
+from tests.mirotwin.testing.rigs import rig
 
 
 def test_numbers_count_by_themselves_and_velocities_go_by_slot() -> None:

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from hypothesis.internal.conjecture import engine
 from hypothesis.stateful import run_state_machine_as_test
 from intelhex import IntelHex
-from tests.mirotwin.cli.conftest import Result, mirotwin
 
 from miro_protocol import stream
 from miro_protocol.decoder import Decoder, Received
@@ -24,6 +23,7 @@ from mirotwin.testing.bench import Bench, LinkFailure
 from mirotwin.testing.bench_case import case_of_bench
 from mirotwin.testing.machine import LinkMachine
 from mirotwin.testing.profiles import link_profiles, seeds
+from tests.mirotwin.conftest import Result, mirotwin
 
 __all__ = ["mirotwin"]
 UNDEFINED = 0xA5

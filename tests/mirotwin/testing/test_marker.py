@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from tests.mirotwin.testing.rigs import HERE
 
 from miro_exact.bad_input import BadInput
-from mirotwin.checks.registry import ALWAYS_ON
 from mirotwin.testing.rig import Rig
-from mirotwin.testing.wanted import marked, wanted
+from mirotwin.verify.checks.registry import ALWAYS_ON
+from mirotwin.verify.wanted import marked, wanted
+from tests.mirotwin.testing.rigs import HERE
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,11 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tests.mirotwin.checks.rig import built_in, needs_sdcc
-from tests.mirotwin.testing.sessions import run, session
 
 from miro_robot.firmware import image_path
-from mirotwin.cases.artifacts import image_beside
+from mirotwin.verify.cases.artifacts import image_beside
+from tests.mirotwin.testing.sessions import run, session
+from tests.mirotwin.verify.checks.rig import built_in, needs_sdcc
 
 MANY = """
 @pytest.mark.mirotwin(scenario={"network.radio.bit_error_rate": 0.01})
@@ -94,7 +94,7 @@ def test_a_session_without_worlds_imports_nothing_else_of_ours(tmp_path: Path) -
     tests = "import sys\ndef test_one(tmp_path):\n    pass\n"
     (tmp_path / "test_mine.py").write_text(tests)
     out = session(tmp_path, "-s").stdout
-    assert "LOADED ['mirotwin', 'mirotwin.pytest_plugin']" in out
+    assert "LOADED ['mirotwin', 'mirotwin.testing.pytest_plugin']" in out
 
 
 def test_the_help_names_options_and_the_marker(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.mirotwin.testing.rigs import HERE, rig
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ms
@@ -13,7 +12,8 @@ from miro_protocol.frames import ServiceFrame, TelemetryFrame, encode
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FaultKind
 from miro_sim.world.world import World
-from mirotwin.checks.watching import Checks
+from mirotwin.verify.checks.watching import Checks
+from tests.mirotwin.testing.rigs import HERE, rig
 
 
 def test_a_robot_is_up_and_stands_when_its_test_begins() -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from tests.mirotwin.testing.rigs import rig
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import ms
 from miro_sim.world import conditions
 from miro_sim.world.waits import WaitExpired
 from mirotwin.testing.waiting import WaitFailed
+from tests.mirotwin.testing.rigs import rig
 
 
 def test_service_frames_reach_the_firmware() -> None:

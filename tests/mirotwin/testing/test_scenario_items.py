@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+
 from tests import children
 
 HEAD = 'scenario = "silent"\nduration_s = 0.3\n'

@@ -8,13 +8,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import msgspec
-from tests.robot.mcs51.asm import assemble, labels_of
 
 from miro_robot.board import Board
 from miro_robot.image import Image, Symbol, Symbols
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.plant import Plant
 from miro_robot.wiring import Wiring, load_wiring
+from tests.robot.mcs51.asm import assemble, labels_of
 
 CYCLE = 12
 MS = 24_000

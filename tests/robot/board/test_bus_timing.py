@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive.lm629_bus_timing import NaiveBusTiming
 
 from miro_robot.lm629.bus_timing import LIMITS, READ_ACCESS, BusTiming
+from tests.naive.lm629_bus_timing import NaiveBusTiming
 
 IDLE = (1, 1, 1, 0, 0xFF)
 SELECTED = (0, 1, 1, 0, 0x02)

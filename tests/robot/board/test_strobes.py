@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.robot.board.rig import CYCLE, board_with
 
 from miro_exact.state import snapshot
 from miro_robot.board import Board
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.wiring import CHIP_INPUTS
+from tests.robot.board.rig import CYCLE, board_with
 
 DATA, CONTROL = 0, 2  # ports
 IDLE, RESET = 0x3F, 0x20

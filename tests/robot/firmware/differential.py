@@ -14,12 +14,11 @@ import random
 import sys
 from collections.abc import Sequence
 
-from tests.robot.firmware.rig import CHARACTER, MS, US, Rig, iram
-
 from miro_protocol.decoder import Decoder, Received, Symbol
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.freshness import Freshness
 from miro_protocol.table import FRESH_AGAIN_TICKS, downlink
+from tests.robot.firmware.rig import CHARACTER, MS, US, Rig, iram
 
 FRAMES_PER_RIG = 100
 LOOKING = 4 * MS  # the firmware has looked at a frame so long after its last character

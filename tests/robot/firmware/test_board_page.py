@@ -4,9 +4,9 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.robot.firmware.rig import Command, Rig
 
 from miro_robot.lm629.commands import BY_NAME, COMMANDS
+from tests.robot.firmware.rig import Command, Rig
 
 PAGE = (Path(__file__).parents[3] / "robot_fw/README.md").read_text("utf-8")
 RDSIGS = 0x0C

@@ -4,13 +4,13 @@ from itertools import pairwise
 
 import msgspec
 import pytest
-from tests.robot.firmware.rig import MS, Rig
 
 from miro_protocol.decoder import Received, TelemetryDecoder
 from miro_protocol.frames import TelemetryFrame
 from miro_protocol.table import Flags
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.wiring import load_wiring
+from tests.robot.firmware.rig import MS, Rig
 
 RSTI, MSKI, LFIL, UDF, LTRJ, STT = 0x1D, 0x1C, 0x1E, 0x04, 0x1F, 0x01
 START_UP = [

@@ -1,10 +1,10 @@
 """What happens without fresh frames, measured at the LM629."""
 
 import pytest
-from tests.robot.firmware.rig import CHARACTER, MS, SAMPLE, US, Rig
 
 from miro_protocol.frames import TeamFrame, encode
 from miro_robot.lm629.options import Lm629Options
+from tests.robot.firmware.rig import CHARACTER, MS, SAMPLE, US, Rig
 
 STT, LTRJ = 0x01, 0x1F
 STOP, OFF = bytes.fromhex("0400"), bytes.fromhex("0100")

@@ -4,10 +4,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tests import children
-from tests.robot.firmware.rig import IMAGE, iram
 
 from miro_robot.firmware import image_path
+from tests import children
+from tests.robot.firmware.rig import IMAGE, iram
 
 SOURCE = Path(__file__).parents[3] / "robot_fw" / "firmware"
 VERSION = (SOURCE / "sdcc.version").read_text("utf-8").strip()

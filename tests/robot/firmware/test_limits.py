@@ -1,9 +1,9 @@
 """Limits that must hold whatever the robot is doing: stack, latency, bus."""
 
 import pytest
-from tests.robot.firmware.rig import CHARACTER, CYCLE, IMAGE, MS, Rig
 
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
+from tests.robot.firmware.rig import CHARACTER, CYCLE, IMAGE, MS, Rig
 
 SP, PSW, PORT_2 = 0x81, 0xD0, 2
 CHIP_SELECTS, READ = 0x18, 0x02

@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from tests.robot.firmware.rig import MS, SAMPLE, Rig
 
 STT, LTRJ = 0x01, 0x1F

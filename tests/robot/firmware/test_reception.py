@@ -5,10 +5,10 @@ import random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.robot.firmware.differential import compare, drawn_stream, frame
-from tests.robot.firmware.rig import BIT, CHARACTER, MS, US, Rig
 
 from miro_protocol.strategies import Heard, damaged_streams
+from tests.robot.firmware.differential import compare, drawn_stream, frame
+from tests.robot.firmware.rig import BIT, CHARACTER, MS, US, Rig
 
 LEAD = 6  # characters before the sync
 

@@ -1,10 +1,10 @@
 """Service frames: ping, filter gains, acceleration."""
 
 import pytest
-from tests.robot.firmware.rig import MS, SAMPLE, Command, Rig
 
 from miro_protocol.frames import seal
 from miro_protocol.table import downlink
+from tests.robot.firmware.rig import MS, SAMPLE, Command, Rig
 
 STT, UDF, LFIL, LTRJ, RDSIGS = 0x01, 0x04, 0x1E, 0x1F, 0x0C
 PING, FILTER, ACCELERATION = 0, 1, 2

@@ -3,11 +3,11 @@
 from itertools import pairwise
 
 import pytest
-from tests.robot.firmware.rig import CHARACTER, Rig
 
 from miro_protocol.decoder import Received, TelemetryDecoder
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.table import Flags
+from tests.robot.firmware.rig import CHARACTER, Rig
 
 
 def answers(rig: Rig) -> list[TelemetryFrame]:

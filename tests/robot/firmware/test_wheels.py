@@ -1,10 +1,10 @@
 """The closed loop on the real drive: firmware, LM629, bridge, motors, encoders."""
 
 import pytest
-from tests.robot.firmware.rig import SAMPLE, Rig
 
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import DriveParams
+from tests.robot.firmware.rig import SAMPLE, Rig
 
 
 def follow(rig: Rig, left_units: int, right_units: int, samples: int) -> list[tuple[int, int]]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import shutil
 
-from tests.robot.inspect.programs import SWITCH, build, line_of
-
 from miro_robot.bare.machine import BareMachine
 from miro_robot.image import load_hex
 from miro_robot.image.debug_info import DebugInfo, Sources
@@ -24,6 +22,7 @@ from miro_robot.inspect.coverage import (
 from miro_robot.inspect.lcov import FileRecord
 from miro_robot.inspect.watcher import attach
 from miro_robot.mcs51.opcodes import is_conditional
+from tests.robot.inspect.programs import SWITCH, build, line_of
 
 
 def counts_after(image, cycles):

@@ -6,13 +6,13 @@ import re
 import shutil
 
 import pytest
-from tests import children
-from tests.robot.inspect.programs import PROGRAM, build, line_of
 
 from miro_robot.firmware import image_path, source_folder
 from miro_robot.image import ImageError, load_hex
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.image.symbol_files import SourceLine
+from tests import children
+from tests.robot.inspect.programs import PROGRAM, build, line_of
 
 
 def copied(program, folder, *suffixes):

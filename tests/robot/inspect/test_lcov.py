@@ -10,10 +10,10 @@ from copy import deepcopy
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests import children
 
 from miro_exact.bad_input import BadInput
 from miro_robot.inspect.lcov import FileRecord, add, decode, encode
+from tests import children
 
 COUNTS = st.integers(0, 10**12)
 LINES = st.integers(1, 9999)

@@ -6,14 +6,14 @@ from pathlib import Path
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.robot.inspect.programs import build_modules
-from tests.robot.mcs51.asm import assemble
 
 from miro_robot.image import Image, Symbol, Symbols, load_hex, parse_hex
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.listing import rows, text_lines
 from miro_robot.inspect.symbol_names import SymbolNames, functions
 from miro_robot.mcs51.opcodes import LENGTH
+from tests.robot.inspect.programs import build_modules
+from tests.robot.mcs51.asm import assemble
 
 
 def image_of(code: bytes, symbols: dict[str, Symbol] | None = None) -> Image:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from tests.robot.inspect.test_listing import image_of
-from tests.robot.mcs51.asm import assemble
-from tests.robot.mcs51.rig import RecordingBus
-
 from miro_robot.bare.machine import BareMachine
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.inspect.trace import REGISTERS, Trace, registers
 from miro_robot.inspect.watcher import attach, detach
 from miro_robot.mcs51.cpu import Cpu
+from tests.robot.inspect.test_listing import image_of
+from tests.robot.mcs51.asm import assemble
+from tests.robot.mcs51.rig import RecordingBus
 
 PROGRAM = """
     LJMP main

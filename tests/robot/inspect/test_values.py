@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests import children
 
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
@@ -20,6 +19,7 @@ from miro_robot.image.variables import parse_variables, variables_of
 from miro_robot.inspect.values import read_value, write_value
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
+from tests import children
 
 PROGRAM = """
 #include <8052.h>

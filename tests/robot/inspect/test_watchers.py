@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive import watching
-from tests.robot.mcs51.asm import assemble
-from tests.robot.mcs51.rig import RecordingBus
 
 from miro_exact.state import snapshot
 from miro_robot.inspect.activity import Activity
 from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.watcher import Watcher, attach, detach
 from miro_robot.mcs51.cpu import Cpu
+from tests.naive import watching
+from tests.robot.mcs51.asm import assemble
+from tests.robot.mcs51.rig import RecordingBus
 
 # Two timers at two priorities, a serial port, sleep, and a busy main loop with branches.
 BUSY = """

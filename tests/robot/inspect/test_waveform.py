@@ -12,9 +12,6 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive.waveform import Sampler, Treadmill
-from tests.robot.inspect.reading import read
-from tests.robot.mcs51.asm import assemble
 
 from miro_exact.state import restore, snapshot
 from miro_protocol.frames import TeamFrame, encode
@@ -28,6 +25,9 @@ from miro_robot.lm629.chip import PWM_TICKS
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.wiring import Latch, load_wiring
+from tests.naive.waveform import Sampler, Treadmill
+from tests.robot.inspect.reading import read
+from tests.robot.mcs51.asm import assemble
 
 MS = 24_000
 BIT = 2500

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from hypothesis import HealthCheck, is_hypothesis_test, settings
+
 from tests.example_count import NORM
 
 ROUND = 10

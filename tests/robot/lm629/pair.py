@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from tests.naive.lm629 import NaiveLm629
-
 from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.options import Lm629Options
+from tests.naive.lm629 import NaiveLm629
 
 
 class Pair:

@@ -68,9 +68,8 @@ def play(bench: object, step: tuple[int, ...], place: int) -> int:
 
 
 def digest(seed: int, count: int) -> str:
-    from tests.robot.lm629.bench import Bench
-
     from miro_exact.state import snapshot  # a hot module: not before the engine was chosen
+    from tests.robot.lm629.bench import Bench
 
     bench, place = Bench(), 0
     bench.chip.set_encoder(0, 0, 0)

@@ -9,12 +9,12 @@ from fractions import Fraction
 
 from hypothesis import example, given
 from hypothesis import strategies as st
-from tests.example_count import examples
-from tests.robot.lm629.bench import Bench
-from tests.robot.lm629.pair import Pair
 
 from miro_robot.lm629.commands import COMMANDS
 from miro_robot.lm629.options import CHOICES, DEFAULT_OPTIONS, Lm629Options
+from tests.example_count import examples
+from tests.robot.lm629.bench import Bench
+from tests.robot.lm629.pair import Pair
 
 NO_WORDS = [command.name for command in COMMANDS if not command.words_in and command.name != "RESET"]
 POSITIONS = st.one_of(

@@ -6,9 +6,9 @@ Long because each command of the data sheet has its byte sequences.
 from __future__ import annotations
 
 import pytest
-from tests.robot.lm629.bench import Bench
 
 from miro_robot.lm629.commands import BY_NAME, COMMANDS
+from tests.robot.lm629.bench import Bench
 
 MOTOR_OFF, BREAKPOINT, EXCESS, WRAP, INDEX, COMPLETE, ERROR = 0x80, 0x40, 0x20, 0x10, 0x08, 0x04, 0x02
 

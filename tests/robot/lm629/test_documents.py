@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
+
 from tests.robot.lm629.bench import Bench
 from tests.robot.lm629.test_commands import moving, send
 

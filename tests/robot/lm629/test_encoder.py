@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from hypothesis import given
 from hypothesis import strategies as st
+
+from miro_robot.lm629.encoder import Encoder
 from tests.example_count import examples
 from tests.naive.lm629_encoder import FORWARD, NaiveEncoder
 from tests.robot.lm629.bench import Bench
-
-from miro_robot.lm629.encoder import Encoder
 
 EVENT = st.tuples(
     st.sampled_from(["forward", "back", "a", "b", "index", "take", "arm"]),

@@ -1,11 +1,11 @@
 """The host port: strobes, byte phase, busy bit, command errors, the reset handshake."""
 
 import pytest
-from tests.robot.lm629.bench import Bench
 
 from miro_exact.state import snapshot
 from miro_robot.lm629.chip import SAMPLE_TICKS, Lm629
 from miro_robot.lm629.options import Lm629Options
+from tests.robot.lm629.bench import Bench
 
 BUSY = 480
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from tests.robot.lm629.bench import Bench
-
 from miro_exact.clock import NEVER_TICK
 from miro_robot.lm629.chip import PWM_TICKS, SAMPLE_TICKS, Lm629
+from tests.robot.lm629.bench import Bench
 
 
 def holding(kp: int = 10) -> Bench:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
+from miro_robot.lm629.pid import Pid
 from tests.example_count import examples
 from tests.naive.lm629 import NaivePid
 from tests.robot.lm629.bench import Bench
-
-from miro_robot.lm629.pid import Pid
 
 
 def loop(kp: int = 0, ki: int = 0, kd: int = 0, il: int = 0, ds: int = 0, saturates: bool = True) -> Pid:

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests import children
-from tests.example_count import examples
-from tests.robot.lm629.bench import Bench
-from tests.robot.lm629.session import play, steps
 
 from miro_exact import engine
 from miro_exact.state import restore, snapshot
 from miro_robot.lm629.chip import Lm629
+from tests import children
+from tests.example_count import examples
+from tests.robot.lm629.bench import Bench
+from tests.robot.lm629.session import play, steps
 
 ROOT = Path(__file__).parents[3]
 

@@ -8,11 +8,11 @@ from fractions import Fraction
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.example_count import examples
-from tests.naive.lm629 import NaiveLm629
 
 from miro_robot.lm629.options import DEFAULT_OPTIONS
 from miro_robot.lm629.trajectory import Trajectory
+from tests.example_count import examples
+from tests.naive.lm629 import NaiveLm629
 
 
 def generator(a: int, limit: int, target: int, **modes: int) -> Trajectory:

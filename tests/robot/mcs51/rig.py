@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from tests.robot.mcs51.asm import SFRS, assemble
-
 from miro_robot.mcs51.bus import Bus
 from miro_robot.mcs51.cpu import Cpu
+from tests.robot.mcs51.asm import SFRS, assemble
 
 
 class RecordingBus(Bus):

@@ -6,9 +6,9 @@
 import zlib
 
 import pytest
-from tests.robot.mcs51.rig import cpu_with
 
 from miro_exact import engine
+from tests.robot.mcs51.rig import cpu_with
 
 PAIRS_ONLY_COMPILED = pytest.mark.skipif(
     engine.active() != "compiled", reason="65536 operand pairs take the uncompiled twin too long"

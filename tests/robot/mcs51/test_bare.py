@@ -6,12 +6,12 @@ Long because each way in which a run ends has its own program.
 from pathlib import Path
 
 import pytest
-from tests.robot.mcs51.asm import assemble
 
 from miro_exact.state import restore, snapshot
 from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.faults import FaultKind
 from miro_robot.image import Image, Symbols
+from tests.robot.mcs51.asm import assemble
 
 SERIAL = "MOV RCAP2H,#0FFh\nMOV RCAP2L,#0B2h\nMOV T2CON,#34h\nMOV SCON,#50h\n"
 ECHO = SERIAL + "loop:\nJNB RI,$\nMOV A,SBUF\nCLR RI\nMOV SBUF,A\nJNB TI,$\nCLR TI\nSJMP loop"

@@ -3,11 +3,11 @@
 from itertools import pairwise
 
 import pytest
-from tests.robot.mcs51.test_bare import AUTOBAUD, ECHO, SERIAL, image
 
 from miro_exact.state import restore, snapshot
 from miro_robot.bare.input import Piece
 from miro_robot.bare.machine import BareMachine, Ended
+from tests.robot.mcs51.test_bare import AUTOBAUD, ECHO, SERIAL, image
 
 PROMPT = (
     SERIAL

@@ -3,13 +3,13 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.robot.mcs51.test_bare import SERIAL, image
 
 from miro_exact.bad_input import BadInput
 from miro_exact.state import restore, snapshot
 from miro_robot.bare.input import Piece
 from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.bare.pins import PinEvent, read_pins
+from tests.robot.mcs51.test_bare import SERIAL, image
 
 
 def square_wave(port, bit, count, period, begin=240):

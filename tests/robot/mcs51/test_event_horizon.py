@@ -6,11 +6,11 @@ before every instruction, and both must be in the same state in the end.
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from tests.robot.mcs51.asm import assemble
-from tests.robot.mcs51.rig import RecordingBus
 
 from miro_exact.state import restore, snapshot
 from miro_robot.mcs51.cpu import Cpu
+from tests.robot.mcs51.asm import assemble
+from tests.robot.mcs51.rig import RecordingBus
 
 BYTE = st.sampled_from([0, 1, 2, 0x7F, 0x80, 0xF0, 0xFA, 0xFD, 0xFE, 0xFF])
 WRITES = st.one_of(

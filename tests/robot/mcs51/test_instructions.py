@@ -4,10 +4,10 @@
 """
 
 import pytest
-from tests.robot.mcs51.rig import RecordingBus, cpu_with, run_to_loop, sfr, stepped
 
 from miro_robot.faults import FaultKind
 from miro_robot.mcs51.cpu import Cpu
+from tests.robot.mcs51.rig import RecordingBus, cpu_with, run_to_loop, sfr, stepped
 
 
 def test_parity_is_that_of_acc_whatever_is_written_to_psw():

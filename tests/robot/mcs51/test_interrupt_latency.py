@@ -11,6 +11,7 @@ from itertools import pairwise
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from tests.naive.mcs51_latency import answers
 from tests.robot.mcs51.rig import cpu_with
 

@@ -4,6 +4,7 @@
 """
 
 import pytest
+
 from tests.robot.mcs51.rig import RecordingBus, cpu_with, sfr
 
 VECTORS = {"INT0": 0x03, "T0": 0x0B, "INT1": 0x13, "T1": 0x1B, "SERIAL": 0x23, "T2": 0x2B}

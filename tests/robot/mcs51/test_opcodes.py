@@ -1,10 +1,10 @@
 """The instruction table against the byte and cycle maps of the data sheet, and against the CPU that runs it."""
 
 import pytest
-from tests.robot.mcs51.rig import RecordingBus
 
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import CYCLES, LENGTH, ROW, TABLE, disassemble
+from tests.robot.mcs51.rig import RecordingBus
 
 BYTES_MAP = """
 1 2 3 1 1 2 1 1 1 1 1 1 1 1 1 1

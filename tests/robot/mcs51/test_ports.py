@@ -4,6 +4,7 @@
 """
 
 import pytest
+
 from tests.robot.mcs51.rig import cpu_with, sfr, stepped
 
 

@@ -1,9 +1,9 @@
 """Idle and power-down: what stops, what goes on, what ends them."""
 
 import pytest
-from tests.robot.mcs51.rig import cpu_with, sfr
 
 from miro_exact.state import snapshot
+from tests.robot.mcs51.rig import cpu_with, sfr
 
 TIMER_WAKES = """
 LJMP main

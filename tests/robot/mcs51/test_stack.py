@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests import children
-from tests.naive import stack as naive
-from tests.robot.mcs51.rig import cpu_with
 
 from miro_robot.bare.machine import BareMachine
 from miro_robot.faults import FaultKind
 from miro_robot.image import Symbol, Symbols, load_hex
+from tests import children
+from tests.naive import stack as naive
+from tests.robot.mcs51.rig import cpu_with
 
 OVER, UNDER = FaultKind.STACK_OVERFLOW, FaultKind.STACK_UNDERFLOW
 FIRST, LAST = 0x30, 0xBF

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests import children
 
 from miro_robot.firmware import image_path
 from miro_robot.image import ImageError, load_hex
 from miro_robot.image.evidence import check_cdb, check_map
 from miro_robot.image.symbol_files import parse_cdb, parse_map
+from tests import children
 
 ROBOT = image_path()
 MAP = ROBOT.with_suffix(".map").read_text()

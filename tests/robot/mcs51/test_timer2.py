@@ -3,6 +3,7 @@ AT89S52 data sheet, whose sections 10 to 12 have timer 2 too.
 """
 
 import pytest
+
 from tests.robot.mcs51.rig import cpu_with, sfr
 
 T2EX_LOW, T2_LOW = 0xFD, 0xFE  # on P1

@@ -6,11 +6,11 @@
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+
+from miro_robot.mcs51.cpu import Cpu
 from tests.naive.mcs51_timers import NaiveTimers
 from tests.robot.mcs51.asm import SFRS, assemble
 from tests.robot.mcs51.rig import RecordingBus, cpu_with, run_to_loop, sfr, stepped
-
-from miro_robot.mcs51.cpu import Cpu
 
 REGISTERS = ("TMOD", "TCON", "TL0", "TH0", "TL1", "TH1", "T2CON", "T2MOD", "TL2", "TH2", "RCAP2L", "RCAP2H")
 

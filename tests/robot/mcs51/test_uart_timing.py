@@ -8,6 +8,7 @@ so that k is at 105 + 156 k.
 """
 
 import pytest
+
 from tests.robot.mcs51.rig import cpu_with, sfr
 
 TIMER2 = "MOV RCAP2H,#0FFh\nMOV RCAP2L,#0B2h\nMOV TL2,#0B2h\nMOV TH2,#0FFh\nMOV T2CON,#34h\n"

@@ -13,13 +13,12 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests import children
-from tests.robot.ucsim import s51
-from tests.robot.ucsim.exclusions import COMPARED, P0
-
 from miro_robot.image import load_hex
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.xram import XramBus
+from tests import children
+from tests.robot.ucsim import s51
+from tests.robot.ucsim.exclusions import COMPARED, P0
 
 SOURCE = Path(__file__).with_name("programs") / "mix.c"
 MODELS = ("--model-small", "--model-large")

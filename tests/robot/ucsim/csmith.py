@@ -20,12 +20,11 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from miro_robot.bare.machine import BareMachine, Ended
+from miro_robot.image import Image, load_hex
 from tests import children
 from tests.robot.ucsim import s51
 from tests.robot.ucsim.exclusions import COMPARED, P0
-
-from miro_robot.bare.machine import BareMachine, Ended
-from miro_robot.image import Image, load_hex
 
 HEADER = Path(__file__).with_name("programs")
 MOST_CYCLES = 4_000_000

@@ -17,12 +17,11 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
+from miro_robot.mcs51.opcodes import disassemble
 from tests import children
 from tests.robot.ucsim import s51, states
 from tests.robot.ucsim.exclusions import COMPARED, P0
 from tests.robot.ucsim.walk import PROLOGUE, Step, Walk, Walker
-
-from miro_robot.mcs51.opcodes import disassemble
 
 _ALIGN_P0 = "set mem sfr 0x80 0xff"  # p0-after-movx
 _XRAM = "dump /b xram 0 65535"

@@ -3,10 +3,10 @@
 import shutil
 
 import pytest
-from tests.robot.ucsim import s51
-from tests.robot.ucsim.compiled import MODELS, build, differences
 
 from miro_exact import engine
+from tests.robot.ucsim import s51
+from tests.robot.ucsim.compiled import MODELS, build, differences
 
 CHECKPOINTS = 40 if engine.active() == "compiled" else 2
 

@@ -3,10 +3,10 @@
 import shutil
 
 import pytest
-from tests.robot.ucsim import s51
-from tests.robot.ucsim.csmith import EQUAL, LEFT_OUT, build, differences, tried
 
 from miro_exact import engine
+from tests.robot.ucsim import s51
+from tests.robot.ucsim.csmith import EQUAL, LEFT_OUT, build, differences, tried
 
 pytestmark = [
     pytest.mark.skipif(

@@ -4,13 +4,13 @@ import re
 from pathlib import Path
 
 import pytest
+
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.xram import XramBus
 from tests.robot.mcs51.asm import assemble
 from tests.robot.ucsim import exclusions, lockstep, s51
 from tests.robot.ucsim.disagreements import DISAGREEMENTS, table
 from tests.vectors.paths import VECTORS
-
-from miro_robot.mcs51.cpu import Cpu
-from miro_robot.mcs51.xram import XramBus
 
 CPU_TESTS = Path(__file__).parents[1] / "mcs51"
 pytestmark = pytest.mark.skipif(not s51.installed(), reason="needs ucsim's s51")

@@ -10,9 +10,8 @@ from __future__ import annotations
 from random import Random
 from typing import NamedTuple
 
-from tests.robot.ucsim import s51
-
 from miro_robot.mcs51.cpu import Cpu
+from tests.robot.ucsim import s51
 
 SIZE = 0x100  # bytes of code for each program
 RESULTS, READS = 0x30, 60  # internal RAM written

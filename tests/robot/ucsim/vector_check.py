@@ -10,10 +10,9 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from miro_robot.mcs51.vectors import RESET, Bench, Vector, decode
 from tests.robot.ucsim import s51
 from tests.robot.ucsim.exclusions import COMPARED, MOVX, P0, PSW, allowed
-
-from miro_robot.mcs51.vectors import RESET, Bench, Vector, decode
 
 _BATCH = 2000  # vectors per start of the simulator
 

@@ -11,12 +11,11 @@ from __future__ import annotations
 from random import Random
 from typing import NamedTuple
 
-from tests.robot.ucsim import states
-from tests.robot.ucsim.exclusions import COMPARED, MOVX, P0, allowed, has_bit, has_direct
-
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH
 from miro_robot.mcs51.xram import XramBus
+from tests.robot.ucsim import states
+from tests.robot.ucsim.exclusions import COMPARED, MOVX, P0, allowed, has_bit, has_direct
 
 VISITS = 4  # of one address, before the walk is moved elsewhere
 TRIES = 40  # instructions drawn for one place, before the walk is moved elsewhere

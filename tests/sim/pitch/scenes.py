@@ -8,14 +8,13 @@ from __future__ import annotations
 import random
 from typing import NamedTuple
 
-from tests.naive.camera import Body, NaiveCamera
-
 from miro_exact.rng import Stream
 from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.lens import Lens
 from miro_host.eye.patterns import PATTERNS, Pattern
 from miro_sim.pitch.camera import Camera
 from miro_sim.pitch.picture_settings import PictureSettings
+from tests.naive.camera import Body, NaiveCamera
 
 SIZES = ((32, 32), (32, 32), (8, 8), (33, 1), (1, 17), (64, 5))
 

@@ -6,8 +6,6 @@ import sys
 
 import pytest
 from msgspec.structs import replace
-from tests.children import run
-from tests.sim.pitch.windows import check_rig
 
 from miro_exact import engine
 from miro_exact.rng import Stream
@@ -16,6 +14,8 @@ from miro_host.eye.lens import Lens
 from miro_host.eye.patterns import PATTERNS
 from miro_sim.pitch.camera import Camera
 from miro_sim.pitch.picture_settings import PictureSettings
+from tests.children import run
+from tests.sim.pitch.windows import check_rig
 
 LENS = CameraParameters()
 QUIET = PictureSettings(

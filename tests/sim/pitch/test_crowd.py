@@ -3,10 +3,10 @@
 import random
 
 import pytest
-from tests.sim.pitch.crowd import Crowd
 
 from miro_exact import engine
 from miro_sim.pitch.picture_settings import PictureSettings
+from tests.sim.pitch.crowd import Crowd
 
 pytestmark = pytest.mark.skipif(engine.active() != "compiled", reason="takes minutes uncompiled")
 

@@ -5,11 +5,11 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive.plant import NaiveBridge, winding_run
 
 from miro_exact.state import restore, snapshot
 from miro_sim.plant.circuit import Winding
 from miro_sim.plant.params import Bridge, DriveParams
+from tests.naive.plant import NaiveBridge, winding_run
 
 PARAMS = DriveParams(bridge=Bridge(on_delay_s=0.0, off_delay_s=0.0))
 LATE = DriveParams()

@@ -8,16 +8,16 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests import children
-from tests.naive.plant import NaiveDrive
-from tests.robot.lm629.bench import Bench
-from tests.sim.plant.runs import pwm, trace
 
 from miro_exact.state import restore, snapshot, values
 from miro_robot.lm629.chip import Lm629
 from miro_sim.plant.circuit import Winding
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import Battery, Bridge, Chassis, DriveParams, Encoder, Motor
+from tests import children
+from tests.naive.plant import NaiveDrive
+from tests.robot.lm629.bench import Bench
+from tests.sim.plant.runs import pwm, trace
 
 PARAMS = DriveParams()
 PROMPT = DriveParams(bridge=Bridge(on_delay_s=0.0, off_delay_s=0.0))  # a bridge without delays

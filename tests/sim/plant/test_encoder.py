@@ -4,11 +4,11 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive.plant import quadrature_edges
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import restore, snapshot
 from miro_sim.plant.encoder import Quadrature
+from tests.naive.plant import quadrature_edges
 
 MOVES = st.floats(-40.0, 40.0)
 TICKS = st.integers(64, 2048)

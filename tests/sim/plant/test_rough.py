@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests import children
-from tests.naive.plant import NaiveRoughDrive
-from tests.sim.plant.runs import pwm, trace
 
 from miro_exact.state import restore, snapshot, values
 from miro_sim.plant.chassis import Body
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import Chassis, Disturbance, DriveParams, Motor, RollingBall, Tyre
 from miro_sim.plant.rough import RoughBody
+from tests import children
+from tests.naive.plant import NaiveRoughDrive
+from tests.sim.plant.runs import pwm, trace
 
 BALL = RollingBall(friction=0.3)
 ALL = DriveParams(

@@ -2,12 +2,11 @@
 
 import hashlib
 
-from tests.naive.radio import wire_bits
-
 from miro_exact.rng import Stream
 from miro_exact.state import snapshot
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import ChainParams, Downlink, RadioParams, SlicerParams, Uplink
+from tests.naive.radio import wire_bits
 
 ROBOTS = 3
 PERIOD = 800_800

@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from tests.robot.firmware.rig import BOOTED, MS, Rig
-from tests.robot.mcs51.rig import cpu_with
-from tests.robot.mcs51.test_uart import RECEIVER, TIMER2_9600
-
 from miro_exact.rng import Stream
 from miro_robot.mcs51.cpu import Cpu
 from miro_sim.radio import Downlink, RadioParams
+from tests.robot.firmware.rig import BOOTED, MS, Rig
+from tests.robot.mcs51.rig import cpu_with
+from tests.robot.mcs51.test_uart import RECEIVER, TIMER2_9600
 
 SLOW = """
 loop:

@@ -5,13 +5,13 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive import radio as naive
-from tests.sim.radio.strategies import chains, seeds
 
 from miro_sim.radio import ChainParams
 from miro_sim.radio.chain import Chain
 from miro_sim.scenario import profiles
 from miro_sim.scenario.file import load
+from tests.naive import radio as naive
+from tests.sim.radio.strategies import chains, seeds
 
 SECONDS = 100
 SLOTS = 9600 * SECONDS

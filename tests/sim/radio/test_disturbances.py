@@ -4,10 +4,10 @@ import math
 from itertools import pairwise
 
 import pytest
-from tests.naive import radio as naive
 
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import ChainParams, Downlink, RadioParams
+from tests.naive import radio as naive
 
 DATA = bytes(i * 73 & 255 for i in range(25))
 PERIOD = 700_000  # of frames that take 625 000 ticks

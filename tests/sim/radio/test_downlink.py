@@ -5,8 +5,6 @@ import struct
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive import radio as naive
-from tests.sim.radio.strategies import cuts, flawed, neighbours, params, seeds
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import restore, snapshot
@@ -14,6 +12,8 @@ from miro_protocol.line import LineReceiver
 from miro_protocol.transmission import Transmission
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import Downlink, RadioParams
+from tests.naive import radio as naive
+from tests.sim.radio.strategies import cuts, flawed, neighbours, params, seeds
 
 UNTIL = 1_500_000
 

@@ -1,6 +1,7 @@
 """Frames lost against Eb/N0, in a sample small enough for every test run; the curves are `benchmarks.frame_loss`."""
 
 import pytest
+
 from benchmarks import frame_loss
 from benchmarks.interval import clopper_pearson, wilson
 

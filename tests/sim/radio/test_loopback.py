@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from miro_robot.mcs51.line import Line
+from miro_sim.radio import Downlink, RadioParams, Uplink
 from tests import children
 from tests.naive import radio as naive
 from tests.sim.radio import exercise
 from tests.sim.radio.strategies import seeds, transmissions
-
-from miro_robot.mcs51.line import Line
-from miro_sim.radio import Downlink, RadioParams, Uplink
 
 
 def echo(params, seed, sent, until):

@@ -3,14 +3,14 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.naive import radio as naive
-from tests.sim.radio.strategies import slicers
 
 from miro_exact.state import restore, snapshot, values
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import Downlink, RadioParams, SlicerParams
 from miro_sim.radio.probability import fsk_threshold
 from miro_sim.radio.slicer import Slicer
+from tests.naive import radio as naive
+from tests.sim.radio.strategies import slicers
 
 BIT = 2500
 TYPICAL = SlicerParams.of(settle_s=0.004, offset=0.0, eb_n0_db=11.0)

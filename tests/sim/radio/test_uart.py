@@ -1,10 +1,10 @@
 """Disturbances on the wire, as the robot's own UART and firmware take them."""
 
 import pytest
-from tests.sim.radio.on_board import RadioRig, hears, receiver, seed_where, slow_receiver, stored
 
 from miro_protocol.frames import TeamFrame, encode
 from miro_sim.radio import ChainParams, RadioParams
+from tests.sim.radio.on_board import RadioRig, hears, receiver, seed_where, slow_receiver, stored
 
 START = 100_000
 QUIET = RadioParams(squelch=True)

@@ -3,12 +3,12 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.naive import radio as naive
-from tests.sim.radio.strategies import cuts, params, seeds, transmissions
 
 from miro_exact.state import restore, snapshot
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import RadioParams, Uplink
+from tests.naive import radio as naive
+from tests.sim.radio.strategies import cuts, params, seeds, transmissions
 
 UNTIL = 1_500_000
 CLEAN = RadioParams()

@@ -5,7 +5,6 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.sim.world.rig import image
 
 from miro_host.posture import Posture
 from miro_sim.pitch.contact import GRID_TICKS, next_look, touch
@@ -15,6 +14,7 @@ from miro_sim.scenario import file
 from miro_sim.world import conditions as wait
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
+from tests.sim.world.rig import image
 
 HEAD_ON = """
 name = "head-on"

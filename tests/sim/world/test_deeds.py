@@ -5,8 +5,6 @@ import sys
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests import children
-from tests.sim.world.rig import PERIOD, fig6, image, two_networks
 
 from miro_exact import engine
 from miro_exact.clock import ticks
@@ -18,6 +16,8 @@ from miro_sim.world import conditions as wait
 from miro_sim.world.deeds import POWER, RESET, Waiting
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
+from tests import children
+from tests.sim.world.rig import PERIOD, fig6, image, two_networks
 
 HELD, RUNS, OFF, ON = 1, 0, 0, 1
 BOOTED_TICK = ticks(0.060)

@@ -2,6 +2,7 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from tests.sim.world.every_tick import differing
 from tests.sim.world.rig import image
 

@@ -3,8 +3,6 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.sim.world.random_cuts import differing
-from tests.sim.world.rig import PERIOD, fig6, image, two_networks
 
 from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.frames import TeamFrame, encode
@@ -12,6 +10,8 @@ from miro_protocol.transmission import Transmission
 from miro_sim.scenario.file import load
 from miro_sim.world import conditions as wait
 from miro_sim.world.world import World
+from tests.sim.world.random_cuts import differing
+from tests.sim.world.rig import PERIOD, fig6, image, two_networks
 
 FRAME = encode(TeamFrame(0, 5, ((100, 100), (0, 0), (0, 0))), 3)
 KEYUP_TICKS = 24_000

@@ -6,13 +6,13 @@ import io
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.robot.inspect import reading
-from tests.sim.world.rig import PERIOD, fig6, two_networks
 
 from miro_exact.clock import LM629_SAMPLE_TICKS, ticks
 from miro_robot.inspect.waveform import Waveform
 from miro_sim.world import conditions as wait
 from miro_sim.world.waits import WaitExpired
+from tests.robot.inspect import reading
+from tests.sim.world.rig import PERIOD, fig6, two_networks
 
 WAITS = {
     "sent": wait.Sent(),

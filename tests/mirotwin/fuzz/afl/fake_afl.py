@@ -13,11 +13,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tests import children
-
 from mirotwin.fuzz.afl.serve import CASES_VARIABLE, CONTROL_FD, MAP_VARIABLE, STATUS_FD
 from mirotwin.fuzz.afl.shared_memory import attach
 from mirotwin.fuzz.spec import TargetSpec
+from tests import children
 
 ROOT = Path(__file__).parents[4]
 PRIVATE, CREATE, REMOVE = 0, 0o1000, 0

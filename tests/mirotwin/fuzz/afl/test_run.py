@@ -10,9 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests import children
-from tests.mirotwin.fuzz.afl.double import WORD, Double, spec
-from tests.mirotwin.fuzz.afl.fake_afl import ROOT
 
 from miro_exact.bad_input import BadInput
 from miro_protocol.frames import TeamFrame, encode
@@ -20,6 +17,9 @@ from miro_protocol.table import FrameType
 from mirotwin.fuzz.afl import AflRun
 from mirotwin.fuzz.afl.inputs import write_seeds
 from mirotwin.fuzz.spec import TargetSpec
+from tests import children
+from tests.mirotwin.fuzz.afl.double import WORD, Double, spec
+from tests.mirotwin.fuzz.afl.fake_afl import ROOT
 
 pytestmark = pytest.mark.skipif(
     shutil.which("afl-fuzz") is None and not os.environ.get("CI"), reason="needs AFL++"

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.mirotwin.fuzz.afl.double import spec
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.afl import cores, missing
@@ -15,6 +14,7 @@ from mirotwin.fuzz.afl.ending import REMEDIES, why_ended
 from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.afl.settings import REASONS, Call, environment, job_name
 from mirotwin.fuzz.spec import TargetSpec, spec_of
+from tests.mirotwin.fuzz.afl.double import spec
 
 
 def test_one_job_is_not_distributed_and_several_are() -> None:

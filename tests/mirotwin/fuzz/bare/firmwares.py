@@ -3,9 +3,8 @@
 import hashlib
 from pathlib import Path
 
-from tests.robot.mcs51.asm import assemble
-
 from miro_robot.image import Image, Symbols
+from tests.robot.mcs51.asm import assemble
 
 SERIAL = """
 MOV TMOD,#20h

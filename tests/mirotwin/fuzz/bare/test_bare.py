@@ -3,7 +3,6 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.mirotwin.fuzz.bare.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
 
 from miro_exact.bad_input import BadInput
 from miro_protocol.miro_wire import Miro
@@ -11,6 +10,7 @@ from miro_protocol.protocol import Protocol
 from mirotwin.fuzz.bare import CHECK_CODE, NEVER_SLEEPS_CODE, NO_FAULT_CODE, BareTarget, frame_input
 from mirotwin.fuzz.bare_run import BareRun
 from mirotwin.fuzz.exchange import NamedCheck
+from tests.mirotwin.fuzz.bare.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
 
 INPUTS = st.sampled_from(["bytes", "frames", "session"])
 

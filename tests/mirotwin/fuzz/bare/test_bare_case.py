@@ -1,7 +1,6 @@
 """Finds on a bare processor as files: the same verdict again, on this firmware and on others."""
 
 import pytest
-from tests.mirotwin.fuzz.bare.firmwares import POLLS, SLEEPS, image
 
 from miro_exact.bad_input import BadInput
 from miro_protocol.stream_events import Reset
@@ -12,6 +11,7 @@ from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.bare_case import case_text, failure_of, replay_bare
 from mirotwin.fuzz.bare_run import AHEAD_TICKS, BareRun
 from mirotwin.fuzz.exchange import NamedCheck
+from tests.mirotwin.fuzz.bare.firmwares import POLLS, SLEEPS, image
 
 MENDED = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
 WRONG = 'def short(run):\n    return f"{len(run.sent)} are too many" if len(run.sent) > 2 else None\n'

@@ -4,7 +4,8 @@ import shlex
 
 import pytest
 from intelhex import IntelHex
-from tests.mirotwin.cli.conftest import mirotwin as mirotwin
+
+from tests.mirotwin.conftest import mirotwin as mirotwin
 from tests.mirotwin.fuzz.bare.firmwares import FAULTY, POLLS, SLEEPS, image
 from tests.mirotwin.fuzz.conftest import engines as engines
 

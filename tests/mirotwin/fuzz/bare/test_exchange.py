@@ -3,10 +3,10 @@
 import sys
 
 import pytest
-from tests.host import distribution
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.exchange import check_named
+from tests.host import distribution
 
 SOURCE = """
 limit = 3

@@ -3,11 +3,11 @@
 import sys
 
 import pytest
-from tests.host import distribution
 
 from miro_exact.bad_input import BadInput
 from miro_protocol.miro_wire import Miro
 from mirotwin.fuzz.protocols import protocol_named
+from tests.host import distribution
 
 THEIRS = """
 from miro_protocol.protocol import Protocol

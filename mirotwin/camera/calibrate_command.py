@@ -1,0 +1,226 @@
+"""`mirotwin calibrate`: a camera's parameters from control points, of a real camera or of a scenario's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import click
+from click.core import ParameterSource
+from rich.table import Table
+
+from miro_exact.bad_input import BadInput
+from miro_exact.inputs import check_regular
+from miro_exact.seed import MAX_SEED
+from miro_host.eye import calibration as calibrations
+from miro_host.eye import calibration_kinds as kinds
+from miro_host.eye.calibration import Calibration
+from miro_host.eye.camera_parameters import CameraParameters
+from miro_host.eye.colours import classes_of
+from miro_host.eye.fit import ControlPoint, fit, parse_points, read_points
+from miro_host.eye.sample_file import read_samples
+from miro_sim.pitch.colour_samples import colours_of
+from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
+from miro_sim.scenario.file import load
+from mirotwin.shell.console import show
+from mirotwin.shell.options import Number, Place, Whole, choose_engine, engine_option, set_option
+from mirotwin.shell.outputs import OutputError, check_new, check_not_input, whole_file
+from mirotwin.shell.program import tell_notes
+
+SHOWN = 20
+"""Points in the table; the file has them all."""
+ONLY_SCENARIO = ("seed", "noise_px", "settings", "points_out")
+
+
+class _Found(NamedTuple):
+    """What came out: control points and calibration, and the further texts to write."""
+
+    points: list[ControlPoint]
+    calibration: Calibration
+    points_text: str = ""
+    colours_text: str = ""
+    worst_m: float | None = None
+
+
+@click.command(short_help="Finds a camera's parameters from control points.")
+@click.option(
+    "--points", type=Place(path_type=Path), help="CSV file: x_cm, y_cm, height_cm, u_px, v_px of each point."
+)
+@click.option("--scenario", help="Take the points from the camera of this scenario instead.")
+@click.option("--out", type=Place(path_type=Path), required=True, help="TOML file for the calibration.")
+@click.option(
+    "--start",
+    type=Place(path_type=Path),
+    help="Calibration file to begin with, for what the points cannot tell. Default: 2 m above the middle of the pitch;"
+    " with --scenario its camera, without tilt and distortion.",
+)
+@click.option("--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Of the points' noise.")
+@click.option(
+    "--noise-px",
+    type=Number(0.0, 10.0),
+    default=0.3,
+    show_default=True,
+    help="Standard deviation of a point's u, and of its v: how well somebody finds a mark in the picture.",
+)
+@set_option("A key of the scenario, as for `run`; may be repeated.")
+@click.option(
+    "--points-out", type=Place(path_type=Path), help="CSV file for the points of the scenario's camera."
+)
+@click.option(
+    "--samples",
+    type=Place(path_type=Path),
+    help="With --points: CSV file of pixels sampled from one's own pictures: colour, r, g, b (or y, cb, cr).",
+)
+@click.option(
+    "--colours-out",
+    type=Place(path_type=Path),
+    help="TOML file for the colour classes of --samples, or sampled from pictures of the scenario's camera.",
+)
+@click.option("--force", is_flag=True, help="Replace files that are there.")
+@engine_option
+@click.pass_context
+def calibrate(
+    context: click.Context,
+    points: Path | None,
+    scenario: str | None,
+    out: Path,
+    start: Path | None,
+    seed: int,
+    noise_px: float,
+    settings: tuple[str, ...],
+    points_out: Path | None,
+    samples: Path | None,
+    colours_out: Path | None,
+    force: bool,
+    engine: str | None,
+) -> None:
+    """Finds the camera that draws control points nearest to where they were measured, and writes it as a calibration.
+
+    A control point is a place on the pitch (cm, in the axes of the scenarios) and its height, and the pixel that shows
+    it. Points at one height tell the lens and the tilt as far as they matter there; points on the floor and on robots'
+    tops tell all. Points of a simulated camera show the form:
+
+    \b
+        mirotwin calibrate --scenario fig6 --out camera.toml --points-out points.csv
+        mirotwin calibrate --points points.csv --out camera.toml --force
+
+    Pixels sampled from one's own pictures, at least 4 of each patch's colour, of the floor and of the ball if there is
+    one, tell the colour classes: --samples. Names: yellow, blue, magenta, cyan, green, violet, lime, orange, floor.
+
+    Prints what remains between measured and drawn pixels. `track` takes the files of --out and --colours-out.
+    """
+    choose_engine(engine)
+    if (points is None) == (scenario is None):
+        raise click.UsageError("Give either --points or --scenario.")
+    if scenario is None:
+        for name in ONLY_SCENARIO:
+            if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
+                option = "set" if name == "settings" else name.replace("_", "-")
+                raise click.UsageError(f"--{option} needs --scenario.")
+    if samples is not None and scenario is not None:
+        raise click.UsageError("--samples needs --points; the scenario's camera is sampled by itself.")
+    if scenario is None and (samples is None) != (colours_out is None):
+        raise click.UsageError("With --points, give both --samples and --colours-out or neither.")
+    outputs = {"--out": out, "--points-out": points_out, "--colours-out": colours_out}
+    _check_outputs(outputs, force, (points, start, scenario, samples))
+    first = None if start is None else _start(start)
+    if scenario is not None:
+        found = _of_scenario(scenario, settings, first, noise_px, seed, colours_out is not None)
+    else:
+        assert points is not None
+        check_regular(points)
+        measured = read_points(points)
+        calibration = fit(measured, first or CameraParameters(), f"{points}")
+        found = _Found(measured, calibration, colours_text="" if samples is None else _classes(samples))
+    texts = (found.calibration.text(), found.points_text, found.colours_text)
+    for (option, path), text in zip(outputs.items(), texts, strict=True):
+        if path is not None:
+            with whole_file(path, option) as staging:
+                staging.write_text(text, encoding="utf-8")
+    _print(found, [path for path in outputs.values() if path is not None])
+
+
+def _check_outputs(outputs: dict[str, Path | None], force: bool, inputs: Sequence[str | Path | None]) -> None:
+    """Raises OutputError for files that cannot be written, or that are the same."""
+    seen: dict[Path, str] = {}
+    for option, path in outputs.items():
+        if path is None:
+            continue
+        check_not_input(path, option, *inputs)
+        check_new(path, option, force)
+        other = seen.setdefault(path.resolve(), option)
+        if other != option:
+            raise OutputError(path, f"is the file of {other} and of {option}", "give two files")
+
+
+def _classes(samples: Path) -> str:
+    check_regular(samples)
+    return classes_of(read_samples(samples), f"{samples}").text()
+
+
+def _start(path: Path) -> CameraParameters:
+    check_regular(path)
+    return calibrations.read(path).camera
+
+
+def _of_scenario(
+    name: str,
+    settings: tuple[str, ...],
+    start: CameraParameters | None,
+    noise_px: float,
+    seed: int,
+    colours: bool,
+) -> _Found:
+    """Points, calibration and perhaps colours of a scenario's camera. Raises BadInput for one that sees nothing."""
+    text = load(name, settings)
+    tell_notes(text.notes)
+    camera = text.scenario.camera
+    if not isinstance(camera, SeeingCamera):
+        remedy = 'choose kind = "pixels" or "geometric" in [camera]'
+        raise BadInput(text.origin, "camera.kind", "this camera has no lens", remedy)
+    if colours and not isinstance(camera, PixelCamera):
+        remedy = 'choose kind = "pixels" in [camera], or leave out --colours-out'
+        raise BadInput(text.origin, "camera.kind", "this camera renders no pixels, so no colours", remedy)
+    from mirotwin.camera import marks
+
+    points_text = marks.text(camera.lens, noise_px, seed)
+    points = parse_points(points_text, text.origin)
+    calibration = fit(points, start or kinds.none(camera.lens).camera, text.origin)
+    worst_m = kinds.worst_error_m(camera.lens, calibration)
+    classes = ""
+    if colours and isinstance(camera, PixelCamera):
+        classes = colours_of(camera.lens, camera.picture, camera.pattern, camera.ball is not None).text()
+    return _Found(points, calibration, points_text, classes, worst_m)
+
+
+def _print(found: _Found, files: Sequence[Path]) -> None:
+    residuals = found.calibration.residuals
+    assert residuals is not None
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(style="bold")
+    table.add_column()
+    table.add_row("points", f"{residuals.points}")
+    table.add_row("residuals", f"rms {residuals.rms_px:.3f} px, max {residuals.max_px:.3f} px")
+    if found.worst_m is not None:
+        table.add_row("worst error", f"{100.0 * found.worst_m:.3f} cm over the pitch, at the robots' tops")
+    for name in found.calibration.free:
+        table.add_row(name, f"{getattr(found.calibration.camera, name):.6g}")
+    table.add_row("files", ", ".join(map(str, files)))
+    show(table)
+    show(_by_residual(found.points, residuals.px))
+
+
+def _by_residual(points: Sequence[ControlPoint], off_px: Sequence[float]) -> Table:
+    """The points that fit worst, the worst first."""
+    table = Table(box=None, pad_edge=False)
+    for name in ("point", "x_cm", "y_cm", "height_cm", "u_px", "v_px", "off_px"):
+        table.add_column(name, justify="right")
+    order = sorted(range(len(points)), key=lambda number: -off_px[number])
+    for number in order[:SHOWN]:
+        x_m, y_m, z_m, u, v = points[number]
+        place = (f"{100.0 * x_m:.2f}", f"{100.0 * y_m:.2f}", f"{100.0 * z_m:.2f}")
+        table.add_row(f"{number + 1}", *place, f"{u:.2f}", f"{v:.2f}", f"{off_px[number]:.3f}")
+    if len(order) > SHOWN:
+        table.add_row("..", *[""] * 5, f"<= {off_px[order[SHOWN]]:.3f}")
+    return table

@@ -1,0 +1,85 @@
+"""A folder that fills with the frames of a run, each a PNG file that is whole as soon as it has its name.
+
+What belongs here: whether the folder may be used, names, writing. What does not: what is in the pictures (`view`).
+
+A frame is written as frame-000123.part.png and renamed. A run that is broken off leaves the frames up to then.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from mirotwin.shell.outputs import FULL, OutputError, part_name
+
+_OURS = re.compile(r"(net[0-9]+-)?frame-[0-9]{6,}(\.part)?\.png")
+
+
+def frame_name(network: int | None, frame: int) -> str:
+    """Of a file; `network` None: there is only one."""
+    return f"{'' if network is None else f'net{network}-'}frame-{frame:06d}.png"
+
+
+class FrameFolder:
+    """`path` for the frames of one run; `option` is the one it was given with.
+
+    Checks at once. Raises OutputError for what is no folder, one with content (unless `force`), and a full disk.
+    `open` makes it and removes frames of an earlier run, `add` writes one.
+    """
+
+    def __init__(self, path: Path, option: str, force: bool = False) -> None:
+        self.path = path
+        self.option = option
+        present = self._present()
+        if present and not force:
+            some = ", ".join(present[:3]) + (", .." if len(present) > 3 else "")
+            remedy = f"choose another with {option}, or replace frame-*.png in it with --force"
+            raise OutputError(path, f"the folder is not empty ({some})", remedy)
+
+    def __repr__(self) -> str:
+        return f"FrameFolder({self.path})"
+
+    def _present(self) -> list[str]:
+        """What it holds. Raises OutputError for what cannot be used."""
+        remedy = f"choose another folder with {self.option}"
+        try:
+            present = sorted(os.listdir(self.path))
+        except FileNotFoundError:
+            return []
+        except OSError as error:
+            what = "exists and is not a folder" if isinstance(error, NotADirectoryError) else _reason(error)
+            raise OutputError(self.path, what, remedy) from None
+        if not os.access(self.path, os.W_OK | os.X_OK):
+            raise OutputError(self.path, "the folder cannot be written to", remedy)
+        return present
+
+    def open(self) -> None:
+        """Ready for the first frame: no frame of an earlier run stands beside those of this one."""
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            for name in self._present():
+                if _OURS.fullmatch(name):
+                    (self.path / name).unlink()
+        except OSError as error:
+            remedy = f"choose another folder with {self.option}"
+            raise OutputError(self.path, _reason(error), remedy) from None
+
+    def add(self, name: str, data: bytes, undisturbed: AbstractContextManager[object]) -> None:
+        """Writes a file; `undisturbed` puts off what an exception out of the blue would leave half-written."""
+        part = self.path / part_name(name)
+        with undisturbed:
+            try:
+                part.write_bytes(data)
+                os.replace(part, self.path / name)
+            except OSError as error:
+                room = "make room, or " if error.errno in FULL else ""
+                remedy = f"{room}choose another folder with {self.option}"
+                raise OutputError(self.path, _reason(error), remedy) from None
+            finally:
+                part.unlink(missing_ok=True)
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or type(error).__name__

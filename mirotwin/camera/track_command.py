@@ -1,0 +1,164 @@
+"""`mirotwin track`: the tracker on pictures of one's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, get_args
+
+import click
+import msgspec
+
+from miro_exact.inputs import check_regular
+from miro_host.eye import calibration as calibrations
+from miro_host.eye import eye_file
+from miro_host.eye.colours import ColourClasses
+from miro_host.eye.eye_file import EyeError
+from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
+from miro_host.eye.tracker import CentroidKind, Sighting, Tracker
+from mirotwin.shell.options import Place, Whole, choose_engine, engine_option
+from mirotwin.shell.program import complain, show_line
+
+_DEGREES = 57.29577951308232
+_MOST = len(IDENTITIES) - 1
+HEADING = f"{'frame':>6} {'robot':>6} {'x_cm':>9} {'y_cm':>9} {'heading_deg':>12} {'confidence':>11}  picture"
+
+
+class Robots(click.types.StringParamType):
+    """Numbers of robots, separated by commas."""
+
+    name = "numbers"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        words = [word.strip() for word in f"{value}".split(",")]
+        for word in words:
+            if word not in [str(number) for number in range(_MOST + 1)]:
+                self.fail(f"{word!r} is no robot's number: 0 to {_MOST}, separated by commas.", param, ctx)
+            if words.count(word) > 1:
+                self.fail(f"two robots have the number {word}; name each once.", param, ctx)
+        return tuple(map(int, words))
+
+
+class Line(msgspec.Struct):
+    """One robot in one frame, as `--json` prints it; what is measured is null for a lost robot."""
+
+    frame: int
+    picture: str
+    tick: int
+    robot: int
+    lost: bool
+    x_m: float | None = None
+    y_m: float | None = None
+    theta_rad: float | None = None
+    confidence: float | None = None
+
+
+@click.command(short_help="Finds robots in pictures of your own, or in recorded ones.")
+@click.argument("path", type=Place(path_type=Path))
+@click.option("--calibration", type=Place(path_type=Path), required=True, help="TOML file: the camera.")
+@click.option("--colours", type=Place(path_type=Path), required=True, help="TOML file: the colour classes.")
+@click.option(
+    "--team", type=click.Choice(TEAMS), default=TEAMS[0], show_default=True, help="Colour of the team patch."
+)
+@click.option("--robots", type=Robots(), default="0,1,2", show_default=True, help="Numbers to look for.")
+@click.option(
+    "--pattern",
+    type=click.Choice(list(PATTERNS)),
+    default="diagonal",
+    show_default=True,
+    help="Of the patches.",
+)
+@click.option(
+    "--centroid",
+    type=click.Choice(get_args(CentroidKind)),
+    default="binary",
+    show_default=True,
+    help="Of a patch: each of its pixels counts the same, or by its chroma.",
+)
+@click.option(
+    "--network",
+    type=Whole(0, 0xFFFF),
+    default=0,
+    show_default=True,
+    help="Whose camera, in a recording or among files called netN-frame-..",
+)
+@click.option("--json", "as_json", is_flag=True, help="JSON lines, in m and rad, instead of a table.")
+@engine_option
+def track(
+    path: Path,
+    calibration: Path,
+    colours: Path,
+    team: str,
+    robots: tuple[int, ...],
+    pattern: PatternName,
+    centroid: CentroidKind,
+    network: int,
+    as_json: bool,
+    engine: str | None,
+) -> None:
+    """Prints where the tracker finds each robot in each picture of PATH, or that it is lost there.
+
+    PATH is a folder of PNG or PPM files of 320 x 240 pixels, taken in the order of their names at 30000/1001 a second;
+    or a recording with frames (`run --record-frames`). `calibrate` writes the files of --calibration and --colours,
+    and both may be written by hand:
+
+    \b
+        mirotwin run fig6 --frames frames --plain-frames
+        mirotwin calibrate --scenario fig6 --out camera.toml --colours-out colours.toml
+        mirotwin track frames --calibration camera.toml --colours colours.toml --robots 0
+    """
+    choose_engine(engine)
+    tracker = _tracker(calibration, colours, team, robots, pattern, centroid)
+    from mirotwin.camera.stills import stills  # loads the pictures' library
+
+    found = dict.fromkeys(robots, 0)
+    frames = 0
+    for frame, still in enumerate(stills(path, network, complain)):
+        if not frame and not as_json:
+            click.echo(HEADING)
+        for robot, seen in zip(robots, tracker.track(still.picture, still.tick), strict=True):
+            found[robot] += seen is not None
+            line = _line(frame, _utf8(still.name), still.tick, robot, seen)
+            show_line(msgspec.json.encode(line).decode() if as_json else _row(line))
+        frames = frame + 1
+    if not as_json:
+        counts = ", ".join(f"robot {robot} in {count}" for robot, count in found.items())
+        click.echo(f"{frames} pictures: {counts}")
+
+
+def _tracker(
+    calibration: Path,
+    colours: Path,
+    team: str,
+    robots: tuple[int, ...],
+    pattern: PatternName,
+    centroid: CentroidKind,
+) -> Tracker:
+    """Raises BadInput for files that make none."""
+    for path in (calibration, colours):
+        check_regular(path)
+    believed = calibrations.read(calibration)
+    classes = eye_file.read(colours, ColourClasses)
+    try:
+        return Tracker(team, robots, pattern, believed, classes, centroid)
+    except EyeError as error:  # a colour that these robots need has no class
+        raise EyeError(colours, error.place, error.what, error.remedy) from None
+
+
+def _utf8(name: str) -> str:
+    """A file's name in characters that JSON has: other bytes are escaped."""
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+
+
+def _line(frame: int, name: str, tick: int, robot: int, seen: Sighting | None) -> Line:
+    if seen is None:
+        return Line(frame, name, tick, robot, True)
+    return Line(frame, name, tick, robot, False, seen.x_m, seen.y_m, seen.theta_rad, seen.confidence)
+
+
+def _row(line: Line) -> str:
+    head = f"{line.frame:6d} {line.robot:6d}"
+    x_m, y_m, theta_rad, confidence = line.x_m, line.y_m, line.theta_rad, line.confidence
+    if x_m is None or y_m is None or theta_rad is None or confidence is None:
+        return f"{head} {'lost':>9} {'':>9} {'':>12} {'':>11}  {line.picture}"
+    place = f"{100.0 * x_m:9.2f} {100.0 * y_m:9.2f} {_DEGREES * theta_rad:12.2f} {confidence:11.2f}"
+    return f"{head} {place}  {line.picture}"

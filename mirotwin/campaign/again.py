@@ -1,0 +1,41 @@
+"""The command that makes one row of a campaign again.
+
+What belongs here: from what a results file says of itself, and a row, to that line. What does not: the page and the
+tables that show it.
+
+Scenarios and images are named without their folders: they stand beside the campaign's file, or are the product's own.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from typing import Any
+
+from miro_sim.scenario.settings import option_words
+from mirotwin.campaign.inline import inline
+from mirotwin.campaign.results import About
+from mirotwin.shell.command_line import command_line, operand
+
+
+def arm_line(about: About, levels: Mapping[str, Any]) -> str:
+    """`mirotwin run ..` with all that the levels of the factors set; "" for a file that does not say it."""
+    if not about.scenario:
+        return ""
+    scenario, firmware, settings = about.scenario, about.firmware, list(about.settings)
+    for name, known in zip(about.factors, about.levels, strict=True):
+        level = next((one for one in known if one.value == levels[name]), None)
+        if level is None:
+            return ""
+        scenario, firmware = level.scenario or scenario, level.firmware or firmware
+        settings += level.settings
+    image = ["--firmware", operand(firmware)] if firmware else []
+    return command_line(
+        "run", operand(scenario), *image, *(word for one in settings for word in option_words(one))
+    )
+
+
+def drawn_words(about: About, row: Mapping[str, Any]) -> str:
+    """What was drawn for a row, as words of that command."""
+    words = [word for name in about.drawn for word in ("--set", f"{name}={inline(row[name])}")]
+    return shlex.join(words)

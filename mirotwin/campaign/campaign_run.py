@@ -1,0 +1,177 @@
+"""`mirotwin campaign FILE.toml`: all runs of a campaign into one Parquet file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import msgspec
+
+from mirotwin.campaign import running
+from mirotwin.campaign.file import MOST_RUNS
+from mirotwin.campaign.journal import journal_path
+from mirotwin.campaign.plan import Plan, load_plan
+from mirotwin.campaign.results import counted, require_arrow
+from mirotwin.campaign.running import Tally
+from mirotwin.campaign.seeds import seeds_of
+from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.workers import Processes, Workers
+from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, set_option
+from mirotwin.shell.program import (
+    BAD_INPUT,
+    DONE,
+    EXPECTATION_FAILED,
+    FIRMWARE_FAULT,
+    complain,
+    show_line,
+    tell_notes,
+)
+from mirotwin.shell.progress import ProgressBar
+from mirotwin.verify.expectations import expect_option
+
+LINES = 5
+"""Runs that went wrong are named, so many at most."""
+
+
+class SeedRange(click.ParamType[range]):
+    """Seeds from a first one to a last one: 0-49, or one alone."""
+
+    name = "seeds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
+        try:
+            return seeds_of(str(value), MOST_RUNS)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+@click.command(short_help="Makes the runs of FILE.toml; `campaign FILE.toml` is short for it.")
+@click.argument("file", metavar="FILE.toml", type=Place(path_type=Path))
+@click.option("--out", type=Place(path_type=Path), help="Results. Default: runs/FILE.parquet.")
+@click.option("--seeds", type=SeedRange(), help="First and last seed, instead of those of the file.")
+@set_option("A key of the scenario, for all runs, as `mirotwin run` has it; may be repeated.")
+@expect_option
+@click.option("--jobs", type=Whole(1, 256), help="Processes. Default: one for each core.")
+@click.option("--cluster", metavar="ADDRESS", help="A Dask scheduler whose workers run it: tcp://host:8786.")
+@engine_option
+@click.option("--force", is_flag=True, help="Replace results that are there, or parts of them.")
+@click.option("--yes", is_flag=True, help=f"More than {running.MANY_RUNS} runs are meant.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar, no last line.")
+def run(
+    file: Path,
+    out: Path | None,
+    seeds: range | None,
+    settings: tuple[str, ...],
+    expected: tuple[str, ...],
+    jobs: int | None,
+    cluster: str | None,
+    engine: str | None,
+    force: bool,
+    yes: bool,
+    quiet: bool,
+) -> int:
+    """Makes the runs of FILE.toml, or of the built-in campaign `bench1`, and writes a row for each to a Parquet file.
+
+    A campaign that is broken off goes on when the same command is given again; nothing but the runs under way is lost
+    (FILE.part.jsonl). The file is the same whatever ran it, byte for byte; how long the runs took is in
+    FILE.wall.parquet.
+
+    Exit code 2: a run has an error; 3: the firmware did what it must not; 1: more runs than allowed_failed_share failed
+    a check. The rows say which.
+    """
+    choose_engine(engine)
+    if jobs is not None and cluster is not None:
+        raise click.UsageError("--jobs and --cluster do not go together.")
+    require_arrow()
+    plan = load_plan(file, (*settings, *expected))
+    tell_notes(plan.notes)
+    if seeds is not None:
+        plan = _with_seeds(plan, seeds)
+    results = out or Path("runs") / f"{file.stem}.parquet"
+    running.refuse_many(plan, yes)
+    if not force and running.complete(results, running.head_of(plan)):
+        if not quiet:
+            show_line(f"{results} has all {plan.runs} runs already")
+        return _judge(plan, results)
+    workers = _workers(jobs, cluster)
+    try:
+        tally, wall_s = _run(plan, results, workers, force, quiet)
+    finally:
+        workers.close()
+    if not quiet:
+        rate = f"{tally.new / wall_s:.1f} runs/s" if tally.new else "all there before"
+        show_line(f"{tally.runs} runs ({tally.new} of them now, in {wall_s:.1f} s, {rate}): {results}")
+    return _judge(plan, results)
+
+
+def _with_seeds(plan: Plan, seeds: range) -> Plan:
+    replace = msgspec.structs.replace
+    design = replace(plan.design, first_seed=seeds[0], seed_count=len(seeds))
+    return replace(plan, file=replace(plan.file, design=design))
+
+
+def _workers(jobs: int | None, cluster: str | None) -> Workers:
+    if cluster is None:
+        return Processes(jobs)
+    from mirotwin.campaign.cluster import Cluster  # loads Dask
+
+    return Cluster(cluster)
+
+
+def _run(plan: Plan, results: Path, workers: Workers, force: bool, quiet: bool) -> tuple[Tally, float]:
+    began_s = time.monotonic()
+    bar: ProgressBar | None = None
+    last: Tally | None = None
+
+    def show(tally: Tally, outcome: Outcome) -> None:
+        nonlocal bar, last
+        last = tally
+        if bar is None:
+            bar = ProgressBar(plan.file.path, plan.runs, quiet, "runs", tally.done - tally.new)
+            bar.__enter__()
+        bar.to(tally.done)
+
+    try:
+        tally = running.run(plan, results, workers, force=force, many=True, on_outcome=show)
+    except BaseException:
+        if last is not None:
+            where = f"{last.done} of {plan.runs} runs are in {journal_path(results)}"
+            complain(f"{where}; the same command goes on from there")
+        raise
+    finally:
+        if bar is not None:
+            bar.__exit__(None, None, None)
+    return tally, time.monotonic() - began_s
+
+
+def _judge(plan: Plan, results: Path) -> int:
+    """Says what went wrong; returns the exit code."""
+    found = counted(results, LINES)
+    for verdict, (_, first) in found.items():
+        if verdict != "passed":
+            _list(verdict, first)
+    errors, faults, failed = (found.get(name, (0, []))[0] for name in ("error", "fault", "failed"))
+    if errors:
+        complain(f"{errors} of {plan.runs} runs have an error; {results} says which")
+        return BAD_INPUT
+    if faults:
+        complain(f"{faults} of {plan.runs} runs had firmware faults")
+        return FIRMWARE_FAULT
+    if failed > plan.file.allowed_failed_share * plan.runs:
+        allowed = plan.file.allowed_failed_share
+        complain(f"expectation failed: {failed} of {plan.runs} runs failed a check; {100 * allowed:g} % may")
+        return EXPECTATION_FAILED
+    return DONE
+
+
+def _list(verdict: str, first: Sequence[tuple[int, str]]) -> None:
+    """One line for each text; of those that repeat it, only their numbers."""
+    runs: dict[str, list[int]] = {}
+    for run, text in first:
+        runs.setdefault(text, []).append(run)
+    for text, numbers in runs.items():
+        which = f"run{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
+        complain(f"{verdict}: {which}: {text}" if text else f"{verdict}: {which}")

@@ -1,0 +1,245 @@
+"""`mirotwin campaign show RESULTS.parquet`: statistics of a campaign, alone, of two levels, or against a baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import msgspec
+import numpy as np
+from rich.table import Table
+
+from miro_exact.bad_input import BadInput
+from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, Difference, difference
+from mirotwin.campaign.design import Value
+from mirotwin.campaign.rows import VERDICTS, Rows, paired, paired_levels
+from mirotwin.campaign.statistics import Figures, Interval, figures
+from mirotwin.shell.console import show as show_table
+from mirotwin.shell.options import Number, Place
+from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
+
+SHOWN = ("rms_position_cm", "rms_theta_deg", "settling_s")
+MOST_GROUPS = 50
+"""More are in --json only."""
+
+
+class Group(msgspec.Struct, frozen=True):
+    """Runs with the same levels of some factors."""
+
+    factors: dict[str, Value]
+    runs: int
+    verdicts: dict[str, int]
+    metrics: dict[str, Figures | None]
+
+
+@click.command(short_help="Statistics of RESULTS.parquet, alone or against a baseline.")
+@click.argument("results", type=Place(path_type=Path))
+@click.option(
+    "--metric",
+    "metrics",
+    metavar="NAME",
+    multiple=True,
+    help="A figure of the results, or failed, fault, error, unsettled, check.NAME; may be repeated."
+    f" Default: {', '.join(SHOWN)}; in comparisons {', '.join(GATED)}.",
+)
+@click.option(
+    "--by", metavar="FACTOR", multiple=True, help="Runs with the same levels stand together; may be repeated."
+)
+@click.option("--compare", metavar="FACTOR=A,B", help="Two levels of a factor, paired on the same seeds.")
+@click.option(
+    "--against",
+    metavar="BASELINE.parquet",
+    type=Place(path_type=Path),
+    help="Exit code 1 if worse than these.",
+)
+@click.option(
+    "--tolerance",
+    type=Number(0.0, 1000.0),
+    default=0.0,
+    show_default=True,
+    help="Per cent by which a mean may be worse than the baseline's.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of tables.")
+def show(
+    results: Path,
+    metrics: tuple[str, ...],
+    by: tuple[str, ...],
+    compare: str | None,
+    against: Path | None,
+    tolerance: float,
+    as_json: bool,
+) -> int:
+    """Shows medians with their 95 % intervals, and the spread, of each combination of factors.
+
+    --compare and --against pair runs with the same seed, and the same values of all else. A metric has got worse when
+    the 95 % interval of its mean difference lies on the bad side of 0 as a whole; of errors and firmware faults one
+    more is worse.
+
+    Exit code 1: something is worse than --against, a line each says what, by how much, and with which interval.
+    """
+    if compare is not None and against is not None:
+        raise click.UsageError("--compare and --against do not go together.")
+    rows = Rows(results)
+    for name in metrics:
+        rows.check_metric(name)
+    if not rows.count:
+        raise BadInput(results, "", "holds no runs", "give the results of a campaign")
+    if compare is not None:
+        return _compare(rows, compare, metrics or GATED, as_json)
+    if against is not None:
+        return _against(rows, against, metrics or GATED, tolerance / 100.0, as_json)
+    _show(rows, metrics or SHOWN, by or rows.about.factors, as_json)
+    return DONE
+
+
+def _show(rows: Rows, metrics: Sequence[str], by: Sequence[str], as_json: bool) -> None:
+    columns = {name: rows.numbers(name) for name in metrics}
+    verdicts = rows.column("verdict")
+    groups = rows.groups(by)
+    found, samples = [], rows.samples()
+    for levels, members in list(groups.items())[: None if as_json else MOST_GROUPS]:
+        numbers = {name: column[np.array(members)] for name, column in columns.items()}
+        seeds = samples[np.array(members)]
+        found.append(
+            Group(
+                factors=dict(zip(by, levels, strict=True)),
+                runs=len(members),
+                verdicts={name: [verdicts[row] for row in members].count(name) for name in VERDICTS},
+                metrics={
+                    name: figures(column[~np.isnan(column)], seeds[~np.isnan(column)])
+                    for name, column in numbers.items()
+                },
+            )
+        )
+    if as_json:
+        _print_json({"results": str(rows.path), "runs": rows.count, "groups": found})
+        return
+    show_line(f"{rows.path}: {rows.count} runs of {rows.about.campaign}")
+    show_table(_groups_table(found))
+    if len(groups) > len(found):
+        show_line(f"{len(groups) - len(found)} more groups: --by names fewer factors, --json shows all")
+
+
+def _groups_table(groups: Sequence[Group]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for name in (*(groups[0].factors if groups else ()), "runs", *VERDICTS, "metric"):
+        table.add_column(name)
+    for name in ("of", "median", "95 % interval", "5 %", "95 %", "worst"):
+        table.add_column(name, justify="right")
+    for group in groups:
+        head = [*(f"{level}" for level in group.factors.values()), f"{group.runs}"]
+        head += [f"{group.verdicts[name]}" for name in VERDICTS]
+        for name, found in group.metrics.items():
+            table.add_row(*head, name, *_cells(found))
+            head = [""] * len(head)
+    return table
+
+
+def _cells(found: Figures | None) -> list[str]:
+    if found is None:
+        return ["0"]
+    spread = [_number(found.quantiles[share]) for share in ("0.05", "0.95", "1")]
+    return [f"{found.count}", _number(found.median), _interval(found.median_interval), *spread]
+
+
+def _compare(rows: Rows, text: str, metrics: Sequence[str], as_json: bool) -> int:
+    name, first, second = rows.two_levels(text)
+    pairs = paired_levels(rows, name, first, second)
+    if not pairs:
+        what = f"no run with {first} has a twin with {second}"
+        raise BadInput(rows.path, "--compare", what, "the campaign has to be complete")
+    found = _differences(rows, rows, pairs, metrics)
+    if as_json:
+        _print_json({"factor": name, "first": first, "second": second, "differences": found})
+        return DONE
+    show_line(f"{rows.path}: {name}, {second} against {first}, {len(pairs)} pairs with the same seed")
+    show_table(_differences_table(found, f"{first}", f"{second}"))
+    return DONE
+
+
+def _against(rows: Rows, path: Path, metrics: Sequence[str], tolerance: float, as_json: bool) -> int:
+    baseline = Rows(path)
+    for name in metrics:
+        baseline.check_metric(name)
+    pairs = paired(baseline, rows)
+    seeds = len(set(rows.samples()[[second for _, second in pairs]].tolist()))
+    if seeds < FEWEST_FOR_GATE:
+        what = f"has only {seeds} seeds in common with {rows.path}"
+        raise BadInput(path, "", what, f"a gate needs {FEWEST_FOR_GATE}; give both campaigns more seeds")
+    found = _differences(baseline, rows, pairs, metrics)
+    worse = [one for one in found if one.worse(tolerance)]
+    ours, theirs = rows.column("digest"), baseline.column("digest")
+    same = [theirs[first] == ours[second] for first, second in pairs].count(True)
+    if as_json:
+        names = [one.metric for one in worse]
+        _print_json(
+            {
+                "against": str(path),
+                "pairs": len(pairs),
+                "same_digest": same,
+                "differences": found,
+                "worse": names,
+            }
+        )
+    else:
+        show_line(f"{rows.path} against {path}: {len(pairs)} pairs of runs, {same} with the same digest")
+        show_table(_differences_table(found, "before", "now"))
+    for ours_only, where, there in ((rows, rows.path, path), (baseline, path, rows.path)):
+        if unpaired := ours_only.count - len(pairs):
+            complain(f"{unpaired} of {ours_only.count} runs of {where} are not in {there}")
+    for one in worse:
+        complain(f"worse than {path}: {_sentence(one)}")
+    return EXPECTATION_FAILED if worse else DONE
+
+
+def _differences(
+    first: Rows, second: Rows, pairs: Sequence[tuple[int, int]], metrics: Sequence[str]
+) -> list[Difference]:
+    found = [difference(name, first, second, pairs) for name in metrics]
+    return [one for one in found if one is not None]
+
+
+def _differences_table(found: Sequence[Difference], first: str, second: str) -> Table:
+    table = Table(box=None, pad_edge=False)
+    table.add_column("metric")
+    for name in ("pairs", "left out", "seeds", first, second, "difference", "95 % interval", "median"):
+        table.add_column(name, justify="right")
+    for name in ("higher", "lower"):
+        table.add_column(name, justify="right")
+    for one in found:
+        table.add_row(
+            one.metric,
+            f"{one.pairs}",
+            f"{one.without}",
+            f"{one.seeds}",
+            _number(one.first),
+            _number(one.second),
+            f"{one.difference:+.4g}",
+            _interval(one.interval),
+            f"{one.median:+.4g}",
+            f"{one.higher}",
+            f"{one.lower}",
+        )
+    return table
+
+
+def _sentence(one: Difference) -> str:
+    """What has got worse, by how much, and with which interval."""
+    means = f"from {_number(one.first)} to {_number(one.second)}"
+    interval = f" (95 % interval {_interval(one.interval)})" if one.interval is not None else ""
+    of = f"{one.pairs} pairs of {one.seeds} seeds"
+    return f"{one.metric} by {one.difference:+.4g}{interval} in the mean of {of}, {means}"
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _interval(found: Interval | None) -> str:
+    return "too few" if found is None else f"{found.low:.4g} to {found.high:.4g}"
+
+
+def _print_json(document: dict[str, Any]) -> None:
+    click.echo(msgspec.json.format(msgspec.json.encode(document), indent=2).decode())

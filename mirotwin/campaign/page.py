@@ -1,0 +1,218 @@
+"""The page of a campaign: how metrics spread in each arm, paired differences, what failed, and how to make a row again.
+
+What belongs here: putting it together. What does not: statistics (`statistics`, `comparison`: the same as those of
+`campaign show`), figures (`plots`), and HTML (`mirotwin.report.page`, its `assets/campaign.html`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from miro_exact.bad_input import BadInput
+from mirotwin.campaign.again import arm_line, drawn_words
+from mirotwin.campaign.comparison import GATED, Difference, difference
+from mirotwin.campaign.design import Value
+from mirotwin.campaign.rows import VERDICTS, Rows, paired_levels
+from mirotwin.campaign.statistics import Figures, figures
+from mirotwin.report.page.bokeh_page import require_bokeh
+from mirotwin.report.page.document import render
+
+METRICS = ("rms_position_cm", "rms_theta_deg", "settling_s")
+MOST_ARMS = 24
+"""More would be no picture: then the runs are grouped by fewer factors."""
+MOST_LEVELS = 6
+MOST_COMPARISONS = 12
+LISTED = 300
+"""Runs that went wrong; the table says how many there are."""
+EVERYONE = "all runs"
+
+
+class ArmRow(msgspec.Struct, frozen=True):
+    """An arm in the table."""
+
+    label: str
+    runs: int
+    verdicts: dict[str, int]
+    metrics: dict[str, Figures | None]
+
+
+class Comparison(msgspec.Struct, frozen=True):
+    """Two levels of a factor in `pairs` pairs. `figure`: id of its figure's element, "" where there is none."""
+
+    factor: str
+    first: Value
+    second: Value
+    pairs: int
+    differences: list[Difference]
+    figure: str
+
+
+def campaign_page(path: Path) -> bytes:
+    """The page of a results file. Raises BadInput for a file that is none, and where Bokeh is not installed."""
+    require_bokeh()
+    rows = Rows(path)
+    if not rows.count:
+        raise BadInput(path, "", "holds no runs", "give the results of a campaign")
+    metrics = [name for name in METRICS if name in rows.metrics()]
+    by = _by(rows)
+    groups = rows.groups(by)
+    made: dict[str, Any] = {}
+    arms = _arms(rows, by, groups, metrics, made)
+    comparisons = _comparisons(rows, made)
+    failed = _failed(rows)
+    verdicts = rows.column("verdict")
+    counts = {name: verdicts.count(name) for name in ("passed", *VERDICTS)}
+    values = {
+        "file": path.name,
+        "about": rows.about,
+        "count": rows.count,
+        "seeds": _seeds(rows),
+        "counts": counts,
+        "badge": _badge(counts),
+        "by": by,
+        "arms": arms,
+        "metrics": metrics,
+        "comparisons": comparisons,
+        "failed": failed[:LISTED],
+        "more_failed": max(0, len(failed) - LISTED),
+    }
+    return render("campaign.html", made, _data(rows), values)
+
+
+def _by(rows: Rows) -> tuple[str, ...]:
+    """As many factors, from the first on, as make no more arms than a picture can have."""
+    factors = rows.about.factors
+    while factors and len(rows.groups(factors)) > MOST_ARMS:
+        factors = factors[:-1]
+    return factors
+
+
+def label_of(by: Sequence[str], levels: Sequence[Value]) -> str:
+    """An arm by its levels: texts by themselves, numbers with the last word of their key."""
+    if not by:
+        return EVERYONE
+    return ", ".join(
+        level if isinstance(level, str) else f"{name.rpartition('.')[2]} {level}"
+        for name, level in zip(by, levels, strict=True)
+    )
+
+
+def _arms(
+    rows: Rows,
+    by: tuple[str, ...],
+    groups: dict[tuple[Value, ...], list[int]],
+    metrics: Sequence[str],
+    made: dict[str, Any],
+) -> list[ArmRow]:
+    from mirotwin.campaign.plots import Arm, spread  # loads Bokeh
+
+    verdicts = rows.column("verdict")
+    drawn: dict[str, list[Arm]] = {name: [] for name in metrics}
+    columns, samples = {name: rows.numbers(name) for name in metrics}, rows.samples()
+    found = []
+    for levels, members in groups.items():
+        label = label_of(by, levels)
+        of_arm: dict[str, Figures | None] = {}
+        for name, column in columns.items():
+            numbers = column[np.array(members)]
+            there = ~np.isnan(numbers)
+            numbers = numbers[there]
+            of_arm[name] = summary = figures(numbers, samples[np.array(members)][there])
+            if summary is not None:
+                drawn[name].append(Arm(label, numbers, summary))
+        counted = [verdicts[row] for row in members]
+        found.append(ArmRow(label, len(members), {name: counted.count(name) for name in VERDICTS}, of_arm))
+    for name, arms in drawn.items():
+        if arms:
+            made[f"plot-{name}"] = spread(name, arms)
+    return found
+
+
+def _comparisons(rows: Rows, made: dict[str, Any]) -> list[Comparison]:
+    """Each level of a factor against its first one."""
+    from mirotwin.campaign.plots import Apart, apart  # loads Bokeh
+
+    found: list[Comparison] = []
+    for factor in rows.about.factors:
+        first, *others = rows.levels(factor)
+        for second in others[: MOST_LEVELS - 1]:
+            pairs = paired_levels(rows, factor, first, second)
+            if not pairs or len(found) == MOST_COMPARISONS:
+                continue
+            differences = [one for name in GATED if (one := difference(name, rows, rows, pairs)) is not None]
+            shown = [
+                Apart(one, _apart(rows, one.metric, pairs)) for one in differences if one.metric in METRICS
+            ]
+            figure = ""
+            if any(one.difference.first and one.difference.interval for one in shown):
+                figure = f"plot-pairs-{len(found)}"
+                made[figure] = apart(shown)
+            found.append(Comparison(factor, first, second, len(pairs), differences, figure))
+    return found
+
+
+def _apart(rows: Rows, metric: str, pairs: Sequence[tuple[int, int]]) -> Any:
+    numbers = rows.numbers(metric)
+    places = np.array(pairs, dtype=np.int64)
+    found = numbers[places[:, 1]] - numbers[places[:, 0]]
+    return found[~np.isnan(found)]
+
+
+def _failed(rows: Rows) -> list[tuple[int, str, int, str, str]]:
+    """Run, arm, seed, verdict and what it said, of each run that has not passed."""
+    factors = rows.about.factors
+    columns = [rows.column(name) for name in ("run", "seed", "verdict", "error", "failure")]
+    levels = [rows.column(name) for name in factors]
+    return [
+        (run, label_of(factors, [column[row] for column in levels]), seed, verdict, error or failure)
+        for row, (run, seed, verdict, error, failure) in enumerate(zip(*columns, strict=True))
+        if verdict != "passed"
+    ]
+
+
+def _seeds(rows: Rows) -> str:
+    seeds = rows.column("seed")
+    first, last = min(seeds), max(seeds)
+    return f"{first}" if first == last else f"{first} to {last}"
+
+
+def _badge(counts: dict[str, int]) -> tuple[str, str]:
+    """A word, and the numbers behind it."""
+    wrong = [
+        f"{counts[name]} {word}" for name, word in (("failed", "failed"), ("fault", "with a firmware fault"))
+    ]
+    wrong.append(f"{counts['error']} with an error")
+    said = ", ".join(text for text in wrong if not text.startswith("0 "))
+    worst = next((name for name in ("error", "fault", "failed") if counts[name]), "passed")
+    return worst, said or f"{counts['passed']} runs passed"
+
+
+def _data(rows: Rows) -> bytes:
+    """What composes the command of each row: those of the arms, and for each row its arm, seed and what was drawn."""
+    factors, about = rows.about.factors, rows.about
+    arms = rows.groups(factors)
+    drawn = {name: rows.column(name) for name in about.drawn}
+    seeds, numbers = rows.column("seed"), rows.column("run")
+    arm_of = [0] * rows.count
+    for number, members in enumerate(arms.values()):
+        for row in members:
+            arm_of[row] = number
+    return msgspec.json.encode(
+        {
+            "arms": [arm_line(about, dict(zip(factors, levels, strict=True))) for levels in arms],
+            "runs": numbers,
+            "rows": [
+                [arm_of[row], seeds[row], *([words] if (words := _drawn(rows, drawn, row)) else [])]
+                for row in range(rows.count)
+            ],
+        }
+    )
+
+
+def _drawn(rows: Rows, drawn: dict[str, list[Any]], row: int) -> str:
+    return drawn_words(rows.about, {name: column[row] for name, column in drawn.items()})

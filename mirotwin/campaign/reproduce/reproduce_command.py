@@ -1,0 +1,231 @@
+"""`mirotwin reproduce`: the paper's figures and claims, run again, as one page with pictures and recordings."""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import click
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from mirotwin.campaign.execute import in_order
+from mirotwin.campaign.job import Job, Row, run
+from mirotwin.campaign.processes import cores, processes
+from mirotwin.campaign.reproduce.crate import METADATA, metadata, write_rows
+from mirotwin.campaign.reproduce.page import page
+from mirotwin.campaign.reproduce.pictures import course, draw
+from mirotwin.campaign.reproduce.plan import (
+    GROUPS,
+    ILLUSTRATIVE,
+    LEARNING,
+    PAPER,
+    RETUNED,
+    STARTS,
+    Group,
+    Start,
+    jobs,
+    recorded,
+)
+from mirotwin.campaign.reproduce.rows import by_label, middle_seeds
+from mirotwin.campaign.results import require_arrow
+from mirotwin.campaign.seeds import seeds_of
+from mirotwin.firmware.held_signals import Hold, held_signals
+from mirotwin.shell.options import Place, Whole, choose_engine, engine_option
+from mirotwin.shell.outputs import OutputFolder, check_new, told_when_full, whole_file
+from mirotwin.shell.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line
+from mirotwin.shell.progress import ProgressBar
+
+PAGE = "reproduction.md"
+FOLDER = "reproduction"
+ROWS = "rows.csv"
+TABLE = "rows.parquet"
+AHEAD = 4
+"""Jobs for each process that are handed over: enough to keep it busy, few enough to stop soon."""
+
+
+class Seeds(click.ParamType[range]):
+    """Seeds from a first one to a last one: 0-49, or one alone."""
+
+    name = "seeds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
+        if isinstance(value, range):
+            return value
+        try:
+            return seeds_of(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+@click.command(short_help="Runs the paper's figures again and writes one page about them.")
+@click.option(
+    "--out",
+    type=Place(path_type=Path),
+    help=f"Folder for {PAGE} and {FOLDER}/. Default: here.",
+)
+@click.option(
+    "--deposit",
+    metavar="DIR",
+    type=Place(path_type=Path),
+    help="Instead of --out: a folder for an archive, with all runs as Parquet and a description as RO-Crate 1.1.",
+)
+@click.option(
+    "--date",
+    metavar="YYYY-MM-DD",
+    type=click.DateTime(["%Y-%m-%d"]),
+    help="Date of publication in that description. Default: today.",
+)
+@click.option("--seeds", type=Seeds(), default="0-49", show_default=True, help="First and last seed.")
+@click.option("--jobs", "count", type=Whole(1, 256), help="Processes. Default: one for each core.")
+@engine_option
+@click.option("--force", is_flag=True, help="Replace the files of an earlier reproduction.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar, no last line.")
+def reproduce(
+    out: Path | None,
+    deposit: Path | None,
+    date: datetime | None,
+    seeds: range,
+    count: int | None,
+    engine: str | None,
+    force: bool,
+    quiet: bool,
+) -> int:
+    """Runs Figs. 6 to 10 of the paper, and the comparison of its controllers, over all seeds.
+
+    Writes reproduction.md (each claim beside what was measured), and in the folder reproduction: five pictures, a row
+    for each run, and of each controller and start the recording of the run with the median error. Running it again
+    gives the same bytes.
+
+    --deposit writes all of it into one new folder, for an archive: with the rows as Parquet, and size and SHA-256 of
+    each file in ro-crate-metadata.json. The same bytes again, for the same --date.
+    """
+    choose_engine(engine)
+    if out is not None and deposit is not None:
+        raise click.UsageError("--out and --deposit do not go together.")
+    if date is not None and deposit is None:
+        raise click.UsageError("--date is of a --deposit.")
+    if deposit is not None:
+        require_arrow()
+        _check_deposit(deposit, force)
+    out = deposit or out or Path(".")
+    day = (date or datetime.now()).date().isoformat()
+    began_s = time.monotonic()
+    names = [*_pictures(), ROWS, *(group.recording for group in GROUPS), *([TABLE] if deposit else [])]
+    if deposit is not None:
+        deposit.mkdir(parents=True, exist_ok=True)
+    folder = OutputFolder(out / FOLDER, force, names)
+    if (out / FOLDER).is_dir() or (out / PAGE).exists():
+        check_new(out / PAGE, "--out", force)
+    processors = count or cores()
+    with (
+        held_signals() as hold,
+        folder,
+        whole_file(out / PAGE, "--out") as page_path,
+        told_when_full(out / FOLDER, "--out"),
+    ):
+        folder.keep = (ROWS,)
+        found = _run(jobs(seeds), processors, folder.part(ROWS), hold, quiet)
+        shown = middle_seeds(by_label(found))
+        _record(recorded(shown, lambda name: str(folder.part(name))), processors, hold, quiet)
+        for start in STARTS:
+            _draw(start, folder, shown)
+        text = page(by_label(found), f"{seeds[0]} to {seeds[-1]}", FOLDER)
+        page_path.write_text(text, encoding="utf-8")
+        if deposit is not None:
+            write_rows(found, folder.part(TABLE))
+    if deposit is not None:
+        _describe(deposit, names, f"{seeds[0]} to {seeds[-1]}", day)
+    if not quiet:
+        show_line(f"{len(found)} runs in {time.monotonic() - began_s:.0f} s: {out / PAGE}")
+    return _failures(found)
+
+
+def _check_deposit(path: Path, force: bool) -> None:
+    """Raises BadInput for what is no folder, and for a folder that is not empty unless `force`."""
+    if path.exists() and not path.is_dir():
+        raise BadInput(path, "--deposit", "exists and is not a folder", "choose another folder")
+    if path.is_dir() and not force and (present := sorted(entry.name for entry in path.iterdir())):
+        what = f"the folder is not empty ({', '.join(present[:3])}{', ..' if present[3:] else ''})"
+        raise BadInput(path, "--deposit", what, "choose another one, or replace a deposit in it with --force")
+
+
+def _describe(deposit: Path, names: Sequence[str], seeds: str, day: str) -> None:
+    """The description of what this command has written, and of nothing else that is there."""
+    paths = [deposit / PAGE, *(path for name in names if (path := deposit / FOLDER / name).exists())]
+    with whole_file(deposit / METADATA, "--deposit") as place:
+        place.write_text(metadata(deposit, paths, seeds, day), encoding="utf-8")
+
+
+def _pictures() -> list[str]:
+    return [f"{start.name}.png" for start in STARTS]
+
+
+def _run(plan: Sequence[Job], count: int, path: Path, hold: Hold, quiet: bool) -> list[Row]:
+    """All rows, each in the file as soon as it is there."""
+    found: list[Row] = []
+    names = [field.name for field in msgspec.structs.fields(Row)]
+    with (
+        path.open("w", newline="", encoding="utf-8") as stream,
+        ProgressBar("running", len(plan), quiet) as bar,
+    ):
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(names)
+        with hold.released():
+            for row in _rows(plan, count):
+                found.append(row)
+                writer.writerow(msgspec.structs.astuple(row))
+                stream.flush()
+                bar.to(len(found))
+    return found
+
+
+def _record(plan: Sequence[Job], count: int, hold: Hold, quiet: bool) -> None:
+    """The runs that are shown, once more, with their recordings."""
+    with ProgressBar("recording", len(plan), quiet) as bar, hold.released():
+        for done, _ in enumerate(_rows(plan, count), 1):
+            bar.to(done)
+
+
+def _rows(plan: Sequence[Job], count: int) -> Iterator[Row]:
+    yield from in_order(run, plan, processes(count), AHEAD * count)
+
+
+def _draw(start: Start, folder: OutputFolder, seeds: Mapping[str, int]) -> None:
+    """The figure's own controller, the other one, and the improved chain, each with the seed of its median error."""
+    names = {
+        PAPER: "the paper's law",
+        RETUNED: "epsilon-tracking, retuned",
+        ILLUSTRATIVE: "epsilon-tracking, illustrative",
+        LEARNING: "body_frame, ekf, self_calibration",
+    }
+    shown = (PAPER, LEARNING) if start.figure < 9 else (ILLUSTRATIVE, RETUNED, PAPER, LEARNING)
+    groups = {controller: Group(start, controller) for controller in shown}
+    courses = [
+        course(f"{names[controller]} (seed {seeds[group.label]})", folder.part(group.recording), 1)
+        for controller, group in groups.items()
+        if group.label in seeds
+    ]
+    if not courses:
+        return
+    errors = f"{start.x_cm:.2f} cm, {start.y_cm:.2f} cm, {start.theta_rad:.2f} rad"
+    title = f"Fig. {start.figure} again: {start.path}, initial errors ({errors})"
+    draw(folder.part(f"{start.name}.png"), title, courses)
+
+
+def _failures(found: Sequence[Row]) -> int:
+    failed = [row for row in found if row.error]
+    for row in failed[:5]:
+        complain(f"{row.label}, seed {row.seed}: {row.error}")
+    if failed:
+        complain(f"{len(failed)} of {len(found)} runs failed; {ROWS} says which")
+    faults = 0
+    for row in found:
+        faults += row.faults
+    if faults:
+        complain(f"{faults} firmware faults; rows.csv says in which runs")
+    return BAD_INPUT if failed else FIRMWARE_FAULT if faults else DONE

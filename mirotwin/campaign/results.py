@@ -1,0 +1,269 @@
+"""Results of a campaign as Parquet files: written at the end in the order of the plan, and read again.
+
+What belongs here: the two files and what they say of themselves. What does not: columns and their types (`columns`),
+outcomes while a campaign is under way (`journal`).
+
+    noise.parquet            every run: the same bytes whichever processes or machines ran it, in whatever order
+    noise.wall.parquet       `run`, `wall_s`: how long each simulation loop took, which differs from time to time
+
+pyarrow is loaded when a file is written or read; it comes with the extra `campaign`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.util import find_spec
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from miro_exact.bad_input import BadInput, shortened
+from miro_exact.inputs import check_regular
+from mirotwin.campaign.columns import CHECK, FIGURES
+from mirotwin.campaign.design import Level
+from mirotwin.campaign.journal import Head, in_order
+from mirotwin.campaign.plan import OWN_IMAGE, Plan
+from mirotwin.campaign.worker import Outcome
+from mirotwin.shell.outputs import OutputError, whole_file
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+GIVE = "give the .parquet file of a campaign"
+MOST_ROWS, MOST_COLUMNS, MOST_BYTES, META_BYTES = 5_000_000, 2000, 2 << 30, 64 << 20
+EACH_ROW = {"run": ("int64",), "seed": ("int64",), "verdict": ("string",)}
+"""Columns that no row may lack, with their types."""
+OWN_COLUMNS = frozenset(("run", "seed", "draw", "verdict", "error", "failure", "digest", *FIGURES))
+ROWS = 10_000
+"""Rows of a group: what is in memory while a file is written."""
+META = b"mirotwin_campaign"
+OPTION = "--out"
+
+
+class About(msgspec.Struct, frozen=True):
+    """What a results file says of itself. `factors`: columns of the design, `drawn`: those of its random part.
+
+    What makes a row again, by names without folders: `scenario`, `firmware`, `settings` of all runs, and the `levels`
+    of each factor. Files of earlier versions do not have it.
+    """
+
+    head: Head
+    campaign: str
+    factors: tuple[str, ...]
+    drawn: tuple[str, ...]
+    checks: tuple[str, ...]
+    scenario: str = ""
+    firmware: str = ""
+    settings: tuple[str, ...] = ()
+    levels: tuple[tuple[Level, ...], ...] = ()
+
+
+def require_arrow() -> None:
+    """Raises BadInput where pyarrow is not installed; does not load it."""
+    if find_spec("pyarrow") is None:
+        raise BadInput("", "pyarrow", "is not installed", "pip install 'mirotwin[campaign]'")
+
+
+def wall_path(results: Path) -> Path:
+    return results.with_suffix(".wall.parquet")
+
+
+def about(plan: Plan, head: Head) -> About:
+    design = plan.design
+    return About(
+        head,
+        Path(plan.file.path).stem,
+        tuple(factor.name for factor in design.factors),
+        tuple(draw.name for draw in design.draws),
+        plan.checks,
+        _name(plan.file.scenario),
+        _name(plan.file.firmware),
+        tuple(setting for setting, _ in plan.file.settings),
+        tuple(tuple(map(_elsewhere, factor.levels)) for factor in design.factors),
+    )
+
+
+def _elsewhere(level: Level) -> Level:
+    """The level without what is so on this machine only."""
+    names = {"scenario": _name(level.scenario), "firmware": _name(level.firmware)}
+    return msgspec.structs.replace(level, place="", **names)
+
+
+def _name(path: str) -> str:
+    """The robot's own image is named by no path."""
+    return "" if path == OWN_IMAGE else Path(path).name
+
+
+def write(plan: Plan, head: Head, journal: Path, results: Path) -> None:
+    """Both files of a campaign whose runs all have an outcome in `journal`. Raises OutputError."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    schema = _schema(plan).with_metadata({META: msgspec.json.encode(about(plan, head))})
+    wall = pa.schema([("run", pa.int64()), ("wall_s", pa.float64())])
+    with (
+        whole_file(wall_path(results), OPTION) as wall_file,
+        whole_file(results, OPTION) as file,
+        pq.ParquetWriter(file, schema, compression="zstd") as rows,
+        pq.ParquetWriter(wall_file, wall, compression="zstd") as walls,
+    ):
+        count = 0
+        for group in _groups(in_order(journal)):
+            count += len(group)
+            rows.write_table(_table([_row(plan, one) for one in group], schema))
+            walls.write_table(_table([{"run": one.run, "wall_s": one.wall_s} for one in group], wall))
+        if count != plan.runs:
+            what = f"has the outcome of {count} of {plan.runs} runs: it was changed while the campaign went"
+            raise OutputError(
+                journal, what, "give the same command again, which makes the runs that are missing"
+            )
+
+
+def read(path: str | Path) -> tuple[pa.Table, About]:
+    """The rows of a results file, and what it says of itself. Raises BadInput for any other file."""
+    require_arrow()
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    check_regular(path)
+    try:
+        with pq.ParquetFile(path, thrift_string_size_limit=META_BYTES) as file:
+            _check_size(path, file.metadata)
+            about = about_of(path, file.schema_arrow.metadata)
+            _check_columns(path, file.schema_arrow, about)
+            table = file.read()
+    except FileNotFoundError:
+        raise BadInput(path, "", "there is no such file", GIVE) from None
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+        reason = f"{error}".partition("\n")[0]
+        raise BadInput(path, "", f"is no Parquet file: {reason}", GIVE) from None
+    for name in (*about.factors, *about.drawn, *EACH_ROW):
+        if table[name].null_count:
+            raise BadInput(path, f"column {shortened(name)}", "lacks a value in some row", GIVE)
+    return table, about
+
+
+def _check_size(path: str | Path, metadata: Any) -> None:
+    """Before anything is read: a small file may hold many rows, which are many equal ones."""
+    size = 0
+    for at in range(metadata.num_row_groups):
+        size += metadata.row_group(at).total_byte_size
+    if metadata.num_rows > MOST_ROWS:
+        raise BadInput(path, "", f"holds {metadata.num_rows} runs, more than {MOST_ROWS}", GIVE)
+    if metadata.num_columns > MOST_COLUMNS:
+        raise BadInput(path, "", f"has {metadata.num_columns} columns, more than {MOST_COLUMNS}", GIVE)
+    if size > MOST_BYTES:
+        raise BadInput(path, "", f"holds {size >> 20} MiB, more than {MOST_BYTES >> 20}", GIVE)
+
+
+def _check_columns(path: str | Path, schema: Any, about: About) -> None:
+    """What statistics rely on: a seed in each row, and each factor once, with values that can be compared."""
+    kinds = ("int64", "double", "bool", "string")
+    named = (*about.factors, *about.drawn)
+    if len(set(named)) < len(named) or set(named) & OWN_COLUMNS:
+        raise BadInput(path, "", "names a factor twice, or one that is none", GIVE)
+    for name in (*named, *EACH_ROW):
+        places = schema.get_all_field_indices(name)
+        kind = f"{schema.field(places[0]).type}" if len(places) == 1 else None
+        if kind not in EACH_ROW.get(name, kinds):
+            what = "there is no such column" if kind is None else f"holds {kind}"
+            raise BadInput(path, f"column {shortened(name)}", what, GIVE)
+
+
+def counted(path: Path, listed: int) -> dict[str, tuple[int, list[tuple[int, str]]]]:
+    """Verdict -> how many runs have it, and the first ones: number, and what the row says of it."""
+    import pyarrow.parquet as pq
+
+    found: dict[str, tuple[int, list[tuple[int, str]]]] = {}
+    with pq.ParquetFile(path) as file:
+        for batch in file.iter_batches(columns=["run", "verdict", "error", "failure"]):
+            for run, verdict, error, failure in zip(
+                *(column.to_pylist() for column in batch.columns), strict=True
+            ):
+                count, first = found.get(verdict, (0, []))
+                if len(first) < listed:
+                    first.append((run, error or failure))
+                found[verdict] = (count + 1, first)
+    return found
+
+
+def read_about(path: str | Path) -> About:
+    """Only what the file says of itself. Raises BadInput for any other file."""
+    require_arrow()
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return about_of(path, pq.read_schema(path).metadata)
+    except (pa.ArrowException, OSError):
+        raise BadInput(path, "", "is no Parquet file", "choose another file with --out") from None
+
+
+def about_of(path: str | Path, metadata: Mapping[bytes, bytes] | None) -> About:
+    try:
+        return msgspec.json.decode((metadata or {})[META], type=About)
+    except (KeyError, msgspec.DecodeError, UnicodeDecodeError):
+        what = "is no campaign's results"
+        raise BadInput(
+            path, "", what, "give the .parquet file that `mirotwin campaign` has written"
+        ) from None
+
+
+def _schema(plan: Plan) -> pa.Schema:
+    import pyarrow as pa
+
+    types: dict[type, Any] = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
+    columns: list[tuple[str, Any]] = [("run", pa.int64())]
+    for factor in plan.design.factors:
+        columns.append((factor.name, types[type(factor.levels[0].value)]))
+    for draw in plan.design.draws:
+        columns.append((draw.name, types[_kind(draw.ends())]))
+    if plan.design.draws:
+        columns.append(("draw", pa.int64()))
+    columns.append(("seed", pa.int64()))
+    columns += [(name, pa.string()) for name in ("verdict", "error", "failure", "digest")]
+    columns += [(name, types[kind]) for name, kind in FIGURES.items()]
+    columns += [(CHECK + name, pa.string()) for name in plan.checks]
+    return pa.schema(columns)
+
+
+def _kind(values: Iterable[Any]) -> type:
+    kinds = {type(value) for value in values}
+    if kinds == {int, float}:
+        return float
+    return kinds.pop() if len(kinds) == 1 else str
+
+
+def _row(plan: Plan, outcome: Outcome) -> dict[str, Any]:
+    row: dict[str, Any] = {"run": outcome.run, **plan.varied(outcome.run)}
+    for draw in plan.design.draws:
+        if _kind(draw.ends()) is str:
+            row[draw.name] = f"{row[draw.name]}"
+    row |= {
+        "verdict": outcome.verdict,
+        "error": outcome.error,
+        "failure": outcome.failure,
+        "digest": outcome.digest,
+    }
+    row |= {name: outcome.figures.get(name) for name in FIGURES}
+    return row | {CHECK + name: outcome.checks.get(name) for name in plan.checks}
+
+
+def _table(rows: list[dict[str, Any]], schema: pa.Schema) -> pa.Table:
+    import pyarrow as pa
+
+    columns = []
+    for field in schema:
+        try:
+            columns.append(pa.array([row[field.name] for row in rows], field.type))
+        except (pa.ArrowException, TypeError, OverflowError):
+            what = f"runs {rows[0]['run']} to {rows[-1]['run']} have a value that is no {field.type}"
+            raise BadInput("", field.name, what, "begin anew with --force") from None
+    return pa.Table.from_arrays(columns, schema=schema)
+
+
+def _groups(outcomes: Iterator[Outcome]) -> Iterator[list[Outcome]]:
+    while group := list(islice(outcomes, ROWS)):
+        yield group

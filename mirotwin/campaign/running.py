@@ -1,0 +1,113 @@
+"""Runs a campaign: from its plan to the results file, taking up what an earlier process has left.
+
+What belongs here: the order of journal, workers and results, and which files may be replaced. What does not: each of
+them, and what is said meanwhile (`campaign.campaign_run`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from pathlib import Path
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from mirotwin.campaign import results as tables
+from mirotwin.campaign.drive import Drive
+from mirotwin.campaign.journal import FORM, Head, Journal, journal_path
+from mirotwin.campaign.plan import Plan
+from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.workers import Processes, Workers
+from mirotwin.shell.outputs import check_file
+
+MANY_RUNS = 100_000
+"""More have to be asked for: they take most of a day."""
+
+
+class Tally(msgspec.Struct):
+    """So many runs have an outcome, in all and in this process, and how many of each kind came in this process."""
+
+    done: int = 0
+    runs: int = 0
+    new: int = 0
+    verdicts: dict[str, int] = msgspec.field(default_factory=dict)
+
+
+def head_of(plan: Plan) -> Head:
+    return Head(FORM, plan.hash, plan.versions, plan.runs)
+
+
+def refuse_many(plan: Plan, agreed: bool) -> None:
+    """Raises BadInput for a campaign that nobody can have meant, unless it was `agreed` to."""
+    if plan.runs > MANY_RUNS and not agreed:
+        what = f"has {plan.runs} runs, more than {MANY_RUNS}"
+        raise BadInput(plan.file.path, "", what, "take fewer seeds or levels, or say --yes")
+
+
+def run(
+    plan: Plan,
+    results: str | Path,
+    executor: Executor | Workers | None = None,
+    *,
+    force: bool = False,
+    many: bool = False,
+    on_outcome: Callable[[Tally, Outcome], object] = lambda tally, outcome: None,
+) -> Tally:
+    """Makes all runs that `results` lacks, and writes it.
+
+    `executor`: any of `concurrent.futures`, which stays open; without one, a process for each core. Results that are
+    there already are those of the same campaign, and are left as they are, or BadInput is raised; with `force` they are
+    made anew. `many`: more than 100 000 runs are meant. Interrupted, it goes on when it is called again.
+    """
+    path = Path(results)
+    tables.require_arrow()
+    refuse_many(plan, many)
+    head = head_of(plan)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not force and complete(path, head):
+        journal_path(path).unlink(missing_ok=True)  # left by a process that ended before it was taken away
+        return Tally(plan.runs, plan.runs)
+    workers = executor if isinstance(executor, Workers) else Workers(executor) if executor else Processes()
+    check_file(path, "--out")
+    with Journal(journal_path(path), head, begin_anew=force) as journal:
+        tally = Tally(journal.count, plan.runs)
+        _make(plan, journal, workers, tally, on_outcome)
+        tables.write(plan, head, journal.path, path)
+    journal.path.unlink()
+    return tally
+
+
+def complete(results: Path, head: Head) -> bool:
+    """Whether the results are there. Raises BadInput for a file of another campaign, and where none can be written."""
+    if results.suffix != ".parquet":
+        raise BadInput(results, "", "results are a .parquet file", f"write --out {results.stem}.parquet")
+    if not results.exists():
+        return False
+    found = tables.read_about(results).head
+    difference = head.difference(found)
+    if difference:
+        what = f"holds the results of another campaign: {difference}"
+        raise BadInput(results, "", what, "choose another file with --out, or replace it with --force")
+    return True
+
+
+def _make(
+    plan: Plan,
+    journal: Journal,
+    workers: Workers,
+    tally: Tally,
+    on_outcome: Callable[[Tally, Outcome], object],
+) -> None:
+    if tally.done == plan.runs:
+        return
+    drive = Drive(plan.work, workers)
+    outcomes = drive.outcomes(journal.missing())
+    try:
+        for outcome in outcomes:
+            journal.add(outcome)
+            tally.done, tally.new = journal.count, tally.new + 1
+            tally.verdicts[outcome.verdict] = tally.verdicts.get(outcome.verdict, 0) + 1
+            on_outcome(tally, outcome)
+    finally:
+        outcomes.close()

@@ -1,0 +1,144 @@
+"""One run of a campaign in this process, from a job to its figures.
+
+What belongs here: running one world, its checks and steps, and what is kept for the next run. What does not: what a
+worker refuses (`worker`), figures and their definitions (`report.summary`), and their columns (`columns`).
+
+A process keeps images, and scenarios with their settings, so that a run costs little more than its loop.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_robot.firmware import image_path
+from miro_robot.image import Image, load_hex
+from miro_sim.periods import Period
+from miro_sim.scenario.file import parse_noted
+from miro_sim.scenario.keys import Scenario
+from miro_sim.world.world import World
+from mirotwin.campaign.columns import figures_of
+from mirotwin.campaign.wall import now_s
+from mirotwin.campaign.worker import Outcome, Work
+from mirotwin.recording.track import Tracks
+from mirotwin.report.seen import Seen
+from mirotwin.report.summary import Expectation, summarise
+from mirotwin.report.theory import gains_of
+from mirotwin.rerun import runner
+from mirotwin.shell.tracebacks import show_traceback
+from mirotwin.verify.checks.expect import Place, expectations_of
+from mirotwin.verify.checks.interface import Check
+from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.steps.keys import Step
+from mirotwin.verify.steps.plan import check_symbols
+from mirotwin.verify.steps.player import Player
+from mirotwin.verify.steps.reading import steps_of
+
+
+class Prepared(msgspec.Struct, frozen=True):
+    """A scenario with its settings made, what it expects, its steps, and what the settings left out."""
+
+    scenario: Scenario
+    expected: dict[Place, list[Check]]
+    steps: list[Step]
+    notes: tuple[str, ...] = ()
+
+
+@lru_cache(maxsize=16)
+def image_of(path: str) -> Image:
+    """The image at a path, "" for the robot's own, with its symbols. Raises BadInput and OSError."""
+    found = load_hex(Path(path) if path else image_path())
+    _ = found.symbols.names
+    return found
+
+
+@lru_cache(maxsize=64)
+def prepared(origin: str, text: str, settings: tuple[str, ...]) -> Prepared:
+    """Raises BadInput for a scenario that cannot be run with these settings."""
+    scenario, notes = parse_noted(text, origin, settings)
+    expected, steps = expectations_of(scenario, origin), steps_of(scenario, origin)
+    return Prepared(scenario, expected, steps, notes)
+
+
+def run_single(job: Work) -> Outcome:
+    """Runs it to the end; whatever goes wrong becomes the outcome's error."""
+    try:
+        return _run(job)
+    except BadInput as error:
+        show_traceback(error)
+        return Outcome(job.run, error=f"{error}")
+    except ValueError as error:  # numbers with which nothing can be computed, a part that fails
+        return Outcome(job.run, error=f"cannot be run: {error}")
+    except Exception as error:  # a fault of this program costs one run, too
+        return Outcome(job.run, error=f"internal error: {type(error).__name__}: {error}")
+
+
+def _run(job: Work) -> Outcome:
+    image = image_of(job.firmware.path)
+    found = prepared(job.origin, job.text, job.settings)
+    check_symbols(found.steps, image, job.origin)
+    world = World(found.scenario, job.seed, image)
+    checks = Checks(world, found.expected)
+    player = Player(world, found.steps, job.origin) if found.steps else None
+    tracks, seen = Tracks(), Seen(found.scenario.camera.delay_frames)
+    began_s = now_s()
+    _move(world, player, tracks, seen)
+    wall_s = now_s() - began_s
+    checks.finish()
+    summary = summarise(
+        scenario=found.scenario.name,
+        seed=job.seed,
+        engine=job.engine,
+        tracks=tracks,
+        simulated_ticks=world.tick,
+        wall_s=wall_s,
+        counters=world.counters(),
+        firmware_sha256=image.sha256 or "",
+        gains=gains_of(found.scenario),
+    )
+    verdicts = _verdicts(checks, player)
+    failure = _failure(checks, player)
+    return Outcome(
+        run=job.run,
+        verdict="fault" if summary.firmware.faults else "failed" if failure else "passed",
+        failure=failure,
+        digest=tracks.digest,
+        figures=figures_of(summary, tracks, seen),
+        checks={verdict.name: verdict.verdict for verdict in verdicts},
+        wall_s=wall_s,
+    )
+
+
+def _move(world: World, player: Player | None, tracks: Tracks, seen: Seen) -> None:
+    def keep(period: Period) -> None:
+        tracks.add(period)
+        if period.robots:
+            seen.add(period.robots[0], period.tick)
+
+    if player is None:
+        runner.run(world, on_period=keep)
+    else:
+        runner.run(world, on_period=keep, move=player.play)
+        player.finish()
+
+
+def _verdicts(checks: Checks, player: Player | None) -> list[Expectation]:
+    """Those of the run, and of checks that steps began; a name that is there twice has its worst verdict."""
+    order = ("failed", "not judged", "passed")
+    found: dict[str, Expectation] = {}
+    for group in (checks, *(player.checks if player else ())):
+        for one in group.verdicts():
+            before = found.get(one.name)
+            if before is None or order.index(one.verdict) < order.index(before.verdict):
+                found[one.name] = one
+    return list(found.values())
+
+
+def _failure(checks: Checks, player: Player | None) -> str:
+    if player is not None and player.failure is not None:
+        return f"step: {player.failure}"
+    failures = [one for group in (checks, *(player.checks if player else ())) for one in group.failures]
+    return f"{min(failures, key=lambda one: one.tick)}" if failures else ""

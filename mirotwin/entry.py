@@ -1,0 +1,60 @@
+"""Where the `mirotwin` program starts: Ctrl-C is one line and exit code 130 from the first moment to the last.
+
+What belongs here: what Ctrl-C does while modules are loaded, while a command runs, and after it. What does not:
+anything that has to be imported first; the command line itself is `mirotwin.commands`.
+
+Loading takes half a second, in which nothing has been opened yet: the process ends at once, whatever module is half
+imported. A command that runs gets KeyboardInterrupt and cleans up (`shell.program`). Once its exit code is known all is
+written, and Ctrl-C comes too late: in the last moments of the interpreter an exception would be a traceback.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from types import FrameType
+
+INTERRUPTED = 130
+LOADING, RUNNING, ENDED = range(3)
+
+_phase = LOADING
+
+
+def _on_interrupt(number: int, frame: FrameType | None) -> None:
+    if _phase == LOADING:
+        _leave()
+    if _phase == RUNNING:
+        raise KeyboardInterrupt
+
+
+def _leave() -> None:
+    """Ends the process: no clean-up, which is for what was opened, and no exception, which importing code may catch."""
+    try:  # noqa: SIM105 (contextlib would have to be imported)
+        os.write(2, b"mirotwin: interrupted\n")
+    except OSError:  # stderr is closed
+        pass
+    os._exit(INTERRUPTED)
+
+
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored, as under nohup
+    signal.signal(signal.SIGINT, _on_interrupt)
+
+
+def main() -> None:
+    """Loads the command line, runs it and ends the process."""
+    global _phase
+    from mirotwin.commands import main as command
+
+    try:
+        _phase = RUNNING
+        try:
+            command()
+        finally:
+            _phase = ENDED
+            if signal.getsignal(signal.SIGINT) is _on_interrupt:
+                # In its last moments the interpreter takes handlers away, and would end by the signal.
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+    except KeyboardInterrupt:  # outside of what the command guards: nothing is open
+        _leave()
+    sys.exit(0)

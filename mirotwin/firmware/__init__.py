@@ -1,0 +1,1 @@
+"""Firmware images: read, run on the bare processor, looked into (`mirotwin fw`)."""

@@ -1,0 +1,120 @@
+"""Firmware coverage as a report: what the command line and the pytest plugin make of counts.
+
+What belongs here: where debug files and sources are looked for, paths, the table for people, the files that are added
+to and written. What does not: the mapping to lines (`miro_robot.inspect.coverage`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import msgspec
+from rich.table import Table
+
+from miro_exact.bad_input import one_line
+from miro_exact.inputs import read_input
+from miro_robot.firmware import image_path, source_folder
+from miro_robot.image import Image, load_hex
+from miro_robot.image.debug_info import DebugInfo, Sources
+from miro_robot.inspect.coverage import (
+    Counts,
+    Share,
+    at_paths,
+    branch_share,
+    by_line,
+    by_listing,
+    instruction_share,
+    line_share,
+    missed,
+)
+from miro_robot.inspect.lcov import Tracefile, decode, encode
+from mirotwin.shell.outputs import whole_file
+
+
+class Report(msgspec.Struct, frozen=True):
+    """`listing`: text of the listing whose lines were counted, None when C lines were."""
+
+    tracefile: Tracefile
+    instructions: Share
+    listing: str | None
+
+
+def with_debug_files(image: Image) -> Image:
+    """The image as it has debug files: one out of a recording that is the robot's own has that one's."""
+
+    if image.path.is_file():
+        return image
+    own = load_hex(image_path())
+    return own if own.sha256 == image.sha256 else image
+
+
+def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
+    """The folders to look for C files in: those given, the image's own, and the robot's firmware's."""
+
+    own = source_folder()
+    return Sources([*map(Path, given), image.path.parent, *([own] if own else [])])
+
+
+def has_listing(image: Image) -> bool:
+    """Whether the lines that are counted are those of a listing: no debug file names C lines."""
+
+    return not DebugInfo.of(image).lines
+
+
+def listing_path(out: Path) -> Path:
+    """Where the listing belongs that goes with the tracefile at `out`."""
+    return out.with_name(f"{out.name}.lst")
+
+
+def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) -> Report:
+    """Coverage of `image` with paths as seen from the current folder."""
+
+    debug = DebugInfo.of(image)
+    share = instruction_share(image, debug, counts)
+    if debug.lines:
+        tracefile = at_paths(by_line(image, debug, counts), sources, Path.cwd())
+        return Report(tracefile, share, None)
+    listing, record = by_listing(image, counts)
+    return Report({str(listing_path(out or image.path)): record}, share, listing)
+
+
+def is_of_another_image(report: Report, out: Path) -> bool:
+    """Whether the listing beside `out` is not the one whose lines `report` counts: their numbers mean other things."""
+    beside = listing_path(out)
+    if report.listing is None or not beside.exists():
+        return False
+    return read_input(beside) != report.listing.encode("utf-8")
+
+
+def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
+    """Writes `total`, and the listing of `report` if it has one. Raises OutputError; then neither is written."""
+
+    with ExitStack() as files:
+        for path, text in ((listing_path(out), report.listing), (out, encode(total))):
+            if text is not None:
+                files.enter_context(whole_file(path, option)).write_bytes(
+                    text.encode("utf-8", "surrogateescape")
+                )
+
+
+def read_tracefile(path: Path) -> Tracefile:
+    """What a tracefile holds, nothing if there is none yet. Raises BadInput."""
+
+    if not path.exists():
+        return {}
+    return decode(read_input(path).decode("utf-8", "surrogateescape"), str(path))
+
+
+def table(tracefile: Tracefile) -> Table:
+    """A row a file and a total: lines, branches, and the lines that never ran."""
+
+    result = Table(box=None, pad_edge=False)
+    for column in ("file", "lines", "branches", "never ran"):
+        result.add_column(column, overflow="fold")
+    for path in sorted(tracefile):
+        one = {path: tracefile[path]}
+        result.add_row(one_line(path), str(line_share(one)), str(branch_share(one)), missed(tracefile[path]))
+    result.add_row("all", str(line_share(tracefile)), str(branch_share(tracefile)), "")
+    return result

@@ -1,0 +1,97 @@
+"""`mirotwin fw profile`: where the processor spends its time."""
+
+from __future__ import annotations
+
+import click
+import msgspec
+from rich.table import Table
+
+from miro_robot.inspect.activity import Activity
+from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.profile import Profile
+from miro_robot.inspect.profile import profile as profile_of
+from mirotwin.firmware.coverage_files import with_debug_files
+from mirotwin.firmware.subject import Request, image_name, look, open_run, subject_options
+from mirotwin.shell.console import show
+
+
+@click.command(short_help="Shows where the processor spends its time.")
+@subject_options
+@click.option("--json", "as_json", is_flag=True, help="As JSON, for programs.")
+def profile(request: Request, as_json: bool) -> int:
+    """Shows cycles by function, interrupts with their worst cases, the share of idling, and the depth of the stack.
+
+    A machine cycle is 12 periods of the crystal: 0.5 us at 24 MHz. A function's cycles are its own, without those of
+    what it calls. The latency of an interrupt is counted from the cycle in which its flag is latched to the first one
+    of its routine: 3 at least.
+    """
+    run = open_run(request)
+
+    image = with_debug_files(run.image)
+    counters, activity = Counters(), Activity()
+    code = look(run, request, counters, activity)
+    result = profile_of(image, counters, activity)
+    if as_json:
+        click.echo(msgspec.json.format(msgspec.json.encode(result), indent=2))
+    else:
+        _print(result, image_name(run))
+    return code
+
+
+def _print(result: Profile, name: str) -> None:
+    awake = result.cycles - result.asleep_cycles
+    show(
+        f"{name}: {result.cycles} machine cycles, {result.instructions} instructions, "
+        f"asleep {_percent(result.asleep_cycles, result.cycles)}"
+    )
+    functions = _table("function", "address", "calls", "instructions", "cycles", "of awake", "of all")
+    for function in result.functions:
+        functions.add_row(
+            function.name,
+            f"{function.address:#06x}",
+            str(function.calls),
+            str(function.instructions),
+            str(function.cycles),
+            _percent(function.cycles, awake),
+            _percent(function.cycles, result.cycles),
+        )
+    show(functions)
+    interrupts = _table(
+        "interrupt", "count", "worst latency", "at tick", "worst duration", "at tick", "of all"
+    )
+    for found in result.interrupts:
+        if found.count:
+            interrupts.add_row(
+                found.source,
+                str(found.count),
+                f"{found.worst_latency} cycles",
+                str(found.worst_latency_tick),
+                f"{found.worst_duration} cycles",
+                str(found.worst_duration_tick),
+                _percent(found.total_cycles, result.cycles),
+            )
+    if interrupts.row_count:
+        show(interrupts)
+    stack = result.stack
+    begins = "" if stack.first is None else f"from {stack.first:02X}h, "
+    used = "" if stack.first is None else f"{stack.highest - stack.first + 1} bytes used, "
+    show(
+        f"stack: {begins}highest {stack.highest:02X}h at tick {stack.highest_tick}: {used}{stack.free} bytes free"
+        + ("" if stack.last == 0xFF else f" below the data at {stack.last + 1:02X}h")
+    )
+    unknown = f"; not followed: {', '.join(stack.unknown)}" if stack.unknown else ""
+    show(f"stack by the code: at least {stack.at_least} bytes, in {' > '.join(stack.deepest)}{unknown}")
+    room = stack.last - stack.first + 1 if stack.first is not None else None
+    if room is not None and stack.at_least > room:
+        show(f"the stack has {room} bytes: it can run out by {stack.at_least - room}")
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="right" if index else "left")
+    return table
+
+
+def _percent(part: int, whole: int) -> str:
+    return f"{100.0 * part / whole:.1f} %" if whole else "-"

@@ -1,0 +1,104 @@
+"""How afl-fuzz is called: its environment, with the reason for each variable, and its options.
+
+What belongs here: the tables and the command line. What does not: starting it (`run`).
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from mirotwin.shell.children import python_module
+
+PROGRAM = "afl-fuzz"
+LONGEST_BYTES = 1024
+"""Inputs that afl-fuzz makes are not longer: a thousand characters are a second on the air, and a hundred frames."""
+
+ANSWER_MS = 10_000
+"""Time for one execution. The server answers at once at its end (`serve`), so that AFL++ never sees it pass."""
+
+START_MS = 120_000
+"""Time for a target to start: Python, the modules and the boot of the firmware, on a machine that does other things."""
+
+REASONS = {
+    "AFL_I_DONT_CARE_ABOUT_MISSING_CRASHES": "finds come as a status: a core_pattern that starts a program is harmless",
+    "AFL_SKIP_CPUFREQ": "CPU scaling costs some speed and does no harm; changing it takes root",
+    "AFL_SKIP_BIN_CHECK": "the target is a Python program, which no compiler has instrumented",
+    "AFL_MAP_SIZE": "bytes of the edge map; the default is eight times as large and slower",
+    "AFL_NO_UI": "the output goes to a file",
+    "AFL_NO_AFFINITY": "the command binds each job to a core itself: see `cores`",
+    "AFL_NO_CRASH_README": "folders hold inputs only",
+    "AFL_AUTORESUME": "a folder that is there is a campaign to go on with",
+    "AFL_FORKSRV_INIT_TMOUT": "milliseconds in which the target has to be ready",
+}
+"""Variable -> why the command sets it. Those that only switch something on are 1. None is here that afl-fuzz 4.04c does
+not know: it warns and sleeps 2 s for such a one."""
+
+
+def environment(inherited: Mapping[str, str], map_size: int) -> dict[str, str]:
+    """The environment of afl-fuzz: what is inherited, and what `REASONS` names. Ours win."""
+    ours = dict.fromkeys(REASONS, "1")
+    ours |= {"AFL_MAP_SIZE": str(map_size), "AFL_FORKSRV_INIT_TMOUT": str(START_MS)}
+    return {**inherited, **ours}
+
+
+class Call(msgspec.Struct, frozen=True):
+    """One call of afl-fuzz, without what differs from job to job.
+
+    `lengths`: the shortest and the longest input in bytes that it makes.
+
+    `seconds`: it ends by itself after so long, 0 is never. `seed`: of its random numbers; afl-fuzz then takes all
+    inputs for equally fast, so that its choices do not depend on time. None takes one from the system.
+    """
+
+    target: tuple[str, ...]
+    seeds: Path
+    out: Path
+    dictionary: Path | None = None
+    seconds: int = 0
+    seed: int | None = None
+    lengths: tuple[int, int] = (1, LONGEST_BYTES)
+
+    def line(self, job: int, jobs: int) -> list[str]:
+        """The command of one of the jobs: the first is the main one, the others take its finds over.
+
+        Raises BadInput for a folder whose name means something to afl-fuzz.
+        """
+        name = job_name(job, jobs)
+        options = ["-i", str(self.seeds), "-o", str(self.out), "-t", str(ANSWER_MS)]
+        options += ["-g", str(self.lengths[0]), "-G", str(self.lengths[1])]
+        if jobs > 1:
+            options += ["-M" if job == 0 else "-S", name]
+        if self.dictionary is not None:
+            options += ["-x", str(self.dictionary)]
+        if self.seconds:
+            options += ["-V", str(self.seconds)]
+        if self.seed is not None:
+            options += ["-s", str(self.seed + job)]
+        beside = str(self.out / name)
+        if "@@" in beside:
+            raise BadInput(self.out, "", "afl-fuzz puts the name of a file for @@", "choose another folder")
+        server = python_module("mirotwin.fuzz.afl.serve", *self.target, beside)
+        return [shutil.which(PROGRAM) or PROGRAM, *options, "--", *server]
+
+
+def job_name(job: int, jobs: int) -> str:
+    """The name of a job, which is that of its folder. One alone has the name that afl-fuzz gives it."""
+    if jobs == 1:
+        return "default"
+    return "main" if job == 0 else f"job{job}"
+
+
+def missing(programs: Sequence[str] = (PROGRAM,)) -> str | None:
+    """What of AFL++ is missing and how to get it; None where all is there."""
+    if sys.platform != "linux":
+        return f"AFL++ is spoken to by System V shared memory as Linux has it; this is {sys.platform}"
+    absent = [program for program in programs if shutil.which(program) is None]
+    if not absent:
+        return None
+    return f"{', '.join(absent)} is not on the PATH; install AFL++ (Debian, Ubuntu: `apt install afl++`)"

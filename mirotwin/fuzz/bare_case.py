@@ -1,0 +1,190 @@
+"""Cases of a bare processor: finds as files, and run again.
+
+What belongs here: cases whose header says `bare`. What does not: cases of the robot (`confirm`, `mirotwin.verify.cases`), and
+the run (`bare_run`).
+
+    # mirotwin stream 2
+    #: firmware_sha256 = ".."
+    #: verdict = "no_fault: tick 368772 (33.346 ms): firmware executed outside the loaded image at 0x03c0, .."
+    #: end_tick = 368772
+    #:
+    #: [bare]
+    #: crystal_hz = 11059200
+    #: bit_ticks = 576
+    #: begin_tick = 9840
+    #:
+    #: [expect]
+    #: no_fault = true
+    11040 > c0 03 c0 ..
+
+A case names its check and never the file that holds it: what is played again must not choose which program is run.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import tomli_w
+
+from miro_exact.bad_input import BadInput, one_line
+from miro_protocol import stream, stream_header
+from miro_protocol.stream_events import Deed
+from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.image import Image
+from mirotwin.fuzz.bare import NO_FAULT
+from mirotwin.fuzz.bare_machine import BareLine
+from mirotwin.fuzz.bare_run import BareRun
+from mirotwin.fuzz.exchange import OPTION, NamedCheck, check_named, installed_check
+from mirotwin.fuzz.target import NEVER_SLEEPS
+from mirotwin.verify.checks.interface import Failure
+
+FAULT_CODE, FAILED_CODE, DIVERGED_CODE = 3, 1, 4
+"""Exit codes, as everywhere: a firmware fault, an expectation that failed, a case that does not fail again."""
+
+
+class BareFailure(Failure, frozen=True, kw_only=True):
+    """A check that failed on a bare processor."""
+
+    crystal_hz: int
+
+    def __str__(self) -> str:
+        return f"{self.check}: tick {self.tick} ({self.tick * 1000 / self.crystal_hz:.3f} ms): {self.found}"
+
+
+class Verdict(msgspec.Struct, frozen=True):
+    """What became of a case: the exit code, and a line. `failed`: its check fails, as recorded or otherwise."""
+
+    code: int
+    line: str
+    failed: bool
+
+
+def failure_of(run: BareRun, name: str, check: NamedCheck | None) -> BareFailure | None:
+    """What is wrong with a run, by the check `name`, or by a fault, which goes before it."""
+    fault = run.processor.fault()
+    what, tick = "", 12 * run.processor.cpu.cycles
+    if fault is not None:
+        name, what, tick = NO_FAULT, str(fault), fault.tick
+    elif name == NEVER_SLEEPS:
+        what = "" if run.idle else "the firmware is awake long after the last character"
+    elif check is not None:
+        what = run.verdict(check)
+    if not what:
+        return None
+    return BareFailure(
+        check=name,
+        network=0,
+        slot=0,
+        tick=tick,
+        wanted=name,
+        found=what,
+        fault=name == NO_FAULT,
+        crystal_hz=run.line.crystal_hz,
+    )
+
+
+def case_text(
+    image: Image,
+    line: BareLine,
+    heard: Sequence[Transmission | Deed],
+    end_tick: int,
+    failure: BareFailure | None = None,
+) -> str:
+    """The stream file; a case, if something failed."""
+    header: dict[str, Any] = {"version": importlib.metadata.version("mirotwin")}
+    if image.sha256:
+        header["firmware_sha256"] = image.sha256
+    if failure is not None:
+        header["verdict"] = one_line(str(failure))
+    header["end_tick"] = end_tick
+    if failure is not None:
+        header["expect"] = {failure.check: True}
+    header["bare"] = msgspec.to_builtins(line)
+    text = tomli_w.dumps(header).rstrip("\n")
+    return stream.format_stream([stream.Entry(one) for one in heard], stream_header.of_text(text))
+
+
+def check_of_case(path: str | Path) -> str:
+    """The name of the check that a case is of."""
+    return _name(stream.read(path))
+
+
+def replay_bare(path: str | Path, image: Image, check: str | None = None) -> Verdict:
+    """Plays a case on `image`, from power-on. `check`: as of --expect, where the case names one that is in a file.
+
+    Raises BadInput for what is no such case.
+    """
+    case = stream.read(path)
+    name = _name(case)
+    line = _line(case)
+    judge = None if name in (NO_FAULT, NEVER_SLEEPS, "") else _check(case, name, check)
+    heard = _heard(case)
+    header = case.header
+    run = BareRun(
+        image, line, heard, header.end_tick or max((one.tick for one in heard), default=0), case.source
+    )
+    failure = failure_of(run, name, judge)
+    recorded = header.verdict or ""
+    if failure is not None:
+        if str(failure) == recorded:
+            line_said = f"fails as recorded: {failure}"
+        elif recorded:
+            line_said = f"still fails, but not as recorded: {failure}; recorded: {recorded}"
+        else:
+            line_said = f"fails: {failure}"
+        return Verdict(FAULT_CODE if failure.fault else FAILED_CODE, line_said, True)
+    if not recorded:
+        return Verdict(0, "passes", False)
+    if header.firmware_sha256 not in (None, image.sha256):
+        return Verdict(0, f"cured: {name} passes; recorded: {recorded}", False)
+    return Verdict(DIVERGED_CODE, f"not reproduced: {name} passes; recorded: {recorded}", False)
+
+
+def _name(case: stream.Stream) -> str:
+    names = list(case.header.expect or {})
+    if len(names) > 1:
+        what = f"expects {', '.join(names)} of a bare processor"
+        raise BadInput(case.source, "header: expect", what, "a case has one check")
+    return names[0] if names else NO_FAULT
+
+
+def _line(case: stream.Stream) -> BareLine:
+    if case.header.bare is None:
+        remedy = "`mirotwin replay` plays what is for the robot"
+        raise BadInput(case.source, "header", "says nothing of a bare processor", remedy)
+    try:
+        line = msgspec.convert(case.header.bare, BareLine)
+    except (msgspec.ValidationError, ValueError) as error:
+        remedy = "give crystal_hz and bit_ticks as whole numbers"
+        raise BadInput(case.source, "header: bare", str(error), remedy) from None
+    if not line.bit_ticks:
+        raise BadInput(case.source, "header: bare", "says no bit_ticks", "give the length of a bit")
+    return line
+
+
+def _check(case: stream.Stream, name: str, given: str | None) -> NamedCheck:
+    """The check that the case names: the one given on the command line, or one that is installed."""
+    if given:
+        if (found_name := given.rpartition(":")[2]) != name:
+            what = f"is a case of the check {name!r}, and {OPTION} gives {found_name!r}"
+            raise BadInput(case.source, "header: expect", what, f"give {name}")
+        return check_named(given)
+    try:
+        return installed_check(name)
+    except BadInput as error:
+        what = f"names the check {name!r}, which is not installed"
+        own = name.isidentifier()
+        remedy = f"give it: {OPTION} FILE.py:{name}" if own else "a case names a check, and never its file"
+        raise BadInput(case.source, "header: expect", what, remedy) from error
+
+
+def _heard(case: stream.Stream) -> list[Transmission | Deed]:
+    return [
+        one
+        for one in case.happenings()
+        if not isinstance(one, Transmission) or (one.direction == DOWN and one.network == 0)
+    ]

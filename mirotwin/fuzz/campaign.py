@@ -1,0 +1,214 @@
+"""A campaign: what is done with what an engine finds, until the time is over.
+
+What belongs here: the loop, and what is looked at in which order. What does not: engines (`engine`), finds (`finds`),
+coverage (`reached`), and how it is shown (`mirotwin.fuzz.fuzz_command`). This is one of the few places that know the wall clock.
+
+    engine ──crashes──► finds: minimised, told apart, confirmed
+       └────queue────► coverage, --covering, checks in Python (a share of the time, the rest waits)
+
+The engine works in processes of its own, so it goes on while one of its inputs is looked at.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from mirotwin.fuzz.engine import Engine, NoProgress, Progress
+from mirotwin.fuzz.files import CampaignFolder
+from mirotwin.fuzz.finds import Find, Finds
+
+LOOK_S = 0.2
+"""Wall time between two looks at the engine."""
+SLICE_S = 0.5
+"""How long inputs of the queue are looked at in one go."""
+LOOKED = 8
+"""Inputs of the queue that are looked at between two finds, which take longer."""
+AFTER_S = 20.0
+"""How long inputs are still looked at once the time is over."""
+
+
+class Covering(msgspec.Struct, frozen=True):
+    """A function that is to be reached, and where it begins."""
+
+    name: str
+    address: int
+
+
+class Status(msgspec.Struct, frozen=True):
+    """How a campaign stands. Rates over wall time; `waiting`: inputs that were not looked at yet."""
+
+    run_s: float
+    executions: int
+    executions_per_s: float
+    edges: int | None
+    finds: int
+    unconfirmed: int
+    waiting: int
+
+
+class Campaign:
+    """One campaign. `expected`: checks in Python that look at each input of the queue; `tell` gets each find at once.
+
+    `judged`: inputs that those have looked at; `reached_by`: the stream that reached what was to be reached.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        finds: Finds,
+        folder: CampaignFolder,
+        expected: Mapping[str, Any],
+        covering: Covering | None = None,
+        tell: Callable[[Find], None] = lambda find: None,
+    ) -> None:
+        self.engine = engine
+        self._progress: Progress = NoProgress()
+        self.finds = finds
+        self.folder = folder
+        self.expected = expected
+        self.covering = covering
+        self.tell = tell
+        self.judged = 0
+        self.inputs = 0
+        self.reached_by: Path | None = None
+        self._crashes: deque[bytes] = deque()
+        self._queue: deque[bytes] = deque()
+        self._to_judge: deque[bytes] = deque()
+        self._seen: set[bytes] = set()
+        self._judging_s = 0.0
+        self._looked = LOOKED
+        self._began_s = time.monotonic()
+        self._stopped_s: float | None = None
+        self._shown_s = 0.0
+
+    def begin_with(self, failing: Iterable[bytes], passing: Iterable[bytes]) -> None:
+        """Inputs to look at before those of the engine: seeds that fail are finds, of the others coverage is taken."""
+        for inputs, data_of in ((self._crashes, failing), (self._queue, passing)):
+            for data in data_of:
+                self._seen.add(data)
+                inputs.append(data)
+        self._looked = LOOKED - len(self._queue)  # these are quick, and --covering may need no more
+
+    # ---- the loop ------------------------------------------------------------------------------------------
+
+    def run(self, time_s: float | None, show: Callable[[Status], None]) -> None:
+        """Until the time is over (None: never), or what was to be reached is. The engine is stopped however it ends."""
+        self._began_s = time.monotonic()
+        self.finds.tell = lambda: self._show_sometimes(show)
+        try:
+            self.engine.start()
+            while self.reached_by is None and (time_s is None or self.run_s < time_s):
+                began_s = time.monotonic()
+                self._collect()
+                self._work(began_s + SLICE_S, time_s)
+                self._show_sometimes(show)
+                time.sleep(max(0.0, LOOK_S - (time.monotonic() - began_s)))
+        finally:
+            self.engine.stop()
+            self._stopped_s = time.monotonic()
+        self._collect()
+
+    def finish(self, show: Callable[[Status], None], limit_s: float = AFTER_S) -> int:
+        """Looks at what is left, so long at most; returns how many inputs were left out."""
+        end_s = time.monotonic() + limit_s
+        self.finds.tell = lambda: self._show_sometimes(show)
+        while (self._crashes or self._queue or self._to_judge) and time.monotonic() < end_s:
+            self._work(end_s, None, at_ease=True)
+        return len(self._crashes) + len(self._queue) + len(self._to_judge)
+
+    @property
+    def run_s(self) -> float:
+        """Wall time for which the engine has been running."""
+        return (self._stopped_s or time.monotonic()) - self._began_s
+
+    def status(self) -> Status:
+        """How far it is; of an engine that has ended with an error, how far it was when last asked."""
+        with suppress(BadInput):
+            self._progress = self.engine.progress()
+        progress = self._progress
+        return Status(
+            self.run_s,
+            progress.executions,
+            progress.executions_per_s,
+            progress.edges,
+            len(self.finds.confirmed),
+            len(self.finds.unconfirmed),
+            len(self._crashes) + len(self._queue) + len(self._to_judge),
+        )
+
+    def _show_sometimes(self, show: Callable[[Status], None]) -> None:
+        now_s = time.monotonic()
+        if now_s - self._shown_s >= LOOK_S:
+            self._shown_s = now_s
+            show(self.status())
+
+    # ---- what comes from the engine ------------------------------------------------------------------------
+
+    def _collect(self) -> None:
+        for path in self.engine.new_crashes():
+            self._take(path, self._crashes)
+        for path in self.engine.new_queue():
+            self._take(path, self._queue)
+
+    def _take(self, path: Path, inputs: deque[bytes]) -> None:
+        try:
+            data = path.read_bytes()
+        except OSError:  # the engine has taken it away again
+            return
+        if data not in self._seen:
+            self._seen.add(data)
+            inputs.append(data)
+
+    def _work(self, end_s: float, time_s: float | None, at_ease: bool = False) -> None:
+        """Finds, and coverage between two of them; then checks in Python, a third of the time while the engine runs."""
+        while self.reached_by is None or at_ease:
+            if time.monotonic() >= end_s or (time_s is not None and self.run_s >= time_s):
+                return
+            if self._crashes and (not self._queue or self._looked >= LOOKED):
+                done = self._crashes
+                self._looked = 0
+                self._keep(self.finds.take(done[0]))
+            elif self._queue:
+                done = self._queue
+                self._looked += 1
+                self._look(done[0])
+            elif self._to_judge and (at_ease or 3 * self._judging_s <= self.run_s):
+                done = self._to_judge
+                self._judge(done[0])
+            else:
+                return
+            done.popleft()  # now: what is interrupted is looked at again
+
+    def _keep(self, find: Find | None) -> None:
+        if find is not None:
+            self.tell(find)
+
+    def _look(self, data: bytes) -> None:
+        """An input that found something new: what it executes."""
+        self.inputs += 1
+        self.folder.write("corpus", f"input-{self.inputs:05d}", data)
+        counts = self.finds.reached.run(data)
+        if self.expected:
+            self._to_judge.append(data)
+        if self.covering is not None and self.reached_by is None and self.covering.address in counts:
+            stream = self.finds.court.stream(self.finds.target, data)
+            self.reached_by = self.finds.leave("covering", self.covering.name, data, stream, counts)
+
+    def _judge(self, data: bytes) -> None:
+        """What the checks in Python say of it. Raises PartError where one raises."""
+        began_s = time.monotonic()
+        try:
+            self.judged += 1
+            failure = self.finds.judged(data, self.expected).failure
+            if failure is not None:
+                self._keep(self.finds.take_judged(data, failure, self.expected))
+        finally:
+            self._judging_s += time.monotonic() - began_s

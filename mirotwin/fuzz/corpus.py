@@ -1,0 +1,121 @@
+"""A folder of inputs that a user gives: recordings, stream files, captures, and inputs of earlier campaigns.
+
+What belongs here: which files are inputs, and what the others are. What does not: reading single formats
+(`mirotwin.recording.capture`).
+
+Files are taken from the folder itself and, where it is one that a campaign or afl-fuzz left, from the folders of its
+queues. Hidden files are not looked at. Files of other kinds are passed over and named in one line; a folder in which
+nothing is an input is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.inputs import TEXT_BYTES
+from miro_protocol import stream
+from mirotwin.fuzz.inputs import Heard, inputs_of
+from mirotwin.recording.capture.detect import TIMED, detect
+from mirotwin.recording.capture.input import Input
+from mirotwin.recording.capture.source import READ_ERRORS, open_source
+
+OPTION = "--corpus"
+INPUT_BYTES = 8192
+"""Longer files are no inputs."""
+QUEUES = ("corpus", "queue", "*/queue", "engine/*/queue")
+FOREIGN = (
+    *(".c", ".h", ".py", ".ihx", ".hex", ".map", ".cdb", ".rst", ".toml", ".json", ".xml", ".yml", ".yaml"),
+    *(".mcap", ".stream"),  # damaged ones: what is whole was recognised by its content
+    *(
+        ".md",
+        ".txt",
+        ".log",
+        ".png",
+        ".jpg",
+        ".pdf",
+        ".csv",
+        ".vcd",
+        ".zip",
+        ".gz",
+        ".info",
+        ".lst",
+        ".world",
+    ),
+)
+"""Suffixes of files that are no inputs, whatever bytes they hold."""
+_NAMED = 3
+MOST = 2000
+"""Inputs that are taken from a folder."""
+
+
+class Corpus(msgspec.Struct, frozen=True):
+    """`inputs`, no two the same, and `notes`: what a user should hear about files that are none."""
+
+    inputs: tuple[bytes, ...]
+    notes: tuple[str, ...] = ()
+
+
+def read_corpus(folder: Path, kind: str, robots: int) -> Corpus:
+    """The inputs of that kind in a folder. Raises BadInput where there are none."""
+    if not folder.is_dir():
+        what = "is no folder" if folder.exists() else "there is no such folder"
+        raise BadInput(folder, OPTION, what, "name a folder of .stream, .mcap or input files")
+    found: dict[bytes, None] = {}
+    foreign: list[str] = []
+    notes: list[str] = []
+    files = list(_files(folder))
+    for path in files:
+        try:
+            taken = _inputs_in(path, kind, robots)
+        except (*READ_ERRORS, OSError) as error:
+            notes.append(f"{OPTION}: passed over: {error}")
+            continue
+        if taken:
+            found.update(dict.fromkeys(taken))
+        else:
+            foreign.append(path.name)
+    if not found:
+        held = f"none of the {len(files)} files is an input" if files else "holds no file"
+        more = f" ({notes[0].removeprefix(f'{OPTION}: passed over: ')})" if notes else ""
+        remedy = "put .stream or .mcap files, or inputs of an earlier campaign there, or leave --corpus out"
+        raise BadInput(folder, OPTION, f"{held}{more}", remedy)
+    if foreign:
+        names = ", ".join(foreign[:_NAMED]) + (", .." if len(foreign) > _NAMED else "")
+        files_text = (
+            "1 file that is no input" if len(foreign) == 1 else f"{len(foreign)} files that are no inputs"
+        )
+        notes.append(f"{OPTION} {folder}: passed over {files_text}: {names}")
+    if len(found) > MOST:
+        notes.append(f"{OPTION} {folder}: {len(found)} inputs, of which the first {MOST} are taken")
+    return Corpus(tuple(found)[:MOST], tuple(notes))
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    places = [folder, *(place for queue in QUEUES for place in sorted(folder.glob(queue)))]
+    for place in dict.fromkeys(places):
+        if place.is_dir():
+            yield from (path for path in sorted(place.iterdir()) if path.is_file() and path.name[0] != ".")
+
+
+def _inputs_in(path: Path, kind: str, robots: int) -> list[bytes]:
+    """What a file says as inputs; none for a file of another kind."""
+    with Input(str(path)) as given:
+        format, _ = detect(given.peek())
+        if format in TIMED:
+            by_network: dict[int, list[Heard]] = {}
+            for one in _heard(given, format):
+                by_network.setdefault(one.network, []).append(one)
+            return [data for sent in by_network.values() for data in inputs_of(kind, sent, robots)]
+    if path.suffix.lower() in FOREIGN or not 0 < path.stat().st_size <= INPUT_BYTES:
+        return []
+    return [path.read_bytes()]
+
+
+def _heard(given: Input, format: str) -> Iterator[Heard]:
+    if format == "stream":  # may say what is done to robots, too
+        return iter(stream.decode(given.read(TEXT_BYTES), given.label).happenings())
+    return iter(open_source(given, format, lambda text: None).sent)

@@ -1,0 +1,131 @@
+"""The folder of a campaign: what stands where.
+
+What belongs here: names, the check of the folder before a campaign, and writing single files whole. What does not: what
+is in them.
+
+    OUT/
+      finds/NAME.stream        a case: `mirotwin replay` gives the verdict again
+      finds/NAME.input         the minimised input, for --corpus
+      finds/NAME.txt           the same as readable lines
+      finds/NAME.info          what it executed, as an lcov tracefile
+      unconfirmed/NAME.*       what a world did not find wrong: the same files, and a stream that nothing is expected of
+      covering/SYMBOL.*        the input that reached a function (--covering)
+      corpus/                  inputs that found something new
+      seeds/, dictionary       what it began with
+      engine/                  the engine's own
+      coverage.info            what all inputs executed
+      summary.json
+"""
+
+from __future__ import annotations
+
+import glob
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from miro_exact.bad_input import BadInput
+from miro_protocol import files
+from mirotwin.shell.outputs import OutputError, told_when_full
+
+FOLDERS = ("finds", "unconfirmed", "covering", "corpus", "seeds", "engine")
+FILES = ("coverage.info", "coverage.info.lst", "summary.json", "dictionary")
+SCRATCH = ("corpus", "seeds", "engine")
+"""What a campaign that could not end leaves to nobody."""
+OPTION = "--out"
+
+
+class CampaignFolder:
+    """`path` as the folder of a campaign.
+
+    Raises OutputError for one that holds something, unless `force`: then what an earlier campaign left is taken away,
+    and a folder that holds anything else is refused all the same.
+    """
+
+    def __init__(self, path: Path, force: bool = False) -> None:
+        self.path = path
+        try:
+            present = sorted(os.listdir(path)) if path.exists() else []
+        except OSError as error:
+            what = (
+                "exists and is not a folder" if isinstance(error, NotADirectoryError) else f"{error.strerror}"
+            )
+            raise OutputError(path, what, f"choose another folder with {OPTION}") from None
+        others = [name for name in present if name not in (*FOLDERS, *FILES)]
+        if present and not force:
+            remedy = f"choose another with {OPTION}, or replace an earlier campaign with --force"
+            raise OutputError(path, f"the folder is not empty ({_some(present)})", remedy)
+        if others:
+            what = f"holds what no campaign leaves ({_some(others)})"
+            raise OutputError(path, what, f"choose another folder with {OPTION}")
+        self._present = present
+
+    def make(self) -> None:
+        """Takes away what an earlier campaign left, and makes the folder. Raises OutputError."""
+        try:
+            for name in self._present:
+                if (self.path / name).is_dir() and not (self.path / name).is_symlink():
+                    shutil.rmtree(self.path / name)
+                else:
+                    (self.path / name).unlink()
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(
+                self.path, error.strerror or str(error), f"choose another folder with {OPTION}"
+            ) from None
+
+    def folder(self, name: str) -> Path:
+        """One of its folders, which is made."""
+        assert name in FOLDERS
+        path = self.path / name
+        path.mkdir(parents=True, exist_ok=True)
+        return path
+
+    def write(self, folder: str, name: str, data: bytes | str) -> Path:
+        """Writes a file whole or not at all; returns where it is."""
+        path = (self.folder(folder) if folder else self.path) / name
+        files.replace(path, data.encode("utf-8", "surrogateescape") if isinstance(data, str) else data)
+        return path
+
+    @contextmanager
+    def filled(self) -> Iterator[None]:
+        """While the campaign writes there. A full disk is an OutputError, and leaves finds only, or no folder."""
+        try:
+            with told_when_full(self.path, OPTION):
+                yield
+        except OutputError:
+            for name in SCRATCH:
+                shutil.rmtree(self.path / name, ignore_errors=True)
+            for name in FILES:
+                (self.path / name).unlink(missing_ok=True)
+            for path in (*self.path.rglob("*"), self.path):
+                with suppress(OSError):  # a folder with finds in it, or a find
+                    path.rmdir()
+            raise
+
+    def remove(self, folder: str, name: str) -> None:
+        """Takes away the files of a find."""
+        for path in self.folder(folder).glob(f"{glob.escape(name)}.*"):
+            path.unlink()
+
+
+def unused(path: Path) -> Path:
+    """`path`, or the first of `path-2`, `path-3`, .. with nothing in it: what an earlier campaign found is not lost."""
+    number, free = 1, path
+    while free.is_dir() and any(free.iterdir()):
+        number += 1
+        free = path.with_name(f"{path.name}-{number}")
+    return free
+
+
+def check_outside(path: Path, corpus: Path | None) -> None:
+    """Refuses a corpus that the campaign would take away. Raises BadInput."""
+    if corpus is not None and path.exists() and corpus.resolve().is_relative_to(path.resolve()):
+        what = f"lies in {path}, which the campaign replaces"
+        raise BadInput(corpus, "--corpus", what, f"choose another folder with {OPTION}")
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names[:3]) + (", .." if len(names) > 3 else "")

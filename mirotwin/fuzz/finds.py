@@ -1,0 +1,223 @@
+"""What becomes of an input that failed: minimised, told apart from the others, confirmed in a World, left as files.
+
+What belongs here: that order, and what makes two finds the same. What does not: each of the steps (`minimise`,
+`reached`, `confirm`), and where inputs come from (`campaign`).
+
+Two finds are the same where check, PC and path are. The PC is that of the instruction that did it, a fault; where no
+instruction did it (nothing came in time, say) there is none. The path is that of the minimised input (`reached`).
+
+Of inputs with the same check and PC only the first few are minimised, unless a new path comes of them: an easy mistake
+fails thousands of inputs, which are counted.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+
+from miro_robot.image.debug_info import Sources
+from miro_robot.inspect.coverage import Counts
+from miro_robot.inspect.lcov import Tracefile
+from mirotwin.firmware.coverage_files import collect, write
+from mirotwin.fuzz.budget import Budget
+from mirotwin.fuzz.confirm import Court, Expected, Judgement
+from mirotwin.fuzz.files import CampaignFolder
+from mirotwin.fuzz.minimise import minimise
+from mirotwin.fuzz.reached import Reached
+from mirotwin.fuzz.target import Finding, Target
+from mirotwin.verify.checks.interface import Failure
+
+MINIMISE_S = 10.0
+TRIES = 50_000
+TRIES_IN_A_WORLD = 400
+SAME_TRIED = 6
+"""Inputs of one check and PC in a row that are minimised although nothing new comes of them."""
+CONFIRMED, UNCONFIRMED = "finds", "unconfirmed"
+
+
+class Find(msgspec.Struct, frozen=True, kw_only=True):
+    """A mistake that an input shows. `verdict`: of the World, or of the target where that is not confirmed.
+
+    `pc` None: no instruction did it. `folder`: `finds` or `unconfirmed`. `sizes`: bytes of the input as it was found
+    and as it is left.
+    """
+
+    name: str
+    check: str
+    pc: int | None
+    path: str
+    function: str
+    verdict: str
+    folder: str
+    sizes: tuple[int, int]
+    fault: bool = False
+
+    @property
+    def confirmed(self) -> bool:
+        return self.folder == CONFIRMED
+
+
+class Finds:
+    """All that was found so far. `more`: by name, inputs that came down to the same find or were not looked at.
+
+    `unrepeated`: inputs that the engine said had failed and that do not fail again.
+    """
+
+    def __init__(
+        self,
+        target: Target,
+        reached: Reached,
+        court: Court,
+        folder: CampaignFolder,
+        sources: Sources,
+        minimise_s: float = MINIMISE_S,
+        tell: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.target = target
+        self.reached = reached
+        self.court = court
+        self.folder = folder
+        self.sources = sources
+        self.minimise_s = minimise_s
+        self.tell = tell
+        self.found: list[Find] = []
+        self.more: Counter[str] = Counter()
+        self.unrepeated = 0
+        self._by_key: dict[tuple[str, int | None, str], Find] = {}
+        self._in_vain: Counter[tuple[str, int | None]] = Counter()
+        self._last: dict[tuple[str, int | None], Find] = {}
+
+    @property
+    def confirmed(self) -> list[Find]:
+        return [find for find in self.found if find.confirmed]
+
+    @property
+    def unconfirmed(self) -> list[Find]:
+        return [find for find in self.found if not find.confirmed]
+
+    def take(self, data: bytes) -> Find | None:
+        """An input that failed on a target; the find that it is, if it is a new one."""
+        finding = self._finding(data)
+        if finding is None:
+            self.unrepeated += 1
+            return None
+        group = _group(finding)
+        if self._in_vain[group] >= SAME_TRIED:
+            self.more[self._last[group].name] += 1
+            return None
+        small = minimise(data, lambda one: self._fails(one, group), Budget(TRIES, self.minimise_s, self.tell))
+        counts = self.reached.run(small)
+        key = (*group, self.reached.path(counts))
+        known = self._by_key.get(key)
+        if known is not None and known.confirmed:
+            self._count(key)
+            return None
+        again = self._finding(small) or finding
+        judgement = self.court.confirm(self.target, small, again)
+        if judgement.failure is None and small != data:
+            whole = self.court.confirm(self.target, data, finding)
+            if whole.failure is not None:  # smaller, it is only the target's
+                small, judgement, again = data, whole, finding
+                counts = self.reached.run(small)
+        if known is not None:
+            if judgement.failure is None:
+                self._count(key)
+                return None
+            self._take_back(known)
+        sizes = (len(data), len(small))
+        return self._keep(key, small, again.pc, again.what, judgement, counts, sizes)
+
+    def take_judged(self, data: bytes, failure: Failure, expected: Expected) -> Find | None:
+        """An input in whose World one of the checks in `expected` failed; the find, if it is a new one."""
+        group = (failure.check, None)
+        if self._in_vain[group] >= SAME_TRIED:
+            self.more[self._last[group].name] += 1
+            return None
+
+        def fails(one: bytes) -> bool:
+            found = self.judged(one, expected).failure
+            return found is not None and found.check == failure.check
+
+        small = minimise(data, fails, Budget(TRIES_IN_A_WORLD, self.minimise_s, self.tell))
+        counts = self.reached.run(small)
+        key = (*group, self.reached.path(counts))
+        if key in self._by_key:
+            self._count(key)
+            return None
+        judgement = self.judged(small, expected)
+        return self._keep(key, small, 0, "", judgement, counts, (len(data), len(small)))
+
+    def judged(self, data: bytes, expected: Expected) -> Judgement:
+        """What the checks in `expected`, and those that are always on, say of an input."""
+        return self.court.judged(self.target, data, expected)
+
+    def _finding(self, data: bytes) -> Finding | None:
+        return self.target.finding if self.target.run(data) else None
+
+    def _fails(self, data: bytes, group: tuple[str, int | None]) -> bool:
+        finding = self._finding(data)
+        return finding is not None and _group(finding) == group
+
+    def _take_back(self, find: Find) -> None:
+        """A find that was not confirmed, of which another input shows now that it is real."""
+        self.found.remove(find)
+        self.more[find.name] += 1
+        self.folder.remove(find.folder, find.name)
+
+    def _count(self, key: tuple[str, int | None, str]) -> None:
+        find = self._by_key[key]
+        self.more[find.name] += 1
+        self._in_vain[key[:2]] += 1
+
+    def _keep(
+        self,
+        key: tuple[str, int | None, str],
+        data: bytes,
+        pc: int,
+        what: str,
+        judgement: Judgement,
+        counts: Counts,
+        sizes: tuple[int, int],
+    ) -> Find:
+        check, place_pc, path = key
+        name = "-".join([check, *([] if place_pc is None else [f"{place_pc:04x}"]), path])
+        failure = judgement.failure
+        find = Find(
+            name=name,
+            check=check,
+            pc=place_pc,
+            path=path,
+            function="" if place_pc is None else self.reached.function(pc),
+            verdict=f"{check}: {what}" if failure is None else str(failure),
+            folder=UNCONFIRMED if failure is None else CONFIRMED,
+            sizes=sizes,
+            fault=failure is not None and failure.fault,
+        )
+        case = judgement.case or self.court.stream(self.target, data)
+        self.leave(find.folder, name, data, case, counts)
+        self.found.append(find)
+        self._by_key[key] = find
+        self._last[key[:2]] = find
+        self._in_vain[key[:2]] = 0
+        return find
+
+    def leave(self, folder: str, name: str, data: bytes, stream: str, counts: Counts) -> Path:
+        """The files of an input; returns the stream's path."""
+        self.folder.write(folder, f"{name}.input", data)
+        self.folder.write(folder, f"{name}.txt", self.target.describe(data).rstrip("\n") + "\n")
+        self.write_coverage(self.folder.folder(folder) / f"{name}.info", counts)
+        return self.folder.write(folder, f"{name}.stream", stream)
+
+    def write_coverage(self, path: Path, counts: Counts) -> Tracefile:
+        """Writes an lcov tracefile of these counts."""
+        report = collect(self.target.image, counts, self.sources, path)
+        write(report.tracefile, report, path, "--out")
+        return report.tracefile
+
+
+def _group(finding: Finding) -> tuple[str, int | None]:
+    """Check and PC of what a target found."""
+    return finding.check, finding.pc or None

@@ -1,0 +1,333 @@
+"""`mirotwin fuzz`: inputs that make firmware fail, found by an engine that is guided by what the firmware executes.
+
+Long because the command has an option for each thing that a campaign may be asked.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Literal, cast
+
+import click
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import TICKS_PER_SECOND
+from miro_exact.seed import MAX_SEED
+from miro_host.parts import PartError
+from miro_robot.harness.harness import AWAKE_TICKS
+from miro_robot.image import Image
+from miro_sim.scenario.file import changed
+from mirotwin.firmware.sources_option import sources_of, sources_option
+from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
+from mirotwin.fuzz.confirm import Court, WorldCourt
+from mirotwin.fuzz.confirm import Place as RobotPlace
+from mirotwin.fuzz.corpus import read_corpus
+from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
+from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
+from mirotwin.fuzz.finds import MINIMISE_S, Find, Finds
+from mirotwin.fuzz.fuzz_bare import (
+    BareAsked,
+    bare_court,
+    bare_fuzz_options,
+    bare_seeds,
+    bare_spec,
+    load_bare_firmware,
+    take_bare_fuzz,
+)
+from mirotwin.fuzz.fuzz_progress import FuzzProgress
+from mirotwin.fuzz.fuzz_regress import refuse_others, regress
+from mirotwin.fuzz.fuzz_summary import Ended, report
+from mirotwin.fuzz.reached import Reached
+from mirotwin.fuzz.seeds import seeds
+from mirotwin.fuzz.spec import TargetSpec
+from mirotwin.fuzz.target import Target
+from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, load_image
+from mirotwin.shell.program import Terminated, complain
+from mirotwin.shell.times import WallTime
+from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.expectations import as_setting, refuse_files
+from mirotwin.verify.wanted import silent_scenario
+
+LONGEST_S = 1e7
+AWAKE_MS = 1000 * AWAKE_TICKS // TICKS_PER_SECOND
+INTERRUPTED_S = 5.0
+"""How long inputs are still looked at behind a Ctrl-C."""
+
+
+class Asked(msgspec.Struct, frozen=True, kw_only=True):
+    """What a campaign was asked for; names as the options'."""
+
+    time_s: float
+    jobs: int | None
+    corpus: Path | None
+    checks: tuple[str, ...]
+    covering: str | None
+    out: Path
+    seed: int | None
+    minimise_s: float
+    force: bool
+    quiet: bool
+    sources: tuple[str, ...]
+
+
+@click.command(short_help="Looks for inputs that make a firmware image fail.")
+@click.argument("image", metavar="[IMAGE.ihx]", type=Place(), required=False)
+@click.option(
+    "--time",
+    "time_s",
+    type=WallTime(LONGEST_S),
+    default="1min",
+    show_default=True,
+    help="How long: 30s, 5min, 2h.",
+)
+@click.option("--jobs", type=Whole(1), help="Processes of the engine. Default: the processors but one.")
+@click.option(
+    "--input",
+    "kind",
+    type=click.Choice(["bytes", "frames", "session"]),
+    default="session",
+    show_default=True,
+    help="What an input is: characters; frames, whose CRC is made right; frames, pauses, damage, resets.",
+)
+@click.option(
+    "--corpus",
+    type=Place(path_type=Path),
+    metavar="DIR",
+    help="Folder of recordings, stream files, captures and inputs of earlier campaigns to begin with.",
+)
+@click.option(
+    "--expect",
+    "checks",
+    metavar="KEY[=VALUE]",
+    multiple=True,
+    help="A check that judges each input that found something new, as for `run`; may be repeated. With --bare: a check"
+    " by its name, or FILE.py:FUNCTION.",
+)
+@click.option(
+    "--covering", metavar="SYMBOL", help="Look for an input that reaches this function, and end with it."
+)
+@click.option(
+    "--robots", type=click.Choice(["3", "5"]), default="3", show_default=True, help="Slots of the network."
+)
+@click.option("--slot", type=Whole(0, 4), default=0, show_default=True, help="Slot of the robot.")
+@click.option("--seed", type=Whole(0, MAX_SEED), help="Seed of the engine. Default: from the system.")
+@click.option(
+    "--out",
+    type=Place(path_type=Path),
+    metavar="DIR",
+    help="Folder for what it leaves. Default: runs/fuzz-IMAGE, with -2, -3, .. after an earlier campaign.",
+)
+@click.option("--force", is_flag=True, help="Replace an earlier campaign in --out.")
+@click.option(
+    "--minimise",
+    "minimise_s",
+    type=WallTime(LONGEST_S),
+    default=f"{MINIMISE_S:.0f}s",
+    show_default=True,
+    help="Longest time for making a find small.",
+)
+@click.option(
+    "--regress", "cases", type=Place(path_type=Path), metavar="DIR", help="Run the saved cases of a folder."
+)
+@bare_fuzz_options
+@sources_option
+@engine_option
+@click.option("-q", "--quiet", is_flag=True, help="No progress, and of the results only what failed.")
+def fuzz(
+    image: str | None,
+    kind: str,
+    robots: str,
+    slot: int,
+    out: Path | None,
+    cases: Path | None,
+    engine: str | None,
+    **given: Any,
+) -> int:
+    """Looks for inputs that make IMAGE.ihx (default: the robot's own firmware) fail, on the robot's board.
+
+    Each input is played from the moment at which the firmware is up. Faults and the promises of the protocol are judged
+    in each; what fails is made small, played again in a World, and left in --out as finds/NAME.stream, a case for
+    `mirotwin replay`. Afterwards it says which functions and lines no input has reached.
+
+    With --bare it is any 8051 firmware with a serial port, on a processor to which nothing of the robot is connected.
+
+    Ctrl-C ends a campaign early, with all that was found.
+
+    Exit code 1: something was found and confirmed, or --covering was not reached; with --regress: a case fails.
+    """
+    active = cast(Literal["compiled", "python"], choose_engine(engine))
+    bare = take_bare_fuzz(given)
+    firmware = load_bare_firmware(image) if bare.bare else load_image(image)
+    if cases is not None:
+        refuse_others()
+        return regress(cases, firmware, engine, given["quiet"], given["checks"])
+    if slot >= int(robots):
+        raise click.UsageError(
+            f"--slot {slot} does not exist among {robots} robots; give 0 to {int(robots) - 1}."
+        )
+    default = Path("runs") / f"fuzz-{firmware.path.stem}"
+    asked = Asked(out=out or (default if given["force"] else unused(default)), **given)
+    if bare.bare:
+        return _bare_campaign(image or "", kind, active, firmware, asked, bare)
+    spec = TargetSpec(image=image or "", input=kind, robots=int(robots), slot=slot, engine=active)
+    expected = _expected(asked.checks)
+    court = WorldCourt(RobotPlace(firmware, spec.robots, spec.slot))
+    return _campaign(spec, firmware, asked, court, expected, seeds(spec.input, spec.robots, spec.slot))
+
+
+def _bare_campaign(
+    path: str, kind: str, engine: Literal["compiled", "python"], image: Image, asked: Asked, bare: BareAsked
+) -> int:
+    court, expected = bare_court(asked.checks)
+    spec = bare_spec(path, kind, engine, bare, asked.checks)
+    return _campaign(spec, image, asked, court, expected, bare_seeds(spec))
+
+
+def _campaign(
+    spec: TargetSpec, image: Image, asked: Asked, court: Court, expected: dict[str, Any], inputs: list[bytes]
+) -> int:
+    folder = CampaignFolder(asked.out, asked.force)
+    check_outside(asked.out, asked.corpus)
+    covering = _covering(asked.covering, image)
+    if asked.corpus is not None:
+        corpus = read_corpus(asked.corpus, spec.input, spec.robots)
+        inputs = list(dict.fromkeys((*inputs, *corpus.inputs)))
+        for note in corpus.notes:
+            complain(note)
+    target = spec.make()
+    _check_at_rest(target, image)
+    reached = Reached(image, spec.make)
+    if covering is not None and covering.address in reached.total:
+        what = f"{covering.name} runs while the firmware starts, before any input"
+        raise BadInput("", "--covering", what, "name a function that an input has to reach")
+    folder.make()
+    finds = Finds(target, reached, court, folder, sources_of(image, asked.sources), asked.minimise_s)
+    with folder.filled():
+        campaign, asked = _begun(spec, asked, finds, folder, expected, covering, _sorted_out(target, inputs))
+        return _run(campaign, image, asked)
+
+
+def _begun(
+    spec: TargetSpec,
+    asked: Asked,
+    finds: Finds,
+    folder: CampaignFolder,
+    expected: dict[str, Any],
+    covering: Covering | None,
+    inputs: tuple[list[bytes], list[bytes], list[bytes]],
+) -> tuple[Campaign, Asked]:
+    """A campaign that has looked at the inputs that fail, pass and execute no branch; how long it may go on."""
+    failing, passing, silent = inputs
+    engine: Engine = NoEngine()
+    if passing:
+        engine, notes = engine_for(spec, passing, folder, spec.make(), _jobs(asked.jobs), asked.seed)
+        for note in notes:
+            complain(note)
+    else:
+        complain("every input fails or executes no branch: there is nothing to go on from")
+        asked = msgspec.structs.replace(asked, time_s=0.0)
+    campaign = Campaign(engine, finds, folder, expected, covering, _teller(asked.quiet))
+    campaign.begin_with(failing, (*passing, *silent))
+    return campaign, asked
+
+
+def _sorted_out(target: Target, inputs: list[bytes]) -> tuple[list[bytes], list[bytes], list[bytes]]:
+    """Those that fail, those that an engine can begin with, and those that execute no branch."""
+    failing: list[bytes] = []
+    passing: list[bytes] = []
+    silent: list[bytes] = []
+    edges = bytearray(target.map_size)
+    target.use_map(edges)
+    for data in inputs:
+        edges[:] = bytes(len(edges))
+        if target.run(data):
+            failing.append(data)
+        else:
+            (passing if any(edges) else silent).append(data)
+    return failing, passing, silent
+
+
+def _run(campaign: Campaign, image: Image, asked: Asked) -> int:
+    """The campaign to its end, whatever ends it; the exit code."""
+    stopped: BaseException | None = None
+    left = 0
+    with FuzzProgress(image.path.name, asked.time_s, asked.quiet) as progress:
+        try:
+            campaign.run(asked.time_s, progress.show)
+            left = campaign.finish(progress.show, AFTER_S)
+        except (KeyboardInterrupt, Terminated) as error:
+            stopped = error
+            if isinstance(error, KeyboardInterrupt):
+                complain(f"interrupted; looking for {INTERRUPTED_S:.0f} s at most at what is left")
+            left = campaign.finish(
+                progress.show, INTERRUPTED_S if isinstance(error, KeyboardInterrupt) else 1.0
+            )
+        except PartError as error:
+            stopped = BadInput("", "--expect", f"{error.what}; the campaign has ended", error.remedy)
+            stopped.__cause__ = error
+        except BadInput as error:  # of the engine: what was found until then is told first
+            stopped = error
+            with suppress(BadInput, PartError):
+                left = campaign.finish(progress.show, INTERRUPTED_S)
+    ended = Ended(left=left, complete=stopped is None, checks=asked.checks)
+    code = report(campaign, image, asked.out, asked.covering, ended, asked.quiet)
+    if stopped is not None:
+        raise stopped
+    return code
+
+
+def _teller(quiet: bool) -> Any:
+    def tell(find: Find) -> None:
+        kind = "found" if find.confirmed else "found, but not confirmed in a World"
+        complain(f"{kind}: {find.name}: {find.verdict}")
+
+    return (lambda find: None) if quiet else tell
+
+
+def _expected(checks: tuple[str, ...]) -> dict[str, Any]:
+    """The checks of --expect as a table. Raises BadInput for one that there is not, or with wrong parameters."""
+    if not checks:
+        return {}
+    refuse_files(checks)
+    settings = [as_setting(text) for text in checks]
+    return dict(changed(silent_scenario(()), "fuzz", settings, expectations_of).expect)
+
+
+def _covering(symbol: str | None, image: Image) -> Covering | None:
+    """Where the function begins. Raises BadInput for one that is not there."""
+    if symbol is None:
+        return None
+    found = image.symbols.find(symbol)
+    if found is None or found.space != "code":
+        if not image.symbols.names:
+            remedy = "put the .map or .cdb that the linker wrote beside the image"
+            raise BadInput(image.path, f"--covering {symbol}", "the image has no symbols", remedy)
+        from difflib import get_close_matches
+
+        functions = [name for name, one in image.symbols.names.items() if one.space == "code"]
+        close = get_close_matches(symbol, functions, n=1)
+        remedy = f"did you mean {close[0]}?" if close else "`mirotwin fw disasm` lists the functions"
+        raise BadInput(image.path, f"--covering {symbol}", "there is no such function", remedy)
+    return Covering(symbol, found.address)
+
+
+def _check_at_rest(target: Target, image: Image) -> None:
+    """Raises BadInput for firmware in which something is wrong before it has heard anything."""
+    target.run(b"")
+    finding = target.finding
+    harness = getattr(target, "harness", None)
+    if harness is not None and not harness.sleeps:
+        complain(
+            f"{image.path}: never sleeps (IDL); each run goes on for {AWAKE_MS} ms behind its last character"
+        )
+    if finding is not None:
+        what = f"fails before it has heard anything: {finding.check}: {finding.what}"
+        raise BadInput(image.path, "", what, "mend that first: each input would find it")
+
+
+def _jobs(jobs: int | None) -> int:
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, cores - 1) if jobs is None else jobs

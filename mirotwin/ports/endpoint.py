@@ -1,0 +1,110 @@
+"""What all live ports have in common: one client at a time, a bounded buffer towards it, and counts of what passed.
+
+What belongs here: buffers, counts, and what is told when a client comes and goes. What does not: sockets and terminals
+(`sockets`, `rfc2217`, `terminal`), and when they are asked (`session`).
+
+Bytes from a client wait in the kernel until the transmit buffer has room, so a client that is too fast is held up, and
+nothing is lost. Bytes for a client that does not read them wait here, 64 KiB of them; what comes then is dropped and
+counted, as by a serial port's driver: the robots do not wait.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from selectors import BaseSelector
+
+import msgspec
+
+from mirotwin.ports.bounded import Bounded
+from mirotwin.ports.radio_port import RadioPort
+from mirotwin.report.live import Plug
+
+CHUNK_BYTES = 4096
+Tell = Callable[[str], object]
+"""Takes a line for the user."""
+
+
+class Place(msgspec.Struct, frozen=True):
+    """What all endpoints are made with: the port behind, the selector that wakes the session, who is told."""
+
+    port: RadioPort
+    selector: BaseSelector
+    tell: Tell
+
+
+class Endpoint:
+    """A port that programs open: its `kind`, `where` it is, and `client`, who is there ("": nobody)."""
+
+    kind = ""
+
+    def __init__(self, place: Place, where: str) -> None:
+        self.port = place.port
+        self.selector = place.selector
+        self.tell = place.tell
+        self.where = where
+        self.name = f"{self.kind} {where}"
+        self.client = ""
+        self.out = Bounded()
+        self.clients = self.refused = 0
+        self.bytes_in = self.bytes_out = self.dropped = 0
+        self._client_bytes = (0, 0)
+
+    def receive(self) -> bytes:
+        """What the client has sent, at most what the transmit buffer has room for. Notices who comes and goes."""
+        raise NotImplementedError
+
+    def push(self) -> None:
+        """Hands the client as much as it takes."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Takes the port away."""
+        raise NotImplementedError
+
+    def exchange(self) -> None:
+        """The client's bytes to the radio."""
+        data = self.receive()
+        if data:
+            self.bytes_in += len(data)
+            self.port.send(data)
+
+    def deliver(self, data: bytes) -> None:
+        """What the PC has heard, to the client if one is there."""
+        if self.client:
+            full = self.out.dropped
+            self.out.add(data)
+            if self.out.dropped and not full:
+                self.tell(
+                    f"{self.name}: {self.client} does not read; {len(self.out)} bytes wait, more are dropped"
+                )
+
+    def plug(self) -> Plug:
+        """The counts, for the summary."""
+        return Plug(
+            name=self.name,
+            clients=self.clients,
+            refused=self.refused,
+            bytes_in=self.bytes_in,
+            bytes_out=self.bytes_out,
+            dropped=self.dropped + self.out.dropped,
+        )
+
+    # ---- for derived classes -----------------------------------------------------------------------------
+
+    def has_come(self, client: str) -> None:
+        self.client = client
+        self.clients += 1
+        self._client_bytes = self.bytes_in, self.bytes_out
+        self.tell(f"{self.name}: {client} is there")
+
+    def has_gone(self, why: str = "has gone") -> None:
+        """Forgets what waits for the client."""
+        counted_in, counted_out = self._client_bytes
+        lost = len(self.out)
+        text = f"{self.bytes_in - counted_in} bytes came from it, {self.bytes_out - counted_out} went to it"
+        if self.out.dropped or lost:
+            text += f", {self.out.dropped + lost} that it did not read are dropped"
+        self.tell(f"{self.name}: {self.client} {why}; {text}")
+        self.dropped += self.out.dropped + lost
+        self.client = ""
+        self.out = Bounded()

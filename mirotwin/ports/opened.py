@@ -1,0 +1,116 @@
+"""The world behind an open `miro://` port, and the files that it leaves.
+
+What belongs here: making the world that a URL asks for, and recording it. What does not: the port.
+"""
+
+from __future__ import annotations
+
+import atexit
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import NoReturn
+
+from serial.serialutil import SerialException
+
+from miro_exact.bad_input import BadInput
+from miro_exact.inputs import check_regular
+from miro_robot.firmware import image_path
+from miro_robot.image import Image, load_hex
+from miro_sim.periods import Period
+from miro_sim.scenario.file import ScenarioText
+from miro_sim.world.world import World
+from mirotwin.ports.live import live_scenario
+from mirotwin.ports.url import Target
+from mirotwin.recording.recorder import Recorder
+from mirotwin.recording.source import source_of
+from mirotwin.rerun import runner
+from mirotwin.rerun.pacing import Every
+from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder
+
+FLUSH_S = 0.2
+
+
+class Opened:
+    """A world at tick 0 and, with `folder`, its recording until `close`."""
+
+    def __init__(self, world: World, text: ScenarioText, seed: int, folder: OutputFolder | None) -> None:
+        self.world = world
+        self._files = ExitStack()
+        self._recorder: Recorder | None = None
+        self._flush = Every(FLUSH_S)
+        if folder is not None:
+            self._record(text, seed, folder)
+
+    def _record(self, text: ScenarioText, seed: int, folder: OutputFolder) -> None:
+        source = source_of(text, self.world)
+        with ExitStack() as files:
+            files.enter_context(folder)
+            folder.keep = KEPT
+            stream = files.enter_context(folder.part(RECORDING).open("wb", buffering=0))
+            self._recorder = files.enter_context(Recorder(stream, source))
+            self._files = files.pop_all()
+        self.world.observers.append(self._keep)
+
+    def _keep(self, period: Period) -> None:
+        assert self._recorder is not None
+        try:
+            self._recorder.write(period)
+            if self._flush.due():
+                self._recorder.flush()
+        except OSError as error:
+            self._break_off(error)
+
+    def _break_off(self, error: OSError) -> NoReturn:
+        """What was recorded stays, as a part."""
+        self._recorder = None
+        self.world.observers.remove(self._keep)
+        try:
+            self._files.__exit__(type(error), error, error.__traceback__)
+        except (BadInput, OSError) as told:
+            raise SerialException(str(told)) from None
+        raise error
+
+    def close(self) -> None:
+        """Ends the control period and the recording, whose file then has its name. Raises SerialException."""
+        if self._recorder is None:
+            return
+        if self.world.in_period and not self.world.stopped:
+            self.world.run_to(self.world.period_end)
+        try:
+            for network, slot, faults in runner.faults_by_robot(self.world):
+                self._recorder.write_faults(network, slot, faults)
+            self._recorder.flush()
+        except OSError as error:
+            self._break_off(error)
+        self._recorder = None
+        try:
+            self._files.close()
+        except (BadInput, OSError) as told:
+            raise SerialException(str(told)) from None
+
+
+def _image(path: str) -> Image:
+    """The one that is named, or the robot's own."""
+    if not path:
+        return load_hex(image_path())
+    if not Path(path).exists():
+        raise BadInput(path, "", "there is no such file", "give the path of an .ihx or .hex file")
+    check_regular(path)
+    return load_hex(Path(path))
+
+
+def opened(target: Target, at_exit: Callable[[], object]) -> Opened:
+    """The world that `target` asks for. A program that records and ends without closing calls `at_exit`.
+
+    Raises BadInput, or ValueError for a network that the scenario does not have.
+    """
+    text = live_scenario(target.scenario, target.settings)
+    image = _image(target.firmware)
+    world = World(text.scenario, target.seed, image)
+    world.earliest_tick(target.network)  # refuses a network that is not there
+    if not target.out:
+        return Opened(world, text, target.seed, None)
+    found = Opened(world, text, target.seed, OutputFolder(Path(target.out)))
+    atexit.register(at_exit)
+    return found

@@ -1,0 +1,90 @@
+"""The two ways in which time passes for a program that holds a world: in its calls, or by the wall clock.
+
+What belongs here: moving a world and its port on. What does not: what a call waits for (`serial_port`), and the wall
+clock itself (`pacing`).
+"""
+
+from __future__ import annotations
+
+import logging
+from contextlib import suppress
+from typing import Protocol
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND, seconds
+from miro_sim.world.conditions import Heard
+from miro_sim.world.waits import WaitExpired
+from mirotwin.ports.bounded import Bounded
+from mirotwin.ports.radio_port import RadioPort
+from mirotwin.rerun.pacing import Pace
+
+CATCH_UP_S = 0.25
+"""A call that finds the world behind works on that for so long; the rest is left to later ones."""
+
+_log = logging.getLogger("mirotwin.ports")
+
+
+class Passing(Protocol):
+    """How time passes. `inbox` gets what the PC hears."""
+
+    def catch_up(self) -> None:
+        """Before a call looks at anything: to where the world should be now."""
+
+    def advance(self, tick: int, for_byte: bool) -> None:
+        """Towards `tick`; with `for_byte` not beyond the next byte heard. The caller asks again until it is content."""
+
+    def rest(self, tick: int) -> None:
+        """Between two of these, without the world: other threads take their turns."""
+
+
+class InCalls:
+    """Virtual time: nothing passes between calls, and a call takes no longer than computing takes."""
+
+    def __init__(self, port: RadioPort, inbox: Bounded) -> None:
+        self.port = port
+        self.inbox = inbox
+
+    def catch_up(self) -> None:
+        self.inbox.add(self.port.heard())
+
+    def advance(self, tick: int, for_byte: bool) -> None:
+        world = self.port.world
+        tick = min(tick, world.tick + CONTROL_PERIOD_TICKS)
+        if for_byte:
+            with suppress(WaitExpired):
+                world.run_until(Heard(network=self.port.network), within=tick - world.tick)
+        else:
+            world.run_to(tick)
+        self.catch_up()
+
+    def rest(self, tick: int) -> None:
+        """No time to pass."""
+
+
+class ByWallClock:
+    """Real time: the world stands where the wall clock says, as often as a call comes, and a wait is one."""
+
+    def __init__(self, port: RadioPort, inbox: Bounded, pace: Pace) -> None:
+        self.port = port
+        self.inbox = inbox
+        self.pace = pace
+        self._told_ticks = 0
+
+    def catch_up(self) -> None:
+        world = self.port.world
+        due = self.pace.tick()
+        latest = due + int(CATCH_UP_S * self.pace.factor * TICKS_PER_SECOND)
+        while world.tick < due and not world.stopped and self.pace.tick() < latest:
+            world.run_to(min(due, world.tick + CONTROL_PERIOD_TICKS))
+            self.inbox.add(self.port.heard())
+        now = self.pace.tick()
+        if self.pace.note(world.tick, world.tick, now) and now - world.tick >= 2 * self._told_ticks:
+            self._told_ticks = now - world.tick
+            _log.warning(
+                "tick %d: %.0f ms behind the wall clock", world.tick, 1000.0 * seconds(now - world.tick)
+            )
+
+    def advance(self, tick: int, for_byte: bool) -> None:
+        """Only the wall clock does that."""
+
+    def rest(self, tick: int) -> None:
+        self.pace.sleep_until(min(tick, self.port.world.tick + HOST_CHARACTER_TICKS))

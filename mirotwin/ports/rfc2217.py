@@ -1,0 +1,97 @@
+"""A radio's port behind RFC 2217: TCP with telnet negotiation of baud rate, format and lines, as `rfc2217://` speaks.
+
+What belongs here: the negotiation, by pyserial's `PortManager`, and what of it this radio's port has. What does not:
+connections (`sockets`).
+
+Rate and format: 9600 8N1 and nothing else; another one is answered with what there is, and the client raises. Flow
+control, DTR, RTS and BREAK are acknowledged and have no effect: the radio module has no such wires, and no break gets
+through it. CTS, DSR and CD are active. Negotiation that makes no sense is ignored and counted.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+from serial import rfc2217
+from serial.serialutil import EIGHTBITS, PARITY_NONE, STOPBITS_ONE
+
+from mirotwin.ports.endpoint import Place
+from mirotwin.ports.sockets import TcpEndpoint
+
+BAUD = 9600
+LONGEST_SUBOPTION = 256
+NONSENSE = (struct.error, TypeError, ValueError, KeyError, IndexError)
+"""What `PortManager` raises for a command that is cut short or has values that are none."""
+
+
+class Rfc2217Endpoint(TcpEndpoint):
+    """`ignored`: commands of all clients that made no sense."""
+
+    kind, scheme = "rfc2217", "rfc2217"
+
+    def __init__(self, place: Place, host: str, number: int) -> None:
+        super().__init__(place, host, number)
+        self.ignored = 0
+        self._manager: Any = None
+
+    def greet(self) -> None:
+        self._told = False
+        self._manager = rfc2217.PortManager(_Line(self), self)
+
+    def heard_from(self, data: bytes) -> bytes:
+        manager = self._manager
+        found = bytearray()
+        for value in data:
+            try:
+                for byte in manager.filter(bytes([value])):
+                    found += byte
+                if manager.suboption is not None and len(manager.suboption) > LONGEST_SUBOPTION:
+                    raise ValueError("a suboption that does not end")
+            except NONSENSE:
+                self._ignore()
+        return bytes(found)
+
+    def _ignore(self) -> None:
+        self._manager.suboption = None
+        self._manager.mode = rfc2217.M_NORMAL
+        self.ignored += 1
+        if not self._told:
+            self._told = True
+            self.tell(f"{self.name}: {self.client} negotiates nonsense, which is ignored")
+
+    def said_to(self, data: bytes) -> bytes:
+        return b"".join(self._manager.escape(data))
+
+
+class _Line:
+    """The port as `PortManager` sees it: settings that can be read, of which none can be changed."""
+
+    cts = dsr = cd = True
+    ri = False
+    xonxoff = rtscts = dtr = rts = break_condition = False
+
+    def __init__(self, endpoint: Rfc2217Endpoint) -> None:
+        self._endpoint = endpoint
+
+    @staticmethod
+    def _fixed(value: object) -> property:
+        def get(line: _Line) -> object:
+            return value
+
+        def put(line: _Line, wanted: object) -> None:
+            if wanted != value:
+                raise ValueError(f"this radio's port has {value}")
+
+        return property(get, put)
+
+    baudrate = _fixed(BAUD)
+    bytesize = _fixed(EIGHTBITS)
+    parity = _fixed(PARITY_NONE)
+    stopbits = _fixed(STOPBITS_ONE)
+
+    def reset_input_buffer(self) -> None:
+        self._endpoint.out.clear()
+
+    def reset_output_buffer(self) -> None:
+        self._endpoint.port.purge()

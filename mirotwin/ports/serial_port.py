@@ -1,0 +1,312 @@
+"""`miro://` for pyserial: a robot behind its radio, in the process of the program that opens it.
+
+What belongs here: what pyserial's `Serial` promises, over a world. What does not: the URL (`url`), how time passes
+(`passing`), the port itself (`radio_port`), and how pyserial finds this class (`protocol_miro`).
+
+Each `open` is a robot that is switched on: virtual time begins at 0 and nothing is kept of the port's last use.
+
+    read(n)          time passes until n bytes are there, up to `timeout` (None: for ever), or up to
+                     `inter_byte_timeout` behind a byte; it stands at the tick at which the last of them was known
+    read, timeout 0  what is there; no time passes
+    in_waiting       what is there; no time passes
+    write(data)      none passes while the transmit buffer (4096 characters) has room; else until it has, up to
+                     `write_timeout`
+    flush, close     until everything is sent
+    sleep, others    none passes
+
+With `realtime=1` it passes by the wall clock instead, also between calls, and calls wait for it.
+
+Long because pyserial wants one class with all of it.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+from serial.serialutil import (
+    EIGHTBITS,
+    PARITY_NONE,
+    STOPBITS_ONE,
+    PortNotOpenError,
+    SerialBase,
+    SerialException,
+    SerialTimeoutException,
+    to_bytes,
+)
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import HOST_CHARACTER_TICKS, NEVER_TICK, seconds, ticks
+from miro_robot.faults import FirmwareFault
+from miro_sim.world.world import World
+from mirotwin.ports.bounded import Bounded
+from mirotwin.ports.opened import Opened, opened
+from mirotwin.ports.passing import ByWallClock, InCalls, Passing
+from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
+from mirotwin.ports.url import parse_url
+from mirotwin.rerun.pacing import Pace, Turns
+
+BAUD = 9600
+POLLS = 1000
+"""After so many in a row that find nothing while no time passes, a warning says why."""
+
+
+class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
+    """A port of pyserial; see the head of this file. `world`: the world behind it while it is open."""
+
+    BAUDRATES = (BAUD,)
+    is_open: bool
+
+    def __init__(self, *args: Any, **named: Any) -> None:
+        self._turn = Turns()
+        self._opened: Opened | None = None
+        self._cancel_read = self._cancel_write = False
+        self._polls = 0
+        super().__init__(*args, **named)
+
+    @property
+    def world(self) -> World:
+        """The world behind the open port. Raises PortNotOpenError."""
+        return self._there().world
+
+    # ---- opening -----------------------------------------------------------------------------------------
+
+    def open(self) -> None:
+        """Makes the world. Raises SerialException for a URL, scenario, image or folder that cannot be used."""
+        if self._port is None:
+            raise SerialException("Port must be configured before it can be used.")
+        if self.is_open:
+            raise SerialException("Port is already open.")
+        self._reconfigure_port()
+        try:
+            target = parse_url(self._port)
+            self._opened = opened(target, self.close)
+        except (BadInput, OSError, ValueError) as error:
+            raise SerialException(str(error)) from None
+        world = self._opened.world
+        port = self._radio = RadioPort(world, target.network)
+        self._inbox = Bounded()
+        self._limit_tick = ticks(target.limit_s)
+        self._passing: Passing
+        if target.realtime:
+            self._passing = ByWallClock(port, self._inbox, Pace(target.realtime))
+        else:
+            self._passing = InCalls(port, self._inbox)
+        self._polling = not target.realtime
+        self.is_open = True
+
+    def close(self) -> None:
+        """Sends what waits, and ends the control period, so that a recording holds it."""
+        if not self.is_open:
+            return
+        there = self._there()
+        try:
+            if not self._why_over():
+                self._drain(None)
+        except SerialException:  # the run ended meanwhile: nobody is left who could hear it
+            pass
+        finally:
+            self.is_open = False
+            with self._turn:
+                self._opened = None
+                there.close()
+
+    def _reconfigure_port(self) -> None:
+        """Raises ValueError for anything that the port of this radio is not: it has one rate and one format."""
+        if self._baudrate != BAUD:
+            raise ValueError(f"{self._baudrate} baud: the port of this radio has {BAUD}")
+        if (self._bytesize, self._parity, self._stopbits) != (EIGHTBITS, PARITY_NONE, STOPBITS_ONE):
+            raise ValueError("the port of this radio has 8 data bits, no parity and 1 stop bit")
+        if self._xonxoff:
+            raise ValueError("xonxoff: frames hold all byte values, also 11h and 13h")
+
+    # ---- reading -----------------------------------------------------------------------------------------
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that are there."""
+        with self._turn:
+            self._there()
+            self._passing.catch_up()
+            self._note_poll(len(self._inbox))
+            return len(self._inbox)
+
+    @property
+    def overruns(self) -> int:
+        """Bytes that came while 65536 waited to be read, and were dropped."""
+        self._there()
+        return self._inbox.dropped
+
+    def read(self, size: int = 1) -> bytes:
+        """See the head of this file. Raises SerialException once the run is over and all is read."""
+        world = self._there().world
+        deadline = gap_end = NEVER_TICK
+        first, there = True, 0
+        while True:
+            with self._turn:
+                self._there()
+                self._passing.catch_up()
+                if first and self._timeout is not None:
+                    deadline = world.tick + ticks(self._timeout)
+                if self._inter_byte_timeout is not None and len(self._inbox) > there:
+                    there = len(self._inbox)
+                    gap_end = world.tick + ticks(self._inter_byte_timeout)
+                if self._read_ends(size, min(deadline, gap_end)):
+                    return self._inbox.take(size)
+                tick = min(deadline, gap_end, self._limit_tick)
+                self._passing.advance(tick, for_byte=True)
+            self._passing.rest(tick)
+            first = False
+
+    def _read_ends(self, size: int, deadline: int) -> bool:
+        world = self._there().world
+        if len(self._inbox) >= size:
+            return True
+        if self._cancel_read:
+            self._cancel_read = False
+            return True
+        why = self._why_over()
+        if why and not self._inbox:
+            raise SerialException(why)
+        if why or world.tick >= deadline:
+            self._note_poll(len(self._inbox) or self._timeout)
+            return True
+        self._polls = 0
+        return False
+
+    def cancel_read(self) -> None:
+        """The read of another thread, or else the next one, returns what is there."""
+        self._cancel_read = True
+
+    def reset_input_buffer(self) -> None:
+        with self._turn:
+            self._there()
+            self._passing.catch_up()
+            self._inbox.clear()
+
+    # ---- writing -----------------------------------------------------------------------------------------
+
+    def write(self, data: Any) -> int:
+        """See the head of this file. Raises SerialTimeoutException where the buffer has no room in time."""
+        data = to_bytes(data)
+        world = self._there().world
+        deadline = NEVER_TICK
+        sent, first = 0, True
+        while True:
+            with self._turn:
+                self._there()
+                self._passing.catch_up()
+                if first and self._write_timeout is not None:
+                    deadline = world.tick + ticks(self._write_timeout)
+                if why := self._why_over():
+                    raise SerialException(why)
+                if taken := data[sent : sent + self._radio.room]:
+                    self._radio.send(taken)
+                    sent += len(taken)
+                    self._polls = 0
+                if sent == len(data) or self._cancel_write:
+                    self._cancel_write = False
+                    return sent
+                if world.tick >= deadline:
+                    if self._write_timeout == 0:
+                        return sent
+                    raise SerialTimeoutException("Write timeout")
+                wanted = min(len(data) - sent, TRANSMIT_CHARACTERS)
+                room_tick = self._radio.free_tick - (TRANSMIT_CHARACTERS - wanted) * HOST_CHARACTER_TICKS
+                tick = min(deadline, max(room_tick, world.tick + 1), self._limit_tick)
+                self._passing.advance(tick, for_byte=False)
+            self._passing.rest(tick)
+            first = False
+
+    def cancel_write(self) -> None:
+        """The write of another thread, or else the next one, returns how much it has written."""
+        self._cancel_write = True
+
+    def flush(self) -> None:
+        """Waits until everything is sent. Raises SerialException where the run ends before."""
+        self._there()
+        self._drain(self._write_timeout)
+
+    def _drain(self, timeout_s: float | None) -> None:
+        deadline = NEVER_TICK
+        while True:
+            with self._turn:
+                world = self._there().world
+                self._passing.catch_up()
+                if deadline == NEVER_TICK and timeout_s is not None:
+                    deadline = world.tick + ticks(timeout_s)
+                if not self._radio.waiting:
+                    return
+                if why := self._why_over():
+                    raise SerialException(why)
+                if world.tick >= deadline:
+                    raise SerialTimeoutException("Write timeout")
+                tick = min(self._radio.free_tick, deadline, self._limit_tick)
+                self._passing.advance(tick, for_byte=False)
+            self._passing.rest(tick)
+
+    @property
+    def out_waiting(self) -> int:
+        """Characters that are not sent yet."""
+        with self._turn:
+            self._there()
+            self._passing.catch_up()
+            return self._radio.waiting
+
+    def reset_output_buffer(self) -> None:
+        """Takes back what has not begun to be sent."""
+        with self._turn:
+            self._there()
+            self._passing.catch_up()
+            self._radio.purge()
+
+    # ---- lines that a radio does not have ----------------------------------------------------------------
+
+    @property
+    def cts(self) -> bool:
+        """Always active, as DSR and CD are; RI never is."""
+        self._there()
+        return True
+
+    dsr = cd = cts
+
+    @property
+    def ri(self) -> bool:
+        self._there()
+        return False
+
+    def _update_break_state(self) -> None:
+        """A break does not get through the radio module."""
+
+    def _update_rts_state(self) -> None:
+        """Not connected."""
+
+    def _update_dtr_state(self) -> None:
+        """Not connected."""
+
+    # ---- within ------------------------------------------------------------------------------------------
+
+    def _there(self) -> Opened:
+        if self._opened is None:
+            raise PortNotOpenError()
+        return self._opened
+
+    def _why_over(self) -> str:
+        """Why no more time passes, if so."""
+        world = self._there().world
+        if world.stopped:
+            fault: FirmwareFault = world.faults[0]
+            return f"the run has stopped: firmware fault: {fault}"
+        if world.tick >= self._limit_tick:
+            return f"the limit of {seconds(self._limit_tick):g} s of virtual time is reached (limit_s)"
+        return "the day that a world may last is over" if world.finished else ""
+
+    def _note_poll(self, found: object) -> None:
+        self._polls = 0 if found else self._polls + self._polling
+        if self._polls == POLLS:
+            warnings.warn(
+                f"{POLLS} times in a row nothing was there, and no time passed: in_waiting and reads with timeout 0"
+                " let none pass; use realtime=1 in the URL for programs that poll",
+                RuntimeWarning,
+                stacklevel=3,
+            )

@@ -1,0 +1,163 @@
+"""`mirotwin serve`: a live session, from its ports to its files."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from selectors import DefaultSelector
+
+import click
+
+from miro_exact.seed import MAX_SEED
+from miro_sim.world.world import World
+from mirotwin.firmware.held_signals import held_signals
+from mirotwin.ports.live import LONGEST_S, live_scenario
+from mirotwin.ports.serve_ports import Wanted, open_ports, ports_option
+from mirotwin.ports.session import Session
+from mirotwin.ports.url import FASTEST
+from mirotwin.recording.source import source_of
+from mirotwin.report.live import Live
+from mirotwin.rerun.pacing import Pace
+from mirotwin.run.run_command import report_faults
+from mirotwin.run.run_files import RunFiles
+from mirotwin.shell.options import (
+    Number,
+    Place,
+    Whole,
+    choose_engine,
+    engine_option,
+    firmware_option,
+    load_image,
+    plain_parameters,
+    set_option,
+)
+from mirotwin.shell.outputs import FILES, KEPT, RECORDING, OutputFolder
+from mirotwin.shell.program import complain, show_line, tell_notes
+from mirotwin.shell.progress import ProgressBar
+from mirotwin.shell.times import Time, TimeType
+from mirotwin.verify.cases.case import case_of_checks, case_text
+from mirotwin.verify.cases.trace import Trace
+from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.expectations import expect_option, report_failures
+
+CASE = "case.stream"
+
+
+@click.command(short_help="Offers the robot's radio as PTY, TCP and RFC 2217 ports.")
+@click.argument("scenario")
+@ports_option
+@click.option(
+    "--realtime",
+    type=Number(0.0, FASTEST, min_open=True),
+    default=1.0,
+    show_default=True,
+    help="Virtual seconds in a second of the wall clock.",
+)
+@click.option(
+    "--duration",
+    type=TimeType(positive=True, longest_s=LONGEST_S),
+    default=f"{LONGEST_S:.0f}s",
+    help="Ends after so much virtual time, such as 30s. Default: a day.",
+)
+@click.option("--once", is_flag=True, help="Ends when a client was there and none is left.")
+@click.option(
+    "--out", type=Place(path_type=Path), help="Folder for the files. Default: runs/SCENARIO-SEED-live."
+)
+@click.option(
+    "--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Master seed of all noise."
+)
+@set_option("A key to set in the scenario, as for `run`.")
+@expect_option
+@firmware_option("Image to run instead of the robot's own.")
+@engine_option
+@click.option(
+    "--force", is_flag=True, help="Replace the files of an earlier session in the folder, and its link."
+)
+@click.option(
+    "-q", "--quiet", is_flag=True, help="Do not tell who comes and goes, and how late the world is."
+)
+def serve(
+    scenario: str,
+    pty: tuple[tuple[str, int], ...],
+    tcp: tuple[tuple[int, int], ...],
+    rfc2217: tuple[tuple[int, int], ...],
+    host: str,
+    realtime: float,
+    duration: Time,
+    once: bool,
+    out: Path | None,
+    seed: int,
+    settings: tuple[str, ...],
+    expected: tuple[str, ...],
+    firmware: str | None,
+    engine: str | None,
+    force: bool,
+    quiet: bool,
+) -> int:
+    """Runs SCENARIO by the wall clock; programs are its PC. Each port is the serial port of the PC's radio.
+
+    A line on stdout names each port, and `serving` follows. All ports may be used at once, each by one client: all hear
+    the robots, all may send. A port of another network than the first is asked for as PORT@NETWORK or LINK@NETWORK.
+
+    run.mcap and summary.json are those of `run`; `mirotwin replay run.mcap` sends the same bytes at the same ticks.
+    Ctrl-C and SIGTERM leave run.part.mcap and summary.part.json, which hold all control periods up to then, and
+    case.part.stream: what was sent, as text. So does a check that fails (case.stream).
+
+    Exit code 1: a check failed; 3: the firmware did what it must not.
+    """
+    active = choose_engine(engine)
+    text = live_scenario(scenario, (*settings, *expected), expectations_of)
+    tell_notes(text.notes)
+    default = Path("runs") / f"{text.scenario.name}-{seed}-live"
+    folder = OutputFolder(out or default, force, (*FILES, CASE), ours=out is None)
+    image = load_image(firmware)
+    with plain_parameters(text.origin):
+        world = World(text.scenario, seed, image)
+    source = source_of(text, world)
+    trace, checks = Trace(world), Checks(world, expectations_of(text.scenario, text.origin))
+    wanted = Wanted(pty, tcp, rfc2217, host, force)
+
+    def tell(line: str) -> None:
+        if not quiet:
+            complain(line)
+
+    with (
+        plain_parameters(text.origin),
+        held_signals() as hold,
+        folder,
+        DefaultSelector() as selector,
+        open_ports(wanted, world, selector, tell) as ports,
+    ):
+        for port in ports:
+            show_line(f"{port.kind} {port.where}")
+        show_line("serving")
+        session = Session(world, Pace(realtime), selector, ports, tell, duration.ticks(), once)
+        run_files = RunFiles(folder, source, world, active, hold, checks, text.settings, session=session)
+        try:
+            summary = run_files.fill(ProgressBar("serving", None, quiet=True), None)
+            if checks.failures:
+                _leave_case(folder, world, trace, checks)
+        except BaseException:
+            if world.index:
+                folder.keep = (*KEPT, CASE)
+                with suppress(OSError):  # a full disk, which is told as what ended the session
+                    _leave_case(folder, world, trace, checks)
+            raise
+        finally:
+            tell(_paced(session.live()))
+    tell(f"{summary.simulated_s:.2f} s are in {folder.path / RECORDING}")
+    failed = report_failures(checks)
+    return report_faults(world) or failed
+
+
+def _leave_case(folder: OutputFolder, world: World, trace: Trace, checks: Checks) -> None:
+    """What was sent as one text file, with the check that failed if one did; `mirotwin replay` runs it again."""
+    text = case_of_checks(world, trace, checks) if checks.failures else case_text(world, trace, {}, "")
+    folder.part(CASE).write_text(text, encoding="utf-8")
+
+
+def _paced(live: Live) -> str:
+    """How far the world was behind."""
+    most = f"at most {live.late_max_ms:.1f} ms behind the wall clock"
+    return f"{most}; by 20 ms or more for {live.late_s:.2f} s" if live.late_s else most

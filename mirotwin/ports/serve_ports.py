@@ -1,0 +1,150 @@
+"""The ports that `mirotwin serve` is asked for: their options, and opening them.
+
+What belongs here: words of the command line. What does not: what a port does (`mirotwin.ports`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from selectors import BaseSelector
+from typing import Any, TypeVar
+
+import click
+import msgspec
+
+from miro_exact.bad_input import BadInput, shortened
+from miro_sim.world.world import World
+from mirotwin.ports import endpoint
+from mirotwin.ports.endpoint import Endpoint, Tell
+from mirotwin.ports.radio_port import RadioPort
+from mirotwin.ports.rfc2217 import Rfc2217Endpoint
+from mirotwin.ports.sockets import TcpEndpoint
+from mirotwin.ports.terminal import PtyEndpoint
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+HIGHEST_PORT = 65_535
+LONGEST_NUMBER = 5
+HERE = "127.0.0.1"
+
+
+class PortNumber(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """NUMBER, or NUMBER@NETWORK; 0 stands for a free port."""
+
+    name = "port"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        number, at, network = str(value).partition("@")
+        plain = _is_number(number) and (not at or _is_number(network))
+        if not plain or int(number) > HIGHEST_PORT:
+            what = f"{shortened(repr(value))} is no port, such as 7000, or 7000@1 for network 1."
+            self.fail(what, param, ctx)
+        return int(number), int(network or 0)
+
+
+class Link(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """A path, or PATH@NETWORK; "" or @NETWORK for none."""
+
+    name = "link"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, int]:
+        path, at, network = str(value).rpartition("@")
+        return (path, int(network)) if at and _is_number(network) else (str(value), 0)
+
+
+class Host(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """An address to listen on. The empty one would be all of the machine's."""
+
+    name = "address"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        if not str(value).strip():
+            self.fail(
+                f"the address is empty; {HERE} is this machine, 0.0.0.0 is all its addresses.", param, ctx
+            )
+        return str(value)
+
+
+def _is_number(text: str) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) <= LONGEST_NUMBER
+
+
+class Wanted(msgspec.Struct, frozen=True):
+    """What was asked for: links and port numbers, each with its network."""
+
+    pty: Sequence[tuple[str, int]]
+    tcp: Sequence[tuple[int, int]]
+    rfc2217: Sequence[tuple[int, int]]
+    host: str
+    force: bool
+
+
+def ports_option(command: Command) -> Command:
+    """`--pty`, `--tcp`, `--rfc2217`, `--host`."""
+    for option in (
+        click.option(
+            "--host",
+            type=Host(),
+            default=HERE,
+            show_default=True,
+            help="Address on which TCP ports are opened.",
+        ),
+        click.option(
+            "--rfc2217",
+            type=PortNumber(),
+            multiple=True,
+            metavar="PORT",
+            help="TCP with telnet negotiation, `rfc2217://` of pyserial. 0: any free port.",
+        ),
+        click.option(
+            "--tcp",
+            type=PortNumber(),
+            multiple=True,
+            metavar="PORT",
+            help="TCP with the bytes as they are, `socket://` of pyserial. 0: any free port.",
+        ),
+        click.option(
+            "--pty",
+            type=Link(),
+            multiple=True,
+            is_flag=False,
+            flag_value="",
+            metavar="[LINK]",
+            help="A pseudo-terminal, and a symbolic link to it. The default where no port is asked for.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+@contextmanager
+def open_ports(wanted: Wanted, world: World, selector: BaseSelector, tell: Tell) -> Iterator[list[Endpoint]]:
+    """All of them, or none. Raises BadInput for one that cannot be had."""
+    radios = [RadioPort(world, network) for network in range(len(world.networks))]
+
+    def place(option: str, network: int) -> endpoint.Place:
+        if network >= len(radios):
+            what = f"there is no network {network}; there are {len(radios)}, from 0 on"
+            raise BadInput(option, "", what)
+        return endpoint.Place(radios[network], selector, tell)
+
+    pty = wanted.pty if wanted.pty or wanted.tcp or wanted.rfc2217 else [("", 0)]
+    with ExitStack() as closing:
+        found: list[Endpoint] = []
+
+        def opened(one: Endpoint) -> None:
+            closing.callback(one.close)
+            found.append(one)
+
+        for link, network in pty:
+            opened(PtyEndpoint(place("--pty", network), Path(link) if link else None, wanted.force))
+        for number, network in wanted.tcp:
+            opened(TcpEndpoint(place("--tcp", network), wanted.host, number))
+        for number, network in wanted.rfc2217:
+            opened(Rfc2217Endpoint(place("--rfc2217", network), wanted.host, number))
+        yield found

@@ -1,0 +1,180 @@
+"""A radio's port behind TCP: the bytes as they are.
+
+What belongs here: listening, one client, its bytes. What does not: telnet negotiation, which `rfc2217` adds.
+
+A second client is refused: its connection is closed at once and the user is told. A client that has shut down its
+sending side (`socat - TCP:..` at the end of its input) is there for half a second more, in which it gets answers,
+unless another one comes.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+from selectors import EVENT_READ, EVENT_WRITE
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import ticks
+from mirotwin.ports.endpoint import CHUNK_BYTES, Endpoint, Place
+
+LINGER_TICKS = ticks(0.5)
+MOST_WIRE_BYTES = 65_536
+"""What may wait in a connection's own words; a client that makes more of them without reading is put out."""
+
+
+class TcpEndpoint(Endpoint):
+    """Listens on `host`, `number` (0: any free one). Raises BadInput for an address that cannot be had."""
+
+    kind, scheme = "tcp", "socket"
+
+    def __init__(self, place: Place, host: str, number: int) -> None:
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        try:
+            self._listener = socket.create_server((host, number), family=family, backlog=8)
+        except OSError as error:
+            reason = os.strerror(error.errno) if error.errno and error.errno > 0 else f"{error}"
+            remedy = "choose another port, or 0 for a free one"
+            raise BadInput(f"--{self.kind} {number}", "", f"{host}: {reason}", remedy) from None
+        self._listener.setblocking(False)
+        shown = f"[{host}]" if ":" in host else host
+        super().__init__(place, f"{self.scheme}://{shown}:{self._listener.getsockname()[1]}")
+        self._socket: socket.socket | None = None
+        self._wire = bytearray()
+        self._input_over_tick = -1
+        self._watched = 0
+        self.selector.register(self._listener, EVENT_READ)
+
+    def receive(self) -> bytes:
+        self._accept()
+        over_tick = self._input_over_tick
+        if self._socket is None:
+            return b""
+        if over_tick >= 0:
+            if self.port.world.tick >= max(over_tick, self.port.free_tick) + LINGER_TICKS:
+                self._put_out()
+            return b""
+        data = self._read(min(CHUNK_BYTES, self.port.room))
+        self._watch()
+        return data
+
+    def _read(self, most: int) -> bytes:
+        assert self._socket is not None
+        if not most:
+            return b""
+        try:
+            data = self._socket.recv(most)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            self._put_out(f"has gone ({error.strerror or error})")
+            return b""
+        if not data:
+            self._input_over_tick = self.port.world.tick
+        return self.heard_from(data)
+
+    def push(self) -> None:
+        if self._socket is None:
+            return
+        if not self._wire and self.out:
+            taken = self.out.take(CHUNK_BYTES)
+            self.bytes_out += len(taken)
+            self._wire += self.said_to(taken)
+        if self._wire:
+            try:
+                del self._wire[: self._socket.send(self._wire)]
+            except BlockingIOError:
+                pass
+            except OSError as error:
+                self._put_out(f"has gone ({error.strerror or error})")
+                return
+        if len(self._wire) > MOST_WIRE_BYTES:
+            self._put_out("is put out: it makes answers and reads none")
+        self._watch()
+
+    def close(self) -> None:
+        if self._socket is not None:
+            self.push()
+        if self._socket is not None:
+            self._put_out("is left: the session ends")
+        self.selector.unregister(self._listener)
+        self._listener.close()
+
+    # ---- for what is more than bytes ---------------------------------------------------------------------
+
+    def greet(self) -> None:
+        """A client is there."""
+
+    def heard_from(self, data: bytes) -> bytes:
+        """What of the client's bytes is for the radio."""
+        return data
+
+    def said_to(self, data: bytes) -> bytes:
+        """How the radio's bytes go to the client."""
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Own words for the client."""
+        self._wire += data
+
+    # ---- connections -------------------------------------------------------------------------------------
+
+    def _accept(self) -> None:
+        try:
+            found, address = self._listener.accept()
+        except (BlockingIOError, ConnectionError):
+            return
+        client = f"{address[0]}:{address[1]}"
+        if self._socket is not None and self._input_over_tick >= 0:
+            self._put_out()
+        if self._socket is not None:
+            self.refused += 1
+            found.close()
+            self.tell(f"{self.name}: {client} is refused; {self.client} is there")
+            return
+        found.setblocking(False)
+        found.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        _keep_alive(found)
+        self._socket = found
+        self._input_over_tick = -1
+        self._wire = bytearray()
+        self.has_come(client)
+        self.greet()
+        self._watch()
+
+    def _put_out(self, why: str = "has gone") -> None:
+        assert self._socket is not None
+        if self._watched:
+            self.selector.unregister(self._socket)
+        self._watched = 0
+        self._socket.close()
+        self._socket = None
+        self.has_gone(why)
+
+    def _watch(self) -> None:
+        """Lets the selector wake for what can be done with the client now."""
+        if self._socket is None:
+            return
+        reads = self.port.room and self._input_over_tick < 0
+        wanted = (EVENT_READ if reads else 0) | (EVENT_WRITE if self._wire else 0)
+        if wanted == self._watched:
+            return
+        if not self._watched:
+            self.selector.register(self._socket, wanted)
+        elif not wanted:
+            self.selector.unregister(self._socket)
+        else:
+            self.selector.modify(self._socket, wanted)
+        self._watched = wanted
+
+
+def _keep_alive(found: socket.socket) -> None:
+    """A client that vanished without a word is gone after a minute: nobody else could come as long as it is there."""
+    found.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in (
+        ("TCP_KEEPIDLE", 30),
+        ("TCP_KEEPINTVL", 10),
+        ("TCP_KEEPCNT", 3),
+        ("TCP_USER_TIMEOUT", 60_000),  # ms; while an answer is on its way, the kernel does not probe
+    ):
+        if hasattr(socket, name):
+            found.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)

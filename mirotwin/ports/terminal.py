@@ -1,0 +1,180 @@
+"""A radio's port as a pseudo-terminal, which programs open as they open /dev/ttyUSB0.
+
+What belongs here: the terminal and the link to it. What does not: what passes through (`endpoint`).
+
+The kernel tells whether anybody has it open, not how many: two programs that open it share what comes, as they would a
+real port. It is raw, without echo, at 9600 baud, and made so again whenever it was closed; a terminal takes any baud
+rate, and one that is not the radio's is told once, because no rate has an effect here. What a program has not read when
+it closes is gone.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+from contextlib import suppress
+from pathlib import Path
+from selectors import EVENT_READ, EVENT_WRITE
+from typing import Any
+
+from miro_exact.bad_input import BadInput
+from mirotwin.ports.endpoint import CHUNK_BYTES, Endpoint, Place
+
+SOMEBODY = "a program"
+
+
+class PtyEndpoint(Endpoint):
+    """`link`: a symbolic link that is made to it, None for none. Raises BadInput where either cannot be had.
+
+    `force`: replaces a link to a terminal; one that leads nowhere is replaced anyway. A session that was killed leaves
+    its link, and the kernel may have given the terminal's number to another program. A link that a living session
+    serves is never replaced: that one holds the lock of `.NAME.lock` beside it.
+    """
+
+    kind = "pty"
+
+    def __init__(self, place: Place, link: Path | None, force: bool = False) -> None:
+        try:
+            import termios
+            import tty
+        except ImportError:
+            raise BadInput("--pty", "", "there are no pseudo-terminals on this system", "use --tcp") from None
+        self._termios: Any = termios
+        self._tty: Any = tty
+        self._master, slave = os.openpty()
+        self.path = os.ttyname(slave)
+        os.set_blocking(self._master, False)
+        self._make_raw()
+        os.close(slave)
+        self._link: Path | None = None
+        self._lock: int | None = None
+        if link is not None:
+            self._make_link(link, force)
+        super().__init__(place, self.path if link is None else f"{link}")
+        self._poll = select.poll()
+        self._poll.register(self._master, select.POLLIN)
+        self._watched = 0
+        self._told = False
+
+    def _make_raw(self) -> None:
+        self._tty.setraw(self._master)
+        modes = self._termios.tcgetattr(self._master)
+        modes[4] = modes[5] = self._termios.B9600
+        self._termios.tcsetattr(self._master, self._termios.TCSANOW, modes)
+
+    def _make_link(self, link: Path, force: bool) -> None:
+        try:
+            self._lock = _locked(_lock_of(link))
+            if link.is_symlink() and (not link.exists() or (force and _is_terminal(link))):
+                link.unlink()
+            link.symlink_to(self.path)
+        except BlockingIOError:
+            os.close(self._master)
+            what, remedy = "another session serves it", "end that one, or choose another link with --pty"
+            raise BadInput(link, "", what, remedy) from None
+        except OSError as error:
+            os.close(self._master)
+            if self._lock is not None:
+                _lock_of(link).unlink(missing_ok=True)
+            _unlock(self._lock)
+            what = "is there already" if isinstance(error, FileExistsError) else f"{error.strerror or error}"
+            remedy = "choose another link with --pty, or replace a link to a terminal with --force"
+            raise BadInput(link, "", what, remedy) from None
+        self._link = link
+
+    def receive(self) -> bytes:
+        events = 0
+        for _, found in self._poll.poll(0):
+            events |= found
+        data = b""
+        if events & select.POLLIN and self.port.room:
+            with suppress(BlockingIOError, OSError):
+                data = os.read(self._master, min(CHUNK_BYTES, self.port.room))
+        is_open = not events & select.POLLHUP
+        was_there = bool(self.client)
+        if not was_there and (data or is_open):
+            self._told = False
+            self.has_come(SOMEBODY)
+        if data and not self._told:
+            self._tell_speed()
+        if was_there and not is_open and not events & select.POLLIN:
+            self._hang_up()
+        self._watch()
+        return data
+
+    def _tell_speed(self) -> None:
+        self._told = True
+        if self._termios.tcgetattr(self._master)[5] != self._termios.B9600:
+            self.tell(f"{self.name}: {SOMEBODY} has set another baud rate; the radio has 9600")
+
+    def _hang_up(self) -> None:
+        self._watch(leave=True)
+        self.has_gone()
+        self._termios.tcflush(self._master, self._termios.TCIOFLUSH)
+        self._make_raw()
+
+    def push(self) -> None:
+        if not self.client or not self.out:
+            return
+        with suppress(BlockingIOError, OSError):  # nobody has it open any more, which `receive` notices
+            count = os.write(self._master, self.out.data[:CHUNK_BYTES])
+            self.bytes_out += count
+            self.out.take(count)
+        self._watch()
+
+    def close(self) -> None:
+        self._watch(leave=True)
+        if self.client:
+            self.has_gone("is left: the session ends")
+        if self._link is not None and self._link.is_symlink() and os.readlink(self._link) == self.path:
+            self._link.unlink()
+        if self._link is not None:
+            _lock_of(self._link).unlink(missing_ok=True)
+        _unlock(self._lock)
+        os.close(self._master)
+
+    def _watch(self, leave: bool = False) -> None:
+        """Lets the selector wake for the terminal while somebody has it open: a closed one would never let it sleep."""
+        reads = EVENT_READ if self.port.room else 0
+        wanted = reads | (EVENT_WRITE if self.out else 0) if self.client and not leave else 0
+        if wanted == self._watched:
+            return
+        if not self._watched:
+            self.selector.register(self._master, wanted)
+        elif not wanted:
+            self.selector.unregister(self._master)
+        else:
+            self.selector.modify(self._master, wanted)
+        self._watched = wanted
+
+
+def _is_terminal(link: Path) -> bool:
+    return os.path.dirname(os.readlink(link)) == "/dev/pts"
+
+
+def _lock_of(link: Path) -> Path:
+    return link.with_name(f".{link.name}.lock")
+
+
+def _locked(path: Path) -> int:
+    """The descriptor that holds the lock; it is free once that is closed or the process is gone.
+
+    Raises BlockingIOError where another process has it.
+    """
+    import fcntl
+
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(descriptor)
+            raise
+        if os.fstat(descriptor).st_nlink:
+            return descriptor
+        os.close(descriptor)  # the session that had it removed the file meanwhile
+
+
+def _unlock(descriptor: int | None) -> None:
+    if descriptor is not None:
+        os.close(descriptor)

@@ -1,0 +1,140 @@
+"""The characters in a recording (`run.mcap`), in the order of time.
+
+What belongs here: the wire messages of a recording as transmissions. What does not: reading messages
+(`recording.messages`), and all other channels.
+
+A recording holds the characters of each control period. A transmission of a robot that goes on over the end of a
+period is put together again here.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+from miro_protocol.transmission import UP, Transmission, joined
+from miro_sim.periods import Period
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.file import parse
+from mirotwin.recording import channels
+from mirotwin.recording.capture.input import Input
+from mirotwin.recording.container import BrokenOff, RecordingError
+from mirotwin.recording.messages import Messages
+from mirotwin.recording.recorder import SCENARIO_ATTACHMENT
+
+
+def transmissions(
+    source: Input, robots: dict[int, int], tell: Callable[[str], None] = lambda text: None
+) -> Iterator[Transmission]:
+    """Transmissions in the order of time; `robots` is filled with the layout (3 or 5) of each network before the first.
+
+    RecordingError, after all that could be read, for what is no recording of this program, and for a part of a copy.
+    `tell` is called with a message for a recording whose run was broken off, after all its transmissions.
+    """
+    messages = Messages(source, source.label, (channels.WireMessage, channels.PeriodMessage))
+    order = _Order()
+    broken_off = ""
+    try:
+        yield from _ordered(messages, order, robots)
+    except RecordingError as error:
+        _take_layouts(messages, robots)
+        yield from order.rest()
+        if not isinstance(error, BrokenOff) or messages.metadata is None:
+            raise
+        broken_off = str(error)
+    else:
+        _take_layouts(messages, robots)
+        yield from order.rest()
+        messages.check_ours()
+    if broken_off or messages.broken_off:
+        tell(broken_off or messages.broken_off)
+
+
+def transmissions_of(periods: Iterable[Period]) -> list[Transmission]:
+    """The transmissions in `periods`, all from the first on, in the order of time."""
+    order = _Order()
+    found = [sent for period in periods for sent in order.close(period.tick, period.wire)]
+    return [*found, *order.rest()]
+
+
+def _ordered(messages: Messages, order: _Order, robots: dict[int, int]) -> Iterator[Transmission]:
+    period: list[Transmission] = []
+    for place, message in messages:
+        if isinstance(message, channels.PeriodMessage):
+            _take_layouts(messages, robots)
+            yield from order.close(message.tick, period)
+            period = []
+            continue
+        try:
+            sent = channels.transmission(place.network, message)
+        except ValueError as error:
+            raise messages.unfit(error) from None
+        period.append(sent)
+        order.last = period
+
+
+def _take_layouts(messages: Messages, robots: dict[int, int]) -> None:
+    """How many robots each network has; a scenario that this version cannot read does not say."""
+    text = messages.attachments.pop(SCENARIO_ATTACHMENT, None)
+    if text is not None:
+        try:
+            scenario = parse(text.decode("utf-8"), messages.path)
+        except (ScenarioError, UnicodeDecodeError):
+            return
+        robots.update({index: network.robots for index, network in enumerate(scenario.networks)})
+
+
+class _Order:
+    """Puts transmissions in the order of time, those together that go on over the end of a period.
+
+    `last`: transmissions of the period that has no end yet.
+    """
+
+    def __init__(self) -> None:
+        self.open: dict[int, Transmission] = {}  # network -> what its robots sent last, which may go on
+        self.last: Sequence[Transmission] = ()
+        self._heap: list[tuple[int, int, str, int, Transmission]] = []
+        self._count = 0
+
+    def close(self, tick: int, period: Sequence[Transmission]) -> list[Transmission]:
+        """All that can be given out when the period that began at `tick` is complete."""
+        self.last = ()
+        self._take(period)
+        return self._before(min([tick, *(sent.tick for sent in self.open.values())]))
+
+    def rest(self) -> list[Transmission]:
+        """What is left when nothing more comes."""
+        self._take(self.last)
+        for sent in self.open.values():
+            self._push(sent)
+        self.open = {}
+        return self._before(None)
+
+    def _take(self, period: Sequence[Transmission]) -> None:
+        carried, self.open = self.open, {}
+        for sent in period:
+            if sent.direction != UP:
+                self._push(sent)
+                continue
+            before = carried.pop(sent.network, None)
+            if before is not None:
+                both = joined(before, sent)
+                if both is None:
+                    self._push(before)
+                else:
+                    sent = both
+            if sent.network in self.open:
+                self._push(self.open[sent.network])
+            self.open[sent.network] = sent
+        for sent in carried.values():  # nothing came that could go on with it
+            self._push(sent)
+
+    def _push(self, sent: Transmission) -> None:
+        heapq.heappush(self._heap, (sent.tick, sent.network, sent.direction, self._count, sent))
+        self._count += 1
+
+    def _before(self, tick: int | None) -> list[Transmission]:
+        found = []
+        while self._heap and (tick is None or self._heap[0][0] < tick):
+            found.append(heapq.heappop(self._heap)[-1])
+        return found

@@ -1,0 +1,184 @@
+"""Rows as lines of a table and as JSON objects, one a line.
+
+What belongs here: labels, columns and units. What does not: decoding (`rows`).
+
+The JSON form, for programs:
+
+* first `{"event": "input", "file", "format", "timed", "units": {field: unit}}`
+* `{"event": "frame", "offset", "tick", "time_s", "direction", "network", "type", "seq", "fresh", "fields", "data"}`;
+  `tick` and `time_s` are null where the input has no times, `fresh` is null for telemetry, `fields` is null and
+  `unknown` says why for a frame whose CRC is good but whose content is unknown
+* `{"event": "damage", "offset", "tick", "time_s", "direction", "network", "reason", "data"}`
+* last `{"event": "end", ...counts}`, and before it `{"event": "error", "text"}` when the input could not be read on
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import msgspec
+
+from miro_exact.clock import seconds
+from miro_protocol.events import Damaged, Received
+from miro_protocol.frames import Message, ServiceFrame, TeamFrame, describe
+from miro_protocol.table import (
+    FLAG_MEANINGS,
+    SERVICE_DATA,
+    TELEMETRY_FIELDS,
+    VELOCITY,
+    FrameType,
+    Opcode,
+)
+from mirotwin.recording.capture.rows import Row
+
+SHOWN_BYTES = 16
+UNITS = {
+    field.name: field.unit
+    for fields in (VELOCITY, *SERVICE_DATA.values(), TELEMETRY_FIELDS)
+    for field in fields
+    if field.unit
+}
+_NUMBERS = [field.name for field in TELEMETRY_FIELDS[1:]]
+
+
+def units_line() -> str:
+    """The units of all fields, for people."""
+    by_unit: dict[str, list[str]] = {}
+    for name, unit in UNITS.items():
+        by_unit.setdefault(unit, []).append(name)
+    return "; ".join(f"{', '.join(names)} in {unit}" for unit, names in by_unit.items())
+
+
+def head_line(timed: bool) -> str:
+    place = f"{'tick':>12}  {'t [s]':>10}" if timed else f"{'offset':>10}"
+    return f"{place}  dir  net  {'frame':<12}  seq  {'state':<12}  fields"
+
+
+def table_line(row: Row, timed: bool) -> str:
+    """One row; damage shows its first bytes."""
+    event = row.event
+    tick = event.start_tick
+    place = f"{tick:>12}  {seconds(tick):>10.4f}" if timed else f"{row.offset:>10}"
+    head = f"{place}   {row.direction}   {row.network:>3}"
+    if isinstance(event, Damaged):
+        shown = event.data[:SHOWN_BYTES].hex(" ") + (" .." if len(event.data) > SHOWN_BYTES else "")
+        return f"{head}  {'damage':<12}    -  {reason(event):<12}  {len(event.data)} bytes: {shown}"
+    state = "-" if row.fresh is None else "accepted" if row.fresh else "stale"
+    return f"{head}  {kind(event, row.message):<12}  {event.seq:>3}  {state:<12}  {contents(row)}"
+
+
+def reason(event: Damaged) -> str:
+    return event.reason.name.lower().replace("_", " ")
+
+
+def kind(event: Received, message: Message | None) -> str:
+    """`team`, `filter`, `telemetry`: a service frame goes by its opcode."""
+    if isinstance(message, ServiceFrame):
+        return Opcode(message.opcode).name.lower()
+    return FrameType(event.type).name.lower()
+
+
+def described(row: Row) -> str:
+    """A few words: what a frame is, or what is wrong with these bytes. The comment in a stream file."""
+    event = row.event
+    if isinstance(event, Damaged):
+        return f"{len(event.data)} bytes, {reason(event)}"
+    return describe(row.message) if row.message is not None else f"unknown content: {row.unknown}"
+
+
+def contents(row: Row) -> str:
+    """The fields of a frame in one line."""
+    message = row.message
+    if message is None:
+        return f"unknown content: {row.unknown}"
+    if isinstance(message, TeamFrame):
+        return "  ".join(f"{slot}: {a:+d}/{b:+d}" for slot, (a, b) in enumerate(message.velocities))
+    return " ".join(f"{name}={_shown(value)}" for name, value in _fields(message).items())
+
+
+def _shown(value: Any) -> str:
+    return ("+".join(value) or "none") if isinstance(value, list) else str(value)
+
+
+def json_line(row: Row, timed: bool) -> bytes:
+    """One row as a JSON object."""
+    event = row.event
+    place = {
+        "offset": row.offset,
+        "tick": event.start_tick if timed else None,
+        "time_s": seconds(event.start_tick) if timed else None,
+        "direction": row.direction,
+        "network": row.network,
+    }
+    if isinstance(event, Damaged):
+        found = {"event": "damage", **place, "reason": reason(event), "data": event.data.hex()}
+        return msgspec.json.encode(found)
+    frame: dict[str, Any] = {"event": "frame", **place, "type": kind(event, row.message), "seq": event.seq}
+    frame["fresh"] = row.fresh
+    frame["fields"] = None if row.message is None else _fields(row.message)
+    if row.unknown:
+        frame["unknown"] = row.unknown
+    frame["data"] = event.data.hex()
+    return msgspec.json.encode(frame)
+
+
+def _fields(message: Message) -> dict[str, Any]:
+    """What a frame says besides its type and number."""
+    if isinstance(message, TeamFrame):
+        names = [field.name for field in VELOCITY]
+        return {"velocities": [dict(zip(names, pair, strict=True)) for pair in message.velocities]}
+    if isinstance(message, ServiceFrame):
+        data = zip(SERVICE_DATA[message.opcode], message.values, strict=True)
+        return {"slot": message.slot, **{field.name: value for field, value in data}}
+    flags = [flag.name.lower() for flag in FLAG_MEANINGS if flag & message.flags and flag.name]
+    return {"slot": message.slot, "flags": flags, **{name: getattr(message, name) for name in _NUMBERS}}
+
+
+def json_input(file: str, format: str, timed: bool) -> bytes:
+    return msgspec.json.encode(
+        {"event": "input", "file": _utf8(file), "format": format, "timed": timed, "units": UNITS}
+    )
+
+
+def json_error(text: str) -> bytes:
+    return msgspec.json.encode({"event": "error", "text": _utf8(text)})
+
+
+def _utf8(text: str) -> str:
+    """`text` with what is no UTF-8 (a file's name need not be) written out."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
+def json_end(totals: Totals) -> bytes:
+    return msgspec.json.encode({"event": "end", **totals.as_dict()})
+
+
+class Totals:
+    """Counts rows for the last line."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.reasons: Counter[str] = Counter()
+
+    def add(self, row: Row) -> None:
+        event = row.event
+        if isinstance(event, Damaged):
+            self.counts["damaged"] += 1
+            self.counts["damaged_bytes"] += len(event.data)
+            self.reasons[reason(event)] += 1
+        elif row.fresh is None:
+            self.counts["telemetry"] += 1
+        else:
+            self.counts["accepted" if row.fresh else "stale"] += 1
+
+    def as_dict(self) -> dict[str, Any]:
+        names = ("accepted", "stale", "telemetry", "damaged", "damaged_bytes")
+        return {**{name: self.counts[name] for name in names}, "reasons": dict(sorted(self.reasons.items()))}
+
+    def __str__(self) -> str:
+        counts = self.counts
+        why = ", ".join(f"{count} {name}" for name, count in sorted(self.reasons.items()))
+        damage = f"{counts['damaged']} damaged runs of {counts['damaged_bytes']} bytes"
+        frames = f"{counts['accepted']} accepted, {counts['stale']} stale, {counts['telemetry']} telemetry"
+        return f"frames: {frames}; {damage}" + (f" ({why})" if why else "")

@@ -1,0 +1,165 @@
+"""Where two runs differ, period by period: how strictly is a rule's matter.
+
+What belongs here: the rules, and all differences of two runs under one. What does not: the values' names (`fields.py`),
+sequences with a tolerance in time (`sequences.py`), states (`lockstep.py`), what is sent again (`script.py`), and the
+commands (`cli/replay.py`, `cli/diff.py`).
+
+    rule       compared                                                                  tolerance
+    bits       all that a robot did: counters, LM629s, PWM, motion, commands, answers    none
+    bytes      the characters that the PC heard of the robots, and their order           in time
+    commands   the commands of each LM629: opcode, data, order; not what they read       in time
+    wheels     each LM629's positions and desired velocity once a control period         in counts
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from operator import attrgetter
+from typing import Literal, get_args
+
+import msgspec
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK
+from miro_sim.periods import Period, RobotPeriod
+from mirotwin.recording import fields, sequences
+from mirotwin.recording.difference import DIGEST, Difference
+from mirotwin.recording.sequences import Happening
+
+Kind = Literal["bits", "bytes", "commands", "wheels"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+WITHIN_TICKS = 12_000
+"""Default tolerance in time, 0.5 ms: half of the failsafe's unit, five bits of the robot's serial port."""
+WITHIN_COUNTS = 20
+"""Default tolerance of positions: 0.15 mm at the wheel, or a sample's way at 0.45 m/s."""
+WITHIN_COUNTS_PER_SAMPLE = 0.25
+"""Default tolerance of desired velocities, 5.6 mm/s: what 6 m/s^2 make of 0.9 ms."""
+_VELOCITY_UNIT = 65536.0
+
+
+class Rule(msgspec.Struct, frozen=True):
+    """What counts as a difference. Differences at ticks from `from_tick` to before `to_tick` (None: the end) are told.
+
+    `within_ticks`: of bytes and commands; `within_counts`, `within_counts_per_sample`: of wheels. `host`: also what the
+    PCs did, `digests`: also the digests of the states (both of bits only).
+    """
+
+    kind: Kind = "bits"
+    within_ticks: int = WITHIN_TICKS
+    within_counts: int = WITHIN_COUNTS
+    within_counts_per_sample: float = WITHIN_COUNTS_PER_SAMPLE
+    from_tick: int = 0
+    to_tick: int | None = None
+    host: bool = False
+    digests: bool = False
+
+
+EXACT = Rule()
+
+
+def differences(
+    recorded: Sequence[Period], replayed: Sequence[Period], rule: Rule = EXACT
+) -> list[Difference]:
+    """All differences of two runs under a rule, in the order of time, as far as both go.
+
+    Both runs have the same robots, in the same order. What is under way where the shorter one ends is not compared.
+    """
+    periods = min(len(recorded), len(replayed))
+    if not periods:
+        return []
+    one, other = recorded[:periods], replayed[:periods]
+    found = sorted(_all(one, other, rule), key=attrgetter("tick"))
+    to_tick = NEVER_TICK if rule.to_tick is None else rule.to_tick
+    return [difference for difference in found if rule.from_tick <= difference.tick < to_tick]
+
+
+def _all(one: Sequence[Period], other: Sequence[Period], rule: Rule) -> Iterator[Difference]:
+    """Causes before effects: of those at one tick the first is the first to be told."""
+    if rule.kind in ("bits", "commands"):
+        yield from _commands(one, other, rule)
+    if rule.kind in ("bits", "bytes"):
+        yield from _air(one, other, rule)
+    if rule.kind in ("bits", "wheels"):
+        for here, there in zip(one, other, strict=True):
+            for robot, twin in zip(here.robots, there.robots, strict=True):
+                compare = _wheels(robot, twin, rule) if rule.kind == "wheels" else _values(robot, twin, rule)
+                for name, recorded, replayed in compare:
+                    place = here.tick, here.index, robot.network, robot.slot
+                    yield Difference(*place, name, recorded, replayed)
+    if rule.digests and rule.kind == "bits":
+        for here, there in zip(one, other, strict=True):
+            if here.digest != there.digest:
+                end_tick = here.tick + CONTROL_PERIOD_TICKS
+                yield Difference(end_tick, here.index, -1, -1, DIGEST, here.digest, there.digest)
+
+
+Named = Iterator[tuple[str, fields.Value, fields.Value]]
+
+
+def _values(robot: RobotPeriod, twin: RobotPeriod, rule: Rule) -> Named:
+    """Every value that is not the same."""
+    theirs = dict(fields.response(twin))
+    for name, value in fields.response(robot):
+        unknown = name in fields.COUNTERS and (value is None or theirs[name] is None)
+        if value != theirs[name] and not unknown:
+            yield name, value, theirs[name]
+    if rule.host:
+        mine, theirs = dict(fields.of_host(robot)), dict(fields.of_host(twin))
+        for name in {**mine, **theirs}:
+            if mine.get(name) != theirs.get(name):
+                yield name, mine.get(name), theirs.get(name)
+
+
+def _wheels(robot: RobotPeriod, twin: RobotPeriod, rule: Rule) -> Named:
+    for side, axis, other in (("left", robot.left, twin.left), ("right", robot.right, twin.right)):
+        for name in ("real_position", "desired_position"):
+            one, two = getattr(axis, name), getattr(other, name)
+            if abs(one - two) > rule.within_counts:
+                yield f"lm629 {side} {name}", one, two
+        velocity, twins = axis.desired_velocity, other.desired_velocity
+        if abs(velocity - twins) > rule.within_counts_per_sample * _VELOCITY_UNIT:
+            yield f"lm629 {side} desired_velocity", velocity, twins
+
+
+def _commands(one: Sequence[Period], other: Sequence[Period], rule: Rule) -> Iterator[Difference]:
+    """Commands are known up to the last exposure: one that comes later in one run may not have been recorded."""
+    exact = rule.kind == "bits"
+    within_ticks = 0 if exact else rule.within_ticks
+    known_tick = NEVER_TICK if exact else one[-1].tick - within_ticks
+    for index, robot in enumerate(one[0].robots):
+        for side in ("left", "right"):
+            here, there = (sequences.commands(run, index, side, exact) for run in (one, other))
+            place = robot.network, robot.slot, f"lm629 {side} command"
+            yield from _unlike(here, there, within_ticks, known_tick, place)
+
+
+def _air(one: Sequence[Period], other: Sequence[Period], rule: Rule) -> Iterator[Difference]:
+    """Characters are known once their stop bits were sampled."""
+    within_ticks = rule.within_ticks if rule.kind == "bytes" else 0
+    end_tick = one[-1].tick + CONTROL_PERIOD_TICKS
+    for network in sorted({robot.network for robot in one[0].robots}):
+        if rule.kind == "bytes":
+            known_tick = end_tick - within_ticks - HOST_CHARACTER_TICKS
+            here, there = sequences.characters(one, network), sequences.characters(other, network)
+            yield from _unlike(here, there, within_ticks, known_tick, (network, -1, "wire"))
+            continue
+        for name, sent in (("wire", False), *([("wire sent", True)] if rule.host else [])):
+            here = sequences.transmissions(one, network, sent)
+            there = sequences.transmissions(other, network, sent)
+            yield from _unlike(here, there, 0, NEVER_TICK, (network, -1, name))
+        if rule.host:
+            done, there = sequences.deeds(one, network), sequences.deeds(other, network)
+            yield from _unlike(done, there, 0, NEVER_TICK, (network, -1, "deeds"))
+
+
+def _unlike(
+    one: Sequence[Happening],
+    other: Sequence[Happening],
+    within_ticks: int,
+    known_tick: int,
+    place: tuple[int, int, str],
+) -> Iterator[Difference]:
+    for here, there in sequences.unlike(one, other, within_ticks):
+        tick = min(each.tick for each in (here, there) if each is not None)
+        if tick < known_tick or (here is not None and there is not None):
+            texts = (None if here is None else str(here), None if there is None else str(there))
+            yield Difference(tick, tick // CONTROL_PERIOD_TICKS, *place, *texts)

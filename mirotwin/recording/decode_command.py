@@ -1,0 +1,119 @@
+"""`mirotwin decode`: the frames in the bytes of a file, and the damage between them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+
+import click
+
+from miro_exact.bad_input import one_line
+from miro_protocol.table import ROBOT_COUNTS
+from miro_protocol.transmission import DOWN, UP, Transmission
+from mirotwin.recording.capture import render
+from mirotwin.recording.capture.detect import FORMATS, NAMES, detect
+from mirotwin.recording.capture.input import Input
+from mirotwin.recording.capture.layout import Layouts, look
+from mirotwin.recording.capture.rows import Row, rows
+from mirotwin.recording.capture.source import READ_ERRORS, Source, open_source
+from mirotwin.shell.options import Place, choose_engine, engine_option
+from mirotwin.shell.program import DONE, complain
+from mirotwin.shell.progress import ProgressBar
+
+DIRECTIONS = {"down": DOWN, "up": UP}
+PROGRESS_BYTES = 1 << 16
+
+
+@click.command(short_help="Decodes captured bytes to frames and damage.")
+@click.argument("file", metavar="FILE|-", type=Place())
+@click.option(
+    "--format",
+    "format",
+    type=click.Choice(FORMATS),
+    help="Format of FILE. Default: recognized by its first bytes.",
+)
+@click.option(
+    "--robots",
+    type=click.Choice([str(count) for count in ROBOT_COUNTS]),
+    help="Robots in the network. Default: as FILE says, else the number with which more frames can be decoded.",
+)
+@click.option(
+    "--direction",
+    type=click.Choice([*DIRECTIONS]),
+    help="Direction of raw bytes and hex text: down to the robots (default, unless they decode as telemetry), or up.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object per line, for programs.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar.")
+@engine_option
+def decode(
+    file: str,
+    format: str | None,
+    robots: str | None,
+    direction: str | None,
+    as_json: bool,
+    quiet: bool,
+    engine: str | None,
+) -> int:
+    """Decodes FILE (standard input for -) and prints one line a frame or damaged run of bytes.
+
+    FILE may be hex text, raw bytes, a pcapng capture of a serial line, a recording (run.mcap) or a stream file; its
+    first bytes tell which, and the first line printed says so. Any bytes can be decoded. A capture that is cut
+    short or damaged is reported with the offset, after everything before it, and the exit code is 2.
+    """
+    choose_engine(engine)
+    with Input(file) as given:
+        if format is None:
+            format, note = detect(given.peek())
+            if note:
+                complain(f"{given.label}: {note} (--format says otherwise)")
+        source = open_source(given, format, complain, DIRECTIONS[direction or "down"])
+        layouts = look(source, None if robots is None else int(robots), complain, direction is None)
+        with ProgressBar("decoding", given.size, quiet or sys.stdout.isatty()) as bar:
+            found = rows(_counted(source.sent, given, bar), layouts.of)
+            return (
+                _print_json(given, source, found) if as_json else _print_table(given, source, layouts, found)
+            )
+
+
+def _counted(sent: Iterable[Transmission], given: Input, bar: ProgressBar) -> Iterator[Transmission]:
+    """Moves the progress bar; for input without a size (a pipe), flushes the lines printed so far."""
+    shown = 0
+    for one in sent:
+        yield one
+        if given.size is None:
+            sys.stdout.flush()
+        elif given.tell() >= shown + PROGRESS_BYTES:
+            shown = given.tell()
+            bar.to(shown)
+
+
+def _print_table(given: Input, source: Source, layouts: Layouts, found: Iterable[Row]) -> int:
+    out = sys.stdout
+    totals = render.Totals()
+    out.write(f"{one_line(given.label)}: {NAMES[source.format]}{layouts}\n{render.units_line()}\n")
+    out.write(f"{render.head_line(source.timed)}\n")
+    try:
+        for row in found:
+            totals.add(row)
+            out.write(f"{render.table_line(row, source.timed)}\n")
+    finally:
+        out.write(f"{totals}\n")
+    return DONE
+
+
+def _print_json(given: Input, source: Source, found: Iterable[Row]) -> int:
+    def put(line: bytes) -> None:
+        sys.stdout.write(line.decode() + "\n")
+
+    totals = render.Totals()
+    put(render.json_input(given.label, source.format, source.timed))
+    try:
+        for row in found:
+            totals.add(row)
+            put(render.json_line(row, source.timed))
+    except READ_ERRORS as error:
+        put(render.json_error(str(error)))
+        raise
+    finally:
+        put(render.json_end(totals))
+    return DONE

@@ -1,0 +1,112 @@
+"""The messages of a recording one after the other, and what it was made from: the one reader of our MCAP files.
+
+What belongs here: which record is ours, its type, and what its contents lack. What does not: the container
+(`container`), putting periods together (`reader`), and characters in the order of time (`recording.capture.recorded`).
+"""
+
+from collections.abc import Collection, Iterator
+from typing import Any
+
+import msgspec
+from mcap.records import Attachment, Channel, Message, Metadata
+
+from miro_exact.bad_input import one_line, shortened
+from mirotwin.recording import channels
+from mirotwin.recording.container import Readable, RecordingError, records
+from mirotwin.recording.recorder import (
+    BROKEN_OFF,
+    FIRMWARE_ATTACHMENT,
+    FORMAT,
+    METADATA,
+    RESUMED_ATTACHMENT,
+    SCENARIO_ATTACHMENT,
+    SYMBOLS_ATTACHMENT,
+)
+from mirotwin.recording.topics import Place, place_of
+
+ATTACHMENTS = (SCENARIO_ATTACHMENT, FIRMWARE_ATTACHMENT, SYMBOLS_ATTACHMENT)
+AGAIN = "record the run again"
+
+
+class Messages:
+    """Iterates over (place, message) of those of `kinds` (default: all). Raises RecordingError where it cannot go on.
+
+    `path` names the file in errors. `metadata` (None: not a recording of this program) and `attachments` stand at the
+    beginning of a file and are there with the first message. `broken_off`: what to say of a run that was.
+    """
+
+    def __init__(
+        self, source: Readable, path: str, kinds: Collection[type[msgspec.Struct]] | None = None
+    ) -> None:
+        self.path = path
+        self.kinds = kinds
+        self.offset = 0
+        self.metadata: dict[str, str] | None = None
+        self.attachments: dict[str, bytes] = {}
+        self.broken_off = ""
+        self._topic = ""
+        self._records = records(source, path)
+        self._channels: dict[int, tuple[str, Place, msgspec.json.Decoder[Any]]] = {}
+
+    def __iter__(self) -> Iterator[tuple[Place, Any]]:
+        for offset, record in self._records:
+            self.offset = offset
+            if isinstance(record, Message):
+                channel = self._channels.get(record.channel_id)
+                if channel is not None:
+                    self._topic, place, decoder = channel
+                    try:
+                        message = decoder.decode(record.data)
+                    except (msgspec.DecodeError, ValueError) as error:
+                        raise self.unfit(error) from None
+                    yield place, message
+            elif isinstance(record, Channel):
+                self._open(record)
+            elif isinstance(record, Attachment) and record.name in (*ATTACHMENTS, RESUMED_ATTACHMENT):
+                self.attachments[record.name] = record.data
+            elif isinstance(record, Metadata):
+                self._take_metadata(record)
+
+    def _open(self, record: Channel) -> None:
+        place = place_of(record.topic)
+        kind = None if place is None else channels.message_type(place)
+        if place is None or kind is None or record.id in self._channels:
+            return
+        if self.kinds is None or kind in self.kinds:
+            self._channels[record.id] = (record.topic, place, msgspec.json.Decoder(kind))
+
+    def _take_metadata(self, record: Metadata) -> None:
+        if record.name == BROKEN_OFF:
+            self.broken_off = f"{self.path}: the run that wrote it was broken off"
+            if record.metadata.get("reason"):
+                self.broken_off += f": {one_line(shortened(record.metadata['reason']))}"
+        elif record.name == METADATA:
+            self.metadata = record.metadata
+            found = record.metadata.get("format")
+            if found != FORMAT:
+                remedy = f"this program reads format {FORMAT}; use the version that wrote it, or {AGAIN}"
+                raise self.error(f"recording format {found!r}", remedy)
+
+    def drain(self) -> None:
+        """Reads to the end. Raises RecordingError for what the container's checksums say about the rest."""
+        for _ in self._records:
+            pass
+
+    def check_ours(self) -> None:
+        """Raises RecordingError unless what was read is a recording of this program."""
+        if self.metadata is None:
+            what = "an MCAP file, but not a recording of this program"
+            raise self.error(what, "give a run.mcap that it wrote")
+
+    def error(self, what: str, remedy: str) -> RecordingError:
+        return RecordingError(self.path, f"offset {self.offset}", what, remedy)
+
+    def unfit(self, error: Exception) -> RecordingError:
+        """The last message cannot be what it says."""
+        return self.error(f"{self._topic}: {brief(error)}", AGAIN)
+
+
+def brief(error: Exception) -> str:
+    """One line about an error."""
+    text = f"{error}".strip()
+    return text.splitlines()[0] if text else type(error).__name__

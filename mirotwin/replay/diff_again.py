@@ -1,0 +1,129 @@
+"""Two recordings that differ, run again: the exact tick and fields, and the instruction where firmwares differ.
+
+What belongs here: which of both can be run again, and what is said where one cannot. What does not: the search
+(`mirotwin.replay`), and the words of its result (`cli/differences.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_robot.image import Image
+from miro_sim.world.world import World
+from mirotwin.recording.difference import DIGEST, Difference
+from mirotwin.recording.reader import Recording
+from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
+from mirotwin.replay.lockstep import LOOK_TICKS, StateDifference, first_difference
+from mirotwin.replay.program import Program
+from mirotwin.replay.sources import Made
+from mirotwin.rerun.rerun import repeating, world_of
+from mirotwin.shell.options import plain_parameters
+
+Both = tuple[Recording, Recording]
+
+
+class Again(msgspec.Struct, frozen=True):
+    """What came of it. `period`: the first control period that differs."""
+
+    period: int | None = None
+    state: StateDifference | None = None
+    firmwares: FirmwareDifference | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "period": self.period,
+            "state": None if self.state is None else self.state.as_json(),
+            "instruction": None if self.firmwares is None else self.firmwares.as_json(),
+        }
+
+
+def run_again(
+    paths: tuple[str, str],
+    recordings: Both,
+    made: tuple[Made, Made],
+    programs: Sequence[Program],
+    found: Sequence[Difference],
+    notes: list[str],
+) -> Again:
+    """Runs both again as far as their digests allow; `notes` gets what could not be done, and why."""
+    period = min(one.period for one in found)
+    first = _first_period(recordings, period)
+    worlds = None
+    try:
+        with plain_parameters(paths[0]):
+            worlds = _repeating(paths, recordings, first, notes)
+    except BadInput as error:
+        notes.append(f"they cannot be run again: {error}")
+    if worlds is None:
+        return Again(period)
+    one, other, scripted = worlds
+    state = first_difference(one, other, (max(first, period) + 1) * CONTROL_PERIOD_TICKS)
+    if state is None:
+        notes.append(
+            f"run again, their states do not differ up to the end of control period {period}: what made the difference"
+            " is in neither recording (another version of this program, or values that were changed)"
+        )
+        return Again(period)
+    return Again(period, state, _firmwares(paths, recordings, made, programs, _seen_tick(found), scripted))
+
+
+def _first_period(recordings: Both, period: int) -> int:
+    """Where the states differ first, by the digests; else the one before what was seen when `period` began."""
+    one, other = recordings
+    if one.source.state == other.source.state:
+        for here, there in zip(one.periods, other.periods, strict=False):
+            if here.digest != there.digest:
+                return here.index
+    return max(0, period - 1)
+
+
+def _repeating(
+    paths: tuple[str, str], recordings: Both, period: int, notes: list[str]
+) -> tuple[World, World, bool] | None:
+    for scripted in (False, True):
+        worlds = [
+            repeating(recording, path, period, scripted)
+            for recording, path in zip(recordings, paths, strict=True)
+        ]
+        if worlds[0] is not None and worlds[1] is not None:
+            return worlds[0], worlds[1], scripted
+    which = " and ".join(
+        word
+        for word, recording, path in zip("AB", recordings, paths, strict=True)
+        if all(repeating(recording, path, period, scripted) is None for scripted in (False, True))
+    )
+    whose = f"{which} does" if len(which) == 1 else "they do"
+    notes.append(
+        f"no tick within the control period: run again, {whose} not give the recorded digests up to there (another"
+        " version of this program recorded, or input was put in beside a controller)"
+    )
+    return None
+
+
+def _seen_tick(found: Sequence[Difference]) -> int:
+    """When something differs that is more than a digest: dead bytes of a stack are enough for that."""
+    return next((one.tick for one in found if one.channel != DIGEST), found[0].tick)
+
+
+def _firmwares(
+    paths: tuple[str, str],
+    recordings: Both,
+    made: tuple[Made, Made],
+    programs: Sequence[Program],
+    tick: int,
+    scripted: bool,
+) -> FirmwareDifference | None:
+    """Where the firmwares go apart, in runs that differ in nothing else."""
+    alike = made[0].scenario == made[1].scenario and made[0].source.seed == made[1].source.seed
+    if not alike or len(programs) < 2 or programs[0].image.code == programs[1].image.code:
+        return None
+
+    def make(image: Image) -> World:
+        return world_of(recordings[0], paths[0], image, scripted)
+
+    return first_instruction(make, programs[0], programs[1], tick + LOOK_TICKS)

@@ -1,0 +1,191 @@
+"""`mirotwin diff`: two recordings, what they were made from, and where they differ first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import click
+import msgspec
+from rich.table import Table
+
+from miro_exact.bad_input import BadInput
+from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
+from miro_sim.scenario.file import parse as parse_scenario
+from mirotwin.firmware.sources_option import checked_sources, sources_option
+from mirotwin.recording.compare import differences
+from mirotwin.recording.difference import Difference
+from mirotwin.recording.reader import Recording, parse
+from mirotwin.recording.writer import MAGIC
+from mirotwin.replay.compare_options import Asked, compare_options
+from mirotwin.replay.diff_again import Again, run_again
+from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
+from mirotwin.replay.replay_firmware import lines_from_option, load_images, program_of
+from mirotwin.replay.sources import Made, SourceDifference, source_differences
+from mirotwin.rerun.rerun import image_if_any
+from mirotwin.shell.console import show
+from mirotwin.shell.options import Place, choose_engine, engine_option
+from mirotwin.shell.outputs import RECORDING
+from mirotwin.shell.program import DIVERGENCE, DONE, complain
+
+WORDS = ("A", "B")
+
+
+@click.command(short_help="Compares two recordings.")
+@click.argument("a", type=Place())
+@click.argument("b", type=Place())
+@compare_options
+@lines_from_option
+@sources_option
+@engine_option
+@click.option("-q", "--quiet", is_flag=True, help="No tables.")
+def diff(
+    a: str,
+    b: str,
+    asked: Asked,
+    lines_from: tuple[str, ...],
+    sources: tuple[str, ...],
+    engine: str | None,
+    quiet: bool,
+) -> int:
+    """Compares the recordings A and B (run.mcap): what they were made from, then all that they hold.
+
+    `bits` compares what the PCs did as well, and the digests of the states. Where both can be run again, the first
+    tick is looked for at which their states differ, with the fields that do; and with two firmwares the first
+    instruction.
+
+    Exit code 4 when the recordings differ, 0 when they hold the same, whatever they were made from.
+    """
+    choose_engine(engine)
+    checked_sources(sources)
+    recordings = _read(a), _read(b)
+    made = _made(recordings[0], a), _made(recordings[1], b)
+    origins = list(source_differences(*made))
+    notes: list[str] = []
+    one, other = _same_robots(recordings, notes)
+    digests = _digests(asked, recordings, notes)
+    rule = msgspec.structs.replace(asked.rule, host=asked.rule.kind == "bits", digests=digests)
+    found = differences(one.periods, other.periods, rule)
+    lengths = len(one.periods), len(other.periods)
+    images = load_images(lines_from, *(one.image for one in made))
+    again = Again()
+    if found:
+        programs = [program_of(one.image, images, sources) for one in made if one.image is not None]
+        again = run_again((a, b), recordings, made, programs, found, notes)
+
+    if not quiet and not asked.as_json:
+        _print_sources(origins)
+        if found:
+            print_differences(found, asked.everything, WORDS)
+    code = _verdict(asked, origins, found, lengths, again, notes)
+    if asked.as_json:
+        document = {
+            "a": a,
+            "b": b,
+            "sources": [one.as_json() for one in origins],
+            "periods": {"a": lengths[0], "b": lengths[1]},
+            **asked.rule_as_json(),
+            **differences_as_json(found, asked.everything, ("a", "b")),
+            **again.as_json(),
+            "notes": notes,
+            "exit_code": code,
+        }
+        print_json(document)
+    return code
+
+
+def _read(path: str) -> Recording:
+    check_no_folder(path, RECORDING)
+    data = read_input(path, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
+    if not MAGIC.startswith(data[: len(MAGIC)]):
+        raise BadInput(path, "offset 0", "not a recording", "give a run.mcap that `mirotwin run` wrote")
+    recording = parse(data, path)
+    if not recording.periods:
+        raise BadInput(path, "", "the recording holds no control period", "there is nothing to compare")
+    if recording.source.resumed:
+        what = f"a run that was resumed: it begins with control period {recording.periods[0].index}"
+        raise BadInput(path, "", what, "replay it, or compare recordings of whole runs")
+    if recording.broken_off:
+        complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
+    return recording
+
+
+def _made(recording: Recording, path: str) -> Made:
+    scenario = parse_scenario(recording.source.scenario_text, f"{path}: scenario.toml")
+    return Made(recording.source, scenario, image_if_any(recording, path))
+
+
+def _same_robots(recordings: tuple[Recording, Recording], notes: list[str]) -> tuple[Recording, Recording]:
+    """Both with the robots that both have. Raises BadInput where they have none in common."""
+    robots = [[(one.network, one.slot) for one in recording.periods[0].robots] for recording in recordings]
+    if robots[0] == robots[1]:
+        return recordings
+    common = [place for place in robots[0] if place in robots[1]]
+    for word, there in zip(WORDS, robots, strict=True):
+        alone = ", ".join(
+            f"net{network}/robot{slot}" for network, slot in there if (network, slot) not in common
+        )
+        if alone:
+            notes.append(f"only {word} has {alone}")
+    if not common:
+        raise BadInput("", "", f"the recordings have no robot in common: {'; '.join(notes)}")
+    return _only(recordings[0], common), _only(recordings[1], common)
+
+
+def _only(recording: Recording, robots: Sequence[tuple[int, int]]) -> Recording:
+    periods = []
+    for period in recording.periods:
+        by_place = {(robot.network, robot.slot): robot for robot in period.robots}
+        kept = tuple(by_place[place] for place in robots)
+        periods.append(msgspec.structs.replace(period, robots=kept))
+    return msgspec.structs.replace(recording, periods=tuple(periods))
+
+
+def _digests(asked: Asked, recordings: tuple[Recording, Recording], notes: list[str]) -> bool:
+    """Whether the digests say anything: they are of states of one form."""
+    if asked.rule.kind != "bits":
+        return False
+    one, other = (recording.source.state for recording in recordings)
+    if one != other:
+        why = "their states have another form, by scenario or version of this program"
+        notes.append(f"the digests are not compared: {why}")
+    return one == other
+
+
+def _print_sources(sources: Sequence[SourceDifference]) -> None:
+    if not sources:
+        return
+    table = Table(box=None, pad_edge=False)
+    for name in ("made from", *WORDS):
+        table.add_column(name, overflow="fold")
+    for one in sources:
+        table.add_row(one.key, one.one, one.other)
+    show(table)
+    show("")
+
+
+def _verdict(
+    asked: Asked,
+    sources: Sequence[SourceDifference],
+    found: Sequence[Difference],
+    lengths: tuple[int, int],
+    again: Again,
+    notes: Sequence[str],
+) -> int:
+    code = DONE
+    if found:
+        code = DIVERGENCE
+        complain(f"the recordings differ in control period {again.period}, {found[0].said(WORDS)}")
+        if again.state is not None:
+            complain(f"their states differ from {again.state} on")
+        if again.firmwares is not None:
+            print_firmwares(again.firmwares, WORDS)
+    if lengths[0] != lengths[1] and asked.rule.to_tick is None:
+        code = DIVERGENCE
+        complain(f"A has {lengths[0]} control periods, B has {lengths[1]}")
+    for note in notes:
+        complain(note)
+    if code == DONE and not asked.as_json:
+        how = "" if asked.rule.kind == "bits" else f" ({asked.described()})"
+        whence = "; they were not made from the same" if sources else ""
+        show(f"the recordings hold the same in all {min(lengths)} control periods{how}{whence}")
+    return code

@@ -1,0 +1,68 @@
+"""Firmwares of recordings: their debug files, and where two of them go apart.
+
+What belongs here: finding files, for `replay` and `diff`. What does not: the search (`mirotwin.replay.firmwares`) and
+its words (`cli/differences.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from miro_exact.bad_input import BadInput
+from miro_robot.firmware import image_path, source_folder
+from miro_robot.image import Image, load_hex
+from miro_sim.world.world import World
+from mirotwin.firmware.coverage_files import with_debug_files
+from mirotwin.recording.difference import Difference
+from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
+from mirotwin.replay.lockstep import LOOK_TICKS
+from mirotwin.replay.program import Program
+from mirotwin.rerun.job import Job
+from mirotwin.shell.options import Place, load_image, plain_parameters
+
+
+def lines_from_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    return click.option(
+        "--lines-from",
+        multiple=True,
+        metavar="IMAGE.ihx",
+        type=Place(),
+        help="A recorded image as a file, beside which its debug files lie: for its C lines; may be repeated. The"
+        " robot's own image needs none.",
+    )(command)
+
+
+def load_images(paths: Sequence[str], *recorded: Image | None) -> list[Image]:
+    """The images of --lines-from. Raises BadInput for one that was not recorded."""
+    codes = [image.code for image in recorded if image is not None]
+    images = [load_image(path) for path in paths]
+    for path, image in zip(paths, images, strict=True):
+        if image.code not in codes:
+            raise BadInput(
+                path, "--lines-from", "is not a recorded image", "give one that is, or leave it out"
+            )
+    return images
+
+
+def program_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> Program:
+    """The image with its debug files: those beside one of `images`, or the robot's own; C files also in `sources`."""
+    known = next((one for one in images if one.code == image.code), with_debug_files(image))
+    folder = source_folder()
+    own = [] if folder is None or load_hex(image_path()).sha256 != image.sha256 else [folder]
+    return Program(known, [*own, *map(Path, sources)])
+
+
+def firmwares_apart(
+    file: str, job: Job, programs: tuple[Program, Program], found: Sequence[Difference]
+) -> FirmwareDifference | None:
+    """Where the recorded image and the one that ran go apart, up to the first difference."""
+
+    def make(which: Image) -> World:
+        return job.world(which)
+
+    with plain_parameters(file, "replayed"):
+        return first_instruction(make, *programs, found[0].tick + LOOK_TICKS)

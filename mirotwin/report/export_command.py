@@ -1,0 +1,157 @@
+"""`mirotwin export`: the characters of a run, or all of it, as a file for other programs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import click
+
+from miro_exact.bad_input import BadInput
+from miro_protocol.transmission import DOWN, Transmission
+from mirotwin.recording.capture import convert
+from mirotwin.recording.capture.detect import NAMES, TIMED, detect
+from mirotwin.recording.capture.input import STDIN, Input
+from mirotwin.recording.capture.layout import look
+from mirotwin.recording.capture.source import READ_ERRORS, open_source
+from mirotwin.report.export_foxglove import export_foxglove
+from mirotwin.shell.console import show
+from mirotwin.shell.options import Place, Whole, choose_engine, engine_option
+from mirotwin.shell.outputs import check_new, check_not_input, whole_file
+from mirotwin.shell.program import BAD_INPUT, DONE, complain
+from mirotwin.shell.progress import ProgressBar
+
+DEFAULTS = {".stream": "stream", ".txt": "stream", ".mcap": "foxglove"}
+TARGETS = ("pcapng", "stream", "foxglove")
+
+
+class Exported:
+    """Hands transmissions on and counts them. What cannot be read ends them; `failure` if anything came before."""
+
+    def __init__(
+        self, sent: Iterator[Transmission], network: int | None, given: Input, bar: ProgressBar
+    ) -> None:
+        self.sent = sent
+        self.network = network
+        self.given = given
+        self.bar = bar
+        self.down = 0
+        self.up = 0
+        self.bad_stops = 0
+        self.networks: set[int] = set()
+        self.failure: Exception | None = None
+
+    def __iter__(self) -> Iterator[Transmission]:
+        try:
+            for one in self.sent:
+                self.networks.add(one.network)
+                if self.network in (None, one.network):
+                    self.down += one.direction == DOWN
+                    self.up += one.direction != DOWN
+                    self.bad_stops += len(one.bad_stop)
+                    yield one
+                self.bar.to(self.given.tell())
+        except READ_ERRORS as error:
+            if not self.down + self.up:
+                raise
+            self.failure = error
+
+
+@click.command(short_help="Writes a run for Foxglove, Wireshark, or as a stream file.")
+@click.argument("file", metavar="FILE|-", type=Place())
+@click.option("--out", required=True, type=Place(), help="File to write, or - for standard output.")
+@click.option(
+    "--to",
+    type=click.Choice(TARGETS),
+    help="What to write. Default: stream for *.stream and *.txt, foxglove for *.mcap, else pcapng.",
+)
+@click.option(
+    "--format", type=click.Choice(TIMED), help="Format of FILE. Default: recognized by its first bytes."
+)
+@click.option("--network", type=Whole(0, 0xFFFF), help="Only this network. Default: all.")
+@click.option("--force", is_flag=True, help="Replace the file at --out.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no closing line.")
+@engine_option
+def export(
+    file: str,
+    out: str,
+    to: str | None,
+    format: str | None,
+    network: int | None,
+    force: bool,
+    quiet: bool,
+    engine: str | None,
+) -> int:
+    """Writes the characters in FILE (a recording, a stream file or a pcapng capture) as pcapng or as a stream file, or
+    a recording for Foxglove.
+
+    pcapng is for Wireshark and tshark: one packet a transmission (characters without a pause), with virtual time,
+    direction, and the network as interface; link type 250 (RTAC serial). `protocol/miro.lua` (or `python -m
+    miro_protocol.dissector`) shows the fields:
+
+    \b
+        mirotwin export run.mcap --out run.pcapng
+        tshark -X lua_script:miro.lua -d rtacser.data,miro -r run.pcapng -V
+
+    A stream file is for `mirotwin replay`, for editors and for git; a capture does not hold stop bits, a stream file
+    does. The same input gives the same bytes. Of an input that is cut short, all that could be read is written, and the
+    exit code is 2. A run that was broken off (run.part.mcap) is written as far as it goes, with a note.
+
+    For Foxglove, all that is in the recording is written again, with the scene, transforms, log and camera frames that
+    Foxglove draws; `mirotwin examples foxglove` writes a layout for it:
+
+    \b
+        mirotwin export run.mcap --out foxglove.mcap
+    """
+    if out != STDIN:
+        check_new(Path(out), "--out", force)
+        check_not_input(Path(out), "--out", file)
+    choose_engine(engine)
+    to = to or DEFAULTS.get(Path(out).suffix, "pcapng")
+    if to == "foxglove" and network is not None:
+        raise click.UsageError("--network does not go with --to foxglove, which writes all networks.")
+    with Input(file) as given, ProgressBar("exporting", given.size, quiet) as bar:
+        format = format or detect(given.peek())[0]
+        if to == "foxglove":
+            return export_foxglove(given, format, out, quiet)
+        if format not in TIMED:
+            raise BadInput(
+                given.label, "", f"{NAMES[format]} without times", "give a recording, stream or capture"
+            )
+        source = open_source(given, format, complain)
+        layouts = look(source, None, complain) if to == "stream" else None
+        exported = Exported(source.sent, network, given, bar)
+        pieces = convert.to_stream(exported, layouts.of) if layouts else convert.to_pcapng(exported)
+        try:
+            _write(out, _some(pieces, exported, given.label))
+        except convert.ConversionError as error:
+            raise BadInput(given.label, error.place, error.what, error.remedy) from None
+    if not quiet and out != STDIN:
+        show(f"{out}: {exported.down} transmissions from the host and {exported.up} from robots")
+    if exported.bad_stops and to == "pcapng":
+        complain(
+            f"{exported.bad_stops} bad stop bits were left out: a capture holds none, a stream file does"
+        )
+    if exported.failure is not None:
+        complain(f"error: {exported.failure}; everything before it was written")
+        return BAD_INPUT
+    return DONE
+
+
+def _some(pieces: Iterable[bytes], exported: Exported, label: str) -> Iterator[bytes]:
+    """The same; a network that was asked for and is not there is an error, before anything takes its place."""
+    yield from pieces
+    if exported.network is not None and not exported.down + exported.up and exported.failure is None:
+        there = ", ".join(map(str, sorted(exported.networks))) or "none"
+        raise BadInput(label, f"--network {exported.network}", "nothing of it", f"networks there: {there}")
+
+
+def _write(out: str, pieces: Iterable[bytes]) -> None:
+    if out == STDIN:
+        for piece in pieces:
+            sys.stdout.buffer.write(piece)
+        return
+    with whole_file(Path(out), "--out") as staging, staging.open("wb") as file:
+        for piece in pieces:
+            file.write(piece)

@@ -1,0 +1,59 @@
+"""The camera as it hangs: its frame, and its optics in the words of OpenCV.
+
+What belongs here: a scenario's lens as Foxglove takes it. What does not: what the PC believes about it, which is wrong
+by as much as the scenario says (`miro_sim.scenario.build.calibration_for`).
+
+The lens draws a point at the tangent r from its axis at r (1 + k1 r^2): the model `plumb_bob` with one number. Our
+pixel (i, j) covers i <= u < i + 1, and OpenCV's has its middle at (i, j): so half a pixel less.
+"""
+
+from __future__ import annotations
+
+from miro_exact.dmath import sincos
+from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
+from mirotwin.report.foxglove.frames import PITCH, camera_frame
+from mirotwin.report.foxglove.messages import CameraCalibration, FrameTransform, Quaternion, Time, Vector3
+
+UPSIDE_DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
+"""From right, up, backwards to right, down, ahead: half a turn about the first."""
+
+
+def transform(network: int, lens: CameraParameters, at: Time) -> FrameTransform:
+    """Where the camera hangs and where it looks: turned, tilted, and upside down."""
+    turned = _about(lens.turn_rad, (0.0, 0.0, 1.0))
+    tilted = _product(_about(lens.tilt_x_rad, (1.0, 0.0, 0.0)), _about(lens.tilt_y_rad, (0.0, 1.0, 0.0)))
+    place = Vector3(lens.x_m, lens.y_m, lens.height_m)
+    rotation = _product(_product(tilted, turned), UPSIDE_DOWN)
+    return FrameTransform(at, PITCH, camera_frame(network), place, rotation)
+
+
+def calibration(network: int, lens: CameraParameters, at: Time) -> CameraCalibration:
+    """The true optics."""
+    along, down = lens.focal_px, lens.focal_px * lens.pixel_aspect
+    u, v = lens.centre_u_px - 0.5, lens.centre_v_px - 0.5
+    return CameraCalibration(
+        timestamp=at,
+        frame_id=camera_frame(network),
+        width=WIDTH,
+        height=HEIGHT,
+        distortion_model="plumb_bob",
+        distortion=(lens.k1, 0.0, 0.0, 0.0, 0.0),
+        intrinsic=(along, 0.0, u, 0.0, down, v, 0.0, 0.0, 1.0),
+        rectification=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        projection=(along, 0.0, u, 0.0, 0.0, down, v, 0.0, 0.0, 0.0, 1.0, 0.0),
+    )
+
+
+def _about(angle_rad: float, axis: tuple[float, float, float]) -> Quaternion:
+    sin, cos = sincos(0.5 * angle_rad)
+    return Quaternion(axis[0] * sin, axis[1] * sin, axis[2] * sin, cos)
+
+
+def _product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The turn `b`, then the turn `a`."""
+    return Quaternion(
+        a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+        a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
+        a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w,
+        a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z,
+    )

@@ -1,0 +1,159 @@
+"""A recording with Foxglove's topics beside its own, as another recording: `mirotwin export run.mcap --out fox.mcap`.
+
+What belongs here: passing on a recording's records, and adding what follows from them. What does not: what follows
+(`derived`), files and the command line.
+
+The result holds every record of the recording as it is, but for the frames of cameras, which stand in it once, in
+Foxglove's form. So what reads recordings reads it too. The same recording gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+
+import msgspec
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+
+from miro_exact.bad_input import BadInput, shortened
+from miro_exact.clock import nanoseconds
+from miro_sim.periods import Period
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.file import parse
+from miro_sim.scenario.keys import Scenario
+from mirotwin.recording import reader
+from mirotwin.recording.channels import FaultMessage
+from mirotwin.recording.container import Cut, RecordingError, records
+from mirotwin.recording.images import ImageMessage
+from mirotwin.recording.messages import AGAIN, brief
+from mirotwin.recording.recorder import BROKEN_OFF, METADATA
+from mirotwin.recording.topics import IMAGE, PERIOD, Place, image_topic, place_of
+from mirotwin.recording.writer import McapWriter, Writable
+from mirotwin.report.foxglove import derived, notes, topics
+from mirotwin.report.foxglove.derived import Derived, Said
+from mirotwin.report.foxglove.published import schema_of
+
+FAULT = "fault"
+
+
+class Converted(msgspec.Struct):
+    """What came of it. `notes`: what is missing, and why, a line each."""
+
+    periods: int
+    images: int
+    notes: list[str]
+
+
+def convert(data: bytes, path: str, stream: Writable) -> Converted:
+    """Writes the recording `data` with Foxglove's topics. `path` names it in errors. Raises BadInput."""
+    recording = reader.parse(data, path)
+    told = [recording.broken_off] if recording.broken_off else []
+    scenario: Scenario | None = None
+    try:
+        scenario = parse(recording.source.scenario_text, path)
+    except ScenarioError as error:
+        told.append(f"{error}; so there are no camera, no ball, no patches and no references in the scene")
+    return _Conversion(path, recording.periods, Derived(scenario), stream, told).run(data)
+
+
+class _Conversion:
+    """The state of a conversion: which schemas and channels the new file has."""
+
+    def __init__(
+        self,
+        path: str,
+        periods: tuple[Period, ...],
+        derive: Derived,
+        stream: Writable,
+        told: list[str],
+    ) -> None:
+        self.path = path
+        self.periods = periods
+        self.derive = derive
+        self.writer = McapWriter(stream, profile=METADATA, library=METADATA)
+        self.result = Converted(len(periods), 0, told)
+        self._encode = msgspec.json.Encoder().encode
+        self._images = msgspec.json.Decoder(ImageMessage)
+        self._faults = msgspec.json.Decoder(FaultMessage)
+        self._schemas: dict[int, int] = {}  # theirs by number -> ours
+        self._channels: dict[int, tuple[int, Place | None]] = {}
+        self._named: dict[str, int] = {}
+        self._topics: dict[str, int] = {}
+        self._next = 0
+
+    def run(self, data: bytes) -> Converted:
+        broken = False
+        try:
+            for _, record in records(BytesIO(data), self.path):
+                self._take(record)
+                broken = broken or (isinstance(record, Metadata) and record.name == BROKEN_OFF)
+        except Cut as error:
+            if not broken:
+                reason = {"by": type(error).__name__, "reason": shortened(error.what)}
+                self.writer.add_metadata(BROKEN_OFF, reason)
+        self.writer.finish()
+        return self.result
+
+    def _take(self, record: object) -> None:
+        if isinstance(record, Message):
+            self._take_message(record)
+        elif isinstance(record, Schema):
+            number = self.writer.add_schema(record.name, record.encoding, record.data)
+            self._schemas[record.id] = number
+        elif isinstance(record, Channel):
+            self._take_channel(record)
+        elif isinstance(record, Attachment):
+            self.writer.add_attachment(record.name, record.media_type, record.data)
+        elif isinstance(record, Metadata):
+            self.writer.add_metadata(record.name, record.metadata)
+
+    def _take_channel(self, record: Channel) -> None:
+        if record.topic.startswith(topics.PREFIX):
+            what = f"holds Foxglove's topics already ({record.topic})"
+            raise BadInput(
+                self.path, "", what, "open it in Foxglove, or give the run.mcap that it was made of"
+            )
+        place = place_of(record.topic)
+        schema = self._schemas.get(record.schema_id, 0)
+        kept = 0
+        if place is None or place.channel != IMAGE:
+            kept = self.writer.add_channel(record.topic, record.message_encoding, schema)
+        self._channels[record.id] = kept, place
+
+    def _take_message(self, record: Message) -> None:
+        number, place = self._channels.get(record.channel_id, (0, None))
+        if number:
+            self.writer.add_message(number, record.log_time, record.data)
+        if place is None:
+            return
+        if place.channel == IMAGE:
+            self._take_image(place, record)
+        elif place.channel == FAULT and place.slot >= 0:
+            fault = self._faults.decode(record.data)
+            line = notes.of_fault(place.network, place.slot, fault.tick, fault.text)
+            self._add(derived.log(fault.tick, line))
+        elif place.channel == PERIOD and self._next < len(self.periods):
+            period = self.periods[self._next]
+            self._next += 1
+            for said in self.derive.period(period):
+                self._add(said)
+
+    def _take_image(self, place: Place, record: Message) -> None:
+        try:
+            found = self._images.decode(record.data)
+        except (msgspec.DecodeError, ValueError) as error:
+            where = f"{image_topic(place.network)} at {record.log_time} ns"
+            raise RecordingError(self.path, where, brief(error), AGAIN) from None
+        self.result.images += 1
+        self._add(derived.image(place.network, found.tick, found.data))
+
+    def _add(self, said: Said) -> None:
+        topic, tick, message = said
+        channel = self._topics.get(topic) or self._register(topic, message)
+        self.writer.add_message(channel, nanoseconds(tick), self._encode(message))
+
+    def _register(self, topic: str, message: msgspec.Struct) -> int:
+        name, text = schema_of(message)
+        if name not in self._named:
+            self._named[name] = self.writer.add_schema(name, "jsonschema", text)
+        self._topics[topic] = self.writer.add_channel(topic, "json", self._named[name])
+        return self._topics[topic]

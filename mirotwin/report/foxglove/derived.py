@@ -1,0 +1,144 @@
+"""From a run to Foxglove's messages: what control periods, frames, faults and checks become.
+
+What belongs here: which message goes to which topic, and when. What does not: what single ones say (`frames`, `pitch`,
+`robots`, `paths`, `camera`, `notes`), where periods come from and where messages go (`convert`, `server`).
+
+Pure: of the same periods the same messages come out, whether the run is under way or was recorded. What stands still is
+said again each second, for viewers that come late or jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import msgspec
+
+from miro_sim.periods import Period, RobotPeriod
+from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
+from miro_sim.scenario.keys import Scenario
+from mirotwin.recording.track import error_of
+from mirotwin.report.foxglove import camera, frames, notes, paths, pitch, robots, topics
+from mirotwin.report.foxglove.messages import (
+    CompressedImage,
+    FrameTransforms,
+    Log,
+    SceneEntity,
+    SceneUpdate,
+    Time,
+    time_of,
+)
+from mirotwin.report.foxglove.shapes import Point
+
+AGAIN = 30
+"""Control periods from one message about what stands still to the next."""
+
+Place = tuple[int, int]
+"""Network and slot of a robot."""
+
+
+class ErrorMessage(msgspec.Struct, frozen=True):
+    """`error`: truth against reference at `tick`, the paper's c - r, heading wrapped. `off_pitch`: a corner is."""
+
+    tick: int
+    x_cm: float
+    y_cm: float
+    position_cm: float
+    theta_rad: float
+    off_pitch: bool
+
+
+class Said(NamedTuple):
+    """A message, where it goes, and of when it is."""
+
+    topic: str
+    tick: int
+    message: msgspec.Struct
+
+
+class Derived:
+    """What of a run goes to Foxglove, one control period after the other.
+
+    `scenario` None: nobody knows it; then there are no camera, no ball, no patches and no references.
+    """
+
+    def __init__(self, scenario: Scenario | None) -> None:
+        self.scenario = scenario
+        self._lens = (
+            scenario.camera if scenario and isinstance(scenario.camera, SeeingCamera) else None
+        )  # a Gaussian camera has none
+        self._paths: dict[Place, tuple[Point, ...]] = {}
+        for network, spec in enumerate(() if scenario is None else scenario.networks):
+            for robot in spec.robot:
+                assert scenario is not None
+                points = paths.reference_points(robot, scenario.duration_s)
+                self._paths[network, robot.slot] = points
+        self._trails: dict[Place, paths.Trail] = {}
+        self._notes: dict[Place, notes.RobotNotes] = {}
+        self._count = 0
+
+    def period(self, period: Period) -> Iterator[Said]:
+        """Everything about a control period."""
+        tick, at = period.tick, time_of(period.tick)
+        still = self._count % AGAIN == 0
+        self._count += 1
+        yield Said(topics.TRANSFORMS, tick, self._transforms(period, at))
+        if still:
+            yield from self._standing(period, at)
+        trails = [entity for robot in period.robots for entity in self._trail(robot, period.index, at)]
+        yield Said(topics.TRAILS, tick, SceneUpdate((), tuple(trails)))
+        for robot in period.robots:
+            place = robot.network, robot.slot
+            yield Said(topics.error_topic(*place), tick, _error(robot, tick))
+            for line in self._notes.setdefault(place, notes.RobotNotes()).add(robot, tick):
+                yield Said(topics.LOG, tick, line)
+        for deed in period.deeds:
+            yield Said(topics.LOG, deed.tick, notes.of_deed(deed))
+
+    def _trail(self, robot: RobotPeriod, index: int, at: Time) -> Iterator[SceneEntity]:
+        place = robot.network, robot.slot
+        return self._trails.setdefault(place, paths.Trail()).add(robot, index, at)
+
+    def _transforms(self, period: Period, at: Time) -> FrameTransforms:
+        found = [one for robot in period.robots for one in frames.of_robot(robot, at)]
+        if self._lens is not None:
+            found += [camera.transform(network, self._lens.lens, at) for network in _networks(period)]
+        return FrameTransforms(tuple(found))
+
+    def _standing(self, period: Period, at: Time) -> Iterator[Said]:
+        yield Said(topics.SCENE, period.tick, SceneUpdate((), tuple(self._scene(period, at))))
+        if self._lens is not None:
+            for network in _networks(period):
+                message = camera.calibration(network, self._lens.lens, at)
+                yield Said(topics.calibration_topic(network), period.tick, message)
+
+    def _scene(self, period: Period, at: Time) -> Iterator[SceneEntity]:
+        yield pitch.pitch(at)
+        if isinstance(self._lens, PixelCamera) and self._lens.ball is not None:
+            yield pitch.ball(self._lens.ball, at)
+        pattern = None if self._lens is None else self._lens.pattern
+        for robot in period.robots:
+            place = robot.network, robot.slot
+            yield from robots.drawn(*place, pattern, at)
+            if self._paths.get(place):
+                yield paths.reference(*place, self._paths[place], at)
+
+
+def image(network: int, tick: int, png: bytes) -> Said:
+    """The frame of a network's camera that was exposed at `tick`."""
+    message = CompressedImage(time_of(tick), frames.camera_frame(network), png, "png")
+    return Said(topics.image_topic(network), tick, message)
+
+
+def log(tick: int, line: Log) -> Said:
+    """A line of the log."""
+    return Said(topics.LOG, tick, line)
+
+
+def _networks(period: Period) -> list[int]:
+    return sorted({robot.network for robot in period.robots})
+
+
+def _error(robot: RobotPeriod, tick: int) -> ErrorMessage:
+    found = error_of(robot, tick)
+    return ErrorMessage(tick, found.x_cm, found.y_cm, found.position_cm, found.theta_rad, found.off_pitch)

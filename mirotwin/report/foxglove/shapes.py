@@ -1,0 +1,77 @@
+"""The usual shapes of a scene: boxes, balls, lines and marks, made of few numbers.
+
+What belongs here: ways to make primitives, and how paints look on a screen. What does not: what is drawn (`pitch`,
+`robots`, `paths`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+
+from miro_exact.dmath import exp, log, sincos
+from miro_sim.pitch.paints import PAINTS
+from mirotwin.report.foxglove.messages import (
+    LINE_LIST,
+    LINE_LOOP,
+    LINE_STRIP,
+    Color,
+    CubePrimitive,
+    LinePrimitive,
+    Pose,
+    Quaternion,
+    SpherePrimitive,
+    Vector3,
+)
+
+STRAIGHT = Quaternion(0.0, 0.0, 0.0, 1.0)
+ORIGIN = Pose(Vector3(0.0, 0.0, 0.0), STRAIGHT)
+SCREEN_GAMMA = 0.45
+"""As the camera's: a paint is a share of light, a colour is what a screen is told."""
+
+Point = tuple[float, float]
+
+
+def heading(theta_rad: float) -> Quaternion:
+    """A turn about the axis that points up."""
+    sin, cos = sincos(0.5 * theta_rad)
+    return Quaternion(0.0, 0.0, sin, cos)
+
+
+@cache
+def paint(name: str, alpha: float = 1.0) -> Color:
+    """How a paint of the scene looks on a screen."""
+    red, green, blue = (exp(SCREEN_GAMMA * log(part / 1000.0)) for part in PAINTS[name])
+    return Color(red, green, blue, alpha)
+
+
+def box(low: tuple[float, float, float], high: tuple[float, float, float], color: Color) -> CubePrimitive:
+    """Between two corners."""
+    middle = Vector3(*((one + other) / 2.0 for one, other in zip(low, high, strict=True)))
+    size = Vector3(*(other - one for one, other in zip(low, high, strict=True)))
+    return CubePrimitive(Pose(middle, STRAIGHT), size, color)
+
+
+def ball(at: tuple[float, float, float], radius_m: float, color: Color) -> SpherePrimitive:
+    """A ball with its centre there."""
+    across = 2.0 * radius_m
+    return SpherePrimitive(Pose(Vector3(*at), STRAIGHT), Vector3(across, across, across), color)
+
+
+def strip(points: Iterable[Point], z_m: float, wide_m: float, color: Color) -> LinePrimitive:
+    """From point to point, at one height."""
+    return _line(LINE_STRIP, points, z_m, wide_m, color)
+
+
+def loop(points: Iterable[Point], z_m: float, wide_m: float, color: Color) -> LinePrimitive:
+    """From point to point and back to the first."""
+    return _line(LINE_LOOP, points, z_m, wide_m, color)
+
+
+def pieces(points: Iterable[Point], z_m: float, wide_m: float, color: Color) -> LinePrimitive:
+    """From the first to the second point, from the third to the fourth, and so on."""
+    return _line(LINE_LIST, points, z_m, wide_m, color)
+
+
+def _line(kind: int, points: Iterable[Point], z_m: float, wide_m: float, color: Color) -> LinePrimitive:
+    return LinePrimitive(kind, ORIGIN, wide_m, False, tuple(Vector3(x, y, z_m) for x, y in points), color)

@@ -1,0 +1,76 @@
+"""Camera frames out of a recording, small enough for a page.
+
+What belongs here: reading them, and making them small. What does not: the tracker's view (`mirotwin.camera`).
+
+A frame is recorded as PNG, 0.2 MB of mostly noise; here it becomes a JPEG of a tenth of that.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from mirotwin.recording.channels import SampleMessage
+from mirotwin.recording.container import Cut
+from mirotwin.recording.images import ImageMessage
+from mirotwin.recording.messages import Messages
+from mirotwin.recording.track import Place
+
+QUALITY = 72
+"""Of a JPEG; noise of the picture is hardly kept below 60."""
+
+
+class CameraFrame(msgspec.Struct, frozen=True):
+    """A picture that was exposed at `tick`; `jpeg` in base64."""
+
+    network: int
+    tick: int
+    jpeg: str
+
+
+class Extras(msgspec.Struct, frozen=True):
+    """What a recording holds besides control periods. `broken_off`: its run did not come to its end."""
+
+    frames: Sequence[CameraFrame] = ()
+    samples: Sequence[tuple[Place, SampleMessage]] = ()
+    broken_off: bool = False
+
+
+def extras_of(path: str | Path, from_tick: int, to_tick: int, frames: bool) -> Extras:
+    """Frames, if they are wanted, and samples from `from_tick` to before `to_tick`. Raises RecordingError."""
+    kinds: list[type[msgspec.Struct]] = [SampleMessage, *([ImageMessage] if frames else [])]
+    found: list[CameraFrame] = []
+    samples: list[tuple[Place, SampleMessage]] = []
+    with open(path, "rb") as stream:
+        messages = Messages(stream, str(path), kinds)
+        cut = False
+        try:
+            for place, message in messages:
+                if not from_tick <= message.tick < to_tick:
+                    continue
+                if isinstance(message, ImageMessage):
+                    found.append(_frame(str(path), place.network, message))
+                else:
+                    samples.append(((place.network, place.slot), message))
+        except Cut:  # what came before is whole
+            cut = True
+    return Extras(found, samples, cut or bool(messages.broken_off))
+
+
+def _frame(path: str, network: int, message: ImageMessage) -> CameraFrame:
+    from PIL import Image as Picture  # loads the pictures' library
+    from PIL import UnidentifiedImageError
+
+    small = BytesIO()
+    try:
+        with Picture.open(BytesIO(message.data)) as picture:
+            picture.convert("RGB").save(small, "JPEG", quality=QUALITY, optimize=True)
+    except (UnidentifiedImageError, OSError, ValueError, Picture.DecompressionBombError):
+        what = f"the camera frame at tick {message.tick} is no picture"
+        raise BadInput(path, "camera/image", what, "leave the frames out with --no-frames") from None
+    return CameraFrame(network, message.tick, base64.b64encode(small.getvalue()).decode())

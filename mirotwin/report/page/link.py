@@ -1,0 +1,259 @@
+"""What was on the air: each transmission of a host, what became of it at each robot, and the answers.
+
+What belongs here: events of a world's logs to marks on lanes, and their fates. What does not: drawing them (`plots`).
+
+A host's transmission that holds a frame has a fate at each robot of its network: `fresh` (a valid frame with a new
+number arrived), `repeated` (a valid frame that is not), `damaged` (characters that are no frame), `lost` (nothing),
+`open` where the run ended before it could have arrived.
+What arrives belongs to the last transmission before it, shifted by the radio's latency. Characters that come at other
+times are `noise` on an idle carrier.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+
+import msgspec
+
+from miro_exact.clock import CHARACTER_BITS, HOST_CHARACTER_TICKS, ROBOT_BIT_TICKS, ticks
+from miro_protocol.decoder import Damaged, Decoder, Received
+from miro_protocol.frames import ContentError, describe
+from miro_protocol.freshness import Freshness
+from miro_protocol.table import TELEMETRY
+from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.event_log import EventLog
+from miro_sim.periods import Period
+from miro_sim.world.events import Event, of_board
+from miro_sim.world.world import World
+from mirotwin.verify.checks.hearing import TO_RI_TICKS
+
+OF_PC = ("answer", "reset", "power", "radio")
+RESTARTS = ("reset", "power")
+FATES = ("fresh", "repeated", "damaged", "lost", "open")
+ROBOT_CHARACTER_TICKS = CHARACTER_BITS * ROBOT_BIT_TICKS
+TOGETHER_TICKS = 3 * ROBOT_CHARACTER_TICKS
+"""Characters with a longer pause between them are two noises."""
+SLACK_TICKS = 24_000
+"""By so much a frame may arrive before it should: rounding of delays."""
+
+
+class Mark(msgspec.Struct, frozen=True):
+    """Something on a lane from `start_tick` to `end_tick`."""
+
+    lane: str
+    kind: str
+    start_tick: int
+    end_tick: int
+    text: str
+
+
+class Heard(msgspec.Struct, frozen=True):
+    """Characters at a robot, by their ticks: a valid frame (`fresh` or not), or none (`fresh` None)."""
+
+    ticks: tuple[int, ...]
+    fresh: bool | None
+
+
+class Ear:
+    """Decodes what a robot's serial port delivers, and keeps when each character came."""
+
+    def __init__(self, robots: int) -> None:
+        self.heard: list[Heard] = []
+        self._robots = robots
+        self._ticks: list[int] = []
+        self.restart()
+
+    def restart(self) -> None:
+        """The robot begins anew, and knows nothing of before."""
+        self.flush()
+        self._decoder, self._freshness = Decoder(self._robots), Freshness()
+
+    def take(self, received: Event) -> None:
+        tick = received.tick - TO_RI_TICKS
+        self._ticks.append(tick)
+        self._note(self._decoder.feed_symbols([(received.value, received.good_stop, tick)]))
+
+    def flush(self) -> None:
+        """Nothing more comes."""
+        if self._ticks:
+            self._note(self._decoder.flush())
+
+    def _note(self, found: Sequence[Received | Damaged]) -> None:
+        """Every character belongs to one event, in the order in which they came."""
+        for one in found:
+            fresh = None
+            if isinstance(one, Received):
+                fresh = self._freshness.judge(one.seq, one.last_tick)
+            ticks_of = tuple(self._ticks[: len(one.data)])
+            del self._ticks[: len(one.data)]
+            self.heard.append(Heard(ticks_of, fresh))
+
+
+class LinkLog:
+    """Watches the air of a world while it runs. `marks` is for the end."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.wire: list[Transmission] = []
+        self._at_pc: dict[int, list[Event]] = {network.index: [] for network in world.networks}
+        self._pc_read = {network.index: network.log.end for network in world.networks}
+        self._board_read: dict[tuple[int, int], int] = {}
+        self._ears: dict[tuple[int, int], Ear] = {}
+        for network in world.networks:
+            for robot in network.robots:
+                place = (network.index, robot.slot)
+                self._board_read[place] = robot.board.log.end
+                self._ears[place] = Ear(network.spec.robots)
+        world.observers.append(self.look)
+
+    def look(self, period: Period) -> None:
+        """Takes over what the logs have that is new."""
+        self.wire += period.wire
+        for network in self.world.networks:
+            index, log = network.index, network.log
+            new = [event for _, event in log.since(self._pc_read[index]) if event.what in OF_PC]
+            self._pc_read[index] = log.end
+            self._at_pc[index] += new
+            for robot in network.robots:
+                restarts = [event for event in new if event.what in RESTARTS and event.slot == robot.slot]
+                self._look_at((index, robot.slot), robot.board.log, restarts)
+
+    def _look_at(self, place: tuple[int, int], log: EventLog, restarts: Sequence[Event]) -> None:
+        events = [event for _, event in of_board(log, self._board_read[place], *place)]
+        self._board_read[place] = log.end
+        received = [event for event in events if event.what == "received"]
+        for event in sorted([*received, *restarts], key=lambda event: event.tick):
+            if event.what in RESTARTS:
+                self._ears[place].restart()
+            else:
+                self._ears[place].take(event)
+
+    def marks(self) -> list[Mark]:
+        """All marks, lane by lane, in the order of time."""
+        found: list[Mark] = []
+        for network in self.world.networks:
+            index = network.index
+            sent = [one for one in self.wire if one.network == index and one.direction == DOWN]
+            heard = [one for one in self.wire if one.network == index and one.direction != DOWN]
+            named = [_named(one, network.spec.robots) for one in sent]
+            delay = ticks(network.spec.radio.latency_s)
+            found += [_sent(one, name) for one, name in zip(sent, named, strict=True)]
+            for robot in network.robots:
+                ear = self._ears[index, robot.slot]
+                ear.flush()
+                lane = f"net{index}/robot{robot.slot} hears"
+                found += _fates(lane, sent, named, ear.heard, delay, self.world.tick)
+            found += _answers(heard, self._at_pc[index], index)
+            found += [_deed(event) for event in self._at_pc[index] if event.what != "answer"]
+        return found
+
+
+def lanes_of(marks: Sequence[Mark]) -> list[str]:
+    """Names of the lanes, in the order in which they are drawn from the top."""
+    return list(dict.fromkeys(mark.lane for mark in marks))
+
+
+def _named(sent: Transmission, robots: int) -> str:
+    """What the frames in a transmission say; empty where it holds none."""
+    decoder = Decoder(robots)
+    frames = [one for one in [*decoder.hear(sent), *decoder.flush()] if isinstance(one, Received)]
+    return ", ".join(_said(frame, robots) for frame in frames)
+
+
+def _said(frame: Received, robots: int) -> str:
+    try:
+        return describe(frame.message(robots))
+    except ContentError:
+        return f"unknown frame seq={frame.seq}"
+
+
+def _sent(sent: Transmission, named: str) -> Mark:
+    end = sent.tick + len(sent.data) * HOST_CHARACTER_TICKS
+    text = named or _characters(len(sent.data))
+    return Mark(f"net{sent.network} PC sends", "sent" if named else "raw", sent.tick, end, text)
+
+
+def _fates(
+    lane: str,
+    sent: Sequence[Transmission],
+    named: Sequence[str],
+    heard: Sequence[Heard],
+    delay: int,
+    over_tick: int,
+) -> list[Mark]:
+    """What came of each transmission; characters that belong to none are noise."""
+    begins = [one.tick + delay - SLACK_TICKS for one in sent]
+    ends = [one.tick + delay + len(one.data) * HOST_CHARACTER_TICKS + SLACK_TICKS for one in sent]
+    damaged: dict[int, int] = {}  # transmission -> characters of it in no frame
+    frames: dict[int, bool] = {}  # ... -> whether the frame was fresh
+    marks = []
+    for one in heard:
+        if one.fresh is not None:
+            frames[bisect_right(begins, one.ticks[-1]) - 1] = one.fresh
+            continue
+        noise: list[int] = []
+        for tick in one.ticks:
+            number = bisect_right(begins, tick) - 1
+            if number >= 0 and tick <= ends[number]:
+                damaged[number] = damaged.get(number, 0) + 1
+            else:
+                noise.append(tick)
+        for first, last, count in _together(noise):
+            marks.append(Mark(lane, "noise", first, last, f"{_characters(count)} of noise"))
+    for number, name in enumerate(named):
+        start, end = begins[number] + SLACK_TICKS, ends[number] - SLACK_TICKS
+        kind = _fate(frames.get(number), damaged.get(number, 0), end + SLACK_TICKS > over_tick)
+        if name or kind not in ("lost", "open"):
+            shown = min(end, over_tick) if kind == "open" else end
+            marks.append(Mark(lane, kind, start, shown, f"{name or 'no frame'}: {kind}"))
+    return sorted(marks, key=lambda mark: mark.start_tick)
+
+
+def _together(ticks_of: Sequence[int]) -> list[tuple[int, int, int]]:
+    """Begin, end and number of characters that come close to each other."""
+    found: list[tuple[int, int, int]] = []
+    for tick in ticks_of:
+        end = tick + ROBOT_CHARACTER_TICKS
+        if found and tick - found[-1][1] <= TOGETHER_TICKS:
+            found[-1] = (found[-1][0], end, found[-1][2] + 1)
+        else:
+            found.append((tick, end, 1))
+    return found
+
+
+def _fate(fresh: bool | None, damaged: int, at_the_end: bool) -> str:
+    if fresh is not None:
+        return "fresh" if fresh else "repeated"
+    if at_the_end:
+        return "open"
+    return "damaged" if damaged else "lost"
+
+
+def _answers(heard: Sequence[Transmission], events: Sequence[Event], network: int) -> list[Mark]:
+    """What the PC heard: characters without a valid answer are a damaged one, or too few for that, noise."""
+    answers = [event for event in events if event.what == "answer" and event.frame is not None]
+    marks = []
+    for one in heard:
+        end = one.tick + len(one.data) * ROBOT_CHARACTER_TICKS
+        within = [event for event in answers if one.tick <= event.tick <= end + SLACK_TICKS]
+        enough = len(one.data) >= TELEMETRY.wire_size // 2
+        kind = "answer" if within else "damaged" if enough else "noise"
+        who = (
+            ", ".join(_answer(event) for event in within) or f"{_characters(len(one.data))}, no valid answer"
+        )
+        marks.append(Mark(f"net{network} PC hears", kind, one.tick, end, who))
+    return marks
+
+
+def _answer(event: Event) -> str:
+    return _said(event.frame, 3) if event.frame is not None else ""
+
+
+def _deed(event: Event) -> Mark:
+    lane = f"net{event.network} done to it"
+    return Mark(lane, "deed", event.tick, event.tick + HOST_CHARACTER_TICKS, f"{event}".partition(": ")[2])
+
+
+def _characters(count: int) -> str:
+    return f"{count} character" if count == 1 else f"{count} characters"

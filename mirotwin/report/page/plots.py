@@ -1,0 +1,188 @@
+"""The figures of a run against time: errors, speeds, wheels, and the air.
+
+What belongs here: which columns are drawn, and how. What does not: the columns (`course`, `link`), the figures' style
+(`axes`), and their place on the page (`assets`).
+
+All share one range of time. A renderer of one robot has the tag `robot:N`, its place among the robots; the page shows
+those of one robot at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from bokeh.models import BoxAnnotation, ColumnDataSource, FactorRange
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
+from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
+from mirotwin.report.page.axes import add_cursor, add_failures, at_least, panel, tagged, time_range
+from mirotwin.report.page.course import SIDES, Course, RobotCourse
+from mirotwin.report.page.link import Mark, lanes_of
+
+PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
+MOST_FAILURES = 20
+"""So many are marked; the table has more."""
+KIND_COLOURS = {
+    "noise": "noise",
+    "open": "rule",
+    "sent": "muted",
+    "raw": "measured",
+    "fresh": "good",
+    "repeated": "repeated",
+    "answer": "truth",
+    "deed": "measured",
+    "damaged": "bad",
+    "lost": "lost",
+}
+"""Kinds of marks and their colours, in the order in which they are drawn: what went wrong lies on top."""
+HEIGHTS = {"noise": 0.26, "damaged": 0.94, "lost": 0.94}
+"""Of a lane; 0.6 for all others."""
+LEAST_M_S, LEAST_RAD_S = 0.01, 0.1
+"""The least that an axis of speeds spans: some forty steps of the encoder over a control period, at the wheel."""
+HOLLOW, WRONG = ("lost",), ("damaged", "lost")
+Figures = dict[str, Any]
+
+
+def figures_of(course: Course, marks: Sequence[Mark], failure_ticks: Sequence[int]) -> Figures:
+    """All figures by the id of their element."""
+    times = time_range(course.times_s, PERIOD_S)
+    made: Figures = {}
+    if any(robot.steered for robot in course.robots):
+        made["plot-position"] = _errors(course, times, "position error [cm]", SETTLED_CM, _position)
+        made["plot-heading"] = _errors(course, times, "heading error [rad]", SETTLED_RAD, _heading)
+    made["plot-v"] = _speeds(course, times, "v [m/s]", "v_m_s", LEAST_M_S)
+    made["plot-w"] = _speeds(course, times, "\u03c9 [rad/s]", "w_rad_s", LEAST_RAD_S)
+    for side in SIDES:
+        made[f"plot-{side}"] = _wheel(course, times, side)
+    if marks:
+        made["plot-link"] = _link(marks, times)
+    marked = list(dict.fromkeys(tick / TICKS_PER_SECOND for tick in failure_ticks))[:MOST_FAILURES]
+    for figure in made.values():
+        add_failures(figure, marked)
+        add_cursor(figure)
+        if figure.y_range.__class__.__name__ == "DataRange1d":
+            figure.y_range.only_visible = True
+    return made
+
+
+def _position(errors: Any) -> Any:
+    x_cm, y_cm = np.array(errors.x_cm), np.array(errors.y_cm)
+    return np.sqrt(x_cm * x_cm + y_cm * y_cm)
+
+
+def _heading(errors: Any) -> Any:
+    return np.array(errors.theta_rad)
+
+
+def _errors(course: Course, times: Any, label: str, band: float, value_of: Callable[[Any], Any]) -> Any:
+    made = panel(label, times, x_label="t [s]")
+    low = 0.0 if value_of is _position else -band
+    shaded = BoxAnnotation(bottom=low, top=band, fill_alpha=1.0, line_color=None, level="underlay")
+    made.add_layout(tagged(shaded, fill_color="band"))
+    for number, robot in enumerate(course.robots):
+        seen = {"t": _times(robot.seen.ticks), "value": value_of(robot.seen)}
+        dots = made.scatter(
+            "t", "value", source=ColumnDataSource(seen), size=3.5, line_color=None, fill_alpha=0.7
+        )
+        _of_robot(dots, number, fill_color="measured")
+        truth = {"t": _times(robot.errors.ticks), "value": value_of(robot.errors)}
+        _of_robot(
+            made.line("t", "value", source=ColumnDataSource(truth), line_width=1.8),
+            number,
+            line_color="truth",
+        )
+    return made
+
+
+def _speeds(course: Course, times: Any, label: str, name: str, least: float) -> Any:
+    made = panel(label, times, x_label="t [s]")
+    for number, robot in enumerate(course.robots):
+        found = {"t": _of_course(course), "truth": _array(robot, name), "told": _array(robot, f"told_{name}")}
+        source = ColumnDataSource(found)
+        told = made.step("t", "told", source=source, mode="after", line_width=1.4)
+        _of_robot(told, number, line_color="told")
+        _of_robot(made.line("t", "truth", source=source, line_width=1.8), number, line_color="truth")
+        _widen(made, number, course, least, found["truth"], found["told"])
+    return made
+
+
+def _wheel(course: Course, times: Any, side: str) -> Any:
+    made = panel(f"{side} [m/s]", times, x_label="t [s]")
+    for number, robot in enumerate(course.robots):
+        wheel, fine = robot.wheels[side], robot.fine[side]
+        found = {
+            "t": _of_course(course),
+            **{name: np.array(getattr(wheel, name)) for name in ("told", "actual")},
+        }
+        source = ColumnDataSource(found)
+        of_profile = (
+            (fine.times_s, fine.profile) if len(fine.profile) else (_of_course(course), wheel.profile)
+        )
+        profile = ColumnDataSource({"t": np.array(of_profile[0]), "profile": np.array(of_profile[1])})
+        told = made.step("t", "told", source=source, mode="after", line_width=1.0)
+        _of_robot(told, number, line_color="told")
+        _of_robot(made.line("t", "profile", source=profile, line_width=1.6), number, line_color="profile")
+        actual = made.line("t", "actual", source=source, line_width=1.6)
+        _of_robot(actual, number, line_color="truth")
+        _widen(made, number, course, LEAST_M_S, found["told"], found["actual"], of_profile[1])
+    return made
+
+
+def _widen(made: Any, number: int, course: Course, least: float, *columns: Any) -> None:
+    """Makes the axis of one robot span `least` where its numbers vary by less: by two points that nobody sees."""
+    if (ends := at_least(least, *columns)) is not None:
+        source = ColumnDataSource({"t": [course.times_s[0]] * 2, "value": list(ends)})
+        points = made.scatter("t", "value", source=source, size=0, line_color=None, fill_alpha=0.0)
+        _of_robot(points, number)
+
+
+def _link(marks: Sequence[Mark], times: Any) -> Any:
+    lanes = lanes_of(marks)
+    made = panel(
+        "",
+        times,
+        height=64 + 26 * len(lanes),
+        x_label="t [s]",
+        y_range=FactorRange(factors=list(reversed(lanes))),
+    )
+    made.yaxis[0].major_label_text_align = "left"
+    made.ygrid[0].visible = False
+    made.min_border_left = 120
+    for kind, colour in KIND_COLOURS.items():
+        found = [mark for mark in marks if mark.kind == kind]
+        if not found:
+            continue
+        source = ColumnDataSource(
+            {
+                "lane": [mark.lane for mark in found],
+                "left": _times([mark.start_tick for mark in found]),
+                "right": _times([mark.end_tick for mark in found]),
+            }
+        )
+        bars = made.hbar(y="lane", left="left", right="right", source=source, name=f"link:{kind}")
+        bars.glyph.height = HEIGHTS.get(kind, 0.6)
+        bars.glyph.line_width = 2.0 if kind in WRONG else 1.0
+        alpha = 0.0 if kind in HOLLOW else 1.0
+        bars.glyph.fill_alpha = alpha
+        tagged(bars.glyph, fill_color=colour, line_color=colour)
+    return made
+
+
+def _of_robot(renderer: Any, number: int, **colours: str) -> None:
+    renderer.tags = [f"robot:{number}"]
+    renderer.visible = number == 0
+    tagged(renderer.glyph, **colours)
+
+
+def _of_course(course: Course) -> Any:
+    return _times(course.ticks)
+
+
+def _times(ticks: Any) -> Any:
+    return np.array(ticks, dtype=np.float64) / TICKS_PER_SECOND
+
+
+def _array(robot: RobotCourse, name: str) -> Any:
+    return np.array(getattr(robot, name))

@@ -1,0 +1,224 @@
+"""The page of one run: what its header says, its sections, and the data that its JavaScript moves.
+
+What belongs here: putting them together. What does not: where a run comes from (`report.report_subject`), numbers
+(`course`, `link`, `again`), figures (`plots`), and HTML (`assets/run.html`).
+"""
+
+from __future__ import annotations
+
+import base64
+import sys
+from array import array
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from miro_robot.image.debug_info import Sources
+from miro_sim.periods import Period
+from miro_sim.scenario.keys import Scenario
+from mirotwin.recording.difference import Difference, first_per_channel
+from mirotwin.report.page.again import Again
+from mirotwin.report.page.course import Column, Course, Postures, RobotCourse, add_samples, course_of
+from mirotwin.report.page.document import render
+from mirotwin.report.page.firmware import SHOWN, coverage_rows, function_rows
+from mirotwin.report.page.frames import CameraFrame, Extras
+from mirotwin.report.page.link import Mark, lanes_of
+from mirotwin.report.page.pitch import pitch_of
+from mirotwin.report.summary import Steps, rms_name, settling_text, tracking_of
+
+FIRST = 200
+"""Failures of checks, and differences, that are listed."""
+SILENT = "silent"
+
+
+class About(msgspec.Struct, frozen=True):
+    """What the header says. `kind`: run, case or failed test; `file`: its name without folders; `name`: of a test.
+
+    `notes`: what is to be known before all else, a line each; `report`: the text that a failed test left; `again`:
+    commands that give it again.
+    """
+
+    kind: str
+    file: str
+    seed: int
+    firmware: str
+    firmware_sha256: str
+    notes: Sequence[str] = ()
+    report: str = ""
+    again: Sequence[str] = ()
+    verdict: str = ""
+    name: str = ""
+
+
+class Replayed(msgspec.Struct, frozen=True):
+    """How the recorded run and the one that this page made compare: what of, and where they differ."""
+
+    what: str
+    differences: Sequence[Difference] = ()
+
+
+class Material(msgspec.Struct, frozen=True):
+    """All that a page is made from. `periods`: those that are drawn; `shown`: numbers of the wanted ones."""
+
+    about: About
+    scenario: Scenario
+    scenario_text: str
+    periods: Sequence[Period]
+    again: Again
+    sources: Sources
+    extras: Extras = Extras()
+    replayed: Replayed | None = None
+    steps: Steps | None = None
+    shown: range | None = None
+    broken_off: bool = False
+
+
+def run_page(material: Material) -> bytes:
+    """The page. Raises BadInput where Bokeh is not installed."""
+    from mirotwin.report.page.plots import KIND_COLOURS, figures_of  # loads Bokeh
+
+    scenario, again = material.scenario, material.again
+    steered = [network.host != SILENT for network in scenario.networks]
+    delay_frames = getattr(scenario.camera, "delay_frames", 0)
+    course = course_of(material.periods, steered, delay_frames, material.shown)
+    add_samples(course, material.extras.samples)
+    marks = _within(again.marks, course)
+    ticks = [*(one.tick for one in again.failures), *(one.tick for one in again.faults)]
+    figures = figures_of(course, marks, [tick for tick in ticks if _shows(course, tick)])
+    functions = function_rows(again.profile)
+    values = {
+        "about": material.about,
+        "title": scenario.title,
+        "scenario": scenario.name,
+        "scenario_text": material.scenario_text,
+        "verdict": _verdict(material),
+        "told": any(value == value for robot in course.robots for value in robot.told_v_m_s),
+        "facts": _facts(material, course),
+        "course": course,
+        "pitch": pitch_of(course),
+        "again": again,
+        "failures": again.failures[:FIRST],
+        "more_failures": max(0, len(again.failures) - FIRST),
+        "steps": material.steps,
+        "kinds": [(kind, colour) for kind, colour in KIND_COLOURS.items() if _count(marks, kind)],
+        "lanes": [(lane, _counts(marks, lane)) for lane in lanes_of(marks)],
+        "functions": functions,
+        "functions_shown": SHOWN,
+        "interrupts": [one for one in again.profile.interrupts if one.count],
+        "coverage": coverage_rows(again.image, again.counts, material.sources),
+        "replayed": material.replayed,
+        "channels": first_per_channel(material.replayed.differences)[:FIRST] if material.replayed else [],
+        "frames": material.extras.frames,
+    }
+    return render("run.html", figures, _data(course, marks, material.extras.frames, ticks), values)
+
+
+def _verdict(material: Material) -> tuple[str, str]:
+    """A word for the badge, and how many checks it comes from."""
+    again, steps = material.again, material.steps
+    verdicts = [*again.verdicts, *(steps.expectations if steps else ())]
+    failed = [one for one in verdicts if one.verdict == "failed"]
+    of = f"{len(failed)} of {len(verdicts)} checks failed" if failed else f"{len(verdicts)} checks"
+    if again.faults:
+        return "fault", of
+    if material.about.verdict:
+        return material.about.verdict, of
+    if failed or (steps is not None and steps.failed):
+        return "failed", of
+    return ("broken off" if material.broken_off else "passed"), of
+
+
+def _facts(material: Material, course: Course) -> list[tuple[str, str, str]]:
+    """Name, what is shown, and the whole of it where that is shortened."""
+    about, digest = material.about, material.again.digest
+    if material.periods and material.replayed is not None:
+        digest = material.periods[-1].digest
+    facts = [
+        ("seed", f"{about.seed}", ""),
+        (
+            "firmware",
+            f"{about.firmware_sha256[:12] or 'no file'}",
+            f"{about.firmware} {about.firmware_sha256}",
+        ),
+        ("digest", digest[:12], digest),
+        ("simulated", f"{len(course.ticks) * CONTROL_PERIOD_TICKS / TICKS_PER_SECOND:.2f} s", ""),
+    ]
+    for robot in course.robots[:1]:
+        if robot.steered:
+            found = tracking_of(robot.errors)
+            rms = f"{found.rms_position_cm:.2f} cm, {found.rms_theta_deg:.2f}\u00b0"
+            facts.append((rms_name(robot.errors), rms, f"of {robot.name}, position and heading"))
+            facts.append(("settling", settling_text(robot.errors), "within 3 cm and 0.15 rad"))
+    return facts
+
+
+def _within(marks: Sequence[Mark], course: Course) -> list[Mark]:
+    return [mark for mark in marks if _shows(course, mark.start_tick)]
+
+
+def _shows(course: Course, tick: int) -> bool:
+    return bool(course.ticks) and course.ticks[0] <= tick < course.ticks[-1] + CONTROL_PERIOD_TICKS
+
+
+def _count(marks: Sequence[Mark], kind: str) -> int:
+    return len([mark for mark in marks if mark.kind == kind])
+
+
+def _counts(marks: Sequence[Mark], lane: str) -> list[tuple[str, int]]:
+    found: dict[str, int] = {}
+    for mark in marks:
+        if mark.lane == lane:
+            found[mark.kind] = found.get(mark.kind, 0) + 1
+    return list(found.items())
+
+
+def _data(
+    course: Course, marks: Sequence[Mark], frames: Sequence[CameraFrame], ticks: Sequence[int]
+) -> bytes:
+    """What the page's JavaScript needs: postures as 64-bit floats in base64, so that none is rounded."""
+    lanes = lanes_of(marks)
+    kinds = list(dict.fromkeys(mark.kind for mark in marks))
+    return msgspec.json.encode(
+        {
+            "first": course.first,
+            "ticks": course.ticks,
+            "period_ticks": CONTROL_PERIOD_TICKS,
+            "ticks_per_s": TICKS_PER_SECOND,
+            "robots": [_robot(robot) for robot in course.robots],
+            "failures": sorted(set(ticks)),
+            "lanes": lanes,
+            "kinds": kinds,
+            "marks": [
+                (one.start_tick, one.end_tick, lanes.index(one.lane), kinds.index(one.kind), one.text)
+                for one in sorted(marks, key=lambda mark: mark.start_tick)
+            ],
+            "frames": [(one.network, one.tick, one.jpeg) for one in frames],
+        }
+    )
+
+
+def _robot(robot: RobotCourse) -> dict[str, Any]:
+    return {
+        "name": robot.name,
+        "network": robot.place[0],
+        "steered": robot.steered,
+        "truth": _packed(robot.truth),
+        "reference": _packed(robot.reference),
+        "measured": _packed(robot.measured),
+        "v": _base64(robot.v_m_s),
+        "w": _base64(robot.w_rad_s),
+    }
+
+
+def _packed(postures: Postures) -> list[str]:
+    return [_base64(one) for one in (postures.x_m, postures.y_m, postures.theta_rad)]
+
+
+def _base64(numbers: Column) -> str:
+    """Little-endian."""
+    ordered = array("d", numbers)
+    if sys.byteorder == "big":
+        ordered.byteswap()
+    return base64.b64encode(ordered.tobytes()).decode()

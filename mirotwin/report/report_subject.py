@@ -1,0 +1,224 @@
+"""What `mirotwin report` is given: a run, a case or a failed test, and all that its page is made from.
+
+What belongs here: finding out what a path is, and running it again. What does not: reading it (`replay_job`), pages
+(`mirotwin.report.page`, `mirotwin.campaign.page`), and the command (`report`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+import tomli_w
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_exact.inputs import read_input
+from miro_robot.image import Image
+from miro_sim.radio.downlink import TransmissionError
+from mirotwin.firmware.coverage_files import source_folders
+from mirotwin.fuzz.fuzz_bare import is_bare_case
+from mirotwin.recording.compare import Rule, differences
+from mirotwin.report.page.again import Again, run_again
+from mirotwin.report.page.bokeh_page import require_bokeh
+from mirotwin.report.page.frames import Extras, extras_of
+from mirotwin.report.page.run_page import About, Material, Replayed, run_page
+from mirotwin.report.summary import Summary
+from mirotwin.rerun.job import Job, load_job
+from mirotwin.shell.command_line import replay_line
+from mirotwin.shell.options import plain_parameters
+from mirotwin.shell.outputs import RECORDING, part_name
+from mirotwin.shell.progress import ProgressBar
+from mirotwin.verify.cases.artifacts import CASE, REPORT, SENT
+from mirotwin.verify.cases.case import tables_of
+from mirotwin.verify.checks.expect import expectations_of
+
+RECORDINGS = (RECORDING, part_name(RECORDING))
+CASES = (CASE, SENT)
+SUMMARIES = ("summary.json", "summary.part.json")
+PARQUET = b"PAR1"
+
+
+class Wanted(msgspec.Struct, frozen=True):
+    """The command line. `to_tick` None: to the end."""
+
+    subject: str
+    from_tick: int
+    to_tick: int | None
+    frames: bool
+    firmware: str | None
+    sources: Sequence[str]
+    engine: str | None
+    quiet: bool
+
+    @property
+    def shown(self) -> range:
+        """Numbers of the control periods that are wanted."""
+        last = 1 << 62 if self.to_tick is None else -(-self.to_tick // CONTROL_PERIOD_TICKS)
+        return range(self.from_tick // CONTROL_PERIOD_TICKS, last)
+
+
+def is_campaign(subject: str) -> bool:
+    """Whether it is a Parquet file, by its first bytes."""
+    if not Path(subject).is_file():
+        return subject.endswith(".parquet")
+    with open(subject, "rb") as file:
+        return file.read(len(PARQUET)) == PARQUET
+
+
+def material_of(wanted: Wanted) -> Material:
+    """All that the page is made from. Raises BadInput, and OSError as `open` does."""
+    if wanted.to_tick is not None and wanted.to_tick <= wanted.from_tick:
+        place = f"--from {wanted.from_tick}t --to {wanted.to_tick}t"
+        raise BadInput("", place, "the window is empty", "--to must be later")
+    file = _file_of(wanted.subject)
+    if is_bare_case(file):
+        what = "is a case of a bare processor, which has no robot to show"
+        raise BadInput(file, "", what, "`mirotwin replay` says what it comes to")
+    job, image = load_job(file, wanted.firmware, wanted.engine)
+    if job.recorded:
+        return _of_recording(wanted, file, job, image)
+    return _of_case(wanted, file, job, image)
+
+
+def page_of_failure(folder: str) -> bytes:
+    """The page of what a failure left in `folder`. Raises BadInput, also where the library of pages is missing."""
+    require_bokeh()
+    wanted = Wanted(folder, 0, None, True, None, (), None, True)
+    return run_page(material_of(wanted))
+
+
+def _file_of(subject: str) -> str:
+    """The file that is meant: of a folder, the recording or the case in it."""
+    folder = Path(subject)
+    if not folder.is_dir():
+        return subject
+    for name in (*RECORDINGS, *CASES):
+        if (folder / name).is_file():
+            return str(folder / name)
+    what = f"holds neither {RECORDING} nor {CASES[0]}"
+    raise BadInput(subject, "", what, "give a run's folder, or that of one failed test")
+
+
+def _again(wanted: Wanted, file: str, job: Job, image: Image, end_tick: int | None) -> Again:
+    with plain_parameters(file, "replayed"):
+        world = job.world(image)
+    expected = expectations_of(job.scenario, file)
+    end_tick = end_tick or world.periods * CONTROL_PERIOD_TICKS
+    try:
+        with (
+            ProgressBar("running it again", end_tick, wanted.quiet) as bar,
+            plain_parameters(file, "replayed"),
+        ):
+            return run_again(world, end_tick, expected, bar.to)
+    except TransmissionError as error:
+        raise BadInput(file, "", f"cannot be replayed beyond tick {world.tick}: {error}") from None
+
+
+def _of_recording(wanted: Wanted, file: str, job: Job, image: Image) -> Material:
+    recorded = [period for period in job.recorded if period.index in wanted.shown]
+    if not recorded:
+        first, last = job.recorded[0].tick, (job.recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
+        place = f"--from {wanted.from_tick}t"
+        raise BadInput(file, place, f"the recording goes from tick {first} to {last}", "look within it")
+    end_tick = (recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
+    again = _again(wanted, file, job, image, end_tick)
+    other = job.image is None or job.image.code != image.code
+    extras = extras_of(file, recorded[0].tick, end_tick, wanted.frames)
+    summary = _summary(Path(file), job.recorded[-1].digest)
+    notes = []
+    if extras.broken_off:
+        notes.append(
+            f"This run was broken off: the page shows the {len(recorded)} control periods that were recorded."
+        )
+    if other:
+        recorded = [period for period in again.periods if period.index in wanted.shown]
+        extras = Extras(broken_off=extras.broken_off)  # frames and samples are of the recorded robot
+        notes.append(_played_with(image, "recording", job.image))
+    what = f"Another firmware ({image.path.name})" if other else "This page's own run of it"
+    # the state of a controller is not computed again, so that digests of states say nothing here
+    found = differences(job.recorded[: len(again.periods)], again.periods, Rule(to_tick=end_tick))
+    return Material(
+        about=_about("run", file, job, image, notes, _command(wanted, file)),
+        scenario=job.scenario,
+        scenario_text=tomli_w.dumps(tables_of(job.scenario)),
+        periods=recorded,
+        again=again,
+        sources=source_folders(image, wanted.sources),
+        extras=extras,
+        replayed=Replayed(what, found),
+        steps=None if summary is None else summary.steps,
+        broken_off=extras.broken_off,
+    )
+
+
+def _of_case(wanted: Wanted, file: str, job: Job, image: Image) -> Material:
+    ends = [tick for tick in (job.case.end_tick, wanted.to_tick) if tick]
+    again = _again(wanted, file, job, image, min(ends, default=None))
+    report = Path(file).with_name(REPORT)
+    text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
+    notes = [*([_played_with(image, "case")] if job.case.changed else []), *_said(job, again)]
+    about = _about("failed test" if text else "case", file, job, image, notes, _command(wanted, file))
+    return Material(
+        about=msgspec.structs.replace(
+            about,
+            report=text,
+            name=Path(file).absolute().parent.name if text else "",
+            verdict="failed" if text and not again.failures else "",
+        ),
+        scenario=job.scenario,
+        scenario_text=tomli_w.dumps(tables_of(job.scenario)),
+        periods=again.periods,
+        again=again,
+        sources=source_folders(image, wanted.sources),
+        shown=wanted.shown,
+    )
+
+
+def _played_with(image: Image, kind: str, recorded: Image | None = None) -> str:
+    """That the page is of another firmware than what was recorded."""
+    own = f" ({recorded.sha256[:12]})" if recorded is not None and recorded.sha256 else ""
+    return (
+        f"Played with another firmware, {image.path.name} ({(image.sha256 or '')[:12]}), than the {kind}'s{own}."
+        f" Pitch, figures and checks show what it did with the bytes of the {kind}."
+    )
+
+
+def _said(job: Job, again: Again) -> list[str]:
+    """What became of a case's verdict."""
+    verdict = job.case.verdict
+    if not verdict or verdict in map(str, again.failures):
+        return []
+    now = f"; now: {again.failures[0]}" if again.failures else " does not fail any more"
+    return [f"What was recorded{now}. Recorded: {verdict}"]
+
+
+def _about(kind: str, file: str, job: Job, image: Image, notes: Sequence[str], again: str) -> About:
+    return About(
+        kind=kind,
+        file=Path(file).name,
+        seed=job.seed,
+        firmware=image.path.name,
+        firmware_sha256=image.sha256 or "",
+        notes=notes,
+        again=(again,),
+    )
+
+
+def _command(wanted: Wanted, file: str) -> str:
+    return replay_line(Path(file).name, Path(wanted.firmware).name if wanted.firmware else None)
+
+
+def _summary(recording: Path, digest: str) -> Summary | None:
+    """That of the same run, which stands beside its recording; None where there is none that can be read."""
+    for name in SUMMARIES:
+        path = recording.with_name(name)
+        if path.is_file():
+            try:
+                found = msgspec.json.decode(read_input(path), type=Summary)
+            except (msgspec.DecodeError, BadInput):
+                continue
+            if found.digest == digest:
+                return found
+    return None

@@ -1,0 +1,286 @@
+"""What a run amounts to, as numbers: `summary.json` and the table on the screen.
+
+What belongs here: the figures and their definitions. What does not: what is kept of a run for them (`track`), pictures
+(`figure`) and where files go (`shell.outputs`).
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
+from mirotwin.recording.track import ErrorSample, Place, Tracks
+from mirotwin.report.learnt_calibration import LearntCalibration
+from mirotwin.report.learnt_wheels import LearntWheels
+from mirotwin.report.live import Live
+from mirotwin.report.theory import Gains, Theory, theory_of
+
+
+class Tracking(msgspec.Struct, frozen=True):
+    """How well a robot followed its reference.
+
+    `rms_*`: root mean square over the last second of the run (all of it, if shorter), one value a control
+    period; position is the distance. `settling_s`: the last time at which the robot was outside 3 cm or
+    0.15 rad; 0 if it never was, None if it never was inside. `off_pitch_s`: how long a corner of the robot's square was
+    beyond the edge of the pitch, in whole control periods.
+    """
+
+    rms_x_cm: float | None
+    rms_y_cm: float | None
+    rms_theta_deg: float | None
+    rms_position_cm: float | None
+    settling_s: float | None
+    off_pitch_s: float | None
+
+
+class RobotTracking(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The tracking of one robot among several; `theory` is left out where no host steered it."""
+
+    network: int
+    slot: int
+    tracking: Tracking
+    theory: Theory | None = None
+
+
+class Link(msgspec.Struct, frozen=True):
+    """Frames sent by all hosts; accepted, rejected (CRC) and stale as counted by the robots' firmware,
+    added up.
+
+    `frames_*` of the robots are None when the firmware exports no counters. `bit_errors`: bits that the
+    radio turned over, both ways, all listeners.
+    """
+
+    frames_sent: int
+    frames_accepted: int | None
+    frames_rejected: int | None
+    frames_stale: int | None
+    bit_errors: int
+
+
+class Vision(msgspec.Struct, frozen=True):
+    """What the cameras of all hosts saw: frames exposed, robots not found in them, frames dropped and repeated.
+
+    `wrong`: measurements further off than three times the worst case of the calibration, `swapped`: nearer to another
+    robot of the team than to their own; both against the truth, which no host knows.
+    """
+
+    frames: int
+    lost: int
+    dropped: int
+    repeated: int
+    wrong: int
+    swapped: int
+
+
+class Firmware(msgspec.Struct, frozen=True):
+    """The image and what it executed; `machine_cycles` includes `idle_cycles`; all robots added up."""
+
+    sha256: str
+    instructions: int
+    machine_cycles: int
+    idle_cycles: int
+    faults: int
+
+
+class FirstFailure(msgspec.Struct, frozen=True):
+    """The earliest failure of a check: of which robot, at which tick, what was wanted and found."""
+
+    network: int
+    slot: int
+    tick: int
+    wanted: str
+    found: str
+
+
+class Expectation(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What came of a check (`mirotwin.verify.checks`), over all robots.
+
+    `kind`: safety (never) or liveness (within a time). `verdict`: passed, failed, or "not judged" where the run had no
+    occasion for it. `failures`: how many; `first`: the earliest.
+    """
+
+    name: str
+    kind: str
+    verdict: str
+    failures: int = 0
+    first: FirstFailure | None = None
+
+
+class Steps(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Results of a scenario's steps (`mirotwin.verify.steps`): how many were done, which failed and how.
+
+    `expectations`: the checks that steps began.
+    """
+
+    done: int
+    count: int
+    failed: str = ""
+    expectations: tuple[Expectation, ...] = ()
+
+
+class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
+    """`summary.json`. `tracking` and `theory` are the first robot's; `robots` lists all when there are several.
+
+    `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is
+    written only where it is false: the run was broken off, and all figures are of the part before; `reason` says why,
+    if a part of the scenario failed (which one, of which robot, when). `resumed_s` is written only for a run that went
+    on from a saved world: tracking, theory and expectations cover the time from there, counters the time from 0.
+    `set`: the keys of the scenario that were set on the command line (`KEY=VALUE`), only where there were some.
+    `calibrations`: of hosts that learn how their cameras hang, `wheels`: of robots whose estimator learns their wheels.
+    `expectations`: the checks of the run, also those that are always on. `live`: how a live session was paced, and what
+    passed through its ports.
+    """
+
+    scenario: str
+    seed: int
+    engine: str
+    digest: str
+    simulated_s: float
+    wall_s: float
+    realtime_factor: float
+    tracking: Tracking
+    link: Link
+    firmware: Firmware
+    vision: Vision | None = None
+    calibrations: tuple[LearntCalibration, ...] = ()
+    wheels: tuple[LearntWheels, ...] = ()
+    theory: Theory | None = None
+    robots: tuple[RobotTracking, ...] = ()
+    complete: bool = True
+    reason: str = ""
+    resumed_s: float | None = None
+    set: tuple[str, ...] = ()
+    expectations: tuple[Expectation, ...] = ()
+    live: Live | None = None
+    steps: Steps | None = None
+
+
+def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
+    """The figures of one robot; None throughout when there is no sample."""
+    if not samples:
+        return Tracking(None, None, None, None, None, None)
+    last = _last_second(samples)
+    return Tracking(
+        rms_x_cm=_rms([sample.x_cm for sample in last]),
+        rms_y_cm=_rms([sample.y_cm for sample in last]),
+        rms_theta_deg=_rms([math.degrees(sample.theta_rad) for sample in last]),
+        rms_position_cm=_rms([sample.position_cm for sample in last]),
+        settling_s=_settling_s(samples),
+        off_pitch_s=seconds(CONTROL_PERIOD_TICKS * len([sample for sample in samples if sample.off_pitch])),
+    )
+
+
+def rms_name(samples: Sequence[ErrorSample]) -> str:
+    """What `rms_*` of these samples are, for people: with the times, where they cover less than a second."""
+    last = _last_second(samples)
+    from_tick, to_tick = last[0].tick, last[-1].tick + CONTROL_PERIOD_TICKS
+    if to_tick - from_tick >= TICKS_PER_SECOND:
+        return "rms of the last second"
+    return f"rms ({seconds(from_tick):.2f} s to {seconds(to_tick):.2f} s)"
+
+
+def _last_second(samples: Sequence[ErrorSample]) -> Sequence[ErrorSample]:
+    return [sample for sample in samples if sample.tick > samples[-1].tick - TICKS_PER_SECOND]
+
+
+def _rms(values: Sequence[float]) -> float:
+    total = 0.0
+    for value in values:
+        total += value * value
+    return math.sqrt(total / len(values))
+
+
+def _settling_s(samples: Sequence[ErrorSample]) -> float | None:
+    if not any(sample.settled for sample in samples):
+        return None
+    outside = [sample.tick for sample in samples if not sample.settled]
+    return seconds(outside[-1]) if outside else 0.0
+
+
+def settling_text(samples: Sequence[ErrorSample]) -> str:
+    """When the robot settled, for people; one that is outside at the end has not, whatever `settling_s` is."""
+    settling_s = _settling_s(samples)
+    if settling_s is None or not samples[-1].settled:
+        return "not settled"
+    return f"settled at {settling_s:.2f} s"
+
+
+def summarise(
+    *,
+    scenario: str,
+    seed: int,
+    engine: str,
+    tracks: Tracks,
+    simulated_ticks: int,
+    resumed_ticks: int = 0,
+    wall_s: float,
+    counters: Mapping[str, Mapping[str, Any]],
+    firmware_sha256: str,
+    complete: bool = True,
+    reason: str = "",
+    settings: tuple[str, ...] = (),
+    calibrations: tuple[LearntCalibration, ...] = (),
+    wheels: tuple[LearntWheels, ...] = (),
+    gains: Mapping[Place, Gains] = {},
+    expectations: tuple[Expectation, ...] = (),
+    steps: Steps | None = None,
+) -> Summary:
+    """The summary of a run; `counters` as `World.counters()` gives them, `gains` as `theory.gains_of`."""
+    everyone = tuple(
+        RobotTracking(*place, tracking_of(track.errors), theory_of(track.theory, gains.get(place, Gains())))
+        for place, track in tracks.robots.items()
+    )
+    return Summary(
+        scenario=scenario,
+        seed=seed,
+        engine=engine,
+        digest=tracks.digest,
+        simulated_s=seconds(simulated_ticks),
+        wall_s=wall_s,
+        realtime_factor=seconds(simulated_ticks - resumed_ticks) / wall_s if wall_s > 0.0 else 0.0,
+        tracking=everyone[0].tracking if everyone else tracking_of([]),
+        link=Link(**counters["link"]),
+        firmware=Firmware(sha256=firmware_sha256, **counters["firmware"]),
+        vision=Vision(**counters["vision"]) if counters["vision"] else None,
+        calibrations=calibrations,
+        wheels=wheels,
+        theory=everyone[0].theory if everyone else None,
+        robots=everyone if len(everyone) > 1 else (),
+        complete=complete,
+        reason=reason,
+        resumed_s=seconds(resumed_ticks) if resumed_ticks else None,
+        set=settings,
+        expectations=expectations,
+        steps=steps,
+    )
+
+
+def off_pitch_text(summary: Summary) -> str:
+    """Which robots left the pitch and for how long, for people; empty if none did."""
+    everyone = summary.robots or (RobotTracking(0, -1, summary.tracking),)
+    left = [
+        f"{one.tracking.off_pitch_s:.2f} s"
+        + (f" (net{one.network}/robot{one.slot})" if summary.robots else "")
+        for one in everyone
+        if one.tracking.off_pitch_s
+    ]
+    return f"off it for {', '.join(left)} (the pitch has no walls here)" if left else ""
+
+
+def vision_text(vision: Vision) -> str:
+    """What the cameras saw, for people: what did not happen is left out, but for lost robots."""
+    happened = {
+        "frames dropped": vision.dropped,
+        "frames repeated": vision.repeated,
+        "measurements WRONG": vision.wrong,
+        "robots SWAPPED": vision.swapped,
+    }
+    parts = [f"{vision.frames} frames", f"{vision.lost} robots not found"]
+    return ", ".join(parts + [f"{count} {what}" for what, count in happened.items() if count])
+
+
+def to_json(summary: Summary) -> bytes:
+    """`summary.json`: indented, keys in the order above, a newline at the end."""
+    return msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n"

@@ -1,0 +1,188 @@
+"""What a file asks to be sent again: a recording with all that it was made from, or a text stream.
+
+What belongs here: from a file's content to scenario, seed, bytes to send, and image. What does not: running it
+(`replay`, `subject`), and the bytes themselves (`mirotwin.recording.compare`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
+from miro_protocol import stream
+from miro_protocol.transmission import Transmission
+from miro_robot.image import Image
+from miro_sim.periods import Period
+from miro_sim.scenario.file import changed
+from miro_sim.scenario.file import parse as parse_scenario
+from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.settings import in_text
+from mirotwin.recording.capture.detect import detect
+from mirotwin.recording.capture.input import HEAD_BYTES
+from mirotwin.recording.reader import Recording, parse
+from mirotwin.recording.writer import MAGIC
+from mirotwin.rerun.rerun import image_if_any, image_of
+from mirotwin.rerun.script import (
+    Doing,
+    check_deeds,
+    check_script,
+    scenario_of_stream,
+    script_of,
+    script_of_stream,
+)
+from mirotwin.shell.options import choose_engine, load_image
+from mirotwin.shell.outputs import RECORDING
+from mirotwin.shell.program import complain
+from mirotwin.verify.cases.artifacts import image_beside
+from mirotwin.verify.checks.expect import expectations_of
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
+
+
+class Case(msgspec.Struct, frozen=True):
+    """What a case says of itself: the check's line, and where that run ended (0: with its scenario). `changed`: it is
+    to run with other firmware or other settings.
+    """
+
+    verdict: str = ""
+    end_tick: int = 0
+    changed: bool = False
+
+
+class Job(msgspec.Struct, frozen=True):
+    """What is to be replayed: a recording, or a text stream (then `recorded` is empty and `image` None).
+
+    `image`: the one that was recorded, None where it is none. `state`: the form of the states whose digests were
+    recorded, if a replay computes the same states, else empty: a controller's states are not computed again.
+    """
+
+    scenario: Scenario
+    seed: int
+    script: list[Doing]
+    recorded: Sequence[Period]
+    image: Image | None = None
+    state: str = ""
+    case: Case = Case()
+    resumed: bytes = b""
+
+    def world(self, image: Image | None = None) -> World:
+        """A world that is to do it again, with `image`; a run that was resumed begins where that one did."""
+        from miro_sim.world.world import World  # a hot module: not before the engine was chosen
+
+        run = image or self.image
+        assert run is not None
+        if not self.resumed:
+            return World(self.scenario, self.seed, run, script=self.script)
+        world = World(self.scenario, self.seed, run, script=())
+        try:
+            world.load(self.resumed)
+        except ValueError as error:
+            what = f"the recorded run was resumed, and what it went on from fits nothing else: {error}"
+            raise BadInput("", "replay", what, "replay it without --firmware, --set and --seed") from None
+        for one in self.script:
+            if isinstance(one, Transmission):
+                world.inject(one.data, one.network, one.tick, one.bad_stop)
+            else:
+                world.do(one)
+        return world
+
+
+def load_job(
+    file: str,
+    firmware: str | None,
+    engine: str | None,
+    settings: Sequence[str] = (),
+    seed: int | None = None,
+    stack_from: int | None = None,
+) -> tuple[Job, Image]:
+    """Reads `file` and loads the image that was asked for, recorded, or the robot's own.
+
+    `settings`: keys to set in the recorded scenario, or in the default one. `seed`: instead of its own.
+    `stack_from`: where the stack of `firmware` begins.
+    """
+    check_no_folder(file, RECORDING)
+    data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
+    choose_engine(engine)
+    if MAGIC.startswith(data[: len(MAGIC)]):
+        recording = parse(data, file)
+        if recording.broken_off:
+            complain(f"{recording.broken_off}; it goes to control period {len(recording.periods) - 1}")
+        if not recording.periods:
+            raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
+        image = image_of(recording, file) if firmware is None else image_if_any(recording, file)
+        job = _job_of_recording(recording, file, settings, image, seed)
+        return job, image if firmware is None and image is not None else load_image(
+            firmware, stack_from=stack_from
+        )
+    _refuse_other_formats(data, file)
+    given = stream.decode(data, file)
+    header = given.header
+    image = load_image(firmware or image_beside(file, header.firmware_sha256), stack_from=stack_from)
+    _check_firmware(header, image, file, firmware)
+    reseeded = seed not in (None, header.seed or 0)
+    other = header.firmware_sha256 not in (None, image.sha256) or bool(settings) or reseeded
+    case = Case(header.verdict or "", header.end_tick or 0, other)
+    return msgspec.structs.replace(_job_of_stream(given, file, settings, seed), case=case), image
+
+
+def load_stream(file: str, engine: str | None) -> Job:
+    """The job of a stream file, whatever firmware it is for: that is the caller's to choose."""
+    check_no_folder(file, RECORDING)
+    data = read_input(file)
+    choose_engine(engine)
+    _refuse_other_formats(data, file)
+    given = stream.decode(data, file)
+    case = Case(given.header.verdict or "", given.header.end_tick or 0)
+    return msgspec.structs.replace(_job_of_stream(given, file, (), None), case=case)
+
+
+def _refuse_other_formats(data: bytes, path: str) -> None:
+    format, _ = detect(data[:HEAD_BYTES])
+    if format == "pcapng":
+        remedy = "make a stream file of it with `mirotwin export --out NAME.stream`"
+        raise BadInput(path, "offset 0", "a capture, which cannot be replayed", remedy)
+    if format != "stream" and b"\0" in data[:4096]:
+        what = "neither a recording nor a stream file (UTF-8 text)"
+        raise BadInput(path, "offset 0", what, "give a run.mcap that `mirotwin run` wrote, or a stream file")
+
+
+def _job_of_recording(
+    recording: Recording, path: str, settings: Sequence[str], image: Image | None, seed: int | None
+) -> Job:
+    source = recording.source
+    scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings, expectations_of)
+    script = script_of(recording.periods)
+    check_script(script, path, len(scenario.networks))
+    check_deeds(script, path, scenario)
+    as_it_was = image is not None and not settings and seed in (None, source.seed)
+    silent = all(network.host == "silent" for network in scenario.networks)
+    state = source.state if as_it_was and silent else ""
+    own = source.seed if seed is None else seed
+    return Job(scenario, own, script, recording.periods, image, state, resumed=source.resumed)
+
+
+def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str], seed: int | None) -> Job:
+    sent = given.happenings()
+    header = [*in_text(given.header.set or {}), *in_text({"expect": given.header.expect or {}})]
+    scenario = changed(
+        scenario_of_stream(sent, path, given.header), path, [*header, *settings], expectations_of
+    )
+    check_deeds(sent, path, scenario)
+    own = given.header.seed or 0
+    return Job(scenario, own if seed is None else seed, script_of_stream(sent), ())
+
+
+def _check_firmware(header: stream.Header, image: Image, path: str, firmware: str | None) -> None:
+    """An image that was named may be another one: that is what a replay is for."""
+    wanted = header.firmware_sha256
+    if wanted is None or wanted == image.sha256:
+        return
+    what = f"the stream is for firmware {wanted[:12]}.., this is {image.sha256[:12]}.. ({image.path})"
+    if firmware is None:
+        raise BadInput(path, "header", what, "name the image with --firmware")
+    complain(f"{path}: {what}")

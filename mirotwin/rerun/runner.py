@@ -1,0 +1,127 @@
+"""Runs a world from its first control period to its last, and hands on what it leaves behind.
+
+What belongs here: the loop that all commands share, and what it reads off a world besides its periods. What
+does not: the world itself (`world`), files (`recording`, `shell.outputs`), and the wall clock, which only the
+command line knows.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Protocol
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, LM629_SAMPLE_TICKS
+from miro_robot.faults import FirmwareFault
+from miro_sim.periods import Period
+from mirotwin.recording.channels import SampleMessage
+from mirotwin.recording.recorder import Recorder
+
+
+class Simulation(Protocol):
+    """What is used of `world.World`."""
+
+    @property
+    def tick(self) -> int: ...
+    @property
+    def index(self) -> int: ...
+    @property
+    def periods(self) -> int: ...
+    @property
+    def observers(self) -> list[Callable[[Period], object]]: ...
+    @property
+    def networks(self) -> Sequence[Any]: ...
+    @property
+    def finished(self) -> bool: ...
+    def step(self) -> Period: ...
+    def run_to(self, tick: int) -> None: ...
+
+
+def run(
+    world: Simulation,
+    recorder: Recorder | None = None,
+    full: bool = False,
+    on_period: Callable[[Period], bool | None] = lambda period: None,
+    move: Callable[[], object] | None = None,
+) -> None:
+    """Steps the world until it is finished, or until `on_period` returns True.
+
+    Every period goes to `recorder`, with `full` each LM629 sample as well, and the firmware faults at the
+    end, also when something raises: a recording up to then is worth having. `move`: runs the world in its own way,
+    which goes together with neither `full` nor an early end by `on_period`.
+    """
+    try:
+        if move is not None:
+            _moved(world, recorder, on_period, move)
+            return
+        while not world.finished:
+            if full and recorder is not None:
+                _run_samples(world, recorder)
+            period = world.step()
+            if recorder is not None:
+                recorder.write(period)
+            if on_period(period):
+                break
+    finally:
+        if recorder is not None:
+            for network, slot, faults in faults_by_robot(world):
+                recorder.write_faults(network, slot, faults)
+
+
+def _moved(
+    world: Simulation,
+    recorder: Recorder | None,
+    on_period: Callable[[Period], object],
+    move: Callable[[], object],
+) -> None:
+    """Lets `move` run the world, and hands on each period when it ends."""
+
+    def keep(period: Period) -> None:
+        if recorder is not None:
+            recorder.write(period)
+        on_period(period)
+
+    world.observers.append(keep)
+    try:
+        move()
+    finally:
+        world.observers.remove(keep)
+
+
+def _run_samples(world: Simulation, recorder: Recorder) -> None:
+    """Up to the last LM629 sample of the period under way, recording each (they are 8192 ticks apart)."""
+    end_tick = (world.index + 1) * CONTROL_PERIOD_TICKS
+    first = -(-(world.tick + 1) // LM629_SAMPLE_TICKS) * LM629_SAMPLE_TICKS
+    for tick in range(first, end_tick, LM629_SAMPLE_TICKS):
+        world.run_to(tick)
+        if world.finished:
+            return
+        for network, robot in _robots(world):
+            recorder.write_sample(network, robot.spec.slot, _sample(tick, robot))
+
+
+def _sample(tick: int, robot: Any) -> SampleMessage:
+    left, right = robot.board.left, robot.board.right
+    return SampleMessage(
+        tick,
+        left.desired_position,
+        left.real_position,
+        left.desired_velocity,
+        -left.pwm_magnitude if left.sign else left.pwm_magnitude,
+        right.desired_position,
+        right.real_position,
+        right.desired_velocity,
+        -right.pwm_magnitude if right.sign else right.pwm_magnitude,
+    )
+
+
+def faults_by_robot(world: Simulation) -> list[tuple[int, int, list[FirmwareFault]]]:
+    """(network, slot, faults) of every robot that has any."""
+    return [
+        (network, robot.spec.slot, list(robot.board.faults))
+        for network, robot in _robots(world)
+        if robot.board.faults
+    ]
+
+
+def _robots(world: Simulation) -> Iterator[tuple[int, Any]]:
+    for index, network in enumerate(world.networks):
+        for robot in network.robots:
+            yield index, robot

@@ -1,0 +1,1 @@
+"""`mirotwin run`: a scenario, its files, its table and its viewers."""

@@ -1,0 +1,203 @@
+"""The files of a run while it is under way: what is written when, and what is left of a run that is broken off.
+
+What belongs here: the order recording, flushes, summary, figure, and the wall clock for them. What does not: names and
+locks (`shell.outputs`), what a recording says (`recording`), and the command line (`run`).
+
+Signals are held except while the world is stepped, so no file is left between two states. What was recorded is flushed
+several times a second; a process that is killed loses no more.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
+from typing import TYPE_CHECKING
+
+from msgspec.structs import replace
+
+from miro_exact.bad_input import BadInput
+from miro_sim.periods import Period
+from miro_sim.world.world import World
+from mirotwin.firmware.held_signals import Hold
+from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.track import Tracks
+from mirotwin.report.learnt_calibration import learnt_calibrations
+from mirotwin.report.learnt_wheels import learnt_wheels
+from mirotwin.report.summary import Steps, Summary, summarise, to_json
+from mirotwin.report.theory import gains_of
+from mirotwin.rerun import runner
+from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
+from mirotwin.shell.program import complain
+from mirotwin.shell.progress import ProgressBar
+from mirotwin.verify.checks.watching import Checks
+
+if TYPE_CHECKING:
+    from mirotwin.camera.view import View
+    from mirotwin.ports.session import Session
+    from mirotwin.run.run_live import LiveView
+    from mirotwin.run.run_stops import Stops
+    from mirotwin.verify.steps.player import Player
+
+SUMMARY = "summary.json"
+FIGURE = "figure.png"
+FLUSH_S = 0.2
+"""Wall time between two flushes of the recording, which comes to half a second on a busy machine too."""
+
+
+class RunFiles:
+    """Runs `world` and fills `folder`, which is open and in which `hold` holds signals.
+
+    The recording gets each frame of `views`. `player` runs a world with steps. A live `session` drives the world, else
+    it runs as fast as it can. `stops`: where it saves the world, and ends. `live` is told what is recorded.
+    """
+
+    def __init__(
+        self,
+        folder: OutputFolder,
+        source: Source,
+        world: World,
+        engine: str,
+        hold: Hold,
+        checks: Checks,
+        settings: tuple[str, ...] = (),
+        views: Sequence[View] = (),
+        player: Player | None = None,
+        session: Session | None = None,
+        stops: Stops | None = None,
+        live: LiveView | None = None,
+    ) -> None:
+        self.folder = folder
+        self.source = source
+        self.world = world
+        self.engine = engine
+        self.hold = hold
+        self.checks = checks
+        self.settings = settings
+        self.views = views
+        self.player = player
+        self.session = session
+        self.stops = stops
+        self.live = live
+        self.tracks = Tracks()
+        self._wall_s = 0.0
+        self._flushed_s = -FLUSH_S
+
+    def fill(self, bar: ProgressBar, title: str | None) -> Summary:
+        """The whole run; returns its summary. Whatever it raises, parts of the recording and the summary are left.
+
+        `title` None: no figure.
+        """
+        try:
+            self._record(bar)
+            self.checks.finish()
+            if self.live is not None:
+                self.live.finish()
+            summary = self._summary(complete=True)
+            self.folder.part(SUMMARY).write_bytes(to_json(summary))
+            if self.tracks.count and title is not None:
+                from mirotwin.report.figure import draw  # takes half a second to load
+
+                scenario, seed = self.source.scenario_name, self.source.seed
+                draw(self.tracks, self.folder.part(FIGURE), scenario=scenario, seed=seed, title=title)
+        except BaseException as error:
+            self._leave_parts(str(error) if isinstance(error, BadInput) else "")
+            raise
+        return summary
+
+    def _record(self, bar: ProgressBar) -> None:
+        began_s = time.perf_counter()
+        try:
+            with (
+                self.folder.part(RECORDING).open("wb", buffering=0) as stream,
+                Recorder(stream, self.source, self.hold) as recorder,
+            ):
+                recorder.flush()
+                self._simulate(recorder, bar)
+        finally:
+            self._wall_s = time.perf_counter() - began_s
+
+    def _simulate(self, recorder: Recorder, bar: ProgressBar) -> None:
+        def keep(period: Period) -> None:
+            self.tracks.add(period)
+            theories = list(self.tracks.theories())
+            recorder.write_theories(theories)
+            now_s = time.monotonic()
+            if now_s - self._flushed_s >= FLUSH_S:
+                recorder.flush()
+                self._flushed_s = now_s
+            bar.to(self.tracks.count)
+            if self.live is not None:
+                self.live.period(period, theories)
+
+        def keep_frame(view: View) -> None:
+            png = view.png(plain=True)
+            recorder.write_image(view.network, view.tick, png)
+            if self.live is not None:
+                self.live.frame(view.network, view.tick, png)
+
+        for view in self.views:
+            view.shows.append(keep_frame)
+        with bar, self.hold.released():
+            runner.run(
+                self.session or self.world,
+                recorder,
+                self.source.record == "full",
+                keep,
+                self._own_way(),
+            )
+
+    def _own_way(self) -> Callable[[], None] | None:
+        """How the world moves where it is not just stepped."""
+        if self.player is not None:
+            return self._play
+        stops = self.stops
+        return partial(stops.move, self.world, self.folder) if stops else None
+
+    def _play(self) -> None:
+        assert self.player is not None
+        self.player.play()
+        self.player.finish()
+
+    def _summary(self, complete: bool, reason: str = "") -> Summary:
+        summary = summarise(
+            scenario=self.source.scenario_name,
+            seed=self.source.seed,
+            engine=self.engine,
+            tracks=self.tracks,
+            simulated_ticks=self.world.tick,
+            resumed_ticks=0 if self.stops is None else self.stops.begin_tick,
+            wall_s=self._wall_s,
+            counters=self.world.counters(),
+            firmware_sha256=self.source.firmware_sha256,
+            complete=complete,
+            reason=reason,
+            settings=self.settings,
+            calibrations=learnt_calibrations(self.world.networks),
+            wheels=learnt_wheels(self.world.networks),
+            gains=gains_of(self.world.scenario),
+            expectations=self.checks.verdicts(),
+            steps=None if self.player is None else self._steps(self.player),
+        )
+        return summary if self.session is None else replace(summary, live=self.session.live())
+
+    def _steps(self, player: Player) -> Steps:
+        verdicts = [verdict for checks in player.checks for verdict in checks.verdicts()]
+        failed = f"{player.failure}" if player.failure else ""
+        return Steps(player.done, len(player.steps), failed, tuple(verdicts))
+
+    def _leave_parts(self, reason: str) -> None:
+        """What is left when the run is broken off: nothing, if not even one control period was recorded.
+
+        `reason`: which part failed, if one did.
+        """
+        if not self.tracks.count:
+            return
+        self.folder.keep = KEPT
+        with suppress(OSError):  # a full disk, which is reported as what broke the run off
+            self.folder.part(SUMMARY).write_bytes(to_json(self._summary(complete=False, reason=reason)))
+        complain(
+            f"the run broke off after {self.tracks.count} control periods;"
+            f" they are in {self.folder.path / part_name(RECORDING)}"
+        )

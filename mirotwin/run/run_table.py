@@ -1,0 +1,75 @@
+"""The table that `mirotwin run` prints at its end.
+
+What belongs here: its rows. What does not: the figures in it (`report.summary`).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.table import Table
+
+from mirotwin.recording.track import Tracks
+from mirotwin.report.learnt_calibration import calibration_text
+from mirotwin.report.learnt_wheels import wheels_text
+from mirotwin.report.summary import Summary, off_pitch_text, rms_name, settling_text, vision_text
+from mirotwin.report.theory import theory_text
+from mirotwin.shell.console import show
+from mirotwin.verify.expectations import expectations_text
+
+
+def print_table(summary: Summary, tracks: Tracks, folder: Path) -> None:
+    tracking, link, firmware = summary.tracking, summary.link, summary.firmware
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(style="bold")
+    table.add_column()
+    table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
+    if summary.set:
+        table.add_row("set", " ".join(summary.set))
+    began = f"{summary.resumed_s:.2f} s to " if summary.resumed_s is not None else ""
+    table.add_row(
+        "time",
+        f"{began}{summary.simulated_s:.2f} s in {summary.wall_s:.2f} s ({summary.realtime_factor:.1f} x real time, "
+        f"engine {summary.engine})",
+    )
+    if summary.resumed_s is not None:
+        covered = "errors, theory and checks from there; camera, link and firmware from 0 s"
+        table.add_row("resumed", f"at {summary.resumed_s:.2f} s: {covered}")
+    if tracking.rms_position_cm is not None:
+        errors = next(iter(tracks.robots.values())).errors
+        table.add_row(
+            "tracking",
+            f"{rms_name(errors)} {tracking.rms_position_cm:.2f} cm (x {tracking.rms_x_cm:.2f}, "
+            f"y {tracking.rms_y_cm:.2f}), {tracking.rms_theta_deg:.2f} deg; {settling_text(errors)}",
+        )
+    theory = theory_text(summary.theory) if summary.theory is not None else ""
+    if theory:
+        table.add_row("theory", theory)
+    off_pitch = off_pitch_text(summary)
+    if off_pitch:
+        table.add_row("pitch", off_pitch)
+    if summary.vision is not None:
+        table.add_row("camera", vision_text(summary.vision))
+    for learnt in summary.calibrations:
+        table.add_row("calibration", calibration_text(learnt))
+    for wheels in summary.wheels:
+        table.add_row("wheels", wheels_text(wheels))
+    table.add_row(
+        "link",
+        f"{link.frames_sent} frames sent, {_known(link.frames_accepted)} accepted, "
+        f"{_known(link.frames_rejected)} rejected, {_known(link.frames_stale)} stale; {link.bit_errors} bit errors",
+    )
+    idle = 100.0 * firmware.idle_cycles / firmware.machine_cycles if firmware.machine_cycles else 0.0
+    table.add_row(
+        "firmware",
+        f"{firmware.instructions} instructions, {firmware.machine_cycles} cycles ({idle:.0f} % idle), "
+        f"{firmware.faults} faults",
+    )
+    table.add_row("expected", expectations_text(summary.expectations))
+    table.add_row("digest", summary.digest)
+    table.add_row("files", str(folder))
+    show(table)
+
+
+def _known(count: int | None) -> str:
+    return "?" if count is None else str(count)

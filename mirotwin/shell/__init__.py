@@ -1,0 +1,1 @@
+"""What all commands share: options, exit codes, the screen, files that are whole or not there."""

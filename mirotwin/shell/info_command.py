@@ -1,0 +1,97 @@
+"""`mirotwin info`: what is installed, which engine runs, and which firmware."""
+
+import importlib
+import platform
+from importlib import metadata
+
+import click
+from rich.table import Table
+
+from miro_exact import engine as engines
+from miro_exact import hot_modules
+from mirotwin.shell.console import show
+from mirotwin.shell.options import choose_engine, engine_option, firmware_option, load_image
+from mirotwin.shell.program import BAD_INPUT, DONE, complain
+
+PACKAGES = (
+    "numpy",
+    "msgspec",
+    "click",
+    "rich",
+    "mcap",
+    "matplotlib",
+    "pillow",
+    "pyserial",
+    "crcmod-plus",
+    "pyvcd",
+    "tomli-w",
+    "pyarrow",
+    "distributed",
+)
+
+PLAIN_REMEDY = "rebuild with GCC or Clang, and with the Cython of .ci/constraints.txt"
+
+
+def version_of(package: str) -> str:
+    """The installed version of a distribution, or a word that says it is not there."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
+@click.command(short_help="Shows versions, engine and firmware.")
+@engine_option
+@firmware_option("Image to describe instead of the robot's own.")
+def info(engine: str | None, firmware: str | None) -> int:
+    """Shows versions, the engine, and the firmware image with its hash."""
+    active = choose_engine(engine)
+    broken = _broken_modules(active)
+    image = load_image(firmware, named=False)
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    table.add_row("mirotwin", version_of("mirotwin"))
+    table.add_row("Python", f"{platform.python_version()} ({platform.python_implementation()})")
+    table.add_row("platform", platform.platform())
+    for package in PACKAGES:
+        table.add_row(package, version_of(package))
+    table.add_row("engine", _engine_line(active))
+    table.add_row("firmware", str(image.path))
+    table.add_row("", f"sha256 {image.sha256}")
+    table.add_row("", f"{image.size} bytes of 8192")
+    show(table)
+    for message in broken:
+        complain(f"error: {message}")
+    return BAD_INPUT if broken else DONE
+
+
+def _engine_line(active: str) -> str:
+    finder = engines.install()
+    hot, missing = len(finder.sources), len(finder.missing())
+    if active == "compiled":
+        return f"compiled ({hot} modules), {_dispatch()}"
+    return f"python ({hot - missing} of {hot} modules have a compiled twin)"
+
+
+def _dispatch() -> str:
+    """Whether the build gave the CPU's loop the shape that processors predict well; the bits do not depend on it."""
+    if hot_modules.dispatch_replicated(engines.install().compiled()):
+        return "dispatch replicated"
+    return f"dispatch plain: slower, the same bits; {PLAIN_REMEDY}"
+
+
+def _broken_modules(active: str) -> list[str]:
+    """Imports every hot module: what cannot be loaded (a stale one, say) shows here and not in a run.
+
+    Uncompiled, a `.pyx` is not used and cannot be imported.
+    """
+    found = []
+    for name, source in engines.install().sources.items():
+        if active == "python" and source.suffix == ".pyx":
+            continue
+        try:
+            importlib.import_module(name)
+        except ImportError as error:
+            found.append(str(error))
+    return found

@@ -1,0 +1,251 @@
+"""How the command line fails: one line on stderr and an exit code, never a traceback for bad input. An unexpected
+error is one line too, which requests a report; with MIROTWIN_TRACEBACK=1 in the environment the traceback
+comes before it.
+
+What belongs here: exit codes, the translation of errors, single lines on stdout and stderr. What does not: any command,
+tables (`console`), and imports that `mirotwin --help` does not need.
+"""
+
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from difflib import get_close_matches
+from importlib import import_module
+from io import TextIOWrapper
+from itertools import pairwise
+from types import FrameType
+from typing import Any, NamedTuple, NoReturn
+
+import click
+
+from miro_exact.bad_input import BadInput, one_line, shortened
+from miro_exact.engine import EngineError, select
+
+DONE = 0
+EXPECTATION_FAILED = 1
+BAD_INPUT = 2
+FIRMWARE_FAULT = 3
+DIVERGENCE = 4
+LIMIT_REACHED = 42
+INTERNAL_ERROR = 70
+"""EX_SOFTWARE of sysexits.h."""
+INTERRUPTED = 130
+SIGPIPE = 13
+SIGNALLED = 128
+"""Plus the number of the signal: what a shell reports for a program that a signal ended."""
+
+
+def print_version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+    """`--version`."""
+    if wanted:
+        from importlib.metadata import version
+
+        click.echo(f"mirotwin, version {version('mirotwin')}")
+        context.exit()
+
+
+class Terminated(BaseException):
+    """SIGTERM or SIGHUP: raised where the program stands, so that it cleans up as after Ctrl-C."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        super().__init__(signal.Signals(number).name)
+
+
+class ReaderGone(Exception):
+    """The reader of our output has closed it (`| head`)."""
+
+
+def complain(message: str) -> None:
+    """One line on stderr, whatever the message holds."""
+    click.echo(f"mirotwin: {one_line(message)}", err=True)
+
+
+def tell_notes(notes: Iterable[str]) -> None:
+    """What the settings of a scenario left out, on stderr."""
+    for note in notes:
+        complain(f"note: {note}")
+
+
+def show_line(text: str) -> None:
+    """One line on stdout, whatever the text holds: names in files of others may hold codes that a terminal obeys."""
+    click.echo(one_line(text.expandtabs()))
+
+
+def _report(error: Exception) -> None:
+    """One line that requests a report, after the traceback if MIROTWIN_TRACEBACK is set."""
+    if os.environ.get("MIROTWIN_TRACEBACK"):
+        click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+    text = f"{type(error).__name__}: {error}".rstrip(": ")
+    ask = "please report this line with the command (MIROTWIN_TRACEBACK=1 shows the place)"
+    complain(f"internal error: {text}; {ask}")
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Within it, SIGTERM and SIGHUP raise Terminated; a signal that is ignored (nohup) stays ignored."""
+
+    def terminate(number: int, frame: FrameType | None) -> NoReturn:
+        raise Terminated(number)
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for name in ("SIGTERM", "SIGHUP"):
+            number = getattr(signal, name, None)  # not every system has both
+            if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+                before[number] = signal.signal(number, terminate)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _give_up_stdout() -> None:
+    """What is still buffered has nowhere to go; without this the interpreter tries again when it ends."""
+    try:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (OSError, ValueError):  # not a real file: nothing will be tried
+        return
+
+
+class Lazy(NamedTuple):
+    """A command that is loaded when it is used."""
+
+    module: str
+    about: str
+
+
+Sections = Mapping[str, Mapping[str, Lazy]]
+
+
+class LazyGroup(click.Group):
+    """Commands whose modules are loaded when they are used.
+
+    `sections`: heading -> name of a command -> its module and what `--help` says of it. The command is the function of
+    that name in the module. `settle_engine` runs before, so such modules import at their heads whatever they need.
+    """
+
+    def __init__(self, *args: Any, sections: Sections | None = None, **named: Any) -> None:
+        super().__init__(*args, **named)
+        self.sections = sections or {}
+        self.lazy = {name: lazy for section in self.sections.values() for name, lazy in section.items()}
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return [*self.lazy, *super().list_commands(ctx)]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.lazy:
+            return super().get_command(ctx, cmd_name)
+        command = getattr(import_module(self.lazy[cmd_name].module), cmd_name)
+        assert isinstance(command, click.Command)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if self.get_command(ctx, name) is None and not name.startswith("-"):
+            close = get_close_matches(name, self.list_commands(ctx), n=1)
+            hint = (
+                f"did you mean {close[0]}?" if close else f"there are {', '.join(self.list_commands(ctx))}."
+            )
+            ctx.fail(f"No such command {shortened(repr(name))}; {hint}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        if not self.sections:
+            super().format_commands(ctx, formatter)
+        width = max(map(len, self.lazy), default=0)
+        for heading, section in self.sections.items():
+            with formatter.section(heading):
+                formatter.write_dl([(name.ljust(width), lazy.about) for name, lazy in section.items()])
+
+
+def settle_engine(arguments: Sequence[str]) -> None:
+    """Fixes the engine that the arguments name, before the command's module imports anything hot.
+
+    A word that is no engine, or one that cannot be had, is left to the command, which refuses it.
+    """
+    words = list(arguments)
+    named = [word.partition("=")[2] for word in words if word.startswith("--engine=")]
+    named += [after for word, after in pairwise(words) if word == "--engine"]
+    if named:
+        with suppress(EngineError):
+            select(named[-1])
+
+
+class Program(LazyGroup):
+    """The group behind `mirotwin`: runs a command and turns what went wrong into a line and an exit code."""
+
+    def main(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any
+    ) -> NoReturn:
+        extra["standalone_mode"] = False
+        sys.exit(self._run(args, prog_name or "mirotwin", extra))
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """The library would make 1 of a reader that has gone, which here means that an expectation failed, and of a
+        file that ends too soon (a module's bytecode that was cut short) the Ctrl-D of a user.
+        """
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            raise ReaderGone from None
+        except EOFError as error:
+            raise RuntimeError(f"a file ends too soon: {error}") from error
+
+    def _run(self, args: Sequence[str] | None, prog_name: str, extra: dict[str, Any]) -> int:
+        if vars(sys)["stderr"] is None:  # `2>&-`: the next file to be opened would take its place
+            sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+        if vars(sys)["stdout"] is None:  # `>&-`: the next file to be opened would take its place
+            complain("error: standard output is closed; send it to a file or a pipe")
+            return BAD_INPUT
+        if isinstance(sys.stdout, TextIOWrapper):  # a file's name may hold what stdout cannot
+            sys.stdout.reconfigure(errors="backslashreplace")
+        settle_engine(sys.argv[1:] if args is None else args)
+        try:
+            with terminable():
+                code = super().main(args, prog_name, **extra)
+                sys.stdout.flush()
+        except click.exceptions.NoArgsIsHelpError as error:
+            error.show()
+            return BAD_INPUT
+        except click.UsageError as error:
+            path = error.ctx.command_path if error.ctx else prog_name
+            complain(f"error: {error.format_message()} See `{path} --help`.")
+            return BAD_INPUT
+        except click.ClickException as error:
+            complain(f"error: {error.format_message()}")
+            return BAD_INPUT
+        except BadInput as error:
+            from mirotwin.shell.tracebacks import show_traceback  # only an error needs it
+
+            show_traceback(error)
+            complain(f"error: {error}")
+            return BAD_INPUT
+        except (ReaderGone, BrokenPipeError):
+            _give_up_stdout()
+            return SIGNALLED + SIGPIPE
+        except OSError as error:
+            reason = error.strerror or str(error) or type(error).__name__
+            if error.filename is None:  # no file was being opened: stdout is full, or a disk
+                complain(f"error: reading or writing failed: {reason}")
+                _give_up_stdout()
+            else:
+                complain(f"error: {os.fsdecode(error.filename)}: {reason}")
+            return BAD_INPUT
+        except (click.Abort, KeyboardInterrupt):
+            complain("interrupted")
+            return INTERRUPTED
+        except Terminated as error:
+            complain(f"ended by {error}")
+            return SIGNALLED + error.number
+        except Exception as error:
+            _report(error)
+            return INTERNAL_ERROR
+        return code if isinstance(code, int) else DONE

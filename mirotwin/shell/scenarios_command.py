@@ -1,0 +1,78 @@
+"""`mirotwin scenarios`: the built-in ones, and their files to copy from."""
+
+import json
+from typing import Any
+
+import click
+from rich.table import Table
+
+from miro_sim.scenario import file as scenario_file
+from miro_sim.scenario import profiles as radio_profiles
+from miro_sim.scenario import variants as scenario_variants
+from mirotwin.shell.console import show as print_result
+from mirotwin.shell.options import set_option
+
+
+@click.group(invoke_without_command=True, short_help="Lists the built-in scenarios, or shows one.")
+@click.pass_context
+def scenarios(context: click.Context) -> None:
+    """Lists the built-in scenarios."""
+    if context.invoked_subcommand is not None:
+        return
+    table = Table(box=None, pad_edge=False)
+    table.add_column("scenario", style="bold")
+    table.add_column("duration", justify="right")
+    table.add_column("robots", justify="right")
+    table.add_column("what it shows")
+    for name in scenario_file.builtin_names():
+        scenario = scenario_file.load(name).scenario
+        robots = len([robot for network in scenario.networks for robot in network.robot])
+        table.add_row(name, f"{scenario.duration_s:g} s", str(robots), scenario.title)
+    print_result(table)
+
+
+@scenarios.command()
+@click.argument("name")
+@set_option(
+    "A key to set in it, as for `run`; may be repeated. The file is then checked, and its comments are left out."
+)
+def show(name: str, settings: tuple[str, ...]) -> None:
+    """Prints the file of the built-in scenario NAME, to read or to start one's own from. NAME may be a file, too."""
+    text = scenario_file.load(name, settings).text if settings else scenario_file.source_text(name)
+    click.echo(text, nl=False)
+
+
+@scenarios.command()
+def profiles() -> None:
+    """Lists the radio profiles and the keys that each sets, for `profile = ".."` in [network.radio]."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("profile", style="bold")
+    table.add_column("what it does")
+    table.add_column("keys")
+    for name, profile in radio_profiles.profiles().items():
+        table.add_row(name, profile["about"], _keys(radio_profiles.keys_of(name)))
+    print_result(table)
+
+
+@scenarios.command()
+def variants() -> None:
+    """Lists the variants, for `--set variant=..` or `variant = ".."` in a file, and the keys that each sets.
+
+    With --set a variant wins over the file, and over what is set before it; in a file, keys that are given win.
+    """
+    table = Table(box=None, pad_edge=False)
+    table.add_column("variant", style="bold")
+    table.add_column("what it is")
+    table.add_column("keys")
+    for name, variant in scenario_variants.variants().items():
+        keys = _keys({key: value for key, value in variant.items() if key != "about"})
+        table.add_row(name, variant["about"], keys)
+    print_result(table)
+
+
+def _keys(table: dict[str, Any]) -> str:
+    """A table as TOML in one line."""
+    return ", ".join(
+        f"{key} = {{ {_keys(value)} }}" if isinstance(value, dict) else f"{key} = {json.dumps(value)}"
+        for key, value in table.items()
+    )

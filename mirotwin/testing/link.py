@@ -1,0 +1,263 @@
+"""The link fixture: a host at the radio that sends what a test says, and waits for answers in virtual time.
+
+What belongs here: sending, polling, expecting, silence. What does not: the robot's inside (`robot`) and the air
+(`miro_sim.radio`).
+
+Each answer is taken once: those that a wait does not ask for stay for the next one. The link reads along by itself, so
+that a wait for something else (`world`, `robot`) takes nothing away from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
+from miro_protocol.frames import (
+    ContentError,
+    Message,
+    ServiceFrame,
+    TeamFrame,
+    TelemetryFrame,
+    encode,
+)
+from miro_protocol.table import SEQ_MODULUS, FrameType
+from miro_sim.periods import Period
+from miro_sim.world.conditions import Answer, Condition, Heard
+from miro_sim.world.events import Event
+from miro_sim.world.waits import WaitExpired, Waits
+from miro_sim.world.world import World
+from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called, why_ended
+from mirotwin.verify.cases.waits import expect_of_silence, expect_of_wait
+
+_CHARACTERS_KEPT = 4096
+Velocities = Mapping[int, tuple[int, int]]
+"""(left, right) by slot, in 1/256 count per LM629 sample."""
+
+
+class Sent(msgspec.Struct, frozen=True):
+    """A transmission: first start bit, end of the last stop bit, its sequence number (None for bare characters)."""
+
+    tick: int
+    end_tick: int
+    seq: int | None
+    data: bytes
+
+
+class Link:
+    """The host's end of `network`. Sequence numbers count by themselves; `velocities` are those that were sent last."""
+
+    def __init__(self, world: World, network: int = 0) -> None:
+        self.world = world
+        self.network = network
+        self.robots: int = world.networks[network].spec.robots
+        self.seq = -1
+        self.velocities: dict[int, tuple[int, int]] = {}
+        self.answers: list[tuple[int, TelemetryFrame]] = []
+        """(tick, answer) of all that were heard."""
+        self._waits = Waits(world)
+        self._read = world.networks[network].log.end
+        self._open: list[tuple[int, TelemetryFrame]] = []
+        self._characters: list[Event] = []
+        world.observers.append(self._look)
+
+    # Sending
+
+    @shown_where_it_was_called
+    def send(
+        self,
+        frame: Message | bytes | None = None,
+        *,
+        velocities: Velocities | None = None,
+        ask: bool = False,
+        seq: int | None = None,
+        bad_stop: Sequence[int] = (),
+        at_tick: int | None = None,
+        wait: bool = True,
+    ) -> Sent:
+        """Sends a frame, bare characters, or a team frame with `velocities` (robots that are not named: 0), and goes on
+        to the end of the last character; without `wait`, virtual time stands still and the next frame queues.
+
+        `ask`: robot (seq mod N) answers. `seq`: instead of the next number; a frame brings its own. `bad_stop`: indices
+        of characters whose stop bit is bad. `at_tick`: of the first start bit. ValueError for what cannot be sent.
+        """
+        number: int | None = None
+        if isinstance(frame, bytes | bytearray):
+            data = bytes(frame)
+        else:
+            message = frame if frame is not None else self._team(velocities, ask, seq)
+            data = encode(message, self.robots)
+            number = self.seq = message.seq
+            if isinstance(message, TeamFrame):
+                self.velocities = dict(enumerate(message.velocities))
+        tick = self.world.inject(data, self.network, at_tick, tuple(bad_stop))
+        sent = Sent(tick, tick + len(data) * HOST_CHARACTER_TICKS, number, data)
+        if wait:
+            self.world.run_to(sent.end_tick)
+        return sent
+
+    def _team(self, velocities: Velocities | None, ask: bool, seq: int | None) -> TeamFrame:
+        if velocities is None:
+            raise ValueError("nothing to send: give a frame, bytes, or velocities={slot: (left, right)}")
+        wrong = [slot for slot in velocities if slot not in range(self.robots)]
+        if wrong:
+            raise ValueError(f"slot {wrong[0]!r} does not exist on a network of {self.robots} robots")
+        kind = FrameType.TEAM_ASK if ask else FrameType.TEAM
+        pairs = tuple(velocities.get(slot, (0, 0)) for slot in range(self.robots))
+        return TeamFrame(kind, (self.seq + 1) % SEQ_MODULUS if seq is None else seq, pairs)
+
+    @shown_where_it_was_called
+    def poll(self, slot: int = 0, *, velocities: Velocities | None = None, wait: bool = True) -> Sent:
+        """Asks the robot in `slot`: a team frame with the next number at its turn, and the velocities sent last."""
+        if slot not in range(self.robots):
+            raise ValueError(f"slot {slot!r} does not exist on a network of {self.robots} robots")
+        seq = (self.seq + 1) % SEQ_MODULUS
+        while seq % self.robots != slot:
+            seq = (seq + 1) % SEQ_MODULUS
+        return self.send(velocities=velocities or self.velocities, ask=True, seq=seq, wait=wait)
+
+    @shown_where_it_was_called
+    def drive(self, velocities: Velocities, for_ticks: int) -> None:
+        """Sends `velocities` once a control period (33.4 ms) for so long, and lets the last period pass."""
+        end_tick = self.world.tick + for_ticks
+        while self.world.tick < end_tick:
+            begun = self.world.tick
+            self.send(velocities=velocities)
+            self.world.run_to(min(begun + CONTROL_PERIOD_TICKS, end_tick))
+
+    def ping(self, slot: int = 0) -> Sent:
+        """A service frame that changes nothing."""
+        return self.send(ServiceFrame.ping((self.seq + 1) % SEQ_MODULUS, slot))
+
+    def set_acceleration(self, slot: int, value: int) -> Sent:
+        """In 1/65536 count per sample^2."""
+        return self.send(ServiceFrame.acceleration((self.seq + 1) % SEQ_MODULUS, slot, value))
+
+    def set_filter(self, slot: int, kp: int, ki: int, kd: int, il: int) -> Sent:
+        return self.send(ServiceFrame.filter((self.seq + 1) % SEQ_MODULUS, slot, kp, ki, kd, il))
+
+    def radio(self, state: Literal["up", "down", "noise"]) -> None:
+        """Lets the radio of the network work, be off, or give noise, from now on."""
+        self.world.run_to(self.world.set_radio(state, self.network))
+
+    # Hearing
+
+    @shown_where_it_was_called
+    def expect(
+        self, wanted: type[TelemetryFrame] = TelemetryFrame, *, within: int, **fields: int
+    ) -> TelemetryFrame:
+        """Waits for an answer whose `fields` are these and returns it; one that has come already and was not taken
+        counts too. `within`: ticks from now, `ms(40)`. Raises WaitFailed with what came instead, BadInput for a field
+        that telemetry does not have.
+        """
+        if wanted is not TelemetryFrame:
+            raise BadInput(
+                "", "link.expect", f"{wanted!r} is no kind of answer", "give Telemetry, or use expect_bytes"
+            )
+        wrong = [name for name in fields if name not in TelemetryFrame.__slots__]
+        if wrong:
+            names = ", ".join(TelemetryFrame.__slots__)
+            raise BadInput("", "link.expect", f"telemetry has no field {wrong[0]!r}", f"it has {names}")
+        slot = fields.get("slot")
+        filters = ", ".join(f"{name}={value}" for name, value in fields.items())
+        what = f"no answer{' with ' + filters if fields else ''} within {within / 24_000:g} ms"
+        judged = fields.keys() <= {"slot"}  # no check asks for other fields
+        deadline = _Deadline(self, what, within, Answer(network=self.network, robot=slot), judged)
+        while True:
+            self._gather()
+            for place, (_, answer) in enumerate(self._open):
+                if all(getattr(answer, name) == value for name, value in fields.items()):
+                    del self._open[place]
+                    return answer
+            deadline.wait()
+
+    @shown_where_it_was_called
+    def expect_bytes(self, pattern: bytes, *, within: int) -> int:
+        """Waits until the PC has heard `pattern`, and returns the tick; what stood before it is taken too."""
+        what = f"{pattern.hex(' ')} not heard within {within / 24_000:g} ms"
+        deadline = _Deadline(self, what, within, Heard(network=self.network), judged=False)
+        while True:
+            self._gather()
+            place = bytes(event.value for event in self._characters).find(pattern)
+            if place >= 0:
+                end = place + len(pattern)
+                tick = self._characters[end - 1].tick
+                del self._characters[:end]
+                return tick
+            deadline.wait()
+
+    @shown_where_it_was_called
+    def expect_silence(self, for_ticks: int) -> None:
+        """Lets so much time pass. Raises WaitFailed at the first character that the PC hears meanwhile."""
+        begun = self.world.tick
+        what = f"silence for {for_ticks / 24_000:g} ms"
+        while True:
+            try:
+                rest = max(0, begun + for_ticks - self.world.tick)
+                event = self._waits.until([Heard(network=self.network)], rest)
+            except WaitExpired as error:
+                if error.tick < begun + for_ticks:
+                    raise WaitFailed(
+                        f"{what}: {why_ended(self.world)}", begun, error.tick, error.seen
+                    ) from None
+                return
+            if event.tick > begun:
+                expect = expect_of_silence(Heard(network=self.network), begun, begun + for_ticks)
+                raise WaitFailed(f"{what}: broken", begun, event.tick, [event], expect)
+
+    def _look(self, period: Period) -> None:
+        self._gather()
+
+    def _gather(self) -> None:
+        """Reads what the PC has heard by now."""
+        log = self.world.networks[self.network].log
+        for serial, event in log.since(self._read):
+            if event.what in ("heard", "answer") and event.tick > self.world.tick:
+                break
+            self._read = serial + 1
+            if event.what == "heard":
+                self._characters.append(event)
+            elif event.what == "answer" and event.frame is not None:
+                self._take(event.tick, event.frame)
+        del self._characters[:-_CHARACTERS_KEPT]
+
+    def _take(self, tick: int, frame: Any) -> None:
+        try:
+            answer = frame.message(self.robots)
+        except ContentError:  # its CRC is good, but no correct robot says this: the checks tell
+            return
+        self.answers.append((tick, answer))
+        self._open.append((tick, answer))
+
+    def __repr__(self) -> str:
+        return f"Link(net{self.network}, seq={self.seq}, {len(self.answers)} answers, {len(self._open)} not taken)"
+
+
+class _Deadline:
+    """The end of one wait of a link, which may go on several times."""
+
+    def __init__(self, link: Link, what: str, within: int, condition: Condition, judged: bool) -> None:
+        if within < 0:
+            raise ValueError(f"within {within}: give a number of ticks that is not negative, ms(40)")
+        self.link = link
+        self.what = what
+        self.condition = condition
+        self.judged = judged
+        self.begun = link.world.tick
+        self.end = self.begun + within
+        self.seen: list[Event] = []
+
+    def wait(self) -> None:
+        """On to the next event. Raises WaitFailed when the time is over."""
+        world, waits = self.link.world, self.link._waits
+        try:
+            self.seen.append(waits.until([self.condition], max(0, self.end - world.tick)))
+        except WaitExpired as error:
+            seen = sorted([*self.seen, *error.seen], key=lambda event: event.tick)
+            seen = [event for event in seen if event.tick >= self.begun]
+            what = self.what if error.tick >= self.end else f"{self.what}: {why_ended(world)}"
+            expect = expect_of_wait(error, self.begun) if self.judged else None
+            raise WaitFailed(what, self.begun, error.tick, seen, expect) from None

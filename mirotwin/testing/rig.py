@@ -1,0 +1,75 @@
+"""What one test works with: its world, links and robots, the checks that judge it, and its story when it fails.
+
+What belongs here: putting these together, judging at the end, the lines that a report shows. What does not: pytest
+(`mirotwin.testing.pytest_plugin`) and files (`left_behind`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from miro_sim.world.events import Event, of_board
+from mirotwin.testing.booted import world_for
+from mirotwin.testing.link import Link
+from mirotwin.testing.robot import RobotUnderTest
+from mirotwin.testing.waiting import in_words
+from mirotwin.verify.checks.interface import Failure
+from mirotwin.verify.wanted import Wanted
+
+LAST_EVENTS = 240
+LAST_LINES = 12
+
+
+class Rig:
+    """The world of one test. `links`: by network; `robots`: by network and slot."""
+
+    def __init__(self, wanted: Wanted) -> None:
+        self.wanted = wanted
+        self.world, self.trace, self.checks = world_for(wanted)
+        self.links = [Link(self.world, network.index) for network in self.world.networks]
+        self.robots = [
+            RobotUnderTest(self.world, network.index, robot.slot)
+            for network in self.world.networks
+            for robot in network.robots
+        ]
+        self.tick = -1
+        """Where the test ended, -1 while it runs."""
+
+    def judge(self) -> Sequence[Failure]:
+        """What the checks have found when the test is over; lets a control period end first."""
+        if self.tick < 0:
+            self.tick = self.world.tick
+            if not self.world.stopped and (self.world.in_period or not self.world.finished):
+                self.world.run_to(self.world.period_end)
+            self.checks.finish()
+        return self.checks.failures
+
+    @property
+    def written(self) -> bool:
+        """Whether the test has put something into a robot's memory by itself."""
+        return any(robot.written for robot in self.robots)
+
+    def facts(self) -> dict[str, str | int]:
+        """What names a run: for the report and for JUnit."""
+        return {
+            "mirotwin_seed": self.wanted.seed,
+            "mirotwin_scenario": self.wanted.scenario.name,
+            "mirotwin_firmware": self.wanted.image.sha256,
+            "mirotwin_digest": self.world.digest,
+        }
+
+    def last_events(self) -> list[str]:
+        """The last things that happened up to the end of the test, a line each."""
+        events: list[Event] = []
+        for network in self.world.networks:
+            events += [event for _, event in network.log.since(network.log.end - LAST_EVENTS)]
+            for robot in network.robots:
+                log = robot.board.log
+                place = (network.index, robot.slot)
+                events += [event for _, event in of_board(log, log.end - LAST_EVENTS, *place)]
+        end_tick = self.tick if self.tick >= 0 else self.world.tick
+        events = sorted((event for event in events if event.tick <= end_tick), key=lambda event: event.tick)
+        return in_words(events[-LAST_EVENTS:])[-LAST_LINES:]
+
+    def __repr__(self) -> str:
+        return f"Rig({self.wanted.scenario.name!r}, seed={self.wanted.seed}, tick={self.world.tick})"

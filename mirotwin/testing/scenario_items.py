@@ -1,0 +1,111 @@
+"""Scenario files as tests of pytest: each `*.scenario.toml` that it collects is one test.
+
+What belongs here: what joins pytest and `mirotwin.verify.steps`. What does not: the hook (`pytest_plugin`), running a
+file (`mirotwin.verify.steps.running`), and the session's options, which the plugin declares: `--mirotwin-firmware`,
+`--mirotwin-seed`, `--mirotwin-artifacts`, in the ini file with underscores.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from miro_robot.firmware import image_path
+from miro_robot.image import Image, load_hex
+from mirotwin.verify.steps.running import Outcome, reproduce_line, run_test, stem_of
+
+
+class ScenarioFailed(Exception):
+    """What is wrong, in lines: no traceback of ours helps."""
+
+
+class ScenarioFile(pytest.File):
+    """A `*.scenario.toml`: one test, or with `--mirotwin-repeat N` one for each of N seeds."""
+
+    def collect(self) -> Iterator[pytest.Item]:
+        name, first = stem_of(str(self.path)), int(_given(self.config, "seed") or 0)
+        repeat = int(_given(self.config, "repeat") or 1)
+        for seed in range(first, first + repeat):
+            item = ScenarioItem.from_parent(self, name=f"{name}[seed{seed}]" if repeat > 1 else name)
+            item.seed = seed
+            yield item
+
+
+class ScenarioItem(pytest.Item):
+    """Its run with one seed."""
+
+    seed = 0
+
+    def runtest(self) -> None:
+        firmware = _path(self.config, "firmware")
+        seed = self.seed
+        file = relative(self.path)
+        again = reproduce_line(file, seed, None if firmware is None else str(firmware), ())
+        try:
+            image = _image(str(firmware or image_path()))
+        except ValueError as error:
+            raise ScenarioFailed(f"{error}") from None
+        outcome = run_test(file, image, seed, artifacts=_path(self.config, "artifacts"), again=again)
+        self._note(outcome, again)
+        if outcome.verdict != "passed":
+            left = [f"left in {relative(Path(outcome.left))}"] if outcome.left else []
+            raise ScenarioFailed("\n".join((*outcome.lines, *outcome.notes, f"again: {again}", *left)))
+
+    def _note(self, outcome: Outcome, again: str) -> None:
+        facts = {
+            "mirotwin_seed": outcome.seed,
+            "mirotwin_digest": outcome.digest,
+            "mirotwin_firmware_sha256": outcome.firmware_sha256,
+            "mirotwin_reproduce": again,
+        }
+        self.user_properties += list(facts.items())
+        if outcome.notes:
+            self.add_report_section("call", "mirotwin", "\n".join(outcome.notes))
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        if isinstance(excinfo.value, ScenarioFailed):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        return self.path, None, self.name
+
+
+def relative(path: Path) -> str:
+    """The path as one types it here."""
+    try:
+        return os.path.relpath(path)
+    except ValueError:  # on another drive
+        return str(path)
+
+
+def _given(config: pytest.Config, name: str) -> Any:
+    """An option of the plugin, else what the ini file says, else None."""
+    given = config.getoption(f"--mirotwin-{name}", default=None)
+    if given is not None:
+        return given
+    try:
+        return config.getini(f"mirotwin_{name}") or None
+    except (ValueError, KeyError):
+        return None
+
+
+def _path(config: pytest.Config, name: str) -> Path | None:
+    """The same for paths: an option's goes from where pytest was called, an ini file's from where that lies."""
+    given = _given(config, name)
+    if given is None:
+        return None
+    from_option = config.getoption(f"--mirotwin-{name}", default=None) is not None
+    return Path(config.invocation_params.dir if from_option else config.rootpath, given)
+
+
+@lru_cache(maxsize=4)
+def _image(path: str) -> Image:
+    image = load_hex(Path(path))
+    _ = image.symbols.names
+    return image

@@ -1,0 +1,127 @@
+"""Which lines of the firmware a test session ran: `pytest --firmware-coverage=firmware.info`.
+
+What belongs here: watching every CPU that tests load the image into (in this process and in those of pytest-xdist),
+and the report at the end. What does not: the options (`mirotwin.testing.pytest_plugin`) and the mapping to lines
+(`miro_robot.inspect.coverage`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from miro_exact.inputs import check_regular
+from miro_robot.firmware import image_path, source_folder
+from miro_robot.image import Image, load_hex
+from miro_robot.image.debug_info import Sources
+from miro_robot.inspect.counters import Counters
+from miro_robot.inspect.coverage import Counts, counts_of, line_share, merged
+from miro_robot.inspect.watcher import Inspector, attach
+from miro_robot.mcs51.cpu import Cpu, on_load
+from mirotwin.firmware import coverage_files as firmware_coverage
+from mirotwin.firmware.coverage_files import Report, table, write
+from mirotwin.shell.outputs import check_file, check_not_input
+
+OUTPUT = "firmware_coverage"
+"""Under this name a pytest-xdist worker hands over its counts."""
+TABLE_COLUMNS = 160
+
+
+class FirmwareCoverage:
+    """Of one session. On the controller of pytest-xdist it adds up what its workers counted."""
+
+    def __init__(self, config: pytest.Config) -> None:
+
+        self.config = config
+        self.out = Path(config.getoption("--firmware-coverage"))
+        self.wanted: float = config.getoption("--firmware-coverage-fail-under")
+        self.from_workers: list[Counts] = []
+        self.counters = Counters()
+        try:
+            self.image = _image(config.getoption("--firmware-image"))
+            check_file(self.out, "--firmware-coverage")
+            check_not_input(self.out, "--firmware-coverage", self.image.path)
+            _check_folders(config.getoption("--firmware-sources"))
+        except ValueError as error:
+            raise pytest.UsageError(str(error)) from None
+        on_load.set(self.watch)
+
+    def watch(self, cpu: Cpu) -> None:
+        """Counts what `cpu` does from now on, if it was the image that it got."""
+
+        inspector = cpu.inspector
+        watched = isinstance(inspector, Inspector) and self.counters in inspector.watchers
+        if not watched and cpu.code == self.image.code:
+            attach(cpu, self.counters)
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+
+        if hasattr(session.config, "workeroutput"):  # a worker of pytest-xdist: JSON has no numbers as keys
+            counts = counts_of(self.counters)
+            session.config.workeroutput[OUTPUT] = [[address, *both] for address, both in counts.items()]
+        elif session.exitstatus == pytest.ExitCode.OK and self._too_few():
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any) -> None:
+        handed: Iterable[tuple[int, int, int]] = getattr(node, "workeroutput", {}).get(OUTPUT, ())
+        self.from_workers.append({address: (executed, jumped) for address, executed, jumped in handed})
+
+    def pytest_terminal_summary(self, terminalreporter: Any) -> None:
+
+        if hasattr(self.config, "workeroutput"):  # the controller's file has the counts of all
+            return
+        report = self._report
+        write(report.tracefile, report, self.out, "--firmware-coverage")
+        terminalreporter.section(f"coverage of {self.image.path.name}, written to {self.out}")
+        console = Console(highlight=False, markup=False, width=TABLE_COLUMNS)
+        with console.capture() as capture:
+            console.print(table(report.tracefile))
+            console.print(f"instructions: {report.instructions}")
+        for line in capture.get().splitlines():
+            terminalreporter.write_line(line.rstrip())
+        if self._too_few():
+            terminalreporter.write_line(
+                f"fewer lines ran than the {self.wanted} % of --firmware-coverage-fail-under", red=True
+            )
+
+    @cached_property
+    def _report(self) -> Report:
+        """Of the whole session: for when its last test has run."""
+
+        own = source_folder()
+        folders = [
+            *map(Path, self.config.getoption("--firmware-sources")),
+            self.image.path.parent,
+            *([own] if own else []),
+        ]
+        counts = merged([counts_of(self.counters), *self.from_workers])
+        return firmware_coverage.collect(self.image, counts, Sources(folders), self.out)
+
+    def _too_few(self) -> bool:
+
+        share = line_share(self._report.tracefile)
+        return bool(share.total) and 100.0 * share.hit / share.total < self.wanted
+
+
+def _image(path: str | None) -> Image:
+    if path:
+        check_regular(path)
+    image = load_hex(path or image_path())
+    _ = (
+        image.symbols.names
+    )  # the listing needs them: what is wrong with their files is said before the tests run
+    return image
+
+
+def _check_folders(folders: list[str]) -> None:
+    for folder in folders:
+        if not Path(folder).is_dir():
+            raise ValueError(
+                f"{folder}: --firmware-sources: there is no such folder; name the one with the C files"
+            )

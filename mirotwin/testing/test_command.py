@@ -1,0 +1,178 @@
+"""`mirotwin test`: scenario files as tests, for people and machines without pytest."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from miro_exact.bad_input import BadInput
+from miro_exact.seed import MAX_SEED
+from mirotwin.report.junit import TestCase, junit_xml
+from mirotwin.shell.options import (
+    Place,
+    Whole,
+    choose_engine,
+    engine_option,
+    firmware_option,
+    load_image,
+    set_option,
+)
+from mirotwin.shell.outputs import check_file, check_not_input, whole_file
+from mirotwin.shell.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, show_line, tell_notes
+from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, replay_line, report_line
+from mirotwin.verify.expectations import expect_option
+from mirotwin.verify.steps.collecting import SUFFIX, collect
+from mirotwin.verify.steps.keys import end_ms
+from mirotwin.verify.steps.running import Outcome, Verdict, reproduce_line, run_test, stem_of
+
+WORDS = {"passed": "passed", "failed": "FAILED", "fault": "FAULT", "error": "ERROR"}
+CODES: dict[Verdict, int] = {
+    "error": BAD_INPUT,
+    "fault": FIRMWARE_FAULT,
+    "failed": EXPECTATION_FAILED,
+    "passed": DONE,
+}
+"""In the order of precedence."""
+
+
+@click.command(short_help="Runs scenario files as tests: steps, checks, a verdict each.")
+@click.argument("paths", metavar="DIR|FILE..", nargs=-1, required=True, type=Place())
+@click.option("-k", "word", metavar="TEXT", default="", help="Only files with TEXT in their path.")
+@click.option(
+    "--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Master seed of all noise."
+)
+@set_option("A key to set in each scenario, as for `run`; may be repeated.")
+@expect_option
+@firmware_option("Image to run instead of the robot's own.")
+@engine_option
+@click.option(
+    "--junit", type=Place(path_type=Path), metavar="FILE", help="Write the verdicts as JUnit XML, too."
+)
+@click.option(
+    "--artifacts",
+    type=Place(path_type=Path),
+    metavar="DIR",
+    help="Folder for what files leave: worlds that `save` steps keep; of one that fails its case, for `replay`.",
+)
+@click.option(
+    "--pages", is_flag=True, help="With --artifacts: make the page of each failure, as `report` does."
+)
+@click.option("-q", "--quiet", is_flag=True, help="No line for a file that passed.")
+def test(
+    paths: tuple[str, ...],
+    word: str,
+    seed: int,
+    settings: tuple[str, ...],
+    expected: tuple[str, ...],
+    firmware: str | None,
+    engine: str | None,
+    junit: Path | None,
+    artifacts: Path | None,
+    pages: bool,
+    quiet: bool,
+) -> int:
+    """Runs each *.scenario.toml that is named or lies below DIR: its steps, what it expects, and the checks that are
+    always on. One line each with the verdict, and one for each failure.
+
+    Exit code 1: a step or a check failed; 3: the firmware did what it must not; 2: a file cannot be run, or there is
+    none. Where several apply: 2, then 3, then 1.
+    """
+    choose_engine(engine)
+    if pages and artifacts is None:
+        raise click.UsageError("--pages needs --artifacts.")
+    files = collect(paths)
+    chosen = [file for file in files if word.lower() in file.lower()]
+    if not chosen:
+        what = f"{len(files)} files, none with {word!r} in its path" if files else f"no *{SUFFIX} there"
+        raise BadInput(" ".join(paths), "", what, f"nothing was tested; a test is a scenario in a *{SUFFIX}")
+    if junit is not None:
+        check_file(junit, "--junit")
+        check_not_input(junit, "--junit", *chosen)
+    image = load_image(firmware)
+    settings = (*settings, *expected)
+    left_out: dict[str, None] = {}
+    outcomes: list[Outcome] = []
+    times_s: list[float] = []
+    for file in chosen:
+        began_s = time.perf_counter()
+        again = reproduce_line(file, seed, firmware, settings)
+        outcome = run_test(file, image, seed, settings, artifacts, again)
+        times_s.append(time.perf_counter() - began_s)
+        outcomes.append(outcome)
+        tell_notes(note for note in outcome.left_out if note not in left_out)
+        left_out |= dict.fromkeys(outcome.left_out)
+        _show(outcome, quiet, again)
+        if pages and outcome.left:
+            _page(outcome.left)
+    if junit is not None:
+        lines = [reproduce_line(file, seed, firmware, settings) for file in chosen]
+        _write_junit(junit, outcomes, times_s, lines)
+    return _summary(outcomes)
+
+
+def _page(folder: str) -> None:
+    from mirotwin.report.report_subject import page_of_failure  # loads the pages' library
+
+    (Path(folder) / PAGE).write_bytes(page_of_failure(folder))
+
+
+def _show(outcome: Outcome, quiet: bool, again: str) -> None:
+    passed = outcome.verdict == "passed"
+    if quiet and passed:
+        return
+    steps = f"{outcome.done} of {outcome.steps} steps, " if outcome.steps else ""
+    how = (
+        ""
+        if outcome.verdict == "error"
+        else f" ({steps}{end_ms(outcome.tick)}, digest {outcome.digest[:12]})"
+    )
+    show_line(f"{WORDS[outcome.verdict]}  {outcome.path}{how}")
+    for line in (*outcome.lines, *outcome.notes):
+        show_line(f"    {line}")
+    if outcome.left:
+        show_line(f"    left in {outcome.left}")
+        case = Path(outcome.left) / CASE
+        if case.exists():
+            show_line(f"    {replay_line(outcome.left, not case.with_name(FIRMWARE).exists())}")
+        show_line(f"    {report_line(outcome.left)}")
+    if not passed and outcome.verdict != "error":
+        show_line(f"    {again}")
+
+
+def _summary(outcomes: Sequence[Outcome]) -> int:
+    """Prints what came of all; returns the exit code."""
+    counted = {verdict: [one.verdict for one in outcomes].count(verdict) for verdict in CODES}
+    words = {
+        "error": "cannot be run",
+        "fault": "with a firmware fault",
+        "failed": "failed",
+        "passed": "passed",
+    }
+    show_line(", ".join(f"{count} {words[verdict]}" for verdict, count in counted.items() if count))
+    return next(code for verdict, code in CODES.items() if counted[verdict])
+
+
+def _write_junit(
+    path: Path, outcomes: Sequence[Outcome], times_s: Sequence[float], again: Sequence[str]
+) -> None:
+    cases = [
+        TestCase(
+            name=stem_of(one.path),
+            classname=str(Path(one.path).parent).strip("./").replace("/", ".") or "scenario",
+            time_s=time_s,
+            verdict={"passed": "passed", "error": "error"}.get(one.verdict, "failure"),  # type: ignore[arg-type]
+            lines=(*one.lines, *one.notes),
+            properties={
+                "seed": str(one.seed),
+                "digest": one.digest,
+                "firmware_sha256": one.firmware_sha256,
+                "reproduce": line,
+            },
+        )
+        for one, time_s, line in zip(outcomes, times_s, again, strict=True)
+    ]
+    with whole_file(path, "--junit") as part:
+        part.write_bytes(junit_xml("mirotwin", cases))

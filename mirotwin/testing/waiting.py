@@ -1,0 +1,166 @@
+"""A wait of a test that failed, in words: what was awaited, since when, and what happened meanwhile.
+
+What belongs here: the error, and how events read. What does not: waiting (`miro_sim.world.waits`).
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ParamSpec, TypeVar
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_protocol.decoder import Decoder, Received, TelemetryDecoder, WindowDecoder
+from miro_protocol.frames import ContentError, TeamFrame, describe
+from miro_sim.world.events import Event
+from miro_sim.world.waits import WaitExpired
+from miro_sim.world.world import World
+from mirotwin.verify.cases.waits import expect_of_wait
+
+P = ParamSpec("P")
+T = TypeVar("T")
+LAST_LINES = 6
+CHARACTERS = ("heard", "received", "transmitted")
+NETWORK_SIZES = (3, 5)
+
+
+class WaitFailed(AssertionError):
+    """What a test waited for did not come, or what should not come did. `expect`: the check that says the same, as in
+    `[expect]`; None where no check can.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        begun_tick: int,
+        tick: int,
+        seen: Sequence[Event],
+        expect: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.begun_tick = begun_tick
+        self.tick = tick
+        self.seen = list(seen)
+        self.expect = expect
+        times = f"from {at(begun_tick)} to {at(tick)}"
+        happened = "\n".join(f"  {one}" for one in in_words(seen)[-LAST_LINES:]) or "  nothing"
+        count = f", {len(seen)} events" if len(seen) > LAST_LINES else ""
+        super().__init__(f"{what}, {times}; meanwhile{count}:\n{happened}")
+
+    @classmethod
+    def of(cls, expired: WaitExpired, world: World) -> WaitFailed:
+        """In words, a wait of the world that a test has not caught."""
+        wanted = " or ".join(map(str, expired.conditions))
+        seen = [event for event in expired.seen if event.tick >= expired.begun_tick]
+        why = f": {why_ended(world)}" if world.finished else ""
+        expect = expect_of_wait(expired, expired.begun_tick)
+        return cls(f"no {wanted}{why}", expired.begun_tick, expired.tick, seen, expect)
+
+
+def why_ended(world: World) -> str:
+    """Why a world goes no further."""
+    if world.stopped:
+        return f"the run was stopped by a firmware fault: {world.faults[0]}"
+    return f"the limit of virtual time was reached, duration_s = {world.scenario.duration_s:g}"
+
+
+def at(tick: int) -> str:
+    """A tick for people."""
+    return f"tick {tick} ({tick / 24_000:.3f} ms)"
+
+
+def in_words(events: Sequence[Event]) -> list[str]:
+    """One line each; the characters of a frame are the frame, others that follow each other on one wire are one."""
+    lines: list[str] = []
+    run: list[Event] = []
+    for event in [*_with_frames(events), None]:
+        if run and (event is None or _place(event) != _place(run[0])):
+            lines.append(_line(run))
+            run = []
+        if event is not None:
+            run.append(event)
+            if event.what not in CHARACTERS or event.frame is not None:
+                lines.append(_line(run))
+                run = []
+    return lines
+
+
+def _with_frames(events: Sequence[Event]) -> list[Event]:
+    """The events with each valid frame, at its last character, in place of its characters."""
+    wires: dict[tuple[str, int, int], list[int]] = {}
+    for index, event in enumerate(events):
+        if event.what in CHARACTERS:
+            wires.setdefault(_place(event), []).append(index)
+    replaced: dict[int, Event | None] = {}
+    for (what, _, _), wire in wires.items():
+        decoders: list[WindowDecoder] = (
+            [Decoder(3), Decoder(5)] if what == "received" else [TelemetryDecoder()]
+        )
+        for decoder in decoders:
+            at = 0
+            symbols = [(one.value, one.good_stop, one.tick) for one in map(events.__getitem__, wire)]
+            for found in [*decoder.feed_symbols(symbols), *decoder.flush()]:
+                characters = wire[at : at + len(found.data)]
+                at += len(found.data)
+                if isinstance(found, Received):
+                    replaced.update(dict.fromkeys(characters))
+                    last = characters[-1]
+                    replaced[last] = msgspec.structs.replace(events[last], frame=found)
+    all_ = (replaced.get(index, event) for index, event in enumerate(events))
+    return [one for one in all_ if one is not None]
+
+
+def _frame_text(event: Event) -> str:
+    """`received team seq=3 ..` of the event that a frame stands in."""
+    frame = event.frame
+    assert frame is not None
+    for robots in NETWORK_SIZES:
+        try:
+            message = frame.message(robots)
+        except ContentError:
+            continue
+        pairs = message.velocities if isinstance(message, TeamFrame) else ()
+        speeds = "".join(f" {slot}: {left:+d}/{right:+d}" for slot, (left, right) in enumerate(pairs))
+        return f"{event.what} {describe(message)}{speeds}"
+    return f"{event.what} a frame of unknown content, seq={frame.seq}"
+
+
+def _sent_text(event: Event) -> str:
+    """`team seq=3 ..`, or the characters."""
+    for decoder in (Decoder(3), Decoder(5)):
+        for found in decoder.feed(event.data, event.tick):
+            if isinstance(found, Received) and event.good_stop:
+                return _frame_text(msgspec.structs.replace(event, frame=found)).partition(" ")[2]
+    return event.data.hex(" ").upper()
+
+
+def _place(event: Event) -> tuple[str, int, int]:
+    return (event.what, event.network, event.slot)
+
+
+def _line(run: Sequence[Event]) -> str:
+    first = run[0]
+    time = f"{first.tick / 24_000:10.3f} ms "
+    if first.frame is not None:
+        return f"{time}{str(first).split(': ')[1]}: {_frame_text(first)} (tick {first.tick})"
+    if first.what == "sent":
+        return f"{time}{str(first).partition(': ')[2]}: {_sent_text(first)} (tick {first.tick})"
+    if len(run) == 1:
+        return time + str(first).partition(": ")[2] + f" (tick {first.tick})"
+    values = " ".join(f"{one.value:02X}{'' if one.good_stop else '!'}" for one in run)
+    return time + f"{str(first).split(': ')[1]}: {first.what} {values} (from tick {first.tick})"
+
+
+def shown_where_it_was_called(function: Callable[P, T]) -> Callable[P, T]:
+    """For the methods of fixtures: what they raise for a test is shown at the test's own line."""
+
+    @functools.wraps(function)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> T:
+        __tracebackhide__ = True
+        try:
+            return function(*args, **kwargs)
+        except (WaitFailed, BadInput, ValueError) as error:
+            raise error.with_traceback(None) from None
+
+    return wrapped

@@ -1,0 +1,1 @@
+"""What a run or a firmware has to fulfil: checks, steps, cases, conformance."""

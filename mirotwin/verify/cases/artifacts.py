@@ -1,0 +1,89 @@
+"""What a failure leaves in a folder of its own, in one form for pytest, `mirotwin test` and `mirotwin conform`.
+
+What belongs here: names, clearing, writing, and the commands that look into the folder. What does not: the form of a
+case (`case`), the text of a report, and pages (`mirotwin report FOLDER` makes them).
+
+    report.txt        what failed, and the commands that give it again
+    case.stream       what was sent and done, with the check that failed: `mirotwin replay` gives its verdict again
+    sent.stream       the same without a verdict, where no check can judge the failure
+    firmware.ihx      the image, with its .map and .cdb: `replay` and `report` find it beside the stream; not where it
+                      is the robot's own, which every installation has
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from miro_robot.firmware import image_path
+from miro_robot.image import Image
+from mirotwin.shell import command_line
+from mirotwin.verify.cases.case import write_case
+
+REPORT, CASE, SENT = "report.txt", "case.stream", "sent.stream"
+PAGE = "report.html"
+FIRMWARE = "firmware.ihx"
+DEBUG_FILES = (".map", ".cdb")
+IMAGE_FILES = (FIRMWARE, *(Path(FIRMWARE).stem + suffix for suffix in DEBUG_FILES))
+FILES = (REPORT, CASE, SENT, PAGE, *IMAGE_FILES)
+
+
+def clear(folder: Path, *others: str) -> None:
+    """Takes away what an earlier run left there, `others` too, and nothing else."""
+    for name in (*FILES, *others):
+        (folder / name).unlink(missing_ok=True)
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+
+
+def leave(
+    folder: Path, report: str, case: str | None, sent: str | None, image: Image, others: Mapping[str, str]
+) -> None:
+    """Writes the folder. `case`, `sent`: streams; the second where there is no first. `others`: more files, by name."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, stream in ((CASE, case), (SENT, sent if case is None else None)):
+        if stream is not None:
+            write_case(folder / name, stream)
+    for name, text in {REPORT: report, **others}.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    if case is not None or sent is not None:
+        leave_image(folder, image)
+
+
+def leave_image(folder: Path, image: Image) -> None:
+    """The image's own file, as long as that is what ran."""
+    if image.path == image_path() or not image.path.is_file():
+        return
+    content = image.path.read_bytes()
+    if hashlib.sha256(content).hexdigest() != image.sha256:
+        return
+    (folder / FIRMWARE).write_bytes(content)
+    for suffix in DEBUG_FILES:
+        beside = image.path.with_suffix(suffix)
+        if beside.is_file():
+            (folder / FIRMWARE).with_suffix(suffix).write_bytes(beside.read_bytes())
+
+
+def image_beside(stream: str | Path, sha256: str | None) -> Path | None:
+    """The image that was left beside a stream, if it is the one with this hash."""
+    path = Path(stream).with_name(FIRMWARE)
+    if sha256 is None or not path.is_file():
+        return None
+    with open(path, "rb") as file:
+        content = file.read(MOST_BYTES + 1)
+    return path if hashlib.sha256(content).hexdigest() == sha256 else None
+
+
+MOST_BYTES = 1 << 20
+"""An image of 8 KB is a file of 23 KB."""
+
+
+def replay_line(folder: str, own: bool, name: str = CASE) -> str:
+    """The command that gives the verdict of the case in `folder` again; `own`: with the robot's own firmware."""
+    return command_line.replay_line(f"{folder}/{name}", None if own else f"{folder}/{FIRMWARE}")
+
+
+def report_line(folder: str) -> str:
+    """The command that makes the page of what happened, as a line of a report."""
+    return "page: " + command_line.command_line("report", command_line.operand(folder))

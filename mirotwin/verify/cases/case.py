@@ -1,0 +1,103 @@
+"""A failure as one text file: what went into the world, the world itself, and the check that failed.
+
+What belongs here: writing that file. What does not: the format (`miro_protocol.stream`), running it again
+(`mirotwin replay`), and collecting what went in (`trace`).
+
+    # mirotwin stream 2
+    #: version = "0.1.0"
+    #: seed = 7
+    #: firmware_sha256 = ".."
+    #: verdict = "failsafe_stop_ms: net0/robot0: tick 4665120 (..): wanted .., found .."
+    #: end_tick = 6000000
+    #:
+    #: [expect]
+    #: failsafe_stop_ms = true
+    #:
+    #: [scenario]
+    #: ..
+    1440120 > 55 55 ..
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import tomli_w
+
+from miro_exact.bad_input import one_line
+from miro_protocol import files, stream, stream_header
+from miro_protocol.stream_events import Deed
+from miro_protocol.transmission import Transmission
+from miro_sim.scenario.keys import Scenario, without_expectations
+from miro_sim.world.world import World
+from mirotwin.verify.cases.trace import Trace
+from mirotwin.verify.checks.interface import Failure
+from mirotwin.verify.checks.watching import Checks
+
+SUFFIX = ".stream"
+
+
+def case_text(world: World, trace: Trace, expect: Mapping[str, Any], verdict: str) -> str:
+    """The case of `world` as it is now. `expect`: the check that failed, as in `[expect]`; `verdict`: what it said."""
+    header: dict[str, Any] = {"version": importlib.metadata.version("mirotwin"), "seed": world.seed}
+    if world.image.sha256:  # else it comes from no file
+        header["firmware_sha256"] = world.image.sha256
+    if verdict:
+        header["verdict"] = one_line(verdict)
+    header["end_tick"] = world.tick
+    header["expect"] = dict(expect)
+    header["scenario"] = tables_of(world.scenario)
+    return stream.format_stream(
+        _in_order(trace.happenings()), stream_header.of_text(tomli_w.dumps(header).rstrip("\n"))
+    )
+
+
+def _in_order(happened: Sequence[Transmission | Deed]) -> Sequence[stream.Entry]:
+    return [stream.Entry(one) for one in happened]
+
+
+def tables_of(scenario: Scenario) -> dict[str, Any]:
+    """A scenario as the tables of TOML, without what is expected of it."""
+    found = _without_none(msgspec.to_builtins(without_expectations(scenario)))
+    assert isinstance(found, dict)
+    return found
+
+
+def _without_none(value: Any) -> Any:
+    """TOML has no null: a key that is not there says the same."""
+    if isinstance(value, dict):
+        return {
+            key: _without_none(inner) for key, inner in value.items() if inner is not None and inner != {}
+        }
+    if isinstance(value, list | tuple):
+        return [_without_none(inner) for inner in value]
+    return value
+
+
+def expect_of_failure(checks: Checks, failure: Failure) -> dict[str, Any]:
+    """The check that failed as a table `[expect]`."""
+    for judge in checks.judges:
+        place = (judge.subject.network, judge.subject.slot)
+        if judge.check.name == failure.check and place == (failure.network, failure.slot):
+            given = msgspec.to_builtins(judge.check)
+            given.pop("check")
+            return {failure.check: _without_none(given) or True}
+    raise ValueError(f"no check {failure.check!r} judges net{failure.network}/robot{failure.slot}")
+
+
+def case_of_checks(world: World, trace: Trace, checks: Checks) -> str:
+    """The case of the first failure of `checks`. Raises ValueError if nothing failed."""
+    if not checks.failures:
+        raise ValueError("no check has failed")
+    first = checks.failures[0]
+    return case_text(world, trace, expect_of_failure(checks, first), str(first))
+
+
+def write_case(path: str | os.PathLike[str], text: str) -> None:
+    """Writes it whole or not at all."""
+    files.replace(Path(path), text.encode())

@@ -1,0 +1,221 @@
+"""The check that a robot does anything at all with frames that reach it: dead, deaf and lame robots fail every run.
+
+What belongs here: that check, which is always on. What does not: how soon and how exactly a robot acts (`reception`).
+
+It asks for little, so that firmware which is merely different passes: of several frames in a row that ask a wheel to
+turn at another speed than before, one is followed by an STT to that wheel; and a wheel that is asked to turn has its
+motor driven or its encoder counting. It does not go by the robot's serial port, which a dead firmware never starts:
+a frame counts if it is fresh as sent, no bit of it was turned over by the radio, and the robot is supplied.
+
+A firmware that begins again and again (a watchdog, a jump to its start) obeys frames in between. It shows in the LM629:
+they are reset a second time after they were told to turn, though nothing reset the processor.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from miro_exact.clock import HOST_CHARACTER_TICKS
+from miro_protocol.decoder import Decoder, Received
+from miro_protocol.freshness import Freshness
+from miro_protocol.table import downlink
+from miro_robot.lm629.commands import BY_NAME
+from miro_sim.periods import Axis, RobotPeriod
+from miro_sim.radio.condition import UP
+from miro_sim.radio.params import RadioParams
+from miro_sim.radio.probability import ONE
+from miro_sim.world.events import SIDES, Event
+from mirotwin.verify.checks.failsafe import ACTING_MS
+from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject, ms_ticks
+from mirotwin.verify.checks.reception import words_of
+
+FRAMES = 5
+"""Frames in a row without any effect."""
+SLOWEST = 256
+"""A speed of one count per LM629 sample (22 mm/s): 500 counts between two frames."""
+FURTHEST_PPM = 10_000
+"""Of the PC's clock beside the robots'; further off a UART may lose characters."""
+UNLIKELY = 1e-12
+MOST_FRAMES = 10_000
+_STT = BY_NAME["STT"].opcode
+Waiting = tuple[int, tuple[int, ...], tuple[int, int]]
+
+
+class ActsAtAll(Check, frozen=True, kw_only=True, tag="acts_at_all"):
+    """Of 5 fresh frames in a row that reach the robot undisturbed and ask for other speeds, it acts on one: it tells
+    the wheels to turn, and their motors are driven. It does not begin again by itself.
+    """
+
+    KIND: ClassVar[Kind] = "liveness"
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return AliveJudge(self, subject)
+
+
+def frames_needed(params: RadioParams, characters: int) -> int:
+    """So many frames in a row that a radio like this does not lose all of them; 0: nothing can be said."""
+    if abs(params.baud_offset_ppm - params.crystal_offset_ppm) > FURTHEST_PPM:
+        return 0
+    arrives = 1.0 - params.lost_frame_threshold / ONE
+    for _ in range(characters):
+        arrives *= 1.0 - params.lost_threshold / ONE
+    all_lost = 1.0
+    for frames in range(1, MOST_FRAMES):
+        all_lost *= 1.0 - arrives
+        if frames >= FRAMES and all_lost <= UNLIKELY:
+            return frames
+    return 0
+
+
+class _Wheel:
+    """One wheel. `asked`: the speed of the last frame when it was told something last, None while nobody knows; the
+    counts: frames since it was told something, and since its motor was driven. `told`: in the last control period.
+    """
+
+    def __init__(self) -> None:
+        self.asked: int | None = 0
+        self.untold = 0
+        self.undriven = 0
+        self.told = self.driven = False
+        self.position: int | None = None
+
+    def look(self, axis: Axis, word: int | None) -> None:
+        self.told = False
+        for _, opcode, _ in axis.commands:
+            if opcode == _STT:
+                self.told = True
+                break
+        position = axis.real_position
+        self.driven = axis.pwm_magnitude != 0 or (position != self.position and self.position is not None)
+        if self.told:
+            self.asked = word
+            self.untold = 0
+        if self.driven:
+            self.undriven = 0
+        self.position = position
+
+    def ask(self, word: int) -> None:
+        if self.asked is None:
+            self.asked = word
+        if abs(word) >= SLOWEST:
+            self.untold += word != self.asked
+            self.undriven += 1
+
+
+class AliveJudge(Judge[ActsAtAll]):
+    """`waiting`: (end, air before, velocities) of frames that are not counted yet.
+
+    `counted`: frames that asked for something; `shown`: frames to a robot that had just acted, which are not decoded:
+    that would take a tenth of the loop.
+    """
+
+    HEARS = ("sent",)
+
+    def __init__(self, check: ActsAtAll, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.acting_ticks = ms_ticks(ACTING_MS)
+        radio = subject.radio
+        self.needed = 0 if radio is None else frames_needed(radio.params, downlink(subject.robots).wire_size)
+        self.decoder = Decoder(subject.robots)
+        self.freshness = Freshness()
+        self.air = self.before = self._air()
+        self.counted = self.shown = 0
+        self.begun_tick = -1
+        self.reset_tick = self.subject.robot.board.left.reset_tick
+        self.resets: list[int] = []  # of the LM629s, that are not judged yet
+        self._begin()
+
+    def _begin(self) -> None:
+        self.waiting: list[Waiting] = []
+        self.wheels = {side: _Wheel() for side in SIDES}
+        self.turned = False  # a wheel was told to turn since the processor began
+        self.words: tuple[int | None, int | None] = (0, 0)
+
+    def _air(self) -> tuple[int, ...]:
+        """What changes when something comes between the transmitter and the robot."""
+        board, radio = self.subject.robot.board, self.subject.radio
+        if radio is None or not board.powered or board.held:
+            return ()
+        listener = radio.listeners[self.subject.slot]
+        return (listener.bit_errors,) if listener.condition == UP else ()
+
+    def restarted(self, tick: int) -> None:
+        self.begun_tick = tick
+        self._begin()
+
+    def event(self, event: Event) -> None:
+        if not self.needed or not event.good_stop:
+            return
+        if all(wheel.told and wheel.driven for wheel in self.wheels.values()):
+            self.words = (None, None)  # alive: what it is asked need not be known
+            self.shown += 1
+            self.judged = int(self.shown >= FRAMES)
+            return
+        self.decoder.gap()
+        for found in self.decoder.feed(event.data, event.tick):
+            words = words_of(found, self.subject) if isinstance(found, Received) else None
+            if isinstance(found, Received) and self.freshness.judge(found.seq, found.last_tick):
+                if words is not None:
+                    end_tick = found.last_tick + HOST_CHARACTER_TICKS
+                    self.waiting.append((end_tick, self.before, words))
+
+    def period(self, record: RobotPeriod, tick: int) -> None:
+        self._look_at_resets(record, tick)
+        if not self.needed:
+            return
+        self.before, self.air = self.air, self._air()
+        due = self._due(tick) if self.waiting else []
+        for axis, wheel, word in zip(
+            (record.left, record.right), self.wheels.values(), self.words, strict=True
+        ):
+            wheel.look(axis, word)
+        for _, air, words in due:
+            if air and air == self.air:
+                self.counted += any(abs(word) >= SLOWEST for word in words)
+                self.judged = max(self.judged, int(self.counted >= self.needed))
+                for wheel, word in zip(self.wheels.values(), words, strict=True):
+                    wheel.ask(word)
+        if due:
+            self._judge(record, tick)
+
+    def _look_at_resets(self, record: RobotPeriod, now: int) -> None:
+        """In the order of time. The board may have gone on: what it has done after `now` is kept for later."""
+        tick = self.subject.robot.board.left.reset_tick
+        if tick != self.reset_tick:
+            self.resets.append(tick)
+            self.reset_tick = tick
+        if self.turned and not self.resets:
+            return
+        due = [one for one in self.resets if one <= now]
+        del self.resets[: len(due)]
+        commands = (*record.left.commands, *record.right.commands)
+        turns = {at for at, opcode, _ in commands if opcode == _STT and at > self.begun_tick}
+        for at in sorted(turns.union(due)):
+            if at in turns:
+                self.turned = True
+            elif self.turned:
+                self.fail(at, "a robot that does not begin again by itself", "the firmware reset the LM629s")
+                self.turned = False
+
+    def _due(self, tick: int) -> list[Waiting]:
+        """The frames that should have had their effect by now; `words` become those of the last one that is over."""
+        self.words = next((words for end, _, words in reversed(self.waiting) if end <= tick), self.words)
+        due = [one for one in self.waiting if one[0] + self.acting_ticks <= tick]
+        del self.waiting[: len(due)]
+        return due
+
+    def _judge(self, record: RobotPeriod, tick: int) -> None:
+        """Fails where a wheel has just been asked so often."""
+        wheels = self.wheels.items()
+        untold = [side for side, wheel in wheels if wheel.untold == self.needed]
+        undriven = [
+            side for side, wheel in wheels if wheel.undriven == self.needed and wheel.untold < self.needed
+        ]
+        wanted = f"a robot that acts on one of {self.needed} frames that reached it"
+        if untold:
+            accepted = (
+                "" if record.accepted is None else f"; the firmware has accepted {record.accepted} frames"
+            )
+            self.fail(tick, wanted, f"no command to turn the {' and the '.join(untold)} wheel{accepted}")
+        if undriven:
+            self.fail(tick, wanted, f"the {' and the '.join(undriven)} wheel at rest, its motor not driven")

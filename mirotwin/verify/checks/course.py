@@ -1,0 +1,134 @@
+"""Checks of where a robot is: near its reference, settled in time, on the pitch.
+
+What belongs here: those three. What does not: what a tracking error is (`recording.track`).
+
+They look once a control period, at its begin, as the summary does. A failure is noted where the robot begins to be
+wrong.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
+
+from miro_exact.clock import TICKS_PER_SECOND, seconds, ticks
+from miro_sim.periods import RobotPeriod
+from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD, ErrorSample, error_of
+from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject
+
+LONGEST_S = 86_400.0
+LimitCm = Annotated[float, Meta(gt=0.0, le=1000.0)]
+
+
+class TracksWithin(Check, frozen=True, kw_only=True, tag="tracks_within_cm"):
+    """The robot is never further than so from its reference, from `from_s` on; default: in the run's last second."""
+
+    KIND: ClassVar[Kind] = "safety"
+    MAIN: ClassVar[str] = "limit_cm"
+
+    limit_cm: LimitCm
+    from_s: Annotated[float, Meta(ge=0.0, le=LONGEST_S)] | None = None
+
+    def objection(self, end_tick: int) -> str:
+        if self.from_s is not None and ticks(self.from_s) >= end_tick:
+            return f"from_s: {self.from_s:g} s is not before the end of the run, {seconds(end_tick):g} s"
+        return ""
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return TracksJudge(self, subject)
+
+
+class SettlesWithin(Check, frozen=True, kw_only=True, tag="settles_within_s"):
+    """From so long after the begin of the run on the robot stays within `position_cm` and `heading_rad` of its
+    reference.
+    """
+
+    KIND: ClassVar[Kind] = "liveness"
+    MAIN: ClassVar[str] = "within_s"
+
+    within_s: Annotated[float, Meta(ge=0.0, le=LONGEST_S)]
+    position_cm: LimitCm = SETTLED_CM
+    heading_rad: Annotated[float, Meta(gt=0.0, le=3.141592653589793)] = SETTLED_RAD
+
+    def objection(self, end_tick: int) -> str:
+        if ticks(self.within_s) >= end_tick:
+            return f"{self.within_s:g} s is not before the end of the run, {seconds(end_tick):g} s"
+        return ""
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return SettlesJudge(self, subject)
+
+
+class InsidePitch(Check, frozen=True, kw_only=True, tag="inside_pitch"):
+    """All corners of the robot's square stay on the pitch."""
+
+    KIND: ClassVar[Kind] = "safety"
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return PitchJudge(self, subject)
+
+
+class _CourseJudge(Judge[Check]):
+    """Notes when the robot begins to be wrong. `first_tick`: from then on it is judged."""
+
+    def __init__(self, check: Check, subject: Subject, first_tick: int) -> None:
+        super().__init__(check, subject)
+        self.first_tick = first_tick
+        self.wrong = False
+
+    def period(self, record: RobotPeriod, tick: int) -> None:
+        if tick < self.first_tick:
+            return
+        self.judged += 1
+        before, found = self.wrong, self.found(error_of(record, tick))
+        self.wrong = bool(found)
+        if found and not before:
+            self.fail(tick, self.wanted(), found)
+
+    def wanted(self) -> str:
+        raise NotImplementedError
+
+    def found(self, error: ErrorSample) -> str:
+        """What is wrong with where the robot is, or the empty string."""
+        raise NotImplementedError
+
+
+class TracksJudge(_CourseJudge):
+    def __init__(self, check: TracksWithin, subject: Subject) -> None:
+        last_second = max(0, subject.end_tick - TICKS_PER_SECOND)
+        super().__init__(check, subject, last_second if check.from_s is None else ticks(check.from_s))
+        self.limit_cm = check.limit_cm
+
+    def wanted(self) -> str:
+        return f"at most {self.limit_cm:g} cm from the reference"
+
+    def found(self, error: ErrorSample) -> str:
+        return f"{error.position_cm:.3f} cm" if error.position_cm > self.limit_cm else ""
+
+
+class SettlesJudge(_CourseJudge):
+    def __init__(self, check: SettlesWithin, subject: Subject) -> None:
+        super().__init__(check, subject, ticks(check.within_s))
+        self.limits = check
+
+    def wanted(self) -> str:
+        position_cm, heading_rad = self.limits.position_cm, self.limits.heading_rad
+        return f"within {position_cm:g} cm and {heading_rad:g} rad of the reference after {self.limits.within_s:g} s"
+
+    def found(self, error: ErrorSample) -> str:
+        position_cm, heading_rad = error.position_cm, abs(error.theta_rad)
+        if position_cm <= self.limits.position_cm and heading_rad <= self.limits.heading_rad:
+            return ""
+        return f"{position_cm:.3f} cm and {heading_rad:.4f} rad"
+
+
+class PitchJudge(_CourseJudge):
+    def __init__(self, check: InsidePitch, subject: Subject) -> None:
+        super().__init__(check, subject, 0)
+
+    def wanted(self) -> str:
+        return "all corners on the pitch"
+
+    def found(self, error: ErrorSample) -> str:
+        return "a corner beyond its edge" if error.off_pitch else ""

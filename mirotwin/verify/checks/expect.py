@@ -1,0 +1,129 @@
+"""What a scenario expects: its `[expect]` tables as checks, for each robot.
+
+What belongs here: from a key and its value to a check, and what is wrong with either. What does not: the scenario's
+other keys (`miro_sim.scenario` passes these tables on as they are), and judging (`watching`).
+
+    [expect]                                 for all robots
+    inside_pitch = true                      a check with its defaults
+    tracks_within_cm = 3.0                   .. with its main parameter
+    settles_within_s = { within_s = 2.0, position_cm = 2.0 }       .. with any of them
+
+    [network.robot.expect]                   for one robot: instead of the key of the same name above
+    inside_pitch = false                     not for this one
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, cast
+
+import msgspec
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
+from miro_host.parts import PartError
+from miro_host.raised import raised
+from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
+from miro_sim.scenario.keys import Scenario
+from mirotwin.verify.checks.interface import Check
+from mirotwin.verify.checks.judges import problem_of_class
+from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS
+
+Place = tuple[int, int]
+"""Network and slot of a robot."""
+
+
+def struct_of(name: str) -> type[Check]:
+    """The parameters of the check `name`. Raises PartError."""
+    return cast(type[Check], CHECKS.find(name))
+
+
+def expectations_of(scenario: Scenario, origin: str) -> dict[Place, list[Check]]:
+    """The checks of each robot, those that are always on first. Raises ScenarioError with the path of what is wrong."""
+    end_tick = max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
+    for_all = checks_of_table(scenario, origin, "expect", scenario.expect, end_tick)
+    found: dict[Place, list[Check]] = {}
+    for index, network in enumerate(scenario.networks):
+        for at, robot in enumerate(network.robot):
+            path = f"network[{index}].robot[{at}].expect"
+            own = checks_of_table(scenario, origin, path, robot.expect, end_tick)
+            wanted = {**{name: struct_of(name)() for name in ALWAYS_ON}, **for_all, **own}
+            found[index, robot.slot] = [check for check in wanted.values() if check is not None]
+    return found
+
+
+def says_anything(scenario: Scenario) -> bool:
+    """Whether a scenario expects more than what every run has to fulfil."""
+    return bool(scenario.expect or any(robot.expect for one in scenario.networks for robot in one.robot))
+
+
+def checks_of_table(
+    scenario: Scenario, origin: str, path: str, table: Mapping[str, Any], end_tick: int
+) -> dict[str, Check | None]:
+    """The checks of one table at `path`; None for one that is not expected. Raises ScenarioError."""
+    found: dict[str, Check | None] = {}
+    for name, value in table.items():
+        place = f"{path}.{name}"
+        try:
+            struct = struct_of(name)
+        except PartError as error:
+            raise _no_check(origin, place, name, error) from error.__cause__
+        if problem := problem_of_class(struct):
+            raise ScenarioError(origin, place, problem, "repair the check")
+        found[name] = check = _check(scenario, origin, place, struct, name, value)
+        objection = "" if check is None else _objection(check, origin, place, end_tick)
+        if objection:
+            raise ScenarioError(origin, place, objection, "give an earlier time, or a longer duration_s")
+    return found
+
+
+def _objection(check: Check, origin: str, place: str, end_tick: int) -> str:
+    try:
+        return check.objection(end_tick)
+    except (Exception, SystemExit) as error:
+        raise ScenarioError(
+            origin, place, f"`objection` raised {raised(error)}", "repair the check"
+        ) from error
+
+
+def _no_check(origin: str, place: str, name: str, error: PartError) -> ScenarioError:
+    if "is not one of the choices" in error.what:
+        return ScenarioError(origin, place, "there is no such check", remedy_for_key(name, CHECKS.names()))
+    return ScenarioError(origin, place, error.what, error.remedy)
+
+
+def _check(
+    scenario: Scenario, origin: str, place: str, struct: type[Check], name: str, value: Any
+) -> Check | None:
+    if value is False:
+        if name in ALWAYS_ON:
+            raise ScenarioError(origin, place, "this check is always on", "remove the key")
+        return None
+    bare = not isinstance(value, dict) and value is not True
+    if bare and not struct.MAIN:
+        raise ScenarioError(origin, place, f"expected true or false, got {value!r}", f"write {name} = true")
+    given = {} if value is True else {struct.MAIN: value} if bare else value
+    unknown = [key for key in given if key not in struct.__struct_encode_fields__]
+    if unknown:
+        remedy = remedy_for_key(unknown[0], list(struct.__struct_encode_fields__))
+        raise ScenarioError(origin, f"{place}.{unknown[0]}", "unknown key", remedy)
+    try:
+        return msgspec.convert({**given, "check": name}, struct)
+    except msgspec.ValidationError as error:
+        raise _wrong(scenario, origin, place, struct, value, str(error)) from None
+    except (Exception, SystemExit) as error:  # from the check's own look at its parameters
+        raise ScenarioError(origin, place, f"cannot check its parameters: {raised(error)}") from error
+
+
+def _wrong(
+    scenario: Scenario, origin: str, place: str, struct: type[Check], value: Any, message: str
+) -> ScenarioError:
+    """What msgspec found, at the path of the scenario."""
+    what, _, inner = message.partition(" - at `$")
+    inner = inner.rstrip("`")
+    if what.startswith("Object missing required field"):
+        key = what.split("`")[1]
+        example = f"{place.rpartition('.')[2]} = .." if key == struct.MAIN else f"{key} = .."
+        return ScenarioError(origin, place, f"{key} is missing", f"give it: {example}")
+    below = inner if isinstance(value, dict) else ""
+    raw = msgspec.to_builtins(scenario)
+    return value_error(origin, raw, f"{what} - at `$.{place}{below}`")

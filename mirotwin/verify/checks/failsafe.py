@@ -1,0 +1,166 @@
+"""Checks of the failsafe: without a fresh frame the wheels are told to stop in time, and the motors go off in time.
+
+What belongs here: the two times. What does not: which frame is fresh (`hearing`) and what a command tells a wheel
+(`orders`).
+
+Times count from the end of the last fresh frame's last character, when a robot can know of it (protocol/README.md,
+"Freshness and failsafe"). Too early is as wrong as too late. An order within `ACTING_MS` of a fresh frame is what that
+frame says and no failsafe. A robot that receives characters when the time comes may be testing a frame, which may be
+the fresh one: it has `TESTING_MS` more.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
+
+from miro_exact.clock import HOST_CHARACTER_TICKS
+from miro_sim.world.events import Event
+from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject, in_ms, ms_ticks
+from mirotwin.verify.checks.orders import Order, Orders
+
+ACTING_MS = 10.0
+"""Firmware has dealt with a frame so long after its last character; a fair third of a camera frame."""
+
+TESTING_MS = 2.0
+"""How long the test of a frame may put the failsafe off; the shipped firmware takes up to 1.5 ms for five robots."""
+
+TimeMs = Annotated[float, Meta(gt=ACTING_MS, le=60_000.0)]
+ToleranceMs = Annotated[float, Meta(ge=0.0, le=1000.0)]
+
+
+class SilenceCheck(Check, frozen=True, kw_only=True):
+    """So long after the last fresh frame, within +- `tolerance_ms` (half a millisecond is 1.5 LM629 samples)."""
+
+    KIND: ClassVar[Kind] = "liveness"
+    MAIN: ClassVar[str] = "after_ms"
+    WANTED: ClassVar[str] = ""
+
+    after_ms: TimeMs = 110.0
+    tolerance_ms: ToleranceMs = 0.5
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return SilenceJudge(self, subject)
+
+    def fulfilled(self, order: Order) -> bool:
+        """Whether a wheel under this order is as it has to be after that time."""
+        raise NotImplementedError
+
+
+class FailsafeStop(SilenceCheck, frozen=True, kw_only=True, tag="failsafe_stop_ms"):
+    """Without a fresh frame both wheels are told to stop."""
+
+    WANTED = "both wheels told to stop"
+
+    def fulfilled(self, order: Order) -> bool:
+        return not order.moves
+
+
+class MotorsOff(SilenceCheck, frozen=True, kw_only=True, tag="motors_off_ms"):
+    """Without a fresh frame both motors go off."""
+
+    WANTED = "both motors off"
+
+    after_ms: TimeMs = 500.0
+
+    def fulfilled(self, order: Order) -> bool:
+        return order.what == "off"
+
+
+class SilenceJudge(Judge[SilenceCheck]):
+    """`fresh_tick`: end of the last fresh frame, None before the first and once its silence has been judged.
+    `in_time`: a wheel was told in time. A wheel that needed no order, because it stood, is no occasion to judge.
+    `late`: (end of the last fresh frame, tick of the failure) of wheels that have not been told yet.
+    """
+
+    HEARS = ("received", "frame", "command")
+
+    def __init__(self, check: SilenceCheck, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.orders = Orders()
+        self.fresh_tick: int | None = None
+        self.in_time = False
+        self.acting_ticks = ms_ticks(ACTING_MS)
+        self.earliest_ticks = ms_ticks(max(check.after_ms - check.tolerance_ms, 0.0))
+        self.after_ticks = ms_ticks(check.after_ms)
+        self.latest_ticks = ms_ticks(check.after_ms + check.tolerance_ms)
+        self.testing_ticks = ms_ticks(TESTING_MS)
+        self.heard_tick: int | None = None
+        self.late: tuple[int, int] | None = None
+        self.wanted = (
+            f"{check.WANTED} {check.after_ms:g} +- {check.tolerance_ms:g} ms after the last fresh frame"
+        )
+
+    def event(self, event: Event) -> None:
+        self.until(event.tick)
+        if event.what == "received":
+            if self.fresh_tick is None or event.tick <= self.fresh_tick + self.latest_ticks:
+                self.heard_tick = event.tick  # what comes when the time is over puts nothing off
+        elif event.what == "frame":
+            if event.value and event.frame is not None:
+                self._fail_late(event.tick)
+                self.fresh_tick = event.frame.last_tick + HOST_CHARACTER_TICKS
+                self.in_time = False
+        else:
+            self._command(event)
+
+    def _command(self, event: Event) -> None:
+        unfulfilled = self._unfulfilled()
+        order = self.orders.take(event)
+        if not self._unfulfilled():
+            self._fail_late(event.tick)
+        if order is None or self.fresh_tick is None or not self.check.fulfilled(order):
+            return
+        silence = event.tick - self.fresh_tick
+        if order.side not in unfulfilled or silence <= self.acting_ticks:
+            return
+        if silence >= self.earliest_ticks:
+            self.in_time = True
+            return
+        self.judged += 1
+        self.fail(event.tick, self.wanted, f"the {order.side} one after {in_ms(silence)}")
+        self.fresh_tick = None
+
+    def restarted(self, tick: int) -> None:
+        self.until(tick)
+        self._fail_late(tick)
+        self.fresh_tick = None
+        self.orders = Orders()
+
+    def end(self, tick: int) -> None:
+        self._fail_late(tick)
+
+    def until(self, tick: int) -> None:
+        if self.fresh_tick is None or tick <= self.fresh_tick + self.latest_ticks:
+            return
+        latest_tick = self.fresh_tick + self.latest_ticks
+        testing_tick = self.fresh_tick + self.after_ticks - self.testing_ticks
+        if self.heard_tick is not None and testing_tick <= self.heard_tick <= latest_tick:
+            latest_tick += self.testing_ticks
+        if tick <= latest_tick:
+            return
+        unfulfilled = self._unfulfilled()
+        self.judged += bool(unfulfilled or self.in_time)
+        if unfulfilled:
+            self.late = (self.fresh_tick, latest_tick)
+        self.fresh_tick = None
+
+    def _fail_late(self, tick: int) -> None:
+        """Notes the failure of wheels that are late, when it is known how late: at `tick` they are told, or it is given
+        up to wait.
+        """
+        if self.late is not None:
+            (fresh_tick, latest_tick), self.late = self.late, None
+            found = [self._when(order, fresh_tick, tick) for order in self.orders.last.values()]
+            self.fail(latest_tick, self.wanted, ", ".join(found))
+
+    def _when(self, order: Order, fresh_tick: int, tick: int) -> str:
+        if not self.check.fulfilled(order):
+            return f"{order.side} not within {in_ms(tick - fresh_tick)}"
+        if order.tick <= fresh_tick:
+            return f"{order.side} before that frame"
+        return f"{order.side} at {in_ms(order.tick - fresh_tick)}"
+
+    def _unfulfilled(self) -> list[str]:
+        return [side for side, order in self.orders.last.items() if not self.check.fulfilled(order)]

@@ -1,0 +1,85 @@
+"""What firmware must not do, by kinds of firmware fault: four checks that are always on.
+
+What belongs here: which faults fail which check, and the LM629's own complaint. What does not: finding faults. CPU and
+board do that while they run (`miro_robot.faults`), so these checks cost next to nothing.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
+from miro_robot.lm629.signals import COMMAND_ERROR
+from miro_sim.periods import RobotPeriod
+from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject
+
+
+class FaultCheck(Check, frozen=True, kw_only=True):
+    """Fails for firmware faults of `KINDS`."""
+
+    KIND: ClassVar[Kind] = "safety"
+    KINDS: ClassVar[tuple[FaultKind, ...]] = ()
+    WANTED: ClassVar[str] = ""
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return FaultJudge(self, subject)
+
+
+class NoFault(FaultCheck, frozen=True, kw_only=True, tag="no_fault"):
+    """The firmware never does what it must not: no firmware fault of any kind."""
+
+    KINDS = tuple(FaultKind)
+    WANTED = "no firmware fault"
+
+
+class Lm629Protocol(FaultCheck, frozen=True, kw_only=True, tag="lm629_protocol"):
+    """The LM629s are used as their data sheet says: timing, never written while busy, one at a time on the bus, and no
+    command that they refuse (bit 1 of the status byte, as it is at the begin of a control period).
+    """
+
+    KINDS = (FaultKind.BUS_CONTENTION, FaultKind.LM629_BUSY, FaultKind.LM629_TIMING)
+    WANTED = "the LM629s used as their data sheet says"
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return Lm629Judge(self, subject)
+
+
+class MainLoopAlive(FaultCheck, frozen=True, kw_only=True, tag="main_loop_alive"):
+    """Interrupts never take all of 10 ms from the main loop."""
+
+    KINDS = (FaultKind.MAIN_LOOP_STARVED,)
+    WANTED = "a main loop that runs every 10 ms"
+
+
+class StackClear(FaultCheck, frozen=True, kw_only=True, tag="stack_clear"):
+    """The stack pointer never leaves the stack: what the linker's map gives it, all of internal RAM without a map."""
+
+    KINDS = STACK_FAULTS
+    WANTED = "a stack clear of data"
+
+
+class FaultJudge(Judge[FaultCheck]):
+    def __init__(self, check: FaultCheck, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.judged = 1
+
+    def fault(self, fault: FirmwareFault) -> None:
+        if fault.kind in self.check.KINDS:
+            self.fail(fault.tick, self.check.WANTED, str(fault), fault=True)
+
+
+class Lm629Judge(FaultJudge):
+    """`refused`: which chips' status bytes said "command error" the last time."""
+
+    def __init__(self, check: FaultCheck, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.refused = (False, False)
+
+    def period(self, record: RobotPeriod, tick: int) -> None:
+        refused = (bool(record.left.status & COMMAND_ERROR), bool(record.right.status & COMMAND_ERROR))
+        if refused == self.refused:
+            return
+        for side, now, before in zip(("left", "right"), refused, self.refused, strict=True):
+            if now and not before:
+                self.fail(tick, self.check.WANTED, f"a command error in the status of the {side} LM629")
+        self.refused = refused

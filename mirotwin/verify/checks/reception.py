@@ -1,0 +1,268 @@
+"""Checks of what a robot makes of the frames that it hears.
+
+What belongs here: that it moves by fresh frames only, by frames that its host sent, and by each of them in time. What
+does not: which frame is fresh (`hearing`), answers (`answers`) and silence (`failsafe`).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
+
+from miro_exact.clock import HOST_CHARACTER_TICKS
+from miro_protocol.decoder import Decoder, Received
+from miro_protocol.frames import ContentError, TeamFrame
+from miro_protocol.table import VELOCITY_SATURATION
+from miro_sim.periods import RobotPeriod
+from miro_sim.world.events import Event
+from mirotwin.verify.checks.failsafe import ACTING_MS
+from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject, in_ms, ms_ticks
+from mirotwin.verify.checks.orders import Orders
+
+WithinMs = Annotated[float, Meta(gt=0.0, le=60_000.0)]
+Words = tuple[int, int]
+
+
+class MovesOnlyWhenFresh(Check, frozen=True, kw_only=True, tag="moves_only_when_fresh"):
+    """A wheel is told to turn only within `within_ms` of the last character of a fresh frame."""
+
+    KIND: ClassVar[Kind] = "safety"
+
+    within_ms: WithinMs = ACTING_MS
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return MovesJudge(self, subject)
+
+
+class MovesJudge(Judge[MovesOnlyWhenFresh]):
+    HEARS = ("frame", "command")
+
+    def __init__(self, check: MovesOnlyWhenFresh, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.orders = Orders()
+        self.fresh_tick: int | None = None
+        self.within_ticks = ms_ticks(check.within_ms)
+
+    def restarted(self, tick: int) -> None:
+        self.fresh_tick = None
+        self.orders = Orders()
+
+    def event(self, event: Event) -> None:
+        if event.what == "frame":
+            if event.value and event.frame is not None:
+                self.fresh_tick = event.frame.last_tick
+            return
+        order = self.orders.take(event)
+        if order is None or not order.moves:
+            return
+        self.judged += 1
+        wanted = f"wheels told to turn only within {self.check.within_ms:g} ms of a fresh frame"
+        if self.fresh_tick is None:
+            self.fail(event.tick, wanted, f"the {order.side} one, before any fresh frame")
+        elif event.tick - self.fresh_tick > self.within_ticks:
+            self.fail(event.tick, wanted, f"the {order.side} one after {in_ms(event.tick - self.fresh_tick)}")
+
+
+class AcceptsOnlySent(Check, frozen=True, kw_only=True, tag="accepts_only_sent"):
+    """Both wheels get the velocities of one team frame that this network's host began to send in the last `within_ms`,
+    cut off at +-16633. Velocity 0 is always allowed: it is a way to stop.
+    """
+
+    KIND: ClassVar[Kind] = "safety"
+
+    within_ms: WithinMs = 1000.0
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return SentJudge(self, subject)
+
+
+class SentJudge(Judge[AcceptsOnlySent]):
+    """`sent`: (tick, velocities of this robot) of team frames. `ordered_tick`: of orders that are not judged yet,
+    because one to the other wheel may come on the same tick.
+    """
+
+    HEARS = ("sent", "command")
+
+    def __init__(self, check: AcceptsOnlySent, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.orders = Orders()
+        self.decoder = Decoder(subject.robots)
+        self.sent: deque[tuple[int, Words]] = deque()
+        self.within_ticks = ms_ticks(check.within_ms)
+        self.ordered_tick: int | None = None
+
+    def event(self, event: Event) -> None:
+        self.until(event.tick)
+        if event.what == "sent":
+            self._note_sent(event)
+            return
+        order = self.orders.take(event)
+        if order is not None and order.moves:
+            self.ordered_tick = event.tick
+
+    def restarted(self, tick: int) -> None:
+        self.until(tick)
+        self.orders = Orders()
+
+    def _note_sent(self, event: Event) -> None:
+        symbols = [
+            (value, True, event.tick + at * HOST_CHARACTER_TICKS) for at, value in enumerate(event.data)
+        ]
+        for found in self.decoder.feed_symbols(symbols):
+            words = words_of(found, self.subject) if isinstance(found, Received) else None
+            if words is not None:
+                self.sent.append((found.start_tick, words))
+
+    def until(self, tick: int) -> None:
+        if self.ordered_tick is None or tick <= self.ordered_tick:
+            return
+        at, self.ordered_tick = self.ordered_tick, None
+        while self.sent and self.sent[0][0] < at - self.within_ticks:
+            self.sent.popleft()
+        self.judged += 1
+        left, right = self.orders.last["left"], self.orders.last["right"]
+        told = tuple(order.word if order.what == "drive" else 0 for order in (left, right))
+        if not any(words == told for sent_tick, words in self.sent if sent_tick <= at):
+            wanted = f"velocities that the host sent in the last {self.check.within_ms:g} ms"
+            self.fail(at, wanted, f"{told[0]}, {told[1]} (left, right)")
+
+    def end(self, tick: int) -> None:
+        self.until(tick + 1)
+
+
+class ActsCheck(Check, frozen=True, kw_only=True):
+    """A robot acts on frames within `within_ms` of the start bit of the last character."""
+
+    KIND: ClassVar[Kind] = "liveness"
+    MAIN: ClassVar[str] = "within_ms"
+    AFTER_DAMAGE: ClassVar[bool] = False
+
+    within_ms: WithinMs = ACTING_MS
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return ActsJudge(self, subject)
+
+
+class ActsWithin(ActsCheck, frozen=True, kw_only=True, tag="acts_within_ms"):
+    """On each fresh team frame both wheels are told its velocities in time, unless that is 0 and they stop already."""
+
+
+class BackInSync(ActsCheck, frozen=True, kw_only=True, tag="back_in_sync_within_ms"):
+    """The same, for the first valid frame after characters that are no frame."""
+
+    AFTER_DAMAGE = True
+
+
+class ActsJudge(Judge[ActsCheck]):
+    """`waiting`: (deadline, velocities) of frames that no order has followed yet."""
+
+    HEARS = ("frame", "damaged", "command")
+
+    def __init__(self, check: ActsCheck, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.orders = Orders()
+        self.damaged = False
+        self.waiting: deque[tuple[int, Words]] = deque()
+        self.within_ticks = ms_ticks(check.within_ms)
+
+    def event(self, event: Event) -> None:
+        self.until(event.tick)
+        if event.what == "damaged":
+            self.damaged = True
+        elif event.what == "frame":
+            self._frame(event)
+        elif self.orders.take(event) is not None:
+            left, right = self.orders.last["left"], self.orders.last["right"]
+            told = tuple(order.word if order.what == "drive" else 0 for order in (left, right))
+            while any(words == told for _, words in self.waiting):
+                self.waiting.popleft()
+
+    def restarted(self, tick: int) -> None:
+        self.until(tick)
+        self.waiting.clear()
+        self.damaged = False
+        self.orders = Orders()
+
+    def _frame(self, event: Event) -> None:
+        damaged, self.damaged = self.damaged, False
+        frame = event.frame
+        if frame is None or not event.value or (self.check.AFTER_DAMAGE and not damaged):
+            return
+        words = words_of(frame, self.subject)
+        if words is not None:
+            self.judged += 1
+            if words != (0, 0) or not self._stopping():
+                self.waiting.append((frame.last_tick + self.within_ticks, words))
+
+    def _stopping(self) -> bool:
+        """Whether both wheels are told to stop, with their loops closed: velocity 0 says nothing new to them."""
+        return all(order.what != "off" and not order.moves for order in self.orders.last.values())
+
+    def until(self, tick: int) -> None:
+        while self.waiting and tick > self.waiting[0][0]:
+            deadline, words = self.waiting.popleft()
+            after = " after damage" if self.check.AFTER_DAMAGE else ""
+            wanted = (
+                f"wheels told {words[0]}, {words[1]} within {self.check.within_ms:g} ms of a frame{after}"
+            )
+            left, right = self.orders.last["left"], self.orders.last["right"]
+            self.fail(deadline, wanted, f"{left.what} {left.word}, {right.what} {right.word}")
+
+
+class FramesAccepted(Check, frozen=True, kw_only=True, tag="frames_accepted_min"):
+    """The firmware counts at least so many fresh frames by the end of the run; needs its counter."""
+
+    KIND: ClassVar[Kind] = "liveness"
+    MAIN: ClassVar[str] = "frames"
+
+    frames: Annotated[int, Meta(ge=1, le=1 << 40)]
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return AcceptedJudge(self, subject)
+
+
+class AcceptedJudge(Judge[FramesAccepted]):
+    """`counter`: the firmware's, which wraps at 2^16, `frames` does not."""
+
+    def __init__(self, check: FramesAccepted, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.counter = 0
+        self.frames = 0
+
+    def period(self, record: RobotPeriod, tick: int) -> None:
+        self._count(record.accepted)
+
+    def end(self, tick: int) -> None:
+        accepted = self.subject.robot.counter(0)
+        if accepted is None:  # an image without the counter: nothing can be judged
+            return
+        self._count(accepted)
+        self.judged += 1
+        if self.frames < self.check.frames:
+            self.fail(tick, f"at least {self.check.frames} frames accepted", f"{self.frames}")
+
+    def restarted(self, tick: int) -> None:
+        self.counter = 0
+
+    def _count(self, counter: int | None) -> None:
+        if counter is not None:
+            self.frames += (counter - self.counter) & 0xFFFF
+            self.counter = counter
+
+
+def words_of(frame: Received, subject: Subject) -> Words | None:
+    """The velocities that a team frame has for this robot, cut off as firmware does; None for other frames."""
+    try:
+        message = frame.message(subject.robots)
+    except ContentError:  # contents to come: valid, but no robot acts on it
+        return None
+    if not isinstance(message, TeamFrame) or subject.slot >= len(message.velocities):
+        return None
+    left, right = message.velocities[subject.slot]
+    return saturated(left), saturated(right)
+
+
+def saturated(word: int) -> int:
+    return max(-VELOCITY_SATURATION, min(VELOCITY_SATURATION, word))

@@ -1,0 +1,39 @@
+"""The names of the checks.
+
+What belongs here: the table of our own checks, and which are always on. What does not: the interface (`interface`) and
+the checks. No check is imported before it is named.
+"""
+
+from miro_host.parts import Registry
+
+ALWAYS_ON = ("no_fault", "lm629_protocol", "main_loop_alive", "stack_clear", "acts_at_all")
+
+CHECKS: Registry[object] = Registry(
+    "mirotwin.checks",
+    word="check",
+    key="check",
+    base="mirotwin.verify.checks.interface:Check",
+    own={
+        "no_fault": "mirotwin.verify.checks.faults:NoFault",
+        "lm629_protocol": "mirotwin.verify.checks.faults:Lm629Protocol",
+        "main_loop_alive": "mirotwin.verify.checks.faults:MainLoopAlive",
+        "stack_clear": "mirotwin.verify.checks.faults:StackClear",
+        "acts_at_all": "mirotwin.verify.checks.alive:ActsAtAll",
+        "failsafe_stop_ms": "mirotwin.verify.checks.failsafe:FailsafeStop",
+        "motors_off_ms": "mirotwin.verify.checks.failsafe:MotorsOff",
+        "moves_only_when_fresh": "mirotwin.verify.checks.reception:MovesOnlyWhenFresh",
+        "accepts_only_sent": "mirotwin.verify.checks.reception:AcceptsOnlySent",
+        "acts_within_ms": "mirotwin.verify.checks.reception:ActsWithin",
+        "back_in_sync_within_ms": "mirotwin.verify.checks.reception:BackInSync",
+        "frames_accepted_min": "mirotwin.verify.checks.reception:FramesAccepted",
+        "answers_within_ms": "mirotwin.verify.checks.answers:AnswersWithin",
+        "answers_only_in_turn": "mirotwin.verify.checks.answers:AnswersOnlyInTurn",
+        "happens": "mirotwin.verify.checks.happens:Happens",
+        "never_happens": "mirotwin.verify.checks.happens:NeverHappens",
+        "wheels_within_m_s": "mirotwin.verify.checks.wheels:WheelsWithin",
+        "tracks_within_cm": "mirotwin.verify.checks.course:TracksWithin",
+        "settles_within_s": "mirotwin.verify.checks.course:SettlesWithin",
+        "inside_pitch": "mirotwin.verify.checks.course:InsidePitch",
+        "conforms_to": "mirotwin.verify.conform.judgement:ConformsTo",
+    },
+)

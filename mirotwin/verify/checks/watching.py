@@ -1,0 +1,256 @@
+"""Feeds the checks of a run while it is under way, and says what came of them.
+
+What belongs here: reading the logs of a world once a control period, and the order in which judges are told. What does
+not: judging (the checks) and what a scenario expects (`expect`).
+
+    checks = Checks(world)
+    while not world.finished:
+        world.step()
+    checks.finish()
+    checks.check()  # raises ExpectationFailed; or look at `failures`, `verdicts()`
+
+The world tells its observers at the end of each control period. Parts of a board run ahead of each other, so only
+events before the tick at which the world stands are told, in the order of ticks; the others wait for the next look. A
+wait (`World.run_until`) may note an event twice and take it back; at the end of a period each stands in the log once.
+Nothing here changes a bit of the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from operator import attrgetter
+from typing import Any, TypeVar
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_host.parts import PartError
+from miro_host.raised import raised
+from miro_sim.periods import Period
+from miro_sim.world.events import Event, of_board
+from miro_sim.world.network import Network
+from miro_sim.world.robot import Robot
+from miro_sim.world.world import World
+from mirotwin.report.summary import Expectation, FirstFailure
+from mirotwin.verify.checks.expect import Place, expectations_of
+from mirotwin.verify.checks.hearing import Hearing
+from mirotwin.verify.checks.interface import Check, Failure, Judge, Subject
+from mirotwin.verify.checks.judges import checked_judge
+
+T = TypeVar("T")
+Expected = Mapping[Place, Sequence[Check]]
+_FROM_RECEIVED = ("frame", "damaged")
+_RESTARTS = ("reset", "power")
+_FROM_PC = ("sent", "heard", "answer", "touch", "radio", *_RESTARTS)
+_BY_TICK = attrgetter("tick")
+
+
+class ExpectationFailed(AssertionError):
+    """Checks failed: one line for each failure."""
+
+    def __init__(self, failures: Sequence[Failure]) -> None:
+        super().__init__("\n".join(map(str, failures)))
+        self.failures = list(failures)
+
+
+class Checks:
+    """The checks of a world from now on: what its scenario expects of each robot, and those that are always on.
+
+    `expected` replaces that, by network and slot. Begin with the run: a check does not know what wheels were told
+    before. RuntimeError is raised if the world is loaded meanwhile, because what a check remembers is not saved.
+    """
+
+    def __init__(self, world: World, expected: Expected | None = None) -> None:
+        self.world = world
+        if expected is None:
+            expected = expectations_of(world.scenario, world.scenario.name)
+        end_tick = world.periods * CONTROL_PERIOD_TICKS
+        self.robots = [
+            _Watched(
+                world,
+                network,
+                robot,
+                expected.get((network.index, robot.slot), ()),
+                end_tick,
+            )
+            for network in world.networks
+            for robot in network.robots
+        ]
+        self.finished = False
+        self.index = world.index
+        world.observers.append(self._look)
+
+    def _look(self, period: Period) -> None:
+        if period.index != self.index:
+            raise RuntimeError(
+                f"control period {period.index} follows {self.index - 1}: the world was loaded; begin new checks then"
+            )
+        self.index += 1
+        for watched, record in zip(self.robots, period.robots, strict=True):
+            watched.look(record, period.tick, self.world.tick)
+
+    def finish(self) -> None:
+        """The run is over, by itself or because it was broken off."""
+        if not self.finished:
+            self.finished = True
+            self.world.observers.remove(self._look)
+            for watched in self.robots:
+                watched.end(self.world.tick)
+
+    @property
+    def judges(self) -> list[Judge[Any]]:
+        return [judge for watched in self.robots for judge in watched.judges]
+
+    @property
+    def failures(self) -> list[Failure]:
+        """All that were kept, in the order of time."""
+        return sorted((one for judge in self.judges for one in judge.failures), key=_BY_TICK)
+
+    def check(self) -> None:
+        """Raises ExpectationFailed if a check has failed."""
+        if self.failures:
+            raise ExpectationFailed(self.failures)
+
+    def verdicts(self) -> tuple[Expectation, ...]:
+        """One for each name, over all robots, in the order of names as they were expected."""
+        by_name: dict[str, list[Judge[Any]]] = {}
+        for judge in self.judges:
+            by_name.setdefault(judge.check.name, []).append(judge)
+        lost = any(watched.lost for watched in self.robots)
+        return tuple(_verdict(name, judges, lost) for name, judges in by_name.items())
+
+
+class _Watched:
+    """One robot and its judges. `lost`: events that the log no longer held when they were asked for.
+
+    A judge may be a user's own: whatever it raises becomes a PartError with its name.
+    """
+
+    def __init__(
+        self, world: World, network: Network, robot: Robot, checks: Sequence[Check], end_tick: int
+    ) -> None:
+        subject = Subject(robot, network.spec.robots, end_tick, network.robots[0].slot, network.downlink)
+        self.network = network
+        self.robot = robot
+        self.judges = [self._guarded(check, partial(checked_judge, check, subject)) for check in checks]
+        self.of_periods = [judge for judge in self.judges if type(judge).period is not Judge.period]
+        self.of_times = [judge for judge in self.judges if type(judge).until is not Judge.until]
+        self.of_events: dict[str, list[Judge[Any]]] = {}
+        for judge in self.judges:
+            for what in judge.HEARS:
+                self.of_events.setdefault(what, []).append(judge)
+        self.hearing: Hearing | None = None
+        if any(what in self.of_events for what in _FROM_RECEIVED):
+            self.hearing = Hearing(network.index, robot.slot, network.spec.robots)
+        self.hears_board = any(what not in _FROM_PC for what in self.of_events)
+        self.hears_pc = bool(self.of_events)
+        self.hears_characters = "heard" in self.of_events
+        self.read_board = robot.board.log.end
+        self.read_pc = network.log.end
+        self.faults = len(robot.board.faults)
+        self.waiting: list[Event] = []
+        self.lost = 0
+
+    def look(self, record: Any, begun_tick: int, tick: int) -> None:
+        """Tells the judges of the control period that began at `begun_tick` and of events before `tick`."""
+        self._tell_faults()
+        for judge in self.of_periods:
+            self._guarded(judge.check, partial(judge.period, record, begun_tick))
+        self._tell_events(tick)
+
+    def _tell_faults(self) -> None:
+        board = self.robot.board
+        if len(board.faults) > self.faults:
+            for fault in board.faults[self.faults :]:
+                for judge in self.judges:
+                    self._guarded(judge.check, partial(judge.fault, fault))
+            self.faults = len(board.faults)
+
+    def _tell_events(self, tick: int) -> None:
+        if self.of_events:
+            self._gather()
+            self._tell(tick)
+
+    def _gather(self) -> None:
+        """What is new in the logs."""
+        log, pc = self.robot.board.log, self.network.log
+        if self.hears_pc:
+            self.lost += max(0, pc.first - self.read_pc)
+            self.waiting += [
+                event for _, event in pc.since(self.read_pc, self.hears_characters) if self._concerns(event)
+            ]
+            self.read_pc = pc.end
+        if self.hears_board:
+            self.lost += max(0, log.first - self.read_board)
+            place = (self.network.index, self.robot.slot)
+            self.waiting += [event for _, event in of_board(log, self.read_board, *place)]
+            self.read_board = log.end
+
+    def _concerns(self, event: Event) -> bool:
+        if event.what in _RESTARTS:
+            return event.slot == self.robot.slot
+        return event.what in self.of_events
+
+    def _tell(self, tick: int) -> None:
+        self.waiting.sort(key=_BY_TICK)
+        told = 0
+        for event in self.waiting:
+            if event.tick >= tick:
+                break
+            told += 1
+            if event.what in _RESTARTS:
+                self._restart(event.tick)
+            self._tell_one(event)
+            if event.what == "received" and self.hearing is not None:
+                for heard in self.hearing.take(event):
+                    self._tell_one(heard)
+        del self.waiting[:told]
+        for judge in self.of_times:
+            self._guarded(judge.check, partial(judge.until, tick))
+
+    def _restart(self, tick: int) -> None:
+        if self.hearing is not None:
+            self.hearing = Hearing(self.network.index, self.robot.slot, self.network.spec.robots)
+        for judge in self.judges:
+            self._guarded(judge.check, partial(judge.restarted, tick))
+
+    def _tell_one(self, event: Event) -> None:
+        for judge in self.of_events.get(event.what, ()):
+            self._guarded(judge.check, partial(judge.event, event))
+
+    def end(self, tick: int) -> None:
+        """The run is over, perhaps within a control period."""
+        self._tell_faults()
+        self._tell_events(tick + 1)
+        for judge in self.judges:
+            self._guarded(judge.check, partial(judge.end, tick))
+
+    def _guarded(self, check: Check, call: Callable[[], T]) -> T:
+        try:
+            return call()
+        except PartError as error:
+            raise PartError(f"{self._named(check)}: {error.what}", error.remedy) from error
+        except (Exception, SystemExit) as error:
+            raise PartError(f"{self._named(check)}: {raised(error)}", "repair the check") from error
+
+    def _named(self, check: Check) -> str:
+        return f"net{self.network.index}/robot{self.robot.slot}: check {check.name!r} cannot judge"
+
+
+def _verdict(name: str, judges: Sequence[Judge[Any]], lost: bool) -> Expectation:
+    failures = sorted((one for judge in judges for one in judge.failures), key=_BY_TICK)
+    failed = 0
+    judged = 0
+    for judge in judges:
+        failed += judge.failed
+        judged += judge.judged
+    open_ = judged == 0 or (lost and any(judge.HEARS for judge in judges))
+    first = failures[0] if failures else None
+    return Expectation(
+        name=name,
+        kind=judges[0].check.KIND,
+        verdict="failed" if failed else "not judged" if open_ else "passed",
+        failures=failed,
+        first=None
+        if first is None
+        else FirstFailure(first.network, first.slot, first.tick, first.wanted, first.found),
+    )

@@ -1,0 +1,234 @@
+"""`mirotwin conform`: the rules of the protocol, tried on a firmware image."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+import msgspec
+from rich.table import Table
+
+from miro_exact.bad_input import BadInput
+from miro_exact.seed import MAX_SEED
+from miro_robot.image import Image
+from mirotwin.shell.console import show
+from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, load_image, stack_option
+from mirotwin.shell.outputs import check_file, check_not_input, whole_file
+from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, complain, show_line
+from mirotwin.shell.progress import ProgressBar
+from mirotwin.verify.cases.artifacts import FIRMWARE, IMAGE_FILES, leave_image, replay_line, report_line
+from mirotwin.verify.cases.case import write_case
+from mirotwin.verify.conform.causes import begin_with, causes_first, folded
+from mirotwin.verify.conform.explain import explain
+from mirotwin.verify.conform.junit import junit as as_junit
+from mirotwin.verify.conform.rule import Rule
+from mirotwin.verify.conform.run import Outcome, case_names, failure_text, try_all, with_faults
+from mirotwin.verify.conform.table import ALL, LONG, RULES, find
+
+LINES = 5
+"""Firmware faults that are listed."""
+
+
+@click.command(short_help="Tries the protocol's rules on a firmware image.")
+@click.argument("image", metavar="[IMAGE.ihx]", type=Place(), required=False)
+@click.option(
+    "--rule", "ids", metavar="ID", multiple=True, help="A rule to try, such as P12; may be repeated."
+)
+@click.option("--long", is_flag=True, help="Also try the rules that take minutes of virtual time.")
+@click.option("--list", "listing", is_flag=True, help="List the rules and try none.")
+@click.option("--all", "everything", is_flag=True, help="Of rules that are not judged, a line each.")
+@click.option(
+    "--explain",
+    "explained",
+    metavar="ID",
+    help="Show what happened in the trial of one rule, and try no other.",
+)
+@click.option("--json", "as_json", is_flag=True, help="One line of JSON a rule instead of the table.")
+@click.option(
+    "--junit", type=Place(path_type=Path), metavar="FILE.xml", help="Write JUnit XML, replacing the file."
+)
+@click.option(
+    "--artifacts",
+    type=Place(path_type=Path),
+    metavar="DIR",
+    help="Leave each failure there as a case, P12.stream, for `mirotwin replay`; earlier ones are replaced.",
+)
+@click.option(
+    "--seed",
+    type=Whole(0, MAX_SEED),
+    default=0,
+    show_default=True,
+    help="Seed of the noise between keyed frames.",
+)
+@stack_option
+@engine_option
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar, and of the table the rules that failed.")
+def conform(
+    image: str | None,
+    ids: tuple[str, ...],
+    long: bool,
+    listing: bool,
+    everything: bool,
+    explained: str | None,
+    as_json: bool,
+    junit: Path | None,
+    artifacts: Path | None,
+    seed: int,
+    stack_from: int | None,
+    engine: str | None,
+    quiet: bool,
+) -> int:
+    """Tries each rule of docs/conformance.md on IMAGE.ihx (default: the robot's own firmware).
+
+    A rule is what a host says, and what robots have to make of it, seen at pins, wires and LM629 alone: an image needs
+    no symbols. Each trial is a world of its own that ends after a known time, whatever the firmware does.
+
+    Rules presuppose others. One whose presupposition failed is not judged; the table begins with what to repair first.
+
+    Exit code 1: a rule failed; 3: the firmware did what it must not (bus, stack, ..) in one of the trials.
+    """
+    choose_engine(engine)
+    rules = list(dict.fromkeys(map(find, ids))) or list(ALL if long or listing else RULES)
+    if listing:
+        _list(rules, as_json)
+        return DONE
+    if junit is not None:
+        check_file(junit, "--junit")
+        check_not_input(junit, "--junit", image)
+    firmware = load_image(image, named=False, stack_from=stack_from)
+    if explained is not None:
+        return _explain(find(explained), firmware, seed)
+    if artifacts is not None:
+        _make_room(artifacts, rules)
+    outcomes: list[Outcome] = []
+    with ProgressBar("trying rules", len(rules), quiet) as bar:
+        for outcome in try_all(rules, firmware, seed, keep=artifacts is not None):
+            outcomes.append(outcome)
+            bar.to(len(outcomes))
+            if artifacts is not None:
+                for name, text in outcome.cases:
+                    write_case(artifacts / name, text)
+                    leave_image(artifacts, firmware)
+    outcomes = with_faults(outcomes, rules)
+    if junit is not None:
+        properties = {"firmware": firmware.path.name, "firmware_sha256": firmware.sha256, "seed": f"{seed}"}
+        with whole_file(junit, "--junit") as part:
+            part.write_bytes(as_junit(outcomes, rules, properties))
+    if as_json:
+        _print_json(outcomes)
+    else:
+        _print_table(outcomes, rules, quiet, everything)
+        if artifacts is not None and not quiet:
+            _print_replays(outcomes, artifacts)
+    return _report_faults(outcomes) or (
+        DONE if all(outcome.passed for outcome in outcomes) else EXPECTATION_FAILED
+    )
+
+
+def _explain(rule: Rule, firmware: Image, seed: int) -> int:
+    """The timeline of a rule's trial; the exit code."""
+    story = explain(rule, firmware, seed)
+    for line in story.lines:
+        show_line(line)
+    return FIRMWARE_FAULT if story.faults else EXPECTATION_FAILED if story.failed else DONE
+
+
+def _make_room(folder: Path, rules: Sequence[Rule]) -> None:
+    """Makes the folder, and takes away what these rules left there before. What others left stays."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for rule in rules:
+            for name in (*case_names(rule), *IMAGE_FILES):
+                (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise BadInput(
+            folder, "", error.strerror or str(error), "choose another folder with --artifacts"
+        ) from None
+
+
+def _list(rules: Sequence[Rule], as_json: bool) -> None:
+    if as_json:
+        for rule in rules:
+            line = {"rule": rule.id, "name": rule.name, "text": rule.text, "source": rule.source}
+            click.echo(msgspec.json.encode(line | {"presupposes": rule.presupposes}))
+        return
+    table = Table(box=None, pad_edge=False)
+    for head in ("rule", "name", "what a robot has to do"):
+        table.add_column(head, overflow="fold")
+    for rule in rules:
+        table.add_row(rule.id, rule.name, rule.text)
+    show(table)
+
+
+def _print_json(outcomes: Sequence[Outcome]) -> None:
+    for outcome in outcomes:
+        first = outcome.failures[0] if outcome.failures else None
+        line = {
+            "rule": outcome.rule,
+            "verdict": outcome.verdict,
+            "cause": outcome.cause or None,
+            "hint": outcome.hint or None,
+            "failures": len(outcome.failures),
+            "first": None if first is None else msgspec.to_builtins(first),
+            "faults": outcome.fault_count,
+        }
+        click.echo(msgspec.json.encode(line))
+
+
+def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool, everything: bool) -> None:
+    begin = begin_with(outcomes)
+    if begin:
+        show(begin)
+    names = {rule.id: rule.name for rule in rules}
+    table = Table(box=None, pad_edge=False)
+    for head in ("rule", "name", "verdict", "first failure"):
+        table.add_column(head, overflow="fold")
+    for outcome in causes_first(outcomes):
+        if (outcome.passed and quiet) or (outcome.cause and not everything):
+            continue
+        first = failure_text(outcome.failures[0]) if outcome.failures else ""
+        if outcome.hint and outcome.hint not in begin:
+            first = f"{outcome.hint}; {first}"
+        because = f"presupposes {outcome.cause}, which failed" if outcome.cause else first
+        table.add_row(outcome.rule, names[outcome.rule], outcome.verdict, because)
+    if table.rows:
+        show(table)
+    if not everything:
+        for line in folded(outcomes):
+            show(line)
+    if not quiet:
+        left_out = [rule.id for rule in LONG if rule not in rules] if len(rules) == len(RULES) else []
+        show(_counts(outcomes) + (f"; --long tries {', '.join(left_out)} too" if left_out else ""))
+
+
+def _counts(outcomes: Sequence[Outcome]) -> str:
+    verdicts = [outcome.verdict for outcome in outcomes]
+    tried = "1 rule" if len(outcomes) == 1 else f"{len(outcomes)} rules"
+    text = f"{tried}: {verdicts.count('passed')} passed, {verdicts.count('failed')} failed"
+    return text + (f", {verdicts.count('not judged')} not judged" if "not judged" in verdicts else "")
+
+
+def _print_replays(outcomes: Sequence[Outcome], artifacts: Path) -> None:
+    """The line that gives each failure again, and the one that makes a page of the first."""
+    names = [name for outcome in outcomes for name, _ in outcome.cases]
+    own = not (artifacts / FIRMWARE).exists()
+    for name in names:
+        show_line(replay_line(f"{artifacts}", own, name))
+    if names:
+        show_line(report_line(f"{artifacts / names[0]}"))
+
+
+def _report_faults(outcomes: Sequence[Outcome]) -> int:
+    """Says which faults came; returns the exit code."""
+    told = 0
+    count = 0
+    for outcome in outcomes:
+        count += outcome.fault_count
+        for network, slot, fault in outcome.faults:
+            if told < LINES:
+                told += 1
+                complain(f"trial of {outcome.rule}: net{network}/robot{slot}: {fault}")
+    if count > told:
+        complain(f"{count - told} more firmware faults in these trials")
+    return FIRMWARE_FAULT if count else DONE

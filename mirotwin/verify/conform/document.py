@@ -1,0 +1,58 @@
+"""Writes the table of docs/conformance.md from the rules: `python -m mirotwin.verify.conform.document`.
+
+What belongs here: turning rules into Markdown. What does not: prose, which is in that page.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+
+from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
+from mirotwin.verify.conform.rule import Air, Rule
+from mirotwin.verify.conform.table import CHAPTERS
+
+
+def render() -> str:
+    """All rules by chapter, ending in a newline."""
+    return "\n".join(line for chapter in CHAPTERS for line in _chapter(chapter.title, chapter.rules))
+
+
+def _chapter(title: str, rules: list[Rule]) -> Iterator[str]:
+    yield f"### {title}\n"
+    yield "| rule | name | a robot must | from | tried with | presupposes |"
+    yield "|---|---|---|---|---|---|"
+    for rule in rules:
+        airs = "; ".join(dict.fromkeys(map(_air, rule.airs))) + _chips(rule.lm629)
+        text, before = rule.text.replace("|", chr(92) + "|"), ", ".join(rule.presupposes)
+        yield f"| {rule.id} | {rule.name} | {text} | {_source(rule.source)} | {airs} | {before} |"
+    yield ""
+
+
+def _source(source: str) -> str:
+    page, _, section = source.partition(", ")
+    anchor = "".join(one for one in section.lower().replace(" ", "-") if one.isalnum() or one == "-")
+    return f"[{section}](../{page}#{anchor})"
+
+
+def _chips(lm629: Lm629Options) -> str:
+    changed = [
+        f"{name} {str(getattr(lm629, name)).lower()}"
+        for name in ("busy_clocks", "reset_clocks", "reset_disarms_breakpoint")
+        if getattr(lm629, name) != getattr(DEFAULT_OPTIONS, name)
+    ]
+    return "".join(f", {one}" for one in changed)
+
+
+def _air(air: Air) -> str:
+    slots = ", ".join(map(str, air.slots))
+    more = ", keyed carrier with noise" if air.keyed else ""
+    if air.strap is not None:
+        more += f", its pins say {air.strap}"
+    if air.baud_offset_ppm:
+        more += f", host {air.baud_offset_ppm / 10_000:+g} %"
+    return f"N = {air.robots}, slot {slots}{more}"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(render())

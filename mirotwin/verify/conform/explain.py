@@ -1,0 +1,166 @@
+"""The timeline of a rule's trial: what was sent, received, commanded and answered, and what was wanted when.
+
+What belongs here: the lines. What does not: running the trial (`listening`) and judging it (`judgement`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import groupby
+
+import msgspec
+
+from miro_protocol.decoder import Decoder
+from miro_protocol.events import Received
+from miro_protocol.frames import ContentError, TeamFrame, TelemetryFrame, describe
+from miro_protocol.table import TICKS_PER_MS
+from miro_protocol.transmission import DOWN, Transmission, follows
+from miro_robot.image import Image
+from miro_robot.lm629.commands import BY_NAME
+from miro_sim.world.events import Event
+from mirotwin.verify.checks.orders import Orders
+from mirotwin.verify.conform.hints import between, in_words, number
+from mirotwin.verify.conform.listening import Listener, listen
+from mirotwin.verify.conform.rule import Rule
+from mirotwin.verify.conform.trial import Trial, trial_of
+
+Row = tuple[int, str, str]
+"""Tick, what, and details."""
+_STT = BY_NAME["STT"].opcode
+
+
+class Story(msgspec.Struct, frozen=True):
+    """`failed` of the rule's expectations; `faults`: how many of the firmware."""
+
+    lines: list[str]
+    failed: int
+    faults: int
+
+
+def explain(rule: Rule, image: Image, seed: int = 0) -> Story:
+    """Runs the trial and tells what happened in it, robot by robot."""
+    trial = trial_of(rule)
+    lines = [f"{rule.id} {rule.name}: {rule.text}", f"({rule.source})"]
+    failed = faults = 0
+    for listener in listen(trial, image, seed):
+        subject = listener.subject
+        verdicts = list(_verdicts(trial, listener))
+        bad = len([row for row in verdicts if row[1] == "FAILED"])
+        board = subject.robot.board
+        told = [(fault.tick, "fault", str(fault)) for fault in board.faults]
+        failed, faults = failed + bad, faults + board.fault_count
+        lines += [
+            "",
+            f"net{subject.network}/robot{subject.slot} (N = {subject.robots}): {_summary(verdicts, bad)}",
+        ]
+        rows = sorted([*_rows(listener), *told, *verdicts], key=lambda row: row[0])
+        lines += map(_line, _collapsed(rows))
+    return Story(lines, failed, faults)
+
+
+def _summary(verdicts: list[Row], bad: int) -> str:
+    return f"{len(verdicts)} expectations, {bad} failed" if bad else f"{len(verdicts)} expectations passed"
+
+
+def _line(row: Row) -> str:
+    tick, what, text = row
+    return f"{tick:>10} {tick / TICKS_PER_MS:>10.3f} ms  {what:<9} {text}"
+
+
+def _collapsed(rows: list[Row]) -> Iterator[Row]:
+    """The same again and again is told once."""
+    for (what, text), group in groupby(rows, key=lambda row: row[1:]):
+        same = list(group)
+        more = f" ({len(same)} times, until tick {same[-1][0]})" if len(same) > 1 else ""
+        yield same[0][0], what, text + more
+
+
+def _verdicts(trial: Trial, listener: Listener) -> Iterator[Row]:
+    """An expectation that failed stands where it failed, one that was fulfilled where it was over."""
+    slot = listener.subject.slot
+    for one in trial.expected[listener.subject.network]:
+        if one.slots and slot not in one.slots:
+            continue
+        found = one.test(listener.seen)
+        if found is None:
+            yield one.tick, "passed", one.wanted
+        else:
+            yield found[0], "FAILED", f"wanted {one.wanted}, found {found[1]}"
+
+
+def _rows(listener: Listener) -> Iterator[Row]:
+    orders, decoder = Orders(), Decoder(listener.subject.robots)
+    for event in listener.events:
+        if event.what == "sent":
+            yield event.tick, "sent", _sent(event, decoder, listener)
+        elif event.what == "frame" and event.frame is not None:
+            yield (
+                event.tick,
+                "received",
+                _frame(event.frame, listener) + (", fresh" if event.value else ", not fresh"),
+            )
+        elif event.what == "command":
+            yield event.tick, "commanded", _command(event, orders)
+        elif event.what in ("reset", "power"):
+            yield event.tick, event.what, f"{event.value}"
+    for what, told in (("received", "received"), ("heard", "answered")):
+        for run in _runs([event for event in listener.events if event.what == what]):
+            answer = _answer(run, listener) if what == "heard" else ""
+            yield run[-1].tick, told, _characters(run) + answer
+
+
+def _sent(event: Event, decoder: Decoder, listener: Listener) -> str:
+    frames = [
+        one
+        for one in decoder.hear(Transmission(event.tick, DOWN, event.data, event.network))
+        if isinstance(one, Received)
+    ]
+    said = "; ".join(_frame(one, listener) for one in frames)
+    return f"{event.data.hex(' ')}" + (f": {said}" if said else "")
+
+
+def _frame(frame: Received, listener: Listener) -> str:
+    try:
+        message = frame.message(listener.subject.robots)
+    except ContentError as error:
+        return f"frame of type {frame.type}, seq {frame.seq}, unknown content: {error}"
+    if not isinstance(message, TeamFrame):
+        return describe(message)
+    left, right = message.velocities[listener.subject.slot]
+    return f"{describe(message)}, this robot {number(left)}, {number(right)}"
+
+
+def _command(event: Event, orders: Orders) -> str:
+    order = orders.take(event)
+    text = str(event).partition(" command ")[2]
+    return f"{text}: {in_words(order)}" if order is not None and event.opcode == _STT else text
+
+
+def _runs(events: list[Event]) -> Iterator[list[Event]]:
+    """Characters without a pause between them."""
+    run: list[Event] = []
+    for event in events:
+        if run and not follows(run[-1].tick, event.tick):
+            yield run
+            run = []
+        run.append(event)
+    if run:
+        yield run
+
+
+def _characters(run: list[Event]) -> str:
+    shown = " ".join(f"{one.value:02x}" + ("" if one.good_stop else "!") for one in run)
+    return f"{len(run)} characters, {between(run[0].tick, run[-1].tick)}: {shown}"
+
+
+def _answer(run: list[Event], listener: Listener) -> str:
+    """What the characters say, if they are an answer."""
+    for answer in listener.seen.answers_in(run[0].tick, run[-1].tick):
+        said = answer.said
+        if not isinstance(said, TelemetryFrame):
+            return ": an answer with unknown contents"
+        return (
+            f": {describe(said)} status={said.status_left:02X}h,{said.status_right:02X}h"
+            f" position={number(said.position_left)}, {number(said.position_right)}"
+        )
+    return ": no answer"

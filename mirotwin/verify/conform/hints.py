@@ -1,0 +1,154 @@
+"""What a robot does instead, in words, where one usual mistake explains all that it does.
+
+What belongs here: velocities, characters and numbers for people. What does not: finding out more by other trials
+(`probe`), and CRC and whitening (`sealing`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from miro_protocol.decoder import TelemetryDecoder
+from miro_protocol.events import Damaged
+from miro_protocol.table import SEQ_MODULUS, SYNC, TELEMETRY, TICKS_PER_MS, VELOCITY_SATURATION, FrameType
+from miro_protocol.transmission import follows
+from mirotwin.verify.checks.orders import Order
+from mirotwin.verify.conform.sealing import mistake_in
+
+if TYPE_CHECKING:
+    from miro_sim.world.events import Event
+    from mirotwin.verify.conform.talk import Frame
+
+Pair = tuple[int, int]
+_SHIFTS = range(1, 17)
+_PLAIN = 16 << 8
+
+
+def number(value: int, digits: int = 4) -> str:
+    """Decimal and hexadecimal, a negative one as its two's complement."""
+    return f"{value} ({value & (1 << 4 * digits) - 1:0{digits}X}h)"
+
+
+def in_words(order: Order) -> str:
+    """An order for people: `off`, `stop`, or the velocity as the radio carries it."""
+    if order.what != "drive":
+        return f"abrupt {order.what}" if order.abrupt else order.what
+    if order.word is None or not -0x8000 <= order.word <= 0x7FFF:
+        return f"{order.velocity / 256:.7g} ({order.velocity & 0xFFFF_FFFF:08X}h in the LM629)"
+    return number(order.word)
+
+
+def cut_off(word: int) -> int:
+    return max(-VELOCITY_SATURATION, min(VELOCITY_SATURATION, word))
+
+
+def wheels_instead(told: Sequence[Order], frame: Frame, slot: int) -> str:
+    """The one mistake that makes both orders of this frame; or ""."""
+    found = (told[0].velocity, told[1].velocity)
+    left, right = frame.for_robot(slot)
+    wanted = (left << 8, right << 8)
+    at_limit = max(map(abs, frame.words[slot])) >= VELOCITY_SATURATION  # where one mistake looks like another
+    if at_limit or any(order.what != "drive" for order in told) or found == wanted:
+        return ""
+    for what, pair in _mistakes(frame, slot):
+        for one, other in (pair, (cut_off(pair[0]), cut_off(pair[1]))):
+            if (one << 8, other << 8) == found:
+                return what
+    for shift in _SHIFTS:
+        if found == (wanted[0] << shift, wanted[1] << shift):
+            return f"{1 << shift} times as fast"
+        if all(_is_slower(*ends, shift) for ends in zip(found, wanted, strict=True)):
+            return f"{1 << shift} times as slow"
+    return ""
+
+
+def _is_slower(found: int, wanted: int, shift: int) -> bool:
+    """By a power of two, exactly or as a number that was shifted as the radio carries it and is not all gone."""
+    off = abs((found << shift) - wanted)
+    return (off == 0 and found != 0) or (off < 256 << shift and abs(found) >= _PLAIN)
+
+
+def _mistakes(frame: Frame, slot: int) -> Iterator[tuple[str, Pair]]:
+    left, right = frame.words[slot]
+    yield "the signs of both are turned over", (-left, -right)
+    yield "the left one goes the wrong way", (-left, right)
+    yield "the right one goes the wrong way", (left, -right)
+    yield "left and right are exchanged", (right, left)
+    yield "left and right are exchanged, and both signs turned over", (-right, -left)
+    yield "the bytes of each are exchanged: the low one comes first", (_exchanged(left), _exchanged(right))
+    yield "the test of the sign is the wrong way round", (_wrong_way(left), _wrong_way(right))
+    yield "the low bytes are lost", (left & ~0xFF, right & ~0xFF)
+    yield "the low bits are lost", (left & ~1, right & ~1)
+    for what, high in (("low", 0), ("high", 8)):
+        yield f"they are the {what} bytes alone", (left >> high & 0xFF, right >> high & 0xFF)
+        yield f"they are the {what} bytes alone, with sign", (_signed(left >> high), _signed(right >> high))
+    yield "they are taken as numbers without sign", (left & 0xFFFF, right & 0xFFFF)
+    for other, pair in enumerate(frame.words):
+        yield f"these are the velocities of robot {other}", pair
+    payload = b"".join(word.to_bytes(2, "little", signed=True) for pair in frame.words for word in pair)
+    for at in range(len(payload) - 3):
+        pair = (_word(payload, at), _word(payload, at + 2))
+        yield f"these are bytes {at} to {at + 3} of the payload and not {4 * slot} to {4 * slot + 3}", pair
+    if frame.before:
+        yield "these are the velocities of the frame before", frame.before[slot]
+
+
+def _wrong_way(word: int) -> int:
+    """What 16 bits make of it that take backward for forward before they take the magnitude."""
+    return -(-word & 0xFFFF) if word > 0 else word & 0xFFFF
+
+
+def _word(payload: bytes, at: int) -> int:
+    return int.from_bytes(payload[at : at + 2], "little", signed=True)
+
+
+def _exchanged(word: int) -> int:
+    return int.from_bytes(word.to_bytes(2, "little", signed=True), "big", signed=True)
+
+
+def _signed(byte: int) -> int:
+    return (byte & 0xFF ^ 0x80) - 0x80
+
+
+def characters(heard: Sequence[Event]) -> str:
+    """Characters that the PC heard: how many, which, from when to when."""
+    shown = " ".join(f"{one.value:02X}" + ("" if one.good_stop else "!") for one in heard[:24])
+    more = " .." if len(heard) > 24 else ""
+    count = "1 character" if len(heard) == 1 else f"{len(heard)} characters"
+    return f"{count}, {shown}{more} ({between(heard[0].tick, heard[-1].tick)})"
+
+
+def in_a_row(heard: Sequence[Event]) -> Sequence[Event]:
+    """The first characters, up to a pause."""
+    for count, (one, other) in enumerate(pairwise(heard), 1):
+        if not follows(one.tick, other.tick):
+            return heard[:count]
+    return heard
+
+
+def between(begin_tick: int, end_tick: int) -> str:
+    times = f"{begin_tick / TICKS_PER_MS:.3f} to {end_tick / TICKS_PER_MS:.3f} ms"
+    return f"ticks {begin_tick} to {end_tick}, {times}"
+
+
+def no_answer(heard: Sequence[Event], seq: int) -> str:
+    """Why these characters are no answer to the question with this number."""
+    data = bytes(one.value for one in heard)
+    at = data.find(SYNC)
+    if at < 0:
+        return "no sync 2D D4"
+    found = data[at : at + TELEMETRY.size]
+    if len(found) < TELEMETRY.size:
+        return f"{len(found)} characters from the sync on and not {TELEMETRY.size}"
+    begins = FrameType.TELEMETRY * SEQ_MODULUS + seq
+    mistake = mistake_in(TELEMETRY, found, begins)
+    if mistake:
+        return f"it has {mistake}"
+    if found[len(SYNC)] == begins:
+        return f"its HDR {begins:02X}h is not whitened"
+    decoder = TelemetryDecoder()
+    events = decoder.feed_symbols([(one.value, one.good_stop, one.tick) for one in heard]) + decoder.flush()
+    reasons = [event.reason for event in events if isinstance(event, Damaged)]
+    return max(reasons).name.lower().replace("_", " ") if reasons else ""

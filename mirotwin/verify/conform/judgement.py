@@ -1,0 +1,99 @@
+"""The check `conforms_to`: whether a robot keeps a rule, in the trial of that rule.
+
+What belongs here: the check and its judge. What does not: rules and their trials.
+
+The judge keeps what it is told and judges at the end, each expectation by itself, but those that are over later than
+the run. In a run in which the hosts say anything else than in the rule's trial nothing is judged: the check is for
+trials alone.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from miro_exact.bad_input import BadInput
+from miro_protocol.transmission import Transmission
+from miro_robot.faults import FirmwareFault
+from miro_sim.periods import RobotPeriod
+from miro_sim.world.events import Event
+from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject
+from mirotwin.verify.conform.rule import Rule
+from mirotwin.verify.conform.seen import Seen
+from mirotwin.verify.conform.trial import trial_of
+
+
+class ConformsTo(Check, frozen=True, kw_only=True, tag="conforms_to"):
+    """A robot keeps a rule of the conformance page, in the trial of that rule."""
+
+    KIND: ClassVar[Kind] = "liveness"
+    MAIN: ClassVar[str] = "rule"
+
+    rule: str
+
+    def __post_init__(self) -> None:
+        self.the_rule()
+
+    def the_rule(self) -> Rule:
+        """ValueError for a rule that there is not."""
+        from mirotwin.verify.conform.table import find  # the rules are read when one is asked for
+
+        try:
+            return find(self.rule)
+        except BadInput as error:
+            raise ValueError(f"{error.what}; {error.remedy}") from None
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return RuleJudge(self, subject)
+
+
+class RuleJudge(Judge[ConformsTo]):
+    """`foreign`: the host of this network says something else than in the trial; `to_come`: what it has to say yet."""
+
+    HEARS = ("command", "heard", "answer", "sent")
+
+    def __init__(self, check: ConformsTo, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.rule = check.the_rule()
+        trial = trial_of(self.rule)
+        self.foreign = subject.network >= len(trial.expected)
+        self.expected = () if self.foreign else trial.expected[subject.network]
+        self.to_come: list[Transmission] = [
+            one for one in trial.transmissions if one.network == subject.network
+        ][::-1]
+        self.seen = Seen(subject.robots, subject.slot)
+
+    def event(self, event: Event) -> None:
+        if event.what != "sent":
+            self.seen.take(event)
+            return
+        said = self.to_come.pop() if self.to_come else None
+        if said is None or (said.tick, said.data) != (event.tick, event.data):
+            self.foreign = True
+
+    def fault(self, fault: FirmwareFault) -> None:
+        if fault.kind in self.rule.faults:
+            self.fail(fault.tick, "no such firmware fault", str(fault), fault=True)
+
+    def restarted(self, tick: int) -> None:
+        self.seen.restarted(tick)
+
+    def period(self, record: RobotPeriod, tick: int) -> None:
+        self.seen.take_period(tick, record, self.subject.robot.board)
+
+    def end(self, tick: int) -> None:
+        if self.foreign or (self.to_come and self.to_come[-1].tick < tick):
+            self.failures.clear()
+            self.failed = 0
+            return
+        self.seen.end_tick = tick
+        found = []
+        for expectation in self.expected:
+            here = not expectation.slots or self.subject.slot in expectation.slots
+            if not here or expectation.tick >= tick:
+                continue
+            self.judged += 1
+            what = expectation.test(self.seen)
+            if what is not None:
+                found.append((what[0], expectation.wanted, what[1]))
+        for at, wanted, text in sorted(found, key=lambda one: one[0]):
+            self.fail(at, wanted, text)

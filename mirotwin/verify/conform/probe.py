@@ -1,0 +1,129 @@
+"""What a robot does that obeys no plain team frame: found out by a trial of its own.
+
+What belongs here: frames sealed in wrong ways, and what the robot's serial port makes of the right one. What does not:
+the wrong ways (`sealing`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from miro_protocol.frames import seal
+from miro_protocol.table import TICKS_PER_MS
+from miro_robot.image import Image
+from miro_robot.lm629.commands import BY_NAME
+from miro_sim.world.events import Event
+from mirotwin.verify.conform.hints import characters
+from mirotwin.verify.conform.listening import Listener, listen
+from mirotwin.verify.conform.rule import BOTH, Air, Rule
+from mirotwin.verify.conform.sealing import MISTAKES
+from mirotwin.verify.conform.talk import ACTING_TICKS, Frame, Talk, obeys
+from mirotwin.verify.conform.trial import make_trial, trial_of
+
+_SETTLING_MS = 200.0
+_STT = BY_NAME["STT"].opcode
+_KNOWN = frozenset(one.opcode for one in BY_NAME.values())
+_UNHEARD = 4
+"""Frames without any command to an LM629, after which a robot counts as hanging."""
+
+
+def why_deaf(network: int, image: Image, seed: int) -> str:
+    """What the robot in this one of `BOTH` does instead of obeying plain frames, or ""."""
+    air = BOTH[network]
+    said: list[tuple[str, Frame]] = []
+
+    def ways(talk: Talk) -> None:
+        talk.wait(_SETTLING_MS)
+        said.append(("", talk.team()))
+        for what, sealing in MISTAKES.items():
+            if sealing.seal(talk.form, bytes(talk.form.body_size)) != seal(
+                talk.form, bytes(talk.form.body_size)
+            ):
+                said.append((f"frames with {what}", talk.team(sealed=sealing.seal)))
+        other = _other_layout(talk)
+        said.append((f"frames for {other.n} robots: its strap for N is read the other way", other.team()))
+        talk.said += other.said
+        talk.wait_until(other.now)
+        talk.expect(talk.now, "", lambda seen: None)
+
+    rule = Rule("P24", "", "", ways, (air,))
+    (listener,) = listen(make_trial(rule), image, seed)
+    right = said[0][1]
+    return (
+        _serial_port(listener.events, right)
+        or _begins_again(listener)
+        or _obeyed(listener, said)
+        or _chips(listener)
+    )
+
+
+def _other_layout(talk: Talk) -> Talk:
+    """The same host, which from now on speaks to a network of the other size."""
+    other = Talk(next(air for air in BOTH if air.robots != talk.n), talk.network)
+    other.air = Air(other.n, talk.air.slots)
+    other.now, other.seq = talk.now, talk.seq
+    return other
+
+
+def _begins_again(listener: Listener) -> str:
+    """Whether the firmware has reset LM629s that it had told to turn. The trial resets no processor."""
+    turned_tick = min((one.tick for one in listener.seen.commands if one.opcode == _STT), default=None)
+    board = listener.subject.robot.board
+    if turned_tick is None or board.left.reset_tick <= turned_tick:
+        return ""
+    return f"it begins again by itself: it reset its LM629s at {board.left.reset_tick / TICKS_PER_MS:.0f} ms"
+
+
+def _serial_port(events: Sequence[Event], frame: Frame) -> str:
+    sent = next(one.data for one in events if one.what == "sent")
+    limit = frame.end_tick + TICKS_PER_MS
+    received = [one for one in events if one.what == "received" and one.tick <= limit]
+    if not received:
+        return "its serial port takes no character: not set up, or off"
+    if len(received) < len(sent):
+        return f"its serial port takes {len(received)} of {len(sent)} characters: RI stays set, or another bit rate"
+    if bytes(one.value for one in received) != sent:
+        return f"its serial port takes other characters than were sent, as at another bit rate: {characters(received)}"
+    return ""
+
+
+def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
+    """Whether a robot's serial port did not take all characters of the rule's trial, or its program did no more."""
+    trial = trial_of(rule)
+    if rule.airs[network].keyed or len(trial.script) > len(trial.transmissions):
+        return ""  # noise, or a robot that was off
+    sent = len(b"".join(one.data for one in trial.transmissions if one.network == network))
+    for listener in listen(trial, image, seed):
+        if listener.subject.network == network:
+            lost = sent - len([one for one in listener.events if one.what == "received"])
+            if lost > 0:
+                return f"its serial port took {sent - lost} of the trial's {sent} characters: off or too slow"
+            if again := _begins_again(listener):
+                return again
+            last_tick = max((one.tick for one in listener.seen.commands), default=0)
+            later = [one for one in trial.transmissions if one.network == network and one.tick > last_tick]
+            if last_tick and len(later) > _UNHEARD:
+                when = f"{last_tick / TICKS_PER_MS:.0f} ms"
+                return f"it does nothing after {when}, though {len(later)} frames follow: it hangs"
+    return ""
+
+
+def _obeyed(listener: Listener, said: Sequence[tuple[str, Frame]]) -> str:
+    for what, frame in said[1:]:
+        told = listener.seen.both_told(frame.end_tick + ACTING_TICKS)
+        if all(map(obeys, told, frame.for_robot(listener.seen.slot))):
+            return f"it obeys {what}"
+    return ""
+
+
+def _chips(listener: Listener) -> str:
+    if not listener.subject.robot.board.left.reset_level:
+        return "it holds its LM629s in reset (/RST is low)"
+    if not listener.seen.commands:
+        return "it tells its LM629s nothing at all"
+    known = {one.opcode for one in listener.seen.commands} & _KNOWN
+    return (
+        ""
+        if known
+        else "it gives its LM629s unknown commands alone: data gone before /WR rises, or wrong pins"
+    )

@@ -1,0 +1,93 @@
+"""A rule: one sentence of the protocol that binds a robot, and how it is tried.
+
+What belongs here: the record, and the air in which a rule is tried. What does not: the rules (`rules/`), what a trial
+says (`talk`) and how it is judged (`judgement`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from miro_robot.faults import FaultKind
+from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
+
+if TYPE_CHECKING:
+    from miro_robot.image import Image
+    from mirotwin.verify.conform.talk import Talk
+
+
+class Air(msgspec.Struct, frozen=True):
+    """A network of `robots` slots with a robot in each of `slots`, and a radio without errors.
+
+    `keyed`: the carrier is on for frames only and the receiver hears noise in between; else it is on all the time.
+    `baud_offset_ppm`: so much faster is the host's serial port. `strap`: what the slot pins of its robots say, if not
+    their slots.
+    """
+
+    robots: int = 3
+    slots: tuple[int, ...] = (1,)
+    keyed: bool = False
+    baud_offset_ppm: int = 0
+    strap: int | None = None
+
+
+BOTH = (Air(3, (1,)), Air(5, (3,)))
+"""A robot in either layout."""
+THREE = (Air(3, (1,)),)
+"""One robot, where the layout does not matter."""
+
+
+class Rule(msgspec.Struct, frozen=True):
+    """`text` is a sentence with MUST, `source` the page and section that it comes from.
+
+    `script` says what the host of a network says and what its robots have to make of it; it is called for each of
+    `airs`. `faults`: kinds of firmware fault that break this rule, in its own trial and in those of others. `lm629`:
+    the chips of its robots. `presupposes`: ids of rules without which its trial says nothing about its own sentence;
+    where one of them failed, this one is not judged. `broken`: what firmware does that breaks it, for rules that others
+    presuppose. `probe` finds out more about such firmware, in the network that is given; it may find nothing, "".
+    """
+
+    id: str
+    text: str
+    source: str
+    script: Callable[[Talk], None]
+    airs: tuple[Air, ...] = BOTH
+    faults: tuple[FaultKind, ...] = ()
+    lm629: Lm629Options = DEFAULT_OPTIONS
+    presupposes: tuple[str, ...] = ()
+    broken: str = ""
+    probe: Callable[[int, Image, int], str] | None = None
+
+    @property
+    def name(self) -> str:
+        """A few words, for tables."""
+        return self.script.__name__.replace("_", " ")
+
+
+class Chapter:
+    """Collects the rules of a file: `@chapter.rule("P01", "The robot MUST ..", SOURCE)` before a script."""
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self.rules: list[Rule] = []
+
+    def rule(
+        self,
+        id: str,
+        text: str,
+        source: str,
+        airs: tuple[Air, ...] = BOTH,
+        faults: tuple[FaultKind, ...] = (),
+        lm629: Lm629Options = DEFAULT_OPTIONS,
+        presupposes: tuple[str, ...] = (),
+        broken: str = "",
+        probe: Callable[[int, Image, int], str] | None = None,
+    ) -> Callable[[Callable[[Talk], None]], Callable[[Talk], None]]:
+        def keep(script: Callable[[Talk], None]) -> Callable[[Talk], None]:
+            self.rules.append(Rule(id, text, source, script, airs, faults, lm629, presupposes, broken, probe))
+            return script
+
+        return keep

@@ -1,0 +1,421 @@
+"""Rules about what a robot says: when, in which form, and what is in it.
+
+Long because every field of the answer has its rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from miro_exact.clock import TICKS_PER_SECOND
+from miro_protocol.table import (
+    BITS_PER_CHARACTER,
+    ROBOT_BIT_TICKS,
+    SEQ_MODULUS,
+    SYNC,
+    TELEMETRY,
+    Flags,
+    Opcode,
+)
+from miro_sim.periods import RobotPeriod
+from miro_sim.world.events import Event
+from mirotwin.verify.conform.hints import characters, in_a_row, no_answer, number
+from mirotwin.verify.conform.rule import BOTH, THREE, Air, Chapter
+from mirotwin.verify.conform.rules import FRAME, FRESHNESS, RECEPTION, TURNS
+from mirotwin.verify.conform.seen import Answer, Seen
+from mirotwin.verify.conform.talk import Found, Frame, Talk, ms, over_by
+
+CHAPTER = Chapter("Answers")
+BAUD = TICKS_PER_SECOND / ROBOT_BIT_TICKS
+BAUD_TOLERANCE = 0.01
+"""A timer's reload that is off by one makes 1.3 %. Chosen."""
+_HEAD = TELEMETRY.lead + SYNC
+
+
+_AT_SPEED = 40
+"""Questions while a wheel goes 50 counts in a sample: a carry falls into some of them."""
+
+
+@CHAPTER.rule(
+    "P41",
+    "The robot in slot seq mod N MUST answer a fresh frame of type 3, with that frame's seq and its own slot, and the"
+    " answer MUST be over before the next question can be: 33.37 ms after it.",
+    TURNS,
+    airs=(*BOTH, Air(3, (0, 1, 2)), Air(5, (0, 1, 2, 3, 4))),
+    presupposes=("P42",),
+    broken="a question is not answered in turn",
+)
+def in_turn(talk: Talk) -> None:
+    talk.seq = 59
+    for _ in range(10):  # over the wrap of seq, where some robot's turn comes early
+        question = talk.team(ask=True, what="question", gap_ms=36.0)
+        asked = question.seq % talk.n
+        if asked in talk.air.slots:
+            talk.answered(question, asked)
+        else:
+            talk.silent(question.last_tick, over_by(question), f"{question.what} is for robot {asked}")
+
+
+@CHAPTER.rule(
+    "P42",
+    "An answer MUST be 19 characters without a pause, at 9615 baud +- 1 %: 55h four times, FFh, 2Dh D4h, HDR to CRC"
+    " whitened, CRC with the layout byte 1Eh.",
+    FRAME,
+    presupposes=("P16",),
+    broken="an answer is not well formed",
+)
+def form(talk: Talk) -> None:
+    for _ in range(3 * talk.n):  # whoever it takes itself for
+        _formed(talk, talk.team(ask=True, what="question", gap_ms=36.0))
+    end = talk.now
+
+    def any_heard(seen: Seen) -> Found:
+        return None if seen.heard else (end, "none")
+
+    talk.expect(end, f"an answer to some of {3 * talk.n} questions in a row", any_heard)
+
+
+def _formed(talk: Talk, question: Frame, then_more: bool = False) -> None:
+    """What is said then, if anything, is formed as an answer. `then_more`: another one may follow at once."""
+    until = question.end_tick + ms(56.0)
+
+    def test(seen: Seen) -> Found:
+        heard = [one for one in seen.heard if question.last_tick < one.tick <= until]
+        heard = heard[: TELEMETRY.wire_size] if then_more else list(in_a_row(heard))
+        what = _badly_formed(heard, question, seen) if heard else ""
+        return (heard[-1].tick, f"{characters(heard)}: {what}") if what else None
+
+    wanted = f"an answer of 19 characters without a pause, {_HEAD.hex(' ')} first, at 9615 baud"
+    talk.expect(until, wanted, test, (talk.air.slots[0],))
+
+
+def _badly_formed(heard: list[Event], question: Frame, seen: Seen) -> str:
+    if len(heard) != TELEMETRY.wire_size:
+        return f"{len(heard)} without a pause"
+    found = bytes(one.value for one in heard)[: len(_HEAD)]
+    if found != _HEAD:
+        return f"{found.hex(' ')} first"
+    if not all(one.good_stop for one in heard):
+        return "a bad stop bit"
+    baud = BITS_PER_CHARACTER * TICKS_PER_SECOND * (len(heard) - 1) / (heard[-1].tick - heard[0].tick)
+    if abs(baud - BAUD) > BAUD_TOLERANCE * BAUD:
+        return f"{baud:.0f} baud"
+    if not seen.answers_in(heard[0].tick - 1, heard[-1].tick):
+        return no_answer(heard, question.seq)
+    return ""
+
+
+@CHAPTER.rule(
+    "P43",
+    "A robot MUST speak only when it is asked: not on type 0 and 1, not on questions to others, nor on those that are"
+    " not fresh or not valid.",
+    TURNS,
+    presupposes=("P07", "P09", "P20", "P41"),
+    broken="a robot speaks unasked",
+)
+def unasked(talk: Talk) -> None:
+    slot = talk.air.slots[0]
+    talk.silent(0, talk.now, "nobody asks")
+    for _ in range(talk.n + 1):
+        talk.team()
+        talk.ping()
+    for other in range(talk.n):
+        if other != slot:
+            talk.ask(other)
+    talk.ask(slot, fresh=False, wrong={talk.form.size - 1: 0x10})
+    talk.ask(slot, fresh=False, bad_stop=9)
+    talk.silent(ms(1.0), talk.now, "no question to this robot")
+    question = talk.ask(slot, gap_ms=36.0)
+    talk.answered(question, slot)
+    after = talk.now
+    for _ in range(3):
+        talk.team(ask=True, step=0, fresh=False)
+    talk.wait(200.0)
+    talk.silent(after, talk.now, "no fresh question")
+    talk.answered(talk.ask(slot, gap_ms=36.0), slot)
+
+
+@CHAPTER.rule(
+    "P44",
+    "A robot MUST hear the next frame while it answers, and what it hears MUST NOT disturb its answer.",
+    TURNS,
+    presupposes=("P04", "P41"),
+)
+def full_duplex(talk: Talk) -> None:
+    slot = talk.air.slots[0]
+    for _ in range(3):
+        question = talk.ask(slot, gap_ms=0.0)
+        talk.answered(question, slot)
+        talk.obeyed(talk.team(lead=b"", gap_ms=12.0))
+    question = talk.ask(slot, gap_ms=0.0)
+    talk.answered(question, slot, "one whole answer to two questions in a row")
+    _formed(talk, question, then_more=True)
+    talk.obeyed(talk.ask(slot, lead=b"", gap_ms=40.0))
+
+
+@CHAPTER.rule(
+    "P45",
+    "The flags MUST say whether since the last answer the robot stopped (08h, 110 ms) and put its motors off (10h,"
+    " 500 ms), and an answer MUST clear them; all other flags are 0.",
+    FRAME,
+    presupposes=("P32", "P43"),
+)
+def flags(talk: Talk) -> None:
+    both = Flags.STOPPED | Flags.MOTORS_OFF
+    _says(talk, f"flags {int(Flags.MOTORS_OFF):02X}h of power-on", partial(_flagged, Flags.MOTORS_OFF))
+    for silence_ms, frames, wanted in (
+        *((0.0, 0, 0), (0.0, 2, 0), (140.0, 0, Flags.STOPPED), (0.0, 0, 0), (520.0, 0, both), (0.0, 0, 0)),
+        *((200.0, 3, Flags.STOPPED), (0.0, 3, 0), (600.0, 2, both), (0.0, 0, 0)),
+    ):
+        talk.wait(silence_ms)
+        for _ in range(frames):
+            talk.team()
+        _says(talk, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
+    talk.wait(140.0)
+    talk.ask_nobody()
+    _says(
+        talk, f"flags {int(Flags.STOPPED):02X}h, which no answer has told,", partial(_flagged, Flags.STOPPED)
+    )
+    talk.wait(140.0)
+    question = talk.ask(talk.air.slots[0], gap_ms=0.0)
+    first = f"flags {int(Flags.STOPPED):02X}h in the answer to {question.what}, the first of two in a row"
+    talk.answered(question, talk.air.slots[0], first, partial(_flagged, Flags.STOPPED))
+    talk.ask(talk.air.slots[0], lead=b"", gap_ms=40.0)
+    _says(talk, "flags 00h", partial(_flagged, 0))
+    for silence_ms, wanted in ((140.0, Flags.STOPPED), (560.0, both)):
+        for _ in range(2):  # what happened twice is told once
+            talk.team()
+            talk.wait(silence_ms)
+        _says(talk, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
+
+
+def _says(talk: Talk, wanted: str, says: Callable[[Answer, Seen], str], gap_ms: float = 36.0) -> Frame:
+    question = talk.ask(talk.air.slots[0], gap_ms=gap_ms)
+    talk.answered(question, talk.air.slots[0], f"{wanted} in the answer to {question.what}", says)
+    return question
+
+
+def _flagged(wanted: int, answer: Answer, seen: Seen) -> str:
+    assert answer.said is not None
+    return "" if answer.said.flags == wanted else f"{answer.said.flags:02X}h"
+
+
+@CHAPTER.rule(
+    "P46",
+    "The status bytes MUST be those of the left and of the right LM629.",
+    FRAME,
+    presupposes=("P35", "P41"),
+)
+def status(talk: Talk) -> None:
+    talk.team()
+    _says(talk, "the chips' status", _status)
+    _run_away(talk)  # then they differ
+    _says(talk, "the chips' status", _status, gap_ms=70.0)
+    end = talk.now
+
+    def differ(seen: Seen) -> Found:
+        last = seen.periods[-1][1]
+        if last.left.status == last.right.status:
+            return end, f"{last.left.status:02X}h in both"
+        return None
+
+    talk.expect(end, "an excessive error in the left LM629 alone", differ)
+
+
+def _run_away(talk: Talk) -> None:
+    """Gains of 0 and a fast left wheel: its desired position runs away from the real one."""
+    slot = talk.air.slots[0]
+    talk.service(slot, Opcode.FILTER, bytes(8))
+    for _ in range(8):
+        talk.team(talk.same(slot, 16000, 50), gap_ms=30.0)
+
+
+def _status(answer: Answer, seen: Seen) -> str:
+    said = answer.said
+    assert said is not None
+    before, after = _around(answer, seen)
+    left, right = (before.left.status, after.left.status), (before.right.status, after.right.status)
+    for side, (one, other), others, found in (
+        ("left", left, right, said.status_left),
+        ("right", right, left, said.status_right),
+    ):
+        if one == other != found:
+            more = ": that is the other one's" if others == (found, found) else ""
+            return f"{found:02X}h and not {one:02X}h of the {side} one{more}"
+    return ""
+
+
+def _around(answer: Answer, seen: Seen) -> tuple[RobotPeriod, RobotPeriod]:
+    """The robot at the begin of the last control period before an answer was asked for, and of the first behind it."""
+    begun = answer.frame.start_tick - ms(14.0)
+    before = [record for tick, record in seen.periods if tick <= begun]
+    after = [record for tick, record in seen.periods if tick >= answer.tick]
+    return before[-1], (after or [seen.periods[-1][1]])[0]
+
+
+@CHAPTER.rule(
+    "P47",
+    "The positions MUST be the low 16 bits of the real positions of both wheels, as they are when the robot answers.",
+    FRAME,
+    presupposes=("P35", "P41"),
+    broken="positions in answers are wrong",
+)
+def positions(talk: Talk) -> None:
+    slot = talk.air.slots[0]
+    for _ in range(10):  # beyond 65536 counts, one wheel forward and one backward
+        talk.team(talk.same(slot, 13000, -12000), gap_ms=50.0)
+    _says(talk, "the real positions", _positions)
+    for _ in range(_AT_SPEED):
+        question = talk.team(
+            talk.same(slot, 13000, -12000),
+            ask=True,
+            step=_step_to(talk, slot),
+            what="question at speed",
+            gap_ms=36.0,
+        )
+        talk.answered(
+            question, slot, f"positions of one sample each in the answer to {question.what}", _read_at_once
+        )
+    talk.team(talk.same(slot, 0, 0), gap_ms=60.0)
+    for _ in range(6):
+        talk.team(talk.same(slot, 0, 0), gap_ms=60.0)
+    _stands(talk, slot)
+    _run_away(talk)
+    _stands(talk, slot)
+
+
+def _stands(talk: Talk, slot: int) -> None:
+    question = talk.team(
+        talk.same(slot, 0, 0),
+        ask=True,
+        step=_step_to(talk, slot),
+        what=f"question to robot {slot}",
+        gap_ms=70.0,
+    )
+    talk.answered(question, slot, f"the real positions in the answer to {question.what}", _positions)
+
+
+def _step_to(talk: Talk, slot: int) -> int:
+    return next(step for step in range(1, 9) if (talk.seq + step) % SEQ_MODULUS % talk.n == slot)
+
+
+def _positions(answer: Answer, seen: Seen) -> str:
+    said = answer.said
+    assert said is not None
+    before, after = _around(answer, seen)
+    left = (before.left.real_position, after.left.real_position)
+    right = (before.right.real_position, after.right.real_position)
+    for side, ends, others, found in (
+        ("left", left, right, said.position_left),
+        ("right", right, left, said.position_right),
+    ):
+        if not _within(found, ends):
+            one, other = (number(end & 0xFFFF) for end in ends)
+            where = f"{number(found)} of the {side} wheel, which went from {one} to {other}"
+            if _within(found >> 8 | (found & 0xFF) << 8, ends):
+                return f"{where}: its bytes are exchanged"
+            return f"{where}: that is the other wheel's" if _within(found, others) else where
+    return ""
+
+
+def _read_at_once(answer: Answer, seen: Seen) -> str:
+    """Each position is the low word of what one RDRP read; a robot that reads no RDRP is not judged by this."""
+    said = answer.said
+    assert said is not None
+    for side, found in (("left", said.position_left), ("right", said.position_right)):
+        read = seen.read_positions(side, answer.frame.start_tick - ms(14.0), answer.tick)
+        if read and found not in read:
+            where = f"{number(found)} of the {side} wheel, of which {', '.join(map(number, read))} was read"
+            mixed = any(found in (one & 0xFF00 | other & 0xFF, one) for one in read for other in read)
+            return f"{where}: its bytes are of two samples" if mixed else where
+    return _positions(answer, seen)
+
+
+def _within(position: int, ends: tuple[int, int]) -> bool:
+    """Whether these 16 bits are a position between the ends, or two counts beyond."""
+    low, high = min(ends) - 2, max(ends) + 2
+    return (position - low) & 0xFFFF <= high - low
+
+
+@CHAPTER.rule(
+    "P48",
+    "`accepted` MUST count the fresh frames since power-on, the question itself included, and wrap at 256; no other"
+    " frame counts.",
+    FRAME,
+    airs=THREE,
+    presupposes=("P17", "P34", "P40", "P41"),
+)
+def accepted(talk: Talk) -> None:
+    count = 0
+
+    def counted(wanted: int) -> None:
+        _says(talk, f"accepted {number(wanted % 256, 2)}", partial(_counts, "accepted", wanted))
+
+    for rows, gap_ms in ((5, 12.0), (122, 0.0), (128, 0.0), (3, 12.0)):
+        for _ in range(rows):
+            talk.team(lead=b"", gap_ms=gap_ms)
+        talk.wait(12.0)
+        talk.team(step=0, fresh=False, lead=b"")
+        talk.team(step=30, fresh=False, lead=b"")
+        talk.team(fresh=False, lead=b"", wrong={6: 2})
+        talk.ping(lead=b"")
+        talk.of_type_2(lead=b"")
+        count += rows + 3
+        counted(count)
+
+
+def _counts(name: str, wanted: int, answer: Answer, seen: Seen) -> str:
+    assert answer.said is not None
+    found = int(getattr(answer.said, name))
+    return "" if found == wanted % 256 else number(found, 2)
+
+
+@CHAPTER.rule(
+    "P49",
+    "`rejected` MUST count the windows whose sync, stop bits and spacings are good and whose CRC is bad, and wrap at"
+    " 256; nothing else counts.",
+    RECEPTION,
+    airs=BOTH,
+    presupposes=("P06", "P13", "P41"),
+)
+def rejected(talk: Talk) -> None:
+    count = 0
+    size = talk.form.size
+
+    def counted() -> None:
+        _says(talk, f"rejected {number(count % 256, 2)}", partial(_counts, "rejected", count))
+
+    counted()
+    for how in ({size - 1: 1}, {2: 0x80}, {size // 2: 0x18}):
+        talk.team(fresh=False, wrong=how)
+        count += 1
+    counted()
+    talk.team(step=0, fresh=False)
+    talk.team(fresh=False, bad_stop=7, wrong={5: 1})
+    talk.team(fresh=False, pauses={9: 200.0}, wrong={5: 1})
+    talk.team(fresh=False, wrong={0: 1})
+    talk.team(fresh=False, wrong={1: 0x80})
+    talk.characters(bytes(40))
+    talk.wait(12.0)
+    counted()
+    for syncs in (40, 90, 150):  # each sync with a whole window behind it is one
+        talk.characters(SYNC * syncs)
+        count += (2 * syncs - size) // 2 + 1
+        talk.wait(20.0)
+        counted()
+
+
+@CHAPTER.rule(
+    "P50",
+    "A robot MUST answer the first question after a silence too: failsafe and motors off change nothing in it.",
+    FRESHNESS,
+    airs=THREE,
+    presupposes=("P41",),
+)
+def after_silence(talk: Talk) -> None:
+    slot = talk.air.slots[0]
+    for silence_ms in (130.0, 700.0):
+        talk.answered(talk.ask(slot, gap_ms=36.0), slot)
+        talk.wait(silence_ms)
+    talk.answered(talk.ask(slot, gap_ms=36.0), slot)

@@ -1,0 +1,110 @@
+"""Rules about power-on: motors off, both chips reset together, ready in time."""
+
+from __future__ import annotations
+
+from miro_exact.clock import NEVER_TICK
+from miro_robot.lm629.chip import SAMPLE_TICKS
+from miro_robot.lm629.commands import BY_NAME
+from miro_robot.lm629.signals import MOTOR_OFF
+from miro_sim.world.events import SIDES
+from mirotwin.verify.conform.hints import in_words
+from mirotwin.verify.conform.rule import Chapter
+from mirotwin.verify.conform.rules import POWER_ON
+from mirotwin.verify.conform.seen import Seen
+from mirotwin.verify.conform.talk import BOOTED_MS, Found, Talk, ms
+
+CHAPTER = Chapter("Power-on")
+_RESET, _RSTI = BY_NAME["RESET"].opcode, BY_NAME["RSTI"].opcode
+
+
+@CHAPTER.rule(
+    "P01",
+    "From power-on until the first fresh team frame both motors MUST be off, however long that takes.",
+    POWER_ON,
+    presupposes=("P24",),
+    broken="a motor is on before the first team frame",
+)
+def motors_off(talk: Talk) -> None:
+    talk.wait(600.0)
+    first = talk.team()
+    keeps_off(talk, 0, first.tick)
+    talk.obeyed(first)
+
+
+@CHAPTER.rule(
+    "P02",
+    "Both LM629 MUST leave reset together, and RESET (00h) MUST never be sent to one alone: their samples coincide;"
+    " RSTI 0000h follows, and both show 80h or C0h.",
+    POWER_ON,
+    presupposes=("P03",),
+)
+def reset_together(talk: Talk) -> None:
+    talk.wait(60.0)
+    first = talk.team()
+    talk.obeyed(first)
+    end = talk.now
+
+    def shown(seen: Seen) -> Found:
+        for tick, side, chip in seen.chips(ms(BOOTED_MS), first.tick):
+            if chip.status not in (0x80, 0xC0):
+                return tick, f"{chip.status:02X}h of the {side} one"
+        return None
+
+    def alone(seen: Seen) -> Found:
+        resets = [(one.tick, one.side) for one in seen.commands if one.opcode == _RESET]
+        for tick, side in resets:
+            if len([at for at, _ in resets if at == tick]) != len(SIDES):
+                return tick, f"RESET to the {side} one"
+        return None
+
+    def other_mask(seen: Seen) -> Found:
+        for one in seen.commands:
+            if one.tick <= first.tick and one.opcode == _RSTI and one.data != bytes(2):
+                return one.tick, f"RSTI {one.data.hex()} to the {one.side} one"
+        return None
+
+    def apart(seen: Seen) -> Found:
+        for tick, left, right in seen.samples:
+            if tick > ms(BOOTED_MS) and NEVER_TICK in (left, right):
+                return tick, "one in reset"
+            if tick > ms(BOOTED_MS) and (left - right) % SAMPLE_TICKS:
+                return tick, f"{(left - right) % SAMPLE_TICKS} ticks from one to the other"
+        return None
+
+    talk.expect(first.tick, f"status 80h or C0h {BOOTED_MS:g} ms after power-on", shown)
+    talk.expect(first.tick, "RSTI 0000h", other_mask)
+    talk.expect(end, "RESET sent to both LM629 or none", alone)
+    talk.expect(end, f"both LM629 with the same samples {BOOTED_MS:g} ms after power-on", apart)
+
+
+@CHAPTER.rule(
+    "P03",
+    f"A robot MUST be ready {BOOTED_MS:g} ms after power-on: it acts on a frame that begins then.",
+    POWER_ON,
+    presupposes=("P24",),
+    broken="it is not ready 40 ms after power-on",
+)
+def ready(talk: Talk) -> None:
+    talk.seq = 0  # P19 has other numbers
+    talk.obeyed(talk.team())
+
+
+def keeps_off(talk: Talk, after_tick: int, until_tick: int) -> None:
+    """Expects both motors off in between; the chips have `BOOTED_MS` for their reset."""
+
+    def ordered(seen: Seen) -> Found:
+        for order in seen.ordered(after_tick, until_tick):
+            if order.what != "off":
+                return order.tick, f"the {order.side} one told {in_words(order)}"
+        return None
+
+    def driven(seen: Seen) -> Found:
+        for tick, side, chip in seen.chips(after_tick + ms(BOOTED_MS), until_tick):
+            if chip.pwm_magnitude:
+                return tick, f"the {side} one driven"
+            if not chip.status & MOTOR_OFF:
+                return tick, f"status {chip.status:02X}h of the {side} LM629"
+        return None
+
+    talk.expect(until_tick, "both motors off", ordered)
+    talk.expect(until_tick, "both motors off", driven)

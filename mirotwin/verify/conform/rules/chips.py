@@ -1,0 +1,96 @@
+"""Rules about LM629s that are slow, as the data sheet allows, or that never come up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from miro_protocol.table import Flags
+from miro_robot.lm629.options import Lm629Options
+from mirotwin.verify.conform.rule import Chapter
+from mirotwin.verify.conform.rules import FRAME, PORT, POWER_ON
+from mirotwin.verify.conform.rules.sound import nothing_refused
+from mirotwin.verify.conform.seen import Answer, Seen
+from mirotwin.verify.conform.talk import Found, Talk
+
+CHAPTER = Chapter("Slow and broken LM629s")
+_BUSY = 0x01
+_SLOW = Lm629Options(busy_clocks=600, reset_clocks=9000, reset_disarms_breakpoint=False)
+_NEVER_FREE = Lm629Options(busy_clocks=1 << 20)  # 175 ms after each command
+_NEVER_UP = Lm629Options(reset_clocks=1 << 24)  # 2.8 s: the trial is over before
+
+
+@CHAPTER.rule(
+    "P57",
+    "LM629s that take the data sheet's longest times, 1.5 ms for a reset and 100 us for a command or a word, and that"
+    " show C4h after a reset, MUST be waited for: the robot does as with others.",
+    POWER_ON,
+    lm629=_SLOW,
+    presupposes=("P47",),
+)
+def slow(talk: Talk) -> None:
+    slot = talk.air.slots[0]
+    for _ in range(3):
+        talk.obeyed(talk.team())
+        talk.answered(
+            talk.ask(slot, gap_ms=36.0), slot, "no flag 20h, and status of LM629s that are free", _free
+        )
+    nothing_refused(talk)
+
+
+@CHAPTER.rule(
+    "P58",
+    "With LM629s that do not come out of reset, motors MUST stay off, and a robot MUST answer all the same and say so"
+    " (20h).",
+    FRAME,
+    lm629=_NEVER_UP,
+    presupposes=("P41",),
+    broken="a broken LM629 is not told of",
+)
+def broken(talk: Talk) -> None:
+    _tells_of_them(talk)
+
+
+@CHAPTER.rule(
+    "P59",
+    "LM629s that stay busy MUST NOT be waited for without end: motors stay off, and a robot answers and says so (20h).",
+    PORT,
+    lm629=_NEVER_FREE,
+    presupposes=("P58",),
+)
+def busy(talk: Talk) -> None:
+    _tells_of_them(talk)
+
+
+def _tells_of_them(talk: Talk) -> None:
+    slot = talk.air.slots[0]
+    talk.team(lead=b"")
+    talk.answered(talk.ask(slot, gap_ms=36.0), slot, "flag 20h", _says(Flags.INIT_FAILED, Flags.INIT_FAILED))
+    both = Flags.INIT_FAILED | Flags.MOTORS_OFF
+    for _ in range(2):
+        talk.wait(520.0)
+        talk.answered(talk.ask(slot, gap_ms=36.0), slot, f"flags {int(both):02X}h", _says(both, both))
+    end = talk.now
+
+    def driven(seen: Seen) -> Found:
+        for tick, side, chip in seen.chips(0, end):
+            if chip.pwm_magnitude:
+                return tick, f"the {side} one driven"
+        return None
+
+    talk.expect(end, "both motors off", driven)
+
+
+def _free(answer: Answer, seen: Seen) -> str:
+    said = answer.said
+    assert said is not None
+    if said.status_left & _BUSY or said.status_right & _BUSY:
+        return f"status {said.status_left:02X}h and {said.status_right:02X}h, read while busy (01h)"
+    return _says(0, Flags.INIT_FAILED)(answer, seen)
+
+
+def _says(wanted: int, among: int) -> Callable[[Answer, Seen], str]:
+    def says(answer: Answer, seen: Seen) -> str:
+        assert answer.said is not None
+        return "" if answer.said.flags & among == wanted else f"{answer.said.flags:02X}h"
+
+    return says

@@ -1,0 +1,189 @@
+"""Rules about what a team frame makes the wheels do."""
+
+from __future__ import annotations
+
+from typing import Unpack
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.table import VELOCITY_SATURATION
+from miro_robot.lm629.chip import SAMPLE_TICKS
+from miro_robot.lm629.commands import BY_NAME
+from mirotwin.verify.checks.failsafe import ACTING_MS
+from mirotwin.verify.conform.probe import why_deaf
+from mirotwin.verify.conform.rule import Air, Chapter
+from mirotwin.verify.conform.rules import FIRMWARE, FRAME, TURNS
+from mirotwin.verify.conform.seen import Seen
+from mirotwin.verify.conform.talk import ACTING_TICKS, Found, Frame, How, Talk, ms
+
+CHAPTER = Chapter("Velocities")
+_LTRJ = BY_NAME["LTRJ"].opcode
+_ACCELERATION = 0x20
+"""Bit of LTRJ's control word: an acceleration follows."""
+_ANY_BOOT_MS = 260.0
+"""More than that of P03, which presupposes P24."""
+
+
+@CHAPTER.rule(
+    "P22",
+    "In a network of 3, each robot MUST take the velocities of its own slot.",
+    FRAME,
+    airs=(Air(3, (0, 1, 2)),),
+    presupposes=("P19",),
+)
+def own_slot_of_three(talk: Talk) -> None:
+    for _ in range(4):
+        talk.obeyed(talk.team())
+
+
+@CHAPTER.rule(
+    "P23",
+    "In a network of 5, each robot MUST take the velocities of its own slot.",
+    FRAME,
+    airs=(Air(5, (0, 1, 2, 3, 4)),),
+    presupposes=("P19",),
+)
+def own_slot_of_five(talk: Talk) -> None:
+    for _ in range(4):
+        talk.obeyed(talk.team())
+
+
+@CHAPTER.rule(
+    "P24",
+    f"On a fresh frame of type 0 or 3 both LM629 MUST be told the velocities within {ACTING_MS:g} ms of its end.",
+    FRAME,
+    broken="a plain team frame is not obeyed",
+    probe=why_deaf,
+)
+def both_types(talk: Talk) -> None:
+    talk.wait(_ANY_BOOT_MS)
+    after = ""
+    for ask in (False, True, True, False):
+        what = "question" if ask else "team frame"
+        talk.obeyed(talk.team(ask=ask, what=what + after))
+        after = f" after a {what}"
+
+
+@CHAPTER.rule(
+    "P25",
+    "Velocities MUST be taken as they are: 16 bits, low byte first, two's complement, left before right, 1/256 count"
+    " per sample, none rounded.",
+    FRAME,
+    presupposes=("P19",),
+)
+def words(talk: Talk) -> None:
+    pairs = [
+        (1, -1),
+        (-1, 1),
+        (2, 255),
+        (-255, -256),
+        (256, 257),
+        (-257, 127),
+        (128, -128),
+        (0x1234, -0x1234),
+    ]
+    pairs += [(0x55AA >> 2, -0x2AD5), (0, 300), (-300, 0), (4097, 16), (-16633, 16632)]
+    for left, right in pairs:
+        talk.obeyed(_only(talk, left, right))
+
+
+@CHAPTER.rule(
+    "P26",
+    f"Velocities beyond +-{VELOCITY_SATURATION} MUST be cut off there, and those within MUST not.",
+    FRAME,
+    presupposes=("P19",),
+)
+def saturation(talk: Talk) -> None:
+    limit = VELOCITY_SATURATION
+    for left, right in (
+        (limit, -limit),
+        (limit + 1, -limit - 1),
+        (-limit - 1, limit + 1),
+        (32767, -32767),
+        (-32767, 32767),
+        (limit - 1, 1 - limit),
+        (20000, 100),
+        (-100, -20000),
+    ):
+        talk.obeyed(_only(talk, left, right))
+
+
+def _only(talk: Talk, left: int, right: int, **how: Unpack[How]) -> Frame:
+    """A frame with these velocities for the robots that are there."""
+    pairs = list(talk.words())
+    for slot in talk.air.slots:
+        pairs[slot] = (left, right)
+    return talk.team(tuple(pairs), what=f"team frame with {left}, {right}", **how)
+
+
+@CHAPTER.rule(
+    "P27",
+    "Both wheels MUST get their velocities in one LM629 sample, and likewise stop and go off.",
+    FIRMWARE,
+    presupposes=("P32",),
+)
+def one_sample(talk: Talk) -> None:
+    frames = [talk.team(gap_ms=12.0 + 0.11 * count) for count in range(12)]
+    talk.wait(620.0)
+    for frame in frames:
+        talk.obeyed(frame)
+        _together(talk, frame.tick, frame.end_tick + ACTING_TICKS, frame.what)
+    end = frames[-1].end_tick
+    _together(talk, end + ms(50.0), end + ms(120.0), "the failsafe's stop")
+    _together(talk, end + ms(450.0), end + ms(510.0), "motors off")
+
+
+def _together(talk: Talk, after_tick: int, until_tick: int, what: str) -> None:
+    def test(seen: Seen) -> Found:
+        left, right = seen.both_told(until_tick)
+        if min(left.tick, right.tick) <= after_tick:
+            return until_tick, "a wheel that was told nothing"
+        grid = seen.samples[-1][1]
+        if (left.tick - grid) // SAMPLE_TICKS != (right.tick - grid) // SAMPLE_TICKS:
+            return max(left.tick, right.tick), f"{abs(left.tick - right.tick)} ticks from one to the other"
+        return None
+
+    talk.expect(until_tick, f"{what}: STT of both wheels in one sample", test)
+
+
+@CHAPTER.rule(
+    "P28",
+    "Between frames the wheels MUST keep their velocities.",
+    TURNS,
+    presupposes=("P19",),
+    broken="velocities are not kept between frames",
+)
+def kept(talk: Talk) -> None:
+    for sign in (1, -1, 1):
+        frame = _only(talk, 300 * sign, -311 * sign, gap_ms=65.0)
+        talk.obeyed(frame)
+        talk.unchanged(frame.end_tick + ACTING_TICKS, talk.now, f"velocities kept behind {frame.what}")
+        _reached(talk, frame)
+
+
+def _why_not_reached(seen: Seen, tick: int) -> str:
+    told = seen.both_told(tick)
+    if not all(order.moves for order in told):
+        return ""
+    if not all(order.acceleration for order in told):
+        return ": an acceleration of 0 is loaded"
+    begun = next(order.tick for order in seen.ordered(0, tick) if order.moves)
+    for one in seen.wrote(begun, tick):
+        if one.opcode == _LTRJ and one.data[1] & _ACCELERATION:
+            return f": at tick {one.tick} an acceleration was loaded in motion, {one.side} LTRJ {one.data.hex(' ')}"
+    return ""
+
+
+def _reached(talk: Talk, frame: Frame) -> None:
+    """Both chips run at the frame's velocities 20 ms after it."""
+    after_tick, until_tick = frame.end_tick + ms(20.0), talk.now
+
+    def test(seen: Seen) -> Found:
+        wanted = frame.for_robot(seen.slot)
+        for tick, record in seen.periods:
+            found = (record.left.desired_velocity / 256, record.right.desired_velocity / 256)
+            if after_tick <= tick <= until_tick and found != wanted:
+                return tick, f"{found[0]:g}, {found[1]:g}{_why_not_reached(seen, tick)}"
+        return None
+
+    assert until_tick - after_tick > CONTROL_PERIOD_TICKS
+    talk.expect(until_tick, f"both LM629 at the velocities of {frame.what}", test)

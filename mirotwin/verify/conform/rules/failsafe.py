@@ -1,0 +1,254 @@
+"""Rules about silence: the smooth stop, motors off, and coming back from both."""
+
+from __future__ import annotations
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.table import (
+    DEFAULT_ACCELERATION,
+    FAILSAFE_OFF_TICKS,
+    FAILSAFE_STOP_TICKS,
+    SYNC,
+    TICKS_PER_MS,
+    Opcode,
+)
+from miro_robot.lm629.chip import SAMPLE_TICKS
+from miro_robot.lm629.signals import MOTOR_OFF
+from miro_sim.world.events import SIDES
+from mirotwin.verify.conform.hints import in_words
+from mirotwin.verify.conform.rule import Chapter
+from mirotwin.verify.conform.rules import FRESHNESS, WHEELS
+from mirotwin.verify.conform.seen import Seen
+from mirotwin.verify.conform.talk import ACTING_TICKS, Found, Frame, Talk, ms
+
+CHAPTER = Chapter("Failsafe")
+TOLERANCE_TICKS = ms(0.5)
+"""One and a half LM629 samples."""
+_COUNTED = (
+    "A robot may count from the start or from the end of that frame's last character (1.04 ms apart), and may be 0.5 ms"
+    " off"
+)
+
+
+@CHAPTER.rule(
+    "P29",
+    f"110 ms after the last fresh frame both wheels MUST be told to stop. {_COUNTED}.",
+    FRESHNESS,
+    presupposes=("P28",),
+    broken="the wheels are not told to stop 110 ms after the last frame",
+)
+def stop(talk: Talk) -> None:
+    for make in (talk.team, talk.team, talk.ask_nobody):
+        talk.obeyed(talk.team())
+        talk.wait(3.3)
+        stops_behind(talk, make())
+        talk.wait(130.0)
+
+
+@CHAPTER.rule(
+    "P30",
+    "Frames that are not fresh, or not valid, and characters that are no frame MUST NOT put off the failsafe.",
+    FRESHNESS,
+    presupposes=("P06", "P13", "P20", "P32", "P37"),
+    broken="the failsafe is put off",
+)
+def not_put_off(talk: Talk) -> None:
+    last = talk.team()
+    talk.obeyed(last)
+    for count in range(16):
+        talk.team(step=0, fresh=False, lead=b"", gap_ms=0.0)
+        talk.team(fresh=False, lead=b"", gap_ms=0.0, wrong={4: 1})
+        if count == 0:  # 150 ms later it would be fresh
+            talk.team(step=40, fresh=False, lead=b"", gap_ms=0.0)
+    stops_behind(talk, last)
+    off_behind(talk, last)
+    talk.wait_until(max(talk.now, last.end_tick + ms(530.0)))
+    talk.obeyed(talk.team())
+    talk.wait(3.3)
+    last = talk.team(gap_ms=0.0)
+    talk.characters(bytes(8))  # no robot has looked at the frame when the first of these ends
+    stops_behind(talk, last)
+    talk.wait(130.0)
+    _stop_of_a_busy_robot(talk)
+
+
+def _stop_of_a_busy_robot(talk: Talk) -> None:
+    """While one wheel still comes to a stop and an acceleration waits for that, syncs in a row before a frame."""
+    slot = talk.air.slots[0]
+    for syncs in (16, 24):
+        for _ in range(8):
+            talk.team(talk.same(slot, 0, 12000))
+        talk.team(talk.same(slot, 0, 12000), gap_ms=2.0)
+        talk.service(slot, Opcode.ACCELERATION, DEFAULT_ACCELERATION.to_bytes(4, "little"), gap_ms=0.0)
+        talk.wait(112.0)
+        talk.characters(SYNC * syncs)
+        last = talk.team(what=f"team frame behind {syncs} syncs", lead=b"")
+        talk.obeyed(last)
+        stops_behind(talk, last)
+        talk.wait(130.0)
+
+
+@CHAPTER.rule(
+    "P31",
+    "The failsafe's stop MUST be smooth, with the acceleration in force: 5973 (6 m/s2) until a service frame sets"
+    " another.",
+    FRESHNESS,
+    presupposes=("P29", "P36"),
+    broken="the failsafe's stop is not as it has to be",
+)
+def smooth(talk: Talk) -> None:
+    for acceleration in (DEFAULT_ACCELERATION, 3000):
+        if acceleration != DEFAULT_ACCELERATION:
+            talk.service(talk.air.slots[0], Opcode.ACCELERATION, acceleration.to_bytes(4, "little"))
+        fast = tuple((12000, -12000) for _ in range(talk.n))
+        until = talk.now + ms(12000 * 256 / acceleration * SAMPLE_TICKS / TICKS_PER_MS + 60.0)
+        while talk.now < until:
+            last = talk.team(fast, gap_ms=60.0)
+        talk.obeyed(last)
+        stop_tick = last.end_tick + FAILSAFE_STOP_TICKS
+        talk.wait_until(
+            last.end_tick + ms(490.0) if acceleration != DEFAULT_ACCELERATION else stop_tick + ms(320.0)
+        )
+        _slows_down(talk, stop_tick + TOLERANCE_TICKS, talk.now, acceleration)
+        _stays_closed(talk, last, talk.now)
+
+
+def _slows_down(talk: Talk, after_tick: int, until_tick: int, acceleration: int) -> None:
+    """From one control period to the next the velocities fall by what the acceleration makes in 97 or 98 samples."""
+    samples = CONTROL_PERIOD_TICKS // SAMPLE_TICKS
+
+    def test(seen: Seen) -> Found:
+        before: dict[str, int] = {}
+        steps = 0
+        for tick, side, chip in seen.chips(after_tick, until_tick):
+            now = abs(chip.desired_velocity)
+            fallen = before.get(side, now) - now
+            if side in before and now:  # the last step is a part of one
+                steps += 1
+                if fallen not in (samples * acceleration, (samples + 1) * acceleration):
+                    return tick, f"the {side} one slower by {fallen / samples:.0f} a sample"
+            before[side] = now
+        if not steps:
+            return until_tick, "no wheel that slowed down"
+        if any(before.values()):
+            return until_tick, "a wheel that still turns"
+        return None
+
+    talk.expect(until_tick, f"wheels slowed down by {acceleration} / 65536 count per sample^2", test)
+
+
+def _stays_closed(talk: Talk, last: Frame, until_tick: int) -> None:
+    """No abrupt stop, and the motors stay on."""
+
+    def test(seen: Seen) -> Found:
+        for order in seen.ordered(last.end_tick + ACTING_TICKS, until_tick):
+            if order.abrupt or order.what == "off":
+                return order.tick, f"the {order.side} wheel told {in_words(order)}"
+        return None
+
+    talk.expect(until_tick, "a smooth stop", test)
+
+
+@CHAPTER.rule(
+    "P32",
+    f"500 ms after the last fresh frame both motors MUST be off. {_COUNTED}.",
+    FRESHNESS,
+    presupposes=("P31", "P34"),
+    broken="the motors are not off 500 ms after the last frame",
+)
+def off(talk: Talk) -> None:
+    talk.obeyed(talk.team())
+    last = talk.ping()
+    off_behind(talk, last)
+    talk.wait_until(last.end_tick + ms(700.0))
+
+    def driven(seen: Seen) -> Found:
+        for tick, side, chip in seen.chips(last.end_tick + ms(501.0), talk_end):
+            if chip.pwm_magnitude or not chip.status & MOTOR_OFF:
+                return tick, f"the {side} one on"
+        return None
+
+    talk_end = talk.now
+    talk.expect(talk_end, "both motors off", driven)
+
+
+@CHAPTER.rule(
+    "P33",
+    "After a failsafe stop and after motors off the next fresh team frame MUST be obeyed, with both motors on.",
+    WHEELS,
+    presupposes=("P28",),
+)
+def back(talk: Talk) -> None:
+    for silence_ms in (150.0, 600.0, 900.0, 120.0):
+        frame = talk.team()
+        talk.obeyed(frame)
+        _turning(talk, talk.team(frame.words, gap_ms=60.0))
+        talk.wait(silence_ms - 60.0)
+    talk.obeyed(talk.team())
+
+
+def _turning(talk: Talk, frame: Frame) -> None:
+    """Both wheels turn as told, as seen from the encoders, when they had time for it."""
+    until = frame.end_tick + ms(60.0)
+
+    def test(seen: Seen) -> Found:
+        *_, one, other = (record for tick, record in seen.periods if tick <= until)
+        left = other.left.real_position - one.left.real_position
+        right = other.right.real_position - one.right.real_position
+        for side, moved, word in zip(SIDES, (left, right), frame.for_robot(seen.slot), strict=True):
+            nominal = word * CONTROL_PERIOD_TICKS / SAMPLE_TICKS / 256
+            if abs(moved - nominal) > abs(nominal) / 2:
+                why = "" if seen.set_to(side, until) else ": no filter was loaded into its LM629 (LFIL, UDF)"
+                return (
+                    until,
+                    f"{moved} counts of the {side} one in a camera frame and not about {nominal:.0f}{why}",
+                )
+        return None
+
+    talk.expect(until, f"wheels that turn as by {frame.what}", test)
+
+
+def stops_behind(talk: Talk, last: Frame) -> None:
+    """Expects the stop in time, and neither earlier nor later."""
+    _in_time(talk, last, FAILSAFE_STOP_TICKS, "stop", "both wheels told to stop")
+
+
+def off_behind(talk: Talk, last: Frame) -> None:
+    """Expects motors off in time."""
+    _in_time(talk, last, FAILSAFE_OFF_TICKS, "off", "both motors off")
+
+
+def _in_time(talk: Talk, last: Frame, after_ticks: int, what: str, wanted: str) -> None:
+    earliest = last.last_tick + after_ticks - TOLERANCE_TICKS
+    latest = last.end_tick + after_ticks + TOLERANCE_TICKS
+
+    def done(seen: Seen, side: str, tick: int) -> bool:
+        order = seen.told(side, tick)
+        return order.what == "off" if what == "off" else not order.moves
+
+    def test(seen: Seen) -> Found:
+        for side in SIDES:
+            if done(seen, side, earliest):
+                early = seen.told(side, earliest).tick
+                if early <= last.tick:
+                    return (
+                        latest,
+                        f"the {side} one told {in_words(seen.told(side, earliest))} before it already",
+                    )
+                return early, f"the {side} one {in_ms(early - last.end_tick)} after its end"
+        if all(done(seen, side, latest) for side in SIDES):
+            return None
+        return latest, ", ".join(when(seen, side) for side in SIDES)
+
+    def when(seen: Seen, side: str) -> str:
+        after = [order.tick for order in seen.orders[side] if order.tick > last.end_tick]
+        tick = next((one for one in after if done(seen, side, one)), None)
+        if tick is None:
+            return f"{side} not within {in_ms(seen.end_tick - last.end_tick)}"
+        return f"{side} at {in_ms(tick - last.end_tick)}"
+
+    window = f"{in_ms(earliest - last.end_tick)} to {in_ms(latest - last.end_tick)}"
+    talk.expect(latest, f"{wanted} {window} after the end of {last.what}", test)
+
+
+def in_ms(ticks: int) -> str:
+    return f"{ticks / TICKS_PER_MS:.2f} ms"

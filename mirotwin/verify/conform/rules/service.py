@@ -1,0 +1,221 @@
+"""Rules about service frames, and about frames whose content is unknown."""
+
+from __future__ import annotations
+
+from miro_protocol.table import DEFAULT_ACCELERATION, Opcode
+from miro_sim.world.events import SIDES
+from mirotwin.verify.conform.hints import number
+from mirotwin.verify.conform.rule import Air, Chapter
+from mirotwin.verify.conform.rules import FIRMWARE, FRAME, RECEPTION, VERSIONS
+from mirotwin.verify.conform.rules.failsafe import stops_behind
+from mirotwin.verify.conform.rules.sound import nothing_refused
+from mirotwin.verify.conform.seen import Seen, Words
+from mirotwin.verify.conform.talk import ACTING_TICKS, Found, Frame, Talk, ms
+
+CHAPTER = Chapter("Service frames and unknown contents")
+
+
+def _filter(words: Words) -> bytes:
+    return b"".join(word.to_bytes(2, "little") for word in words)
+
+
+def _acceleration(value: int) -> bytes:
+    return value.to_bytes(4, "little")
+
+
+@CHAPTER.rule(
+    "P34",
+    "A service frame MUST count as fresh and leave the velocities as they are: a ping does nothing else.",
+    FRAME,
+    presupposes=("P29",),
+    broken="a ping does not do what it has to",
+)
+def ping(talk: Talk) -> None:
+    frame = talk.team()
+    talk.obeyed(frame)
+    for _ in range(5):
+        last = talk.ping(gap_ms=60.0)
+        talk.untouched(last, since=frame)
+    talk.unchanged(frame.end_tick + ACTING_TICKS, talk.now, "velocities kept while service frames come")
+    stops_behind(talk, last)
+    talk.wait(70.0)
+
+
+@CHAPTER.rule(
+    "P35",
+    "Opcode 1 MUST load kp, ki, kd and il into both LM629 and put them in force, at rest and in motion.",
+    FRAME,
+    presupposes=("P21",),
+    broken="filter words are not loaded as they have to be",
+)
+def filter_words(talk: Talk) -> None:
+    slot = talk.air.slots[0]
+    for words in ((0x0102, 0x0304, 0x0506, 0x0708), (0x7FFF, 0, 1, 0x55AA), (400, 40, 3000, 2000)):
+        _filter_taken(talk, talk.service(slot, Opcode.FILTER, _filter(words), "filter frame"), words)
+    talk.obeyed(talk.team())
+    words = (401, 41, 2900, 1999)
+    frame = talk.service(slot, Opcode.FILTER, _filter(words), "filter frame in motion")
+    _filter_taken(talk, frame, words)
+    talk.unchanged(frame.tick, frame.end_tick + ACTING_TICKS, "velocities kept")
+    talk.obeyed(talk.team())
+
+
+def _filter_taken(talk: Talk, frame: Frame, words: Words) -> None:
+    deadline = frame.end_tick + ACTING_TICKS
+
+    def test(seen: Seen) -> Found:
+        for side in SIDES:
+            found = seen.set_to(side, deadline)
+            if found != words:
+                return deadline, f"{_listed(found)} in the {side} one"
+        return None
+
+    talk.expect(deadline, f"kp, ki, kd, il = {_listed(words)} in force after {frame.what}", test)
+
+
+def _listed(words: Words | None) -> str:
+    return "none" if words is None else ", ".join(map(number, words))
+
+
+@CHAPTER.rule(
+    "P36",
+    "Opcode 2 MUST set the acceleration of both wheels, all 32 bits of it; at rest it is in force from the next"
+    " velocities on.",
+    FRAME,
+    presupposes=("P21",),
+    broken="an acceleration is not set as it has to be",
+)
+def acceleration(talk: Talk) -> None:
+    for value in (0x0102_0304, 0x3FFF_FFFF, 0x0001_2345, 4000):
+        talk.service(talk.air.slots[0], Opcode.ACCELERATION, _acceleration(value), "acceleration frame")
+        _driven_with(talk, talk.team(), value)
+        talk.obeyed(talk.team(_standing(talk)))
+        talk.wait(520.0)  # motors off: at rest in any case
+
+
+@CHAPTER.rule(
+    "P37",
+    "An acceleration that comes in motion MUST wait until the wheels stand: velocities go on with the one before.",
+    FIRMWARE,
+    presupposes=("P31", "P41"),
+    broken="an acceleration in motion does not wait",
+)
+def acceleration_waits(talk: Talk) -> None:
+    slot = talk.air.slots[0]
+    talk.obeyed(talk.team())
+    _sent_in_motion(talk, 9000)
+    for words in (talk.words(), ((0, 700),) * talk.n, ((-700, 0),) * talk.n):
+        _driven_with(talk, talk.team(words), DEFAULT_ACCELERATION)
+    for _ in range(8):  # told to stand by frames
+        talk.obeyed(talk.team(_standing(talk), gap_ms=20.0))
+    for _ in range(4):
+        fast = talk.team(((300, 14000),) * talk.n, gap_ms=60.0)
+    _driven_with(talk, fast, 9000)
+    _sent_in_motion(talk, 7000)
+    talk.obeyed(talk.team(_standing(talk), gap_ms=15.0))
+    _driven_with(talk, talk.team(what="team frame while one wheel slows down"), 9000)
+    talk.wait(300.0)  # told to stand by the failsafe
+    _driven_with(talk, talk.team(), 7000)
+    talk.answered(talk.ask(slot, gap_ms=40.0), slot)
+    nothing_refused(talk)
+
+
+def _sent_in_motion(talk: Talk, value: int) -> None:
+    frame = talk.service(
+        talk.air.slots[0], Opcode.ACCELERATION, _acceleration(value), "acceleration in motion"
+    )
+    talk.unchanged(frame.tick, frame.end_tick + ACTING_TICKS, "velocities kept")
+
+
+def _standing(talk: Talk) -> tuple[tuple[int, int], ...]:
+    return ((0, 0),) * talk.n
+
+
+def _driven_with(talk: Talk, frame: Frame, value: int) -> None:
+    """The frame is obeyed, and this acceleration is in force."""
+    talk.obeyed(frame)
+    deadline = frame.end_tick + ACTING_TICKS
+
+    def test(seen: Seen) -> Found:
+        for order in seen.both_told(deadline):
+            if order.acceleration != value:
+                return deadline, f"{number(order.acceleration, 8)} in the {order.side} one"
+        return None
+
+    talk.expect(deadline, f"acceleration {number(value, 8)} in force with {frame.what}", test)
+
+
+@CHAPTER.rule(
+    "P38",
+    "A setting MUST be made by the addressed robot alone.",
+    FRAME,
+    airs=(Air(3, (0, 1, 2)), Air(5, (0, 4))),
+    presupposes=("P35", "P36"),
+)
+def addressed(talk: Talk) -> None:
+    words = (300, 30, 2500, 1500)
+    for slot in talk.air.slots:
+        others = tuple(other for other in talk.air.slots if other != slot)
+        for opcode, data in ((Opcode.FILTER, _filter(words)), (Opcode.ACCELERATION, _acceleration(8000))):
+            frame = talk.service(slot, opcode, data, f"service frame to robot {slot}, opcode {opcode}")
+            talk.untouched(frame, others)
+            if opcode == Opcode.FILTER:
+                _only_of(talk, frame, slot, words)
+    talk.obeyed(talk.team())
+    absent = talk.n - 2
+    if absent not in talk.air.slots:
+        talk.untouched(talk.service(absent, Opcode.FILTER, _filter(words), "service frame to nobody"))
+
+
+def _only_of(talk: Talk, frame: Frame, slot: int, words: Words) -> None:
+    deadline = frame.end_tick + ACTING_TICKS
+
+    def test(seen: Seen) -> Found:
+        for side in SIDES:
+            found = seen.set_to(side, deadline)
+            if found != words:
+                return deadline, f"{_listed(found)} in the {side} one"
+        return None
+
+    talk.expect(deadline, f"{_listed(words)} in force after {frame.what}", test, (slot,))
+
+
+@CHAPTER.rule(
+    "P39",
+    "A service frame with an unknown opcode MUST be valid and count as fresh, and nothing in it be acted on.",
+    VERSIONS,
+    presupposes=("P31",),
+)
+def unknown_opcode(talk: Talk) -> None:
+    slot = talk.air.slots[0]
+    for opcode in (3, 0xFE):
+        talk.untouched(
+            talk.service(slot, opcode, bytes(range(1, 9)), f"service frame at rest, opcode {opcode}")
+        )
+    frame = talk.team()
+    talk.obeyed(frame)
+    for opcode in (3, 4, 0x7F, 0x81, 0xFF):
+        last = talk.service(slot, opcode, bytes(range(1, 9)), f"service frame, opcode {opcode}", gap_ms=50.0)
+        talk.untouched(last, since=frame)
+    talk.unchanged(frame.end_tick + ACTING_TICKS, talk.now, "velocities kept")
+    stops_behind(talk, last)
+    talk.wait(150.0)
+    _driven_with(talk, talk.team(), DEFAULT_ACCELERATION)
+
+
+@CHAPTER.rule(
+    "P40",
+    "A frame of type 2 from a host MUST be valid and count as fresh, and nothing in it be acted on or answered.",
+    RECEPTION,
+    presupposes=("P29",),
+    broken="a frame of type 2 is not handled as it has to be",
+)
+def type_2(talk: Talk) -> None:
+    frame = talk.team()
+    talk.obeyed(frame)
+    for _ in range(3 * talk.n):  # each number asks another robot
+        last = talk.of_type_2(gap_ms=40.0)
+        talk.untouched(last, since=frame)
+    talk.silent(frame.end_tick + ms(25.0), talk.now, "frames of type 2 ask nobody")
+    stops_behind(talk, last)
+    talk.wait(80.0)

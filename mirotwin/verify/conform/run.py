@@ -1,0 +1,175 @@
+"""Tries rules on an image: a world for each rule, run to the end of its trial.
+
+What belongs here: one trial as a run, and what comes of it. What does not: rules (`rules/`), files and tables (`cli`).
+
+Every trial ends at a tick that is known in advance, whatever the firmware does: one that never boots or sends without
+end costs the same virtual time. Trials go on behind a firmware fault, but end behind a thousand. Faults break the rules
+about them, whichever trial they came in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import msgspec
+
+from miro_robot.faults import FaultKind, FirmwareFault
+from miro_robot.image import Image
+from miro_sim.world.world import World
+from mirotwin.verify.cases.case import SUFFIX, case_text
+from mirotwin.verify.cases.trace import Trace
+from mirotwin.verify.checks.expect import Place
+from mirotwin.verify.checks.faults import NoFault
+from mirotwin.verify.checks.interface import Failure
+from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.conform.judgement import ConformsTo
+from mirotwin.verify.conform.probe import why_lost
+from mirotwin.verify.conform.rule import Rule
+from mirotwin.verify.conform.table import presupposed
+from mirotwin.verify.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
+
+FAULTS_KEPT = 20
+"""Of a robot in a trial."""
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """What came of a rule. `failures`: in the order of time, the first hundred. `faults`: (network, slot, fault) of
+    its trial, the first twenty a robot; `fault_count` of all. `cases`: name and text of a file for each failure.
+    `cause`: the rule is not judged, because this one failed. `hint`: what the firmware does instead, if that is known.
+    """
+
+    rule: str
+    failures: tuple[Failure, ...]
+    faults: tuple[tuple[int, int, FirmwareFault], ...] = ()
+    fault_count: int = 0
+    cases: tuple[tuple[str, str], ...] = ()
+    cause: str = ""
+    hint: str = ""
+
+    @property
+    def passed(self) -> bool:
+        return not self.failures and not self.cause
+
+    @property
+    def verdict(self) -> str:
+        return "passed" if self.passed else "failed" if self.failures else "not judged"
+
+
+def failure_text(failure: Failure) -> str:
+    """A failure for people, without the name of the check."""
+    return f"{failure}".partition(": ")[2]
+
+
+def case_names(rule: Rule) -> tuple[str, str]:
+    """Files that a rule may leave: the rule's own failure, and a firmware fault in its trial."""
+    return f"{rule.id}{SUFFIX}", f"{rule.id}-fault{SUFFIX}"
+
+
+def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Outcome:
+    """Runs the rule's trial on `image`; with `keep`, what failed is there as cases."""
+    trial = trial_of(rule)
+    world = World(trial.scenario, seed, image, trial.script)
+    trace = Trace(world)
+    checks = Checks(world, {place: [ConformsTo(rule=rule.id)] for place in _places(world)})
+    run_trial(world)
+    checks.finish()
+    failures = [one for one in checks.failures if not one.fault]
+    faults = tuple(
+        (network.index, robot.slot, fault)
+        for network in world.networks
+        for robot in network.robots
+        for fault in robot.board.faults[:FAULTS_KEPT]
+    )
+    if not failures and (not world.finished or checks.verdicts()[0].verdict != "passed"):
+        wanted = "a trial that can be judged"
+        found = (
+            "more events than the robot's log holds" if world.finished else f"{MOST_FAULTS} firmware faults"
+        )
+        failures = [Failure("conforms_to", *_places(world)[0], world.tick, wanted, found)]
+    cases = _cases(rule, world, trace, failures, faults) if keep else ()
+    return Outcome(rule.id, tuple(failures), faults, fault_count(world), cases)
+
+
+def _cases(
+    rule: Rule,
+    world: World,
+    trace: Trace,
+    failures: Sequence[Failure],
+    faults: Sequence[tuple[int, int, FirmwareFault]],
+) -> tuple[tuple[str, str], ...]:
+    """Each of which `mirotwin replay` brings to the same verdict."""
+    own, of_fault = case_names(rule)
+    found = []
+    if failures and world.finished:
+        found.append((own, case_text(world, trace, {"conforms_to": rule.id}, str(failures[0]))))
+    if faults:
+        network, slot, fault = min(faults, key=lambda one: one[2].tick)
+        verdict = Failure("no_fault", network, slot, fault.tick, NoFault.WANTED, str(fault), True)
+        found.append((of_fault, case_text(world, trace, {"no_fault": True}, str(verdict))))
+    return tuple(found)
+
+
+def _places(world: World) -> list[Place]:
+    return [(network.index, robot.slot) for network in world.networks for robot in network.robots]
+
+
+def try_all(rules: Sequence[Rule], image: Image, seed: int = 0, keep: bool = False) -> Iterator[Outcome]:
+    """Each as soon as it is known, those that others presuppose first; see `with_faults`.
+
+    A rule is not judged where one of `rules` failed that it presupposes: then its trial is not run. Nor is it where the
+    firmware did, before it failed, what another of `rules` forbids: what comes after that says nothing of the rule.
+    """
+    forbidden = {kind: rule.id for rule in rules for kind in rule.faults}
+    causes: dict[str, str] = {}
+    for rule in _presupposed_first(rules):
+        cause = next((causes[one.id] for one in presupposed(rule) if one.id in causes), "")
+        outcome = Outcome(rule.id, (), cause=cause) if cause else try_rule(rule, image, seed, keep)
+        if outcome.failures:
+            cause = next((forbidden[kind] for kind in _before(outcome) if kind in forbidden), "")
+            if cause:
+                outcome = msgspec.structs.replace(outcome, failures=(), cases=outcome.cases[-1:], cause=cause)
+            else:
+                place = (outcome.failures[0].network, image, seed)
+                hint = rule.probe(*place) if rule.probe is not None else why_lost(rule, *place)
+                outcome = msgspec.structs.replace(outcome, hint=hint)
+            causes[rule.id] = cause or rule.id
+        yield outcome
+
+
+def _presupposed_first(rules: Sequence[Rule]) -> list[Rule]:
+    tried = {rule.id: rule for rule in rules}
+    ordered: dict[str, Rule] = {}
+    for rule in rules:
+        ordered |= {one.id: tried[one.id] for one in (*presupposed(rule), rule) if one.id in tried}
+    return list(ordered.values())
+
+
+def _before(outcome: Outcome) -> list[FaultKind]:
+    """The kinds of fault that came before the rule failed."""
+    return [fault.kind for _, _, fault in outcome.faults if fault.tick <= outcome.failures[0].tick]
+
+
+def with_faults(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Outcome]:
+    """The outcomes in the order of `rules`, with all trials' firmware faults held against those that forbid them."""
+    kinds = {rule.id: rule.faults for rule in rules}
+    found = []
+    places = [rule.id for rule in rules]
+    for outcome in sorted(outcomes, key=lambda one: places.index(one.rule)):
+        forbidden = _forbidden(outcomes, kinds[outcome.rule])
+        if forbidden:
+            failures = (*forbidden, *outcome.failures)
+            outcome = msgspec.structs.replace(outcome, failures=failures, cause="")
+        found.append(outcome)
+    return found
+
+
+def _forbidden(outcomes: Sequence[Outcome], kinds: Sequence[FaultKind]) -> list[Failure]:
+    """A failure for each fault of these kinds."""
+    return [
+        Failure(
+            "conforms_to", network, slot, fault.tick, f"no such fault (trial of {one.rule})", f"{fault}", True
+        )
+        for one in outcomes
+        for network, slot, fault in one.faults
+        if fault.kind in kinds
+    ]

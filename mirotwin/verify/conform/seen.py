@@ -1,0 +1,153 @@
+"""What one robot was seen to do in a trial, by its wires and chips: nothing here knows a symbol of the firmware.
+
+What belongs here: what is kept of the events, and the questions that rules ask about it. What does not: what the robot
+should have done (`rules/`), and who tells the events (`judgement`).
+
+What a wheel is told is what its LM629 was told; what the robot says is what the PC heard; what the chips are doing is
+read at the begin of each control period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import msgspec
+
+from miro_protocol.events import Received
+from miro_protocol.frames import ContentError, TelemetryFrame
+from miro_robot.board import Board
+from miro_robot.lm629.commands import BY_NAME
+from miro_sim.periods import Axis, RobotPeriod
+from miro_sim.world.events import SIDES, Event
+from mirotwin.verify.checks.orders import Order, Orders
+
+_RDRP = BY_NAME["RDRP"].opcode
+_LFIL, _UDF = BY_NAME["LFIL"].opcode, BY_NAME["UDF"].opcode
+READING = frozenset(command.opcode for command in BY_NAME.values() if command.words_out)
+"""Commands that only read."""
+
+Words = tuple[int, ...]
+
+
+class Answer(msgspec.Struct, frozen=True):
+    """A valid answer that the PC had heard whole at `tick`; `said` is None where its content is nothing known."""
+
+    tick: int
+    frame: Received
+    said: TelemetryFrame | None
+
+
+class Setting(msgspec.Struct, frozen=True):
+    """The filter words (kp, ki, kd, il) that a chip took at `tick`."""
+
+    tick: int
+    words: Words
+
+
+class Seen:
+    """Robot `slot` of `robots`. Everything is in the order of time; `end_tick`: what came later was not told."""
+
+    def __init__(self, robots: int, slot: int) -> None:
+        self.robots = robots
+        self.slot = slot
+        self.end_tick = 0
+        self._orders = Orders()
+        self.orders: dict[str, list[Order]] = {side: [Order(-1, side, "off")] for side in SIDES}
+        self._filter: dict[str, list[int]] = {side: [0, 0, 0, 0] for side in SIDES}
+        self.filters: dict[str, list[Setting]] = {side: [] for side in SIDES}
+        self.commands: list[Event] = []
+        self.heard: list[Event] = []
+        self.answers: list[Answer] = []
+        self.periods: list[tuple[int, RobotPeriod]] = []
+        self.samples: list[tuple[int, int, int]] = []  # when looked at; next samples of left and right
+
+    # ---- told by the judge ---------------------------------------------------------------------------------
+
+    def take(self, event: Event) -> None:
+        """An event of the kinds command, heard and answer."""
+        if event.what == "command":
+            self._command(event)
+        elif event.what == "heard":
+            self.heard.append(event)
+        elif event.frame is not None:
+            try:
+                said = event.frame.message(self.robots)
+            except ContentError:
+                said = None
+            assert said is None or isinstance(said, TelemetryFrame)
+            self.answers.append(Answer(event.tick, event.frame, said))
+
+    def take_period(self, tick: int, record: RobotPeriod, board: Board) -> None:
+        """The robot as it was at the begin of a control period, and its board as it is now."""
+        self.periods.append((tick, record))
+        self.samples.append((tick, board.left.sample_tick, board.right.sample_tick))
+
+    def restarted(self, tick: int) -> None:
+        """The processor begins anew: nothing that wheels were told before holds on."""
+        self._orders = Orders()
+        for side in SIDES:
+            self.orders[side].append(Order(tick, side, "off"))
+
+    def _command(self, event: Event) -> None:
+        self.commands.append(event)
+        order = self._orders.take(event)
+        if order is not None:
+            self.orders[event.side].append(order)
+        elif event.opcode == _LFIL:
+            words = [int.from_bytes(event.data[at : at + 2], "big") for at in range(0, len(event.data), 2)]
+            control = words.pop(0)
+            for place in range(4):
+                if control & 8 >> place and words:
+                    self._filter[event.side][place] = words.pop(0)
+        elif event.opcode == _UDF:
+            self.filters[event.side].append(Setting(event.tick, tuple(self._filter[event.side])))
+
+    # ---- asked by the rules --------------------------------------------------------------------------------
+
+    def told(self, side: str, tick: int) -> Order:
+        """What the wheel was told last, up to and including `tick`."""
+        return next(order for order in reversed(self.orders[side]) if order.tick <= tick)
+
+    def both_told(self, tick: int) -> tuple[Order, Order]:
+        left, right = SIDES
+        return self.told(left, tick), self.told(right, tick)
+
+    def ordered(self, after_tick: int, until_tick: int) -> Iterator[Order]:
+        """The orders to either wheel in between, in the order of time."""
+        found = [
+            order for side in SIDES for order in self.orders[side] if after_tick < order.tick <= until_tick
+        ]
+        yield from sorted(found, key=lambda order: order.tick)
+
+    def wrote(self, after_tick: int, until_tick: int) -> Iterator[Event]:
+        """The commands in between that do more than read."""
+        for event in self.commands:
+            if after_tick < event.tick <= until_tick and event.opcode not in READING:
+                yield event
+
+    def read_positions(self, side: str, after_tick: int, until_tick: int) -> list[int]:
+        """The low words of the real positions that the robot read in between."""
+        return [
+            int.from_bytes(one.data[-2:], "big")
+            for one in self.commands
+            if one.opcode == _RDRP and one.side == side and after_tick < one.tick <= until_tick
+        ]
+
+    def set_to(self, side: str, tick: int) -> Words | None:
+        """The filter words in force at `tick`, None before the first."""
+        found = [setting.words for setting in self.filters[side] if setting.tick <= tick]
+        return found[-1] if found else None
+
+    def spoke(self, after_tick: int, until_tick: int) -> Event | None:
+        """The first character that the PC heard in between."""
+        return next((one for one in self.heard if after_tick < one.tick <= until_tick), None)
+
+    def answers_in(self, after_tick: int, until_tick: int) -> list[Answer]:
+        return [one for one in self.answers if after_tick < one.tick <= until_tick]
+
+    def chips(self, after_tick: int, until_tick: int) -> Iterator[tuple[int, str, Axis]]:
+        """Tick, side and state of both chips at the begin of each control period in between."""
+        for tick, record in self.periods:
+            if after_tick < tick <= until_tick:
+                yield tick, SIDES[0], record.left
+                yield tick, SIDES[1], record.right

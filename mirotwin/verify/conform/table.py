@@ -1,0 +1,69 @@
+"""All rules, in the order of their numbers, finding one, and what one presupposes.
+
+What belongs here: the list of chapters. What does not: the rules themselves (`rules/`).
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from functools import cache
+
+from miro_exact.bad_input import BadInput
+from mirotwin.verify.conform.rule import Chapter, Rule
+from mirotwin.verify.conform.rules import (
+    answers,
+    boot,
+    chips,
+    driving,
+    failsafe,
+    fresh,
+    long,
+    reception,
+    service,
+    sound,
+    straps,
+)
+
+CHAPTERS: tuple[Chapter, ...] = (
+    boot.CHAPTER,
+    reception.CHAPTER,
+    fresh.CHAPTER,
+    driving.CHAPTER,
+    failsafe.CHAPTER,
+    service.CHAPTER,
+    answers.CHAPTER,
+    sound.CHAPTER,
+    chips.CHAPTER,
+    straps.CHAPTER,
+    long.CHAPTER,
+)
+ALL: tuple[Rule, ...] = tuple(rule for chapter in CHAPTERS for rule in chapter.rules)
+LONG: tuple[Rule, ...] = tuple(long.CHAPTER.rules)
+RULES: tuple[Rule, ...] = tuple(rule for rule in ALL if rule not in LONG)
+"""Those that are tried unless others are asked for."""
+_BY_ID = {rule.id: rule for rule in ALL}
+
+
+def chapter_of(rule: Rule) -> Chapter:
+    """The chapter that a rule stands in."""
+    return next(chapter for chapter in CHAPTERS if rule in chapter.rules)
+
+
+@cache
+def presupposed(rule: Rule) -> tuple[Rule, ...]:
+    """All rules that `rule` presupposes, also by way of others: each behind those that it presupposes itself."""
+    found: dict[str, Rule] = {}
+    for one in map(find, rule.presupposes):
+        found |= {other.id: other for other in (*presupposed(one), one)}
+    return tuple(found.values())
+
+
+def find(id: str) -> Rule:
+    """The rule called `id`, in capitals or not. Raises BadInput, with the nearest one that there is."""
+    found = _BY_ID.get(id.upper())
+    if found is not None:
+        return found
+    close = get_close_matches(id.upper(), _BY_ID, n=1)
+    hint = f"did you mean {close[0]}? " if close else ""
+    remedy = f"{hint}`mirotwin conform --list` shows {ALL[0].id} to {ALL[-1].id}"
+    raise BadInput("", "", f"there is no rule {id[:40]!r}", remedy)

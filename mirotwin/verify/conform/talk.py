@@ -1,0 +1,400 @@
+"""What the host of a network says in a trial, and what is expected of its robots: the words in which rules are written.
+
+What belongs here: frames and damage at known ticks, and the expectations that many rules share. What does not: the
+rules (`rules/`), and running a trial (`trial`).
+
+    frame = talk.team()                 velocities that no frame before it had
+    talk.obeyed(frame)                  expected of each robot of the network
+    talk.wait(5.0)
+    talk.ignored(talk.team(wrong={3: 0x10}))
+
+A trial is open: what is said does not depend on what the robots do. So everything is known in advance, and so is the
+tick at which each expectation is over.
+
+Long because these are all words of the language in which rules are written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TypedDict, Unpack
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
+from miro_protocol.frames import seal
+from miro_protocol.stream_events import Deed, Power, Reset
+from miro_protocol.table import (
+    FAILSAFE_STOP_TICKS,
+    SEQ_MODULUS,
+    TICKS_PER_MS,
+    Format,
+    FrameType,
+    Opcode,
+    downlink,
+)
+from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.lm629.commands import BY_NAME
+from mirotwin.verify.checks.failsafe import ACTING_MS
+from mirotwin.verify.checks.orders import Order
+from mirotwin.verify.conform.hints import (
+    characters,
+    cut_off,
+    in_a_row,
+    in_words,
+    no_answer,
+    number,
+    wheels_instead,
+)
+from mirotwin.verify.conform.rule import Air
+from mirotwin.verify.conform.seen import Answer, Seen
+
+_LTRJ = BY_NAME["LTRJ"].opcode
+_VELOCITY = 0x08
+"""In the low byte of LTRJ's control word: a velocity follows."""
+BOOTED_MS = 40.0
+"""A robot is ready for its first frame so long after power-on (a camera frame and a little more). Chosen."""
+ACTING_TICKS = int(ACTING_MS * TICKS_PER_MS)
+GAP_MS = ACTING_MS + 2.0
+"""From the end of a frame to the begin of the next, unless a rule says otherwise: time to act."""
+Pairs = tuple[tuple[int, int], ...]
+Found = tuple[int, str] | None
+"""What is wrong: since which tick, and what was found instead. None: nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Characters on the air. `last_tick`: start bit of the last one; `end_tick`: end of its stop bit.
+
+    `before`: the velocities of the last frame that had some.
+    """
+
+    tick: int
+    last_tick: int
+    end_tick: int
+    seq: int
+    words: Pairs
+    what: str
+    before: Pairs = ()
+
+    def for_robot(self, slot: int) -> tuple[int, int]:
+        """The velocities of a robot, as it has to cut them off."""
+        left, right = self.words[slot]
+        return cut_off(left), cut_off(right)
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """`test` says what is wrong. It is over at `tick`: later events change nothing in it. `slots`: () is all robots."""
+
+    tick: int
+    wanted: str
+    test: Callable[[Seen], Found]
+    slots: tuple[int, ...] = ()
+
+
+class How(TypedDict, total=False):
+    """How a frame is said; see `Talk.say`."""
+
+    fresh: bool
+    lead: bytes
+    layout: int
+    wrong: Mapping[int, int]
+    bad_stop: int
+    pauses: Mapping[int, float]
+    gap_ms: float
+    sealed: Callable[[Format, bytes], bytes]
+
+
+class Talk:
+    """The host of network `network`. `now`: when it can speak next; `seq`: of its last fresh frame.
+
+    `said`, `done` and `expected` are what comes of it.
+    """
+
+    def __init__(self, air: Air, network: int = 0) -> None:
+        self.air = air
+        self.n = air.robots
+        self.network = network
+        self.form = downlink(air.robots)
+        self.character_ticks = -(-HOST_CHARACTER_TICKS * 1_000_000 // (1_000_000 + air.baud_offset_ppm))
+        self.now = ms(BOOTED_MS)
+        self.seq = 20 + network
+        self.said: list[Transmission] = []
+        self.done: list[Deed] = []
+        self.expected: list[Expectation] = []
+        self._words = 0
+        self._before: Pairs = ()
+
+    # ---- saying --------------------------------------------------------------------------------------------
+
+    def wait(self, time_ms: float) -> None:
+        self.now += ms(time_ms)
+
+    def wait_until(self, tick: int) -> None:
+        """Raises ValueError where the host still speaks then: a mistake in a rule."""
+        if tick < self.now:
+            raise ValueError(f"the host speaks until tick {self.now}, not {tick}")
+        self.now = tick
+
+    def words(self) -> Pairs:
+        """Velocities that were not said before, different for each wheel; every robot turns on the spot, slowly."""
+        self._words += 1
+        pairs = []
+        for slot in range(self.n):
+            speed = 640 + 37 * self._words % 1024 + 301 * slot
+            sign = -1 if (self._words + slot) % 2 else 1
+            pairs.append((sign * speed, -sign * (speed + 5)))
+        return tuple(pairs)
+
+    def team(
+        self,
+        words: Pairs | None = None,
+        ask: bool = False,
+        step: int = 1,
+        what: str = "",
+        **how: Unpack[How],
+    ) -> Frame:
+        """A team frame."""
+        pairs = self.words() if words is None else words
+        kind = FrameType.TEAM_ASK if ask else FrameType.TEAM
+        payload = b"".join(word.to_bytes(2, "little", signed=True) for pair in pairs for word in pair)
+        return self.say(kind, payload, step, what or ("question" if ask else "team frame"), pairs, **how)
+
+    def same(self, slot: int, left: int, right: int) -> Pairs:
+        """New velocities, but for one robot these."""
+        pairs = list(self.words())
+        pairs[slot] = (left, right)
+        return tuple(pairs)
+
+    def ask(self, slot: int, what: str = "", **how: Unpack[How]) -> Frame:
+        """A question to the robot in `slot`, with the next number that asks it."""
+        step = next(step for step in range(1, 9) if (self.seq + step) % SEQ_MODULUS % self.n == slot)
+        return self.team(ask=True, step=step, what=what or f"question to robot {slot}", **how)
+
+    def service(self, slot: int, opcode: int, data: bytes = b"", what: str = "", **how: Unpack[How]) -> Frame:
+        payload = (bytes([slot, opcode]) + data).ljust(self.form.payload_size, b"\0")
+        return self.say(FrameType.SERVICE, payload, 1, what or f"service frame, opcode {opcode}", **how)
+
+    def ping(self, **how: Unpack[How]) -> Frame:
+        """A service frame that changes nothing."""
+        return self.service(self.air.slots[0], Opcode.PING, what="ping", **how)
+
+    def of_type_2(self, **how: Unpack[How]) -> Frame:
+        """A frame that only robots send, with a good CRC."""
+        return self.say(FrameType.TELEMETRY, bytes(self.form.payload_size), 1, "frame of type 2", **how)
+
+    def ask_nobody(self, **how: Unpack[How]) -> Frame:
+        """A question to a robot that is not there."""
+        absent = next(slot for slot in range(self.n) if slot not in self.air.slots)
+        return self.ask(absent, **how)
+
+    def say(
+        self,
+        kind: int,
+        payload: bytes,
+        step: int = 1,
+        what: str = "frame",
+        words: Pairs = (),
+        **how: Unpack[How],
+    ) -> Frame:
+        """A frame whose number is `step` past the last fresh one, which it becomes unless `fresh` is false.
+
+        Instead of its preamble it may have another `lead`, and another `layout` byte in its CRC. `wrong` turns bits
+        over, by place, `bad_stop` is the place of a character with a bad stop bit, and `pauses` (us) come before
+        characters: places count from the first sync byte, the preamble's are negative. `gap_ms`: silence after it.
+        `sealed`: another way to seal it.
+        """
+        seq = (self.seq + step) % SEQ_MODULUS
+        self.seq = seq if how.get("fresh", True) else self.seq
+        form = replace(self.form, layout=how.get("layout", self.form.layout))
+        sealed = how.get("sealed", seal)(form, bytes([kind * SEQ_MODULUS + seq]) + payload)
+        body = bytearray(sealed[len(form.lead) :])
+        for place, bits in how.get("wrong", {}).items():
+            body[place] ^= bits
+        lead = how.get("lead", form.lead)
+        tick = self._put(lead + bytes(body), len(lead), how)
+        end = self.now
+        self.wait(how.get("gap_ms", GAP_MS))
+        text = f"{what}, seq {seq}"
+        frame = Frame(tick, end - self.character_ticks, end, seq, words, text, self._before)
+        self._before = words or self._before
+        return frame
+
+    def _put(self, data: bytes, first: int, how: How) -> int:
+        """Sends characters of which `first` is the first sync byte; returns the tick of the first one."""
+        pauses, bad_stop = how.get("pauses", {}), how.get("bad_stop")
+        cuts = sorted({first + place for place in pauses if first + place > 0} | {0, len(data)})
+        begun = self.now
+        for start, end in pairwise(cuts):
+            self.now += round(pauses.get(start - first, 0.0) * TICKS_PER_MS / 1000) if start else 0
+            bad = () if bad_stop is None else (first + bad_stop - start,)
+            self.characters(data[start:end], tuple(at for at in bad if 0 <= at < end - start))
+        return begun
+
+    def characters(self, data: bytes, bad_stop: tuple[int, ...] = ()) -> None:
+        """Characters right behind what was said last, if nothing was waited."""
+        self.said.append(Transmission(self.now, DOWN, data, self.network, bad_stop))
+        self.now += len(data) * self.character_ticks
+
+    # ---- doing ---------------------------------------------------------------------------------------------
+
+    def reset(self, tick: int, for_ms: float) -> int:
+        """Holds the processor of the network's first robot in reset from `tick` on; returns when it is let go."""
+        return self._do(Reset, tick, for_ms, (1, 0))
+
+    def switch_off(self, tick: int, for_ms: float) -> int:
+        """Takes the supply of the network's first robot away; returns when it is back."""
+        return self._do(Power, tick, for_ms, (0, 1))
+
+    def _do(self, deed: type[Reset] | type[Power], tick: int, for_ms: float, levels: tuple[int, int]) -> int:
+        slot, end_tick = self.air.slots[0], tick + ms(for_ms)
+        self.done += [
+            deed(tick, self.network, slot, levels[0]),
+            deed(end_tick, self.network, slot, levels[1]),
+        ]
+        return end_tick
+
+    # ---- expecting -----------------------------------------------------------------------------------------
+
+    def expect(
+        self, tick: int, wanted: str, test: Callable[[Seen], Found], slots: tuple[int, ...] = ()
+    ) -> None:
+        self.expected.append(Expectation(tick, wanted, test, slots))
+
+    def obeyed(self, frame: Frame, slots: tuple[int, ...] = ()) -> None:
+        """Both wheels are told the frame's velocities in time. A wheel that is told 0 may also be stopped."""
+        deadline = frame.end_tick + ACTING_TICKS
+
+        def test(seen: Seen) -> Found:
+            told = seen.both_told(deadline)
+            wanted = frame.for_robot(seen.slot)
+            if all(obeys(order, word) for order, word in zip(told, wanted, strict=True)):
+                return None
+            left, right = map(number, wanted)
+            found = f"{in_words(told[0])}, {in_words(told[1])} and not {left}, {right}"
+            return deadline, found + _instead(seen, frame, told)
+
+        self.expect(deadline, f"the wheels told as by {frame.what} within {ACTING_MS:g} ms", test, slots)
+
+    def ignored(self, frame: Frame, slots: tuple[int, ...] = ()) -> None:
+        """The wheels are told nothing new."""
+        self.unchanged(frame.tick, frame.end_tick + ACTING_TICKS, f"{frame.what} not acted on", slots)
+
+    def unchanged(self, after_tick: int, until_tick: int, wanted: str, slots: tuple[int, ...] = ()) -> None:
+        """In between no wheel is told anything but what it was told last."""
+
+        def test(seen: Seen) -> Found:
+            for order in seen.ordered(after_tick, until_tick):
+                before = seen.told(order.side, after_tick)
+                if (order.what, order.velocity) != (before.what, before.velocity):
+                    return order.tick, f"the {order.side} wheel told {in_words(order)}"
+            return None
+
+        self.expect(until_tick, wanted, test, slots)
+
+    def untouched(self, frame: Frame, slots: tuple[int, ...] = (), since: Frame | None = None) -> None:
+        """The chips are told nothing at all, only read. `since`: the failsafe must not count from that frame."""
+        until = frame.end_tick + ACTING_TICKS
+
+        def test(seen: Seen) -> Found:
+            for event in seen.wrote(frame.tick, until):
+                found = str(event).partition(" command ")[2]
+                if since is None or abs(event.tick - since.end_tick - FAILSAFE_STOP_TICKS) > ms(2.0):
+                    return event.tick, found
+                return event.tick, f"{found}: the failsafe counts on from {since.what}"
+            return None
+
+        self.expect(until, f"{frame.what} not acted on", test, slots)
+
+    def answered(
+        self,
+        question: Frame,
+        slot: int,
+        wanted: str = "",
+        says: Callable[[Answer, Seen], str] | None = None,
+    ) -> None:
+        """The robot in `slot` answers in time, and with this number. `says`: what is wrong with what it says, or ""."""
+        deadline = over_by(question)
+
+        def test(seen: Seen) -> Found:
+            found = seen.answers_in(question.last_tick, deadline)
+            if not found:
+                return deadline, _no_answer(seen, question, deadline)
+            answer = found[0]
+            said = answer.said
+            if said is None or (said.slot, said.seq) != (slot, question.seq):
+                return answer.tick, who(answer)
+            what = says(answer, seen) if says is not None else ""
+            return (answer.tick, what) if what else None
+
+        self.expect(deadline, wanted or f"an answer to {question.what}", test, (slot,))
+
+    def silent(self, after_tick: int, until_tick: int, why: str) -> None:
+        """The PC hears nothing in between."""
+
+        def test(seen: Seen) -> Found:
+            spoke = seen.spoke(after_tick, until_tick)
+            if spoke is None:
+                return None
+            heard = in_a_row([one for one in seen.heard if spoke.tick <= one.tick <= until_tick])
+            answer = next(iter(seen.answers_in(spoke.tick, heard[-1].tick)), None)
+            return spoke.tick, characters(heard) + (f": {who(answer)}" if answer is not None else "")
+
+        self.expect(until_tick, f"silence: {why}", test)
+
+
+def _instead(seen: Seen, frame: Frame, told: tuple[Order, Order]) -> str:
+    """What the robot made of the frame, where that is plain; else ""."""
+    if max(order.tick for order in told) <= frame.tick:
+        late = _told_late(seen, frame)
+        if late is not None:
+            return f": told so {(late - frame.end_tick) / TICKS_PER_MS:.2f} ms after its end"
+        wrote = seen.wrote(frame.tick, frame.end_tick + ACTING_TICKS)
+        loaded = any(one.opcode == _LTRJ and one.data[1:2] and one.data[1] & _VELOCITY for one in wrote)
+        return ": loaded, but not started (STT)" if loaded else ": nothing was told"
+    what = wheels_instead(told, frame, seen.slot)
+    return f": {what}" if what else ""
+
+
+def _told_late(seen: Seen, frame: Frame) -> int | None:
+    deadline = frame.end_tick + ACTING_TICKS
+    wanted = frame.for_robot(seen.slot)
+    for order in seen.ordered(deadline, deadline + CONTROL_PERIOD_TICKS):
+        if all(map(obeys, seen.both_told(order.tick), wanted)):
+            return order.tick
+    return None
+
+
+def who(answer: Answer) -> str:
+    """Who says it, for people."""
+    said = answer.said
+    return "unknown contents" if said is None else f"an answer of robot {said.slot} to question {said.seq}"
+
+
+def _no_answer(seen: Seen, question: Frame, deadline: int) -> str:
+    heard = [one for one in seen.heard if question.last_tick < one.tick <= deadline]
+    late = next(
+        (one for one in seen.answers_in(deadline, seen.end_tick) if one.frame.seq == question.seq), None
+    )
+    if late is not None and late.frame.start_tick < deadline + CONTROL_PERIOD_TICKS:
+        return f"one that is over {(late.tick - question.end_tick) / TICKS_PER_MS:.2f} ms after the question's end"
+    if not heard:
+        return "no answer"
+    why = no_answer(heard, question.seq)
+    return f"{characters(heard)}: {why}" if why else f"{characters(heard)}, which are no answer"
+
+
+def ms(time_ms: float) -> int:
+    """Ticks."""
+    return round(time_ms * TICKS_PER_MS)
+
+
+def obeys(order: Order, word: int) -> bool:
+    """Whether a wheel under `order` does what the radio's `word` says."""
+    return (order.what == "drive" and order.word == word) or (word == 0 and order.what == "stop")
+
+
+def over_by(question: Frame) -> int:
+    """An answer is over before the next question can be: a camera frame later."""
+    return question.end_tick + CONTROL_PERIOD_TICKS

@@ -1,0 +1,110 @@
+"""What commands that run a scenario say of its checks and steps: `--expect`, one line a failure, and the exit code.
+
+What belongs here: words and exit codes. What does not: the checks (`mirotwin.verify.checks`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from miro_sim.scenario.settings import EXPECT
+from mirotwin.report.summary import Expectation
+from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain
+from mirotwin.verify.checks.registry import ALWAYS_ON
+from mirotwin.verify.checks.watching import Checks
+
+if TYPE_CHECKING:
+    from mirotwin.verify.steps.player import Player
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+LINES = 5
+"""Failures of one check that are listed."""
+
+
+def is_in_file(text: str) -> bool:
+    """Whether `--expect` names a function in a file: FILE.py:FUNCTION."""
+    path, _, function = text.rpartition(":")
+    return path.endswith(".py") and function.isidentifier()
+
+
+def refuse_files(given: Sequence[str]) -> None:
+    """Raises UsageError for a check in a file: only firmware on a bare processor is judged by one."""
+    for text in given:
+        if is_in_file(text):
+            what = "a check in a file is for firmware on a bare processor"
+            remedy = "a check of a run is in an installed distribution, and named by its key"
+            raise click.UsageError(f"--expect {text}: {what}; {remedy}.")
+
+
+def as_setting(text: str) -> str:
+    """`--expect KEY=VALUE` as the setting that it stands for; a KEY alone is a check with its defaults."""
+    return f"{EXPECT}{text}" if "=" in text else f"{EXPECT}{text}=true"
+
+
+def _as_settings(ctx: click.Context, param: click.Parameter, given: Sequence[str]) -> tuple[str, ...]:
+    refuse_files(given)
+    return tuple(map(as_setting, given))
+
+
+def expect_option(command: Command) -> Command:
+    """Gives the command the expectations as settings."""
+    return _option(command, _as_settings)
+
+
+def plain_expect_option(command: Command) -> Command:
+    """The same as they were typed, for a command that also plays cases of a bare processor."""
+    return _option(
+        command, None, " For a case of a bare processor: FILE.py:FUNCTION, if its check is in a file."
+    )
+
+
+def _option(command: Command, callback: Callable[..., Any] | None, more: str = "") -> Command:
+    return click.option(
+        "--expect",
+        "expected",
+        metavar="KEY[=VALUE]",
+        multiple=True,
+        callback=callback,
+        help="A check of the run: a key of the scenario's [expect], such as tracks_within_cm=3; may be repeated. Exit"
+        " code 1 when one fails." + more,
+    )(command)
+
+
+def report_failures(checks: Checks) -> int:
+    """Says on stderr which checks failed and which had nothing to judge; returns the exit code.
+
+    Firmware faults have lines and an exit code of their own.
+    """
+    code = DONE
+    for verdict in checks.verdicts():
+        if verdict.verdict == "not judged" and verdict.name not in ALWAYS_ON:
+            complain(f"expectation not judged: {verdict.name}: the run had no occasion for it")
+        failures = [one for one in checks.failures if one.check == verdict.name and not one.fault]
+        for failure in failures[:LINES]:
+            complain(f"expectation failed: {failure}")
+        if failures:
+            code = EXPECTATION_FAILED
+            more = verdict.failures - min(len(failures), LINES)
+            if more:
+                complain(f"expectation failed: {verdict.name}: {more} more times")
+    return code
+
+
+def expectations_text(expectations: Sequence[Expectation]) -> str:
+    """How many checks passed, and the names of those that did not, for people. One that is always on and had no
+    occasion is not counted.
+    """
+    counted = [one for one in expectations if one.verdict != "not judged" or one.name not in ALWAYS_ON]
+    others = [f"{one.name} {one.verdict}" for one in counted if one.verdict != "passed"]
+    return ", ".join([f"{len(counted) - len(others)} of {len(counted)} checks passed", *others])
+
+
+def report_steps(player: Player, checks: Checks) -> int:
+    """The same where steps were done: the step that failed, and the checks that steps began, too."""
+    if player.failure is not None:
+        complain(f"step failed: {player.failure}")
+    codes = [report_failures(one) for one in (checks, *player.checks)]
+    return EXPECTATION_FAILED if player.failure is not None else max(codes)

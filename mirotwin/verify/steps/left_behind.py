@@ -1,0 +1,63 @@
+"""What a scenario file that failed leaves in its folder: its report, the scenario as a whole, the case of its failure.
+
+What belongs here: the case of a step or check. What does not: the form of a case, and the other files of the folder
+(`mirotwin.verify.cases`).
+
+    report.txt        the lines of the verdict, and the command that gives it again
+    scenario.toml     the whole scenario with all that was set: `mirotwin run` gives the verdict again
+    case.stream       what was sent and done, with the check that failed: `mirotwin replay` does; not where no check can
+                      judge it, as for pins, wheels, places in the program and single fields of an answer: there
+                      sent.stream
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+
+from miro_sim.world.world import World
+from mirotwin.verify.cases.case import case_of_checks, case_text
+from mirotwin.verify.cases.trace import Trace
+from mirotwin.verify.cases.waits import table_of
+from mirotwin.verify.checks.interface import Failure
+from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.steps.keys import HoldStep, NeverStep, WaitStep
+from mirotwin.verify.steps.player import Player
+
+SCENARIO = "scenario.toml"
+
+
+def case_of_step(player: Player, trace: Trace) -> str | None:
+    """The case of the step that has just failed; None where no check can judge it."""
+    failure = player.failure
+    if failure is None or failure.tick <= failure.begun_tick:
+        return None
+    step = player.steps[failure.number - 1]
+    if isinstance(step, HoldStep) or not isinstance(step, WaitStep | NeverStep):
+        return None
+    condition = step.happening.exactly()
+    table = None if condition is None else table_of(condition)
+    if table is None or (isinstance(step, WaitStep) and not failure.in_vain):
+        return None
+    name = "happens" if isinstance(step, WaitStep) else "never_happens"
+    until_tick = max(failure.tick, player.world.tick)
+    expect = {name: {**table, "after_tick": failure.begun_tick, "until_tick": until_tick}}
+    again = _judged_again(player.world, trace, expect)
+    return None if again is None else case_text(player.world, trace, expect, str(again))
+
+
+def _judged_again(world: World, trace: Trace, expect: Mapping[str, Any]) -> Failure | None:
+    """What the check says when all that went into the world goes into a new one."""
+    scenario = msgspec.structs.replace(world.scenario, expect=dict(expect))
+    again = World(scenario, world.seed, world.image, trace.happenings())
+    checks = Checks(again)
+    again.run_to(world.tick)
+    checks.finish()
+    return next((one for one in checks.failures if one.check in expect), None)
+
+
+def case_of_run(world: World, trace: Trace, checks: Checks) -> str | None:
+    """The case of the first of the run's checks that failed; None where none did."""
+    return case_of_checks(world, trace, checks) if checks.failures else None

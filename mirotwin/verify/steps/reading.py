@@ -1,0 +1,181 @@
+"""A scenario's `[[step]]` tables to steps, and in one line what is wrong with one of them.
+
+What belongs here: which verb a table has, its keys, units and ranges. What does not: the keys (`keys`, `sends`,
+`happenings`), and whether the run can get to a step (`plan`).
+
+    [[step]]
+    send = "team"                          the verb, and for some what of it
+    left_m_s = 0.2                         its keys
+    note = "drives off"                    for people
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, NoReturn, TypeVar
+
+import msgspec
+
+from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
+from miro_sim.scenario.keys import Scenario
+from mirotwin.verify.checks.expect import checks_of_table
+from mirotwin.verify.steps import plan
+from mirotwin.verify.steps.happenings import HAPPENINGS, Heard, WheelsAt
+from mirotwin.verify.steps.keys import (
+    PLAIN,
+    VERBS,
+    CheckStep,
+    HoldStep,
+    NeverStep,
+    PauseMs,
+    SendStep,
+    Step,
+    WaitStep,
+    WithinMs,
+)
+from mirotwin.verify.steps.sends import SENDS
+
+S = TypeVar("S", bound=msgspec.Struct)
+_NO_KEYS = ("number", "checks")
+_TIMES = {"within_ms": "wait_for and expect", "from_now": "wait_for and expect", "for_ms": "never and hold"}
+_TIMES_OF = {
+    "wait_for": ("within_ms", "from_now"),
+    "expect": ("within_ms", "from_now"),
+    "never": ("for_ms",),
+    "hold": ("for_ms",),
+}
+
+
+def steps_of(scenario: Scenario, origin: str) -> list[Step]:
+    """The steps of a scenario, of which each can be done in its run. Raises ScenarioError with the place."""
+    steps = [_Table(scenario, origin, index, table).step() for index, table in enumerate(scenario.step)]
+    plan.check_order(steps, scenario, origin)
+    return steps
+
+
+class _Table:
+    """One table to be read."""
+
+    def __init__(self, scenario: Scenario, origin: str, index: int, table: Mapping[str, Any]) -> None:
+        self.scenario = scenario
+        self.origin = origin
+        self.index = index
+        self.table = dict(table)
+
+    def step(self) -> Step:
+        verbs = [key for key in VERBS if key in self.table]
+        if not verbs:
+            known = f"give it one of {', '.join(VERBS)}"
+            close = [remedy_for_key(key, list(VERBS)) for key in self.table]
+            meant = [remedy for remedy in close if remedy.startswith(("did you", "use "))]
+            self.refuse("", "does nothing", meant[0] if meant else known)
+        if len(verbs) > 1:
+            self.refuse(
+                "", f"has both {verbs[0]} and {verbs[1]}", "one deed or one wait a step: make two of it"
+            )
+        step = self._step(verbs[0])
+        what, _, remedy = plan.objection(step, self.scenario).partition("; ")
+        if what:
+            key, _, rest = what.partition(": ")
+            self.refuse(key if rest else "", rest or what, remedy)
+        return step
+
+    def _step(self, verb: str) -> Step:
+        if verb in PLAIN:
+            struct = PLAIN[verb]
+            self.refuse_unknown([key for key in struct.__struct_encode_fields__ if key not in _NO_KEYS])
+            plain = self.made(struct, {**self.table, "number": self.index + 1})
+            return self.with_checks(plain) if isinstance(plain, CheckStep) else plain
+        note: str = self.taken("note", str, "")
+        common: dict[str, Any] = {"number": self.index + 1, "note": note}
+        if verb == "send":
+            return SendStep(what=self.rest(self.choice(verb, SENDS), verb), **common)
+        if verb == "silence_for_ms":
+            for_ms = self.taken(verb, PauseMs)
+            return NeverStep(happening=self.rest(Heard, verb, hidden=("byte",)), for_ms=for_ms, **common)
+        happening = self.choice(verb, {"wheels": WheelsAt} if verb == "hold" else HAPPENINGS)
+        if verb in ("never", "hold"):
+            self.need_for_ms()
+            for_ms = self.taken("for_ms", PauseMs)
+            what = self.rest(happening, verb)
+            if isinstance(what, WheelsAt) and verb == "hold":
+                return HoldStep(happening=what, for_ms=for_ms, **common)
+            return NeverStep(happening=what, for_ms=for_ms, **common)
+        within_ms = self.taken("within_ms", WithinMs, None)
+        from_now = self.taken("from_now", bool, False)
+        what = self.rest(happening, verb)
+        return WaitStep(verb=verb, happening=what, within_ms=within_ms, from_now=from_now, **common)  # type: ignore[arg-type]
+
+    # Keys
+
+    def taken(self, key: str, type_: Any, default: Any = ...) -> Any:
+        """The value of a key that is no key of the happening or frame, taken out of the table."""
+        if default is not ... and key not in self.table:
+            return default
+        try:
+            return msgspec.convert(self.table.pop(key), type_)
+        except msgspec.ValidationError as error:
+            self.refuse_value(f"{error} - at `$.{key}`")
+
+    def need_for_ms(self) -> None:
+        if "for_ms" in self.table:
+            return
+        for key in self.table:
+            remedy = remedy_for_key(key, ["for_ms"])
+            if key in _TIMES or remedy.startswith("use "):
+                self.refuse(key, "unknown key", "use for_ms, in milliseconds")
+        self.refuse("for_ms", "this key is missing", "add it")
+
+    def choice(self, verb: str, choices: Mapping[str, type[S]]) -> type[S]:
+        """What the verb's value names."""
+        value = self.table[verb]
+        if isinstance(value, str) and value in choices:
+            return choices[value]
+        what = f"{value!r} is not one of the choices"
+        self.refuse(verb, what, f"use {' or '.join(', '.join(choices).rsplit(', ', 1))}")
+
+    def rest(self, struct: type[S], verb: str, hidden: Sequence[str] = ()) -> S:
+        """The struct of the keys that are left; `verb` named it."""
+        self.table.pop(verb, None)
+        known = [key for key in struct.__struct_encode_fields__ if key not in hidden]
+        self.refuse_unknown([*known, *_TIMES_OF.get(verb, ()), "note"])
+        config = struct.__struct_config__
+        return self.made(struct, {**self.table, str(config.tag_field): config.tag})
+
+    def refuse_unknown(self, known: Sequence[str]) -> None:
+        for key in self.table:
+            if key not in known:
+                remedy = remedy_for_key(key, list(known))
+                if key in _TIMES and not remedy.startswith("use "):
+                    remedy = f"it belongs to {_TIMES[key]}"
+                self.refuse(key, "unknown key", remedy)
+
+    def made(self, struct: type[S], given: Mapping[str, Any]) -> S:
+        try:
+            return msgspec.convert(dict(given), struct)
+        except msgspec.ValidationError as error:
+            self.refuse_value(f"{error}")
+
+    def with_checks(self, step: CheckStep) -> CheckStep:
+        """The checks of a step's table, in the words of `[expect]`."""
+        end_tick = plan.end_tick(self.scenario)
+        place = f"step {self.index + 1}.check"
+        made = checks_of_table(self.scenario, self.origin, place, step.check, end_tick)
+        return msgspec.structs.replace(
+            step, checks=tuple(check for check in made.values() if check is not None)
+        )
+
+    # What is wrong
+
+    def refuse(self, key: str, what: str, remedy: str = "") -> NoReturn:
+        place = f"step {self.index + 1}"
+        raise ScenarioError(self.origin, f"{place}.{key}" if key else place, what, remedy)
+
+    def refuse_value(self, message: str) -> NoReturn:
+        """What msgspec found: its place, value and limits in the words of the scenario."""
+        what, _, path = message.partition(" - at `$")
+        raw = {"step": [dict(table) for table in self.scenario.step]}
+        found = value_error(self.origin, raw, f"{what} - at `$.step[{self.index}]{path.rstrip('`')}`")
+        place = re.sub(r"^step\[\d+\]\.?", "", f"{found.place}")
+        self.refuse(place, found.what, found.remedy)

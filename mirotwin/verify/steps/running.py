@@ -1,0 +1,193 @@
+"""One scenario file run to its verdict: its steps, what it expects, and what every run has to fulfil.
+
+What belongs here: reading such a file, running it, and what came of it. What does not: finding files (`collecting`),
+and saying it (`testing.test_command`, `mirotwin.testing.scenario_items`).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.domain import DomainError
+from miro_host.parts import PartError
+from miro_robot.image import Image
+from miro_sim.scenario.file import ScenarioText, load
+from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.settings import option_words
+from miro_sim.world.world import World
+from mirotwin.shell.command_line import command_line, operand
+from mirotwin.shell.outputs import whole_file
+from mirotwin.shell.tracebacks import show_traceback
+from mirotwin.verify.cases.artifacts import clear, leave, report_line
+from mirotwin.verify.cases.case import case_text
+from mirotwin.verify.cases.trace import Trace
+from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.registry import ALWAYS_ON
+from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.steps.left_behind import SCENARIO, case_of_run, case_of_step
+from mirotwin.verify.steps.plan import check_symbols
+from mirotwin.verify.steps.player import Player
+from mirotwin.verify.steps.reading import steps_of
+
+Verdict = Literal["passed", "failed", "fault", "error"]
+LINES = 5
+"""Failures of one check that are listed."""
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """What came of a file. `lines`: each failure as one line, none where it passed; `notes`: what else there is to say.
+
+    `error`: it could not be run. `done` of `steps`; `tick`: where the run ended. `left`: the folder with its case.
+    `left_out`: what settings left out of the scenario, a line each.
+    """
+
+    path: str
+    verdict: Verdict
+    lines: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    done: int = 0
+    steps: int = 0
+    tick: int = 0
+    seed: int = 0
+    digest: str = ""
+    firmware_sha256: str = ""
+    left: str = ""
+    left_out: tuple[str, ...] = ()
+
+
+def reproduce_line(path: str, seed: int, firmware: str | None, settings: Sequence[str]) -> str:
+    """The command that gives the verdict again."""
+    words = ["--firmware", operand(firmware)] if firmware else []
+    for setting in settings:
+        words += option_words(setting)
+    return command_line("test", operand(path), "--seed", f"{seed}", *words)
+
+
+def everything(scenario: Scenario, origin: str) -> None:
+    """What a scenario says to checks and in steps: raises ScenarioError for what cannot be meant."""
+    expectations_of(scenario, origin)
+    steps_of(scenario, origin)
+
+
+def load_test(path: str, settings: Sequence[str] = ()) -> ScenarioText:
+    """The scenario of a file, checked with its steps. Raises ScenarioError."""
+    return load(path, settings, everything)
+
+
+def run_test(
+    path: str,
+    image: Image,
+    seed: int = 0,
+    settings: Sequence[str] = (),
+    artifacts: Path | None = None,
+    again: str = "",
+) -> Outcome:
+    """Runs a file to its verdict; whatever cannot be run is an outcome, too.
+
+    `artifacts`: below it, in a folder of its own, the file leaves what `save` steps keep and, if it fails, its case; a
+    file that saves needs one. `again`: the command that gives the verdict again, for its report.
+    """
+    folder = None if artifacts is None else folder_of(artifacts, path)
+    try:
+        if folder is not None:
+            clear(folder, SCENARIO)
+        return _run(path, image, seed, settings, folder, again)
+    except (DomainError, PartError) as error:
+        show_traceback(error)
+        what = f"cannot be run: {error}"
+        return Outcome(path, "error", (f"{BadInput(path, '', what)}",), seed=seed)
+    except OSError as error:
+        what = f"cannot leave anything in {folder}: {error.strerror or error}"
+        return Outcome(path, "error", (f"{BadInput(path, '', what)}",), seed=seed)
+    except BadInput as error:
+        show_traceback(error)
+        return Outcome(path, "error", (f"{error}",), seed=seed)
+
+
+def _run(
+    path: str, image: Image, seed: int, settings: Sequence[str], folder: Path | None, again: str
+) -> Outcome:
+    text = load_test(path, settings)
+    steps = steps_of(text.scenario, path)
+    check_symbols(steps, image, path)
+    saving = [step for step in steps if step.VERB == "save"]
+    if saving and folder is None:
+        raise BadInput(
+            path, f"step {saving[0].number}", "there is no folder to save into", "give --artifacts DIR"
+        )
+    world = World(text.scenario, seed, image)
+    trace = None if folder is None else Trace(world)
+    checks = Checks(world, expectations_of(text.scenario, path))
+    player = Player(world, steps, path)
+    player.play()
+    case = None if trace is None else case_of_step(player, trace)
+    player.finish()
+    checks.finish()
+    lines, notes = said_of(player, checks)
+    if folder is not None and trace is not None:
+        keep_saved(player, folder)
+        if lines:
+            report = "".join(f"{line}\n" for line in (path, *lines, *notes, report_line(str(folder)), again))
+            case = case or case_of_run(world, trace, checks)
+            leave(folder, report, case, case_text(world, trace, {}, ""), image, {SCENARIO: text.text})
+    return Outcome(
+        path=path,
+        verdict="fault" if world.faults else "failed" if lines else "passed",
+        lines=lines,
+        notes=notes,
+        done=player.done,
+        steps=len(steps),
+        tick=world.tick,
+        seed=seed,
+        digest=world.digest,
+        firmware_sha256=image.sha256 or "",
+        left=str(folder) if folder is not None and lines else "",
+        left_out=text.notes,
+    )
+
+
+def folder_of(artifacts: Path, path: str) -> Path:
+    """The file's own folder: by its path, which no other file has."""
+    parts = [part for part in Path(path).parts if part not in (".", "..", os.sep)]
+    return artifacts / "-".join([*parts[:-1], stem_of(path)])
+
+
+def said_of(player: Player, checks: Checks) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Failures, and what was not judged, one line each: faults, the step, the checks in the order of their begin."""
+    lines = [
+        f"firmware fault: net{network.index}/robot{robot.slot}: {fault}"
+        for network in player.world.networks
+        for robot in network.robots
+        for fault in robot.board.faults[:1]
+    ]
+    if player.failure is not None:
+        lines.append(f"step failed: {player.failure}")
+    notes = []
+    for group in (checks, *player.checks):
+        for verdict in group.verdicts():
+            if verdict.verdict == "not judged" and verdict.name not in ALWAYS_ON:
+                notes.append(f"expectation not judged: {verdict.name}: the run had no occasion for it")
+            found = [one for one in group.failures if one.check == verdict.name and not one.fault]
+            lines += [f"expectation failed: {failure}" for failure in found[:LINES]]
+            if found and verdict.failures > LINES:
+                lines.append(f"expectation failed: {verdict.name}: {verdict.failures - LINES} more times")
+    return tuple(lines), tuple(notes)
+
+
+def stem_of(path: str) -> str:
+    """The name of a file without what its kind is called."""
+    return Path(path).name.removesuffix(".toml").removesuffix(".scenario")
+
+
+def keep_saved(player: Player, folder: Path) -> None:
+    """Writes what `save` steps kept. Raises OutputError."""
+    for name, content in player.saved.items():
+        folder.mkdir(parents=True, exist_ok=True)
+        with whole_file(folder / name, "--artifacts") as part:
+            part.write_bytes(content)

@@ -1,0 +1,169 @@
+"""What a test wants: its scenario, firmware, seed and expectations, from its marker and from the session's options.
+
+What belongs here: the marker's keys, and which of marker and options holds. What does not: making the world (`booted`),
+and pytest.
+
+    @pytest.mark.mirotwin(scenario="fig6", settings=["duration_s=2"], seed=7, firmware="mine.ihx",
+                          expect={"settles_within_s": 2.0}, boot=False)
+
+A key of the marker holds for its test, one of the innermost marker before others; `settings` and `expect` of all
+markers add up. Options hold for the tests that do not say; a seed from the command line holds for all, because that is
+how the printed line repeats a test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.inputs import check_regular
+from miro_exact.seed import MAX_SEED
+from miro_robot.firmware import image_path
+from miro_robot.image import Image, load_hex
+from miro_sim.scenario.file import load, parse
+from miro_sim.scenario.keys import Scenario
+from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.interface import Check
+
+MARKER = "@pytest.mark.mirotwin"
+KEYS = ("scenario", "settings", "firmware", "seed", "expect", "boot")
+
+
+class Wanted(msgspec.Struct, frozen=True):
+    """What a test's world is made of. `boot`: it begins when the firmware is up, not at power-on."""
+
+    scenario: Scenario
+    image: Image
+    seed: int
+    expected: Mapping[tuple[int, int], Sequence[Check]]
+    boot: bool
+
+
+class Marked(msgspec.Struct, frozen=True, kw_only=True):
+    """The keys of a test's markers, put together; None where none says anything."""
+
+    scenario: str | Path | dict[str, Any] | None = None
+    settings: tuple[str, ...] = ()
+    firmware: str | Path | None = None
+    seed: int | None = None
+    expect: dict[str, Any] = {}
+    boot: bool | None = None
+
+
+def marked(marks: Sequence[tuple[tuple[Any, ...], Mapping[str, Any]]]) -> Marked:
+    """From the arguments of markers, the innermost one first. Raises BadInput for keys and values that cannot be."""
+    found: dict[str, Any] = {}
+    settings: list[str] = []
+    expect: dict[str, Any] = {}
+    for positional, keys in marks:
+        if positional:
+            what = f"{positional[0]!r} has no name"
+            raise BadInput(
+                "", MARKER, what, f"write scenario={positional[0]!r}, or another of {', '.join(KEYS)}"
+            )
+        for key, value in keys.items():
+            _check_key(key, value)
+            if key == "settings":
+                settings[:0] = value
+            elif key == "expect":
+                expect = {**value, **expect}
+            else:
+                found.setdefault(key, value)
+    return Marked(**found, settings=tuple(settings), expect=expect)
+
+
+_TYPES: dict[str, tuple[tuple[type, ...], str]] = {
+    "scenario": ((str, Path, dict), "a built-in scenario's name, a path, or a table of settings"),
+    "settings": ((list, tuple), 'a list of "KEY=VALUE"'),
+    "firmware": ((str, Path), "the path of an .ihx file"),
+    "seed": ((int,), "a whole number"),
+    "expect": ((dict,), "a table of checks"),
+    "boot": ((bool,), "True or False"),
+}
+
+
+def _check_key(key: str, value: Any) -> None:
+    if key not in KEYS:
+        close = get_close_matches(key, KEYS, n=1)
+        remedy = f"did you mean {close[0]}? " if close else ""
+        raise BadInput("", MARKER, f"there is no key {key!r}", f"{remedy}there are {', '.join(KEYS)}")
+    types, what = _TYPES[key]
+    if not isinstance(value, types) or (key == "seed" and isinstance(value, bool)):
+        raise BadInput("", MARKER, f"{key}={value!r}", f"give {what}")
+    if isinstance(value, list | tuple) and not all(isinstance(one, str) and "=" in one for one in value):
+        raise BadInput("", MARKER, f"settings={value!r}", f"give {what}")
+
+
+def wanted(mark: Marked, folder: Path, firmware: str | Path | None, seed: int) -> Wanted:
+    """What a marker and the session ask for. `folder`: that of the test, from which the marker's paths go; `firmware`:
+    the session's, None for the robot's own. Raises BadInput.
+    """
+    if not 0 <= seed <= MAX_SEED:
+        raise BadInput("", "seed", f"{seed} is out of range", f"give 0 to {MAX_SEED}")
+    scenario = _scenario(mark, folder)
+    if scenario.step:
+        what = f"scenario {scenario.name} has {len(scenario.step)} steps, which a test in Python does not do"
+        raise BadInput("", MARKER, what, "pytest collects *.scenario.toml files by themselves")
+    if mark.firmware is not None:
+        firmware = _near(mark.firmware, folder)
+    image = image_of(str(firmware) if firmware is not None else None)
+    if mark.expect:
+        scenario = msgspec.structs.replace(scenario, expect={**scenario.expect, **mark.expect})
+    boot = mark.boot if mark.boot is not None else all(one.host == "silent" for one in scenario.networks)
+    return Wanted(scenario, image, seed, expectations_of(scenario, scenario.name), boot)
+
+
+def _scenario(mark: Marked, folder: Path) -> Scenario:
+    source = mark.scenario
+    if source is None or isinstance(source, dict):
+        settings = [f"{key}={_toml(value)}" for key, value in (source or {}).items()]
+        return silent_scenario((*settings, *mark.settings))
+    text = str(source)
+    is_path = isinstance(source, Path) or text.endswith(".toml") or "/" in text
+    return load(str(_near(text, folder)) if is_path else text, mark.settings).scenario
+
+
+def _near(path: str | Path, folder: Path) -> Path:
+    """Beside the test if it is there, else as given."""
+    return folder / path if (folder / path).exists() else Path(path)
+
+
+@lru_cache(64)
+def silent_scenario(settings: tuple[str, ...]) -> Scenario:
+    """The scenario of a test that names none, with these settings: read once for all that want the same."""
+    text = (resources.files("mirotwin.testing") / "silent.toml").read_text(encoding="utf-8")
+    return parse(text, "silent", settings)
+
+
+def _toml(value: Any) -> str:
+    """A value as a setting has it: tables inline."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_toml(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return msgspec.json.encode(value).decode()
+
+
+_IMAGES: dict[tuple[str, int, int], Image] = {}
+"""Images of this process, by path and what tells that the file is the same."""
+
+
+def image_of(path: str | None) -> Image:
+    """The image in the file, None for the robot's own, with its symbols; read once a session. Raises BadInput."""
+    place = Path(path) if path is not None else image_path()
+    try:
+        check_regular(str(place))
+        status = place.stat()
+    except OSError:
+        return load_hex(place)  # says what is wrong
+    key = (str(place.resolve()), status.st_mtime_ns, status.st_size)
+    if key not in _IMAGES:
+        _IMAGES[key] = load_hex(place)
+    return _IMAGES[key]

@@ -1,9 +1,0 @@
-"""`miro://` where pyserial looks for it, for programs that name this package themselves:
-
-    serial.protocol_handler_packages.append("mirotwin.bridges")
-
-What belongs here: the name `Serial`. What does not: the class (`serial_port`). Programs that know nothing of Mirotwin
-find the same through `serial.urlhandler.protocol_miro`, which an installation puts beside pyserial's own handlers.
-"""
-
-from mirotwin.bridges.serial_port import Serial as Serial

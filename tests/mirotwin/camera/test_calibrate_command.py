@@ -1,0 +1,260 @@
+"""`mirotwin calibrate`: a camera from control points, and what is said of points that tell none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from miro_host.eye import calibration, calibration_kinds, eye_file
+from miro_host.eye.camera_parameters import CameraParameters
+from miro_host.eye.colours import ColourClasses
+from miro_sim.pitch.colour_samples import colours_of
+from miro_sim.pitch.picture_settings import PictureSettings
+from tests.mirotwin.conftest import Result
+
+HEADER = "x_cm,y_cm,height_cm,u_px,v_px\n"
+LENS = ("camera.kind=pixels", "camera.lens.tilt_x_rad=0.01", "camera.lens.turn_rad=3.14")
+TRUE = CameraParameters(tilt_x_rad=0.01, turn_rad=3.14)
+
+
+def settings(*pairs: str) -> list[str]:
+    return [word for pair in pairs for word in ("--set", pair)]
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_without_noise_the_scenarios_camera_is_found_as_it_is(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "camera.toml"
+    given = ("--scenario", short, *settings(*LENS), "--noise-px", 0, "--out", out)
+    code, table, err = mirotwin("calibrate", *given)
+    assert (code, err) == (0, "")
+    found = calibration.read(out)
+    assert calibration_kinds.worst_error_m(TRUE, found) < 1e-5
+    assert abs(found.camera.tilt_x_rad - 0.01) < 1e-4
+    assert found.residuals is not None
+    assert found.residuals.points == len(found.residuals.px) == 72
+    assert found.residuals.max_px < 1e-3
+    assert "worst error   0.000 cm over the pitch" in table
+
+
+def test_points_of_a_scenario_give_the_same_calibration_from_their_file(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    first, second, points = (tmp_path / name for name in ("first.toml", "second.toml", "points.csv"))
+    made = mirotwin("calibrate", "--scenario", short, "--seed", 3, "--out", first, "--points-out", points)
+    read = mirotwin("calibrate", "--points", points, "--out", second)
+    assert (made[0], made[2]) == (read[0], read[2]) == (0, "")
+    assert calibration_kinds.worst_error_m(calibration.read(first).camera, calibration.read(second)) < 1e-6
+    residuals = calibration.read(second).residuals
+    assert residuals is not None
+    assert 0.3 < residuals.rms_px < 0.5
+    assert f"residuals     rms {residuals.rms_px:.3f} px, max {residuals.max_px:.3f} px" in read[1]
+    table = read[1].split("off_px\n")[1].splitlines()
+    worst = residuals.px.index(max(residuals.px))
+    assert table[0].split()[0] == f"{worst + 1}"
+    assert table[0].split()[-1] == f"{residuals.max_px:.3f}"
+    shown = [float(line.split()[-1]) for line in table]
+    assert shown == sorted(shown, reverse=True)
+
+
+def test_the_noise_is_that_of_the_seed_and_as_large_as_asked_for(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    texts = []
+    for number, (seed, noise) in enumerate([(1, 0.3), (1, 0.3), (2, 0.3), (1, 1.5)]):
+        points = tmp_path / f"{number}.csv"
+        given = ("--scenario", short, "--seed", seed, "--noise-px", noise, "--points-out", points)
+        assert mirotwin("calibrate", *given, "--out", tmp_path / f"{number}.toml")[0] == 0
+        texts.append(points.read_text())
+    assert texts[0] == texts[1]
+    assert len(set(texts)) == 3
+    residuals = [calibration.read(tmp_path / f"{number}.toml").residuals for number in (0, 3)]
+    assert residuals[0] is not None
+    assert residuals[1] is not None
+    assert 4.0 < residuals[1].rms_px / residuals[0].rms_px < 6.0
+
+
+def test_colours_are_those_that_the_scenarios_tracker_would_use(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    colours = tmp_path / "colours.toml"
+    given = ("--scenario", short, "--out", tmp_path / "camera.toml", "--colours-out", colours)
+    assert mirotwin("calibrate", *given)[0] == 0
+    expected = colours_of(CameraParameters(), PictureSettings(), "diagonal", ball=False)
+    assert eye_file.read(colours, ColourClasses) == expected
+
+
+def test_sampled_pixels_of_ones_own_pictures_give_colour_classes(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    points, samples, colours = (tmp_path / name for name in ("points.csv", "samples.csv", "colours.toml"))
+    made = ("--scenario", short, "--points-out", points, "--out", tmp_path / "first.toml")
+    assert mirotwin("calibrate", *made)[0] == 0
+    yellow, blue = "yellow,200,40,140\n" * 4, "blue,60,190,110\n" * 4
+    samples.write_text("colour,y,cb,cr\n" + yellow + blue)
+    given = ("--points", points, "--out", tmp_path / "camera.toml", "--samples", samples)
+    assert mirotwin("calibrate", *given, "--colours-out", colours)[0] == 0
+    assert set(eye_file.read(colours, ColourClasses).colours) == {"yellow", "blue"}
+    samples.write_text("colour,y,cb,cr\n" + yellow + yellow.replace("yellow", "lime"))
+    code, _, err = mirotwin("calibrate", *given, "--colours-out", colours, "--force")
+    assert code == 2
+    assert f"{samples}: colours.lime: cannot be told from yellow" in err.replace("\n", "")
+    code, _, err = mirotwin("calibrate", *given, "--force")
+    assert code == 2
+    assert "give both --samples and --colours-out or neither" in err
+
+
+def test_what_the_points_cannot_tell_is_taken_from_the_start(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    points, flat, start, out = (tmp_path / name for name in ("all.csv", "flat.csv", "start.toml", "out.toml"))
+    given = ("--scenario", short, *settings(*LENS, "camera.lens.height_m=2.1"), "--noise-px", 0)
+    assert mirotwin("calibrate", *given, "--points-out", points, "--out", start)[0] == 0
+    flat.write_text(HEADER + "".join(line for line in points.open() if line.split(",")[2] == "0"))
+    assert mirotwin("calibrate", "--points", flat, "--start", start, "--out", out)[0] == 0
+    found = calibration.read(out)
+    assert "height_m" not in found.free
+    assert found.camera.height_m == calibration.read(start).camera.height_m
+    code, _, err = mirotwin("calibrate", "--points", flat, "--out", tmp_path / "else.toml")
+    assert code == 2
+    assert f"{flat}: no convergence" in err
+
+
+GRID = [(x, y, 0, 16 + 2.28 * (x + 10), 219 - 2.24 * (y + 10)) for x in (-10, 50, 110) for y in (-10, 35, 80)]
+
+
+def csv(rows: list[tuple[float, ...]]) -> str:
+    return HEADER + "".join(",".join(map(str, row)) + "\n" for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (csv(GRID[:4]), ": 4 points for 8 parameters; give at least 5, better 20 all over the pitch"),
+        (csv([(x, 0, 0, 2 * x, 100) for x in range(0, 90, 10)]), ": the points lie on one line; add points"),
+        (
+            csv([*GRID, (50, 35, 250, 160, 120)]),
+            ": point 10: the point (0.500, 0.350, 2.500) m is not in front",
+        ),
+        (csv([(y, x, h, u, v) for x, y, h, u, v in GRID]), ": no convergence"),
+        (
+            csv([(*row[:3], 1e4 * row[3], row[4]) for row in GRID]),
+            ":2: u_px: '160000.0'; write a number within",
+        ),
+        (csv(GRID) + "1,2,three,4,5\n", ":11: height_cm: 'three' is no number; write a number"),
+        (csv(GRID) + "1,2,nan,4,5\n", ":11: height_cm: 'nan'; write a number within +-100000"),
+        (csv(GRID) + "1,2,3\n", ":11: 3 cells; a line must have 5"),
+        ("x,y\n1,2\n", ":1: the columns are x, y; they must be x_cm, y_cm, height_cm, u_px, v_px"),
+        ("", ":1: the columns are ; they must be"),
+        (HEADER, ": 0 points for 8 parameters; give at least 5"),
+        (HEADER + "9" * 200_000, ":2: is no CSV: field larger than field limit"),
+        ("\0" * 50, ":1: the columns are "),
+    ],
+)
+def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
+    mirotwin: Callable[..., Result], tmp_path: Path, text: str, expected: str
+) -> None:
+    points = tmp_path / "points.csv"
+    points.write_text(text)
+    code, out, err = mirotwin("calibrate", "--points", points, "--out", tmp_path / "camera.toml")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"mirotwin: error: {points}{expected}")
+    assert (err.count("\n"), names(tmp_path)) == (1, ["points.csv"])
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ((), "Give either --points or --scenario."),
+        (("--points", "p.csv", "--scenario", "fig6"), "Give either --points or --scenario."),
+        (("--points", "p.csv", "--seed", 1), "--seed needs --scenario."),
+        (("--points", "p.csv", "--set", "duration_s=1"), "--set needs --scenario."),
+        (
+            ("--points", "p.csv", "--colours-out", "c.toml"),
+            "With --points, give both --samples and --colours-out or neither.",
+        ),
+        (("--points", "absent.csv"), "absent.csv: cannot be read: No such file or directory"),
+        (("--points", "."), ".: is a folder"),
+        (("--points", "bytes"), "bytes: not UTF-8 text; give a text file"),
+        (("--points", "p.csv", "--start", "p.csv"), "p.csv: not TOML: "),
+        (("--points", "out.toml"), "out.toml: is the input itself; choose another file with --out"),
+        (("--scenario", "fig5"), "fig5: no such scenario"),
+        (
+            ("--scenario", "fig6", "--points-out", "./out.toml"),
+            "out.toml: is the file of --out and of --points-out",
+        ),
+        (
+            ("--scenario", "fig6", "--noise-px", -1),
+            "Invalid value for '--noise-px': -1.0 is not in the range",
+        ),
+    ],
+)
+def test_what_cannot_be_calibrated_is_refused_and_nothing_is_written(
+    mirotwin: Callable[..., Result],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    options: tuple[object, ...],
+    expected: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("p.csv").write_text(csv(GRID))
+    Path("bytes").write_bytes(b"\xff\xfe")
+    if "out.toml" in options:
+        Path("out.toml").write_text(csv(GRID))
+    before = names(tmp_path)
+    code, out, err = mirotwin("calibrate", *options, "--out", "out.toml")
+    assert (code, out) == (2, "")
+    assert err.startswith(f"mirotwin: error: {expected}")
+    assert (err.count("\n"), names(tmp_path)) == (1, before)
+
+
+def test_a_camera_without_a_lens_is_refused_after_the_note_of_what_its_kind_leaves_out(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    out = tmp_path / "out.toml"
+    code, printed, err = mirotwin(
+        "calibrate", "--scenario", "fig6", "--set", "camera.kind=gaussian", "--out", out
+    )
+    note, error = err.splitlines()
+    assert (code, printed, out.exists()) == (2, "", False)
+    assert note.startswith("mirotwin: note: --set camera.kind=gaussian leaves out calibration")
+    assert error.startswith("mirotwin: error: fig6: camera.kind: this camera has no lens")
+
+
+@pytest.mark.parametrize("kind", ["gaussian", "geometric"])
+def test_a_camera_without_pixels_has_no_colours_and_one_without_a_lens_no_points(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, kind: str
+) -> None:
+    given = ("--scenario", short, "--set", f"camera.kind={kind}", "--out", tmp_path / "camera.toml")
+    code, _, err = mirotwin("calibrate", *given, "--colours-out", tmp_path / "colours.toml")
+    assert code == 2
+    assert f"{short}: camera.kind: this camera {'has no lens' if kind == 'gaussian' else 'renders no'}" in err
+    assert names(tmp_path) == []
+    assert mirotwin("calibrate", *given)[0] == (2 if kind == "gaussian" else 0)
+
+
+def test_files_that_are_there_are_replaced_with_force_only(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    points = tmp_path / "points.csv"
+    points.write_text("before")
+    given = ("calibrate", "--scenario", short, "--out", tmp_path / "camera.toml", "--points-out", points)
+    code, _, err = mirotwin(*given)
+    assert (code, "is there already" in err, points.read_text()) == (2, True, "before")
+    assert mirotwin(*given, "--force")[0] == 0
+    assert points.read_text().startswith(HEADER)
+
+
+def test_noise_that_is_no_number_is_refused(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    given = ("--scenario", short, "--noise-px", "nan", "--out", tmp_path / "camera.toml")
+    code, _, err = mirotwin("calibrate", *given)
+    assert code == 2
+    assert "'nan' is not a number." in err

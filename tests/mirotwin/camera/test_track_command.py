@@ -1,0 +1,282 @@
+"""`mirotwin track`: the tracker on pictures from files and recordings, and what is said of those that are none."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from PIL import Image
+
+from miro_exact.clock import nanoseconds
+from miro_host.eye import calibration_kinds
+from miro_host.eye.camera_parameters import CameraParameters
+from miro_host.eye.colours import FLOOR
+from miro_host.eye.patterns import IDENTITIES, TEAMS
+from miro_sim.pitch.colour_samples import colours_of
+from miro_sim.pitch.picture_settings import PictureSettings
+from mirotwin.recording import reader as recording_reader
+from tests.mirotwin.conftest import Result
+
+FRAMES = 6
+CAMERA = (
+    *("camera.kind=pixels", "camera.calibration=exact", "camera.delay_frames=0"),
+    "network.robot.1.start_error_y_cm=40",
+)
+
+
+@pytest.fixture(scope="module")
+def seen(mirotwin: Callable[..., Result], short: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run whose measurements arrive at once, its plain frames in a folder and in the recording; and the files."""
+    folder = tmp_path_factory.mktemp("seen")
+    camera = [word for key in CAMERA for word in ("--set", key)]
+    frames = ("--frames", folder / "frames", "--plain-frames", "--record-frames")
+    code, _, err = mirotwin("run", short, "--out", folder / "run", "-q", "--no-figure", *camera, *frames)
+    assert (code, err) == (0, "")
+    (folder / "camera.toml").write_text(calibration_kinds.exact(CameraParameters()).text())
+    (folder / "colours.toml").write_text(colours_of(CameraParameters(), PictureSettings(), "diagonal").text())
+    return folder
+
+
+def files(seen: Path) -> tuple[object, ...]:
+    return "--calibration", seen / "camera.toml", "--colours", seen / "colours.toml"
+
+
+def measured(seen: Path) -> dict[tuple[int, int], tuple[float, float, float]]:
+    found = {}
+    for frame, period in enumerate(recording_reader.read(seen / "run" / "run.mcap").periods):
+        for robot in period.robots:
+            assert robot.measurement is not None
+            at = robot.measurement
+            found[frame, robot.slot] = (at.x_m, at.y_m, at.theta_rad)
+    return found
+
+
+@pytest.mark.parametrize("path", ["frames", "run/run.mcap"])
+def test_frames_of_a_run_give_the_postures_that_its_recording_has(
+    mirotwin: Callable[..., Result], seen: Path, path: str
+) -> None:
+    """Rounding to red, green and blue moves a few pixels over the border of a class."""
+    code, out, err = mirotwin("track", seen / path, *files(seen), "--robots", "0,2", "--json")
+    assert (code, err) == (0, "")
+    lines = [json.loads(line) for line in out.splitlines()]
+    expected = measured(seen)
+    assert len(lines) == len(expected) == 2 * FRAMES
+    for line in lines:
+        x_m, y_m, theta_rad = expected[line["frame"], line["robot"]]
+        assert line["lost"] is False
+        assert math.hypot(line["x_m"] - x_m, line["y_m"] - y_m) < 0.002
+        assert abs(math.remainder(line["theta_rad"] - theta_rad, math.tau)) < 0.06
+        assert line["tick"] == 800_800 * line["frame"]
+        assert 0.0 <= line["confidence"] <= 1.0
+
+
+def test_the_table_has_a_row_a_robot_and_frame_and_says_who_is_lost(
+    mirotwin: Callable[..., Result], seen: Path
+) -> None:
+    code, out, err = mirotwin("track", seen / "frames", *files(seen), "--robots", "2,1")
+    assert (code, err) == (0, "")
+    head, *rows, last = [line.split() for line in out.splitlines()]
+    assert head == ["frame", "robot", "x_cm", "y_cm", "heading_deg", "confidence", "picture"]
+    assert [row[:2] for row in rows] == [[f"{n}", robot] for n in range(FRAMES) for robot in "21"]
+    assert {tuple(row[2:3]) for row in rows if row[1] == "1"} == {("lost",)}
+    assert float(rows[0][2]) == pytest.approx(100.0 * measured(seen)[0, 2][0], abs=0.2)
+    assert rows[-1][-1] == "frame-000005.png"
+    assert " ".join(last) == "6 pictures: robot 2 in 6, robot 1 in 0"
+
+
+def test_a_lost_robot_has_no_numbers_in_json(mirotwin: Callable[..., Result], seen: Path) -> None:
+    _, out, _ = mirotwin("track", seen / "frames", *files(seen), "--team", "blue", "--robots", "0", "--json")
+    lost = {"lost": True, "x_m": None, "y_m": None, "theta_rad": None, "confidence": None}
+    for frame, line in enumerate(out.splitlines()):
+        picture = {"frame": frame, "picture": f"frame-{frame:06d}.png", "tick": 800_800 * frame, "robot": 0}
+        assert json.loads(line) == {**picture, **lost}
+
+
+def test_ppm_files_say_the_same_and_other_files_are_passed_over(
+    mirotwin: Callable[..., Result], seen: Path, tmp_path: Path
+) -> None:
+    for number in range(FRAMES):
+        with Image.open(seen / "frames" / f"frame-{number:06d}.png") as image:
+            image.save(tmp_path / f"{number}.PPM", "PPM")
+    (tmp_path / "notes.txt").write_text("mine")
+    given = (*files(seen), "--robots", "0,2", "--json", "--centroid", "weighted")
+    one = mirotwin("track", seen / "frames", *given)[1].splitlines()
+    other = mirotwin("track", tmp_path, *given)[1].splitlines()
+    without: Callable[[str], dict[str, Any]] = lambda line: {**json.loads(line), "picture": ""}  # noqa: E731
+    assert [without(line) for line in one] == [without(line) for line in other] != []
+
+
+def test_of_several_networks_one_is_taken(
+    mirotwin: Callable[..., Result], seen: Path, tmp_path: Path
+) -> None:
+    for number in (0, 1):
+        for network in (0, 3):
+            name = f"net{network}-frame-{number:06d}.png"
+            shutil.copy(seen / "frames" / f"frame-{number:06d}.png", tmp_path / name)
+    _, out, _ = mirotwin("track", tmp_path, *files(seen), "--network", 3, "--robots", "0")
+    assert [line.split()[-1] for line in out.splitlines()[1:3]] == [
+        "net3-frame-000000.png",
+        "net3-frame-000001.png",
+    ]
+    code, _, err = mirotwin("track", tmp_path, *files(seen), "--network", 1)
+    assert (code, f"{tmp_path}: --network 1: no picture of it" in err) == (2, True)
+
+
+def test_recorded_frames_are_images_for_viewers_and_change_nothing_else(
+    mirotwin: Callable[..., Result], short: Path, seen: Path, tmp_path: Path
+) -> None:
+    camera = [word for key in CAMERA for word in ("--set", key)]
+    assert mirotwin("run", short, "--out", tmp_path / "plain", "-q", "--no-figure", *camera)[0] == 0
+    plain = recording_reader.read(tmp_path / "plain" / "run.mcap")
+    assert recording_reader.read(seen / "run" / "run.mcap") == plain
+    with (seen / "run" / "run.mcap").open("rb") as file:
+        found = [*make_reader(file).iter_messages(["/net0/camera/image"])]
+    assert len(found) == FRAMES
+    for frame, (schema, channel, message) in enumerate(found):
+        assert schema is not None
+        assert (schema.name, schema.encoding, channel.message_encoding) == (
+            "foxglove.CompressedImage",
+            "jsonschema",
+            "json",
+        )
+        content = json.loads(message.data)
+        assert sorted(content) == sorted(json.loads(schema.data)["properties"])
+        stamp = content["timestamp"]
+        assert stamp["sec"] * 10**9 + stamp["nsec"] == message.log_time == nanoseconds(800_800 * frame)
+    code, _, err = mirotwin("track", tmp_path / "plain" / "run.mcap", *files(seen))
+    assert code == 2
+    assert "no frames of the camera of network 0; record them: mirotwin run .. --record-frames" in err
+
+
+def test_a_recording_that_was_broken_off_is_tracked_as_far_as_it_goes(
+    mirotwin: Callable[..., Result], seen: Path, tmp_path: Path
+) -> None:
+    part = tmp_path / "run.part.mcap"
+    data = (seen / "run" / "run.mcap").read_bytes()
+    part.write_bytes(data[: len(data) // 2])
+    code, out, err = mirotwin("track", part, *files(seen), "--robots", "0")
+    assert code in (0, 2)
+    assert str(part) in err
+    assert len(out.splitlines()) < FRAMES + 2
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("0.png", b"", "0.png: is no PNG or PPM picture; convert it to PNG"),
+        ("0.png", b"GIF89a....", "0.png: is no PNG or PPM picture; convert it to PNG"),
+        ("0.ppm", b"P6\n320 240\n255\nshort", "0.ppm: is damaged: "),
+        ("0.ppm", b"P6\n640 480\n255\n", "0.ppm: 640 x 480 pixels; give pictures of 320 x 240"),
+        ("0.ppm", b"P6\n100000 100000\n255\n", "0.ppm: far too many pixels; give pictures of 320 x 240"),
+        ("0.ppm", b"P6\n320 x\n", "0.ppm: is "),
+        ("0.txt", b"", ": holds no .png and no .ppm; give a folder of pictures, or a run.mcap"),
+    ],
+)
+def test_a_picture_that_is_none_is_named(
+    mirotwin: Callable[..., Result], seen: Path, tmp_path: Path, name: str, content: bytes, expected: str
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    code, out, err = mirotwin("track", tmp_path, *files(seen))
+    assert (code, out) == (2, "")
+    assert err.startswith(f"mirotwin: error: {tmp_path}{'' if expected[0] == ':' else '/'}{expected}")
+    assert err.count("\n") == 1
+
+
+def test_a_damaged_picture_is_named(mirotwin: Callable[..., Result], seen: Path, tmp_path: Path) -> None:
+    data = (seen / "frames" / "frame-000000.png").read_bytes()
+    for number, broken in enumerate((data[:5000], data[:60] + b"\0" * 90 + data[150:], data[:20])):
+        file = tmp_path / f"{number}" / "x.png"
+        file.parent.mkdir()
+        file.write_bytes(broken)
+        code, out, err = mirotwin("track", file.parent, *files(seen))
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert err.startswith(f"mirotwin: error: {file}: is ")
+
+
+def without_colour(name: str) -> str:
+    classes = colours_of(CameraParameters(), PictureSettings(), "diagonal")
+    text = classes.text()
+    return text.replace(f"[colours.{name}]", f"[colours.{name}_paint]")
+
+
+def same_colour(text: str) -> str:
+    """The class of magenta, once more as violet."""
+    _, _, rest = text.partition("[colours.magenta]\n")
+    means = rest.partition("\n\n")[0]
+    before, _, after = text.partition("[colours.violet]\n")
+    return f"{before}[colours.violet]\n{means}\n\n{after.partition(chr(10) * 2)[2]}"
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (same_colour, ": colours.violet: cannot be told from magenta: hues too near for the noise"),
+        (lambda text: text.replace("magenta", "pink"), ": colours.pink: unknown colour; use yellow, blue,"),
+        (lambda text: text.replace("magenta", "orange", 1), ": not TOML: "),
+        (
+            lambda text: "[colours.yellow]\ny = 200\ncb = 32\ncr = 147\n",
+            ": colours.magenta: no class of this",
+        ),
+        (lambda text: "", ": colours: this key is missing"),
+        (lambda text: "[colours]\n", ": colours: there is no colour; sample"),
+        (lambda text: text.replace("spread", "sprawl", 1), ": colours[...].sprawl: unknown key"),
+    ],
+)
+def test_colours_that_cannot_be_used_are_named_with_file_and_key(
+    mirotwin: Callable[..., Result],
+    seen: Path,
+    tmp_path: Path,
+    change: Callable[[str], str],
+    expected: str,
+) -> None:
+    colours = tmp_path / "colours.toml"
+    colours.write_text(change((seen / "colours.toml").read_text()))
+    given = ("--calibration", seen / "camera.toml", "--colours", colours)
+    code, out, err = mirotwin("track", seen / "frames", *given)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"mirotwin: error: {colours}{expected}")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (
+            ("--robots", "0,1,0"),
+            "Invalid value for '--robots': two robots have the number 0; name each once.",
+        ),
+        (("--robots", "5"), "Invalid value for '--robots': '5' is no robot's number: 0 to 4"),
+        (("--robots", ""), "Invalid value for '--robots': '' is no robot's number"),
+        (("--team", "red"), "Invalid value for '--team': 'red' is not one of 'yellow', 'blue'."),
+        (("--calibration", "absent"), "absent: "),
+        (("--calibration", "."), ".: is a folder"),
+    ],
+)
+def test_what_cannot_be_tracked_is_refused(
+    mirotwin: Callable[..., Result], seen: Path, options: tuple[str, ...], expected: str
+) -> None:
+    code, out, err = mirotwin("track", seen / "frames", *files(seen), *options)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"mirotwin: error: {expected}")
+
+
+@pytest.mark.parametrize("path", ["absent", "camera.toml"])
+def test_a_path_that_is_neither_folder_nor_recording_is_named(
+    mirotwin: Callable[..., Result], seen: Path, path: str
+) -> None:
+    code, out, err = mirotwin("track", seen / path, *files(seen))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"mirotwin: error: {seen / path}: ")
+
+
+def test_every_colour_of_the_tracker_is_in_the_file_that_calibrate_writes(seen: Path) -> None:
+    text = (seen / "colours.toml").read_text()
+    for name in (*TEAMS, *IDENTITIES):
+        assert f"[colours.{name}]" in text
+    assert f"[{FLOOR}]" in text

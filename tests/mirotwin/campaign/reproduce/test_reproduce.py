@@ -1,0 +1,292 @@
+"""The paper's section V again: verdicts follow from rows, and the page is the same however it was made."""
+
+import csv
+import hashlib
+import json
+import string
+from pathlib import Path
+
+import msgspec
+import pyarrow.parquet as pq
+import pytest
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+
+from miro_sim.scenario.file import load
+from mirotwin.campaign.job import Row
+from mirotwin.campaign.reproduce.claims import HOLDS, NOT, NOT_JUDGED, PART, findings
+from mirotwin.campaign.reproduce.page import page
+from mirotwin.campaign.reproduce.plan import (
+    CONTROL_NOISE,
+    DISTURBANCES,
+    EPSILONS,
+    GROUPS,
+    IMPROVED,
+    PAPER,
+    RETUNED,
+    STARTS,
+    Group,
+    jobs,
+    recorded,
+)
+from mirotwin.campaign.reproduce.reproduce_command import _failures
+from mirotwin.campaign.reproduce.rows import by_label, middle, middle_seeds, never_settled, percentile
+from mirotwin.commands import main
+
+DAY = "2026-11-22"
+VALUES = {
+    "rms_x_cm": 0.5,
+    "rms_y_cm": 0.5,
+    "rms_theta_deg": 1.0,
+    "rms_position_cm": 1.0,
+    "seen_position_cm": 0.9,
+    "chattering_m_s2": 0.1,
+    "settled": True,
+}
+
+
+def table(**changes):
+    """Rows as good as they can be, for 20 seeds of each group; `changes`: label -> what its rows have else."""
+    found = {}
+    for group in GROUPS:
+        values = {**VALUES, **({"seen_position_cm": 0.1} if group.controller == IMPROVED else {})}
+        values.update(changes.get(group.label.replace("-", "_").replace(".", "_"), {}))
+        found[group.label] = [Row(group.label, group.start.proposed, seed, **values) for seed in range(20)]
+    return found
+
+
+def called(*arguments):
+    return CliRunner().invoke(main, ["reproduce", *map(str, arguments)])
+
+
+def verdict(words, **changes):
+    return finding(words, **changes).verdict
+
+
+def finding(words, **changes):
+    (found,) = [one for one in findings(table(**changes)) if words in one.claim]
+    return found
+
+
+def label(disturbance):
+    return (
+        Group(STARTS[0], PAPER, "", disturbance)
+        .label.removeprefix("fig6-paper-")
+        .replace("-", "_")
+        .replace(".", "_")
+    )
+
+
+def of_epsilon(*figures, **values):
+    names = ("illustrative", "theory", "retuned")
+    return {f"fig{figure}_epsilon_{name}": values for figure in figures for name in names}
+
+
+LOST_ON_9 = {"fig9_paper": {"settled": False, "rms_position_cm": 130.0, "chattering_m_s2": 0.01}}
+
+
+@pytest.mark.parametrize(
+    ("words", "changes", "expected"),
+    [
+        ("small initial errors", {}, HOLDS),
+        ("small initial errors", {"fig6_paper": {"rms_position_cm": 2.5}}, NOT),
+        ("forward and backward motion", {}, NOT),
+        ("forward and backward motion", {"fig7_paper": {"reversals": 2}}, HOLDS),
+        ("assumption 3", {}, HOLDS),
+        ("assumption 3", {"fig7_paper": {"crossings": 1}}, NOT),
+        ("converge asymptotically", {}, NOT),
+        ("converge asymptotically", {f"fig{n}_paper": {"seen_position_cm": 0.15} for n in (6, 7, 8)}, HOLDS),
+        ("goes to zero", {"fig8_paper": {"rms_theta_deg": 5.0}}, NOT),
+        ("fails to converge", {}, NOT),
+        ("fails to converge", {"fig9_epsilon_theory": {"settled": False}}, NOT),
+        ("in particular in the Y", {"fig9_epsilon_theory": {"rms_y_cm": 3.0}}, PART),
+        ("in particular in the Y", of_epsilon(9, rms_y_cm=3.0), PART),
+        ("in particular in the Y", of_epsilon(9, 10, rms_y_cm=3.0), HOLDS),
+        ("in particular in the Y", {}, NOT),
+        ("chattering", {}, NOT),
+        ("chattering", of_epsilon(9, 10, chattering_m_s2=0.2), HOLDS),
+        ("chattering", of_epsilon(10, chattering_m_s2=0.2), PART),
+        ("chattering", of_epsilon(9, 10, chattering_m_s2=0.2) | LOST_ON_9, PART),
+        ("chattering", LOST_ON_9 | {"fig10_paper": {"settled": False}}, NOT_JUDGED),
+        ("goes to zero", {f"fig{n}_paper": {"settled": False} for n in (6, 7, 8)}, NOT_JUDGED),
+        ("converge asymptotically", {f"fig{n}_paper": {"settled": False} for n in (6, 7, 8)}, NOT_JUDGED),
+        ("small initial errors", {"fig6_paper": {"settled": False}}, NOT),
+        ("integration error", {}, HOLDS),
+        ("integration error", {"fig7_paper_words_of_8_bits": {"settled": False}}, PART),
+        ("control signal", {}, HOLDS),
+        (
+            "control signal",
+            {f"fig{n}_paper_{label(CONTROL_NOISE[1])}": {"settled": False} for n in (6, 7, 8)},
+            PART,
+        ),
+        (
+            "control signal",
+            {
+                f"fig{n}_paper_{label(one)}": {"rms_position_cm": 2.5}
+                for n in (6, 7, 8)
+                for one in CONTROL_NOISE
+            },
+            NOT,
+        ),
+        ("superior", {"fig9_epsilon_retuned": {"rms_position_cm": 5.0}}, PART),
+        ("superior", {f"fig{n}_epsilon_retuned": {"rms_position_cm": 5.0} for n in (6, 7, 8, 9, 10)}, HOLDS),
+    ],
+)
+def test_a_verdict_follows_from_the_rows(words, changes, expected):
+    assert verdict(words, **changes) == expected
+
+
+def test_of_rows_that_are_not_there_nothing_holds():
+    assert all(found.verdict in (NOT, PART, NOT_JUDGED) for found in findings({}))
+
+
+def test_a_robot_that_ran_away_is_not_praised_for_its_calm():
+    """It chatters less than any other, and that says nothing of the law."""
+    found = finding("chattering", **of_epsilon(9, 10, chattering_m_s2=0.2), **LOST_ON_9)
+    assert "Fig. 9, retuned: not judged: 0 of 20 beside 20 of 20 settle" in found.measured
+    assert "Fig. 10, retuned: 0.10 beside 0.20" in found.measured
+    assert "130" not in finding("superior", **LOST_ON_9).measured
+
+
+def test_errors_are_those_of_the_runs_that_settle():
+    rows = table()
+    for row in range(2):
+        rows["fig6-paper"][row] = msgspec.structs.replace(
+            rows["fig6-paper"][row], settled=False, rms_position_cm=500.0, rms_theta_deg=180.0
+        )
+    (found,) = [one for one in findings(rows) if "small initial errors" in one.claim]
+    assert (found.measured, found.verdict) == ("1.00 cm; 18 of 20 runs", HOLDS)
+
+
+@given(st.lists(st.booleans(), min_size=20, max_size=20), st.floats(0.0, 10.0))
+def test_what_a_run_that_does_not_settle_did_changes_no_verdict_on_chattering(settled, chattering):
+    def found(value):
+        rows = table(**of_epsilon(9, 10, chattering_m_s2=0.2))
+        rows["fig9-paper"] = [
+            msgspec.structs.replace(row, settled=one, chattering_m_s2=0.1 if one else value)
+            for row, one in zip(rows["fig9-paper"], settled, strict=True)
+        ]
+        return next(one for one in findings(rows) if "chattering" in one.claim)
+
+    assert found(chattering) == found(0.0)
+
+
+def test_each_disturbance_of_the_paper_drives_the_papers_law_from_figs_6_to_8_and_has_a_line_on_the_page():
+    groups = [group for group in GROUPS if group.disturbance]
+    assert [(group.start.figure, group.controller, group.disturbance) for group in groups] == [
+        (figure, PAPER, disturbance) for figure in (6, 7, 8) for disturbance in DISTURBANCES
+    ]
+    for group in groups:
+        scenario, settings = group.scenario()
+        plain = Group(group.start, PAPER).scenario()[1]
+        assert load(scenario, settings).scenario != load(scenario, plain).scenario
+        assert set(group.recording) <= set(string.ascii_lowercase + string.digits + "-.")
+    text = page(table(), "0 to 19", "reproduction")
+    for disturbance in DISTURBANCES:
+        assert (
+            f"| {disturbance} | 1.00 / 1.00 (0 of 20) | 1.00 / 1.00 (0 of 20) | 1.00 / 1.00 (0 of 20) |"
+            in text
+        )
+
+
+def test_each_controller_runs_from_each_start_with_the_gains_of_its_path():
+    for start in STARTS:
+        for controller in (PAPER, *EPSILONS, IMPROVED):
+            scenario, settings = Group(start, controller).scenario()
+            path = "line" if start.path == "straight line" else "curve"
+            assert (
+                scenario
+                in {
+                    ("line", True): ("fig9",),
+                    ("line", False): ("fig6", "fig7"),
+                    ("curve", True): ("fig10",),
+                    ("curve", False): ("fig8",),
+                }[path, controller in EPSILONS]
+            )
+            assert f"network.robot.start_error_x_cm={start.x_cm}" in settings
+    assert Group(STARTS[0], RETUNED).label == "fig6-epsilon-retuned"
+    assert len({group.label for group in GROUPS}) == len(GROUPS)
+
+
+def test_of_each_group_the_run_with_the_median_error_is_recorded():
+    plan = jobs(range(5, 8))
+    assert len(plan) == 3 * len(GROUPS)
+    assert not any(job.recording for job in plan)
+    table = {"fig6-paper": [Row("fig6-paper", "fig6", n, rms_position_cm=abs(n - 6.9)) for n in range(5, 9)]}
+    table["fig7-paper"] = [Row("fig7-paper", "fig7", 5, error="failed")]
+    assert middle_seeds(table) == {"fig6-paper": 6}
+    (job,) = recorded(middle_seeds(table), lambda name: f"out/{name}")
+    assert (job.seed, job.recording) == (6, "out/fig6-paper.mcap")
+
+
+def test_statistics_are_the_plain_ones():
+    rows = [Row("a", "s", n, rms_x_cm=float(n), settled=n != 4) for n in range(20)]
+    assert middle(rows, "rms_x_cm") == 9.5
+    assert percentile(rows, "rms_x_cm", 0.95) == 18.0
+    assert percentile(rows, "rms_x_cm", 1.0) == 19.0
+    assert percentile(rows[:1], "rms_x_cm", 0.95) == 0.0
+    assert never_settled(rows) == 1
+    assert middle([], "rms_x_cm") is None
+    assert percentile(rows, "rms_y_cm", 0.5) is None
+    assert list(by_label(rows)) == ["a"]
+
+
+@pytest.mark.parametrize("seeds", ["", "a", "3-1", "0-5000", "1-2-3", "-4", "9999999999999999999"])
+def test_seeds_that_are_none_are_refused(seeds):
+    result = called("--seeds", seeds)
+    assert result.exit_code == 2
+    assert "--seeds" in result.output
+
+
+def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_in_a_deposit(tmp_path):
+    for options in (("--out", tmp_path / "a", "--jobs", "1"), ("--deposit", tmp_path / "b", "--date", DAY)):
+        result = called(*options, "--seeds", "4")
+        assert result.exit_code == 0, result.output
+    first, second = (
+        {path.relative_to(folder): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+        for folder in (tmp_path / "a", tmp_path / "b")
+    )
+    crate = Path("ro-crate-metadata.json")
+    added = {crate, Path("reproduction/rows.parquet")}
+    assert second.keys() == first.keys() | added
+    assert all(second[name] == content for name, content in first.items())
+    described = {entity["@id"]: entity for entity in json.loads(second[crate])["@graph"]}
+    files = {name.as_posix(): content for name, content in second.items() if name != crate}
+    assert {one["@id"] for one in described["./"]["hasPart"]} == files.keys()
+    for name, content in files.items():
+        assert described[name]["sha256"] == hashlib.sha256(content).hexdigest()
+        assert described[name]["contentSize"] == str(len(content))
+    table = pq.read_table(tmp_path / "b/reproduction/rows.parquet")
+    assert table["label"].to_pylist() == [group.label for group in GROUPS]
+    assert table.column_names == list(Row.__struct_fields__)
+    names = {path.name for path in first}
+    assert {"reproduction.md", "rows.csv", *(f"fig{n}.png" for n in range(6, 11))} <= names
+    assert len([name for name in names if name.endswith(".mcap")]) == len(GROUPS)
+    with (tmp_path / "a/reproduction/rows.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == len(GROUPS)
+    assert not any(row["error"] for row in rows)
+    page = (tmp_path / "a/reproduction.md").read_text()
+    assert "seeds 4 to 4" in page
+    ours = [line for line in page.splitlines() if line.startswith("| `body_frame`")]
+    assert len(ours) == 5
+    assert not any("| - |" in line for line in ours)
+    again = called("--out", tmp_path / "a", "--seeds", "4")
+    assert again.exit_code == 2
+    assert "--force" in again.output
+    channels = [path for path in first if path.name == "fig7-paper.mcap"]
+    assert b"/net0/robot0/theory" in first[channels[0]]
+
+
+def test_a_page_that_is_there_is_not_replaced_without_force(tmp_path):
+    (tmp_path / "reproduction.md").write_text("mine")
+    result = called("--out", tmp_path, "--seeds", "4")
+    assert result.exit_code == 2
+    assert "--force" in result.output
+    assert (tmp_path / "reproduction.md").read_text() == "mine"
+
+
+def test_runs_that_failed_are_told_and_end_with_2(capsys):
+    assert _failures([Row("a", "fig6", 1, error="no such seed"), Row("a", "fig6", 2)]) == 2
+    assert "1 of 2 runs failed" in capsys.readouterr().err

@@ -1,0 +1,290 @@
+"""`mirotwin campaign`: what it says, its exit codes, and what it refuses."""
+
+import contextlib
+import json
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from mirotwin import campaign
+from mirotwin.campaign.journal import journal_path
+from mirotwin.commands import main
+from tests import children
+from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
+
+pytest.importorskip("pyarrow", reason="needs pyarrow: the extra campaign")
+
+FACTORS = """
+scenario = "fig7"
+seeds = "0-19"
+set = { duration_s = 0.2 }
+[factor.start]
+near = []
+far = ["network.robot.start_error_x_cm=40.0"]
+"""
+
+
+def called(*arguments):
+    return CliRunner().invoke(main, ["campaign", *map(str, arguments)])
+
+
+def made(path, text, **changes):
+    """Results of a campaign; `changes`: column -> what becomes of its values."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    campaign.run(plan_of(text), path, InThisProcess())
+    table = pq.read_table(path)
+    for name, change in changes.items():
+        at = table.schema.get_field_index(name)
+        values = [change(value) for value in table[name].to_pylist()]
+        table = table.set_column(
+            at, table.schema.field(name), pa.array(values, table.schema.field(name).type)
+        )
+    pq.write_table(table, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("results") / "factors.parquet", FACTORS)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.toml").write_text(SHORT)
+    return tmp_path
+
+
+def test_a_file_is_run_with_one_line_and_then_is_there_already(here):
+    result = called("short.toml", "--jobs", 1, "--seeds", "3-4")
+    assert result.exit_code == 0, result.output
+    assert result.output.startswith("4 runs (4 of them now, in ")
+    assert len(rows(here / "runs/short.parquet")) == 4
+    again = called("run", "short.toml", "--seeds", "3-4")
+    assert (again.exit_code, again.output) == (0, "runs/short.parquet has all 4 runs already\n")
+    other = called("short.toml")
+    assert other.exit_code == 2
+    assert "holds the results of another campaign" in other.output
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        (("bit_error_rate", "bit_error_rat"), "grid.network.radio.bit_error_rat[0]"),
+        (("network.radio.bit", "network.7.radio.bit"), "grid.network.7.radio.bit_error_rate[0]"),
+        (("1e-2", "7.0"), "grid.network.radio.bit_error_rate[1]"),
+        (("1e-2", "0.0"), "grid.network.radio.bit_error_rate"),
+        (("[0.0, 1e-2]", "0.5"), "grid.network.radio.bit_error_rate"),
+        (("duration_s", "duration"), "set.duration"),
+        (('"fig7"', '"fig77"'), "scenario"),
+        (('"3-5"', '"5-3"'), "seeds"),
+        (("scenario", "szenario"), "szenario"),
+        (("[grid]", "firmware = 'none.ihx'\n[grid]"), "firmware"),
+        (("[grid]", "[expect]\ntracks_within = 1\n[grid]"), "expect.tracks_within"),
+        (("[grid]", "[factor.far]\na = ['network.robot.x=1']\n[grid]"), "factor.far.a"),
+        (("[grid]", "[factor.run]\na = []\n[grid]"), "run"),
+        (("[grid]", "[grid]\nnetwork.robot.slot = [nan]"), "grid.network.robot.slot[0]"),
+        (
+            ("[grid]", "[random]\ncount = 2\n[random.range]\nhost.compute_s = {from = 1, to = 2}\n[grid]"),
+            "random",
+        ),
+        (("[grid]", "[random]\ncount = 2\n[random.range]\nhost.compute_s = {from = 1}\n[grid]"), "random"),
+        (("[grid]", "[grid"), "not TOML"),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_told_with_its_place_before_anything_runs(here, change, place):
+    (here / "short.toml").write_text(SHORT.replace(*change))
+    result = called("short.toml")
+    assert result.exit_code == 2
+    assert result.output.startswith(f"mirotwin: error: short.toml: {place}"), result.output
+    assert result.output.count("\n") == 1
+    assert [path.name for path in here.iterdir()] == ["short.toml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["short.toml", "--seeds", "0-9999999"], "has 20000000 runs, more than 100000"),
+        (["nothing.toml"], "nothing.toml: there is no such file"),
+        (["short.toml", "--out", "short.csv"], "results are a .parquet file"),
+        (["short.toml", "--jobs", "2", "--cluster", "tcp://x:1"], "--jobs and --cluster"),
+        (["show", "nothing.parquet"], "nothing.parquet: there is no such file"),
+        (["show", "short.toml"], "short.toml: is no Parquet file"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_in_a_line(here, arguments, words):
+    result = called(*arguments)
+    assert result.exit_code == 2
+    assert words in result.output
+    assert "Traceback" not in result.output
+
+
+def test_failed_checks_are_exit_code_1_beyond_the_share_that_may(here):
+    text = FACTORS.replace("0-19", "0-1") + "[expect]\ntracks_within_cm = 50.0\n"
+    (here / "c.toml").write_text(text)
+    result = called("c.toml", "--jobs", 1)
+    assert result.exit_code == 1
+    assert "failed: runs 0, 1: tracks_within_cm" in result.output
+    (here / "c.toml").write_text(f"allowed_failed_share = 1.0\n{text}")
+    assert called("c.toml", "--jobs", 1, "--force").exit_code == 0
+
+
+def test_a_run_with_an_error_is_exit_code_2_and_the_others_are_there(here):
+    (here / "c.toml").write_text(
+        'scenario = "fig7"\nset = { duration_s = 0.1 }\n'
+        "[grid]\nnetwork.robots = [3, 5]\nnetwork.radio.keyup_s = [0.001, 0.005]\n"
+    )
+    result = called("c.toml", "--jobs", 1)
+    assert result.exit_code == 2
+    assert "1 of 4 runs have an error" in result.output
+    assert len(rows(here / "runs/c.parquet")) == 4
+
+
+def children_of(parent):
+    """Processes that a process has started; none where there is no /proc."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            if int(entry.read_text().rpartition(")")[2].split()[1]) == parent:
+                found.append(int(entry.parent.name))
+    return found
+
+
+def runs(process):
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_a_campaign_that_is_killed_goes_on_and_ends_with_the_same_bytes(here):
+    (here / "short.toml").write_text(SHORT.replace("3-5", "0-19"))
+    command = [sys.executable, "-c", "from mirotwin.entry import main; main()", "campaign", "short.toml"]
+    process = children.start([*command, "--jobs", "1", "-q"])
+    part = journal_path(here / "runs/short.parquet")
+    deadline_s = time.monotonic() + 60
+    while not part.exists() or part.read_bytes().count(b"\n") < 4:
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
+    workers = children_of(process.pid)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    while any(map(runs, workers)):  # they have nobody left to work for
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
+    left = part.read_bytes().count(b"\n") - 1
+    assert 3 <= left < 40
+    result = called("short.toml", "--jobs", 1)
+    assert result.exit_code == 0, result.output
+    assert result.output.startswith(f"40 runs ({40 - left} of them now")
+    whole = here / "whole.parquet"
+    campaign.run(campaign.load("short.toml"), whole, InThisProcess())
+    assert (here / "runs/short.parquet").read_bytes() == whole.read_bytes()
+
+
+def test_ctrl_c_says_how_much_is_there_and_that_the_same_command_goes_on(here):
+    (here / "short.toml").write_text(SHORT.replace("3-5", "0-99"))
+    command = [sys.executable, "-c", "from mirotwin.entry import main; main()", "campaign", "short.toml"]
+    process = children.start([*command, "--jobs", "1"], stderr=-1, text=True)
+    part = journal_path(here / "runs/short.parquet")
+    deadline_s = time.monotonic() + 60
+    while not part.exists() or part.read_bytes().count(b"\n") < 4:
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "of 200 runs are in runs/short.part.jsonl; the same command goes on from there" in said
+    assert "Traceback" not in said
+
+
+def test_statistics_are_shown_for_each_combination_of_factors(results):
+    result = called("show", results)
+    assert result.exit_code == 0, result.output
+    lines = result.output.splitlines()
+    assert lines[0] == f"{results}: 40 runs of short"
+    assert lines[1].split()[:3] == ["start", "runs", "failed"]
+    assert [line.split()[0] for line in lines[2::3]] == ["near", "far"]
+    document = json.loads(called("show", results, "--json", "--metric", "rms_x_cm").output)
+    assert [group["factors"] for group in document["groups"]] == [{"start": "near"}, {"start": "far"}]
+    near = sorted(row["rms_x_cm"] for row in rows(results) if row["start"] == "near")
+    assert document["groups"][0]["metrics"]["rms_x_cm"]["median"] == near[9] + (near[10] - near[9]) * 0.5
+
+
+def test_two_levels_are_compared_on_the_same_seeds(results):
+    document = json.loads(called("show", results, "--compare", "start=near,far", "--json").output)
+    (found,) = [one for one in document["differences"] if one["metric"] == "rms_position_cm"]
+    values = {(row["start"], row["seed"]): row["rms_position_cm"] for row in rows(results)}
+    apart = sorted(values["far", seed] - values["near", seed] for seed in range(20))
+    assert (found["pairs"], found["seeds"], found["without"]) == (20, 20, 0)
+    assert found["median"] == apart[9] + (apart[10] - apart[9]) * 0.5
+    assert found["interval"]["low"] <= found["difference"] <= found["interval"]["high"]
+    assert called("show", results, "--compare", "start").exit_code == 0
+    for wrong in ("start=near", "start=near,nowhere", "begin=near,far"):
+        assert called("show", results, "--compare", wrong).exit_code == 2
+
+
+def test_nothing_is_worse_than_the_same_results(results):
+    result = called("show", results, "--against", results)
+    assert result.exit_code == 0, result.output
+    assert "40 pairs of runs, 40 with the same digest" in result.output
+
+
+def test_what_got_worse_is_one_line_and_exit_code_1(results, tmp_path):
+    worse = made(tmp_path / "worse.parquet", FACTORS, rms_position_cm=lambda value: value * 1.1)
+    result = called("show", worse, "--against", results)
+    assert result.exit_code == 1
+    (line,) = [line for line in result.output.splitlines() if line.startswith("mirotwin: worse")]
+    assert f"worse than {results}: rms_position_cm by +" in line
+    assert " (95 % interval " in line
+    assert " in the mean of 40 pairs of 20 seeds, from " in line
+    assert called("show", worse, "--against", results, "--tolerance", 15).exit_code == 0
+    assert called("show", results, "--against", worse).exit_code == 0
+
+
+def test_one_fault_more_is_worse(results, tmp_path):
+    worse = made(tmp_path / "worse.parquet", FACTORS)
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(worse)
+    verdicts = table["verdict"].to_pylist()
+    at = table.schema.get_field_index("verdict")
+    pq.write_table(table.set_column(at, "verdict", pa.array(["fault", *verdicts[1:]])), worse)
+    result = called("show", worse, "--against", results)
+    assert result.exit_code == 1
+    assert "fault by +0.025" in result.output
+
+
+def test_a_gate_needs_twenty_seeds(results, tmp_path):
+    few = made(tmp_path / "few.parquet", FACTORS.replace("0-19", "0-9"))
+    result = called("show", few, "--against", results)
+    assert result.exit_code == 2
+    assert f"{results}: has only 10 seeds in common with {few}; a gate needs 20; " in result.output
+
+
+def test_pairs_of_which_one_run_lacks_the_figure_are_counted(results, tmp_path):
+    found = iter([None, *[1.0] * 39])
+    lacking = made(tmp_path / "lacking.parquet", FACTORS, rms_theta_deg=lambda _: next(found))
+    document = json.loads(called("show", lacking, "--against", results, "--json").output)
+    without = {one["metric"]: one["without"] for one in document["differences"]}
+    assert without["rms_position_cm"] == 0
+    assert without["rms_theta_deg"] == 1
+
+
+def test_results_without_a_run_in_common_are_refused(results, tmp_path):
+    other = made(tmp_path / "other.parquet", FACTORS.replace("0-19", "20-39"))
+    result = called("show", results, "--against", other)
+    assert result.exit_code == 2
+    assert "has no run in common" in result.output
+    other = made(tmp_path / "short.parquet", SHORT)
+    assert (
+        "varies network.radio.bit_error_rate, not start" in called("show", results, "--against", other).output
+    )

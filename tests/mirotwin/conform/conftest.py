@@ -1,3 +1,0 @@
-"""The command, called in this process."""
-
-from tests.mirotwin.cli.conftest import mirotwin as mirotwin

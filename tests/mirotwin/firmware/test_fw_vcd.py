@@ -1,0 +1,284 @@
+"""`mirotwin fw vcd`: files, windows, what is refused, and that sigrok reads out of them what was on the wires."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import shutil
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from intelhex import IntelHex
+
+from miro_exact.clock import (
+    CONTROL_PERIOD_TICKS,
+    HOST_CHARACTER_TICKS,
+    LM629_SAMPLE_TICKS,
+    TICKS_PER_SECOND,
+    ticks,
+)
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_robot.inspect.waveform import Waveform
+from miro_sim.scenario import file as scenario_file
+from miro_sim.world.world import World
+from tests import children
+from tests.mirotwin.conftest import Result, hex_file
+from tests.robot.inspect.reading import read
+from tests.robot.mcs51.asm import assemble
+
+MIROTWIN = Path(sys.executable).with_name("mirotwin")
+QUIET = """name = "quiet"
+title = "A radio without noise"
+duration_s = 0.3
+
+[[network]]
+[network.radio]
+carrier = "on"
+bit_error_rate = 0.0
+latency_s = 0.0002
+
+[[network.robot]]
+slot = 1
+reference.kind = "line"
+"""
+ECHO = """
+MOV RCAP2H,#0FFh
+MOV RCAP2L,#0B2h
+MOV T2CON,#34h
+MOV SCON,#50h
+loop:
+JNB RI,$
+MOV A,SBUF
+CLR RI
+MOV SBUF,A
+JNB TI,$
+CLR TI
+SJMP loop
+"""
+US_TICKS = TICKS_PER_SECOND // 1_000_000
+
+
+@pytest.fixture(scope="module")
+def quiet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("quiet") / "quiet.toml"
+    path.write_text(QUIET)
+    return path
+
+
+def characters(vcd: Path, wire: str, baud: int = 9600) -> list[tuple[int, int]]:
+    """What sigrok makes of a UART wire at 1 us: (us at which the data bits begin, byte)."""
+    if shutil.which("sigrok-cli") is None:
+        if "CI" not in os.environ:
+            pytest.skip("sigrok-cli is not installed (Debian package sigrok-cli)")
+        pytest.fail("sigrok-cli is missing: install the Debian package sigrok-cli")
+    command = ["sigrok-cli", "-I", "vcd:downsample=1000", "-i", vcd, "-P", f"uart:baudrate={baud}:rx={wire}"]
+    command += ["-A", "uart=rx-data:rx-warnings", "--protocol-decoder-samplenum"]
+    done = children.run(command, capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    lines = [re.fullmatch(r"(\d+)-\d+ uart-1: ([0-9A-F]{2})", line) for line in done.stdout.splitlines()]
+    assert all(lines), done.stdout
+    return [(int(line[1]), int(line[2], 16)) for line in lines if line is not None]
+
+
+def test_sigrok_reads_the_bytes_that_the_link_carried(
+    mirotwin: Callable[..., Result], quiet: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "quiet.vcd"
+    code, _, err = mirotwin("fw", "vcd", quiet, "--seed", 3, "--out", out)
+    assert (code, err) == (0, "")
+    scenario = scenario_file.load(str(quiet)).scenario
+    world = World(scenario, 3, load_hex(image_path()))
+    wire = []
+    while not world.finished:
+        wire += world.step().wire
+    latency = ticks(scenario.networks[0].radio.latency_s)
+    bit = HOST_CHARACTER_TICKS // 10
+    down = [
+        (run.tick + latency + index * HOST_CHARACTER_TICKS + bit, byte)
+        for run in wire
+        if run.direction == ">"
+        for index, byte in enumerate(run.data)
+    ]
+    end = read(out.read_bytes()).last_tick
+    down = [(tick, byte) for tick, byte in down if tick + 9 * bit < end]
+    heard = characters(out, "rxd")
+    assert len(heard) > 180
+    assert [byte for _, byte in heard] == [byte for _, byte in down]
+    assert all(
+        abs(us * US_TICKS - tick) <= 2 * US_TICKS for (us, _), (tick, _) in zip(heard, down, strict=True)
+    )
+    up = bytes(byte for run in wire if run.direction == "<" for byte in run.data)
+    sent = characters(out, "txd")
+    assert len(up) > 40
+    assert bytes(byte for _, byte in sent) == up
+
+
+def test_sigrok_reads_what_a_bare_processor_hears_and_says(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image = tmp_path / "echo.ihx"
+    program = IntelHex()
+    program.frombytes(assemble(ECHO))
+    program.write_hex_file(str(image))
+    (tmp_path / "in").write_bytes(b"Hello, sigrok\n")
+    out = tmp_path / "echo.vcd"
+    code, _, err = mirotwin(
+        "fw", "vcd", image, "--stdin", tmp_path / "in", "--max-cycles", 100_000, "--out", out
+    )
+    assert code == 42, err
+    for wire in ("rxd", "txd"):
+        assert bytes(byte for _, byte in characters(out, wire, 9615)) == b"Hello, sigrok\n"
+    vcd = read(out.read_bytes())
+    assert "left_pwm" not in vcd.wires
+    assert vcd.last_tick == 12 * 100_000
+
+
+def test_a_save_file_shows_every_wire_of_the_waveform(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "short.vcd"
+    code, said, _ = mirotwin("fw", "vcd", short, "--to", "40ms", "--out", out)
+    assert code == 0
+    assert said == f"0.000000 s to 0.040000 s; gtkwave {out} {out.with_suffix('.gtkw')}\n"
+    save = out.with_suffix(".gtkw").read_text()
+    vcd = read(out.read_bytes())
+    shown = re.findall(r"robot\.[\w.]+", save)
+    assert sorted(shown) == sorted(f"{scope}.{wire}" for wire, scope in vcd.scopes.items())
+    assert '[dumpfile] "short.vcd"' in save
+    assert "mtime" not in save
+    assert str(tmp_path) not in save
+
+
+def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(
+    short: Path, tmp_path: Path
+) -> None:
+    def written(name: str, *options: str) -> bytes:
+        out = tmp_path / f"{name}.vcd"
+        command = [MIROTWIN, "fw", "vcd", short, "--robot", "0", "--out", out, *options]
+        children.run(command, check=True, capture_output=True)
+        return out.read_bytes()
+
+    window = ("--from", "150ms", "--to", "156ms")
+    compiled = written("compiled", *window)
+    assert compiled == written("python", *window, "--engine", "python")
+    part, whole = read(compiled), read(written("whole", "--to", "160ms"))
+    assert (part.first_tick, part.last_tick) == (3_600_000, 3_744_000)
+    for wire, changes in part.wires.items():
+        inside = [change for change in whole.wires[wire] if 3_600_000 < change[0] < 3_744_000]
+        assert changes == [(3_600_000, whole.level_at(wire, 3_600_000)), *inside], wire
+    assert len(part.wires["left_pwm"]) > 10
+
+
+def test_a_recording_is_a_subject_as_well(
+    mirotwin: Callable[..., Result], short: Path, finished: Path, tmp_path: Path
+) -> None:
+    for name, subject in (("a", (short, "--seed", 5)), ("b", (finished / "run.mcap",))):
+        assert mirotwin("fw", "vcd", *subject, "--to", "50ms", "--out", tmp_path / f"{name}.vcd")[0] == 0
+    assert (tmp_path / "a.vcd").read_bytes() == (tmp_path / "b.vcd").read_bytes()
+
+
+def test_a_faulty_firmware_leaves_its_waveform_up_to_the_fault(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    image = hex_file(
+        tmp_path / "bad.ihx", b"\xb2\x90\xb2\x90\xa5"
+    )  # CPL P1.0 twice, then the undefined opcode
+    code, _, err = mirotwin("fw", "vcd", image, "--out", tmp_path / "bad.vcd")
+    assert code == 3
+    assert "undefined opcode" in err
+    assert read((tmp_path / "bad.vcd").read_bytes()).wires["p1_0"] == [(0, 1), (12, 0), (24, 1)]
+
+
+def refused(result: Result, message: str) -> None:
+    code, out, err = result
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert re.search(message, err), err
+
+
+def test_what_cannot_be_written_is_refused_and_nothing_is_left(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "x.vcd"
+
+    def vcd(*arguments: object) -> Result:
+        return mirotwin("fw", "vcd", *arguments)
+
+    refused(vcd(short, "--from", "5ms", "--to", "5ms", "--out", out), "the window is empty")
+    refused(vcd(short, "--from", "9s", "--out", out), "the run ends at tick 4804800; look earlier")
+    refused(vcd(short), "Missing option '--out'")
+    refused(vcd(short, "--out", tmp_path / "no" / "x.vcd"), "there is no folder")
+    refused(vcd(short, "--out", tmp_path), "is a folder")
+    refused(vcd(short, "--out", tmp_path / "x.gtkw"), "name of the GTKWave save file")
+    refused(vcd(tmp_path / "no.ihx", "--out", out), "there is no such file")
+    image = hex_file(tmp_path / "stops.ihx", b"\x00\x80\xfe")
+    refused(vcd(image, "--from", "20s", "--out", out), "--from 480000000t: the run ended .*; look earlier")
+    refused(vcd(image, "--from", "24000t", "--out", out), "look earlier")
+    assert [path.name for path in tmp_path.iterdir()] == ["stops.ihx"]
+
+
+@pytest.mark.parametrize("there", ["x.vcd", "x.gtkw"])
+def test_what_is_there_stays_unless_it_is_to_be_replaced(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, there: str
+) -> None:
+    (tmp_path / there).write_text("mine")
+    command = ("fw", "vcd", short, "--to", "1ms", "--out", tmp_path / "x.vcd")
+    refused(mirotwin(*command), f"{there}: is there already; .* --force")
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(there, "mine")]
+    assert mirotwin(*command, "--force")[0] == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["x.gtkw", "x.vcd"]
+    assert "mine" not in (tmp_path / there).read_text()
+
+
+def test_a_device_is_not_replaced(mirotwin: Callable[..., Result], short: Path) -> None:
+    refused(mirotwin("fw", "vcd", short, "--force", "--out", os.devnull), "is not a regular file")
+    assert not os.path.isfile(os.devnull)
+
+
+def test_the_encoder_wires_count_what_the_chip_counts(tmp_path: Path) -> None:
+    world = World(scenario_file.load("fig8").scenario, 0, load_hex(image_path()))
+    board = world.networks[0].robots[0].board
+    out = io.StringIO()
+    waveform = Waveform(out, board).attach(board.cpu)
+    for _ in range(24):
+        world.step()
+    waveform.close()
+    vcd = read(out.getvalue().encode())
+    for side, chip in (("left", board.left), ("right", board.right)):
+        latched_tick = chip.sample_tick - LM629_SAMPLE_TICKS
+        edges = sorted(
+            (tick, wire)
+            for wire in "ab"
+            for tick, _ in vcd.wires[f"{side}_{wire}"][1:]
+            if tick <= latched_tick
+        )
+        assert len({tick for tick, _ in edges}) == len(edges)
+        order = [(0, 0), (1, 0), (1, 1), (0, 1)]
+        places = [order.index((vcd.level_at(f"{side}_a", t), vcd.level_at(f"{side}_b", t))) for t, _ in edges]
+        steps = [(after - before + 1) % 4 - 1 for before, after in pairwise([0, *places])]
+        assert set(steps) <= {-1, 1}
+        assert abs(chip.real_position) > 1000
+        assert abs(sum(steps) - chip.real_position) <= 1  # the chip's filter may hold back the last one
+
+
+def test_a_watched_world_has_the_digest_of_an_unwatched_one(
+    mirotwin: Callable[..., Result], short: Path
+) -> None:
+    def digest(watched: bool, pieces: int) -> str:
+        world = World(scenario_file.load(str(short)).scenario, 5, load_hex(image_path()))
+        waveforms = []
+        for robot in world.networks[0].robots if watched else []:
+            waveforms.append(Waveform(io.StringIO(), robot.board).attach(robot.board.cpu))
+        for tick in range(pieces, world.periods * CONTROL_PERIOD_TICKS + pieces, pieces):
+            world.run_to(min(tick, world.periods * CONTROL_PERIOD_TICKS))
+        for waveform in waveforms:
+            waveform.close()
+        return world.digest
+
+    free = digest(False, CONTROL_PERIOD_TICKS)
+    assert digest(True, CONTROL_PERIOD_TICKS) == digest(True, 123_457) == free

@@ -1,0 +1,58 @@
+"""Ports in the test's own process: a world, a selector, and clients that are waited for.
+
+What belongs here: what the tests of sockets, of RFC 2217 and of terminals share. What does not: sessions as processes
+(`rig`).
+"""
+
+import socket
+import time
+from collections.abc import Callable
+from selectors import DefaultSelector
+from typing import TypeVar
+
+from miro_sim.world.world import World
+from mirotwin.ports.endpoint import Endpoint, Place
+from mirotwin.ports.live import live_scenario
+from mirotwin.ports.radio_port import RadioPort
+from mirotwin.ports.sockets import TcpEndpoint
+from tests.mirotwin.ports.rig import own_image
+
+Port = TypeVar("Port", bound=Endpoint)
+
+
+class Rig:
+    """A world and what is needed to open ports of its radio; `told` is what the user would read."""
+
+    def __init__(self) -> None:
+        self.world = World(live_scenario("fig6").scenario, 1, own_image())
+        self.selector = DefaultSelector()
+        self.told: list[str] = []
+        self.place = Place(RadioPort(self.world), self.selector, self.told.append)
+        self.open: list[Endpoint] = []
+
+    def opened(self, port: Port) -> Port:
+        self.open.append(port)
+        return port
+
+    def close(self) -> None:
+        for port in self.open:
+            port.close()
+        assert not self.selector.get_map()
+        self.selector.close()
+
+
+def soon(port: Endpoint, wanted: Callable[[], object]) -> bytes:
+    """What the port receives until `wanted`, in at most 5 s."""
+    got, until_s = b"", time.monotonic() + 5
+    while not wanted():
+        assert time.monotonic() < until_s, port.client
+        got += port.receive()
+        port.push()
+        time.sleep(0.001)
+    return got
+
+
+def connected(port: TcpEndpoint) -> socket.socket:
+    client = socket.create_connection(("127.0.0.1", int(port.where.rpartition(":")[2])), timeout=5)
+    soon(port, lambda: port.client)
+    return client

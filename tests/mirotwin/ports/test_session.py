@@ -1,0 +1,133 @@
+"""A live session in this process, under a wall clock that stands where the test puts it."""
+
+from typing import Any
+
+import pytest
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
+from miro_sim.periods import Period
+from miro_sim.world.world import World
+from mirotwin.ports.bounded import Bounded
+from mirotwin.ports.endpoint import Endpoint, Place
+from mirotwin.ports.live import live_scenario
+from mirotwin.ports.radio_port import RadioPort
+from mirotwin.ports.session import Session
+from mirotwin.rerun import runner
+from mirotwin.rerun.script import script_of
+from tests.mirotwin.ports.rig import NO_SELECTOR, fake_pace, own_image, question
+
+
+class Scripted(Endpoint):
+    """A port whose client sends `data` at once as soon as the world is at `tick`, and reads everything."""
+
+    kind = "scripted"
+
+    def __init__(self, place: Place, sends: list[tuple[int, bytes]]) -> None:
+        super().__init__(place, "here")
+        self.sends = sends
+        self.got = b""
+        self.has_come("a test")
+
+    def receive(self) -> bytes:
+        if self.sends and self.port.world.tick >= self.sends[0][0]:
+            return self.sends.pop(0)[1]
+        return b""
+
+    def push(self) -> None:
+        self.got += self.out.take(len(self.out))
+
+
+def session_of(
+    *sends: tuple[int, bytes], ports: int = 1, **more: Any
+) -> tuple[Session, list[Scripted], list[str]]:
+    scenario = live_scenario("fig6", ("network.radio.bit_error_rate=0",)).scenario
+    world = World(scenario, 1, own_image())
+    told: list[str] = []
+    place = Place(RadioPort(world), NO_SELECTOR, told.append)  # type: ignore[arg-type]
+    found = [Scripted(place, list(sends) if index == 0 else []) for index in range(ports)]
+    pace = fake_pace()
+    session = Session(world, pace, NO_SELECTOR, found, told.append, **{"end_tick": ticks(0.5), **more})  # type: ignore[arg-type]
+    return session, found, told
+
+
+def test_a_session_ends_with_the_period_in_which_its_duration_does_and_replays_to_its_digests() -> None:
+    session, (client,), _ = session_of((ticks(0.05), question(0)), (ticks(0.2), question(3)))
+    session.pace.per_look = ticks(0.0007)  # type: ignore[attr-defined]
+    periods: list[Period] = []
+    session.world.observers.append(periods.append)
+    runner.run(session)
+    assert session.tick == 15 * CONTROL_PERIOD_TICKS >= ticks(0.5)
+    assert len(client.got) == 2 * 19
+    script = script_of(periods)
+    assert [one.data for one in script] == [question(0), question(3)]
+    again = World(session.world.scenario, 1, own_image(), script=script)
+    assert [again.step().digest for _ in periods] == [period.digest for period in periods]
+
+
+def test_what_is_sent_goes_on_the_air_where_the_world_stands_when_it_arrives() -> None:
+    session, _, _ = session_of((ticks(0.1), question(0)))
+    session.pace.per_look = ticks(0.0003)  # type: ignore[attr-defined]
+    periods: list[Period] = []
+    session.world.observers.append(periods.append)
+    runner.run(session)
+    (sent,) = script_of(periods)
+    assert ticks(0.101) <= sent.tick < ticks(0.101 + 0.002) + 121 + 1  # at most a slice later, and the key-up
+
+
+def test_all_ports_of_a_network_hear_its_robots() -> None:
+    session, clients, _ = session_of((0, question(0)), ports=3)
+    session.pace.per_look = ticks(0.001)  # type: ignore[attr-defined]
+    runner.run(session)
+    assert len(clients[0].got) == 19
+    assert clients[0].got == clients[1].got == clients[2].got
+
+
+def test_a_world_that_is_behind_catches_up_without_skipping_and_says_by_how_much() -> None:
+    session, _, told = session_of()
+    session.pace.per_look = ticks(0.0005)  # type: ignore[attr-defined]
+    session.run_to(ticks(0.1))
+    assert session.live().late_max_ms < 3
+    session.pace.now += ticks(0.25)  # type: ignore[attr-defined]
+    session.run_to(ticks(0.8))  # a slice of 2 ms takes 1 ms: after 0.46 s it is 20 ms behind
+    live = session.live()
+    assert 240 < live.late_max_ms < 260
+    assert 0.44 < live.late_s < 0.48
+    assert [line.partition(": ")[2] for line in told[1:]] == ["249 ms behind the wall clock"]
+    assert session.world.tick == ticks(0.8)
+
+
+def test_once_ends_it_when_the_last_client_has_gone() -> None:
+    session, (client, other), _ = session_of(ports=2, once=True)
+    session.pace.per_look = ticks(0.001)  # type: ignore[attr-defined]
+    session.step()
+    client.has_gone()
+    session.step()
+    assert not session.finished
+    other.port.send(question(0))
+    other.has_gone()
+    assert not session.finished  # what it sent is still under way
+    session.step()
+    assert session.finished
+
+
+def test_a_full_buffer_drops_what_comes_in_and_counts_it() -> None:
+    buffer = Bounded(10)
+    buffer.add(b"abcdefgh")
+    buffer.add(b"ijkl")
+    assert (bytes(buffer.data), buffer.dropped) == (b"abcdefghij", 2)
+    assert buffer.take(4) == b"abcd"
+    buffer.add(b"mnop")
+    assert (bytes(buffer.data), buffer.dropped) == (b"efghijmnop", 2)
+
+
+@pytest.mark.parametrize("reads", [True, False])
+def test_a_client_that_does_not_read_loses_what_comes_when_its_buffer_is_full(reads: bool) -> None:
+    _, (client,), told = session_of()
+    client.out = Bounded(16)
+    for _ in range(4):
+        client.deliver(b"12345678")
+        if reads:
+            client.push()
+    client.has_gone()
+    assert client.plug().dropped == (0 if reads else 32)
+    assert any("does not read; 16 bytes wait, more are dropped" in line for line in told) is not reads

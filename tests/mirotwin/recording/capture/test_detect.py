@@ -1,0 +1,82 @@
+"""Formats are told from the first bytes; a guess that could be wrong about plain text is said aloud."""
+
+import gzip
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from miro_protocol import stream
+from miro_protocol.pcapng import render
+from miro_protocol.transmission import Transmission
+from mirotwin.recording.capture.detect import FORMATS, detect
+from mirotwin.recording.capture.input import HEAD_BYTES
+
+
+@pytest.mark.parametrize(
+    ("head", "format"),
+    [
+        (b"", "raw"),
+        (b"\x55\x55\xff\x2d\xd4", "raw"),
+        (b"55 55 ff 2d d4", "hex"),
+        (b"0x55,0x55", "hex"),
+        (b"\xef\xbb\xbf55 55 FF 2D D4\r\n", "hex"),
+        (b"\xef\xbb\xbf# a capture\r\n55 fF\r\n", "hex"),
+        (b"\xef\xbb\xbf792000 > 55 55\r\n", "stream"),
+        (b"\xef\xbb\xbf", "raw"),
+        (b"# a capture\n55 ff\n", "hex"),
+        (b"792000 > 55 55", "stream"),
+        (b"\n  # note\n\n 0 < 55", "stream"),
+        (b"# mirotwin stream 1\n", "stream"),
+        (b"\xef\xbb\xbf# mirotwin stream 1\n", "stream"),
+        (render([Transmission(0, ">", b"a")]), "pcapng"),
+        (b"\xd4\xc3\xb2\xa1", "pcapng"),
+        (b"\x89MCAP0\r\n", "recording"),
+        (b"\x89MCA", "recording"),
+        (b"\x89MC", "raw"),
+        (b"792000 55", "hex"),
+        (b"a" * HEAD_BYTES, "hex"),
+        (b" " + b"a" * (HEAD_BYTES - 1), "hex"),  # half a pair at the end of the part that is looked at
+    ],
+)
+def test_the_beginning_tells_the_format(head: bytes, format: str) -> None:
+    assert detect(head) == (format, "")
+
+
+@pytest.mark.parametrize(
+    "text", [b"hello", b"55 5", b"# only a comment", b"12 | 55", b"   \n", b"\xef\xbb\xbfhello"]
+)
+def test_text_that_is_neither_hex_nor_a_stream_is_raw_and_said_to_be(text: bytes) -> None:
+    format, note = detect(text)
+    assert format == "raw"
+    assert "neither pairs of hex digits nor a stream file; read as raw bytes" in note
+
+
+def test_a_packed_file_is_read_as_raw_bytes_and_said_to_be_packed() -> None:
+    assert detect(gzip.compress(b"x")) == (
+        "raw",
+        "looks packed by gzip, unpack it first; read as raw bytes",
+    )
+
+
+@given(st.binary(max_size=300))
+def test_any_bytes_have_a_format(head: bytes) -> None:
+    assert detect(head)[0] in FORMATS
+
+
+@given(
+    st.lists(st.builds(Transmission, st.just(5), st.sampled_from("<>"), st.binary(min_size=1)), min_size=1)
+)
+def test_what_the_library_writes_as_a_stream_is_a_stream(sent: list[Transmission]) -> None:
+    text = stream.format_stream(sent)
+    assert detect(text.encode())[0] == "stream"
+    assert detect(text.partition("\n")[2].encode())[0] == "stream"
+
+
+def test_the_specification_names_the_formats_in_the_order_in_which_they_are_tried() -> None:
+    page = (Path(__file__).parents[4] / "protocol/README.md").read_text(encoding="utf-8")
+    table = page.partition("| it begins with | taken for |")[2].partition("\n\n")[0]
+    named = [row.split("|")[-2].strip() for row in table.splitlines()[2:]]
+    assert named == ["pcapng", "recording", "stream", "hex", "raw"]
+    assert sorted(named) == sorted(FORMATS)

@@ -1,0 +1,287 @@
+"""`mirotwin decode`: one table from any format, everything that could be read before what could not."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
+from miro_protocol.pcapng import render
+from miro_protocol.stream import format_stream
+from miro_protocol.transmission import Transmission
+from mirotwin.commands import main
+from tests import children
+from tests.mirotwin.conftest import Result
+
+PROGRAM = [sys.executable, "-c", "from mirotwin.commands import main; main()"]
+
+TEAM = encode(TeamFrame(3, 1, ((100, -100), (0, 1), (-32767, 32767))), 3)
+SERVICE = encode(ServiceFrame.acceleration(2, 1, 5973), 3)
+ANSWER = encode(TelemetryFrame(1, 2, 0x18, 0x80, 0x90, 5, 65531, 1, 0), 3)
+BROKEN = TEAM[:12] + bytes([TEAM[12] ^ 1]) + TEAM[13:]
+SENT = [(0, ">", TEAM), (800_800, "<", ANSWER), (1_601_600, ">", BROKEN), (2_402_400, ">", SERVICE)]
+DOWN = TEAM + BROKEN + SERVICE
+PCAPNG = render([Transmission(*sent) for sent in SENT])
+STREAM = format_stream([Transmission(*sent) for sent in SENT]).encode()
+
+
+def decode(data: bytes, *options: str) -> tuple[int, list[str], str]:
+    """Exit code, lines and errors of decoding `data` from standard input."""
+    result = CliRunner().invoke(main, ["decode", "-", *options], input=data)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stdout.splitlines(), result.stderr
+
+
+def as_json(data: bytes, *options: str) -> tuple[int, list[dict], str]:  # type: ignore[type-arg]
+    code, lines, err = decode(data, "--json", *options)
+    return code, [json.loads(line) for line in lines], err
+
+
+@pytest.mark.parametrize("data", [DOWN, DOWN.hex().encode(), b", ".join(b"0x%02x" % byte for byte in DOWN)])
+def test_bytes_without_times_are_told_by_their_offsets(data: bytes) -> None:
+    code, lines, err = decode(data)
+    assert (code, err) == (0, "")
+    assert lines[0].endswith(", network 0 of 3 robots")
+    columns = [line.split(maxsplit=6) for line in lines[3:-1]]
+    assert [column[:6] for column in columns] == [
+        ["0", ">", "0", "team_ask", "1", "accepted"],
+        ["23", ">", "0", "damage", "-", "bad"],
+        ["46", ">", "0", "acceleration", "2", "accepted"],
+    ]
+    assert columns[0][6] == "0: +100/-100  1: +0/+1  2: -32767/+32767"
+    assert columns[2][6] == "slot=1 acceleration=5973"
+    assert "acceleration in 1/65536 count per sample^2" in lines[1]
+    assert lines[-1] == "frames: 2 accepted, 0 stale, 0 telemetry; 1 damaged runs of 23 bytes (1 bad crc)"
+
+
+@pytest.mark.parametrize("data", [PCAPNG, STREAM])
+def test_captures_with_times_and_both_directions_are_told_by_their_ticks(data: bytes) -> None:
+    code, found, err = as_json(data)
+    assert (code, err) == (0, "")
+    first, *rows, last = found
+    assert (first["event"], first["timed"]) == ("input", True)
+    assert [(row["tick"], row["direction"], row["event"]) for row in rows] == [
+        (0, ">", "frame"),
+        (800_800, "<", "frame"),
+        (1_601_600, ">", "damage"),
+        (2_402_400, ">", "frame"),
+    ]
+    assert rows[0]["fields"]["velocities"][2] == {"left": -32767, "right": 32767}
+    assert rows[1]["fields"] == {
+        "slot": 2,
+        "flags": ["stopped", "motors_off"],
+        "status_left": 0x80,
+        "status_right": 0x90,
+        "position_left": 5,
+        "position_right": 65531,
+        "accepted": 1,
+        "rejected": 0,
+    }
+    assert rows[2]["reason"] == "bad crc"
+    assert bytes.fromhex(rows[2]["data"]) == BROKEN
+    assert rows[1]["time_s"] == 800_800 / 24e6
+    assert first["units"]["position_left"] == "count"
+    assert (last["accepted"], last["telemetry"], last["damaged"]) == (2, 1, 1)
+
+
+def test_a_recording_says_how_many_robots_it_has_and_gives_both_directions(
+    mirotwin: Callable[..., Result], finished: Path
+) -> None:
+    code, out, err = mirotwin("decode", finished / "run.mcap", "--json")
+    assert (code, err) == (0, "")
+    rows = [json.loads(line) for line in out.splitlines()]
+    assert rows[0]["format"] == "recording"
+    assert [row["seq"] for row in rows if row.get("type") == "team_ask"] == list(range(6))
+    assert {row["fields"]["slot"] for row in rows if row.get("type") == "telemetry"} <= {0, 2}
+    assert rows[-1]["telemetry"] >= 1
+
+
+def test_repeated_numbers_are_stale() -> None:
+    lines = decode(TEAM + SERVICE + SERVICE)[1]
+    assert [line.split()[5] for line in lines[3:-1]] == ["accepted", "accepted", "stale"]
+
+
+@pytest.mark.parametrize("n", [3, 5])
+def test_the_layout_is_that_in_which_frames_can_be_read_unless_it_is_said(n: int) -> None:
+    wire = encode(TeamFrame(0, 1, ((1, 2),) * n), n)
+    assert as_json(wire)[1][1]["event"] == "frame"
+    code, found, err = as_json(wire, "--robots", str(8 - n))
+    assert (code, err) == (0, "")
+    assert found[1]["event"] == "damage"
+
+
+def test_a_layout_that_cannot_be_told_is_said_to_be_a_guess() -> None:
+    assert "no frame of 3 or 5 robots at the beginning; 3 robots assumed (--robots" in decode(b"\0" * 50)[2]
+    both = TEAM + encode(TeamFrame(0, 2, ((1, 2),) * 5), 5) * 2
+    assert (
+        "1 frames of 3 robots and 2 frames of 5 robots at the beginning; 5 robots assumed" in decode(both)[2]
+    )
+    assert decode(both, "--robots", "3", "--direction", "down")[2] == ""
+
+
+def test_raw_telemetry_is_found_to_come_from_a_robot() -> None:
+    code, found, _ = as_json(ANSWER)
+    assert (code, found[1]["direction"], found[1]["type"]) == (0, "<", "telemetry")
+    assert as_json(TEAM, "--direction", "up")[1][1]["event"] == "damage"
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.binary(max_size=200))
+def test_any_bytes_are_decoded(data: bytes) -> None:
+    code, found, _ = as_json(data, "--format", "raw")
+    assert code == 0
+    assert b"".join(bytes.fromhex(row["data"]) for row in found[1:-1]) == data
+
+
+def test_plain_text_is_taken_for_bytes_with_a_word_about_it() -> None:
+    code, lines, err = decode(b"hello world, how are you?")
+    assert code == 0
+    assert "standard input: is text, but neither pairs of hex digits nor a stream file" in err
+    assert "25 bytes: 68 65 6c" in lines[3]
+
+
+@pytest.mark.parametrize(
+    ("data", "options", "rows", "message"),
+    [
+        (PCAPNG[:-3], (), 3, "offset 324: the file ends in the middle of a block"),
+        (PCAPNG + b"\0" * 12, (), 4, "damaged block: length 0"),
+        (
+            b"\xd4\xc3\xb2\xa1" + bytes(20),
+            (),
+            0,
+            "offset 0: a capture in the old pcap format; convert it with",
+        ),
+        (STREAM + b"5000000 > 5g\n", (), 4, "standard input:6:11: '5g' is not a character"),
+        (STREAM + b"5000000 > \xff\n", (), 4, "standard input:6:11: byte ffh is not UTF-8"),
+        (DOWN.hex(" ").encode() + b"\nxy", ("--format", "hex"), 3, "standard input:2:1: 'x' is no hex digit"),
+        (DOWN, ("--format", "pcapng"), 0, "offset 0: not a pcapng file"),
+        (DOWN, ("--format", "recording"), 0, "offset 0: not an MCAP file"),
+        (b"\x89MCAP0\r\n\1\2", (), 0, "offset 8: the file ends in the middle of a record"),
+    ],
+)
+def test_what_cannot_be_read_is_named_after_all_that_could(
+    data: bytes, options: tuple[str, ...], rows: int, message: str
+) -> None:
+    code, lines, err = decode(data, *options)
+    assert code == 2
+    assert message in err.splitlines()[-1]
+    assert len(lines) == 3 + rows + 1
+    assert lines[-1].startswith("frames: ")
+    code, found, _ = as_json(data, *options)
+    assert code == 2
+    assert [row["event"] for row in found[-2:]] == ["error", "end"]
+    assert message in found[-2]["text"]
+
+
+def test_a_capture_of_very_many_networks_does_not_fill_the_memory() -> None:
+    crowd = render([Transmission(at, ">", TEAM, at) for at in range(200)])
+    code, lines, err = decode(crowd)
+    assert code == 2
+    assert lines[0] == "standard input: pcapng capture, 200 networks"
+    assert "characters of more than 64 networks; take one out with `mirotwin export --network`" in err
+    assert len(lines) == 3 + 64 + 1
+
+
+def test_a_damaged_recording_gives_what_came_before(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
+) -> None:
+    whole = (finished / "run.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
+    code, out, err = mirotwin("decode", tmp_path / "cut.mcap")
+    assert code == 2
+    assert "the file ends in the middle of a record; it was cut short" in err
+    assert out.count("team_ask") >= 1
+
+
+def test_no_such_file_and_devices_are_refused(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    assert mirotwin("decode", tmp_path / "none")[0] == 2
+    assert mirotwin("decode", tmp_path)[0] == 2
+    assert "is a device; name a file or a pipe" in mirotwin("decode", "/dev/zero")[2]
+    assert mirotwin("decode", "/dev/null")[0] == 0
+
+
+def test_it_works_in_a_pipe_and_shows_a_frame_before_the_input_ends() -> None:
+    command = [*PROGRAM, "decode", "-", "--json"]
+    options = ["--format", "raw", "--robots", "3", "--direction", "down"]
+    with children.start([*command, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(TEAM)
+        process.stdin.flush()
+        assert json.loads(process.stdout.readline())["event"] == "input"
+        assert json.loads(process.stdout.readline())["seq"] == 1
+        process.stdin.close()
+        assert json.loads(process.stdout.readline())["accepted"] == 1
+    assert process.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments"), [("decode", ()), ("decode", ("--json",)), ("export", ("--out", "-"))]
+)
+@pytest.mark.parametrize("cut", [0, 3])
+def test_packets_of_unknown_events_are_counted_on_stderr(
+    mirotwin: Callable[..., Result], tmp_path: Path, command: str, arguments: tuple[str, ...], cut: int
+) -> None:
+    odd = bytearray(
+        render(
+            [
+                Transmission(0, ">", DOWN),
+                Transmission(800_800, ">", DOWN),
+                Transmission(2 * 800_800, ">", DOWN),
+            ]
+        )
+    )
+    at = odd.index(DOWN, odd.index(DOWN) + 1) - 4
+    odd[at] = 0x42
+    path = tmp_path / "odd.pcapng"
+    path.write_bytes(odd[: len(odd) - cut])
+    code, _, err = mirotwin(command, path, *arguments)
+    assert code == (2 if cut else 0)
+    assert (
+        f"{path}: passed over 1 packet of other events than data sent or received: 1 of unknown event" in err
+    )
+
+
+@pytest.mark.parametrize("arguments", [(), ("--json",)])
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_a_file_whose_name_is_no_utf_8_is_decoded(
+    tmp_path: Path, arguments: tuple[str, ...], encoding: str
+) -> None:
+    name = os.fsencode(tmp_path) + b"/odd\xff.hex"
+    with open(name, "wb") as file:
+        file.write(DOWN.hex().encode())
+    found = children.run(
+        [*PROGRAM, "decode", name, *arguments],
+        env={**os.environ, "PYTHONIOENCODING": f"{encoding}:strict"},
+        capture_output=True,
+        check=False,
+    )
+    assert (found.returncode, found.stderr) == (0, b"")
+    assert b"odd" in found.stdout.splitlines()[0]
+
+
+def test_a_device_that_never_ends_is_refused_as_standard_input_too() -> None:
+    with open("/dev/zero", "rb") as zeros:
+        found = children.run(
+            [*PROGRAM, "decode", "-"], stdin=zeros, capture_output=True, timeout=30, check=False
+        )
+    assert found.returncode == 2
+    assert b"standard input: is a device; name a file or a pipe" in found.stderr
+
+
+@pytest.mark.parametrize(("closed", "name"), [("<&-", b"standard input"), (">&-", b"standard output")])
+def test_a_closed_standard_stream_is_named(closed: str, name: bytes) -> None:
+    line = shlex.join([*PROGRAM, "decode", "-"])
+    found = children.run(f"{line} {closed}", shell=True, capture_output=True, input=b"", check=False)
+    assert found.returncode == 2
+    assert re.fullmatch(rb"mirotwin: error: " + name + rb":? is closed; .*\n", found.stderr)

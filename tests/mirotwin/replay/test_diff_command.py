@@ -1,0 +1,230 @@
+"""`mirotwin diff`: what two recordings were made from, and where they differ first."""
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_robot.firmware import image_path
+from miro_sim.periods import Period
+from miro_sim.scenario.file import load
+from miro_sim.world.world import World
+from mirotwin.recording.recorder import Recorder
+from mirotwin.recording.source import source_of
+from tests.mirotwin.conftest import SHORT, Result
+from tests.mirotwin.replay.rig import STOP_AT, Planted
+from tests.mirotwin.replay.test_replay_command import rewritten
+from tests.mirotwin.verify.checks.rig import own_image
+
+
+@pytest.fixture(scope="module")
+def runs(mirotwin: Callable[..., Result], short: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of runs: the short one again, and with one thing changed each."""
+    folder = tmp_path_factory.mktemp("runs")
+    patched = folder / "patched.ihx"
+    patched.write_text(with_stop_after(125))
+    for name, options in (
+        ("same", ()),
+        ("seed", ("--seed", 6)),
+        ("gain", ("--set", "network.robot.0.controller.gamma1_per_s=0.5")),
+        ("longer", ("--set", "duration_s=0.3")),
+        ("firmware", ("--firmware", patched)),
+        ("expecting", ("--expect", "frames_accepted_min=1")),
+    ):
+        seed = () if name == "seed" else ("--seed", 5)
+        out = ("--out", folder / name, "-q", "--no-figure")
+        assert mirotwin("run", short, *seed, *options, *out)[0] == 0
+    return folder
+
+
+def with_stop_after(ms: int) -> str:
+    """The robot's own image as Intel HEX, with another constant in the failsafe."""
+    lines = []
+    for line in image_path().read_text().splitlines():
+        data = bytearray.fromhex(line[1:])
+        at = STOP_AT - (data[1] << 8 | data[2])
+        if data[3] == 0 and 0 <= at < data[0]:
+            assert data[4 + at] == 110
+            data[4 + at] = ms
+            data[-1] = -sum(data[:-1]) & 0xFF
+        lines.append(f":{data.hex().upper()}")
+    return "\n".join(lines) + "\n"
+
+
+def test_two_runs_of_the_same_hold_the_same(
+    mirotwin: Callable[..., Result], finished: Path, runs: Path
+) -> None:
+    code, out, err = mirotwin("diff", finished / "run.mcap", runs / "same" / "run.mcap")
+    assert (code, err) == (0, "")
+    assert out == "the recordings hold the same in all 6 control periods\n"
+
+
+def test_what_they_were_made_from_is_told_first_key_by_key(
+    mirotwin: Callable[..., Result], finished: Path, runs: Path
+) -> None:
+    code, out, err = mirotwin("diff", finished / "run.mcap", runs / "gain" / "run.mcap")
+    assert code == 4
+    lines = out.splitlines()
+    assert lines[0].split() == ["made", "from", "A", "B"]
+    assert lines[1].split() == ["network.0.robot.0.controller.gamma1_per_s", "1.7", "0.5"]
+    assert lines[2] == ""
+    assert "the recordings differ in control period 1, tick 800800 (0.033367 s), /net0/robot0/control" in err
+    assert (
+        "their states differ from tick 800801 (0.033367 s), control period 1: networks[0].robots[0].pilot"
+        in err
+    )
+
+
+def test_another_seed_is_named_and_so_is_the_field_that_shows_it_first(
+    mirotwin: Callable[..., Result], finished: Path, runs: Path
+) -> None:
+    code, out, err = mirotwin("diff", finished / "run.mcap", runs / "seed" / "run.mcap", "--json")
+    document = json.loads(out)
+    assert (code, document["exit_code"], document["period"]) == (4, 4, 0)
+    assert document["sources"] == [{"key": "seed", "a": "5", "b": "6"}]
+    assert document["state"]["tick"] <= document["first"]["tick"]
+    assert document["state"]["fields"]
+    assert {"a", "b"} <= set(document["first"])
+    assert document["instruction"] is None
+    assert "the recordings differ in control period 0" in err
+
+
+def test_runs_of_other_sources_may_hold_the_same(
+    mirotwin: Callable[..., Result], finished: Path, runs: Path
+) -> None:
+    code, out, _ = mirotwin("diff", finished / "run.mcap", runs / "expecting" / "run.mcap")
+    assert code == 0
+    assert "expect" in out.splitlines()[1]
+    assert "the recordings hold the same in all 6 control periods; they were not made from the same" in out
+
+
+def test_a_longer_run_differs_in_its_length_alone(
+    mirotwin: Callable[..., Result], finished: Path, runs: Path
+) -> None:
+    code, _, err = mirotwin("diff", finished / "run.mcap", runs / "longer" / "run.mcap")
+    assert code == 4
+    assert err == "mirotwin: A has 6 control periods, B has 9\n"
+    assert mirotwin("diff", finished / "run.mcap", runs / "longer" / "run.mcap", "--to", "100ms")[0] == 0
+
+
+def test_two_firmwares_are_compared_by_hash_byte_and_instruction(
+    mirotwin: Callable[..., Result], short: Path, runs: Path, tmp_path: Path
+) -> None:
+    noise = ("--set", "network.radio.bit_error_rate=0.008", "--set", "duration_s=1.5", "--seed", 5)
+    for name, firmware in (("a", ()), ("b", ("--firmware", runs / "patched.ihx"))):
+        options = (*noise, *firmware, "--out", tmp_path / name, "-q", "--no-figure")
+        assert mirotwin("run", short, *options)[0] == 0
+    command = ("diff", tmp_path / "a" / "run.mcap", tmp_path / "b" / "run.mcap", "--compare", "commands")
+    code, out, err = mirotwin(*command)
+    assert code == 4
+    assert f"firmware code, the first of 1 bytes  6Eh at 0x{STOP_AT:04x} in _failsafe_tick+23" in out
+    assert "the first changed instruction that is executed: net0/robot0: A tick " in err
+    assert "failsafe.c:" in err
+    assert "B tick " in err
+    assert "MOV A,#7Dh" in err
+    assert "--lines-from names the file that they lie beside" in err
+
+
+@pytest.mark.parametrize("what", ["ram", "float"])
+def test_a_bit_that_somebody_changed_is_found_in_its_control_period(
+    mirotwin: Callable[..., Result], finished: Path, short: Path, tmp_path: Path, what: str
+) -> None:
+    """The change is in no recording, so running again shows no tick; the digests show the control period."""
+    text = load(str(short))
+    tick = 3 * CONTROL_PERIOD_TICKS + 123_456
+
+    def change(of: World) -> None:
+        if what == "ram":
+            cpu = of.robot(0, 2).board.cpu
+            cpu.poke_iram(0xF0, cpu.peek_iram(0xF0) ^ 1)
+        else:
+            body = of.robot(0, 2).drive.body
+            body.x_m = math.nextafter(body.x_m, math.inf)
+
+    world = Planted(text.scenario, 5, own_image()).plant(tick, change)
+    source = source_of(text, world)
+    path = tmp_path / "planted.mcap"
+    with path.open("wb") as stream, Recorder(stream, source) as recorder:
+        while not world.finished:
+            recorder.write(world.step())
+    code, _, err = mirotwin("diff", finished / "run.mcap", path, "-q")
+    assert code == 4
+    assert "the recordings differ in control period 3, tick 3203200 (0.133467 s), /period digest" in err or (
+        what == "float" and "the recordings differ in control period 3, tick" in err
+    )
+    assert "run again, their states do not differ up to the end of control period" in err
+
+
+def test_recordings_that_do_not_repeat_are_compared_as_far_as_they_tell(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
+) -> None:
+    def change(period: Period) -> Period:
+        digest = f"{period.index:064x}"
+        robot = msgspec.structs.replace(period.robots[0], accepted=9)
+        changed = period.robots if period.index < 2 else (robot, *period.robots[1:])
+        return msgspec.structs.replace(period, digest=digest, robots=changed)
+
+    path = rewritten(finished / "run.mcap", tmp_path / "edited.mcap", change)
+    code, _, err = mirotwin("diff", finished / "run.mcap", path, "-q", "--from", "60ms")
+    assert code == 4
+    assert "/net0/robot0/firmware accepted: A " in err
+
+
+def test_robots_that_only_one_has_are_named_and_the_others_compared(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
+) -> None:
+    alone = tmp_path / "alone.toml"
+    alone.write_text(SHORT.partition("[[network.robot]]\nslot = 2")[0])
+    assert mirotwin("run", alone, "--seed", 5, "--out", tmp_path / "out", "-q", "--no-figure")[0] == 0
+    code, _, err = mirotwin("diff", finished / "run.mcap", tmp_path / "out" / "run.mcap", "-q")
+    assert code == 4
+    assert "only A has net0/robot2" in err
+    assert "the digests are not compared: their states have another form" in err
+    other = tmp_path / "other.toml"
+    other.write_text(SHORT.replace("slot = 0", "slot = 1").partition("[[network.robot]]\nslot = 2")[0])
+    assert mirotwin("run", other, "--seed", 5, "--out", tmp_path / "other", "-q", "--no-figure")[0] == 0
+    code, _, err = mirotwin("diff", tmp_path / "out" / "run.mcap", tmp_path / "other" / "run.mcap")
+    assert code == 2
+    assert "the recordings have no robot in common" in err
+
+
+def test_half_a_recording_is_compared_as_far_as_it_goes(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
+) -> None:
+    data, half = (finished / "run.mcap").read_bytes(), tmp_path / "half.mcap"
+    half.write_bytes(data[: len(data) * 3 // 4])
+    code, _, err = mirotwin("diff", finished / "run.mcap", half)
+    assert code == 4
+    assert "it was cut short" in err
+    assert "A has 6 control periods, B has " in err
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "offset 0: empty file"),
+        (b"792000 > 55 55\n", "offset 0: not a recording; give a run.mcap that `mirotwin run` wrote"),
+        (b"\x89PNG\r\n\x1a\n\0\0", "offset 0: not a recording"),
+        (b"\x89MCAP0\r\n" + bytes(100), "offset"),
+    ],
+)
+def test_what_is_no_recording_is_refused_on_either_side(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path, content: bytes, expected: str
+) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(content)
+    for pair in ((path, finished / "run.mcap"), (finished / "run.mcap", path)):
+        code, out, err = mirotwin("diff", *pair)
+        assert (code, out) == (2, "")
+        assert err.startswith(f"mirotwin: error: {path}")
+        assert expected in err
+
+
+def test_a_folder_is_told_which_file_is_meant(mirotwin: Callable[..., Result], finished: Path) -> None:
+    code, _, err = mirotwin("diff", finished, finished / "run.mcap")
+    assert code == 2
+    assert f"{finished}: is a folder; name a file in it, such as {finished / 'run.mcap'}" in err

@@ -1,0 +1,322 @@
+"""`mirotwin export run.mcap --out foxglove.mcap`: the recording and what Foxglove draws of it, in one file.
+
+Long because each topic has its messages compared, field for field, with one recording.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from collections import Counter
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import CONTROL_PERIOD_TICKS, nanoseconds
+from mirotwin.recording import reader
+from mirotwin.recording.channels import DeedMessage
+from mirotwin.recording.container import RecordingError
+from mirotwin.recording.recorder import Recorder
+from tests.mirotwin import synthetic
+from tests.mirotwin.conftest import Result
+from tests.mirotwin.report.foxglove import rig
+from tests.mirotwin.report.foxglove.rig import Read
+
+FRAMES = {
+    *("net0/robot0", "net0/robot0/measured", "net0/robot0/reference"),
+    *("net0/robot2", "net0/robot2/measured", "net0/robot2/reference"),
+    *("net1/robot1", "net1/robot1/measured", "net1/robot1/reference"),
+    *("net0/camera", "net1/camera"),
+}
+
+
+def of(shown: list[Read], topic: str) -> list[Read]:
+    return [one for one in shown if one.topic == topic]
+
+
+def stamp_ns(time: dict[str, int]) -> int:
+    return time["sec"] * 1_000_000_000 + time["nsec"]
+
+
+def test_the_same_recording_gives_the_same_bytes(recording: bytes) -> None:
+    assert rig.exported(recording)[0] == rig.exported(recording)[0]
+
+
+def test_everything_that_was_recorded_stands_in_the_file_as_it_was_but_for_the_frames(
+    recording: bytes, shown: list[Read]
+) -> None:
+    ours = [one for one in rig.read(recording) if one.name != "foxglove.CompressedImage"]
+    assert [one for one in shown if not one.topic.startswith("/foxglove/")] == ours
+    before, after = (reader.parse(data, "x") for data in (recording, rig.exported(recording)[0]))
+    assert after == before
+    names = [
+        [one.name for one in make_reader(io.BytesIO(data)).iter_attachments()]
+        for data in (recording, rig.exported(recording)[0])
+    ]
+    assert names[0] == names[1] != []
+
+
+def test_the_frames_of_the_cameras_are_the_recorded_ones(recording: bytes, shown: list[Read]) -> None:
+    for network in (0, 1):
+        before = of(rig.read(recording), f"/net{network}/camera/image")
+        after = of(shown, f"/foxglove/net{network}/image")
+        assert len(after) == 36
+        assert [one.content["data"] for one in after] == [one.content["data"] for one in before]
+        assert base64.b64decode(after[0].content["data"]).startswith(b"\x89PNG")
+        assert {(one.content["format"], one.content["frame_id"]) for one in after} == {
+            ("png", f"net{network}/camera")
+        }
+        assert [one.time_ns for one in after] == [one.time_ns for one in before]
+
+
+def test_every_message_has_the_time_of_what_it_tells(shown: list[Read]) -> None:
+    starts = {nanoseconds(index * CONTROL_PERIOD_TICKS) for index in range(36)}
+    for one in shown:
+        if one.name == "foxglove.FrameTransforms":
+            assert {stamp_ns(part["timestamp"]) for part in one.content["transforms"]} == {one.time_ns}
+        elif one.name == "foxglove.SceneUpdate":
+            assert {stamp_ns(part["timestamp"]) for part in one.content["entities"]} == {one.time_ns}
+        elif one.topic.startswith("/foxglove/") and one.name != "mirotwin.Error":
+            assert stamp_ns(one.content["timestamp"]) == one.time_ns
+        if one.topic.startswith("/foxglove/"):
+            assert one.time_ns in starts
+
+
+def test_the_frames_of_reference_are_one_tree(shown: list[Read]) -> None:
+    parents: dict[str, str] = {}
+    for one in of(shown, "/foxglove/transforms"):
+        for part in one.content["transforms"]:
+            assert parents.setdefault(part["child_frame_id"], part["parent_frame_id"]) == "pitch"
+    assert set(parents) == FRAMES
+    used = {one.content["frame_id"] for one in shown if "frame_id" in one.content}
+    for topic in ("/foxglove/scene", "/foxglove/trails"):
+        used |= {part["frame_id"] for one in of(shown, topic) for part in one.content["entities"]}
+    assert used <= {"pitch", *FRAMES}
+
+
+def quaternions(content: Any) -> list[dict[str, float]]:
+    """Every one in a message, however deep."""
+    if isinstance(content, list):
+        return [found for part in content for found in quaternions(part)]
+    if not isinstance(content, dict):
+        return []
+    if set(content) == {"x", "y", "z", "w"}:
+        return [content]
+    return [found for part in content.values() for found in quaternions(part)]
+
+
+def test_every_quaternion_is_a_rotation_and_every_colour_is_one(shown: list[Read]) -> None:
+    count = 0
+    for one in shown:
+        for q in quaternions(one.content) if one.topic.startswith("/foxglove/") else ():
+            assert abs(q["x"] ** 2 + q["y"] ** 2 + q["z"] ** 2 + q["w"] ** 2 - 1.0) < 1e-14
+            count += 1
+    assert count > 600
+
+
+def test_the_transforms_are_the_recorded_postures(shown: list[Read]) -> None:
+    frames = {
+        "truth": "net0/robot2",
+        "reference": "net0/robot2/reference",
+        "measurement": "net0/robot2/measured",
+    }
+    for channel, frame in frames.items():
+        recorded = {one.time_ns: one.content for one in of(shown, f"/net0/robot2/{channel}")}
+        found = {
+            one.time_ns: part
+            for one in of(shown, "/foxglove/transforms")
+            for part in one.content["transforms"]
+            if part["child_frame_id"] == frame
+        }
+        assert set(found) == set(recorded)
+        assert len(found) > 25
+        for time_ns, part in found.items():
+            at = recorded[time_ns]
+            assert part["translation"] == {"x": at["x_m"], "y": at["y_m"], "z": 0.0}
+            q = part["rotation"]
+            assert (q["x"], q["y"]) == (0.0, 0.0)
+            assert math.remainder(
+                2.0 * math.atan2(q["z"], q["w"]) - at["theta_rad"], math.tau
+            ) == pytest.approx(0.0)
+
+
+def test_the_same_entities_come_again_under_the_same_names(shown: list[Read]) -> None:
+    scenes = [[part["id"] for part in one.content["entities"]] for one in of(shown, "/foxglove/scene")]
+    assert len(scenes) == 2
+    assert scenes[0] == scenes[1]
+    assert len(set(scenes[0])) == len(scenes[0])
+    assert {"pitch", "ball", "net1/robot1", "net0/robot0/measured", "net0/robot2/path"} <= set(scenes[0])
+    trails = [[part["id"] for part in one.content["entities"]] for one in of(shown, "/foxglove/trails")]
+    assert len(trails) == 36
+    assert all(sorted(names) == sorted(set(trails[0])) for names in trails)
+    assert not set(trails[0]) & set(scenes[0])
+
+
+def test_a_trail_ends_where_the_robot_is_and_a_path_holds_the_reference(shown: list[Read]) -> None:
+    truth = of(shown, "/net0/robot0/truth")[-1].content
+    trails = {part["id"]: part for part in of(shown, "/foxglove/trails")[-1].content["entities"]}
+    points = trails["net0/robot0/trail/truth"]["lines"][0]["points"]
+    assert len(points) == 8  # one in five control periods, and the last one
+    assert (points[-1]["x"], points[-1]["y"]) == (truth["x_m"], truth["y_m"])
+    scene = {part["id"]: part for part in of(shown, "/foxglove/scene")[0].content["entities"]}
+    path = scene["net0/robot2/path"]["lines"][0]["points"]
+    for one in of(shown, "/net0/robot2/reference"):
+        ways = [math.hypot(at["x"] - one.content["x_m"], at["y"] - one.content["y_m"]) for at in path]
+        assert min(ways) < 0.011
+
+
+def test_errors_are_truth_against_reference(shown: list[Read]) -> None:
+    found = of(shown, "/foxglove/net0/robot0/error")
+    pairs = zip(of(shown, "/net0/robot0/truth"), of(shown, "/net0/robot0/reference"), strict=True)
+    assert [one.content["x_cm"] for one in found] == [
+        100.0 * (true.content["x_m"] - at.content["x_m"]) for true, at in pairs
+    ]
+    assert len(found) == 36
+
+
+def test_the_log_tells_of_lost_robots_and_frames(shown: list[Read]) -> None:
+    lines = [one.content for one in of(shown, "/foxglove/log")]
+    words = Counter(line["message"].lstrip("0123456789 ") for line in lines)
+    assert words["not measured: the robot or the frame was lost"] >= 3
+    assert words["measured again"] >= 3
+    assert words["damaged frames rejected"] + words["no frame arrived since the last exposure"] >= 3
+    begun = of(shown, "/net0/robot0/truth")
+    measured = {one.time_ns for one in of(shown, "/net0/robot0/measurement")}
+    lost = [one.time_ns not in measured for one in begun][1:]
+    begins = sum(now and not before for before, now in pairwise(lost))
+    told = [
+        line for line in lines if line["name"] == "net0/robot0" and line["message"].startswith("not measured")
+    ]
+    assert len(told) == begins > 0
+
+
+def recorded(count: int, add: Callable[[Recorder], object], scenario: str = "") -> bytes:
+    """A recording of synthetic periods, whose scenario says nothing unless told."""
+    source = reader.Source("none", scenario, 0, b":00000001FF\n", "0" * 64)
+    stream = io.BytesIO()
+    with Recorder(stream, source) as recorder:
+        for period in synthetic.periods(count):
+            recorder.write(period)
+        add(recorder)
+    return stream.getvalue()
+
+
+class Fault:
+    kind, tick, pc, symbol = 3, 5 * CONTROL_PERIOD_TICKS + 7, 0x123, "main"
+
+    def __str__(self) -> str:
+        return "writes to a busy LM629 at main+3"
+
+
+def test_a_fault_of_the_firmware_is_an_error_at_its_tick() -> None:
+    shown = rig.read(rig.exported(recorded(3, lambda to: to.write_faults(0, 0, [Fault()])))[0])
+    (line,) = of(shown, "/foxglove/log")
+    assert line.time_ns == nanoseconds(Fault.tick)
+    assert (line.content["level"], line.content["name"]) == (4, "net0/robot0")
+    assert line.content["message"] == "firmware fault: writes to a busy LM629 at main+3"
+
+
+def test_what_was_done_to_a_robot_stands_in_the_log() -> None:
+    def add(recorder: Recorder) -> None:
+        recorder._add("/net0/deeds", 800_800 * 3 + 5, DeedMessage(800_800 * 3 + 5, 0, "reset", 1))
+        for period in list(synthetic.periods(4))[3:]:
+            recorder.write(period)
+
+    (line,) = of(rig.read(rig.exported(recorded(3, add))[0]), "/foxglove/log")
+    assert (line.content["message"], line.content["name"]) == ("reset: 1", "net0/robot0")
+    assert line.time_ns == nanoseconds(800_800 * 3 + 5)
+
+
+def test_a_recording_whose_scenario_cannot_be_read_is_shown_without_it_and_that_is_said() -> None:
+    data, result = rig.exported(recorded(3, lambda recorder: None, "name = 'x'\nother = 1\n"))
+    shown = rig.read(data)
+    (note,) = result.notes
+    assert note.startswith("run.mcap: other: ")
+    assert note.endswith("so there are no camera, no ball, no patches and no references in the scene")
+    (scene,) = of(shown, "/foxglove/scene")
+    assert [part["id"] for part in scene.content["entities"]] == [
+        *("pitch", "net0/robot0", "net0/robot0/measured", "net0/robot0/reference")
+    ]
+    assert len(of(shown, "/foxglove/transforms")) == 3
+
+
+def test_a_part_is_shown_as_far_as_it_goes_and_stays_marked_as_one(recording: bytes) -> None:
+    part = recording[: len(recording) * 2 // 3]
+    data, result = rig.exported(part)
+    assert 10 < result.periods < 36
+    assert len(of(rig.read(data), "/foxglove/transforms")) == result.periods
+    assert len(result.notes) == 1
+    assert "the file ends in the middle of a record" in result.notes[0]
+    again = reader.parse(data, "x")
+    assert again.periods == reader.parse(part, "x").periods
+    assert "broken off" in again.broken_off
+
+
+def test_a_file_that_has_the_topics_already_is_refused(recording: bytes) -> None:
+    with pytest.raises(BadInput, match="holds Foxglove's topics already"):
+        rig.exported(rig.exported(recording)[0])
+
+
+def test_a_damaged_frame_is_bad_input() -> None:
+    def add(recorder: Recorder) -> None:
+        recorder.write_image(0, 5, b"png")
+        recorder.flush()
+        recorder._writer.add_message(recorder._channels["/net0/camera/image"], 250, b'{"tick":')
+
+    with pytest.raises(RecordingError, match="/net0/camera/image at 250 ns"):
+        rig.exported(recorded(2, add))
+
+
+def test_the_command_writes_the_file_and_replaces_one_only_when_told(
+    mirotwin: Callable[..., Result], recording: bytes, tmp_path: Path
+) -> None:
+    given, out = tmp_path / "run.mcap", tmp_path / "fox.mcap"
+    given.write_bytes(recording)
+    told = f"{out}: 36 control periods and 72 camera frames for Foxglove\n"
+    assert mirotwin("export", given, "--out", out) == (0, told, "")
+    assert out.read_bytes() == rig.exported(recording)[0]
+    out.write_text("mine")
+    code, _, err = mirotwin("export", given, "--out", out)
+    assert (code, "is there already" in err, out.read_text()) == (2, True, "mine")
+    assert mirotwin("export", given, "--out", out, "--force", "-q") == (0, "", "")
+    assert out.read_bytes() == rig.exported(recording)[0]
+    code, _, err = mirotwin("export", given, "--out", given, "--force")
+    assert (code, "is the input itself" in err, given.read_bytes()) == (2, True, recording)
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "expected"),
+    [
+        (
+            b"AA 55 00",
+            (),
+            "{given}: raw bytes, which holds no postures; give a run.mcap that `mirotwin run` wrote",
+        ),
+        (
+            b"1 > aa\n",
+            (),
+            "{given}: stream file, which holds no postures; give a run.mcap that `mirotwin run` wrote",
+        ),
+        (b"\x89MCAP0\r\n", (), "{given}: offset 8: "),
+        (b"", ("--network", "0"), "--network does not go with --to foxglove, which writes all networks."),
+    ],
+)
+def test_what_is_no_recording_is_refused_in_one_line(
+    mirotwin: Callable[..., Result],
+    tmp_path: Path,
+    content: bytes,
+    options: tuple[str, ...],
+    expected: str,
+) -> None:
+    given, out = tmp_path / "given", tmp_path / "fox.mcap"
+    given.write_bytes(content.replace(b"AA 55", b"\xff\xfe"))
+    code, said, err = mirotwin("export", given, "--out", out, *options)
+    assert (code, said, out.exists()) == (2, "", False)
+    assert err.startswith(f"mirotwin: error: {expected.format(given=given)}")
+    assert err.count("\n") == 1

@@ -1,0 +1,139 @@
+"""Each derived message is what Foxglove published: by its JSON schema, and field for field by its protobuf classes."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import importlib
+from collections import Counter
+from typing import Any
+
+import msgspec
+import pytest
+from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto
+
+from mirotwin.report.foxglove import messages, published
+from tests.mirotwin.report.foxglove.rig import Read
+from tests.mirotwin.report.foxglove.validate import objections
+
+NAMES = ("FrameTransforms", "SceneUpdate", "CompressedImage", "CameraCalibration", "Log")
+FOXGLOVE = [f"foxglove.{name}" for name in NAMES]
+
+
+def of_protobuf(name: str) -> Any:
+    """The class of that schema in Foxglove's package."""
+    return getattr(importlib.import_module(f"foxglove_schemas_protobuf.{name}_pb2"), name)
+
+
+def many(field: Any) -> bool:
+    """Whether a field is repeated; how to ask a descriptor depends on its version."""
+    proto = DescriptorProto()
+    field.containing_type.CopyToProto(proto)
+    found: bool = proto.field[field.index].label == FieldDescriptorProto.LABEL_REPEATED
+    return found
+
+
+def schema_fields(schema: dict[str, Any], descriptor: Any, place: str) -> list[str]:
+    """Where a JSON schema and the protobuf message of that name differ in their fields, or in what is in these."""
+    names = [field.name for field in descriptor.fields]
+    found = [] if list(schema["properties"]) == names else [f"{place}: {list(schema['properties'])}, {names}"]
+    for field in descriptor.fields:
+        part = schema["properties"].get(field.name, {})
+        inner = part.get("items", part)
+        inside = field.message_type
+        if (part.get("type") == "array") is not many(field):
+            found.append(f"{place}.{field.name}: one or many")
+        if inside is not None and inside.file.package == "foxglove":
+            found += schema_fields(inner, inside, f"{place}.{field.name}")
+        elif inside is not None and inner.get("title") not in ("time", "duration"):
+            found.append(f"{place}.{field.name}: no time")
+        elif field.enum_type is not None:
+            values = {one["title"]: one["const"] for one in inner["oneOf"]}
+            if values != {value.name: value.number for value in field.enum_type.values}:
+                found.append(f"{place}.{field.name}: {values}")
+    return found
+
+
+def fill(message: Any, content: dict[str, Any]) -> None:
+    """Puts JSON into a protobuf message, by the names of its fields; a name that it has not raises."""
+    for name, value in content.items():
+        field = message.DESCRIPTOR.fields_by_name[name]
+        if field.message_type is not None and field.message_type.file.package == "google.protobuf":
+            getattr(message, name).seconds = value["sec"]
+            getattr(message, name).nanos = value["nsec"]
+        elif field.message_type is not None and many(field):
+            for part in value:
+                fill(getattr(message, name).add(), part)
+        elif field.message_type is not None:
+            getattr(message, name).SetInParent()
+            fill(getattr(message, name), value)
+        elif many(field):
+            getattr(message, name).extend(value)
+        else:
+            raw = base64.b64decode(value) if field.type == field.TYPE_BYTES else value
+            setattr(message, name, raw)
+
+
+def back(message: Any) -> dict[str, Any]:
+    """The same fields out of a protobuf message, as JSON."""
+    found: dict[str, Any] = {}
+    for field in message.DESCRIPTOR.fields:
+        value = getattr(message, field.name)
+        if field.message_type is not None and field.message_type.file.package == "google.protobuf":
+            found[field.name] = {"sec": value.seconds, "nsec": value.nanos}
+        elif field.message_type is not None:
+            found[field.name] = [back(part) for part in value] if many(field) else back(value)
+        elif many(field):
+            found[field.name] = list(value)
+        else:
+            found[field.name] = base64.b64encode(value).decode() if isinstance(value, bytes) else value
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_schemas_that_are_written_have_the_fields_of_foxgloves_protobuf_messages(name: str) -> None:
+    schema = msgspec.json.decode(published._published(name))
+    assert schema["title"] == f"foxglove.{name}"
+    assert schema_fields(schema, of_protobuf(name).DESCRIPTOR, name) == []
+
+
+def test_each_message_fits_its_schema(shown: list[Read]) -> None:
+    found = [one for one in shown if one.topic.startswith("/foxglove/")]
+    wrong = [line for one in found for line in objections(one.content, one.schema, one.topic)]
+    assert wrong[:5] == []
+    assert {one.name for one in found} == {*FOXGLOVE, "mirotwin.Error"}
+
+
+def test_each_message_goes_through_foxgloves_protobuf_classes_unchanged(shown: list[Read]) -> None:
+    counts: Counter[str] = Counter()
+    for one in shown:
+        if one.name in FOXGLOVE and one.topic.startswith("/foxglove/"):
+            kind = of_protobuf(one.name.removeprefix("foxglove."))
+            message = kind()
+            fill(message, one.content)
+            assert back(kind.FromString(message.SerializeToString())) == one.content
+            counts[one.name] += 1
+    assert set(counts) == set(FOXGLOVE)
+    assert min(counts.values()) >= 2
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda log: log.pop("line"),
+        lambda log: log.update(tick=0),
+        lambda log: log.update(level=9),
+        lambda log: log.update(line=-1),
+        lambda log: log.update(line=True),
+        lambda log: log.update(message=None),
+        lambda log: log["timestamp"].update(nsec=1_000_000_000),
+    ],
+)
+def test_the_comparison_with_a_schema_notices_what_does_not_fit(damage: Any) -> None:
+    schema = msgspec.json.decode(published._published("Log"))
+    line = messages.Log(messages.time_of(1), messages.INFO, "words", "net0")
+    good = msgspec.to_builtins(line)
+    assert list(objections(good, schema)) == []
+    bad = copy.deepcopy(good)
+    damage(bad)
+    assert len(list(objections(bad, schema))) == 1

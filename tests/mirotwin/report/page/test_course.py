@@ -1,0 +1,120 @@
+"""The columns of a page are the recorded numbers."""
+
+import math
+from fractions import Fraction
+
+import pytest
+
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from mirotwin.recording.channels import SampleMessage
+from mirotwin.recording.reader import read
+from mirotwin.recording.track import error_of
+from mirotwin.report.page.course import M_S_PER_COUNT, add_samples, course_of
+from mirotwin.report.page.pitch import MOST_POINTS, pitch_of
+from tests.mirotwin import synthetic
+
+
+@pytest.fixture(scope="module")
+def recorded(fig6):
+    return read(fig6 / "run.mcap").periods
+
+
+@pytest.fixture(scope="module")
+def robot(recorded):
+    return course_of(recorded, [True], 1).robots[0]
+
+
+def columns(postures):
+    return list(zip(postures.x_m, postures.y_m, postures.theta_rad, strict=True))
+
+
+def test_postures_are_those_of_the_recording(recorded, robot):
+    def of(kind):
+        found = [getattr(period.robots[0], kind) for period in recorded]
+        return [(one.x_m, one.y_m, one.theta_rad) for one in found]
+
+    assert columns(robot.truth) == of("truth")
+    assert columns(robot.reference) == of("reference")
+
+
+def test_a_measurement_that_is_missing_is_no_number(recorded, robot):
+    for period, (x_m, y_m, theta_rad) in zip(recorded, columns(robot.measured), strict=True):
+        seen = period.robots[0].measurement
+        if seen is None:
+            assert math.isnan(x_m)
+        else:
+            assert (x_m, y_m, theta_rad) == (seen.x_m, seen.y_m, seen.theta_rad)
+    assert math.isnan(robot.measured.x_m[0])  # the picture is still under way
+
+
+def test_errors_are_those_of_the_summary(recorded, robot):
+    assert list(robot.errors) == [error_of(period.robots[0], period.tick) for period in recorded]
+
+
+def test_the_speed_of_a_wheel_is_its_counts_over_the_samples_between_two_exposures(recorded, robot):
+    samples = Fraction(CONTROL_PERIOD_TICKS, 8192)
+    for side in ("left", "right"):
+        axes = [getattr(period.robots[0], side) for period in recorded]
+        actual = list(robot.wheels[side].actual)
+        assert math.isnan(actual[0])
+        for before, after, speed in zip(axes, axes[1:], actual[1:], strict=False):
+            if any(opcode in (0x00, 0x02) for _, opcode, _ in after.commands):
+                assert math.isnan(speed)
+                continue
+            exact = (after.real_position - before.real_position) / samples * Fraction(M_S_PER_COUNT)
+            assert speed == pytest.approx(float(exact), rel=1e-12, abs=1e-15)
+    assert max(robot.wheels["left"].actual[10:]) > 0.1
+
+
+def test_a_position_that_overflows_its_register_is_no_jump():
+    low, high = (synthetic.robot(index) for index in (1, 2))
+    from msgspec.structs import replace
+
+    low = replace(low, left=replace(low.left, real_position=(1 << 31) - 10, commands=()))
+    high = replace(high, left=replace(high.left, real_position=-(1 << 31) + 10, commands=()))
+    periods = [
+        replace(one, robots=(robot,)) for one, robot in zip(synthetic.periods(2), (low, high), strict=True)
+    ]
+    speeds = course_of(periods, [True], 0).robots[0].wheels["left"].actual
+    assert speeds[1] == 20 / (CONTROL_PERIOD_TICKS / 8192) * M_S_PER_COUNT
+
+
+def test_a_window_has_the_periods_that_are_wanted():
+    course = course_of(list(synthetic.periods(10)), [True], 0, range(3, 7))
+    assert course.first == 3
+    assert course.ticks == [index * CONTROL_PERIOD_TICKS for index in range(3, 7)]
+    assert [course.index_at(tick) for tick in (0, course.ticks[1], course.ticks[2] - 1, 1 << 60)] == [
+        0,
+        1,
+        1,
+        3,
+    ]
+
+
+def test_samples_of_a_full_recording_go_to_their_robots():
+    course = course_of(list(synthetic.periods(4, [(0, 0), (0, 2)])), [True], 0, range(1, 3))
+    inside, before = course.ticks[0] + 5, course.ticks[0] - 5
+    samples = [((0, 2), SampleMessage(tick, 1, 2, 65536, 4, 5, 6, 131072, 8)) for tick in (before, inside)]
+    add_samples(course, samples)
+    assert not len(course.robots[0].fine["left"].profile)
+    fine = course.robots[1].fine["right"]
+    assert (list(fine.times_s), list(fine.profile)) == ([inside / TICKS_PER_SECOND], [2 * M_S_PER_COUNT])
+
+
+def test_the_path_of_a_long_run_is_thinned_but_keeps_its_ends():
+    course = course_of(list(synthetic.periods(2 * MOST_POINTS + 4)), [True], 0)
+    path = next(path for path in pitch_of(course).paths if path.kind == "truth")
+    points = path.points.split()
+    assert len(points) <= MOST_POINTS + 1
+    truth = course.robots[0].truth
+    for point, index in ((points[0], 0), (points[-1], -1)):
+        assert point == f"{100.0 * truth.x_m[index]:.2f},{100.0 * truth.y_m[index]:.2f}"
+
+
+def test_a_path_that_leaves_the_pitch_is_in_the_picture():
+    course = course_of(list(synthetic.periods(400)), [True], 0)  # 0.2 m/s for 13 s
+    left, top, width, height = map(float, pitch_of(course).view_box.split())
+    assert left <= -13.0
+    assert left + width >= 100.0 * max(course.robots[0].truth.x_m) > 120.0
+    assert -top >= 83.0
+    assert height >= 96.0

@@ -1,0 +1,290 @@
+"""A run that is broken off: its parts stay, complete files are not touched, and every command reads what there is."""
+
+import errno
+import json
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NoReturn
+
+import pytest
+
+from miro_exact.domain import DomainError
+from miro_sim.world.world import World
+from mirotwin.recording import reader as recording_reader
+from mirotwin.run import run_files
+from mirotwin.shell.outputs import OutputFolder
+from tests import children
+from tests.mirotwin.conftest import Result
+
+PARTS = ["run.part.mcap", "summary.part.json"]
+PROGRAM = "from mirotwin.commands import main; main()"
+
+
+@pytest.fixture(autouse=True)
+def _default_interrupt() -> Iterator[None]:
+    """A program that a shell put into the background ignores SIGINT, and so would the tests in this process."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def at_period(monkeypatch: pytest.MonkeyPatch, index: int, act: Callable[[], object]) -> None:
+    """Has `act` called when the world is about to compute control period `index`."""
+    step = World.step
+
+    def stepped(world: World) -> object:
+        if world.index == index:
+            act()
+        return step(world)
+
+    monkeypatch.setattr(World, "step", stepped)
+
+
+def raising(error: BaseException) -> Callable[[], NoReturn]:
+    def act() -> NoReturn:
+        raise error
+
+    return act
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+CASES: list[tuple[str, Callable[[], object], int, str]] = [
+    ("Ctrl-C", lambda: signal.raise_signal(signal.SIGINT), 130, "mirotwin: interrupted"),
+    ("SIGTERM", lambda: signal.raise_signal(signal.SIGTERM), 143, "mirotwin: ended by SIGTERM"),
+    (
+        "a mistake in the program",
+        raising(ValueError("angle")),
+        70,
+        "mirotwin: internal error: ValueError: angle; please report this line with the command"
+        " (MIROTWIN_TRACEBACK=1 shows the place)",
+    ),
+    (
+        "parameters",
+        raising(DomainError("angle")),
+        2,
+        "angle; the parameters are far outside those of a real robot",
+    ),
+    (
+        "a full disk",
+        raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))),
+        2,
+        "No space left on device; make room, or choose another folder with --out",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("act", "code", "said"), [case[1:] for case in CASES], ids=[case[0] for case in CASES]
+)
+def test_what_was_recorded_stays_as_parts_and_complete_files_stay_as_they_were(
+    mirotwin: Callable[..., Result],
+    finished: Path,
+    short: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    act: Callable[[], object],
+    code: int,
+    said: str,
+) -> None:
+    before = {path.name: path.read_bytes() for path in finished.iterdir()}
+    for name, data in before.items():
+        (tmp_path / name).write_bytes(data)
+    at_period(monkeypatch, 3, act)
+    found, out, err = mirotwin("run", short, "--seed", 5, "--out", tmp_path, "--force")
+    assert (found, out) == (code, "")
+    first, last = filter(None, err.splitlines())  # after ^C, a new line
+    assert first == (
+        f"mirotwin: the run broke off after 3 control periods; they are in {tmp_path / 'run.part.mcap'}"
+    )
+    assert last.endswith(said)
+    assert names(tmp_path) == sorted([*before, *PARTS])
+    assert {name: (tmp_path / name).read_bytes() for name in before} == before
+    recording = recording_reader.read(tmp_path / "run.part.mcap")
+    whole = recording_reader.read(finished / "run.mcap")
+    assert recording.periods == whole.periods[:3]
+    assert recording.broken_off
+    summary = json.loads((tmp_path / "summary.part.json").read_bytes())
+    assert summary["complete"] is False
+    assert summary["digest"] == recording.digest
+    assert "complete" not in json.loads(before["summary.json"])
+
+
+def test_a_run_that_recorded_nothing_leaves_nothing(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_period(monkeypatch, 0, raising(KeyboardInterrupt()))
+    assert mirotwin("run", short, "--out", tmp_path / "out") == (130, "", "\nmirotwin: interrupted\n")
+    assert names(tmp_path) == []
+
+
+@pytest.fixture
+def parts(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Path:
+    """The folder of a run that was broken off after three control periods."""
+    with monkeypatch.context() as patch:
+        at_period(patch, 3, raising(KeyboardInterrupt()))
+        assert mirotwin("run", short, "--seed", 5, "--out", tmp_path / "out", "-q")[0] == 130
+    assert names(tmp_path / "out") == PARTS
+    return tmp_path / "out"
+
+
+def cut(path: Path, size: int) -> Path:
+    """A copy of a recording as a killed process leaves it: without the end, perhaps cut in a record."""
+    target = path.with_name("cut.mcap")
+    target.write_bytes(path.read_bytes()[:size])
+    return target
+
+
+def test_the_next_run_names_the_parts_and_replaces_them_by_force(
+    mirotwin: Callable[..., Result], parts: Path, short: Path, finished: Path
+) -> None:
+    code, _, err = mirotwin("run", short, "--seed", 5, "--out", parts)
+    assert code == 2
+    assert f"{parts}: the folder holds parts of an interrupted command ({', '.join(PARTS)}); " in err
+    assert "with --force" in err
+    (parts / "thesis.tex").write_text("years of work")
+    assert mirotwin("run", short, "--seed", 5, "--out", parts, "-q", "--force") == (0, "", "")
+    assert names(parts) == ["figure.png", "run.mcap", "summary.json", "thesis.tex"]
+    assert (parts / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
+
+
+def test_replay_compares_as_far_as_it_goes_and_says_so(mirotwin: Callable[..., Result], parts: Path) -> None:
+    code, out, err = mirotwin("replay", parts / "run.part.mcap")
+    assert code == 0
+    assert "equals the recorded one in all 3 control periods" in out
+    assert err.endswith("the run that wrote it was broken off; it goes to control period 2\n")
+
+
+@pytest.mark.parametrize("target", ["pcapng", "stream"])
+def test_decode_and_export_read_it_and_say_so(
+    mirotwin: Callable[..., Result], parts: Path, tmp_path: Path, target: str
+) -> None:
+    note = f"mirotwin: {parts / 'run.part.mcap'}: the run that wrote it was broken off\n"
+    code, out, err = mirotwin("decode", parts / "run.part.mcap")
+    assert (code, err) == (0, note)
+    assert "team_ask" in out
+    out_file = tmp_path / f"x.{target}"
+    code, _, err = mirotwin("export", parts / "run.part.mcap", "--out", out_file, "-q")
+    assert (code, err) == (0, note)
+    assert out_file.stat().st_size > 0
+
+
+def killed(parts: Path, more: int) -> Path:
+    """What is left of the run of `parts` if it is killed `more` bytes into the message after its second period."""
+    data = (parts / "run.part.mcap").read_bytes()
+    chunk = data.index(b"mirotwin.Posture") - 200
+    return cut(parts / "run.part.mcap", max(chunk, data.rindex(b'"index":1,') + 10 + 64 + 14 + more))
+
+
+def test_a_part_of_a_copy_is_compared_too_and_is_bad_input_for_decode(
+    mirotwin: Callable[..., Result], parts: Path
+) -> None:
+    path = killed(parts, 30)
+    code, out, err = mirotwin("replay", path, "-q")
+    assert (code, err.count("\n")) == (0, 1)
+    assert "equals the recorded one in all 2 control periods" in out
+    assert re.search(
+        r"the file ends in the middle of a record; it was cut short; .*; it goes to control period 1", err
+    )
+    assert mirotwin("decode", path)[0] == 2
+
+
+def test_a_second_interruption_waits_until_the_files_are_closed(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    encode = run_files.to_json
+
+    def impatient(summary: object) -> bytes:
+        signal.raise_signal(signal.SIGINT)
+        return encode(summary)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(run_files, "to_json", impatient)
+    with monkeypatch.context() as patch:
+        at_period(patch, 3, lambda: signal.raise_signal(signal.SIGTERM))
+        assert mirotwin("run", short, "--out", tmp_path / "out", "-q")[0] == 143
+    assert names(tmp_path / "out") == PARTS
+    assert len(recording_reader.read(tmp_path / "out" / "run.part.mcap").periods) == 3
+    code, _, err = mirotwin("run", short, "--out", tmp_path / "whole", "-q")  # it was complete by then
+    assert (code, err) == (130, "\nmirotwin: interrupted\n")
+    assert names(tmp_path / "whole") == ["figure.png", "run.mcap", "summary.json"]
+
+
+def test_two_runs_into_one_folder_the_second_is_refused(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    with OutputFolder(tmp_path / "out"):
+        for more in ((), ("--force",)):
+            code, _, err = mirotwin("run", short, "--out", tmp_path / "out", "-q", *more)
+            assert code == 2
+            assert (
+                "another process is writing into the folder; wait until it has finished, or choose another"
+                in err
+            )
+    assert names(tmp_path) == []
+
+
+def started(arguments: list[object], **more: object) -> "subprocess.CompletedProcess[str]":
+    command = [sys.executable, "-c", PROGRAM, *map(str, arguments)]
+    return children.run(command, capture_output=True, text=True, timeout=300, check=False, **more)  # type: ignore[call-overload,no-any-return]
+
+
+def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(
+    finished: Path, short: Path, tmp_path: Path
+) -> None:
+    for path in finished.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    size = (finished / "run.mcap").stat().st_size * 3 // 4
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    done = started(["run", short, "--out", tmp_path, "--force", "-q"], preexec_fn=limited)
+    assert done.returncode == 2
+    assert f"error: {tmp_path}: File too large; make room, or choose another folder with --out" in done.stderr
+    for path in finished.iterdir():
+        assert (tmp_path / path.name).read_bytes() == path.read_bytes()
+    assert recording_reader.read(tmp_path / "run.part.mcap").periods
+    assert names(tmp_path) == sorted([*names(finished), *PARTS])
+
+
+def test_a_closed_stderr_is_no_terminal_and_takes_nothing_away(
+    finished: Path, short: Path, tmp_path: Path
+) -> None:
+    command = f'exec "$0" -c "{PROGRAM}" run "$1" --seed 5 --out "$2" 2>&-'
+    arguments = ["sh", "-c", command, sys.executable, str(short), str(tmp_path / "out")]
+    done = children.run(arguments, stdout=subprocess.PIPE, timeout=300, check=False)
+    assert done.returncode == 0
+    assert b"digest" in done.stdout
+    assert (tmp_path / "out" / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
+
+
+def test_an_internal_error_shows_its_place_when_asked(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_period(monkeypatch, 0, raising(AssertionError("angle")))
+    code, out, err = mirotwin("run", short, "--out", tmp_path / "out")
+    assert (code, out, err.count("\n")) == (70, "", 1)
+    monkeypatch.setenv("MIROTWIN_TRACEBACK", "1")
+    assert "Traceback" in mirotwin("run", short, "--out", tmp_path / "out")[2]
+
+
+def test_killed_runs_leave_recordings_that_lack_half_a_second_at_most() -> None:
+    done = children.run(
+        [sys.executable, "-m", "tests.mirotwin.shell.killed", "--times", "3"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "3 runs killed, 3 recordings readable" in done.stdout

@@ -1,0 +1,250 @@
+"""`mirotwin run`: the files it writes, and that nothing is half-written whatever happens."""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NoReturn
+
+import pytest
+
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.file import load
+from miro_sim.world.world import World
+from mirotwin.recording import reader as recording_reader
+from mirotwin.rerun import runner
+from tests import children
+from tests.mirotwin.conftest import SHORT, Result, hex_file
+
+UNDEFINED_OPCODE = b"\xa5"
+
+
+def test_a_run_writes_a_recording_a_figure_and_a_summary(finished: Path) -> None:
+    assert sorted(path.name for path in finished.iterdir()) == ["figure.png", "run.mcap", "summary.json"]
+    summary = json.loads((finished / "summary.json").read_bytes())
+    recording = recording_reader.read(finished / "run.mcap")
+    assert summary["digest"] == recording.digest
+    assert (summary["scenario"], summary["seed"]) == ("short", 5)
+    assert summary["simulated_s"] == len(recording.periods) * 800_800 / 24e6
+    assert recording.source.scenario_text == SHORT
+    assert recording.source.seed == 5
+    assert recording.source.firmware == image_path().read_bytes()
+    assert recording.source.firmware_sha256 == summary["firmware"]["sha256"]
+    assert [(one["network"], one["slot"]) for one in summary["robots"]] == [(0, 0), (0, 2)]
+
+
+def test_recording_changes_nothing_and_leaves_nothing_out(finished: Path, short: Path) -> None:
+    world = World(load(str(short)).scenario, 5, load_hex(image_path()))
+    periods = []
+    while not world.finished:
+        periods.append(world.step())
+    assert recording_reader.read(finished / "run.mcap").periods == tuple(periods)
+
+
+def test_the_same_run_gives_the_same_bytes_and_a_full_recording_the_same_digest(
+    mirotwin: Callable[..., Result], finished: Path, short: Path, tmp_path: Path
+) -> None:
+    assert mirotwin("run", short, "--seed", 5, "--out", tmp_path / "again", "--quiet") == (0, "", "")
+    assert mirotwin("run", short, "--seed", 5, "--out", tmp_path / "full", "-q", "--record", "full")[0] == 0
+    for name in ("run.mcap", "figure.png"):
+        assert (tmp_path / "again" / name).read_bytes() == (finished / name).read_bytes()
+    full = recording_reader.read(tmp_path / "full" / "run.mcap")
+    assert full.periods == recording_reader.read(finished / "run.mcap").periods
+    assert (tmp_path / "full" / "run.mcap").stat().st_size > 2 * (finished / "run.mcap").stat().st_size
+
+
+def test_the_table_names_what_matters(mirotwin: Callable[..., Result], short: Path, tmp_path: Path) -> None:
+    code, out, err = mirotwin("run", short, "--out", tmp_path / "[out]")
+    assert (code, err) == (0, "")
+    for word in ("short, seed 0", "real time", "frames sent", "instructions", "digest", "[out]"):
+        assert word in out
+
+
+def test_the_folder_is_named_after_scenario_and_seed(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert mirotwin("run", short, "--seed", 3, "-q")[0] == 0
+    assert (tmp_path / "runs" / "short-3" / "run.mcap").exists()
+
+
+def test_a_finished_run_in_the_default_folder_is_replaced_and_nothing_else(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "runs" / "short-0"
+    assert mirotwin("run", short, "-q")[0] == 0
+    (folder / "notes.txt").write_text("mine")
+    assert mirotwin("run", short, "-q", "--no-figure")[0] == 0
+    assert sorted(path.name for path in folder.iterdir()) == ["notes.txt", "run.mcap", "summary.json"]
+    code, _, err = mirotwin("run", short, "-q", "--out", folder)
+    assert (code, "the folder is not empty" in err) == (2, True)
+    (folder / "run.mcap").rename(folder / "run.part.mcap")
+    code, _, err = mirotwin("run", short, "-q")
+    assert (code, "parts of an interrupted command (run.part.mcap)" in err) == (2, True)
+    (folder / "run.part.mcap").unlink()
+    code, _, err = mirotwin("run", short, "-q")
+    assert (code, "the folder is not empty (notes.txt, summary.json)" in err) == (2, True)
+    assert mirotwin("run", short, "-q", "--force")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (":00000001FF\n", ": holds no bytes; "),
+        ("hello\n", ":1: is not Intel HEX: "),
+        (":03000000020000FC\n:00000001FF\n", ":1: bad checksum FC, expected FB; "),
+        (":01200000A53A\n:00000001FF\n", ":1: byte at 0x2000 does not fit 8192 bytes; "),
+    ],
+)
+def test_firmware_that_is_none_is_refused_before_anything_is_written(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, content: str, expected: str
+) -> None:
+    image = tmp_path / "broken.ihx"
+    image.write_text(content)
+    code, out, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert f"mirotwin: error: {image}{expected}" in err
+    assert err.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["broken.ihx"]
+
+
+def test_a_firmware_fault_ends_the_run_with_code_3_and_complete_files(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    image = hex_file(tmp_path / "faulty.ihx", UNDEFINED_OPCODE)
+    code, _, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out", "-q")
+    assert code == 3
+    assert "mirotwin: firmware fault: net0/robot0: firmware executed the undefined opcode A5 at 0x" in err
+    recording = recording_reader.read(tmp_path / "out" / "run.mcap")
+    assert len(recording.periods) == 1
+    assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["firmware"]["faults"] >= 1
+    assert (tmp_path / "out" / "figure.png").exists()
+
+
+SHORT_RESET = bytes.fromhex("00 C2A5 D2A5 80FE")  # NOP; CLR P2.5; SETB P2.5; SJMP $
+SYMBOLS = """
+CSEG                                00000000    00000007 =           7. bytes (REL,CON,CODE)
+C:   00000000  _main                              a
+C:   00000001  _pulse                             a
+"""
+
+
+def test_a_fault_of_the_board_names_limit_tick_instruction_and_symbol(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    image = hex_file(tmp_path / "bad.ihx", SHORT_RESET)
+    image.with_suffix(".map").write_text(SYMBOLS)
+    code, _, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out", "-q")
+    limit = "an LM629 bus timing limit (/RST pulse 500 ns, 1333 ns needed)"
+    first = f"firmware fault: net0/robot0: firmware violated {limit}"
+    assert (code, err.splitlines()[0]) == (3, f"mirotwin: {first} at 0x0003 in _pulse, tick 36")
+
+
+def test_a_scenario_may_count_faults_and_go_on(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
+) -> None:
+    patient = tmp_path / "patient.toml"
+    patient.write_text(short.read_text().replace("duration_s", "stop_on_fault = false\nduration_s"))
+    image = hex_file(tmp_path / "bad.ihx", SHORT_RESET)
+    code, _, err = mirotwin("run", patient, "--firmware", image, "--out", tmp_path / "out", "-q")
+    assert (code, err.count("tick 36")) == (3, 2)  # both robots
+    summary = json.loads((tmp_path / "out" / "summary.json").read_bytes())
+    assert summary["firmware"]["faults"] == 2
+    assert summary["simulated_s"] > 0.2
+
+
+def test_an_interrupted_run_leaves_nothing_behind(
+    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*arguments: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runner, "run", interrupted)
+    code, out, err = mirotwin("run", short, "--out", tmp_path / "out")
+    assert (code, out, err.strip()) == (130, "", "mirotwin: interrupted")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("number", "expected"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_a_terminated_run_leaves_nothing_behind(
+    mirotwin: Callable[..., Result],
+    short: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    number: signal.Signals,
+    expected: int,
+) -> None:
+    monkeypatch.setattr(runner, "run", lambda *arguments: signal.raise_signal(number))
+    before = signal.signal(number, signal.SIG_DFL)  # a run leaves a signal alone that it finds ignored
+    try:
+        code, out, err = mirotwin("run", short, "--out", tmp_path / "out")
+        assert signal.getsignal(number) is signal.SIG_DFL
+    finally:
+        signal.signal(number, before)
+    assert (code, out, err) == (expected, "", f"mirotwin: ended by {number.name}\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("arguments", [["scenarios"], ["scenarios", "show", "fig6"], ["--help"], ["info"]])
+def test_output_that_cannot_be_written_is_one_line_on_stderr(arguments: list[str]) -> None:
+    program = [sys.executable, "-c", "from mirotwin.commands import main; main()", *arguments]
+    with Path("/dev/full").open("wb") as full:
+        done = children.run(program, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr == "mirotwin: error: reading or writing failed: No space left on device\n"
+
+
+@pytest.mark.parametrize("command", [("run", "--out", "out", "-q"), ("fw", "profile")])
+def test_parameters_with_which_nothing_can_be_computed_are_bad_input(
+    mirotwin: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("far.toml").write_text(SHORT + "drive.chassis.track_m = 1e-200\n")
+    words = list(command)
+    words.insert(2 if command[0] == "fw" else 1, "far.toml")
+    code, out, err = mirotwin(*words)
+    assert (code, out) == (2, "")
+    assert err == (
+        "mirotwin: error: far.toml: cannot be run: net0/robot2: its drive parameters lead to a value that is not"
+        " finite; the parameters are far outside those of a real robot\n"
+    )
+    assert [path.name for path in tmp_path.iterdir()] == ["far.toml"]
+
+
+def test_the_shortest_duration_is_one_control_period(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    scenario = tmp_path / "shortest.toml"
+    scenario.write_text(SHORT.replace("duration_s = 0.2", "duration_s = 1e-9"))
+    assert mirotwin("run", scenario, "--out", tmp_path / "out", "-q") == (0, "", "")
+    assert len(recording_reader.read(tmp_path / "out" / "run.mcap").periods) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--seed", "abc"], "Invalid value for '--seed': 'abc' is not a whole number."),
+        (["--out", ""], "Invalid value for '--out': the path is empty."),
+        (["--firmware", ""], "Invalid value for '--firmware': the path is empty."),
+        (["--firmware", "no.ihx"], "no.ihx: there is no such file; give the path of an .ihx or .hex file"),
+        (["--firmware", "/dev/null"], "/dev/null: is not a regular file; copy the content to a file first"),
+    ],
+)
+def test_an_option_that_means_nothing_is_refused_in_plain_words(
+    mirotwin: Callable[..., Result], short: Path, arguments: list[str], expected: str
+) -> None:
+    code, out, err = mirotwin("run", short, *arguments)
+    assert (code, out) == (2, "")
+    assert expected in err
+
+
+@pytest.mark.parametrize("arguments", [["info"], ["scenarios"]])
+def test_a_table_in_a_pipe_has_no_trailing_blanks(
+    mirotwin: Callable[..., Result], arguments: list[str]
+) -> None:
+    lines = mirotwin(*arguments)[1].splitlines()
+    assert lines
+    assert [line for line in lines if line != line.rstrip()] == []

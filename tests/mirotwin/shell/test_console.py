@@ -1,0 +1,39 @@
+"""What commands print on stdout, on a terminal and in a pipe."""
+
+import io
+import sys
+
+import pytest
+from rich.table import Table
+
+from mirotwin.shell.console import show
+
+LINE = "written to " + "/a folder with a long name" * 12 + "/out.vcd"
+
+
+class Terminal(io.StringIO):
+    """80 columns wide."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("stream", [io.StringIO, Terminal])
+def test_a_line_of_text_is_not_folded_however_long(
+    stream: type[io.StringIO], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = stream()
+    monkeypatch.setattr(sys, "stdout", out)
+    monkeypatch.setenv("COLUMNS", "80")
+    show(LINE)
+    assert out.getvalue() == f"{LINE}\n"
+
+
+def test_a_table_in_a_pipe_is_not_folded_at_80_columns_nor_padded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", out := io.StringIO())
+    monkeypatch.setenv("COLUMNS", "80")
+    table = Table("name", "value", box=None)
+    table.add_row("a" * 100, "1")
+    show(table)
+    assert out.getvalue().splitlines()[1].strip() == "a" * 100 + "  1"
+    assert not any(line.endswith(" ") for line in out.getvalue().splitlines())

@@ -1,0 +1,87 @@
+"""Ctrl-C at any moment: one line and exit code 130, or the whole result if it came too late; never a traceback."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests import children
+
+ROOT = Path(__file__).parents[3]
+MARK = b"started\n"
+PROGRAM = (
+    "import sys, os; import mirotwin.entry as entry; os.write(2, b'started\\n'); sys.argv[0] = 'mirotwin';"
+    "entry.main()"
+)
+LONGEST_S = 1.2
+
+
+def interrupted(delay_s: float, *arguments: str) -> tuple[int, bytes, bytes]:
+    """Exit code, stdout and stderr of the program, which is interrupted so long after our first line of code ran."""
+    with children.start(
+        [sys.executable, "-c", PROGRAM, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(ROOT / "sim")},
+    ) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == MARK
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    return process.returncode, out, err
+
+
+def moments(count: int, seed: int) -> Iterator[float]:
+    draw = random.Random(seed)
+    for _ in range(count):
+        yield draw.uniform(0.0, LONGEST_S)
+
+
+def check(code: int, out: bytes, err: bytes) -> None:
+    if code == 0:
+        assert err == b""
+        assert out.endswith(b"bytes of 8192\n")
+    else:
+        assert code == 130
+        assert err.strip() == b"mirotwin: interrupted"
+
+
+@pytest.mark.parametrize("delay_s", list(moments(8, 1)))
+def test_ctrl_c_is_one_line_at_any_moment(delay_s: float) -> None:
+    check(*interrupted(delay_s, "info"))
+
+
+def test_ctrl_c_while_modules_are_loaded_ends_the_program_at_once() -> None:
+    assert interrupted(0.0, "info") == (130, b"", b"mirotwin: interrupted\n")
+
+
+def test_a_program_that_was_started_with_ctrl_c_ignored_ignores_it() -> None:
+    program = ["-c", f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); {PROGRAM}", "--version"]
+    with children.start(
+        [sys.executable, *program],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(ROOT / "sim")},
+    ) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == MARK
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, b"")
+    assert out.startswith(b"mirotwin, version")
+
+
+if __name__ == "__main__":  # python -m tests.mirotwin.shell.test_interrupt: 200 moments
+    ends: dict[int, int] = {}
+    for moment in moments(200, 2):
+        ended = interrupted(moment, "info")
+        check(*ended)
+        ends[ended[0]] = ends.get(ended[0], 0) + 1
+    print(ends)

@@ -1,0 +1,154 @@
+"""The list of commands: what `--help` says without loading them is what they say of themselves."""
+
+import sys
+from importlib import import_module
+
+import pytest
+
+from miro_sim.scenario.file import builtin_text
+from mirotwin.campaign.campaign_command import COMMANDS as CAMPAIGN_COMMANDS
+from mirotwin.commands import COMMANDS
+from mirotwin.firmware.fw_command import COMMANDS as FW_COMMANDS
+from tests import children
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_list_says_of_a_command_what_it_says_itself(name):
+    command = getattr(import_module(f"mirotwin.commands.{name}"), name)
+    assert command.get_short_help_str(limit=200) == COMMANDS[name]
+    assert command.name == name
+
+
+def test_help_lists_every_command(mirotwin):
+    code, out, _ = mirotwin("--help")
+    assert code == 0
+    assert [line.split()[0] for line in out.split("Commands:\n")[1].splitlines()] == list(COMMANDS)
+
+
+def test_the_version_loads_no_command_and_nothing_hot():
+    script = (
+        "import sys\ntry:\n    from mirotwin.commands import main; main()\nexcept SystemExit: pass\n"
+        "print(*sorted(n for n in sys.modules if n.startswith(('matplotlib', 'numpy', 'mirotwin.commands.r'))))"
+    )
+    done = children.run(
+        [sys.executable, "-c", script, "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == ""
+
+
+def test_a_run_without_a_figure_writes_the_other_files(mirotwin, tmp_path):
+    short = tmp_path / "short.toml"
+    text = builtin_text("fig6").replace("duration_s = 6.0", "duration_s = 0.03", 1)
+    short.write_text(text, encoding="utf-8")
+    code, _, err = mirotwin("run", short, "--out", tmp_path / "out", "--no-figure")
+    assert (code, err) == (0, "")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["run.mcap", "summary.json"]
+
+
+def test_a_file_that_ends_too_soon_is_no_interruption(mirotwin, monkeypatch):
+    def cut_short(name):
+        raise EOFError("marshal data too short")
+
+    monkeypatch.setattr("mirotwin.shell.program.import_module", cut_short)
+    code, _, err = mirotwin("scenarios")
+    assert code == 70
+    assert err.startswith(
+        "mirotwin: internal error: RuntimeError: a file ends too soon: marshal data too short"
+    )
+
+
+def test_help_loads_click_and_nothing_that_is_slow() -> None:
+    script = (
+        "import sys\nfrom mirotwin.commands import main\n"
+        "try:\n    main(['--help'])\n"
+        "finally:\n    print('loaded:', *sorted(sys.modules), file=sys.stderr)\n"
+    )
+    done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("Usage: mirotwin")
+    loaded = done.stderr.rpartition("loaded: ")[2].split()
+    slow = {"numpy", "msgspec", "rich", "mcap", "matplotlib", "hashlib", "tomllib", "importlib.metadata"}
+    assert not slow.intersection(loaded)
+    ours = [name for name in loaded if name.startswith("miro")]
+    assert ours == [
+        "miro_exact",
+        "miro_exact.bad_input",
+        "miro_exact.engine",
+        "mirotwin",
+        "mirotwin.commands",
+        "mirotwin.shell.program",
+    ]
+
+
+@pytest.mark.parametrize("name", CAMPAIGN_COMMANDS)
+def test_the_list_of_campaign_says_of_a_command_what_it_says_itself(name):
+    command = getattr(import_module(f"mirotwin.commands.campaign_{name}"), name)
+    assert command.get_short_help_str(limit=200) == CAMPAIGN_COMMANDS[name]
+    assert command.name == name
+
+
+@pytest.mark.parametrize("name", FW_COMMANDS)
+def test_the_list_of_fw_says_of_a_command_what_it_says_itself(name):
+    command = getattr(import_module(f"mirotwin.commands.fw_{name}"), name)
+    assert command.get_short_help_str(limit=200) == FW_COMMANDS[name]
+    assert command.name == name
+
+
+def test_a_command_of_fw_loads_no_other():
+    script = (
+        "import sys\ntry:\n    from mirotwin.commands import main; main()\nexcept SystemExit: pass\n"
+        "print(*sorted(n for n in sys.modules if n.startswith('mirotwin.commands.fw_')))"
+    )
+    for arguments, loaded in (
+        (["fw", "--help"], ""),
+        (["fw", "trace", "--help"], "mirotwin.firmware.fw_trace"),
+    ):
+        done = children.run(
+            [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=True
+        )
+        assert done.stdout.splitlines()[-1] == loaded
+
+
+@pytest.mark.parametrize(
+    ("words", "engine"),
+    [
+        ([], None),
+        (["--engine", "python"], "python"),
+        (["--engine=python"], "python"),
+        (["--engine", "compiled", "--engine", "python"], "python"),
+        (["--engine", "numba"], None),
+        (["--engine"], None),
+    ],
+)
+def test_the_engine_is_settled_before_a_command_is_loaded(words, engine):
+    script = (
+        "import sys\nfrom miro_exact.engine import install\nfrom mirotwin.shell.program import settle_engine\n"
+        "settle_engine(['fw', 'run', 'a.ihx', *sys.argv[1:]])\nprint(install().engine)"
+    )
+    done = children.run([sys.executable, "-c", script, *words], capture_output=True, text=True, check=True)
+    assert done.stdout == f"{engine}\n"
+
+
+@pytest.mark.parametrize("name", ["miro_sim.world.world", "miro_robot.mcs51.cpu", "miro_exact.rng"])
+def test_with_the_python_engine_a_command_loads_sources_alone(name, tmp_path):
+    script = (
+        "import sys\nfrom mirotwin.commands import main\ntry:\n    main()\nexcept SystemExit: pass\n"
+        f"print(sys.modules[{name!r}].__file__)"
+    )
+    command = ["run", "fig6", "--set", "duration_s=0.001", "--engine", "python", "--no-figure", "-q"]
+    done = children.run(
+        [sys.executable, "-c", script, *command], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.endswith(".py\n")
+    assert done.stderr == ""
+
+
+def test_a_quiet_run_without_a_figure_loads_neither_rich_nor_matplotlib(tmp_path):
+    script = (
+        "import sys\nfrom mirotwin.commands import main\ntry:\n    main()\nexcept SystemExit: pass\n"
+        "print({'rich', 'matplotlib', 'numpy'}.intersection(sys.modules))"
+    )
+    command = ["run", "fig6", "--set", "duration_s=0.05", "--no-figure", "-q"]
+    done = children.run(
+        [sys.executable, "-c", script, *command], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert (done.stdout, done.stderr) == ("set()\n", "")

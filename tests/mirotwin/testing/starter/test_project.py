@@ -1,0 +1,123 @@
+"""`mirotwin init`: a project with all its files, or nothing."""
+
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+from miro_robot.firmware import image_path
+from mirotwin.testing.starter import project
+from tests import children
+from tests.mirotwin.conftest import Result, mirotwin
+
+__all__ = ["mirotwin"]
+
+
+def tree(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_new_folder_gets_the_firmware_its_tests_and_a_workflow(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    code, out, err = mirotwin("init", tmp_path / "mine")
+    assert (code, err) == (0, "")
+    assert tree(tmp_path / "mine") == {name for name, _ in project.files()}
+    assert {"Makefile", "firmware/main.c", "tests/test_robot.py", ".github/workflows/firmware.yml"} <= tree(
+        tmp_path / "mine"
+    )
+    assert f"next: cd {tmp_path}/mine && make test" in out
+
+
+def test_an_empty_folder_will_do_and_other_files_stay(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    (tmp_path / "LICENSE").write_text("mine")
+    assert mirotwin("init", tmp_path)[0] == 0
+    assert (tmp_path / "LICENSE").read_text() == "mine"
+
+
+def test_nothing_is_written_where_one_of_the_files_is_there_already(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    (tmp_path / "Makefile").write_text("all:\n")
+    code, out, err = mirotwin("init", tmp_path)
+    assert (code, out) == (2, "")
+    assert err == f"mirotwin: error: {tmp_path}: holds Makefile already; name a folder that is new or empty\n"
+    assert tree(tmp_path) == {"Makefile"}
+
+
+def test_a_file_is_no_folder(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+    (tmp_path / "a").write_text("")
+    assert mirotwin("init", tmp_path / "a")[0] == 2
+    code, _, err = mirotwin("init", tmp_path / "a" / "b")
+    assert code == 2
+    assert err.count("\n") == 1
+
+
+def test_an_installation_without_the_files_says_so(
+    mirotwin: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(project, "source_folder", lambda: None)
+    code, _, err = mirotwin("init", tmp_path / "a")
+    assert code == 2
+    assert "not part of this installation" in err
+
+
+def test_without_firmware_there_are_no_c_sources_and_no_test_that_names_one(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    code, out, err = mirotwin("init", "--without-firmware", tmp_path / "mine")
+    assert (code, err) == (0, "")
+    assert tree(tmp_path / "mine") == {
+        name
+        for name, _ in project.files()
+        if not name.startswith("firmware/") and name != "tests/test_firmware.py"
+    }
+    assert "SDCC" not in out
+
+
+@pytest.mark.parametrize("image", [(), (f"IMAGE={image_path()}",)], ids=["the robot's own", "an image"])
+def test_a_project_without_firmware_passes_its_tests_without_a_c_compiler(
+    mirotwin: Callable[..., Result], tmp_path: Path, image: tuple[str, ...]
+) -> None:
+    make = shutil.which("make")
+    if make is None:
+        pytest.skip("needs make")
+    mirotwin("init", "--without-firmware", tmp_path / "mine")
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    for name in ("mkdir", "sh"):
+        (programs / name).symlink_to(shutil.which(name) or name)
+    path = os.pathsep.join((str(Path(sys.executable).parent), str(programs)))
+    done = children.run(
+        [make, "scenarios", "pytest", *image],
+        cwd=tmp_path / "mine",
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "mine/build/scenarios.xml").is_file()
+    assert (tmp_path / "mine/build/pytest.xml").is_file()
+
+
+def test_what_a_project_requires_is_this_version_with_what_its_pages_need() -> None:
+    (requirements,) = (path for name, path in project.files() if name == "requirements.txt")
+    minor = ".".join(metadata.version("mirotwin").split(".")[:2])
+    assert f"mirotwin[report]~={minor}.0" in requirements.read_text("utf-8").splitlines()
+
+
+def test_writing_it_again_is_no_mistake_while_nothing_was_changed(
+    mirotwin: Callable[..., Result], tmp_path: Path
+) -> None:
+    mirotwin("init", tmp_path / "mine")
+    assert mirotwin("init", tmp_path / "mine")[0] == 0
+    (tmp_path / "mine/firmware/main.c").write_text("")
+    code, _, err = mirotwin("init", tmp_path / "mine")
+    assert (code, "holds firmware/main.c already" in err) == (2, True)
+    assert (tmp_path / "mine/firmware/main.c").read_text() == ""

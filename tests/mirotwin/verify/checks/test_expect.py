@@ -1,0 +1,225 @@
+"""What a scenario may say in `[expect]`, and what is said of what it may not."""
+
+import re
+import sys
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.file import load, parse
+from mirotwin.verify.checks.expect import expectations_of, says_anything, struct_of
+from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS
+from tests.host.distribution import install
+
+TWO = """
+name = "two"
+duration_s = 1.0
+{all}
+[[network]]
+[[network.robot]]
+slot = 0
+reference.kind = "line"
+{one}
+[[network.robot]]
+slot = 2
+reference.kind = "arc"
+"""
+
+
+def names(all_: str, one: str = "") -> dict[tuple[int, int], list[str]]:
+    scenario = parse(TWO.format(all=all_, one=one), "two")
+    return {
+        place: [check.name for check in checks] for place, checks in expectations_of(scenario, "two").items()
+    }
+
+
+def test_every_run_has_the_checks_that_are_always_on() -> None:
+    assert names("") == {(0, 0): list(ALWAYS_ON), (0, 2): list(ALWAYS_ON)}
+    assert not says_anything(load("line").scenario)
+
+
+@pytest.mark.parametrize("name", ["fig6", "fig7", "fig8", "fig9", "fig10"])
+def test_the_scenarios_of_the_paper_expect_a_robot_that_accepts_frames_and_tracks(name: str) -> None:
+    assert set(load(name).scenario.expect) == {"frames_accepted_min", "tracks_within_cm"}
+
+
+def test_a_robot_may_expect_otherwise_than_all() -> None:
+    all_ = "[expect]\ninside_pitch = true\ntracks_within_cm = 3\n"
+    one = (
+        "[network.robot.expect]\ntracks_within_cm = { limit_cm = 2.0, from_s = 0.5 }\ninside_pitch = false\n"
+    )
+    assert names(all_, one) == {
+        (0, 0): [*ALWAYS_ON, "tracks_within_cm"],
+        (0, 2): [*ALWAYS_ON, "inside_pitch", "tracks_within_cm"],
+    }
+    scenario = parse(TWO.format(all=all_, one=one), "two")
+    first, second = (checks[-1] for checks in expectations_of(scenario, "two").values())
+    assert (first.limit_cm, first.from_s, second.limit_cm, second.from_s) == (2.0, 0.5, 3.0, None)
+    assert says_anything(scenario)
+
+
+@pytest.mark.parametrize("name", CHECKS.own)
+def test_each_check_says_its_name_and_kind(name: str) -> None:
+    struct = struct_of(name)
+    assert struct.__struct_config__.tag == name
+    assert struct.KIND in ("safety", "liveness")
+    assert struct.MAIN in ("", *struct.__struct_encode_fields__)
+    assert struct.__doc__
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            "tracks_within_m = 0.03",
+            "expect.tracks_within_m: there is no such check; use tracks_within_cm, in centim",
+        ),
+        (
+            "setles_within_s = 1",
+            "expect.setles_within_s: there is no such check; did you mean settles_within_s?",
+        ),
+        (
+            "tracks_within_cm = true",
+            "expect.tracks_within_cm: limit_cm is missing; give it: tracks_within_cm = ..",
+        ),
+        (
+            "tracks_within_cm = '3 cm'",
+            "expect.tracks_within_cm: expected a number in centimetres, got a string",
+        ),
+        (
+            "tracks_within_cm = -1",
+            "expect.tracks_within_cm: -1 is out of range; must be > 0.0 in centimetres",
+        ),
+        (
+            "tracks_within_cm = {limit_m = 1}",
+            "expect.tracks_within_cm.limit_m: unknown key; use limit_cm, in",
+        ),
+        (
+            "tracks_within_cm = {limit_cm = 1, from_s = -1}",
+            "expect.tracks_within_cm.from_s: -1 is out of range",
+        ),
+        (
+            "settles_within_s = 1.01",
+            "expect.settles_within_s: 1.01 s is not before the end of the run, 1.001 s",
+        ),
+        ("inside_pitch = 1", "expect.inside_pitch: expected true or false, got 1; write inside_pitch = true"),
+        ("no_fault = false", "expect.no_fault: this check is always on; remove the key"),
+        (
+            "failsafe_stop_ms = 5",
+            "expect.failsafe_stop_ms: 5 is out of range; must be > 10.0 in milliseconds",
+        ),
+        (
+            "failsafe_stop_ms = [110]",
+            "expect.failsafe_stop_ms: expected a number in milliseconds, got an array",
+        ),
+        (
+            "frames_accepted_min = 1.5",
+            "expect.frames_accepted_min: expected a whole number, got a number (1.5)",
+        ),
+    ],
+)
+def test_what_cannot_be_expected_is_said_with_its_path(line: str, said: str) -> None:
+    text = TWO.format(all=f"[expect]\n{line}\n", one="")
+    with pytest.raises(ScenarioError, match=re.escape(f"two: {said}")):
+        parse(text, "two", (), expectations_of)
+
+
+def test_the_path_of_one_robots_expectation_is_its_own() -> None:
+    text = TWO.format(all="", one="[network.robot.expect]\ninside_pitsch = true\n")
+    with pytest.raises(
+        ScenarioError, match=r"two: network\[0\]\.robot\[0\]\.expect\.inside_pitsch: there is no"
+    ):
+        parse(text, "two", (), expectations_of)
+
+
+def test_a_setting_is_named_as_it_was_given() -> None:
+    with pytest.raises(ScenarioError, match=r"fig6: --expect inside_pitch=3: expected true or false, got 3"):
+        load("fig6", ["expect.inside_pitch=3"], expectations_of)
+    with pytest.raises(
+        ScenarioError, match=r"fig6: --set network.robot.expect.inside_pitch=3: expected true or"
+    ):
+        load("fig6", ["network.robot.expect.inside_pitch=3"], expectations_of)
+
+
+OWN = '''
+from mirotwin.verify.checks.interface import Check, Judge
+
+
+class Slow(Check, frozen=True, kw_only=True, tag="slow_below_m_s"):
+    """No faster than so."""
+
+    KIND = "safety"
+    MAIN = "limit_m_s"
+
+    limit_m_s: float
+
+    def judge(self, subject):
+        return SlowJudge(self, subject)
+
+
+class SlowJudge(Judge):
+    pass
+
+
+class Loud(Check, frozen=True, kw_only=True, tag="loud"):
+    KIND = "safety"
+
+    def __post_init__(self):
+        raise RuntimeError("too loud")
+
+    def judge(self, subject):
+        return SlowJudge(self, subject)
+'''
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    parts = {"slow_below_m_s": "own_checks:Slow", "loud": "own_checks:Loud"}
+    install(tmp_path, "own-checks", "1.0", parts, "checks", own_checks=OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield
+    sys.modules.pop("own_checks", None)
+
+
+@pytest.mark.usefixtures("own")
+def test_a_check_of_another_distribution_is_found_by_its_entry_point() -> None:
+    assert names("[expect]\nslow_below_m_s = 0.5")[0, 0] == [*ALWAYS_ON, "slow_below_m_s"]
+    with pytest.raises(
+        ScenarioError, match=r"expect\.slow_below_cm_s: .* use slow_below_m_s, in metres per second"
+    ):
+        names("[expect]\nslow_below_cm_s = 50")
+
+
+@pytest.mark.usefixtures("own")
+def test_a_check_that_cannot_check_its_parameters_is_named() -> None:
+    with pytest.raises(
+        ScenarioError, match=r"expect\.loud: cannot check its parameters: RuntimeError: too loud"
+    ):
+        names("[expect]\nloud = true")
+
+
+KEYS = st.sampled_from(
+    ["limit_cm", "from_s", "within_ms", "after_ms", "tolerance_ms", "frames", "check", "x"]
+)
+SCALARS = st.one_of(st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.dates())
+VALUES = st.recursive(
+    SCALARS,
+    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(KEYS, inner, max_size=2),
+    max_leaves=4,
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.dictionaries(st.sampled_from([*CHECKS.own, "a b", ""]), VALUES, max_size=3))
+def test_any_table_is_checks_or_a_scenario_error(table) -> None:
+    scenario = msgspec.structs.replace(load("fig6").scenario, expect=table)
+    said = ""
+    try:
+        found = expectations_of(scenario, "x")
+    except ScenarioError as error:
+        said = str(error)
+    assert said.startswith("x: expect.") if said else len(found[0, 0]) >= len(ALWAYS_ON)
+    assert "\n" not in said

@@ -1,0 +1,199 @@
+"""Feeding checks changes no bit of a run, and gives the same verdicts however the run is cut."""
+
+import random
+
+import pytest
+
+from miro_host.parts import PartError
+from miro_robot.event_log import RECEIVED
+from miro_sim.scenario.file import load, parse
+from miro_sim.world import conditions
+from miro_sim.world.events import Event
+from miro_sim.world.world import World
+from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.interface import Check, Judge, Subject
+from mirotwin.verify.checks.watching import Checks, ExpectationFailed
+from tests.mirotwin.verify.checks.rig import MS, finish, own_image, send, silent_world, team
+from tests.mirotwin.verify.checks.test_planted import ALL
+
+EVERYTHING = ALL + "tracks_within_cm = 0.1\nsettles_within_s = 0.2\ninside_pitch = true\n"
+TWO = f"""
+name = "two"
+duration_s = 0.5
+
+[expect]
+{EVERYTHING}
+
+[[network]]
+radio.profile = "fade15"
+robot = [{{ slot = 0, reference.kind = "line" }}, {{ slot = 2, reference.kind = "arc" }}]
+
+[[network]]
+robots = 5
+robot = [{{ slot = 4, reference.kind = "line", start_error_x_cm = 3.0 }}]
+"""
+
+
+def judged(seed: int, advance, text: str = TWO):
+    scenario = parse(text, "two", (), expectations_of)
+    world = World(scenario, seed, own_image())
+    checks = Checks(world)
+    while not world.finished:
+        advance(world)
+    checks.finish()
+    return world.digest, checks.verdicts(), checks.failures
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_run_with_all_checks_has_the_digest_of_one_without(seed: int) -> None:
+    plain = World(parse(TWO, "two"), seed, own_image())
+    while not plain.finished:
+        plain.step()
+    digest, verdicts, failures = judged(seed, World.step)
+    assert digest == plain.digest
+    assert {one.name for one in verdicts if one.verdict == "failed"} >= {"tracks_within_cm"}
+    assert failures
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_stops_and_waits_at_any_tick_change_no_verdict(seed: int) -> None:
+    draw = random.Random(seed)
+
+    def wander(world: World) -> None:
+        if draw.random() < 0.5:
+            world.run_to(world.tick + draw.randrange(1, 900_000))
+        else:
+            world.run_until([conditions.Byte(), conditions.Sent()])
+
+    whole = judged(seed, World.step)
+    assert judged(seed, wander) == whole
+
+
+def test_a_saved_world_of_a_scenario_goes_on_under_other_expectations() -> None:
+    plain = World(load("fig6").scenario, 1, own_image())
+    plain.run_to(100 * MS)
+    other = World(load("fig6", ["expect.inside_pitch=true"]).scenario, 1, own_image())
+    other.load(plain.save())
+    assert other.step().digest == plain.step().digest
+
+
+def test_failures_are_raised_for_tests_in_python() -> None:
+    world, checks = silent_world("frames_accepted_min = 3")
+    send(world, [team(1, 10, 10)])
+    finish(world, checks)
+    with pytest.raises(ExpectationFailed, match=r"wanted at least 3 frames accepted, found 1$") as caught:
+        checks.check()
+    assert [(one.check, one.network, one.slot) for one in caught.value.failures] == [
+        ("frames_accepted_min", 0, 1)
+    ]
+
+
+def test_a_check_without_an_occasion_has_not_passed() -> None:
+    world, checks = silent_world("failsafe_stop_ms = true\nanswers_within_ms = true")
+    found = finish(world, checks)
+    assert found["failsafe_stop_ms"] == found["answers_within_ms"] == "not judged"
+    assert found["no_fault"] == "passed"
+
+
+def test_a_world_that_is_loaded_meanwhile_is_no_run_to_judge() -> None:
+    world, checks = silent_world("")
+    world.step()
+    saved = world.save()
+    world.step()
+    world.load(saved)
+    with pytest.raises(
+        RuntimeError, match="control period 1 follows 1: the world was loaded; begin new checks"
+    ):
+        world.step()
+    checks.finish()
+    Checks(world)
+    world.step()
+
+
+def test_events_that_the_log_no_longer_holds_leave_nothing_judged() -> None:
+    world, checks = silent_world("acts_within_ms = true\ninside_pitch = true")
+    send(world, [team(1, 10, 10)])
+    for _ in range(2049):
+        world.robot(0, 1).board.log.note(RECEIVED, world.tick, 1, 0)
+    found = finish(world, checks)
+    assert (found["acts_within_ms"], found["inside_pitch"]) == ("not judged", "passed")
+
+
+class Raising(Check, frozen=True, kw_only=True, tag="raising"):
+    KIND = "safety"
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return RaisingJudge(self, subject)
+
+
+class RaisingJudge(Judge[Raising]):
+    HEARS = ("received",)
+
+    def event(self, event: Event) -> None:
+        raise KeyError("speed")
+
+
+def test_what_a_check_raises_is_told_with_robot_and_name() -> None:
+    world, checks = silent_world("")
+    checks.finish()
+    Checks(world, {(0, 1): [Raising()]})
+    send(world, [team(1, 10, 10)])
+    with pytest.raises(
+        PartError,
+        match=r"^net0/robot1: check 'raising' cannot judge: KeyError: 'speed' \(.*:\d+ in RaisingJudge.event\)",
+    ):
+        world.run_to(10_000_000)
+
+
+class Listing(Check, frozen=True, kw_only=True, tag="listing"):
+    KIND = "safety"
+
+    def judge(self, subject: Subject) -> Judge[Check]:
+        return ListingJudge(self, subject)
+
+
+class ListingJudge(Judge[Listing]):
+    HEARS = ("sent", "frame", "damaged", "command", "received", "transmitted", "answer")
+
+    def __init__(self, check: Listing, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.heard: list[Event] = []
+
+    def event(self, event: Event) -> None:
+        self.heard.append(event)
+
+
+def test_a_judge_hears_every_event_once_in_the_order_of_ticks() -> None:
+    world, _ = silent_world("")
+    checks = Checks(world, {(0, 1): [Listing()]})
+    send(world, [team(seq, 100, -100, ask=True) for seq in range(1, 8)] + [team(7, 1, 1)])
+    finish(world, checks)
+    (judge,) = checks.judges
+    ticks = [event.tick for event in judge.heard]
+    counts = {what: len([event for event in judge.heard if event.what == what]) for what in judge.HEARS}
+    assert ticks == sorted(ticks)
+    assert (counts["sent"], counts["frame"], counts["received"]) == (8, 8, 8 * 23)
+    assert (counts["answer"], counts["transmitted"]) == (3, 3 * 19)
+    assert [event.value for event in judge.heard if event.what == "frame"] == [1] * 7 + [0]
+
+
+def test_a_robot_that_is_reset_owes_nothing_from_before() -> None:
+    world, checks = silent_world(ALL)
+    world.run_to(60 * MS)
+    send(world, [team(1, 900, 900, ask=True)])
+    world.run_to(world.set_reset(1) + 100)
+    world.set_reset(0)
+    world.run_to(world.tick + 300 * MS)
+    send(world, [team(2, 700, 700, ask=True)])
+    finish(world, checks)
+    assert [failure for failure in checks.failures if failure.check != "frames_accepted_min"] == []
+
+
+def test_a_reset_pin_that_stays_down_excuses_no_other_robot() -> None:
+    scenario = parse(TWO, "two", ["expect.failsafe_stop_ms=true"], expectations_of)
+    world = World(scenario, 1, own_image())
+    checks = Checks(world)
+    world.run_to(world.set_reset(1, 0, 2))
+    finish(world, checks)
+    answers = {one.slot for one in checks.failures if one.check == "answers_within_ms"}
+    assert 2 not in answers

@@ -1,0 +1,3 @@
+"""The command, called in this process."""
+
+from tests.mirotwin.conftest import mirotwin as mirotwin

@@ -1,0 +1,353 @@
+"""Mistakes to plant in the firmware's source, and the rules that each must fail.
+
+What belongs here: the table. What does not: building images (`tests.mirotwin.verify.checks.rig`) and trying them.
+
+Long because it is one table, with a mistake for each rule at least.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Mistake(NamedTuple):
+    """`right`, where it stands once in `file`, becomes `wrong`; the rules in `fails` must fail."""
+
+    file: str
+    right: str
+    wrong: str
+    fails: str
+
+
+MISTAKES = {
+    "a stop is sent while the motors are off": Mistake(
+        *("motion.c", "    if (state != STATE_DRIVING)\n        return;\n    halt_both(TRJ_SMOOTH_STOP);"),
+        "    halt_both(TRJ_SMOOTH_STOP);",
+        "P01",
+    ),
+    "one chip is reset once more, by command": Mistake(
+        *("lm629.c", "        if (handshake())\n            return true;"),
+        "        if (handshake()) {\n            selected = LEFT; lm629_command(0x00);\n"
+        "            while (!boots(LEFT)); return true; }",
+        "P02",
+    ),
+    "leaves out RSTI": Mistake(
+        *(
+            "lm629.c",
+            "    lm629_command(RSTI);\n    lm629_word(0, 0);\n    if (!free_to_go())\n        return false;\n",
+        ),
+        "    return true;\n",
+        "P02",
+    ),
+    "takes long to boot": Mistake(
+        *("main.c", "    decode_start();"),
+        "    decode_start();\n    { unsigned int i; for (i = 0; i != 30000; ++i) { P1_7 = 1; } }",
+        "P03 P55 P56",
+    ),
+    "wants FFh before the sync": Mistake(
+        *("decode.c", "    from = rx_taken - frame_size;"),
+        "    from = rx_taken - frame_size;\n    if (rx_character[RX_INDEX(from - 1)] != 0xFF) return false;",
+        "P04",
+    ),
+    "looks at the first sync byte only": Mistake(
+        *("decode.c", " && rx_character[RX_INDEX(from + 1)] == SYNC_1", ""),
+        "P05",
+    ),
+    "looks at the second sync byte only": Mistake(
+        *("decode.c", "rx_character[RX_INDEX(from)] == SYNC_0 && ", ""),
+        "P05",
+    ),
+    "takes the layout of 3 for its own": Mistake(
+        *("decode.c", "wire_start(robots == 3 ? CRC_START_RX3 : CRC_START_RX5);"),
+        "wire_start(CRC_START_RX3);",
+        "P06 P23",
+    ),
+    "looks at the low byte of the CRC only": Mistake(
+        *("decode.c", " && crc_high == CRC_RESIDUE >> 8", ""),
+        "P07",
+    ),
+    "looks at the high byte of the CRC only": Mistake(
+        *("decode.c", "crc_low == (CRC_RESIDUE & 0xFF) && ", ""),
+        "P07",
+    ),
+    "takes frames with a bad CRC": Mistake(
+        *(
+            "decode.c",
+            "if (!take_body(rx_taken - frame_size + RX3_AT_HDR)) {",
+            "take_body(rx_taken - frame_size + RX3_AT_HDR); if (0) {",
+        ),
+        "P07 P08 P30",
+    ),
+    "does not look at stop bits": Mistake("uart.c", "if (!RB8)", "if (0)", "P09"),
+    "does not see a gap": Mistake("uart.c", "if (!TF0 && high == 0xFF && low", "if (low", "P10"),
+    "does not see a long gap": Mistake("uart.c", "if (!TF0 && ", "if (", "P10"),
+    "measures spacings too short": Mistake(
+        *("uart.c", "(65536UL - SPACING_MAX - 1 + RESTART_CYCLES)", "(65536UL - SPACING_MAX + 69)"),
+        "P11",
+    ),
+    "leaves a frame in the window": Mistake(
+        "decode.c", "    run = 0;\n    return true;", "    return true;", "P12"
+    ),
+    "loses count after 256 characters": Mistake(
+        *("decode.c", "else if (run < RX_SIZE)\n        ++run;", "else\n        ++run;"),
+        "P13",
+    ),
+    "begins anew after a bad CRC": Mistake(
+        *("decode.c", "++frames_rejected;", "++frames_rejected; run = 0;"),
+        "P14",
+    ),
+    "wants a pause before the preamble": Mistake(
+        *("decode.c", "    if (run < frame_size)", "    if (run != frame_size + RX3_PREAMBLE + 1)"),
+        "P04 P13",
+    ),
+    "is deaf for a while after a bad stop bit": Mistake(
+        *("decode.c", "    if (run < frame_size)"),
+        "    {\n        static u8 deaf;\n        if (mark == MARK_DAMAGED)\n            deaf = 12;\n"
+        "        else if (deaf) {\n            --deaf;\n            run = 0;\n        }\n    }\n"
+        "    if (run < frame_size)",
+        "P13 P15",
+    ),
+    "takes 7 steps": Mistake("failsafe.c", "step > FRESH_STEPS", "step >= FRESH_STEPS", "P16"),
+    "takes 9 steps": Mistake("failsafe.c", "step > FRESH_STEPS", "step > FRESH_STEPS + 1", "P17"),
+    "takes any number": Mistake("failsafe.c", "if (heard && (", "if (0 && (", "P17 P18 P20 P21 P30"),
+    "is deaf for 151 ms": Mistake(
+        *("failsafe.c", "    if (whole != FRESH_AGAIN_MS", "    ++whole;\n    if (whole != FRESH_AGAIN_MS"),
+        "P18",
+    ),
+    "wants the first number to be no 0": Mistake("failsafe.c", "if (heard && (", "if ((", "P19"),
+    "takes the same number again after a while": Mistake(
+        *("failsafe.c", "(!step || (step > FRESH_STEPS && !fresh_again()))"),
+        "((!step || step > FRESH_STEPS) && !fresh_again())",
+        "P20",
+    ),
+    "counts service frames by themselves": Mistake(
+        *("failsafe.c", "    last_hdr = HDR;", "    if ((HDR & TYPE_MASK) != TYPE_SERVICE) last_hdr = HDR;"),
+        "P21",
+    ),
+    "takes the velocities of the robot before it": Mistake(
+        *("motion.c", "u8 at = slot * PAIR_SIZE;", "u8 at = (slot - 1) * PAIR_SIZE;"),
+        "P22 P23",
+    ),
+    "does not move on a question": Mistake(
+        *("main.c", "        motion_team();\n        telemetry_answer();", "        telemetry_answer();"),
+        "P24",
+    ),
+    "takes bytes the other way round": Mistake(
+        *("motion.c", "(int)((u16)PAYLOAD[at + 1] << 8 | PAYLOAD[at])"),
+        "(int)((u16)PAYLOAD[at] << 8 | PAYLOAD[at + 1])",
+        "P25",
+    ),
+    "rounds the last bit": Mistake("motion.c", "    return velocity;", "    return velocity & ~1;", "P25"),
+    "cuts off one too early": Mistake(
+        *("motion.c", "    if (velocity > VELOCITY_SATURATION)\n        return VELOCITY_SATURATION;"),
+        "    if (velocity > VELOCITY_SATURATION - 1)\n        return VELOCITY_SATURATION - 1;",
+        "P26",
+    ),
+    "does not cut off backwards": Mistake(
+        *("motion.c", "velocity < -VELOCITY_SATURATION", "velocity < -32767"),
+        "P26",
+    ),
+    "starts one wheel after the other": Mistake(
+        *("motion.c", "    load_velocity(RIGHT, last_right);\n    start_both();"),
+        "    lm629_command(STT);\n    load_velocity(RIGHT, last_right);\n    lm629_command(STT);",
+        "P27",
+    ),
+    "stops after 40 ms": Mistake(
+        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == 40)"),
+        "P28 P29",
+    ),
+    "stops after 125 ms": Mistake(
+        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)"),
+        "P29",
+    ),
+    "stops after 111 ms": Mistake(
+        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 1)"),
+        "P29",
+    ),
+    "stops after 108 ms": Mistake(
+        *("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS - 2)"),
+        "P29",
+    ),
+    "puts the failsafe off by frames that are not fresh": Mistake(
+        *("failsafe.c", "        ++frames_stale;", "        ++frames_stale; restart();"),
+        "P30",
+    ),
+    "stops abruptly": Mistake("motion.c", "halt_both(TRJ_SMOOTH_STOP);", "halt_both(0x02);", "P31"),
+    "stops with another acceleration": Mistake(
+        *("motion.c", "HIGH(DEFAULT_ACCELERATION), 0, 0};", "HIGH(DEFAULT_ACCELERATION) + 1, 0, 0};"),
+        "P31",
+    ),
+    "goes off after 501 ms": Mistake(
+        *("failsafe.c", "age == FAILSAFE_OFF_MS)", "age == FAILSAFE_OFF_MS + 1)"),
+        "P32",
+    ),
+    "never goes off": Mistake("failsafe.c", "        motion_off();\n", "", "P30 P32"),
+    "stays off": Mistake(
+        *("motion.c", "    if (slot >= robots)\n        return;"),
+        "    if (slot >= robots || (failsafe_flags & FLAG_MOTORS_OFF && last_left))\n        return;",
+        "P33",
+    ),
+    "stops on a service frame": Mistake(
+        "main.c", "        motion_service();", "        motion_stop();", "P34 P35"
+    ),
+    "loads kd twice": Mistake(
+        "motion.c", "lm629_word(filter[i + 1], filter[i]);", "lm629_word(filter[5], filter[4]);", "P35"
+    ),
+    "forgets UDF": Mistake("motion.c", "    lm629_command(UDF);\n", "", "P35"),
+    "takes 16 bits of an acceleration": Mistake(
+        *("motion.c", "    lm629_word(acceleration[3], acceleration[2]);", "    lm629_word(0, 0);"),
+        "P36",
+    ),
+    "takes an acceleration in motion": Mistake(
+        *(
+            "motion.c",
+            "    if (!acceleration_waits || state == STATE_DRIVING || rx_taken != rx_count)\n        return;",
+            "",
+        ),
+        "P37 P51",
+    ),
+    "stops while an acceleration waits and one wheel stands": Mistake(
+        *("motion.c", "acceleration_waits && !last_left && !last_right", "acceleration_waits && !last_left"),
+        "P37",
+    ),
+    "loads an acceleration when one wheel stands": Mistake(
+        *("motion.c", "!(on_target(LEFT) && on_target(RIGHT))", "!on_target(LEFT)"),
+        "P37",
+    ),
+    "forgets an acceleration that waits": Mistake(
+        *(
+            "motion.c",
+            "        acceleration_waits = 1;",
+            "        acceleration_waits = state != STATE_DRIVING;",
+        ),
+        "P37",
+    ),
+    "takes the settings of others": Mistake(
+        *("motion.c", "    if (PAYLOAD[SERVICE_SLOT] != slot)\n        return;\n", ""),
+        "P38",
+    ),
+    "takes an unknown opcode for an acceleration": Mistake(
+        *(
+            "motion.c",
+            "    case OPCODE_ACCELERATION:",
+            "    default:\n        if (!PAYLOAD[SERVICE_OPCODE]) break;",
+        ),
+        "P39",
+    ),
+    "takes type 2 for a question": Mistake(
+        *("main.c", "    case TYPE_TEAM_ASK:", "    case TYPE_TELEMETRY:\n    case TYPE_TEAM_ASK:"),
+        "P40",
+    ),
+    "answers in another robot's turn": Mistake(
+        *("telemetry.c", "seq % robots != slot", "seq % robots == 2"),
+        "P41 P43",
+    ),
+    "answers with another number": Mistake(
+        *("telemetry.c", "put(TYPE_TELEMETRY | seq);", "put(TYPE_TELEMETRY | ((seq + 1) & 0x3F));"),
+        "P41",
+    ),
+    "leaves out FFh": Mistake(
+        *("telemetry.c", "tx_frame[TX_PREAMBLE] = PREAMBLE_LAST;", "tx_frame[TX_PREAMBLE] = PREAMBLE_BYTE;"),
+        "P42",
+    ),
+    "answers unasked": Mistake(
+        *("main.c", "        motion_service();", "        motion_service();\n        telemetry_answer();"),
+        "P43",
+    ),
+    "begins a new answer in the middle of one": Mistake(
+        *("telemetry.c", "seq % robots != slot || tx_busy", "seq % robots != slot"),
+        "P44",
+    ),
+    "keeps its flags": Mistake("telemetry.c", "    failsafe_flags = 0;\n", "", "P45"),
+    "never says that it stopped": Mistake(
+        "failsafe.c", "        failsafe_flags |= FLAG_STOPPED;\n", "", "P45"
+    ),
+    "says the left status twice": Mistake(
+        *("telemetry.c", "put(lm629_status(RIGHT));", "put(lm629_status(LEFT));"),
+        "P46",
+    ),
+    "says desired positions": Mistake(
+        "lm629.h", "#define RDRP            0x0A", "#define RDRP            0x08", "P47"
+    ),
+    "says the high words of positions": Mistake(
+        *("telemetry.c", "    lm629_read_word();\n    return lm629_read_word();"),
+        "    return lm629_read_word();",
+        "P47",
+    ),
+    "counts valid frames as accepted": Mistake(
+        *("failsafe.c", "        ++frames_stale;", "        ++frames_accepted;"),
+        "P48",
+    ),
+    "stops counting at 255": Mistake(
+        *("failsafe.c", "    ++frames_accepted;", "    if (frames_accepted != 255) ++frames_accepted;"),
+        "P48",
+    ),
+    "does not count rejected frames": Mistake("decode.c", "++frames_rejected;", ";", "P49"),
+    "is mute once its motors are off": Mistake(
+        *(
+            "telemetry.c",
+            "seq % robots != slot || tx_busy",
+            "seq % robots != slot || tx_busy || failsafe_flags & 0x18",
+        ),
+        "P50",
+    ),
+    "writes while a chip is busy": Mistake(
+        *("lm629.c", "write_cycle(opcode);", "write_cycle(opcode); write_cycle(opcode);"),
+        "P51",
+    ),
+    "stays in an interrupt": Mistake(
+        *("failsafe.c", "    ++ticks;\n    sleep = 0;", "    for (;;) ++ticks;"),
+        "P52",
+    ),
+    "pushes for ever": Mistake(
+        *("main.c", "    EA = 1;", "    __asm\n    00999$: push acc\n    sjmp 00999$\n    __endasm;"),
+        "P53",
+    ),
+    "executes A5h": Mistake(
+        "main.c", "    EA = 1;", "    __asm\n    .db 0xA5\n    __endasm;\n    EA = 1;", "P54"
+    ),
+    "asks the chips while characters wait": Mistake("motion.c", " || rx_taken != rx_count", "", "P30"),
+    "sets a mask by RSTI": Mistake(
+        "lm629.c", "    lm629_word(0, 0);\n    if", "    lm629_word(0xFF, 0);\n    if", "P02"
+    ),
+    "waits 65 us for a busy chip": Mistake("lm629.c", "BUSY_POLLS      25", "BUSY_POLLS      4", "P57"),
+    "waits 0.85 ms for a chip to come up": Mistake(
+        "lm629.c", "BOOT_POLLS      200", "BOOT_POLLS      50", "P57"
+    ),
+    "says nothing of a chip that does not come up": Mistake(
+        *("telemetry.c", " | (lm629_ready ? 0 : FLAG_INIT_FAILED)", ""),
+        "P58",
+    ),
+    "waits for ever for a chip to come up": Mistake(
+        *("lm629.c", "        if (!--polls)\n            return false;", "        ;"),
+        "P58",
+    ),
+    "tells positions of two samples": Mistake(
+        "telemetry.c",
+        "    put_word(position(LEFT));\n    put_word(position(RIGHT));",
+        "    put(position(LEFT) & 0xFF);\n    put(position(LEFT) >> 8);\n    put_word(position(RIGHT));",
+        "P47",
+    ),
+    "forgets its flags where others are asked": Mistake(
+        "telemetry.c",
+        "    if (seq % robots != slot || tx_busy)\n        return;",
+        "    if (seq % robots != slot || tx_busy) {\n        failsafe_flags = 0;\n        return;\n    }",
+        "P45",
+    ),
+    "waits for ever for a busy chip": Mistake(
+        "lm629.c", "        if (!--polls) {\n", "        if (0) {\n            --polls;\n", "P59"
+    ),
+    "moves in a slot that is not there": Mistake(
+        "motion.c", "    if (slot >= robots)\n        return;\n", "", "P60"
+    ),
+    "hangs after 1000 frames": Mistake(
+        "failsafe.c",
+        "    ++frames_accepted;",
+        "    if (++frames_accepted == 1000)\n        for (;;)\n            ;",
+        "P61",
+    ),
+    "says nothing of power-on": Mistake("motion.c", "    failsafe_flags |= FLAG_MOTORS_OFF;\n", "", "P45"),
+    "lets the age begin again": Mistake(
+        "failsafe.c", "    if (age != AGE_MAX)\n        ++age;", "    ++age;", "P62"
+    ),
+}

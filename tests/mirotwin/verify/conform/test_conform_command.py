@@ -1,0 +1,189 @@
+"""`mirotwin conform`: table, exit codes, files, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from mirotwin.verify.conform.table import ALL, RULES
+from tests.mirotwin.verify.checks.rig import built_in, needs_sdcc
+from tests.mirotwin.verify.conform.images import (
+    BABBLES,
+    FAULTS,
+    HANGS,
+    POKES,
+    PUSHES,
+    READS_BOTH,
+    RUNS_OUT,
+    hex_of,
+)
+from tests.mirotwin.verify.conform.mistakes import MISTAKES
+
+
+def program(folder: Path, code: bytes) -> Path:
+    path = folder / "program.ihx"
+    path.write_text(hex_of(code))
+    return path
+
+
+def planted_file(folder: Path, name: str) -> Path:
+    mistake = MISTAKES[name]
+    built_in(folder, mistake.file, mistake.right, mistake.wrong)
+    return folder / "out" / "miro.ihx"
+
+
+def test_rules_that_are_kept_are_a_table_and_exit_code_0(mirotwin: Any) -> None:
+    code, out, err = mirotwin("conform", "--rule", "P29", "--rule", "p02", "--rule", "P29")
+    assert (code, err) == (0, "")
+    assert [line.split() for line in out.splitlines()] == [
+        ["rule", "name", "verdict", "first", "failure"],
+        ["P29", "stop", "passed"],
+        ["P02", "reset", "together", "passed"],
+        ["2", "rules:", "2", "passed,", "0", "failed"],
+    ]
+
+
+@needs_sdcc
+def test_a_failure_is_left_as_a_case_whose_replay_says_the_same(mirotwin: Any, tmp_path: Path) -> None:
+    image = planted_file(tmp_path, "stops after 125 ms")
+    (tmp_path / "out" / "miro.map").unlink()
+    (tmp_path / "out" / "miro.cdb").unlink()
+    folder = tmp_path / "cases"
+    code, out, err = mirotwin("conform", image, "--rule", "P29", "--rule", "P02", "--artifacts", folder)
+    assert (code, err) == (1, "")
+    line = next(line for line in out.splitlines() if line.startswith("P29"))
+    said = line.split(maxsplit=3)[3]
+    assert "found left at 124.94 ms, right at" in said
+    assert "wanted both wheels told to stop 108.46 ms to 110.50 ms after the end of" in said
+    assert out.splitlines()[-2:] == [
+        f"mirotwin replay {folder / 'P29.stream'} --firmware {folder / 'firmware.ihx'}",
+        f"page: mirotwin report {folder / 'P29.stream'}",
+    ]
+    assert sorted(path.name for path in folder.iterdir()) == ["P29.stream", "firmware.ihx"]
+    image.unlink()
+    code, out, err = mirotwin("replay", folder / "P29.stream", "-q")
+    assert (code, out) == (1, "")
+    assert err.startswith(f"mirotwin: fails as recorded: conforms_to: {said}")
+    code, out, _ = mirotwin("replay", folder / "P29.stream", "--firmware", ROBOTS_OWN, "-q")
+    assert (code, out.partition(":")[0]) == (0, "cured")
+    (folder / "other").write_text("of another tool")
+    assert mirotwin("conform", ROBOTS_OWN, "--rule", "P29", "--artifacts", folder)[0] == 0
+    assert [path.name for path in folder.iterdir()] == ["other"]
+
+
+ROBOTS_OWN = Path(__file__).parents[4] / "robot_fw" / "miro_robot" / "firmware" / "miro.ihx"
+
+
+def test_a_firmware_fault_is_exit_code_3_and_a_case_of_its_own(mirotwin: Any, tmp_path: Path) -> None:
+    image = program(tmp_path, PUSHES)
+    folder = tmp_path / "cases"
+    code, out, err = mirotwin("conform", image, "--rule", "P03", "--rule", "P53", "--artifacts", folder)
+    assert code == 3
+    assert "trial of P03: net0/robot1: firmware ran past the end of its stack" in err
+    row = next(line for line in out.splitlines() if line.startswith("P53"))
+    assert "wanted no such fault (trial of P03), found firmware ran past the end" in row
+    code, _, err = mirotwin("replay", folder / "P03-fault.stream", "--firmware", image, "-q")
+    assert code == 3
+    assert err.startswith("mirotwin: fails as recorded: no_fault: net0/robot1: tick ")
+
+
+@pytest.mark.parametrize(
+    ("code", "exit_code"),
+    [(HANGS, 1), (BABBLES, 1), (FAULTS, 3), (RUNS_OUT, 3), (PUSHES, 3), (POKES, 3), (READS_BOTH, 3)],
+)
+def test_programs_that_are_no_firmware_end_with_a_verdict(
+    mirotwin: Any, tmp_path: Path, code: bytes, exit_code: int
+) -> None:
+    ids = [rule.id for rule in RULES] if exit_code == 3 else ["P01", "P41", "P43", "P51"]
+    rules = [option for id in ids for option in ("--rule", id)]
+    found, out, _ = mirotwin("conform", program(tmp_path, code), *rules)
+    assert found == exit_code
+    assert out.splitlines()[-1].startswith(f"{len(ids)} rules: 0 passed, ")
+
+
+def test_a_program_that_babbles_breaks_the_rule_of_silence_first(mirotwin: Any, tmp_path: Path) -> None:
+    _, out, _ = mirotwin("conform", program(tmp_path, BABBLES), "--rule", "P43")
+    assert "wanted silence: nobody asks, found 33 characters, 55 55 55 55" in out
+    assert "55 .. (ticks 157239" in out
+
+
+def test_json_is_a_line_a_rule(mirotwin: Any, tmp_path: Path) -> None:
+    image = program(tmp_path, HANGS)
+    code, out, _ = mirotwin("conform", image, "--json", "--rule", "P03", "--rule", "P43")
+    assert code == 1
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert [(line["rule"], line["verdict"], line["cause"], line["faults"]) for line in lines] == [
+        ("P03", "failed", None, 0),
+        ("P43", "not judged", "P03", 0),
+    ]
+    assert lines[0]["first"]["wanted"] == "the wheels told as by team frame, seq 1 within 10 ms"
+
+
+def test_junit_has_a_case_a_rule_and_the_same_bytes_every_time(mirotwin: Any, tmp_path: Path) -> None:
+    image = program(tmp_path, HANGS)
+    texts = []
+    for _ in range(2):
+        assert (
+            mirotwin("conform", image, "--rule", "P03", "--rule", "P15", "--junit", tmp_path / "j.xml")[0]
+            == 1
+        )
+        texts.append((tmp_path / "j.xml").read_bytes())
+    assert texts[0] == texts[1]
+    suite = ElementTree.fromstring(texts[0])
+    assert (suite.get("tests"), suite.get("failures"), suite.get("skipped")) == ("2", "1", "1")
+    cases = suite.findall("testcase")
+    assert [case.get("name") for case in cases] == ["P03 ready", "P15 slicer noise"]
+    failure = cases[0].find("failure")
+    assert failure is not None
+    assert "wanted the wheels told as by" in str(failure.get("message"))
+    skipped = cases[1].find("skipped")
+    assert skipped is not None
+    assert skipped.get("message") == "not judged: P03 failed, it is not ready 40 ms after power-on"
+    names = [one.get("name") for one in suite.iter("property")]
+    assert names == ["firmware", "firmware_sha256", "seed"]
+
+
+def test_all_rules_are_listed_and_none_is_tried(mirotwin: Any) -> None:
+    code, out, err = mirotwin("conform", "--list")
+    assert (code, err) == (0, "")
+    for rule in ALL:
+        assert rule.id in out
+    code, out, _ = mirotwin("conform", "--list", "--json")
+    assert [json.loads(line)["rule"] for line in out.splitlines()] == [rule.id for rule in ALL]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--rule", "P1"), "there is no rule 'P1'; did you mean P"),
+        (("--rule", "failsafe"), "there is no rule 'failsafe'; `mirotwin conform --list` shows P01 to"),
+        (("none.ihx",), "none.ihx: there is no such file"),
+        (("--seed", "-1"), "-1 is not in the range"),
+        (("--junit", "nowhere/j.xml"), "nowhere"),
+        (
+            ("--artifacts", "/dev/null/x"),
+            "/dev/null/x: Not a directory; choose another folder with --artifacts",
+        ),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    mirotwin: Any, arguments: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = mirotwin("conform", *arguments)
+    if code == 2 and not err:  # a usage error, which the program says
+        return
+    assert (code, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+
+
+def test_a_rule_that_a_scenario_names_and_is_not_there_is_refused(mirotwin: Any) -> None:
+    code, _, err = mirotwin("run", "fig6", "--expect", "conforms_to=P99")
+    assert code == 2
+    assert "conforms_to=P99" in err
+    assert "there is no rule 'P99'" in err

@@ -1,0 +1,125 @@
+"""Every rule passes for the shipped firmware, and fails for an image that does nothing and for a planted mistake."""
+
+from __future__ import annotations
+
+import shutil
+from functools import cache
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from miro_protocol.transmission import Transmission
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.world.world import World
+from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.conform.judgement import ConformsTo
+from mirotwin.verify.conform.run import try_rule
+from mirotwin.verify.conform.table import ALL, find
+from mirotwin.verify.conform.trial import trial_of
+from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image, silent_world
+from tests.mirotwin.verify.conform.images import HANGS, image_of
+from tests.mirotwin.verify.conform.mistakes import MISTAKES
+
+IDS = [rule.id for rule in ALL]
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_the_shipped_firmware_keeps_the_rule(id: str) -> None:
+    outcome = try_rule(find(id), own_image())
+    assert not outcome.failures
+    assert outcome.fault_count == 0
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_an_image_that_does_nothing_breaks_the_rule(id: str) -> None:
+    assert not try_rule(find(id), image_of(HANGS)).passed
+
+
+@needs_sdcc
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_in_the_firmware_breaks_the_rules_that_it_concerns(name: str) -> None:
+    mistake = MISTAKES[name]
+    image = built(mistake.file, mistake.right, mistake.wrong)
+    kept = [id for id in mistake.fails.split() if not broken(id, image)]
+    assert kept == []
+
+
+def broken(id: str, image: object) -> bool:
+    rule = find(id)
+    outcome = try_rule(rule, image)  # type: ignore[arg-type]
+    forbidden = [fault for _, _, fault in outcome.faults if fault.kind in rule.faults]
+    return bool(outcome.failures or forbidden)
+
+
+def test_each_rule_has_a_mistake_that_breaks_it() -> None:
+    assert {id for mistake in MISTAKES.values() for id in mistake.fails.split()} == set(IDS)
+
+
+def test_rules_are_numbered_in_order_and_say_must_and_where_they_come_from() -> None:
+    assert [f"P{number:02d}" for number in range(1, len(IDS) + 1)] == IDS
+    for rule in ALL:
+        assert "MUST" in rule.text
+        page, _, section = rule.source.partition(", ")
+        assert f"# {section}\n" in (Path(__file__).parents[4] / page).read_text()
+
+
+def test_names_of_rules_differ() -> None:
+    assert len({rule.name for rule in ALL}) == len(ALL)
+
+
+@cache
+def bare_image(folder: Path) -> object:
+    path = folder / "bare.ihx"
+    shutil.copy(image_path(), path)
+    return load_hex(path)
+
+
+@pytest.mark.parametrize("id", ["P18", "P29", "P44", "P48", "P49"])
+def test_rules_need_no_symbols(id: str, tmp_path: Path) -> None:
+    image = bare_image(tmp_path)
+    assert not image.symbols.names  # type: ignore[attr-defined]
+    assert try_rule(find(id), image).passed  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_noise_of_any_seed_is_no_reason_to_fail(seed: int) -> None:
+    assert try_rule(find("P15"), own_image(), seed).passed
+
+
+def test_a_trial_depends_on_its_rule_alone() -> None:
+    rule = find("P13")
+    one = trial_of(rule)
+    trial_of.cache_clear()
+    other = trial_of(rule)
+    assert one is not other
+    assert one.script == other.script
+    assert one.scenario == other.scenario
+
+
+def test_a_run_that_is_no_trial_of_the_rule_is_not_judged() -> None:
+    world, _ = silent_world("")
+    checks = Checks(world, {(0, 1): [ConformsTo(rule="P02")]})
+    world.inject(bytes(10))
+    while not world.finished:
+        world.step()
+    checks.finish()
+    assert [one.verdict for one in checks.verdicts()] == ["not judged"]
+
+
+def test_a_trial_of_which_a_network_says_less_is_not_judged_there() -> None:
+    trial = trial_of(find("P29"))
+    said = [one for one in trial.script if one.network == 0 or not isinstance(one, Transmission)]
+    world = World(trial.scenario, 0, own_image(), script=said)
+    places = [(1, robot.slot) for robot in world.networks[1].robots]
+    checks = Checks(world, {place: [ConformsTo(rule="P29")] for place in places})
+    while not world.finished:
+        world.step()
+    checks.finish()
+    assert [one.verdict for one in checks.verdicts()] == ["not judged"]
+
+
+def test_a_rule_that_is_not_there_is_refused_with_the_nearest() -> None:
+    with pytest.raises(msgspec.ValidationError, match="there is no rule 'P99'; did you mean P"):
+        msgspec.convert({"check": "conforms_to", "rule": "P99"}, ConformsTo)

@@ -1,0 +1,162 @@
+"""`--expect` and `[expect]` in `run` and `replay`: lines on stderr, exit codes, the summary."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.mirotwin.verify.checks.rig import needs_sdcc, planted
+from tests.mirotwin.verify.checks.test_planted import ALWAYS
+
+MET = ("--expect", "frames_accepted_min=3", "--expect", "inside_pitch=true")
+MISSED = ("--expect", "tracks_within_cm={limit_cm=1.9, from_s=0.0}")
+FAILURE = "tracks_within_cm: net0/robot0: tick 0 (0.000 ms): wanted at most 1.9 cm from the reference, found 2.000 cm"
+
+
+def summary(folder: Path) -> dict:
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_what_is_met_costs_no_line_and_no_exit_code(mirotwin, short: Path, tmp_path: Path) -> None:
+    code, out, err = mirotwin("run", short, "--no-figure", "--out", tmp_path / "run", *MET)
+    assert (code, err) == (0, "")
+    assert "6 of 6 checks passed" in out
+    found = summary(tmp_path / "run")
+    assert found["set"] == ["expect.frames_accepted_min=3", "expect.inside_pitch=true"]
+    assert [(one["name"], one["kind"], one["verdict"]) for one in found["expectations"]] == [
+        ("no_fault", "safety", "passed"),
+        ("lm629_protocol", "safety", "passed"),
+        ("main_loop_alive", "safety", "passed"),
+        ("stack_clear", "safety", "passed"),
+        ("acts_at_all", "liveness", "not judged"),
+        ("frames_accepted_min", "liveness", "passed"),
+        ("inside_pitch", "safety", "passed"),
+    ]
+
+
+def test_a_failure_is_a_line_with_what_when_wanted_and_found_and_exit_code_1(
+    mirotwin, short: Path, tmp_path: Path
+) -> None:
+    code, out, err = mirotwin("run", short, "--no-figure", "--out", tmp_path / "run", *MISSED)
+    assert (code, err) == (1, f"mirotwin: expectation failed: {FAILURE}\n")
+    assert "4 of 5 checks passed, tracks_within_cm failed" in out
+    first = {
+        "network": 0,
+        "slot": 0,
+        "tick": 0,
+        "wanted": "at most 1.9 cm from the reference",
+        "found": "2.000 cm",
+    }
+    assert summary(tmp_path / "run")["expectations"][-1] == {
+        "name": "tracks_within_cm",
+        "kind": "safety",
+        "verdict": "failed",
+        "failures": 1,
+        "first": first,
+    }
+
+
+def test_one_robot_may_expect_something_by_set(mirotwin, short: Path, tmp_path: Path) -> None:
+    key = "network.robot.1.expect.tracks_within_cm={limit_cm=1.9, from_s=0.0}"
+    code, _, err = mirotwin("run", short, "-q", "--no-figure", "--out", tmp_path / "run", "--set", key)
+    assert (code, err) == (0, "")
+
+
+def test_files_and_digest_are_those_of_a_run_that_expects_nothing(
+    mirotwin, short: Path, finished: Path, tmp_path: Path
+) -> None:
+    mirotwin("run", short, "-q", "--seed", 5, "--no-figure", "--out", tmp_path / "run", *MET, *MISSED)
+    assert summary(tmp_path / "run")["digest"] == summary(finished)["digest"]
+
+
+def test_a_recording_keeps_what_was_expected_and_replay_says_it_again(
+    mirotwin, short: Path, tmp_path: Path
+) -> None:
+    mirotwin("run", short, "-q", "--no-figure", "--out", tmp_path / "run", *MISSED)
+    code, out, err = mirotwin("replay", "-q", tmp_path / "run" / "run.mcap")
+    assert (code, err) == (1, f"mirotwin: expectation failed: {FAILURE}\n")
+    assert "equals the recorded one" in out
+    code, _, err = mirotwin(
+        "replay",
+        "-q",
+        tmp_path / "run" / "run.mcap",
+        "--expect",
+        "tracks_within_cm={limit_cm=2.1, from_s=0.0}",
+    )
+    assert (code, err) == (0, "")
+
+
+def test_what_a_replay_expects_decides_where_it_differs_too(mirotwin, finished: Path) -> None:
+    other = ("--set", "network.robot.0.drive.chassis.mass_kg=0.9")
+    code, _, err = mirotwin("replay", "-q", finished / "run.mcap", *other)
+    assert code == 4
+    assert "the replay differs in control period" in err
+    code, _, err = mirotwin(
+        "replay", "-q", finished / "run.mcap", *other, "--expect", "frames_accepted_min=3"
+    )
+    assert code == 0
+    assert "the replay differs in control period" in err
+    code, _, err = mirotwin("replay", "-q", finished / "run.mcap", *other, *MISSED)
+    assert code == 1
+    assert FAILURE in err
+
+
+def test_a_text_stream_is_judged_too(mirotwin, finished: Path, tmp_path: Path) -> None:
+    stream = tmp_path / "sent.stream"
+    mirotwin("export", finished / "run.mcap", "--out", stream)
+    code, out, err = mirotwin("replay", stream, "--expect", "frames_accepted_min=300")
+    assert code == 1
+    assert "4 of 5 checks passed, frames_accepted_min failed\n" in out
+    assert err.count("wanted at least 300 frames accepted, found 6\n") == 3  # a robot in every slot
+
+
+def test_a_check_without_an_occasion_is_named(mirotwin, short: Path, tmp_path: Path) -> None:
+    code, out, err = mirotwin(
+        "run", short, "--no-figure", "--out", tmp_path / "run", "--expect", "failsafe_stop_ms=true"
+    )
+    assert (code, err) == (
+        0,
+        "mirotwin: expectation not judged: failsafe_stop_ms: the run had no occasion for it\n",
+    )
+    assert "failsafe_stop_ms not judged" in out
+
+
+@pytest.mark.parametrize("command", ["run", "replay"])
+def test_an_unknown_check_is_refused_before_anything_runs(
+    command: str, mirotwin, short: Path, finished: Path, tmp_path: Path
+) -> None:
+    given = (short, "--out", tmp_path / "run") if command == "run" else (finished / "run.mcap",)
+    code, out, err = mirotwin(command, *given, "--expect", "inside_pich=true")
+    assert (code, out) == (2, "")
+    assert "--expect inside_pich=true: there is no such check; did you mean inside_pitch?\n" in err
+    assert not (tmp_path / "run").exists()
+
+
+@needs_sdcc
+def test_a_stream_tells_a_late_failsafe_from_the_right_one(mirotwin, finished: Path, tmp_path: Path) -> None:
+    late = planted("stops 15 ms late").path
+    mirotwin("export", finished / "run.mcap", "--out", tmp_path / "sent.stream")
+    stream = ("replay", "-q", tmp_path / "sent.stream", "--expect", "failsafe_stop_ms=110")
+    code, _, err = mirotwin(*stream, "--firmware", late)
+    assert code == 1
+    assert (
+        "wanted both wheels told to stop 110 +- 0.5 ms after the last fresh frame, found left at 124.9" in err
+    )
+    assert mirotwin(*stream)[::2] == (0, "")
+
+
+@needs_sdcc
+def test_a_firmware_fault_goes_before_what_else_failed(mirotwin, short: Path, tmp_path: Path) -> None:
+    concerned = ALWAYS["stays in an interrupt"]
+    image = planted("stays in an interrupt").path
+    out = ("--no-figure", "--out", tmp_path / "run", "--firmware", image)
+    code, _, err = mirotwin("run", short, "-q", *out, *MISSED)
+    assert code == 3
+    lines = err.splitlines()
+    assert lines[0] == f"mirotwin: expectation failed: {FAILURE}"
+    starved = "firmware starved its main loop: interrupts took all of 10 ms at "
+    assert [line.partition(starved)[0] for line in lines[1:]] == [
+        f"mirotwin: firmware fault: net0/robot{slot}: " for slot in (0, 2)
+    ]
+    verdicts = {one["name"]: one["verdict"] for one in summary(tmp_path / "run")["expectations"]}
+    assert {name for name in verdicts if verdicts[name] == "failed"} == {*concerned, "tracks_within_cm"}
