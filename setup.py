@@ -1,10 +1,5 @@
 """Compiles the hot modules: every `x.py` (or `x.pyx`) that has an `x.pxd` beside it.
 
-What belongs here: finding them, stamping each with the hash of its source, adding where its fields lie, handing them to
-Cython, and compiling the C that comes out.
-What does not: what is added to a source (`miro_exact.places`), how C is reshaped (`miro_exact.threaded`), and anything
-about a single module (its types stand in its own `.pxd`).
-
 Every extension is optional: with no C compiler the package installs all the same and runs from source,
 slowly and with the same bits. With MIROTWIN_PURE=1 in the environment nothing is compiled, and the wheel is one for
 every machine (py3-none-any). Each compiled module checks its stamp when it is imported

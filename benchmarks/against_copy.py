@@ -1,8 +1,5 @@
 """A copy of another commit, built once: what `benchmarks.against` compares this tree with.
 
-What belongs here: copying a commit out of git, building its extensions in the copy, and finding its packages in either
-layout of the repository. What does not: what is measured (`against_worker.py`) and the table (`against.py`).
-
 The copy lies in the folder for temporary files, under the hash of the commit's content: two commits with the same
 content share a copy, and a second comparison with it builds nothing.
 """

@@ -1,8 +1,5 @@
 """The child of `benchmarks.against`: measures one tree's packages, in its own process, whenever it is asked.
 
-What belongs here: the tasks, and the names under which each layout of the repository has what they need. What does
-not: which tree that is (PYTHONPATH says it) and what the figures mean (`against.py`).
-
 A line on stdin is a task's name; the answer on stdout is one line: processor seconds of one execution, and what the
 result of both trees has to share.
 """

@@ -4,8 +4,6 @@ Prints two ratios. `run`: processor time of one run of a campaign over that of t
 turns. `parallel`: runs a second of a campaign on two processes over those of two single processes, which do nothing but
 these runs, made in turns, too, so that what else the machine does concerns both. On a machine that is busy only the
 first says much.
-
-What belongs here: these measurements. What does not: results of campaigns (`mirotwin campaign`).
 """
 
 from __future__ import annotations

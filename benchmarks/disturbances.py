@@ -5,9 +5,6 @@ second) as the median over the seeds, and of how many runs the robot was outside
 The base is the variant `ideal` with a little white noise on the posture, so that seeds differ: 0.3 cm and 0.6 degrees
 at three standard deviations. Estimators are told the delay of the camera and nothing else.
 
-What belongs here: the list of disturbances, running them, the table. What does not: what a disturbance does (the
-plant's, radio's and camera's pages).
-
 Ctrl-C stops it after the cells that are under way, and prints the rows that are complete. A table takes minutes;
 `--only slip --seeds 0-4` is a part.
 """

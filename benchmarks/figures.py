@@ -1,7 +1,6 @@
 """Scenarios over many seeds, as one row of figures each: `python -m benchmarks.figures fig6 fig8 --seeds 0-49`.
 
-What belongs here: running a scenario once a seed, on all processors, and counting up what came of it. What does not:
-the figures of one run (`mirotwin.report`). `--set KEY=VALUE` changes keys as `mirotwin run` does, for all scenarios.
+`--set KEY=VALUE` changes keys as `mirotwin run` does, for all scenarios.
 
 rms      position, x, y in cm over the last second, truth against reference: median, and 95 % (the 48th of 50 values in
          order, the last of 20) and worst of the position

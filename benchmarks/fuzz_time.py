@@ -4,9 +4,6 @@
     python -m benchmarks.fuzz_time --planted [--limit 20]     # the other table: mistakes of tests.mutants.planted
     python -m benchmarks.fuzz_time --write                    # the tables of docs/fuzzing.md, from what was measured
 
-What belongs here: which trials there are, and keeping their results. What does not: one trial (`fuzz_time_trial`), and
-tables (`fuzz_time_tables`).
-
 Trials run one after the other, one process of the engine each. Their results stand in `build/mutants/fuzz_time.json`;
 what stands there for the same image, and was found or not within that limit, is not measured again without `--again`.
 """

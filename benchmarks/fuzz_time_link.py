@@ -1,8 +1,4 @@
-"""The link machine on an image until it fails: `python -m benchmarks.fuzz_time_link IMAGE.ihx SEED`.
-
-What belongs here: ending with the first failure, before Hypothesis makes it smaller; the last line says how many
-examples it took. What does not: the machine (`mirotwin.testing.machine`) and taking the time (`fuzz_time_trial`).
-"""
+"""The link machine on an image until it fails: `python -m benchmarks.fuzz_time_link IMAGE.ihx SEED`."""
 
 from __future__ import annotations
 

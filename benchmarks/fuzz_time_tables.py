@@ -1,7 +1,4 @@
-"""The tables of docs/fuzzing.md that `benchmarks.fuzz_time` measures.
-
-What belongs here: from trials to Markdown. What does not: the page's text around it.
-"""
+"""The tables of docs/fuzzing.md that `benchmarks.fuzz_time` measures."""
 
 from __future__ import annotations
 

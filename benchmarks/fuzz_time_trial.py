@@ -1,7 +1,5 @@
 """One trial: an engine fuzzes an image until a find of it is confirmed, or the time is over.
 
-What belongs here: starting engines and judging their finds. What does not: which trials there are (`fuzz_time`).
-
 What counts is processor time of the engine's processes, from their start to the find, because it depends little on what
 else the machine does. A trial ends after `limit_s` of it, or after three times as long on the wall clock. A find is
 confirmed when checks fail for it in a world with the mistaken firmware that do not fail there with the shipped one.

@@ -1,8 +1,6 @@
 """Many frames on many lines at once: bits, a UART that samples them, and what a decoder makes of it.
 
-What belongs here: a plain model of an asynchronous line, one sample a bit, for statistics over millions of
-frames. What does not: the radio of the simulation (`miro_sim`), which is exact and slow. Arrays are
-uint8 and hold one line a column, so that a step of all UARTs is a few numpy operations.
+Arrays are uint8 and hold one line a column, so that a step of all UARTs is a few numpy operations.
 """
 
 from __future__ import annotations

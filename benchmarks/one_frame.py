@@ -1,8 +1,5 @@
 """One camera frame followed through the whole loop: `python -m benchmarks.one_frame --write docs/one-frame.md`.
 
-What belongs here: the run, and what it says of one frame at each step. What does not: the page
-(`one_frame_page`) and its pictures (`one_frame_pictures`).
-
 The run is `fig6` with seed 0. A camera frame is exposed at the start of a control period and reaches the law one period
 later. The bytes that answer it arrive in the period after that, so three periods are watched. Wires come from a
 waveform (`mirotwin fw vcd`), functions from the CPU's watcher (`mirotwin fw trace`), commands and characters from the

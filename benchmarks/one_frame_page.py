@@ -1,8 +1,4 @@
-"""The tables of docs/one-frame.md; its words are in `one_frame.txt`.
-
-What belongs here: from what became of a frame to numbers and tables. What does not: the run (`one_frame`), the pictures
-(`one_frame_pictures`).
-"""
+"""The tables of docs/one-frame.md; its words are in `one_frame.txt`."""
 
 from __future__ import annotations
 

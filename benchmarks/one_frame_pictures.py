@@ -1,7 +1,6 @@
 """The pictures of docs/one-frame.md: the camera's frame, the wire with the firmware behind it, and the wheels.
 
-What belongs here: drawing. What does not: the run (`one_frame`) and the page (`one_frame_page`). White ground, so that
-they can be read on dark pages too.
+White ground, so that they can be read on dark pages too.
 """
 
 from __future__ import annotations

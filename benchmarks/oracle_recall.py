@@ -1,8 +1,5 @@
 """What the fuzzer's fast oracle misses: `python -m benchmarks.oracle_recall --write`. Needs make and SDCC 4.2.0.
 
-What belongs here: the same sessions judged twice, by the oracle while it fuzzes and by all checks in a World, for each
-planted mistake; the table in docs/fuzzing.md. What does not: how long a find takes (`fuzz_time`).
-
 A session counts as found, missed or extra: both fail it, only the checks do, or only the oracle does. The sessions are
 the built-in seeds, the inputs written by hand for the mistakes, and random ones from a fixed generator.
 """

@@ -1,7 +1,4 @@
-"""Processor time of the processes that this one has started, while they run.
-
-What belongs here: reading Linux's /proc. What does not: whose time it is.
-"""
+"""Processor time of the processes that this one has started, while they run."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """How many wrong bits the CRC lets through: exact weight enumeration of a frame format's code.
 
-What belongs here: counting, in whole numbers. What does not: errors in sync, start and stop bits, which no CRC
-sees (`undetected.py` measures those).
-
 HDR..CRC of one format are a linear code: a set of wrong bits passes exactly if it is a code word, whatever
 the frame says. There are 2^(n-16) of them, too many to list, but the dual code has only 2^16, and
 MacWilliams' identity gives the weights of the code from those of its dual.

@@ -1,8 +1,5 @@
 """Where the `mirotwin` program starts: Ctrl-C is one line and exit code 130 from the first moment to the last.
 
-What belongs here: what Ctrl-C does while modules are loaded, while a command runs, and after it. What does not:
-anything that has to be imported first; the command line itself is `mirotwin.commands`.
-
 Loading takes half a second, in which nothing has been opened yet: the process ends at once, whatever module is half
 imported. A command that runs gets KeyboardInterrupt and cleans up (`shell.program`). Once its exit code is known all is
 written, and Ctrl-C comes too late: in the last moments of the interpreter an exception would be a traceback.

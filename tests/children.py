@@ -1,7 +1,5 @@
 """Programs that tests start: each begins with the default action of every signal, whichever program started the tests.
 
-What belongs here: the ways in which a test starts another process. What does not: which program, and what it says.
-
 A shell that puts a job in the background without job control leaves SIGINT ignored, and `nohup` does so with SIGHUP.
 Children inherit that, and `restore_signals` of `subprocess` does not undo it. Python installs no handler for a SIGINT
 that is ignored: a child that a test interrupts then runs to its end. So the signals are reset in the child, before its

@@ -1,8 +1,4 @@
-"""How many examples a property test draws.
-
-What belongs here: the one decorator by which a test says it, so that a longer run can scale all tests at once.
-What does not: what is drawn; the strategies stand beside the tests.
-"""
+"""How many examples a property test draws."""
 
 from __future__ import annotations
 

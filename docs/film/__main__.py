@@ -1,8 +1,5 @@
 """The recorded terminal of the README: `python -m docs.film` writes `docs/terminal.svg`.
 
-What belongs here: the commands that are shown, and when each line appears. What does not: running them (`terminal`) and
-drawing (`picture`).
-
 A good run, the same run over a bad radio, whose check fails on purpose, and its recording sent again: the same failure
 at the same tick. The commands are run, and what is drawn is what they print. Times are those of this table, not those
 measured, so the file changes only when the text does. One text differs from run to run: how long a run took.

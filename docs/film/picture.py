@@ -1,7 +1,5 @@
 """A terminal as an SVG that moves by itself: CSS keyframes, no script, nothing from outside.
 
-What belongs here: placing lines, and when they appear and scroll. What does not: what they say.
-
 Without animation (a reader who wants less motion, a program that prints the file) it shows its last moment. The window
 is dark on light and dark pages; two colours are added to what the programs print: for prompts, and for lines that
 report a failure.

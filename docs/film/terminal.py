@@ -1,7 +1,6 @@
 """Commands in a pseudo terminal, and the lines that they print there.
 
-What belongs here: running a command as in a terminal of a given size, and what stands there at its end, with bold type.
-What does not: which commands, and drawing (`picture`). Codes other than those of lines and progress bars are refused.
+Codes other than those of lines and progress bars are refused.
 """
 
 from __future__ import annotations

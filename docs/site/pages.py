@@ -1,8 +1,5 @@
 """Brings documents from outside of `docs/` into the site, and makes their links work there.
 
-What belongs here: which documents, and where links lead. What does not: texts, and the order of the pages
-(`properdocs.yml`).
-
 Documents link as they lie in the tree, so that they can be read there: `../../../README.md`, `statistics.py`. In the
 site
 

@@ -1,11 +1,8 @@
 """Tables that are made from the code when the site is built: keys of scenarios, channels, figures of a campaign.
 
-What belongs here: from structs to Markdown. What does not: where a table stands (a comment in the page says so), and
-links (`pages`).
-
-    <!-- keys: miro_sim.scenario.keys:Scenario -->      a section for each struct of keys
-    <!-- channels -->                                   one for each channel of a recording
-    <!-- figures -->                                    the columns of a results file
+<!-- keys: miro_sim.scenario.keys:Scenario -->      a section for each struct of keys
+<!-- channels -->                                   one for each channel of a recording
+<!-- figures -->                                    the columns of a results file
 """
 
 from __future__ import annotations

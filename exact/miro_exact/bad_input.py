@@ -1,8 +1,4 @@
-"""The error of input that cannot be used: one line `FILE: PLACE: what; remedy`.
-
-What belongs here: this one class, and how its line is made. What does not: the errors of single formats, which derive
-from it where they are, and the exit code (`mirotwin.shell.program`), which follows from this class alone.
-"""
+"""The error of input that cannot be used: one line `FILE: PLACE: what; remedy`."""
 
 from os import PathLike
 from typing import Any

@@ -1,10 +1,5 @@
 """Elementary functions from + - * / alone, so that every machine gives the same bits.
 
-What belongs here: sin, cos, atan, atan2, exp, log and wrap_pi on finite float64, each within one unit in the
-last place (measured: sin 0.75, cos 0.74, exp 0.81, log 0.76, atan2 0.82, at extreme exponents 0.95 ulp).
-What does not: anything a correctly rounded operation already gives (`math.sqrt`), vectors, extended domains:
-what the twin can only meet by mistake (NaN, infinity, a heading of a million radians) raises DomainError.
-
 The method is that of fdlibm (Sun Microsystems 1993): reduce the argument by a split constant, evaluate a
 polynomial on the small interval, carry the low part of the reduced argument. Coefficients are fdlibm's
 published ones. Bit tricks are replaced by comparisons and by products with powers of two, which are exact.

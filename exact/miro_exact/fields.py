@@ -1,9 +1,5 @@
 """The kinds of fields that a table of state may name, and their flat bytes.
 
-What belongs here: one kind a class: how a value becomes bytes, how bytes become a value that may be put back, and where
-it stands in a part. What does not: tables of parts and whole states (`state.py`), memory of compiled parts
-(`memory.pyx`, which writes the same bytes).
-
 All bytes are little-endian, without padding, as Python's `struct` writes them with `<`. What comes from bytes is
 checked here: a value out of its range, a length beyond the room, NaN and an early end are a ValueError.
 

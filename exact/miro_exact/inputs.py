@@ -1,7 +1,6 @@
 """Reads an input file whole; refuses devices, pipes that may never end, and files larger than any valid one.
 
-What belongs here: the checks before and while a file is read, and how large each kind of file may be. What does not:
-what is in it. Every file that a stranger may have made is read through here.
+Every file that a stranger may have made is read through here.
 """
 
 import os

@@ -1,6 +1,5 @@
 """What the build adds to each hot module: where in memory the fields of its classes lie.
 
-What belongs here: reading a `.pxd` and writing the text. What does not: which of the fields are state (`state.py`).
 Loaded from its file by setup.py, before anything is installed, so it imports nothing of ours.
 
 For every `cdef class` there is a function `_places_CLASS(part)`. It gives name -> (address, C type, size in bytes) of

@@ -1,8 +1,4 @@
-"""The C of an interpreter's loop, given the shape that a processor predicts well. Used by the build.
-
-What belongs here: this one change of text. What does not: which modules are compiled, and how (setup.py, which loads
-this file by its path before anything is installed, so it imports nothing of ours).
-"""
+"""The C of an interpreter's loop, given the shape that a processor predicts well. Used by the build."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """A check of one's own: the robot never turns faster than so.
 
-What belongs here: the parameters and the judge. `mirotwin.verify.checks.interface` says what a judge may be told:
-besides control periods, as here, events of the logs and firmware faults.
+`mirotwin.verify.checks.interface` says what a judge may be told: besides control periods, as here, events of the logs
+and firmware faults.
 """
 
 from typing import Annotated, ClassVar

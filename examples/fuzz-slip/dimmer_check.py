@@ -1,7 +1,4 @@
-"""What the dimmer must keep to, whatever it is sent: checks for `mirotwin fuzz --expect`.
-
-What belongs here: what is wrong about a run. What does not: the wire format (`slip_protocol.py`).
-"""
+"""What the dimmer must keep to, whatever it is sent: checks for `mirotwin fuzz --expect`."""
 
 from slip_protocol import Damage, Slip
 

@@ -1,7 +1,4 @@
-"""SLIP frames (RFC 1055) with a Fletcher-16 behind the body, as a wire format for `mirotwin fuzz`.
-
-What belongs here: the format. What does not: what bodies say (`dimmer.c`), and what is right (`dimmer_check.py`).
-"""
+"""SLIP frames (RFC 1055) with a Fletcher-16 behind the body, as a wire format for `mirotwin fuzz`."""
 
 from miro_protocol.protocol import Damage, Frame, Protocol
 

@@ -1,8 +1,5 @@
 """What the PC knows from the robots' answers: the last one of each, with the encoder positions unwrapped.
 
-What belongs here: from received characters to findings. What does not: the frame (`miro_protocol.frames`), the radio,
-and what a law or an estimator makes of the findings.
-
 A frame carries the low 16 bits of each encoder count. The full count is taken as the one nearest to the count before; a
 robot boots at 0. This is right as long as a wheel turns by less than 32768 counts between two answers that arrive: for
 0.17 s at 1.46 m/s, for 1.2 s at 0.2 m/s. After a longer silence the counts may be off by a multiple of 65536;

@@ -1,7 +1,5 @@
 """Equation (15) on the host: the LM629 takes speeds, so the law's accelerations are summed up here.
 
-What belongs here: z_cmd and its limits. What does not: the laws (`laws/`) and wheel speeds (`wheels`).
-
 The integrator's state is also the robot's velocity as the law sees it: differences of noisy postures are
 useless (0.8 cm of noise is 0.34 m/s after one frame).
 

@@ -1,7 +1,5 @@
 """The memory of a part, such as a law: declared in a table of attributes, checked after every step.
 
-What belongs here: the check, and the types that a table may name:
-
     d    a finite float
     q    an int of 64 bits with sign
     ?    True or False

@@ -1,8 +1,5 @@
 """Parts that a scenario names: the table of our own, and those that other distributions add by entry points.
 
-What belongs here: from a name to a class, and what can be wrong on the way. What does not: what a part does (`laws`),
-and reading a scenario.
-
 A part is chosen by a frozen `msgspec` struct of its parameters whose tag is the part's name. A distribution adds one in
 its `pyproject.toml`:
 

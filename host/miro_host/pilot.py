@@ -1,8 +1,5 @@
 """One robot's chain on the PC, once per camera frame: measurement, estimator, law, integrator, wheel commands.
 
-What belongs here: the order of these steps, what happens when a measurement is missing, and what a part may not do.
-What does not: the steps themselves, the clock (times are handed in), several robots (`station`).
-
 The law's velocities v_c, w_c are the commanded ones, the integrator's state before the update (`integrator`
 says why). Before the first measurement the command is zero. Without an estimate law and integrator are
 left alone and the last command is repeated.

@@ -1,8 +1,4 @@
-"""Where a robot stands: the posture q = (x, y, theta) of equation (8), the type that all modules share.
-
-What belongs here: the posture itself and nothing else. What does not: its polar form (`reference`), how it is
-measured (`vision`), what to do about it (`yang_kim`).
-"""
+"""Where a robot stands: the posture q = (x, y, theta) of equation (8), the type that all modules share."""
 
 import msgspec
 

@@ -1,8 +1,5 @@
 """Where a plug-in went wrong: file, line and function, for the line that tells the error.
 
-What belongs here: reading a traceback, and where a function is defined. What does not: who calls a plug-in, and which
-error it becomes (`parts.PartError`).
-
 Our own code calls the plug-in and may be called by it, so neither end of a traceback is what its author looks for. That
 is the innermost line in the file in which the plug-in's code begins.
 """

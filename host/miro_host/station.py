@@ -1,9 +1,4 @@
-"""The radio end of the PC: one frame per control period for all robots of a network.
-
-What belongs here: sequence numbers, whose turn it is to answer, and when a service frame may replace a team
-frame. What does not: the frame's bytes (`miro_protocol.frames`), the radio, what the velocities mean
-(`wheels`).
-"""
+"""The radio end of the PC: one frame per control period for all robots of a network."""
 
 from collections import deque
 from collections.abc import Sequence

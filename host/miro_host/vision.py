@@ -1,8 +1,5 @@
 """What the camera says about a posture: true posture in, noisy, gridded and late posture out.
 
-What belongs here: the error model of a measurement and the queue of frames under way. What does not:
-drawing random numbers (the caller hands in standard normals) and light, lenses or patches.
-
 The heading is not put on a grid. Patch centroids are averages over some 64 pixels; if they were whole
 pixels, two of them 4 cm (9 pixels) apart would give headings in steps of more than 6 degrees, more than the
 paper's whole error of 4.83 degrees. Its quantisation is part of that figure. The position is gridded to

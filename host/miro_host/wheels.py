@@ -1,8 +1,5 @@
 """From (v, w) to what the radio carries: two wheel speeds in 1/256 count per LM629 sample.
 
-What belongs here: the split over the track, the speed limit and the quantisation. What does not: the frame
-(`miro_protocol`) and what the robot makes of it.
-
 Rounding rule: to the nearest integer, halves away from zero. It is odd, so that forward and backward, left
 and right are mirror images. The speed limit comes first, so the greatest magnitude is 16633, the robot's
 own limit.

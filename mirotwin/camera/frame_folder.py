@@ -1,7 +1,5 @@
 """A folder that fills with the frames of a run, each a PNG file that is whole as soon as it has its name.
 
-What belongs here: whether the folder may be used, names, writing. What does not: what is in the pictures (`view`).
-
 A frame is written as frame-000123.part.png and renamed. A run that is broken off leaves the frames up to then.
 """
 

@@ -1,8 +1,5 @@
 """Control points that a simulated camera shows: marks on the floor and on robots' tops, found in the picture.
 
-What belongs here: where the marks lie, and their pixels as somebody measures them. What does not: the calibration that
-follows (`miro_host.eye.fit`).
-
 The marks are given as the text of a file of control points, and read like any other: so people see the form.
 """
 

@@ -1,13 +1,11 @@
 """A picture enlarged, with what the tracker made of it drawn on it.
 
-What belongs here: how it looks. What does not: the picture (`picture`), and what the tracker did (its notes).
-
-    thin grey frame          a window in which a robot was looked for and found; red: it was not found there in the end
-    thin blue frame          a window of the search of the whole picture
-    coloured outline         pixels that the tracker took for that colour, in the windows
-    small cross              centroid of a patch
-    arrow, "2 0.93"          measured posture, number of the robot, confidence
-    "2 lost"                 at the window in which it was looked for last, if there is one, and below the picture
+thin grey frame          a window in which a robot was looked for and found; red: it was not found there in the end
+thin blue frame          a window of the search of the whole picture
+coloured outline         pixels that the tracker took for that colour, in the windows
+small cross              centroid of a patch
+arrow, "2 0.93"          measured posture, number of the robot, confidence
+"2 lost"                 at the window in which it was looked for last, if there is one, and below the picture
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
 """A whole picture of the camera: its pixels as the tracker reads them, and as a file that people can open.
 
-What belongs here: Y, Cb, Cr to red, green, blue and back (JFIF, full range, by Pillow's tables), files of pictures in
-and out. What does not: what is drawn on a picture (`overlay`), and which pictures there are (`stills`).
-
 A picture that was saved and read again differs from the first by rounding, a level or two, and where noise made a pixel
 that no red, green and blue can show, by what was cut off.
 """

@@ -1,7 +1,4 @@
-"""Every frame of a run into a folder: `run --frames`.
-
-What belongs here: which picture gets which name. What does not: the folder (`frame_folder`), the pictures (`view`).
-"""
+"""Every frame of a run into a folder: `run --frames`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Pictures in the order of time: from a folder of files, or from a recording.
 
-What belongs here: which pictures there are, their names and ticks. What does not: one picture (`picture`).
-
 Files are in the order of their names, one camera frame apart. Where names begin with `netN-frame-`, as `run --frames`
 writes them for several networks, one network's are taken.
 """

@@ -1,7 +1,6 @@
 """The camera of one network of a world, as one looks at it: each frame as a PNG, with or without the overlay.
 
-What belongs here: asking a world's camera for its pictures. What does not: how they are drawn (`overlay`), files
-(`frame_folder`). It changes no bit of a run: notes and the picture are no state.
+It changes no bit of a run: notes and the picture are no state.
 """
 
 from __future__ import annotations

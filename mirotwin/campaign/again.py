@@ -1,8 +1,5 @@
 """The command that makes one row of a campaign again.
 
-What belongs here: from what a results file says of itself, and a row, to that line. What does not: the page and the
-tables that show it.
-
 Scenarios and images are named without their folders: they stand beside the campaign's file, or are the product's own.
 """
 

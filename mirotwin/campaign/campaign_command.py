@@ -1,7 +1,4 @@
-"""`mirotwin campaign`: `FILE.toml` makes the runs of a campaign, `show RESULTS.parquet` says what came of them.
-
-What belongs here: the two commands' names. What does not: what they do (`campaign_run`, `campaign_show`).
-"""
+"""`mirotwin campaign`: `FILE.toml` makes the runs of a campaign, `show RESULTS.parquet` says what came of them."""
 
 from __future__ import annotations
 

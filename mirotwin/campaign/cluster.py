@@ -1,8 +1,5 @@
 """Workers of a Dask scheduler that is running already.
 
-What belongs here: connecting, and refusing workers that would compute something else. What does not: starting a
-scheduler or workers (`dask scheduler`, `dask worker`), and what workers do (`worker`).
-
 The extra `cluster` brings Dask. Workers need mirotwin in the same version with the same sources; images that are not
 the robot's own have to stand under the same path on each of them. Scenarios travel with the jobs.
 """

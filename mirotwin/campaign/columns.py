@@ -1,8 +1,5 @@
 """The columns of a results file: what each run has, and which figures of `summary.json`.
 
-What belongs here: names, types and order. What does not: the file (`results`) and the figures' definitions
-(`report.summary`, `report.theory`).
-
     run                                    number of the run in the plan, from 0
     one column a factor and a drawn key, `draw` (where something is drawn), `seed`
     verdict, error, failure, digest

@@ -1,8 +1,5 @@
 """Pairs of runs that differ in one thing, and whether the second ones are worse.
 
-What belongs here: differences with their intervals, and what counts as worse. What does not: finding pairs (`rows`),
-statistics (`statistics`), and words (`campaign.campaign_show`).
-
 Runs on the same seed have the same noise, so their difference varies less than either. A seed with all its pairs is one
 sample, because they share that noise. A figure is worse when the whole interval of its mean difference is on the bad
 side, by more than a tolerance. Errors and firmware faults need no statistics: one more is worse.

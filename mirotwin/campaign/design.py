@@ -1,8 +1,5 @@
 """The points of a campaign: every combination of what is varied, the draws, and the seeds, in one order.
 
-What belongs here: factors and their levels, random draws, and which of them run number N has. What does not: the file
-that they come from (`file`), and whether a scenario takes them (`plan`).
-
     run = ((point * draws) + draw) * seeds + seed        point: the last factor changes first
 
 A run is computed from its number, so a plan of millions takes no memory.

@@ -1,8 +1,5 @@
 """Has all missing runs of a plan made by an executor, and hands on each outcome as soon as it is there.
 
-What belongs here: how many jobs are handed over, and what becomes of them when a worker ends. What does not: where
-workers come from (`processes`, `cluster`), what they do (`worker`), and where outcomes go (`journal`).
-
 A process that is killed breaks its whole pool. All jobs that the pool had are then made again by a new one, each by
 itself: the one that ends its process twice gets an outcome that says so, and the others go on together.
 """

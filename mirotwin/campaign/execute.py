@@ -1,8 +1,5 @@
 """Makes the results of many jobs in the order of the jobs, whatever executor runs them.
 
-What belongs here: handing jobs over, and the end when somebody interrupts. What does not: one run (`job`), how
-processes begin (`processes`).
-
 A result is a function of its job, so it does not matter which process made it, or how many there were.
 """
 

@@ -1,31 +1,28 @@
 """The file of a campaign: which runs it consists of, and what is expected of them.
 
-    scenario = "fig6"                      a built-in scenario, or a path beside this file
-    seeds = "0-99"
-    firmware = "mine.ihx"                  an image beside this file; without it, the robot's own
-    set = { duration_s = 3.0 }             keys of the scenario, for all runs
-    allowed_failed_share = 0.05            so many runs may fail a check before the exit code is 1
+scenario = "fig6"                      a built-in scenario, or a path beside this file
+seeds = "0-99"
+firmware = "mine.ihx"                  an image beside this file; without it, the robot's own
+set = { duration_s = 3.0 }             keys of the scenario, for all runs
+allowed_failed_share = 0.05            so many runs may fail a check before the exit code is 1
 
-    [expect]                               checks, beside those of the scenario
-    tracks_within_cm = 3.0
+[expect]                               checks, beside those of the scenario
+tracks_within_cm = 3.0
 
-    [grid]                                 every combination of these values
-    network.radio.bit_error_rate = [0.0, 1e-4, 1e-3]
-    firmware = ["", "mine.ihx"]            images; "" is the robot's own
+[grid]                                 every combination of these values
+network.radio.bit_error_rate = [0.0, 1e-4, 1e-3]
+firmware = ["", "mine.ihx"]            images; "" is the robot's own
 
-    [factor.chain]                         a factor whose levels set several keys, as `--set` does
-    paper = []
-    improved = ["network.robot.controller={law = 'body_frame'}", "network.robot.estimator={kind = 'ekf'}"]
+[factor.chain]                         a factor whose levels set several keys, as `--set` does
+paper = []
+improved = ["network.robot.controller={law = 'body_frame'}", "network.robot.estimator={kind = 'ekf'}"]
 
-    [random]                               so many draws, for each combination of the grid
-    count = 200
-    seed = 0
-    [random.range]
-    host.compute_s = { from = 0.001, to = 0.02 }
-    network.radio.latency_s = { from = 1e-4, to = 1e-2, scale = "log" }
-
-What belongs here: reading that, and what is wrong with it by itself. What does not: whether the scenario has such keys
-(`plan`).
+[random]                               so many draws, for each combination of the grid
+count = 200
+seed = 0
+[random.range]
+host.compute_s = { from = 0.001, to = 0.02 }
+network.radio.latency_s = { from = 1e-4, to = 1e-2, scale = "log" }
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Values as TOML writes them on one line: what stands behind `KEY=` in a setting.
-
-What belongs here: text of one value. What does not: which keys there are, and settings (`miro_sim.scenario.settings`).
-"""
+"""Values as TOML writes them on one line: what stands behind `KEY=` in a setting."""
 
 from __future__ import annotations
 

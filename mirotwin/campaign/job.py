@@ -1,8 +1,5 @@
 """One run of many: what it is made from, and the row of figures that it leaves.
 
-What belongs here: running one job in this process. What does not: several processes (`execute`), what rows mean
-together (`reproduce`).
-
 A run that cannot be made, or fails, leaves a row with its error: one bad corner of a plan does not cost the others.
 """
 

@@ -1,7 +1,5 @@
 """Outcomes while a campaign is under way: a file to which each one is added as soon as it is there.
 
-What belongs here: writing, and reading what a killed process has left. What does not: the finished results (`results`).
-
     {"mirotwin_campaign":1,"hash":"..","versions":{..},"runs":1000}
     {"run":0,"verdict":"passed",..}              one line an outcome, in the order in which they came
 

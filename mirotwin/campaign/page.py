@@ -1,8 +1,4 @@
-"""The page of a campaign: how metrics spread in each arm, paired differences, what failed, and how to make a row again.
-
-What belongs here: putting it together. What does not: statistics (`statistics`, `comparison`: the same as those of
-`campaign show`), figures (`plots`), and HTML (`mirotwin.report.page`, its `assets/campaign.html`).
-"""
+"""The page of a campaign: how metrics spread in each arm, paired differences, failures, how to make a row again."""
 
 from __future__ import annotations
 

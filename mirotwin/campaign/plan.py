@@ -1,8 +1,5 @@
 """The plan of a campaign: every run as a job that any worker can do, checked before anything runs.
 
-What belongs here: joining a campaign file with scenarios and images, what is wrong with that, and what makes two
-campaigns the same one. What does not: the file's own form (`file`), the order of the runs (`design`), running.
-
 Each level of each factor, and both ends of each drawn range, are tried once, with the first level of the others: so a
 key that does not exist is found before the first run. A combination that cannot be run is a row with its error.
 """

@@ -1,8 +1,5 @@
 """The figures of a campaign: the spread of a metric by arm, and differences of pairs.
 
-What belongs here: which numbers are drawn, and how. What does not: statistics (`statistics`, `comparison`), the style
-of figures (`mirotwin.report.page.axes`), and the page (`page`).
-
 An arm is all runs with the same levels. Its row has a dot for each run, a box over the middle half, whiskers from 5 to
 95 %, and a stroke at the median. Dots are spread over the row by their number alone, so that a page is the same each
 time.

@@ -1,7 +1,6 @@
 """The processes that make rows: as many as there are cores, each with the engine of the first one.
 
-What belongs here: how they begin. What does not: what they do (`job`, `execute`). Nothing here imports a hot module: a
-new process reads this file before its engine is chosen.
+Nothing here imports a hot module: a new process reads this file before its engine is chosen.
 """
 
 from __future__ import annotations

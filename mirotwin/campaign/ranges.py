@@ -1,11 +1,9 @@
 """Ranges of the random part of a campaign, as its file writes them.
 
-    { from = 0.001, to = 0.02 }            all values in between are equally likely
-    { from = 1e-6, to = 1e-3, scale = "log" }      equal ratios are
-    { from = 3, to = 16, whole = true }    whole numbers, both ends included
-    { choose = ["euler", "exact"] }        one of these
-
-What belongs here: reading one, and what is wrong with it. What does not: drawing (`design`).
+{ from = 0.001, to = 0.02 }            all values in between are equally likely
+{ from = 1e-6, to = 1e-3, scale = "log" }      equal ratios are
+{ from = 3, to = 16, whole = true }    whole numbers, both ends included
+{ choose = ["euler", "exact"] }        one of these
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
 """Results of a campaign as Parquet files: written at the end in the order of the plan, and read again.
 
-What belongs here: the two files and what they say of themselves. What does not: columns and their types (`columns`),
-outcomes while a campaign is under way (`journal`).
-
     noise.parquet            every run: the same bytes whichever processes or machines ran it, in whatever order
     noise.wall.parquet       `run`, `wall_s`: how long each simulation loop took, which differs from time to time
 

@@ -1,8 +1,5 @@
 """Rows of a results file as columns of numbers: what statistics are made from.
 
-What belongs here: reading figures out of rows, groups of rows, and pairs of rows that differ in one thing. What does
-not: statistics (`statistics`), and what is better (`comparison`).
-
 Besides the figures of a run there are shares, 1 for a run of which it is true and 0 for another one: `failed`, `fault`,
 `error`, `unsettled` (not within 3 cm and 0.15 rad at the end), and `check.NAME` (that check failed).
 """

@@ -1,8 +1,4 @@
-"""Runs a campaign: from its plan to the results file, taking up what an earlier process has left.
-
-What belongs here: the order of journal, workers and results, and which files may be replaced. What does not: each of
-them, and what is said meanwhile (`campaign.campaign_run`).
-"""
+"""Runs a campaign: from its plan to the results file, taking up what an earlier process has left."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Seeds as people write them: 0-49, or one alone.
-
-What belongs here: from text to a range. What does not: what runs with them (`job`).
-"""
+"""Seeds as people write them: 0-49, or one alone."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """One run of a campaign in this process, from a job to its figures.
 
-What belongs here: running one world, its checks and steps, and what is kept for the next run. What does not: what a
-worker refuses (`worker`), figures and their definitions (`report.summary`), and their columns (`columns`).
-
 A process keeps images, and scenarios with their settings, so that a run costs little more than its loop.
 """
 

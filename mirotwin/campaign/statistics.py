@@ -1,7 +1,5 @@
 """Numbers that stand for many runs: quantiles, means, and how far another set of seeds could move them.
 
-What belongs here: a column of numbers to its figures. What does not: which rows (`comparison`), and words (`cli`).
-
 Runs with the same seed share its calibration, its wheels and its noise, so they are not independent: a sample is a
 seed with all its runs. The interval of a mean is Student's, with the variance between seeds (Liang and Zeger,
 "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986, doi:10.1093/biomet/73.1.13) and one

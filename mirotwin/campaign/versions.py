@@ -1,7 +1,4 @@
-"""What a run's bits depend on besides its job: this program's version and sources, and parts of other distributions.
-
-What belongs here: finding that out, and naming what differs. What does not: the firmware, whose hash a job carries.
-"""
+"""What a run's bits depend on besides its job: this program's version and sources, and parts of other distributions."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The edge of a campaign: the wall clock, and the end of a process whose parent has ended.
-
-What belongs here: what no row of a campaign depends on. What does not: anything that a run is made of.
-"""
+"""The edge of a campaign: the wall clock, and the end of a process whose parent has ended."""
 
 from __future__ import annotations
 

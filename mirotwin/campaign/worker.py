@@ -1,7 +1,6 @@
 """What a worker gets, does and gives back, wherever it runs: in this process, in another one, on another machine.
 
-What belongs here: the job as it travels, and refusing one that this worker would compute otherwise. What does not: the
-run itself (`single`). Nothing here imports a hot module: a new process reads this file before its engine is chosen.
+Nothing here imports a hot module: a new process reads this file before its engine is chosen.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""Where workers come from: processes of this machine, or an executor that somebody else has.
-
-What belongs here: starting and stopping executors, and what they say when a worker has ended. What does not: a cluster
-(`cluster`), which processes begin how (`processes`), and handing jobs over (`drive`).
-"""
+"""Where workers come from: processes of this machine, or an executor that somebody else has."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Options of an image on the bare processor: `fw run` and the other `fw` commands have them in common.
-
-What belongs here: the options, the machine that they configure, and the messages about the end of its run. What does
-not: the machine (`miro_robot.bare`), the live terminal (`firmware.terminal`), and trace windows (`firmware.subject`).
-"""
+"""Options of an image on the bare processor: `fw run` and the other `fw` commands have them in common."""
 
 from __future__ import annotations
 

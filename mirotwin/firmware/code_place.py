@@ -1,7 +1,4 @@
-"""Places in code memory as people write and read them: symbols, and addresses as 0x...
-
-What belongs here: both directions. What does not: symbol files (`miro_robot.image`).
-"""
+"""Places in code memory as people write and read them: symbols, and addresses as 0x..."""
 
 from __future__ import annotations
 

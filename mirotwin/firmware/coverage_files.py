@@ -1,8 +1,4 @@
-"""Firmware coverage as a report: what the command line and the pytest plugin make of counts.
-
-What belongs here: where debug files and sources are looked for, paths, the table for people, the files that are added
-to and written. What does not: the mapping to lines (`miro_robot.inspect.coverage`).
-"""
+"""Firmware coverage as a report: what the command line and the pytest plugin make of counts."""
 
 from __future__ import annotations
 

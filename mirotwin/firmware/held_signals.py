@@ -1,8 +1,4 @@
-"""Delays Ctrl-C, SIGTERM and SIGHUP while files are written that an exception would damage.
-
-What belongs here: when a signal may raise. What does not: what it raises (`program.terminable`), and what is left of a
-command that it ends (`run`).
-"""
+"""Delays Ctrl-C, SIGTERM and SIGHUP while files are written that an exception would damage."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Sources of an image, as the `mirotwin fw` commands are told of them.
-
-What belongs here: the option. What does not: where they are looked for (`firmware.coverage_files`), and reading them
-(`miro_robot.image.debug_info`).
-"""
+"""Sources of an image, as the `mirotwin fw` commands are told of them."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""SUBJECT, what the `mirotwin fw` commands look into: an image, a scenario, a recording or a stream file.
-
-What belongs here: the argument and the options that say what runs, for how long, and which of its robots is looked
-at. What does not: looking (one file a command), and the run itself (`mirotwin.rerun.inspected_run`).
-"""
+"""SUBJECT, what the `mirotwin fw` commands look into: an image, a scenario, a recording or a stream file."""
 
 from __future__ import annotations
 

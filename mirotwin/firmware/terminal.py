@@ -1,7 +1,7 @@
 """`fw run --terminal`: the keyboard and the screen as a terminal on the bare machine's serial port.
 
-What belongs here: the terminal's raw mode, pacing, and handing keys over. This is one of the few places that know the
-wall clock. The machine does not: the same keys at the same machine cycles give the same bits.
+This is one of the few places that know the wall clock. The machine does not: the same keys at the same machine cycles
+give the same bits.
 
 The terminal has its old settings back however the run ends: Ctrl-], the program's end, an exception, or a signal, which
 `shell.program` turns into an exception.

@@ -1,8 +1,5 @@
 """A target that is any 8051 firmware with a serial port, on a bare processor.
 
-What belongs here: the target. What does not: the machine (`bare_machine`), checks in Python (`exchange`), and cases
-(`bare_case`).
-
 Where the firmware sleeps when it has nothing to do, a run ends when it sleeps and has sent all it had; where it polls
 for ever, 10 ms (at 24 MHz) after the last character.
 """

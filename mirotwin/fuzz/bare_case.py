@@ -1,8 +1,5 @@
 """Cases of a bare processor: finds as files, and run again.
 
-What belongs here: cases whose header says `bare`. What does not: cases of the robot (`confirm`, `mirotwin.verify.cases`), and
-the run (`bare_run`).
-
     # mirotwin stream 2
     #: firmware_sha256 = ".."
     #: verdict = "no_fault: tick 368772 (33.346 ms): firmware executed outside the loaded image at 0x03c0, .."

@@ -1,8 +1,4 @@
-"""Finds on a bare processor, tried once more from power-on.
-
-What belongs here: who has the last word on an input. What does not: the run (`bare_run`), the file (`bare_case`), and
-the robot's court (`confirm`).
-"""
+"""Finds on a bare processor, tried once more from power-on."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""A processor with 64 KB of RAM and a serial port, powered up with any firmware.
-
-What belongs here: the machine, starting it, and what went in and out of it. What does not: inputs (`bare`), and playing
-a case (`bare_run`).
-"""
+"""A processor with 64 KB of RAM and a serial port, powered up with any firmware."""
 
 from __future__ import annotations
 

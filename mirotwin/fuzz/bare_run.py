@@ -1,8 +1,4 @@
-"""What a bare processor hears, played from power-on: without a saved moment, and without a harness.
-
-What belongs here: this one run and the verdict of a check on it. What does not: the target, whose finds are tried here
-once more, and files (`bare_case`).
-"""
+"""What a bare processor hears, played from power-on: without a saved moment, and without a harness."""
 
 from __future__ import annotations
 

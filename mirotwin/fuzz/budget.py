@@ -1,7 +1,6 @@
 """How long a search may go on: so many tries, and so much wall time.
 
-What belongs here: counting both. What does not: what is searched (`minimise`). This is one of the few places that know
-the wall clock.
+This is one of the few places that know the wall clock.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """A campaign: what is done with what an engine finds, until the time is over.
 
-What belongs here: the loop, and what is looked at in which order. What does not: engines (`engine`), finds (`finds`),
-coverage (`reached`), and how it is shown (`mirotwin.fuzz.fuzz_command`). This is one of the few places that know the wall clock.
+This is one of the few places that know the wall clock.
 
     engine ──crashes──► finds: minimised, told apart, confirmed
        └────queue────► coverage, --covering, checks in Python (a share of the time, the rest waits)

@@ -1,13 +1,9 @@
 """A find played in a World, whose checks have the last word.
 
-What belongs here: from what the robot heard in a run of the target to a world, the checks that judge it there, and the
-case that is left. What does not: the quick judgement while fuzzing (`miro_robot.harness`), and the form of a case
-(`mirotwin.verify.cases`).
-
-    input ──► Target.happenings ──► World: ideal radio, carrier on, the robot of the target alone
-                                      │ checks: the one that the find names, and those that are always on
-                                      ▼
-                             failed: a case            passed: kept apart, as not confirmed
+input ──► Target.happenings ──► World: ideal radio, carrier on, the robot of the target alone
+                                  │ checks: the one that the find names, and those that are always on
+                                  ▼
+                         failed: a case            passed: kept apart, as not confirmed
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
 """A folder of inputs that a user gives: recordings, stream files, captures, and inputs of earlier campaigns.
 
-What belongs here: which files are inputs, and what the others are. What does not: reading single formats
-(`mirotwin.recording.capture`).
-
 Files are taken from the folder itself and, where it is one that a campaign or afl-fuzz left, from the folders of its
 queues. Hidden files are not looked at. Files of other kinds are passed over and named in one line; a folder in which
 nothing is an input is refused.

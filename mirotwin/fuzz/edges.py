@@ -1,7 +1,6 @@
 """The edges that a set of inputs executes together.
 
-What belongs here: running inputs and joining their edge maps. What does not: the map itself (`target`), and which code
-an edge belongs to (coverage). AFL++ says how many edges it has seen once a minute; this counts them when asked.
+AFL++ says how many edges it has seen once a minute; this counts them when asked.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Who makes up inputs: AFL++ where it is installed, else Hypothesis.
-
-What belongs here: what a campaign asks of an engine, and which one it gets. What does not: the engines.
-"""
+"""Who makes up inputs: AFL++ where it is installed, else Hypothesis."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """What went in and out of a bare processor during one run, and the checks in Python that judge it.
 
-What belongs here: what such a check is given, and finding one by its name. What does not: who runs the firmware
-(`bare.py`).
-
 A check is a function that says what is wrong in one line, or None:
 
     def level_is_kept(run: Exchange) -> str | None:

@@ -1,20 +1,17 @@
 """The folder of a campaign: what stands where.
 
-What belongs here: names, the check of the folder before a campaign, and writing single files whole. What does not: what
-is in them.
-
-    OUT/
-      finds/NAME.stream        a case: `mirotwin replay` gives the verdict again
-      finds/NAME.input         the minimised input, for --corpus
-      finds/NAME.txt           the same as readable lines
-      finds/NAME.info          what it executed, as an lcov tracefile
-      unconfirmed/NAME.*       what a world did not find wrong: the same files, and a stream that nothing is expected of
-      covering/SYMBOL.*        the input that reached a function (--covering)
-      corpus/                  inputs that found something new
-      seeds/, dictionary       what it began with
-      engine/                  the engine's own
-      coverage.info            what all inputs executed
-      summary.json
+OUT/
+  finds/NAME.stream        a case: `mirotwin replay` gives the verdict again
+  finds/NAME.input         the minimised input, for --corpus
+  finds/NAME.txt           the same as readable lines
+  finds/NAME.info          what it executed, as an lcov tracefile
+  unconfirmed/NAME.*       what a world did not find wrong: the same files, and a stream that nothing is expected of
+  covering/SYMBOL.*        the input that reached a function (--covering)
+  corpus/                  inputs that found something new
+  seeds/, dictionary       what it began with
+  engine/                  the engine's own
+  coverage.info            what all inputs executed
+  summary.json
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
 """What becomes of an input that failed: minimised, told apart from the others, confirmed in a World, left as files.
 
-What belongs here: that order, and what makes two finds the same. What does not: each of the steps (`minimise`,
-`reached`, `confirm`), and where inputs come from (`campaign`).
-
 Two finds are the same where check, PC and path are. The PC is that of the instruction that did it, a fault; where no
 instruction did it (nothing came in time, say) there is none. The path is that of the minimised input (`reached`).
 

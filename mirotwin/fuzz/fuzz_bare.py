@@ -1,8 +1,4 @@
-"""`mirotwin fuzz --bare`: any firmware with a serial port, and its cases.
-
-What belongs here: the options of a bare processor, what is fuzzed because of them, and cases played again. What
-does not: the campaign (`fuzz`), and the processor (`mirotwin.fuzz.bare`).
-"""
+"""`mirotwin fuzz --bare`: any firmware with a serial port, and its cases."""
 
 from __future__ import annotations
 

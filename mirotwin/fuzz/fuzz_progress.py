@@ -1,7 +1,6 @@
 """How a campaign of `mirotwin fuzz` is shown while it is under way: a line that is drawn again, or plain lines.
 
-What belongs here: words, and when they are written. What does not: what a campaign does (`mirotwin.fuzz`). This is one
-of the few places that know the wall clock.
+This is one of the few places that know the wall clock.
 """
 
 from __future__ import annotations

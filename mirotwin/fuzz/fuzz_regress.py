@@ -1,8 +1,5 @@
 """`mirotwin fuzz --regress DIR`: saved cases, run once more.
 
-What belongs here: one line a case, and the exit code. What does not: running a single case with all that can be said of
-it (`replay_case`).
-
 A case passes where its check passes: that is what is wanted of firmware in which a mistake was mended. A check that had
 no occasion to judge passes if it says "never" (safety), and fails if it says "within a time" (liveness): firmware that
 does nothing at all has mended nothing. Streams that expect nothing are judged by the checks that are always on.

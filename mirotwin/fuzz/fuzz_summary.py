@@ -1,8 +1,4 @@
-"""What `mirotwin fuzz` says at the end: counts, coverage, finds with the line that repeats each, and summary.json.
-
-What belongs here: words, files of the whole campaign, and the exit code. What does not: what is counted
-(`mirotwin.fuzz`).
-"""
+"""What `mirotwin fuzz` says at the end: counts, coverage, finds with the line that repeats each, and summary.json."""
 
 from __future__ import annotations
 

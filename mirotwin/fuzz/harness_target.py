@@ -1,8 +1,4 @@
-"""What targets in a harness have in common: the map, the counters, and what a processor hears of an input.
-
-What belongs here: from an input to characters and resets at ticks, and their description. What does not: the machines
-and what is wrong with a run (`target`, `bare`).
-"""
+"""What targets in a harness have in common: the map, the counters, and what a processor hears of an input."""
 
 from __future__ import annotations
 

@@ -1,12 +1,9 @@
 """The targets of fuzzing under Hypothesis: the engine where AFL++ is missing.
 
-What belongs here: campaigns with the methods and the folders of `AflRun`. What does not: one process of them
-(`hypothesis_process`), and what is made of a find.
-
-    HypothesisRun ── starts ──► python -m mirotwin.fuzz.hypothesis_process SPECIFICATION SEEDS JOB SEED
-                                   │ JOB/queue/id:..     inputs that executed something new
-                                   │ JOB/crashes/id:..   inputs with a finding
-         reads ◄───────────────────┘ JOB/progress        counters
+HypothesisRun ── starts ──► python -m mirotwin.fuzz.hypothesis_process SPECIFICATION SEEDS JOB SEED
+                               │ JOB/queue/id:..     inputs that executed something new
+                               │ JOB/crashes/id:..   inputs with a finding
+     reads ◄───────────────────┘ JOB/progress        counters
 """
 
 from __future__ import annotations

@@ -1,9 +1,5 @@
 """Hypothesis strategies of fuzz inputs: whole operations, so that every byte drawn stands where it means something.
 
-What belongs here: the bytes of an input of each kind. What does not: how they are read (`miro_robot.harness.program`,
-which has the table of operations), running them (`hypothesis_search`), and frames with a right CRC as such
-(`miro_protocol.strategies`).
-
 Each draw costs Hypothesis some 20 us, as much as a short run of the target: what need not be drawn apart is
 one draw.
 """

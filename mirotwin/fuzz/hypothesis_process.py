@@ -1,8 +1,4 @@
-"""One process of a campaign under Hypothesis: it has a target of its own and runs until it is killed.
-
-What belongs here: the folder that it fills. What does not: starting it (`hypothesis_engine`) and the search
-(`hypothesis_search`).
-"""
+"""One process of a campaign under Hypothesis: it has a target of its own and runs until it is killed."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """What Hypothesis draws for a target, and which inputs are worth keeping.
 
-What belongs here: the search in one process. What does not: which inputs there are (`hypothesis_inputs`), files and
-processes (`hypothesis_process`).
-
 Hypothesis draws inputs and climbs towards those that execute many edges (`hypothesis.target`); there is no other
 evolution. It remembers all that it has drawn, so it works in rounds, each with a seed of its own. A finding is no
 failure for it: it goes on, and finds are made smaller elsewhere.

@@ -1,8 +1,5 @@
 """What was sent, written down as inputs that the target reads back as the same.
 
-What belongs here: from transmissions to inputs, for each way to read one. What does not: reading inputs
-(`miro_robot.harness.program`, which has the table of operations), and where transmissions come from.
-
 In `session` pauses keep their length to within a step, and frames become operations, so that a fuzzer changes what they
 say and not their CRC. What is no frame becomes characters. Left out are telemetry, what robots say, switched supplies
 and radios, and bad stop bits of characters outside a frame, for which a session has no operation. `frames` has frames

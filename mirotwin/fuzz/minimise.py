@@ -1,7 +1,5 @@
 """Makes an input shorter and simpler as long as it still does what it was kept for.
 
-What belongs here: the search. What does not: what "still does" means (the caller's question), and running a target.
-
 Delta debugging (Zeller, Hildebrandt: Simplifying and isolating failure-inducing input, IEEE TSE 28(2), 2002), in the
 form that takes away one chunk after the other, from half of the input down to single bytes, then the same with zeros in
 the place of chunks. An input that is shorter is simpler; of two as long as each other, the one with more zeros.

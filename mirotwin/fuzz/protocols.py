@@ -1,8 +1,4 @@
-"""Wire formats by name: `miro`, `miro:robots=5`, `slip` of a distribution of one's own.
-
-What belongs here: the table of our own, and reading a name with its parameters. What does not: the interface
-(`miro_protocol.protocol`) and the formats.
-"""
+"""Wire formats by name: `miro`, `miro:robots=5`, `slip` of a distribution of one's own."""
 
 from __future__ import annotations
 

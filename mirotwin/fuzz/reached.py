@@ -1,8 +1,5 @@
 """What inputs reach: coverage of a campaign and of single inputs, and the path that tells finds apart.
 
-What belongs here: running inputs once more under counters. What does not: counting (`miro_robot.inspect.counters`), and
-what lines follow from addresses (`miro_robot.inspect.coverage`).
-
 The campaign's own target counts edges at full speed. Here is a second one of the same image that counts instructions,
 some fifty times slower, so it sees only inputs that found something new.
 

@@ -1,8 +1,5 @@
 """What a campaign begins with: what a host may say, each kind of it once.
 
-What belongs here: the built-in seeds. What does not: those that a user gives (`corpus`), and how they are written down
-(`inputs`).
-
 Eight random bytes alone never get past the synchronisation, so a campaign begins with frames. A seed is short, and they
 differ in what a robot does with them.
 """

@@ -1,6 +1,5 @@
 """What a process needs to know to make a target: one JSON text, handed from process to process.
 
-What belongs here: the fields, their limits, the text. What does not: the targets, which are imported when one is made.
 Nothing here imports a hot module: the process that reads a specification chooses its engine by it.
 """
 

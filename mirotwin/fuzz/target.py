@@ -1,8 +1,4 @@
-"""A target: a booted robot that runs one fuzz input after the other, from the same moment each time.
-
-What belongs here: what engines, finds and tests ask of a target, and the target that is the MIRO's board. What does
-not: the machine (`miro_robot.harness`), the bare processor (`bare`), and choosing inputs.
-"""
+"""A target: a booted robot that runs one fuzz input after the other, from the same moment each time."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""A buffer of received bytes that drops what comes in when it is full, as the driver of a serial port does.
-
-What belongs here: the bytes and the count of those dropped. What does not: who fills and empties it.
-"""
+"""A buffer of received bytes that drops what comes in when it is full, as the driver of a serial port does."""
 
 from __future__ import annotations
 

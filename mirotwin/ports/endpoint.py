@@ -1,8 +1,5 @@
 """What all live ports have in common: one client at a time, a bounded buffer towards it, and counts of what passed.
 
-What belongs here: buffers, counts, and what is told when a client comes and goes. What does not: sockets and terminals
-(`sockets`, `rfc2217`, `terminal`), and when they are asked (`session`).
-
 Bytes from a client wait in the kernel until the transmit buffer has room, so a client that is too fast is held up, and
 nothing is lost. Bytes for a client that does not read them wait here, 64 KiB of them; what comes then is dropped and
 counted, as by a serial port's driver: the robots do not wait.

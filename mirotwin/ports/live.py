@@ -1,8 +1,4 @@
-"""A scenario made fit for a live session: its hosts are silent, and it goes on for a day.
-
-What belongs here: the keys that differ, as settings, so that a recording holds the scenario that was run. What does
-not: who sends instead of the hosts.
-"""
+"""A scenario made fit for a live session: its hosts are silent, and it goes on for a day."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The world behind an open `miro://` port, and the files that it leaves.
-
-What belongs here: making the world that a URL asks for, and recording it. What does not: the port.
-"""
+"""The world behind an open `miro://` port, and the files that it leaves."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""The two ways in which time passes for a program that holds a world: in its calls, or by the wall clock.
-
-What belongs here: moving a world and its port on. What does not: what a call waits for (`serial_port`), and the wall
-clock itself (`pacing`).
-"""
+"""The two ways in which time passes for a program that holds a world: in its calls, or by the wall clock."""
 
 from __future__ import annotations
 

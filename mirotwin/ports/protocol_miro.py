@@ -2,8 +2,8 @@
 
     serial.protocol_handler_packages.append("mirotwin.ports")
 
-What belongs here: the name `Serial`. What does not: the class (`serial_port`). Programs that know nothing of Mirotwin
-find the same through `serial.urlhandler.protocol_miro`, which an installation puts beside pyserial's own handlers.
+Programs that know nothing of Mirotwin find the same through `serial.urlhandler.protocol_miro`, which an installation
+puts beside pyserial's own handlers.
 """
 
 from mirotwin.ports.serial_port import Serial as Serial

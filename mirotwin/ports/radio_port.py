@@ -3,9 +3,6 @@
     bytes to send ──► transmit buffer, 4096 characters ──► air ──► robots
     bytes heard   ◄──────────── the PC's receiver ◄─────── air ◄── robots
 
-What belongs here: when bytes go on the air, how many wait, and what came back since last asked. What does not: passing
-time (who has a world does that), buffers of received bytes, clients.
-
 A character with a bad stop bit is delivered like any other, as serial ports do unless they are told to check; the
 recording knows which had one. Slicer noise is heard by robots only: the PC's receiver has a squelch.
 """

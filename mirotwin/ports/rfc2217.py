@@ -1,8 +1,5 @@
 """A radio's port behind RFC 2217: TCP with telnet negotiation of baud rate, format and lines, as `rfc2217://` speaks.
 
-What belongs here: the negotiation, by pyserial's `PortManager`, and what of it this radio's port has. What does not:
-connections (`sockets`).
-
 Rate and format: 9600 8N1 and nothing else; another one is answered with what there is, and the client raises. Flow
 control, DTR, RTS and BREAK are acknowledged and have no effect: the radio module has no such wires, and no break gets
 through it. CTS, DSR and CD are active. Negotiation that makes no sense is ignored and counted.

@@ -1,8 +1,5 @@
 """`miro://` for pyserial: a robot behind its radio, in the process of the program that opens it.
 
-What belongs here: what pyserial's `Serial` promises, over a world. What does not: the URL (`url`), how time passes
-(`passing`), the port itself (`radio_port`), and how pyserial finds this class (`protocol_miro`).
-
 Each `open` is a robot that is switched on: virtual time begins at 0 and nothing is kept of the port's last use.
 
     read(n)          time passes until n bytes are there, up to `timeout` (None: for ever), or up to

@@ -1,7 +1,4 @@
-"""The ports that `mirotwin serve` is asked for: their options, and opening them.
-
-What belongs here: words of the command line. What does not: what a port does (`mirotwin.ports`).
-"""
+"""The ports that `mirotwin serve` is asked for: their options, and opening them."""
 
 from __future__ import annotations
 

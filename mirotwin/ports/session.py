@@ -1,8 +1,5 @@
 """A live session: a world that the wall clock drives, and the ports through which programs talk to its robots.
 
-What belongs here: when the world moves on, and when bytes pass. What does not: the ports (`endpoint`), the wall clock
-(`pacing`), files and the command line.
-
 The world goes on in slices, so that a robot's byte is some milliseconds on its way to a program. When a program's bytes
 arrive it is moved on to that very moment first, and they go on the air there. A world that cannot keep pace stays
 behind, catches up as fast as it can, and says so: it never skips. The tick at which bytes went on the air is what the

@@ -1,7 +1,5 @@
 """A radio's port behind TCP: the bytes as they are.
 
-What belongs here: listening, one client, its bytes. What does not: telnet negotiation, which `rfc2217` adds.
-
 A second client is refused: its connection is closed at once and the user is told. A client that has shut down its
 sending side (`socat - TCP:..` at the end of its input) is there for half a second more, in which it gets answers,
 unless another one comes.

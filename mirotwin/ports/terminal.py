@@ -1,7 +1,5 @@
 """A radio's port as a pseudo-terminal, which programs open as they open /dev/ttyUSB0.
 
-What belongs here: the terminal and the link to it. What does not: what passes through (`endpoint`).
-
 The kernel tells whether anybody has it open, not how many: two programs that open it share what comes, as they would a
 real port. It is raw, without echo, at 9600 baud, and made so again whenever it was closed; a terminal takes any baud
 rate, and one that is not the radio's is told once, because no rate has an effect here. What a program has not read when

@@ -2,8 +2,8 @@
 
     miro://SCENARIO?seed=7&firmware=build/mine.ihx&set=network.radio.latency_s=0.002&network=0&realtime=1&limit_s=60&out=DIR
 
-What belongs here: reading it. What does not: what the options do (`serial_port`). SCENARIO is a built-in name or the
-path of a .toml file (`miro:///tmp/my.toml` is absolute). `set` may be repeated. `%xx` stands for a byte.
+SCENARIO is a built-in name or the path of a .toml file (`miro:///tmp/my.toml` is absolute). `set` may be repeated.
+`%xx` stands for a byte.
 """
 
 from __future__ import annotations

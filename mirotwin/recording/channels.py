@@ -1,8 +1,6 @@
 """The channels of a recording: their messages, and how records become messages and back.
 
-What belongs here: one struct a channel, and the two directions of translation. What does not: their JSON schemas
-(`schemas`), MCAP (`recorder`, `reader`). Every message carries its tick; a period's messages are closed by its
-`/period` message.
+Every message carries its tick; a period's messages are closed by its `/period` message.
 
 Where a channel stands: `topics`.
 

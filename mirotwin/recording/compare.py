@@ -1,14 +1,10 @@
 """Where two runs differ, period by period: how strictly is a rule's matter.
 
-What belongs here: the rules, and all differences of two runs under one. What does not: the values' names (`fields.py`),
-sequences with a tolerance in time (`sequences.py`), states (`lockstep.py`), what is sent again (`script.py`), and the
-commands (`cli/replay.py`, `cli/diff.py`).
-
-    rule       compared                                                                  tolerance
-    bits       all that a robot did: counters, LM629s, PWM, motion, commands, answers    none
-    bytes      the characters that the PC heard of the robots, and their order           in time
-    commands   the commands of each LM629: opcode, data, order; not what they read       in time
-    wheels     each LM629's positions and desired velocity once a control period         in counts
+rule       compared                                                                  tolerance
+bits       all that a robot did: counters, LM629s, PWM, motion, commands, answers    none
+bytes      the characters that the PC heard of the robots, and their order           in time
+commands   the commands of each LM629: opcode, data, order; not what they read       in time
+wheels     each LM629's positions and desired velocity once a control period         in counts
 """
 
 from __future__ import annotations

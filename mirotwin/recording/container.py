@@ -1,11 +1,10 @@
 """The records of an MCAP file one after the other, as far as the file goes, and every byte of it checked.
 
-What belongs here: the container. What does not: what messages say (`reader`, `recording.capture.recorded`). The
-library's own reader takes a file that was cut short for a damaged one and gives nothing of a chunk whose end is missing
-(a short recording is one chunk); it checks neither attachments nor the summary. Here the whole records of such a chunk
-are given out before the error, and a bit that was turned over anywhere in a recording of ours is noticed: chunks and
-attachments have a CRC each, DataEnd has one of all before it, Footer one of the rest (MCAP specification, "Records").
-A CRC of 0, which other programs write, says nothing.
+The library's own reader takes a file that was cut short for a damaged one and gives nothing of a chunk whose end is
+missing (a short recording is one chunk); it checks neither attachments nor the summary. Here the whole records of
+such a chunk are given out before the error, and a bit that was turned over anywhere in a recording of ours is
+noticed: chunks and attachments have a CRC each, DataEnd has one of all before it, Footer one of the rest (MCAP
+specification, "Records"). A CRC of 0, which other programs write, says nothing.
 
 A file without an end that stops between two records, or in one that belongs into a chunk and stands outside, is what a
 killed process leaves (`writer`): BrokenOff. One that stops in a chunk or anywhere else is a part of a copy: Cut.

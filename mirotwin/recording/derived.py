@@ -1,7 +1,4 @@
-"""Channels of a recording that follow from its other channels: they are for people, and nothing reads them back.
-
-What belongs here: their messages. What does not: those that control periods are made of (`channels`).
-"""
+"""Channels of a recording that follow from its other channels: they are for people, and nothing reads them back."""
 
 import msgspec
 

@@ -1,8 +1,4 @@
-"""A value that two runs have otherwise, and how it is said.
-
-What belongs here: the record, its words, and its form in JSON. What does not: finding it (`fields.py`, `sequences.py`,
-`compare.py`).
-"""
+"""A value that two runs have otherwise, and how it is said."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""The values of a control period by name: what a robot did, and what its PC made of it.
-
-What belongs here: names and how to read them. What does not: comparing them (`compare.py`), and what has a tick of its
-own, commands and characters (`sequences.py`).
-"""
+"""The values of a control period by name: what a robot did, and what its PC made of it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Camera frames in a recording: PNG files as messages that viewers show.
-
-What belongs here: the message and its schema, which is `foxglove.CompressedImage` with a tick. What does not: pictures
-(`mirotwin.camera`), and when they are recorded (`run --record-frames`).
-"""
+"""Camera frames in a recording: PNG files as messages that viewers show."""
 
 from typing import Annotated, Any
 

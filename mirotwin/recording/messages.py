@@ -1,8 +1,4 @@
-"""The messages of a recording one after the other, and what it was made from: the one reader of our MCAP files.
-
-What belongs here: which record is ours, its type, and what its contents lack. What does not: the container
-(`container`), putting periods together (`reader`), and characters in the order of time (`recording.capture.recorded`).
-"""
+"""The messages of a recording one after the other, and what it was made from: the one reader of our MCAP files."""
 
 from collections.abc import Collection, Iterator
 from typing import Any

@@ -1,6 +1,5 @@
 """Reads a recording back: what it was made from, and its control periods as the world left them.
 
-What belongs here: messages to periods. What does not: reading messages (`messages`), and running it again (`replay`).
 A file is read whole and checked (CRCs, schema) before anything is returned. Of one that has no end, the whole control
 periods are returned.
 """

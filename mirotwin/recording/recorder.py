@@ -1,8 +1,5 @@
 """Writes a run to MCAP: everything that is needed to look at it, and to run it again, in one file.
 
-What belongs here: the file's header, attachments, channels and messages. What does not: what the messages say
-(`channels`), reading them (`reader`).
-
 Two runs of one scenario, seed and firmware give the same bytes: no wall clock, no version, no compression;
 log time is the tick in nanoseconds, rounded down.
 """

@@ -1,7 +1,4 @@
-"""The JSON schemas of a recording's messages, which viewers read.
-
-What belongs here: name and schema of a message. What does not: the messages (`channels`, `images`).
-"""
+"""The JSON schemas of a recording's messages, which viewers read."""
 
 from typing import Any
 

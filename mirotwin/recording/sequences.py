@@ -1,8 +1,4 @@
-"""What happens in a run one after the other, with ticks: LM629 commands and characters on the air.
-
-What belongs here: making sequences of a recording's periods, and comparing two of them with a tolerance in time. What
-does not: values that every period has (`fields.py`), and which sequences are compared (`compare.py`).
-"""
+"""What happens in a run one after the other, with ticks: LM629 commands and characters on the air."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What a recording says that a run was made from.
-
-What belongs here: making it of a scenario and a world. What does not: its fields (`recorder`).
-"""
+"""What a recording says that a run was made from."""
 
 from __future__ import annotations
 

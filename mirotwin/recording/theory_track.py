@@ -1,7 +1,6 @@
 """The paper's theory along a run: what is noted of each control period while the run is under way.
 
-What belongs here: one robot, period by period, from what a period leaves behind. What does not: what a run amounts to
-(`theory`) and the formulas (`miro_host.theory`). Of each period f and the surfaces are kept; the rest is counted.
+Of each period f and the surfaces are kept; the rest is counted.
 
 f is that of equation (15), f = z_r' + u - z', over one control period: z_r' + u is the change of the commanded velocity
 by the command that was computed at the period's exposure, after its limits; z' is the change of the true velocity from

@@ -1,12 +1,10 @@
 """The topics of a recording: their names, and what they name.
 
-What belongs here: text to place and back. What does not: what is said there (`channels`).
-
-    /period                  a control period of the whole world
-    /net0/wire               the characters on the air of network 0
-    /net0/deeds              what was done to its robots and its radio
-    /net0/camera/image       the frames of its camera
-    /net0/robot2/lm629       a channel of the robot in slot 2 of network 0
+/period                  a control period of the whole world
+/net0/wire               the characters on the air of network 0
+/net0/deeds              what was done to its robots and its radio
+/net0/camera/image       the frames of its camera
+/net0/robot2/lm629       a channel of the robot in slot 2 of network 0
 """
 
 import re

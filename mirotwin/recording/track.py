@@ -1,8 +1,7 @@
 """The course of each robot in a run, as columns of numbers: what summary, table and figure are made from.
 
-What belongs here: the numbers that are kept of a control period while a run is under way, and the tracking error. What
-does not: figures made of them (`summary`), pictures (`figure`). A run of hours has 100 000 periods an hour: a record of
-a period is some 3 KB, its row in these columns some 150 bytes.
+A run of hours has 100 000 periods an hour: a record of a period is some 3 KB, its row in these columns some 150
+bytes.
 
 Errors are truth against the reference at the same tick, e = c - r in the paper's axes, heading wrapped to (-pi, pi].
 """

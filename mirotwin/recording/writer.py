@@ -1,9 +1,5 @@
 """Writes an MCAP file, uncompressed, which can be read at any moment of its making.
 
-What belongs here: the container: header, attachments, metadata, chunks with their indexes, summary, footer (MCAP
-specification, "Records"). What does not: what messages say (`recorder`), reading (`container`), and the clock:
-the caller decides when to flush.
-
 A finished file is the bytes that `mcap.writer.Writer` gives without compression and with all checksums. That one keeps
 a chunk in memory until it has 1 MiB, minutes of a run, and a process that is killed loses it. Here `flush` brings the
 open chunk up to date in the file: first the new records at the end of the file, then the head of the chunk (lengths,

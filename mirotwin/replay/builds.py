@@ -1,8 +1,5 @@
 """Where two builds go apart whose code lies at other addresses: the first variables that differ, and who wrote them.
 
-What belongs here: comparing variables by name, and finding the instruction that wrote one. What does not: firmwares of
-the same layout, which are compared instruction by instruction (`instructions.py`), and names of places (`program.py`).
-
 Such builds execute nothing at the same address, and most things at other times. They are compared where both processors
 sleep, and so have done all there was to do: every half millisecond the variables that both symbol files name. What
 holds times (a timer's count, say) differs between builds of other speed, and means nothing; so those that still differ

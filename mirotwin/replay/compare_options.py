@@ -1,8 +1,4 @@
-"""Options that say how two runs are compared, for `replay` and `diff`, and what they come to.
-
-What belongs here: the options and their check. What does not: comparing (`mirotwin.recording.compare`) and what is said of
-the result (`cli/differences.py`).
-"""
+"""Options that say how two runs are compared, for `replay` and `diff`, and what they come to."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Two recordings that differ, run again: the exact tick and fields, and the instruction where firmwares differ.
-
-What belongs here: which of both can be run again, and what is said where one cannot. What does not: the search
-(`mirotwin.replay`), and the words of its result (`cli/differences.py`).
-"""
+"""Two recordings that differ, run again: the exact tick and fields, and the instruction where firmwares differ."""
 
 from __future__ import annotations
 

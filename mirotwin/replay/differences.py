@@ -1,7 +1,4 @@
-"""What `replay` and `diff` say of the differences they found: lines, tables and JSON.
-
-What belongs here: words. What does not: finding differences (`mirotwin.replay`), exit codes (the commands).
-"""
+"""What `replay` and `diff` say of the differences they found: lines, tables and JSON."""
 
 from __future__ import annotations
 

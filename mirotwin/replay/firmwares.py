@@ -1,8 +1,4 @@
-"""What two firmwares do otherwise in one run: the first instruction, or the first variables, and how that was found.
-
-What belongs here: which way of looking fits two images, and what is said of it. What does not: the looking
-(`instructions.py`, `builds.py`) and reading images.
-"""
+"""What two firmwares do otherwise in one run: the first instruction, or the first variables, and how that was found."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """The first instructions that two firmwares of the same layout execute otherwise.
 
-What belongs here: stepping two worlds instruction by instruction, beside each other. What does not: images of another
-layout (`builds.py`), names of places (`program.py`), and states as a whole (`lockstep.py`).
-
 Two instructions are looked for. *Changed*: the first one executed whose code is not the same; found at full speed, by
 marks at all changed places. *Effect*: the one after which the processors' states are not the same again. The worlds'
 states are compared every millisecond; from the last time they are the same on, each step is. An effect that is gone

@@ -1,8 +1,5 @@
 """Two worlds side by side: the first tick at which their states differ, and the fields that do.
 
-What belongs here: moving both, and finding the tick. What does not: what a field's name and value look like
-(`state_fields.py`), the instruction that made the difference (`instructions.py`), and recordings (`rerun.py`).
-
     found = mirotwin.replay.first_difference(one, other)
     print(found)       # tick 1203 (0.000050 s): networks[0].robots[0].board.cpu.iram[35h] ..
 

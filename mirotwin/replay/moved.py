@@ -1,8 +1,5 @@
 """How the code of one build lies in another: by symbols, and within a function instruction by instruction.
 
-What belongs here: which functions are the same but for addresses, and which instructions of the others changed. What
-does not: running them (`firmwares.py`), and builds of one layout (`program.py`).
-
 A piece of code reaches from one symbol to the next. Two pieces of one name are compared as text, in which addresses
 have their names, so that a call to a function that moved is the same call. An address that is loaded in two halves has
 no name there, and counts as changed where it moved.

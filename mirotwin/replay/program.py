@@ -1,8 +1,4 @@
-"""A firmware as people know it: where an address stands in it, by symbol, C line and text.
-
-What belongs here: an image with its names, and whether two images have the same layout. What does not: what it executes
-(`instructions.py`, `builds.py`).
-"""
+"""A firmware as people know it: where an address stands in it, by symbol, C line and text."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""`mirotwin replay` of a case: whether the check that failed fails again.
-
-What belongs here: running up to where the case ends, what became of the verdict, and the exit code. What does not: the
-form of a case (`mirotwin.verify.cases`), and reading it (`replay_job`).
-"""
+"""`mirotwin replay` of a case: whether the check that failed fails again."""
 
 from __future__ import annotations
 

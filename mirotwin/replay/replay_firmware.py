@@ -1,8 +1,4 @@
-"""Firmwares of recordings: their debug files, and where two of them go apart.
-
-What belongs here: finding files, for `replay` and `diff`. What does not: the search (`mirotwin.replay.firmwares`) and
-its words (`cli/differences.py`).
-"""
+"""Firmwares of recordings: their debug files, and where two of them go apart."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The tables that `replay` prints beside the differences: the frames on the air, and what robots made of a stream.
-
-What belongs here: their rows. What does not: differences (`cli/differences.py`), and the replay.
-"""
+"""The tables that `replay` prints beside the differences: the frames on the air, and what robots made of a stream."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What two recordings were made from, and where that differs: scenario key by key, seed, firmware.
-
-What belongs here: names and values. What does not: what came of it (`compare.py`).
-"""
+"""What two recordings were made from, and where that differs: scenario key by key, seed, firmware."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Fields of two states that differ, by name: the path in the tables of state, and what it is called in the firmware.
-
-What belongs here: names and values as people read them. What does not: when states are compared (`lockstep.py`).
-"""
+"""Fields of two states that differ, by name: the path in the tables of state, and what it is called in the firmware."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """The variables of a firmware in internal RAM: which bytes belong to which name.
 
-What belongs here: addresses to names. What does not: registers and places in code (`miro_robot.inspect`), and values
-(`state_fields.py`, `builds.py`).
-
 A symbol file tells where a variable begins.
 """
 

@@ -1,7 +1,5 @@
 """What a controller asks of the wheels: its effort, and a chattering index, how far speeds go back and forth.
 
-What belongs here: the definition, for one robot's commands one after the other. What does not: the runs.
-
 The total variation of what a controller puts out, TV = sum |u(k+1) - u(k)|, is the usual measure of its smoothness
 (S. Skogestad, J. Process Control 13 (2003) 291, doi:10.1016/S0959-1524(02)00062-8). It counts a turn or a start that
 the path needs as well. So the net motion is taken away: in each window of ten control periods the variation less

@@ -1,7 +1,4 @@
-"""`mirotwin export run.mcap --to foxglove`: a recording with the topics that Foxglove draws.
-
-What belongs here: files in and out, and what is said about them. What does not: the topics (`mirotwin.report.foxglove`).
-"""
+"""`mirotwin export run.mcap --to foxglove`: a recording with the topics that Foxglove draws."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """The picture of a run: the four panels of the paper's Figs. 6 to 10, and below them the laws' inner values.
 
-What belongs here: x-y with the dotted reference, then x_e, y_e, theta_e and the inner values against time. What does
-not: the numbers (`summary`). The same run gives the same bytes: fixed size, fixed fonts, no date.
+The same run gives the same bytes: fixed size, fixed fonts, no date.
 """
 
 from __future__ import annotations

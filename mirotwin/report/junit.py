@@ -1,7 +1,4 @@
-"""JUnit XML: what continuous integration shows of tests, as pytest writes it.
-
-What belongs here: the file's form. What does not: what was tested, and its words.
-"""
+"""JUnit XML: what continuous integration shows of tests, as pytest writes it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""What the hosts of a run learnt about their cameras, beside the truth.
-
-What belongs here: the figures for `summary.json` and for people. What does not: the learning
-(`miro_host.eye.self_calibration`).
-"""
+"""What the hosts of a run learnt about their cameras, beside the truth."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What the hosts of a run learnt about the wheels of their robots, beside the truth.
-
-What belongs here: the figures for `summary.json` and for people. What does not: the learning (`miro_host.estimators`).
-"""
+"""What the hosts of a run learnt about the wheels of their robots, beside the truth."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What `summary.json` says of a live session.
-
-What belongs here: the figures. What does not: counting them (`mirotwin.ports`).
-"""
+"""What `summary.json` says of a live session."""
 
 import msgspec
 

@@ -1,8 +1,4 @@
-"""What `mirotwin report` is given: a run, a case or a failed test, and all that its page is made from.
-
-What belongs here: finding out what a path is, and running it again. What does not: reading it (`replay_job`), pages
-(`mirotwin.report.page`, `mirotwin.campaign.page`), and the command (`report`).
-"""
+"""What `mirotwin report` is given: a run, a case or a failed test, and all that its page is made from."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Tracking errors as the PC could plot them: measurements against the reference at their exposure.
 
-What belongs here: finding the reference of a measurement's exposure. What does not: errors of the truth (`track`).
-
 A measurement arrives some frames after its exposure. It is compared with the reference at the exposure, so a delay by
 itself is no error: this is the best that a laboratory without another camera can plot.
 """

@@ -1,8 +1,4 @@
-"""What a run amounts to, as numbers: `summary.json` and the table on the screen.
-
-What belongs here: the figures and their definitions. What does not: what is kept of a run for them (`track`), pictures
-(`figure`) and where files go (`shell.outputs`).
-"""
+"""What a run amounts to, as numbers: `summary.json` and the table on the screen."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,4 @@
-"""What the paper's theory says of a run, as figures: the `theory` part of `summary.json` and a line on the screen.
-
-What belongs here: figures and their definitions. What does not: what is noted during a run (`theory_track`).
-"""
+"""What the paper's theory says of a run, as figures: the `theory` part of `summary.json` and a line on the screen."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""A run with watchers: one CPU, on a robot of a world or on the bare board, run in slices.
-
-What belongs here: what the two kinds of run have in common for watchers (`miro_robot.inspect`). What does not: the
-watchers, and which run the command line means (`firmware.subject`).
-"""
+"""A run with watchers: one CPU, on a robot of a world or on the bare board, run in slices."""
 
 from __future__ import annotations
 

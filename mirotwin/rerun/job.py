@@ -1,8 +1,4 @@
-"""What a file asks to be sent again: a recording with all that it was made from, or a text stream.
-
-What belongs here: from a file's content to scenario, seed, bytes to send, and image. What does not: running it
-(`replay`, `subject`), and the bytes themselves (`mirotwin.recording.compare`).
-"""
+"""What a file asks to be sent again: a recording with all that it was made from, or a text stream."""
 
 from __future__ import annotations
 

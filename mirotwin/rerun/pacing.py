@@ -1,7 +1,6 @@
 """The wall clock beside virtual time, and threads that take turns at one world.
 
-What belongs here: all that bridges know of real time. What does not: the world. A world that is paced is moved on to
-`Pace.tick()` and never beyond; it may be behind, which is counted.
+A world that is paced is moved on to `Pace.tick()` and never beyond; it may be behind, which is counted.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""A recording as a world: what it was made from, run again.
-
-What belongs here: the recorded image, and a world that repeats a recording as far as its digests tell. What does not:
-reading recordings (`recording/reader.py`), and comparing two (`compare.py`, `lockstep.py`).
-"""
+"""A recording as a world: what it was made from, run again."""
 
 from __future__ import annotations
 

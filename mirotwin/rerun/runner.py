@@ -1,9 +1,4 @@
-"""Runs a world from its first control period to its last, and hands on what it leaves behind.
-
-What belongs here: the loop that all commands share, and what it reads off a world besides its periods. What
-does not: the world itself (`world`), files (`recording`, `shell.outputs`), and the wall clock, which only the
-command line knows.
-"""
+"""Runs a world from its first control period to its last, and hands on what it leaves behind."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol

@@ -1,8 +1,5 @@
 """What is sent again: the script of a recording or of a stream file, and the scenario that a stream runs in.
 
-What belongs here: from recorded or written characters to what a world sends. What does not: the comparison
-(`compare.py`), the command (`cli/replay.py`), and reading files (`recording/reader.py`, `miro_protocol.stream`).
-
 The bytes go in before the radio: with the recorded seed it disturbs them as it did then.
 """
 

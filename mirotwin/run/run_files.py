@@ -1,8 +1,5 @@
 """The files of a run while it is under way: what is written when, and what is left of a run that is broken off.
 
-What belongs here: the order recording, flushes, summary, figure, and the wall clock for them. What does not: names and
-locks (`shell.outputs`), what a recording says (`recording`), and the command line (`run`).
-
 Signals are held except while the world is stepped, so no file is left between two states. What was recorded is flushed
 several times a second; a process that is killed loses no more.
 """

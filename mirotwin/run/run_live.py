@@ -1,8 +1,5 @@
 """`mirotwin run --live`: a run that Foxglove shows while it goes.
 
-What belongs here: the wall clock's pace, and what of a running world is sent when. What does not: the options
-(`run_live_options`), the server (`report.foxglove.server`), and what is derived (`report.foxglove.derived`).
-
 The world knows nothing of it: what is sent was recorded, or follows from that.
 """
 

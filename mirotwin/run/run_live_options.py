@@ -1,7 +1,4 @@
-"""The options of `mirotwin run` for viewers: where, how fast, and whether to wait for one.
-
-What belongs here: words of the command line. What does not: what they do (`run_live`), which loads more.
-"""
+"""The options of `mirotwin run` for viewers: where, how fast, and whether to wait for one."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """`mirotwin run --save-at .. --resume .. --to ..`: where a run begins, what it saves, and where it ends.
 
-What belongs here: reading and refusing a saved world, stopping at ticks, and the names of the files. What does not: the
-form of a saved world (`miro_sim.world.saved`), and the files of a run (`run_files`).
-
 A world that goes on from a saved one has the bits of a run that never stopped. A run that is resumed within a control
 period goes on to that period's end first: only whole periods are recorded.
 """

@@ -1,7 +1,4 @@
-"""The table that `mirotwin run` prints at its end.
-
-What belongs here: its rows. What does not: the figures in it (`report.summary`).
-"""
+"""The table that `mirotwin run` prints at its end."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""The output of a command: tables and text, on a terminal or in a pipe.
-
-What belongs here: the console, and how it cleans text from files. What does not: single lines and errors
-(`program`), which need not wait for `rich` to be loaded.
-"""
+"""The output of a command: tables and text, on a terminal or in a pipe."""
 
 import sys
 from typing import Any

@@ -1,8 +1,4 @@
-"""Options that several commands share, and what is loaded because of them.
-
-What belongs here: the options' words, the choice of engine, loading a firmware image, and what is said of parameters
-that cannot be simulated. What does not: single commands.
-"""
+"""Options that several commands share, and what is loaded because of them."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """The folder or file a command writes to: refused if other things are there, filled in one go at the end.
 
-What belongs here: deciding whether a folder or file may be used, and giving what is finished its name. What does not:
-what is in the files. Everything is written under another name beside its place first (run.part.mcap, FILE.xxxx.part),
-so that whatever goes wrong leaves either the files from before or the new ones, never half of one.
+Everything is written under another name beside its place first (run.part.mcap, FILE.xxxx.part), so that whatever goes
+wrong leaves either the files from before or the new ones, never half of one.
 """
 
 from __future__ import annotations

@@ -1,9 +1,6 @@
 """How the command line fails: one line on stderr and an exit code, never a traceback for bad input. An unexpected
 error is one line too, which requests a report; with MIROTWIN_TRACEBACK=1 in the environment the traceback
 comes before it.
-
-What belongs here: exit codes, the translation of errors, single lines on stdout and stderr. What does not: any command,
-tables (`console`), and imports that `mirotwin --help` does not need.
 """
 
 import os

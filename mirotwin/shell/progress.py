@@ -1,7 +1,6 @@
 """A progress bar on stderr for work of more than a second, shown only on a terminal.
 
-What belongs here: when to show it. What does not: what is counted. This is one of the few places that know
-the wall clock.
+This is one of the few places that know the wall clock.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Times on the command line: 2s, 20ms, 341us, 5min, or 48000t, which are ticks of the crystal.
-
-What belongs here: the one spelling of a time, for all commands. What does not: how late is too late for a command.
-"""
+"""Times on the command line: 2s, 20ms, 341us, 5min, or 48000t, which are ticks of the crystal."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The wire between a radio's receiver and the robot's RXD, with hands on it: bursts of noise and dropped links.
-
-What belongs here: changing levels. What does not: the radio itself (`miro_sim.radio`).
-"""
+"""The wire between a radio's receiver and the robot's RXD, with hands on it: bursts of noise and dropped links."""
 
 from __future__ import annotations
 

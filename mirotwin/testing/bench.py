@@ -1,8 +1,5 @@
 """One host and one robot on a bench: real firmware behind a radio, and the Python decoder listening beside it.
 
-What belongs here: sending, troubling, waiting, resetting, saving, and comparing what both ends made of it. What
-does not: choosing what to do (`machine`), motors (none are connected) and the camera.
-
 The Python side hears the same wire through a plain UART (`miro_protocol.line`) and applies decoder and freshness.
 Firmware takes some milliseconds to look at a character, so for the last of them both counts are possible. Frames,
 noise and trouble all change the level on one grid of bits: about a level that changes in the middle of a bit, and about

@@ -1,8 +1,5 @@
 """What failed on the bench as a case: the robot of a world hears the same characters, and a check fails there.
 
-What belongs here: from a bench to such a world, and which checks may tell. What does not: the bench (`bench`), and the
-form of a case (`mirotwin.verify.cases`).
-
 The bench compares counters, a world has checks; so those are tried that say what counters mean. Where none fails there
 is no case: the state changed by saving, a count of rejected frames.
 """

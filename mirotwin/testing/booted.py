@@ -1,8 +1,5 @@
 """Worlds whose robots are up: each test gets its own, and only the first one of its kind waits for the firmware.
 
-What belongs here: when firmware is up, and keeping the state of such worlds for the session. What does not: which world
-a test wants (`wanted`).
-
 A robot is up when its serial receiver is on (REN in SCON) at the end of a control period: that asks nothing of the
 firmware but what a robot on a radio has to do, and leaves it the rest of the period for what comes after.
 """

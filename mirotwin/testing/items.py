@@ -1,8 +1,4 @@
-"""Between pytest's items and rigs: making a test's rig, judging it, and telling what came of it.
-
-What belongs here: what needs both pytest and a world. What does not: the hooks themselves (`mirotwin.testing.pytest_plugin`,
-which must not import a world) and all that needs no pytest (`rig`, `left_behind`).
-"""
+"""Between pytest's items and rigs: making a test's rig, judging it, and telling what came of it."""
 
 from __future__ import annotations
 

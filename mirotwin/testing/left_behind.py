@@ -1,8 +1,4 @@
-"""What a failed test leaves behind: the lines of its report, and a folder of its own with them as files.
-
-What belongs here: the text, the name of the folder, the summary. What does not: when a test has failed
-(`mirotwin.testing.pytest_plugin`), and the files that every failure leaves (`mirotwin.verify.cases.artifacts`).
-"""
+"""What a failed test leaves behind: the lines of its report, and a folder of its own with them as files."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """The link fixture: a host at the radio that sends what a test says, and waits for answers in virtual time.
 
-What belongs here: sending, polling, expecting, silence. What does not: the robot's inside (`robot`) and the air
-(`miro_sim.radio`).
-
 Each answer is taken once: those that a wait does not ask for stay for the next one. The link reads along by itself, so
 that a wait for something else (`world`, `robot`) takes nothing away from it.
 """

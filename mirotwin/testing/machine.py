@@ -1,7 +1,5 @@
 """A Hypothesis state machine: host and robot over the link, with everything that may go wrong between them.
 
-What belongs here: the rules and what must hold after each. What does not: how it is done (`bench`).
-
 What must hold: no firmware fault; decoders never raise; firmware and Python count the same frames; a state that
 is saved and loaded is the same and goes on the same way; every answer is from the robot asked and counts
 what it accepted. A failure carries what the robot heard as a stream file, and leaves it in `stream_file`: Hypothesis

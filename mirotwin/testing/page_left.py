@@ -1,8 +1,5 @@
 """The page that a failed test leaves behind: its run, made again from all that went into its world.
 
-What belongs here: the world of the page, and when there is none. What does not: the page (`mirotwin.report.page`), and the
-other files (`left_behind`).
-
 There is none where Bokeh is not installed, where the test wrote into a robot's memory, which nobody can do again, and
 where the run cannot be made again: a report of a failure does not fail.
 """

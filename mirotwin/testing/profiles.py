@@ -1,7 +1,4 @@
-"""Hypothesis strategies of radios: what `Bench` and `LinkMachine` take as their air.
-
-What belongs here: draws of `RadioParams`. What does not: what the parameters mean (`miro_sim.radio`).
-"""
+"""Hypothesis strategies of radios: what `Bench` and `LinkMachine` take as their air."""
 
 from __future__ import annotations
 

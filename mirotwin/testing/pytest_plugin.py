@@ -6,8 +6,7 @@
 
     pytest --mirotwin-firmware=mine.ihx --mirotwin-seed=7 --firmware-coverage=fw.info
 
-What belongs here: options, fixtures and hooks, each as short as it can be. What does not: what they do, which is in
-`mirotwin.testing` (its README has the fixtures for users). Sessions that use none of it import nothing else of ours.
+Sessions that use none of it import nothing else of ours.
 """
 
 from __future__ import annotations

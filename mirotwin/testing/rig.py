@@ -1,8 +1,4 @@
-"""What one test works with: its world, links and robots, the checks that judge it, and its story when it fails.
-
-What belongs here: putting these together, judging at the end, the lines that a report shows. What does not: pytest
-(`mirotwin.testing.pytest_plugin`) and files (`left_behind`).
-"""
+"""What one test works with: its world, links and robots, the checks that judge it, and its story when it fails."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""The robot fixture: what a robot does at its wheels, and what stands in its memory.
-
-What belongs here: reading and writing by name, breakpoints, wheels, the robot's switches. What does not: the radio
-(`link`), and what is right or wrong (the checks, the test).
-"""
+"""The robot fixture: what a robot does at its wheels, and what stands in its memory."""
 
 from __future__ import annotations
 

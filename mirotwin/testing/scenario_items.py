@@ -1,9 +1,4 @@
-"""Scenario files as tests of pytest: each `*.scenario.toml` that it collects is one test.
-
-What belongs here: what joins pytest and `mirotwin.verify.steps`. What does not: the hook (`pytest_plugin`), running a
-file (`mirotwin.verify.steps.running`), and the session's options, which the plugin declares: `--mirotwin-firmware`,
-`--mirotwin-seed`, `--mirotwin-artifacts`, in the ini file with underscores.
-"""
+"""Scenario files as tests of pytest: each `*.scenario.toml` that it collects is one test."""
 
 from __future__ import annotations
 

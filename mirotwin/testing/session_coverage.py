@@ -1,9 +1,4 @@
-"""Which lines of the firmware a test session ran: `pytest --firmware-coverage=firmware.info`.
-
-What belongs here: watching every CPU that tests load the image into (in this process and in those of pytest-xdist),
-and the report at the end. What does not: the options (`mirotwin.testing.pytest_plugin`) and the mapping to lines
-(`miro_robot.inspect.coverage`).
-"""
+"""Which lines of the firmware a test session ran: `pytest --firmware-coverage=firmware.info`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """A limit to the time in which Hypothesis looks for a smaller example of a failure.
 
-What belongs here: setting the limit and taking it back. What does not: when (`machine`).
-
 Hypothesis has one constant for this, of 300 s, and no setting: its documentation ("engine constants") says to replace
 the constant in the module. It reads it when shrinking begins, which is after the first failure; so it is replaced at
 each failure, and put back when the smallest example runs for the last time.

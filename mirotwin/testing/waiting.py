@@ -1,7 +1,4 @@
-"""A wait of a test that failed, in words: what was awaited, since when, and what happened meanwhile.
-
-What belongs here: the error, and how events read. What does not: waiting (`miro_sim.world.waits`).
-"""
+"""A wait of a test that failed, in words: what was awaited, since when, and what happened meanwhile."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What commands that run a scenario say of its checks and steps: `--expect`, one line a failure, and the exit code.
-
-What belongs here: words and exit codes. What does not: the checks (`mirotwin.verify.checks`).
-"""
+"""What commands that run a scenario say of its checks and steps: `--expect`, one line a failure, and the exit code."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """What a test wants: its scenario, firmware, seed and expectations, from its marker and from the session's options.
 
-What belongs here: the marker's keys, and which of marker and options holds. What does not: making the world (`booted`),
-and pytest.
-
     @pytest.mark.mirotwin(scenario="fig6", settings=["duration_s=2"], seed=7, firmware="mine.ihx",
                           expect={"settles_within_s": 2.0}, boot=False)
 

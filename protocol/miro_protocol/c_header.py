@@ -1,8 +1,6 @@
 """The firmware's header from the table: `mirotwin fw header -o robot_fw/firmware/protocol.h --force`.
 
-What belongs here: turning numbers of `table.py`, `crc.py` and `whitening.py` into C for SDCC. What does
-not: a number of its own. Times come out in 8051 machine cycles of 0.5 us or in milliseconds, whichever the
-firmware counts in.
+Times come out in 8051 machine cycles of 0.5 us or in milliseconds, whichever the firmware counts in.
 """
 
 from __future__ import annotations

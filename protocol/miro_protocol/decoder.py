@@ -1,8 +1,5 @@
 """Finds frames among received characters. Sans-IO: no port, no clock, no thread; characters in, events out.
 
-What belongs here: the decoders that users make. What does not: the window (`scan.py`), what a frame says
-(`frames.py`) and whether it is fresh (`freshness.py`).
-
 The rule (README.md, "Reception"): look at the last F characters, sync to CRC. If they start with the sync,
 all stop bits are good, the F - 1 spacings are 1040 us +- 50 us and the CRC is good, they are a frame and
 the window is emptied. Hence the first undamaged frame after any garbage is taken. Every character belongs

@@ -1,8 +1,5 @@
 """Writes the Wireshark dissector, in Lua: `python -m miro_protocol.dissector > protocol/miro.lua`.
 
-What belongs here: turning `table.py` into Lua tables and fields. What does not: the code that uses them
-(`dissector_code.py`).
-
 A packet is a run of characters without a pause, as `pcapng.py` writes them, so the spacing rule holds within it and
 ends with it; stop bits are not in a capture. Which way a packet went is RTAC's event type, and N is the number of
 robots with which the CRC is good, because the layout byte differs for 3 and 5. A packet may hold several frames.

@@ -1,8 +1,6 @@
 """The part of the Wireshark dissector that no table decides: Lua code, as text.
 
-What belongs here: code that works on the tables `dissector.py` writes before it. What does not: any number of
-the wire. XOR is done by a table of nibbles, because Wireshark's Lua has had bit operators under three names
-since 5.1.
+XOR is done by a table of nibbles, because Wireshark's Lua has had bit operators under three names since 5.1.
 """
 
 CODE = r"""

@@ -1,7 +1,4 @@
-"""Writes the tables of protocol/README.md from the table: `python -m miro_protocol.document`.
-
-What belongs here: turning `table.py` into Markdown. What does not: prose, which is in the README.
-"""
+"""Writes the tables of protocol/README.md from the table: `python -m miro_protocol.document`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What a decoder gives out: valid frames and damaged runs, with every character in exactly one of them.
-
-What belongs here: the event types. What does not: finding frames (`scan.py`) and what they say (`frames.py`).
-"""
+"""What a decoder gives out: valid frames and damaged runs, with every character in exactly one of them."""
 
 from __future__ import annotations
 

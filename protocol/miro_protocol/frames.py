@@ -1,8 +1,6 @@
 """Messages and their bytes: what is said, and how it is written down.
 
-What belongs here: the message types, `encode`, `decode_fields`. What does not: finding a frame among
-received bytes (`decoder.py`) and whether it is new (`freshness.py`). Every size, range and offset comes
-from `table.py`.
+Every size, range and offset comes from `table.py`.
 
 Two error types: `EncodeError` for a message that must not be sent; `ContentError` for bytes whose CRC is good but
 whose content no correct sender makes.

@@ -1,8 +1,5 @@
 """A serial line bit by bit: characters to levels, and a UART's receiver that makes characters of levels.
 
-What belongs here: 8N1 and nothing else. What does not: what the characters mean (`decoder.py`), noise and latency
-(`miro_sim.radio`), and the exact receiver of the robot's chip (`miro_robot.mcs51.uart`).
-
 The receiver is a plain one: it waits for a fall, takes each bit in its middle, and looks for the next fall 10/16 of a
 bit after the beginning of the stop bit, as an 8051 does. Where levels hold for whole bits the two agree character by
 character; for a level that changes near the middle of a bit they may differ.

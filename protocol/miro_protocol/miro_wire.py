@@ -1,7 +1,4 @@
-"""The robot's own wire format as a `Protocol`: what the host sends to a network of robots.
-
-What belongs here: joining what `frames.py` and `decoder.py` do to the interface. What does not: the format itself.
-"""
+"""The robot's own wire format as a `Protocol`: what the host sends to a network of robots."""
 
 from __future__ import annotations
 

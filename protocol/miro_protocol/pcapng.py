@@ -1,8 +1,5 @@
 """Transmissions as a capture that Wireshark opens: pcapng, link type 250 (RTAC serial).
 
-What belongs here: packets to pcapng. What does not: reading captures (`pcapng_reader.py`), and what the
-characters say (`decoder.py`, `dissector.py`).
-
 One packet is one transmission; one interface is one radio network. A packet has
 the 12-byte RTAC header (tcpdump.org/linktypes/LINKTYPE_RTAC_SERIAL.html), big-endian: seconds,
 microseconds, event type, control lines, footer. Event type DATA_TX_START is host to robot, DATA_RX_START

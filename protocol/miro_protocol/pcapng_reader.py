@@ -1,8 +1,4 @@
-"""Reads pcapng captures of serial lines (link type 250), our own and other people's.
-
-What belongs here: pcapng to transmissions, one a packet. What does not: writing (`pcapng.py`, which describes the
-format).
-"""
+"""Reads pcapng captures of serial lines (link type 250), our own and other people's."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """A wire format as fuzzers need it: bodies become frames, characters become frames and damage, and back.
 
-What belongs here: the interface, and a protocol with its parameters as one text. What does not: any protocol (ours is
-`miro_wire.py`) and how one is found by its name (`mirotwin.fuzz.protocols`).
-
 A body is what a frame carries, without all that can be computed: checksum, escapes, delimiters. Mistakes of firmware
 lie behind the checksum, and random bytes never get there; a fuzzer changes bodies, and `repair` makes frames of them
 that the receiver has to take.

@@ -1,8 +1,5 @@
 """The sliding window itself, character by character: the hot part of the decoder.
 
-What belongs here: which characters are a frame and which are not. What does not: the interface for users
-(`decoder.py`) and what a frame says (`frames.py`).
-
 After each character the window of the last F characters is tested, in the order of the rule in README.md
 ("Reception"). The places of the last bad stop bit and of the last pause are kept, so those two tests are one
 comparison each; the CRC is computed only for a window that begins with a sync. This takes at most F/2 table steps a

@@ -1,7 +1,4 @@
-"""What is wrong with a stream file, and where.
-
-What belongs here: the error. What does not: what may stand in a line (`stream_line.py`) or header (`stream_header.py`).
-"""
+"""What is wrong with a stream file, and where."""
 
 from miro_exact.bad_input import BadInput
 

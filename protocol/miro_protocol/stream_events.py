@@ -1,8 +1,4 @@
-"""What a stream file may say besides characters: resets, radios switched off, levels on pins.
-
-What belongs here: one record a kind of event. What does not: how they are written down (`stream_line.py`), and doing
-what they say.
-"""
+"""What a stream file may say besides characters: resets, radios switched off, levels on pins."""
 
 from __future__ import annotations
 

@@ -3,8 +3,7 @@
     #: scenario = "fig6"
     #: seed = 7
 
-What belongs here: the keys, their types, and the place of what is wrong. What does not: what a scenario may say
-(`miro_sim.scenario`), and acting on the keys. One blank behind `#:` is not part of the document.
+One blank behind `#:` is not part of the document.
 """
 
 from __future__ import annotations

@@ -7,8 +7,7 @@
     800000 *@1 radio down
     800000 * P1.0 0
 
-What belongs here: the grammar of lines, of both versions. What does not: the order of lines, the first line and the
-header (`stream.py`, `stream_header.py`). Version 1 has characters of network 0 with good stop bits, and nothing else.
+Version 1 has characters of network 0 with good stop bits, and nothing else.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""The one table that describes the wire: formats, messages, fields, flags and times.
-
-What belongs here: data. The codec, the decoder, the README's tables, the firmware's C header and the
-Hypothesis strategies all read it; none of them writes a number of its own. What does not: code that does
-anything.
-"""
+"""The one table that describes the wire: formats, messages, fields, flags and times."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""TOML where it and our structs part: text that takes `tomllib` minutes, numbers that no key takes, keys that are None.
-
-What belongs here: the limits, and finding what is beyond them. What does not: which keys a document may have, and the
-words of an error.
-"""
+"""TOML where it and our structs part: text that takes `tomllib` minutes, numbers no key takes, keys that are None."""
 
 import math
 import re

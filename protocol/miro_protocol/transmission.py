@@ -1,8 +1,4 @@
-"""Characters without a pause between them: the one record for them, from the host's station to a capture file.
-
-What belongs here: the record, what makes characters one transmission, and how long a character takes. What does not:
-files of transmissions (`stream.py`, `pcapng.py`), and what the characters say (`decoder.py`).
-"""
+"""Characters without a pause between them: the one record for them, from the host's station to a capture file."""
 
 from __future__ import annotations
 

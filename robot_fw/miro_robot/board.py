@@ -10,10 +10,6 @@
     radio -----> P3.0 RXD                    |             |
     radio <----- P3.1 TXD                `Plant`: MAG -> EN, SIGN -> IN2 and inverted IN1 of the L298; A, B come back
 
-What belongs here: carrying levels from pin to pin, and the order in which the parts move on. What does not: what a
-part does with its pins (`mcs51/`, `lm629/`), how the motors answer the bridge (`Plant`), and how a board is
-described (`wiring.py`).
-
 Order on one tick: the plant moves first (its encoder edges reach the decoders), then the left LM629, the right
 LM629, the bridge inputs, the interrupt lines, and last what the CPU did to its port pins on that tick. Everything
 but the CPU is advanced at its own events only, never "up to now", so reading a part at any time changes no bit.

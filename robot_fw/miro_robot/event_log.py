@@ -1,8 +1,6 @@
 """What happened on a robot's board, with exact ticks: the log that waits, checks and fuzzing read.
 
-What belongs here: a ring of events and its serial numbers. What does not: when an event is noted (the board and its
-parts) and how a wait reads it (`miro_sim.world.waits`). The log is no state: it changes no bit of a run, and a board
-that is restored begins a new one.
+The log is no state: it changes no bit of a run, and a board that is restored begins a new one.
 
     kind        code                       value and size
     RECEIVED    stop bit good (1) or not   the character that the serial port delivered

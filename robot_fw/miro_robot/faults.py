@@ -1,7 +1,6 @@
 """What firmware must not do: the kinds of fault, and the record of one.
 
-What belongs here: naming them. They are found by CPU, LM629 and board; the
-scenario says whether a fault stops the run.
+They are found by CPU, LM629 and board; the scenario says whether a fault stops the run.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """What the robot's electronics are wired to: the seam between the board and the physical world.
 
-What belongs here: the base class `Plant`, which is also the plant of a robot on the bench with its motors
-unplugged: nothing turns, no encoder edge ever comes. What does not: physics, which lives above the
-electronics. Time is in ticks of the 24 MHz crystal.
+Time is in ticks of the 24 MHz crystal.
 """
 
 from __future__ import annotations

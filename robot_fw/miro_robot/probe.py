@@ -1,6 +1,5 @@
 """What a board reports to a recorder of its wires, with exact ticks.
 
-What belongs here: the base class `Probe`, whose methods do nothing. What does not: recording the levels (`inspect/`).
 A probe reads levels off the board and its chips and changes nothing; a board without one pays a test per event.
 """
 

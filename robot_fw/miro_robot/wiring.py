@@ -1,7 +1,5 @@
 """A board as data: reads a board file and resolves every net to its source.
 
-What belongs here: the form of board files and their errors. What does not: behaviour (`board.py`).
-
 Nets are point to point: an input pin of an LM629 or of the CPU on the left, its source on the right. Sources are
 port pins (`P2.3`), bits of an output latch that MOVX writes (`CTRL.3`), outputs of an LM629 (`left.hi`), straps
 (`slot.0`, `three`), or the constants `0` and `1`; a leading `!` inverts. The data bus of the LM629 is one shared,

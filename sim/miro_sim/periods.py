@@ -1,9 +1,6 @@
 """What one control period of the world leaves behind: the records that recording, summary, figure and
 replay read.
 
-What belongs here: plain frozen records, as the world fills them. What does not: how they are stored
-(`recording`), what is made of them (`summary`, `figure`), and the state of the world itself (`world`).
-
 One period is one camera frame, 800800 ticks of 24 MHz. Everything in a `RobotPeriod` is taken at the tick
 of the period's exposure, before the host acts on it, except `control`, which is what the host answers to
 it.

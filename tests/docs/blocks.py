@@ -1,8 +1,5 @@
 """The code blocks of a document: what each is, and how it is run.
 
-What belongs here: finding blocks and choosing their evaluator, as a parser for sybil. What does not: running a shell
-(`shell`), and what lies in the folder that a document is run in (`sandbox`).
-
     ```python          is executed; the blocks of a document share their names. One that defines tests goes to pytest
     ```sh, ```console  each line is run, with `$ ` in front of commands where output is shown
     indented           the same: GitHub and the site show it like the two above

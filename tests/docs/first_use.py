@@ -1,9 +1,5 @@
 """The first pages as a newcomer follows them: `python -m tests.docs.first_use`.
 
-What belongs here: README, `docs/start.md` and every how-to, copied line by line in a new environment: each page alone
-in an empty folder, then one after the other in one folder. What does not: the quick part (`test_blocks` runs the same
-pages in empty folders, with this tree's modules and without what pip would install).
-
     python -m tests.docs.first_use                     installs a wheel of this tree, which compiles for minutes
     python -m tests.docs.first_use --smoke             takes the compiled modules of this tree
     python -m tests.docs.first_use docs/howto/ci.md    these pages only

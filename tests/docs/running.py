@@ -1,8 +1,4 @@
-"""What runs a block of each language, in the folder that the process stands in.
-
-What belongs here: one function a language, which returns what is wrong or None. What does not: finding blocks
-(`blocks`) and single shell commands (`shell`).
-"""
+"""What runs a block of each language, in the folder that the process stands in."""
 
 from __future__ import annotations
 

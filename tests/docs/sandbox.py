@@ -1,8 +1,4 @@
-"""The folder that a document's blocks run in: what a reader has who comes to that page.
-
-What belongs here: the examples, what `pip install ./..` of them would have installed, and what single
-pages need besides; nothing on the pages that a newcomer follows (`FIRST_USE`). What does not: running.
-"""
+"""The folder that a document's blocks run in: what a reader has who comes to that page."""
 
 from __future__ import annotations
 

@@ -1,9 +1,6 @@
 """Shell commands of documents. `mirotwin ..` runs in a fork of this process, which has all modules loaded already;
 everything else is given to bash.
 
-What belongs here: from a block's text to commands, running one, and comparing what it printed. What does not: which
-blocks there are.
-
 A fork costs some milliseconds where a new interpreter costs half a second of loading, and there are a hundred commands.
 It has arguments, files, exit code and output as the program has them.
 """

@@ -1,7 +1,4 @@
-"""`python -m tests.fuzz [TARGET ..] [--time 60s]`: fuzzes our own code, guided by what it executes.
-
-What belongs here: the command line and what it prints. What does not: campaigns (`campaign`), targets (`catalogue`).
-"""
+"""`python -m tests.fuzz [TARGET ..] [--time 60s]`: fuzzes our own code, guided by what it executes."""
 
 from __future__ import annotations
 

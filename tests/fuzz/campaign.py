@@ -1,10 +1,7 @@
 """A campaign of one target in a process of its own, and what came of it.
 
-What belongs here: folders, child processes, reading what they say. What does not: what a child does (`guided`,
-`chance`), and the sanitizers' build (`sanitized`).
-
-    build/fuzzing/found/TARGET      inputs that reached something new
-    build/fuzzing/findings/TARGET   inputs that break the promise, and the report of each
+build/fuzzing/found/TARGET      inputs that reached something new
+build/fuzzing/findings/TARGET   inputs that break the promise, and the report of each
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
 """One target by chance, in a process of its own.
 
-    python -m tests.fuzz.chance TARGET ENGINE SECONDS SEED FINDINGS SEEDS
-
-What belongs here: leaving behind the input that ends the process. What does not: changes (`mutation`).
+python -m tests.fuzz.chance TARGET ENGINE SECONDS SEED FINDINGS SEEDS
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 """The kept inputs of each target, and how they are chosen from many: `tests/fuzz/corpus/TARGET/`.
 
-What belongs here: reading, keeping and choosing inputs. What does not: making them (`guided`, `mutation`).
-
 Inputs are chosen by what they reach: the lines of our Python code, one after the other (a line and the one before it in
 the same function), and the outcome. The smallest input that reaches something new is kept first.
 """

@@ -1,7 +1,5 @@
 """One target under Atheris, in a process of its own: `python -m tests.fuzz.guided TARGET ENGINE [libFuzzer's words]`.
 
-What belongs here: what is instrumented, and handing over. What does not: options and folders (`campaign`).
-
 Python code of ours, and what it reads with, is instrumented when the target imports it. With `compiled` the hot modules
 are what the build made of them: without the sanitizers' build coverage does not see into them.
 """

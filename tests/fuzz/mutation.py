@@ -1,8 +1,5 @@
 """Inputs by chance: kept ones, changed. For machines without Atheris, and for a moment in every run of the tests.
 
-What belongs here: changes that know nothing of a target but its words, and running so many of them. What does not:
-guidance by what is executed (`guided`).
-
 Input `number` is a pure function of (target, seed, number).
 """
 

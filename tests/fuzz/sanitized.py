@@ -1,8 +1,5 @@
 """Our compiled modules with the address and the undefined-behaviour sanitizer, in a copy of the sources.
 
-What belongs here: building them once for each state of the sources, and the environment in which they run. What does
-not: what runs them (`campaign`).
-
 With clang and Atheris the modules also tell libFuzzer what they execute, and libFuzzer comes with the runtime of the
 sanitizers, which Atheris brings. With GCC, or without Atheris, the compiler's own runtime is loaded.
 """

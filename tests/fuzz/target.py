@@ -1,8 +1,5 @@
 """What a fuzz target is, and what all targets share: their inputs, and when a refusal is one.
 
-What belongs here: the words of `targets/`. What does not: single targets, engines, and which targets there are
-(`catalogue`).
-
 A target takes any bytes. It returns what came of them in a few words (`taken`, `refused: ..`), by which inputs are told
 apart, and raises where the promise is broken: any exception but the documented refusal, a refusal that is no line
 for people, or a round trip that does not come back.

@@ -1,7 +1,4 @@
-"""Plug-ins that tests install: one of each kind that goes wrong in one way, and checks that do what they should.
-
-What belongs here: their sources and their installing. What does not: what is said of them.
-"""
+"""Plug-ins that tests install: one of each kind that goes wrong in one way, and checks that do what they should."""
 
 from __future__ import annotations
 

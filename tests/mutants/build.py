@@ -1,7 +1,5 @@
 """Firmware with changed sources, built by its own Makefile; each distinct source is built once.
 
-What belongs here: from texts to an image, and the folder that keeps the images. What does not: what is changed.
-
 The Makefile compiles only what a change concerns: the objects of the shipped sources are put beside the changed ones,
 with times that say that they are older. The folder is `build/mutants`, which git ignores; an image is found there again
 by the hash of all that it was built from. Processes may build at the same time.

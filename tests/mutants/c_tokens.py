@@ -1,7 +1,5 @@
 """C source as tokens: all of a file's text, cut into pieces that have a kind.
 
-What belongs here: where a token begins and ends, in the C of SDCC. What does not: what is changed (`operators`).
-
 Words of SDCC (`__bit`, `__interrupt`, ..) are names like others; `__asm .. __endasm` is one token. A line of the
 preprocessor is one token of kind `directive`, but for the body of a `#define`: that is cut up like code, its tokens
 say `macro`, so that constants with names can be changed where they are defined.

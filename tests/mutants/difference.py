@@ -2,9 +2,6 @@
 
     python -m tests.mutants.difference failsafe.c:71:13:condition:not [--seconds 20] [--seed 0]
 
-What belongs here: running an image under a stimulus and comparing event logs. What does not: which rule a difference
-breaks.
-
 "The same" over a long random stimulus is no proof that a mutant is equivalent, but shows where reading is worth it; a
 difference in time alone says by how much. With other times positions are others too: commands that only read are left
 out, and of an answer neither the positions nor its CRC are compared.

@@ -1,7 +1,4 @@
-"""The measured part of docs/mutants.md, from the last whole score: `python -m tests.mutants.document`.
-
-What belongs here: tables. What does not: measuring (`score`), and the page's text around them.
-"""
+"""The measured part of docs/mutants.md, from the last whole score: `python -m tests.mutants.document`."""
 
 from __future__ import annotations
 

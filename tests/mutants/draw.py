@@ -1,7 +1,5 @@
 """Which mutants of the firmware are looked at: all that there could be in a stable order, and a draw with a seed.
 
-What belongs here: names of mutants, and choosing. What does not: what can be changed (`operators`), building (`build`).
-
 The draw is spread over files and operators: of each operator in each file one comes first, then the others in
 proportion to how many there are. So a small file is seen, and a table of constants does not fill the list.
 """

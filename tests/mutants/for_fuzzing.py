@@ -1,8 +1,5 @@
 """Mistakes that a fuzzer has to find: each needs an input that a bench hardly sends.
 
-What belongs here: the table; a mistake that `planted` has already is named, not written again. What does not: inputs
-that show each of them (`test_for_fuzzing.py`), and how long a fuzzer takes (`benchmarks.fuzz_time`).
-
 Long because it is a table with some lines a mistake.
 """
 

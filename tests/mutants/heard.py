@@ -1,7 +1,4 @@
-"""Inputs that show the mistakes of `for_fuzzing`, written by hand, and the run in which all checks of firmware look on.
-
-What belongs here: what the host sends, and the verdicts of checks. What does not: the mistakes.
-"""
+"""Inputs that show the mistakes of `for_fuzzing`, written by hand, and the run that all checks of firmware watch."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Which rules of `mirotwin conform` an image breaks.
-
-What belongs here: the one place where the score meets conformance. What does not: rules, and what a score is made of.
-"""
+"""Which rules of `mirotwin conform` an image breaks."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """What a mutant of a C file is: one small change, of kinds that were found to test tests as real mistakes do.
 
-What belongs here: the operators, and all places of a text where each can be applied. What does not: which of them are
-drawn (`draw`), and building (`build`).
-
 The set is that of Andrews, Briand and Labiche ("Is mutation an appropriate tool for testing experiments?", ICSE 2005,
 doi 10.1145/1062455.1062530), made for C: an integer constant becomes 0, 1, -1, itself + 1 or - 1; an operator becomes
 another one of its class; the decision of an `if` or `while` is negated; a statement is deleted. Added is the class of

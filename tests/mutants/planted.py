@@ -1,8 +1,5 @@
 """Mistakes that people make in such firmware, each planted by hand: one text of one file becomes another one.
 
-What belongs here: the table. What does not: what has to notice a mistake (`test_planted.py` of the checks, the score of
-`mirotwin conform`, fuzzing), and building (`build`).
-
 Long because it is a table with a few lines a mistake.
 """
 

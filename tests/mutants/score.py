@@ -3,9 +3,6 @@
     python -m tests.mutants.score [--count 180] [--seed 1997] [--jobs 2] [--planted | --alive | --only ID ..]
     python -m tests.mutants.score --rules P37 P55
 
-What belongs here: building and judging the mutants of a draw on all processors, and what came of each. What does not:
-the draw (`draw`), rules (`mirotwin.verify.conform`), the page (`document`).
-
 The score is the share of killed ones among those that were drawn, without those that do not compile, those whose image
 has the bytes of the shipped one, and those that conform as `survivors.toml` has it: they are equivalent, or do what the
 pages allow. Planted mistakes are counted apart. `build/mutants/score.json` has what came of each. `--rules` tries those

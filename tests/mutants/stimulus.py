@@ -1,7 +1,4 @@
-"""What a host with all kinds of faults sends for a while: the same characters for every firmware.
-
-What belongs here: drawing transmissions from a seed. What does not: what a firmware makes of them (`difference`).
-"""
+"""What a host with all kinds of faults sends for a while: the same characters for every firmware."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Why mutants are alive: the table `survivors.toml`, one entry for each that no rule kills.
 
-What belongs here: reading the table. What does not: finding out who is alive (`score`).
-
 An entry is named by the mutant's id and has `because`, a sentence or two, and `verdict`:
 
     equivalent   nothing that anybody can do to a robot tells it from the right one

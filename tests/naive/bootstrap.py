@@ -1,7 +1,4 @@
-"""Intervals by seed, number by number, as their definitions read: the bootstrap of a median and Student's of a mean.
-
-What belongs here: plain loops. What does not: anything of `mirotwin.campaign.statistics`, which it is compared with.
-"""
+"""Intervals by seed, number by number, as their definitions read: the bootstrap of a median and Student's of a mean."""
 
 import math
 from statistics import NormalDist

@@ -1,8 +1,6 @@
 """Slow, obvious twin of the camera: every pixel of a window from all of its samples, no shortcut.
 
-What belongs here: the same picture from the definitions in `miro_sim.pitch`: each sample's ray against each robot, the
-ball, walls and floor, for each instant; then brightness, television signal and noise. Arrays hold all samples of a
-window at once: [row, column, sample row, sample column].
+Arrays hold all samples of a window at once: [row, column, sample row, sample column].
 
 Long because it has no part in common with the camera that it is compared with.
 """

@@ -1,7 +1,4 @@
-"""Interrupts of a timer that its own routine reloads, by the rules of 4316E section 2.16 alone: no CPU.
-
-What belongs here: a main loop and a routine as lists of lengths in cycles, and when each overflow is answered.
-"""
+"""Interrupts of a timer that its own routine reloads, by the rules of 4316E section 2.16 alone: no CPU."""
 
 from __future__ import annotations
 

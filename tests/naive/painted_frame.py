@@ -1,7 +1,6 @@
 """Pictures of robots' tops by plain supersampling: what the tracker is measured with.
 
-What belongs here: an obvious painter of flat tops on a flat floor, chroma of little bandwidth, noise. What does not:
-light, walls, ball, blur, sides of robots. Every pixel has 4 x 4 samples; each is traced to the plane of the tops.
+Every pixel has 4 x 4 samples; each is traced to the plane of the tops.
 """
 
 from __future__ import annotations

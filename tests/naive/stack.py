@@ -1,7 +1,4 @@
-"""Whether a program leaves its stack, told from the list of values that SP had.
-
-What belongs here: plain rules over a list. What does not: anything of `miro_robot`, which it is compared with.
-"""
+"""Whether a program leaves its stack, told from the list of values that SP had."""
 
 
 def problems(steps, first, last):

@@ -1,7 +1,7 @@
 """What a watched CPU did, found out from the outside: one `step()` at a time, registers read before and after.
 
-What belongs here: the slow obvious twin of `miro_robot.inspect`'s watchers. It asks the CPU nothing but its public
-state, and knows an interrupt by the program counter at a vector with no instruction executed.
+It asks the CPU nothing but its public state, and knows an interrupt by the program counter at a vector with no
+instruction executed.
 """
 
 from __future__ import annotations

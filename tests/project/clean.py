@@ -1,8 +1,4 @@
-"""A new environment outside of this tree, and what is installed in it: as a user has it.
-
-What belongs here: making the environment, installing there, running programs there; the source archive and the pure
-wheel of this tree. What does not: what is tried in it (`sample`, `packages`).
-"""
+"""A new environment outside of this tree, and what is installed in it: as a user has it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""The rules of "the same bits everywhere" that can be read off the syntax tree of a module.
-
-What belongs here: finding what may give other bits on another machine, in another process or at another time.
-What does not: style, types, imports between our packages (import-linter).
-"""
+"""The rules of "the same bits everywhere" that can be read off the syntax tree of a module."""
 
 import ast
 from collections.abc import Iterator

@@ -1,9 +1,5 @@
 """What an installed mirotwin has to do on any machine: `python tests/project/installed.py --engine compiled`.
 
-What belongs here: the program beside this Python is asked for its version and its engine, and for a short run whose
-digest is in `tests/vectors/digests.json`. What does not: building and installing it (`packages`, and the workflow
-`.github/workflows/wheels.yml`, which runs this file after each build).
-
 It imports nothing of this tree, so it tries what is installed, on each system alike.
 """
 

@@ -1,8 +1,5 @@
 """The tests at the lower bounds of `pyproject.toml`: `python -m tests.project.lowest`.
 
-What belongs here: reading the bounds, an environment that has just these versions, running tests in it. What does not:
-which versions CI uses otherwise (`.ci/constraints.txt`).
-
 It works in `build/lowest`: a copy of the tree and a `.venv` in it, installed as README says, with every requirement
 held to its bound, those of the build too. What requirements themselves require is not held: pip takes the newest that
 fits. The copy has its own compiled modules, so the lowest Cython is tried as well. That takes minutes; with `--smoke`

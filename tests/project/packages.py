@@ -1,9 +1,5 @@
 """The packages as a stranger gets them: `python -m tests.project.packages`.
 
-What belongs here: the source archive and the wheels of this tree, each installed in a new environment outside of it,
-under every Python that is at hand, and tried (`installed`). What does not: wheels for other machines
-(`.github/workflows/wheels.yml`), and a project that uses what is installed (`sample`).
-
     the source archive    has all that git tracks
     the compiled wheel    built from the archive by each Python; compiled modules run
     the pure wheel        built from the archive once, installed under each Python; nothing is compiled, same digest

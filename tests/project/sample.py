@@ -1,9 +1,5 @@
 """The sample project as a user has it: `python -m tests.project.sample`.
 
-What belongs here: a wheel, installed in a new environment outside of this tree; `mirotwin init`, `make test`; then a
-mistake in the firmware, and every line that a failing test prints to reproduce it, run. What does not: the project
-(`examples/hil`).
-
 Compiling takes minutes; with `--smoke` the wheel is built without, and gets the compiled modules of this tree.
 """
 

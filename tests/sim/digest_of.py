@@ -1,8 +1,4 @@
-"""The digest of a run, in this process's engine: `python -m tests.sim.digest_of --engine compiled "fig6 0.5 s seed 7"`.
-
-What belongs here: a run named as in `tests/vectors/digests.json`, and nothing that only a full installation has: other
-machines run this file too (`machines.py`).
-"""
+"""A run's digest, in this process's engine: `python -m tests.sim.digest_of --engine compiled "fig6 0.5 s seed 7"`."""
 
 from __future__ import annotations
 

@@ -2,8 +2,6 @@
 
 Every built-in scenario, every kind of camera and picture noise, every profile of the radio, both variants, every
 disturbance, and two teams: at full length with seed 7, beside a short run for engines and machines that are slow.
-
-What belongs here: which runs. What does not: making one (`digest_of`).
 """
 
 from __future__ import annotations

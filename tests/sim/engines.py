@@ -1,8 +1,7 @@
 """Compiled and uncompiled in lockstep on the real firmware: `python -m tests.sim.engines --instructions 1000000`.
 
-What belongs here: two processes, one an engine each, that run the same worlds (robot, LM629, drive, radio, pilot) and
-print a hash of the whole state at every checkpoint; and the comparison, line by line, while they run. Only instructions
-that were executed count: the firmware sleeps most of the time. A scenario that ends goes on with the next seed.
+Only instructions that were executed count: the firmware sleeps most of the time. A scenario that ends goes on with
+the next seed.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The same bits on another family of processors: `python -m tests.sim.machines s390x`.
 
-What belongs here: a twin of the installation for another machine in `build/NAME`, made and run on this one, and the
-comparison of its digests with `tests/vectors/digests.json`. What a run is stands in `digest_of.py`.
+What a run is stands in `digest_of.py`.
 
     apt-get (own lists, nothing installed) -> root/   Python of Debian for that machine, its C library and headers
     pip                                    -> site/   what `miro_sim.world` imports: wheels, or built from source

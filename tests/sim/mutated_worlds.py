@@ -1,7 +1,5 @@
 """Saved worlds with something changed: `python -m tests.sim.mutated_worlds --count 10000 --resealed 10000`.
 
-What belongs here: two kinds of change, and what must come of them.
-
 * Bytes are changed. `World.load` must refuse each of them.
 * Values of the state are changed (numbers, lengths, counts) and the checksum is made right again. `World.load` must
   refuse them with a ValueError and leave the world as it was, or the world must run for a control period.

@@ -2,8 +2,7 @@
 
     python -m tests.sim.theory_in_the_loop [--seeds 10]
 
-What belongs here: the runs and the table. What does not: the definitions (`mirotwin.report.theory`), assertions
-(`test_theory_in_the_loop`). Medians over seeds from 0; for each |f_i| the root mean square over a run.
+Medians over seeds from 0; for each |f_i| the root mean square over a run.
 """
 
 import argparse

@@ -1,8 +1,5 @@
 """An extended Kalman filter: posture and wheel radii, from the camera and the commands that were sent.
 
-What belongs here: the filter's parameters, the order of its steps, and which measurements are believed. What does not:
-how a robot follows its commands (`motion`), the algebra (`filter`), the encoders (`ekf_telemetry`).
-
 The state is the posture at the last exposure and one factor per wheel, which is its radius over the nominal one. In
 each control period:
 

@@ -1,8 +1,5 @@
 """The filter of `ekf` with the encoder counts that the robots' answers bring.
 
-What belongs here: when a count is used, and what camera and encoders say against each other. What does not: the filter
-(`filter`), unwrapping (`miro_host.ear`), what `ekf` does too.
-
 What each of them sees, and what only both do:
 
     commands    what the wheels should do: known at once, not known to be obeyed

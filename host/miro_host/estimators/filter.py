@@ -1,8 +1,5 @@
 """A Kalman filter of posture, wheel radii, and what encoders and camera see apart from each other.
 
-What belongs here: the state, its covariance, prediction and corrections by measurements. What does not: where
-measurements and commands come from, and which of them are believed (`ekf`, `ekf_telemetry`); the motion (`motion`).
-
     0  x      m    posture at the time `at_s`
     1  y      m
     2  theta  rad

@@ -1,7 +1,5 @@
 """What a posture estimator is given, and what it answers.
 
-What belongs here: the interface. What does not: any estimator, the laws, the order of the steps on the PC (`pilot`).
-
 An estimator is two classes, as a law is: a frozen struct of parameters whose tag is its name and whose `estimator`
 method makes it, and a class with `step`. It is called in every control period, also without a measurement, so that it
 can count periods. It sees what the PC could have seen: no true posture.

@@ -1,8 +1,5 @@
 """What a robot does with the commands that were sent, and by how much its end changes with its beginning.
 
-What belongs here: the remembered commands, the ramps of the rims' speeds, the robot's path as a chain of circular arcs,
-and the derivative of that. What does not: probabilities (`filter`), when a command takes effect (`ekf` says it).
-
     speed
       ^          to ________________        A command takes effect at time 0 and is held until the next one.
       |           /                         The rim's speed goes from `start` to `to` with the LM629's slope,

@@ -1,8 +1,5 @@
 """Prediction through the dead time of the loop, from the velocities that were sent.
 
-What belongs here: moving a measured posture on to the time at which the next command takes effect. What does not:
-filtering noise, learning the wheels' radii, the LM629's slope.
-
 A measurement is `age_s` old when it arrives, and a command takes effect `ahead_s` after it was computed. Between the
 exposure and the effect of the next command the robot does what was commanded in the last age_s + ahead_s: a known
 sequence of velocities, each held for one period. Each is a circular arc; the robot is taken to follow at once.

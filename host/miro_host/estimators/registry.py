@@ -1,7 +1,6 @@
 """The names of the posture estimators.
 
-What belongs here: the table of our own estimators, and the type of a scenario's `estimator`. What does not: the
-interface (`interface`) and the estimators. None is imported before a scenario names it.
+None is imported before a scenario names it.
 """
 
 from miro_host.parts import Registry

@@ -1,8 +1,4 @@
-"""What the PC believes about its camera.
-
-What belongs here: the calibration as data, its file, and what the tracker asks of it. What does not: finding it from
-control points (`fit`), and drawing a wrong one for an experiment (`calibration_kinds`).
-"""
+"""What the PC believes about its camera."""
 
 from __future__ import annotations
 

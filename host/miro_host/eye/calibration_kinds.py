@@ -1,7 +1,5 @@
 """Calibrations for experiments: the true one, one as wrong as that of 1997 may have been, and none.
 
-What belongs here: wrong calibrations made from the true camera. What does not: finding one from points (`fit`).
-
 The paper tells a worst position error of 2.40 cm and not where it comes from. `drawn_1997` takes it for a calibration
 that is slightly wrong: centre off by about 1 px, focal length by 1 %, tilt by 0.57 degrees, in directions and with a
 sign that differ from seed to seed, all scaled by one factor so that the worst error over the pitch is 2.40 cm.

@@ -1,7 +1,5 @@
 """Where a camera hangs, where it looks and how it draws: the numbers that a calibration finds.
 
-What belongs here: the numbers, with units and ranges. What does not: the geometry that follows from them (`lens`).
-
     image, 320 x 240            world: the paper's axes, z up from the floor
     o---> u (right)                  y
     |                                ^     camera at (x_m, y_m, height_m), looks down

@@ -1,8 +1,5 @@
 """Which colours the tracker knows, as the camera shows them: classes, and the table from a pixel to its class.
 
-What belongs here: mean and spread of each colour from sampled pixels, the rule that makes a pixel of a class, and the
-table of 65536 entries built from it. What does not: where the samples come from, and regions (`regions`).
-
 The classes' numbers are fixed: 1 is the first of `patterns.COLOURS`, 0 is none. A pixel belongs to the class with the
 nearest hue (direction of its chroma) if its chroma, projected on the class's mean, has at least `least_chroma` of the
 mean's length, and its Y at least `least_luma` of the mean's. Half the length is where a patch covers half a pixel.

@@ -1,7 +1,4 @@
-"""TOML files of the eye: calibrations and colour classes, with errors that name file, place and remedy.
-
-What belongs here: from a path or a text to a frozen struct, and back. What does not: what the structs mean.
-"""
+"""TOML files of the eye: calibrations and colour classes, with errors that name file, place and remedy."""
 
 from __future__ import annotations
 

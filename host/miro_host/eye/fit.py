@@ -1,8 +1,5 @@
 """A calibration from control points: points whose places on the pitch and in the picture are known.
 
-What belongs here: reading the points, and the camera parameters that draw them best (least squares). What does not:
-how somebody measured them, and what a calibration is (`calibration`).
-
 Which parameters are found depends on what the points can tell:
 
     all points at one height     x_m, y_m, focal_px, pixel_aspect, tilt_x_rad, tilt_y_rad, turn_rad, k1

@@ -1,7 +1,4 @@
-"""A picture as the tracker gets it: windows of pixels out of the grabber's memory.
-
-What belongs here: the interface. What does not: where pixels come from (a simulated camera, a file).
-"""
+"""A picture as the tracker gets it: windows of pixels out of the grabber's memory."""
 
 from typing import Protocol
 

@@ -1,9 +1,4 @@
-"""The grabber: pictures reach the PC whole frames late, some not at all, some twice.
-
-What belongs here: the queue of frames under way, and what a dropped or repeated one means. What does not: drawing which
-frames those are (the caller hands it in), and pixels: the tracker reads nothing but pictures, so what it makes of one
-may wait in the queue in the picture's place.
-"""
+"""The grabber: pictures reach the PC whole frames late, some not at all, some twice."""
 
 from __future__ import annotations
 

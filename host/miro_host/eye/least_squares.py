@@ -1,7 +1,6 @@
 """Least squares for a few parameters: damped Gauss-Newton steps in plain float64, in a written order.
 
-What belongs here: the method. What does not: what is fitted (`fit`). No numpy: its linear algebra gives other bits on
-other machines.
+No numpy: its linear algebra gives other bits on other machines.
 """
 
 from __future__ import annotations

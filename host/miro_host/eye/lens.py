@@ -1,8 +1,5 @@
 """The geometry of a camera: from a pixel to the ground at a height, and from a point to its pixel.
 
-What belongs here: the pinhole, its distortion and its position, both ways. What does not: the numbers that it is made
-of (`camera_parameters`), light, and what is in the picture.
-
     pixel (u, v) -> tangents as drawn -> without distortion -> turned into world axes: slopes -> ground at a height
 
 A slope is how far a ray goes along x (or y) for each metre that it falls.

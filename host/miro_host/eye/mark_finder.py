@@ -1,8 +1,5 @@
 """Where a picture shows a mark: pixels across a bright band in, its distance from where it was expected out.
 
-What belongs here: the band in a few rows (or columns) of pixels. What does not: which marks there are (`pitch_marks`),
-what their distances say (`self_calibration`).
-
       light                 +--+            The light of a row is read outwards from its brightest pixel to the first
         |               +--+|  |            valley on either side; what is above the valley's level belongs to the band.
         |  floor        |      |  wall top  Its centre is the middle of that light.

@@ -1,7 +1,6 @@
 """What a tracker did with one picture, for a person to look at: the windows it read, and the pair that is each robot.
 
-What belongs here: the notes. What does not: taking them (`tracker`), and drawing them. They are no state: a tracker
-that takes notes finds what one without them finds.
+They are no state: a tracker that takes notes finds what one without them finds.
 """
 
 from __future__ import annotations

@@ -1,9 +1,5 @@
 """Pairs of patches in one window: which regions can be the top of a robot.
 
-What belongs here: regions of a patch's size and their place on the plane of the robots' tops, pairs of a team patch and
-an identity patch at the pattern's distance, and the pair nearest to where the robot is expected. What does not: where
-to look, what to make of an ambiguous pair, postures (`tracker`).
-
 A region is a patch if its area is between `least_area` and `most_area`. It is whole if it does not touch the border of
 the window; only whole patches make a pair. A pair is contested if one of its patches could also belong to a patch of
 another robot: any team's or identity's colour at the pattern's distance, whole or not.

@@ -1,8 +1,5 @@
 """What a robot wears on its top: patches of colour, from which the tracker reads who and where it is.
 
-What belongs here: colours by name and where the patches lie. What does not: how colours are told apart (`colours`), and
-their paint (the physical world).
-
 Robot axes: x ahead, y left, origin in the middle of its top, a square of 75 mm. The middle between team patch and
 identity patch is the robot's centre. FIRA's rules ask for a team patch of at least 35 x 35 mm, yellow or blue, and
 nothing orange, which is the ball's colour.

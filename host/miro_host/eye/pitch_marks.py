@@ -1,8 +1,5 @@
 """What a PC knows of the pitch: places of lines and walls that a camera sees as a bright band on dark ground.
 
-What belongs here: the marks, from the rules. What does not: finding one in a picture (`mark_finder`), what the finds
-say about the camera (`self_calibration`).
-
         +--|--|--|--|--|--|--|--|--|--|--|--|--+
         _                  |                   _      | and _  a mark: the picture is read across the band there
      +--+  -               -               -   +--+

@@ -1,8 +1,6 @@
 """Regions of one colour class in a window of pixels.
 
-What belongs here: class of each pixel by a look-up table, runs of one class in a row, runs that touch merged into
-regions, and what a region is: class, area, box, sums for its centroid. What does not: which colours the classes are
-(`colours`), finer centroids (`weighing`), robots (`patches`). After CMVision (Bruce, Balch, Veloso, IROS 2000).
+After CMVision (Bruce, Balch, Veloso, IROS 2000).
 
     pixels (Y, Cb, Cr) -> table -> class -> runs -> union-find -> regions
 

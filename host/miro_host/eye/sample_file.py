@@ -1,10 +1,8 @@
 """Sampled pixels in a CSV file: what somebody reads off his own pictures, so that the tracker knows its colours.
 
-What belongs here: reading the file. What does not: the classes made of the samples (`colours`).
-
-    colour,r,g,b            or: colour,y,cb,cr
-    yellow,231,209,40
-    floor,34,78,52
+colour,r,g,b            or: colour,y,cb,cr
+yellow,231,209,40
+floor,34,78,52
 """
 
 from __future__ import annotations

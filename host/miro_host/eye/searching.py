@@ -1,8 +1,4 @@
-"""Where in the whole picture a robot of a team could be: every fourth row, looked at alone.
-
-What belongs here: rows, runs of the team's colour of a plausible length, and runs that belong together. What does not:
-what is at such a place (`tracker` looks at a window there).
-"""
+"""Where in the whole picture a robot of a team could be: every fourth row, looked at alone."""
 
 from __future__ import annotations
 

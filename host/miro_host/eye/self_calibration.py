@@ -1,9 +1,6 @@
 """A camera's parameters while it is in use, from lines and walls of the pitch (Bailey and Sen Gupta,
 doi 10.5772/7341).
 
-What belongs here: the filter over the parameters, which mark is looked at when, and when the tracker is told. What does
-not: the marks (`pitch_marks`), finding one in a picture (`mark_finder`), control points by hand (`fit`).
-
     picture -> a mark, where the parameters of now draw it -> distance across the band -> Kalman update of 7 numbers
     every `TOLD_FRAMES` frames: parameters -> calibration of the tracker
 

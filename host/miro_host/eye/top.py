@@ -1,8 +1,4 @@
-"""The top of a robot as a calibrated camera sees it: where its two patches are, and what two patches say.
-
-What belongs here: the pattern's distance and angle, the expected size in the picture, posture from patches and back.
-What does not: which regions are patches (`patches`), which pair is which robot (`tracker`).
-"""
+"""The top of a robot as a calibrated camera sees it: where its two patches are, and what two patches say."""
 
 from __future__ import annotations
 

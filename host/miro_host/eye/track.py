@@ -1,7 +1,4 @@
-"""What the tracker knows of one robot: its last two sightings, and where they say that it will be.
-
-What belongs here: the sighting, the memory, prediction at constant velocity and turning rate. What does not: pixels.
-"""
+"""What the tracker knows of one robot: its last two sightings, and where they say that it will be."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """From pictures to postures: follows the robots of one team by the two colour patches on their tops.
 
-What belongs here: where to look, which pair of patches is which robot, when none is, and the posture of a pair. What
-does not: pixels (`regions`, `weighing`), pairs in a window (`patches`), memory and prediction (`track`), the truth.
-
     prediction -> window -> patches -> pair -> centroids -> ground at the tops' height -> posture
         not found: a larger window -> not found: every fourth row of the picture, windows where the team's colour is
 

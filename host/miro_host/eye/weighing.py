@@ -1,8 +1,5 @@
 """Centroids of the two patches of a robot, weighted by chroma.
 
-What belongs here: how much of a pixel is of a patch's colour, to which patch a pixel belongs, and the centroids. What
-does not: finding the regions (`regions`), choosing the pair (`patches`).
-
 A television signal carries little chroma bandwidth: near an edge a pixel's chroma is a mixture of its neighbours'. With
 C the mean chroma vector of a patch's colour and F that of the floor, the share of C in a chroma c is
 

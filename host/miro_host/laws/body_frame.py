@@ -1,8 +1,5 @@
 """Sliding mode on errors in the robot's own axes: no origin, no heading at which the law has no answer.
 
-What belongs here: the law as a function of reference, posture and velocity. What does not: the errors (`errors`), the
-limits of z_cmd and the sum of the accelerations (`integrator`).
-
 The surfaces are those of Yang & Kim (IEEE T-RA 15(3), 1999), equation (13), with two changes. The errors x, y, theta
 are those of Kanayama et al. (ICRA 1990) in place of polar coordinates. And the heading follows a demand h(y), which
 points the robot at the path, in place of the term sgn(theta_e) |phi_e|, which does not know the side of the path:

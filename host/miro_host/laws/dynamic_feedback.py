@@ -1,8 +1,6 @@
 """Dynamic feedback linearisation: A. De Luca, G. Oriolo, M. Vendittelli, "Stabilization of the unicycle via dynamic
 feedback linearization", IFAC SYROCO 2000.
 
-What belongs here: the law and its guard at v = 0. What does not: the limits of z_cmd and of its rate (`integrator`).
-
 With the speed v as a state of the controller, the position obeys x'' = u_x, y'' = u_y exactly for
 
     v' = u_x cos(theta) + u_y sin(theta)

@@ -1,8 +1,5 @@
 """Epsilon-tracking by sliding mode: reconstructed, because the paper that Yang & Kim compare with is not at hand.
 
-What belongs here: the law as a function of reference and posture, its memory of turns, and three sets of gains. What
-does not: the limits of z_cmd and of its rate (`integrator`).
-
 Yang & Kim (IEEE T-RA 15(3), 1999, section V-B, Figs. 9 and 10) compare their law with the tracking law of A. Bloch,
 S. Drakunov, "Tracking in nonholonomic dynamic systems via sliding modes" (IEEE CDC 1995). **Nothing below is quoted
 from it.** The law here is built from the stabiliser of the nonholonomic integrator (R. Brockett's) that the

@@ -1,7 +1,5 @@
 """Tracking errors in the robot's own axes, as Kanayama et al. (ICRA 1990) define them.
 
-What belongs here: the transformation. What does not: the laws that use it, and polar errors (`yang_kim`).
-
 The errors are those of the reference as the robot sees it: x ahead, y to the left, theta anticlockwise. They do not
 depend on where the origin of the world axes is.
 """

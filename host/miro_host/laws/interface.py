@@ -1,8 +1,5 @@
 """What a tracking law is given, what it answers, and what it must declare about itself.
 
-What belongs here: the interface. What does not: any law, the order of the steps on the PC (`pilot`), how a scenario
-finds a law by its name (`registry`), how a law's memory is saved (`miro_host.memory`).
-
 A law is two classes. The parameters are a frozen struct whose tag is the law's name; they are the scenario's
 `controller` table, and their `law` method makes the law. The law itself has a `step`, which is called once in each
 control period in which a posture is known:

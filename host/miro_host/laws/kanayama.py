@@ -1,8 +1,5 @@
 """The tracking law of Y. Kanayama, Y. Kimura, F. Miyazaki, T. Noguchi (IEEE ICRA 1990).
 
-What belongs here: the law. What does not: the errors (`errors`) and the limits of z_cmd and of its rate, which every
-law has (`integrator`).
-
 With the errors x, y, theta of the reference in the robot's own axes,
 
     v = v_r cos(theta) + K_x x

@@ -1,7 +1,6 @@
 """The names of the tracking laws.
 
-What belongs here: the table of our own laws, and the type of a scenario's `controller`. What does not: the interface
-(`interface`) and the laws. No law is imported before a scenario names it.
+No law is imported before a scenario names it.
 """
 
 from miro_host.parts import Registry

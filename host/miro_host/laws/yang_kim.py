@@ -1,9 +1,5 @@
 """The paper's sliding-mode law: equations (13) and (16), literally, with the guards that a machine needs.
 
-What belongs here: the law as a function of reference, measured posture and velocity. What does not: the
-velocity's source (the integrator state, see `pilot`), equation (15) (`integrator`), the reference itself
-(`references`).
-
 Known limits of the law, which this module does not mend (host/README.md): it has no lateral feedback on
 the surface theta_e = 0, so the robot then runs parallel to the path; V = s's/2 jumps by 2 |theta_e'|
 |phi_e| where theta_e crosses zero; it may settle on the path's mirror image through the origin.

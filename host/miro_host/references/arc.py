@@ -1,8 +1,5 @@
 """A circular arc with a speed ramp.
 
-What belongs here: the trajectory and its keys. What does not: the speed profile (`ramp`), and the polar form of
-an arc that starts elsewhere than in the origin, or comes back to it (`polar`).
-
 Assumption 2 (equation 11) of the paper wants a path out of the origin of the world axes. There the polar form of
 equation (9) is 0/0; on such an arc it has a closed form without a division by rho, so that t = 0 is a time like any
 other.

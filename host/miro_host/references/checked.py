@@ -1,7 +1,4 @@
-"""References of other distributions: what is asked of each place that they give.
-
-What belongs here: the check of the numbers. What does not: the path as a whole (`miro_sim.scenario.places`).
-"""
+"""References of other distributions: what is asked of each place that they give."""
 
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Headings at waypoints where none is given.
 
-What belongs here: the choice of headings, from the points alone. What does not: the path between the points (`spline`).
-
 At a point between two others it is the heading of the circle through the three; at an end, that with which a circular
 arc comes from, or leads to, the neighbour. Points on a circle so get its tangents, points on a line its direction.
 """

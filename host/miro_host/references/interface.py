@@ -1,8 +1,5 @@
 """What a reference trajectory gives and what its parameters must have.
 
-What belongs here: the interface. What does not: any path, how a scenario finds one by its name (`registry`), and what
-is refused of one from another distribution (`checked`).
-
 A reference is two classes, like a law: a frozen struct of parameters whose tag is the reference's name, which is the
 scenario's `reference` table, and the trajectory that it makes, a function of time without memory.
 """

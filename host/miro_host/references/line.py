@@ -1,8 +1,4 @@
-"""A straight line with a speed ramp.
-
-What belongs here: the trajectory and its keys. What does not: the speed profile (`ramp`), and the polar form of
-a line that starts elsewhere than in the origin (`polar`).
-"""
+"""A straight line with a speed ramp."""
 
 import math
 

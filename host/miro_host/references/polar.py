@@ -1,8 +1,4 @@
-"""From the Cartesian form of a reference to all of it: polar coordinates, their rates (9), and rho'' (18).
-
-What belongs here: that conversion, for any path. What does not: the closed forms of a line and an arc out of the
-origin, which need no division by rho (`line`, `arc`).
-"""
+"""From the Cartesian form of a reference to all of it: polar coordinates, their rates (9), and rho'' (18)."""
 
 import math
 

@@ -1,8 +1,4 @@
-"""The speed profile that line and arc share: a ramp, steady speed, and perhaps a ramp down.
-
-What belongs here: length, speed and acceleration along a path over time, and the keys that choose them. What does not:
-the path.
-"""
+"""The speed profile that line and arc share: a ramp, steady speed, and perhaps a ramp down."""
 
 from typing import Annotated
 

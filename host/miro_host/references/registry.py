@@ -1,8 +1,4 @@
-"""The names of the references.
-
-What belongs here: the table of our own references, and the type of a scenario's `reference`. What does not: the
-interface (`interface`) and the trajectories, which are not imported before a scenario names one.
-"""
+"""The names of the references."""
 
 from miro_host.parts import Registry
 

@@ -1,7 +1,5 @@
 """A sine about an axis, with a speed ramp along the axis.
 
-What belongs here: the trajectory and its keys. What does not: the speed profile (`ramp`) and the polar form (`polar`).
-
 The ramp is that of the progress along the axis, not along the path: so position, velocities and accelerations have
 closed forms. The price is that the speed on the path changes: it is `speed_m_s` at the crests and greatest on the axis.
 """

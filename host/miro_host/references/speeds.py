@@ -1,8 +1,5 @@
 """How fast a path is driven: the greatest speed within its limits, by one pass forwards and one backwards.
 
-What belongs here: from the cells of a path to the speeds between them, and to times. What does not: the path
-(`spline`).
-
 The path is cut into cells. Within a cell the acceleration along the path is constant, so the square of the speed is
 linear in the way: z' = 2 a ds. A pass forwards keeps z from growing faster than the acceleration allows, one backwards
 from falling faster; what a cell's curvature allows is a bound at both of its ends, so within it, too.

@@ -1,8 +1,5 @@
 """The path through waypoints: quintic polynomials with continuous heading and curvature.
 
-What belongs here: the geometry of the path, without time. What does not: headings that are not given (`headings`), the
-speed along the path (`speeds`), and the trajectory (`waypoints`).
-
 Each piece leads from one point to the next in u = 0 to its length, a guess of the way along it. At both ends dp/du is
 the heading as a unit vector and d2p/du2 is the curvature, normal to it: so heading and curvature do not jump from piece
 to piece. The curvature at a point is the mean of those that the pieces beside it would have by themselves,

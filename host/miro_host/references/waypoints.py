@@ -1,8 +1,5 @@
 """A path through waypoints, planned: from points, some with headings, to a trajectory within bounds.
 
-What belongs here: the trajectory and its keys. What does not: headings that are not given (`headings`), the shape of
-the path (`spline`), the speed along it (`speeds`), and the polar form (`polar`).
-
     points ─► headings ─► quintic pieces ─► table of cells: length, curvature ─► speeds ─► times
                                                                                              │
     t ─► cell ─► way along the path in it ─► tau ─► posture, curvature ─► Reference  ◄───────┘

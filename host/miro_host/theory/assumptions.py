@@ -1,7 +1,5 @@
 """The paper's assumptions 1 to 3 on a trajectory, as numbers: how far a posture is from breaking them.
 
-What belongs here: one posture at a time. What does not: how long a run broke which of them (`mirotwin.report.theory`).
-
 1. "Without loss of generality" all angles lie in (-pi, pi]. Nothing can break it but the seam: an angle that turns past
    pi comes back at -pi. The errors then jump by a turn, which wrapping takes away, unless the error itself passes pi.
 2. Equation (11): rho_r = 0 at t = 0 only, and |rho_c| > rho_f for t > 0; rho_f is the measurement error, 2.40 cm.

@@ -1,8 +1,5 @@
 """Computed torque and the disturbance that it leaves: equations (10), (14), (15) and the matching condition.
 
-What belongs here: from accelerations to torques and back. What does not: H and G (`mechanics`, `unicycle`) and the law
-that gives u (`laws.yang_kim`).
-
     (10)  H z' + G + tau_d = tau      (14)  tau = H z_r' + G + H u      (15)  z' + f = z_r' + u,  tau_d = H f
 
 The matching condition holds for any tau_d, as the paper says, because H is regular: f = H^-1 tau_d. That f is bounded

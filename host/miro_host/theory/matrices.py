@@ -1,7 +1,6 @@
 """Products and linear equations of small matrices of any shape, in a written order of additions.
 
-What belongs here: what equations (2) to (14) need. What does not: anything that knows what a row means. A matrix is a
-list of rows.
+A matrix is a list of rows.
 """
 
 Vector = list[float]

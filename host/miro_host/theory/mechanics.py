@@ -1,8 +1,5 @@
 """Mechanical systems with nonholonomic constraints and their reduced form: equations (1) to (7).
 
-What belongs here: the reduction for any system, at one instant, from its matrices. What does not: the robot's matrices
-(`unicycle`) and what its motors are told (`computed_torque`).
-
     (1)  A q' = 0        (2)  A S = 0        (4)  q' = S z        (5)  q'' = S z' + S' z
     (3)  M q'' + V = E tau - A^T lambda
     (6)  S^T (M S z' + M S' z + V) = S^T E tau

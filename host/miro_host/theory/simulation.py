@@ -1,8 +1,5 @@
 """The robot under its law at the level of torques, in continuous time: equations (8) or (9), (10) and (14).
 
-What belongs here: the equations of motion of the theory, without camera, radio, motors or quantum, by the classical
-Runge-Kutta method of order 4. What does not: the twin's own robot (`miro_sim.plant`), and what the runs show (tests).
-
     demand z_r' + u ─► (14) tau = H z_r' + G + H u ─► (10) H z' + G + tau_d = tau ─► (8) or (9) q' = S z
 
 The law is asked in every stage of a step. Where a sign function switches, the method is of order 1, and a surface is

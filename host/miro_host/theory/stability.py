@@ -1,8 +1,5 @@
 """Surfaces, V and V' of a robot under the paper's law: equations (13), (18) and (23), and what (23) leaves out.
 
-What belongs here: the rates of s1, s2 and V, both as the proof of Theorem 1 has them and as they are. What does not:
-the law itself (`laws.yang_kim`), and runs (`simulation`).
-
 The proof differentiates s2 = theta_e' + gamma2 theta_e + sgn(theta_e) |phi_e| as if sgn(theta_e) were constant. It is,
 except where theta_e crosses 0: there s2 jumps by 2 |phi_e|, in the direction of theta_e', and V rises by
 2 |theta_e'| |phi_e|. With the saturation function of remark 2 in its place, the jump is spread over the boundary layer:

@@ -1,8 +1,5 @@
 """The matrices of the paper's robot in Cartesian and in polar coordinates: section III, equations (8) and (9).
 
-What belongs here: M, V, E, A, S, S' of a symmetric body on two driven wheels, and its H. What does not: the reduction
-(`mechanics`), motors, gears and friction (the plant has them; here they are a disturbance).
-
 The paper prints S for both sets of coordinates, and leaves M, V and E open. They are those of a rigid body whose centre
 of mass lies in the middle between its wheels; tau = (tau_l, tau_r) is the torque at the wheels. In polar coordinates M
 and V follow from the kinetic energy m (rho'^2 + rho^2 phi'^2) / 2 + J theta'^2 / 2. Both have the same H, and G = 0.

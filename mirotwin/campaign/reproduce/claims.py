@@ -1,8 +1,5 @@
 """Each claim of the paper's section V beside what was measured.
 
-What belongs here: the claims in our words, the criterion of each, and the verdict that follows from rows. What does
-not: the runs (`plan`), the page (`page`).
-
 A verdict is computed. "holds" and "does not hold" are a criterion that stands with it; what is true of some cases only
 "holds in part". Errors and chattering are compared over the runs that settle: a robot that ran away does not chatter.
 Where none settles, that case is not judged. The two claims about runs that fail to converge are about all runs.

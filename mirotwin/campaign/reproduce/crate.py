@@ -1,9 +1,5 @@
 """A folder for an archive: the description of its files as an RO-Crate, and the rows of all runs as Parquet.
 
-What belongs here: `ro-crate-metadata.json` in the form RO-Crate 1.1 (https://www.researchobject.org/ro-crate/1.1/,
-sections "RO-Crate Metadata File Descriptor" and "Root Data Entity"), with size and SHA-256 of each file. What does not:
-what the files say (`page`, `pictures`, `rows`).
-
 The same files and the same date give the same bytes.
 """
 

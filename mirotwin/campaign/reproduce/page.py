@@ -1,7 +1,6 @@
 """The page: claims with their verdicts, each figure with its picture and table, cameras, and what was chosen.
 
-What belongs here: Markdown made of rows. What does not: pictures (`pictures`), verdicts (`claims`), runs (`plan`). The
-same rows give the same bytes: no date, no time taken.
+The same rows give the same bytes: no date, no time taken.
 """
 
 from __future__ import annotations

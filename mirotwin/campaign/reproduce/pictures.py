@@ -1,7 +1,6 @@
 """The five pictures: each figure of the paper twice, in truth and as the camera sees it, from the recordings.
 
-What belongs here: drawing. What does not: which runs are drawn (`plan`), one run's own picture (`report.figure`). The
-same recordings give the same bytes: fixed size, fixed fonts, no date.
+The same recordings give the same bytes: fixed size, fixed fonts, no date.
 """
 
 from __future__ import annotations

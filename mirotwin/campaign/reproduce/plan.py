@@ -1,8 +1,5 @@
 """Which runs reproduce the paper: starts, controllers, cameras.
 
-What belongs here: the groups of runs, as settings of built-in scenarios. What does not: what their rows say (`claims`,
-`page`), and gains (in the scenarios, and defaults of the laws).
-
 Each group is one controller from one start, over all seeds. The paper compares two controllers from different starts;
 here each of them also runs from those of the other.
 """

@@ -1,7 +1,4 @@
-"""The rows of a group: medians, shares and counts.
-
-What belongs here: plain statistics over seeds. What does not: what they mean (`claims`).
-"""
+"""The rows of a group: medians, shares and counts."""
 
 from __future__ import annotations
 

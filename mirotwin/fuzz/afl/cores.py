@@ -1,7 +1,5 @@
 """Which processor core each job of afl-fuzz gets.
 
-What belongs here: the choice. What does not: binding a process to its core (`run`).
-
 afl-fuzz and its target take turns: on one core a turn costs a switch of tasks, on two it wakes the other core. So both
 are bound to one core. afl-fuzz can do that itself, but it ends when other programs are bound to all cores, and it knows
 the cores of the machine, not those that this process may use.

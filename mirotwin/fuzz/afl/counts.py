@@ -1,8 +1,7 @@
 """What only the target process knows of a campaign: executions, frames and characters fed.
 
-What belongs here: the file in which they stand, and reading it. What does not: what AFL++ counts (`statistics`). The
-file is mapped into memory: writing costs no system call, and what was written survives the process. A campaign that is
-taken up again counts on.
+The file is mapped into memory: writing costs no system call, and what was written survives the process. A campaign
+that is taken up again counts on.
 """
 
 from __future__ import annotations

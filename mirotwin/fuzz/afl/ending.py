@@ -1,7 +1,4 @@
-"""Why afl-fuzz has ended: its own line, and what to do.
-
-What belongs here: finding the line in its output, and the remedies. What does not: the process (`run`).
-"""
+"""Why afl-fuzz has ended: its own line, and what to do."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""What afl-fuzz is given to begin with: a folder of seeds, and a dictionary of byte strings that it puts into inputs.
-
-What belongs here: writing both, and the strings of our own link, from the table of the wire. What does not: which
-inputs are good seeds, and how an input is read (`program`).
-"""
+"""What afl-fuzz is given to begin with: a folder of seeds, and a dictionary of byte strings for its inputs."""
 
 from __future__ import annotations
 

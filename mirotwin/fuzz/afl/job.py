@@ -1,7 +1,4 @@
-"""One job of a campaign: an afl-fuzz, its target process, and the folder that they write.
-
-What belongs here: starting and ending it, and reading what it leaves. What does not: adding jobs up (`run`).
-"""
+"""One job of a campaign: an afl-fuzz, its target process, and the folder that they write."""
 
 from __future__ import annotations
 

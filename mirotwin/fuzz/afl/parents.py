@@ -1,7 +1,7 @@
 """Processes that end with the one that started them, however that one ends.
 
-What belongs here: asking Linux for it. What does not: who starts whom. A campaign that is killed would otherwise leave
-afl-fuzz running, and a killed afl-fuzz a target in the middle of an execution.
+A campaign that is killed would otherwise leave afl-fuzz running, and a killed afl-fuzz a target in the middle of an
+execution.
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
 """One campaign of afl-fuzz: its jobs, how far they are, and the inputs that they leave.
 
-What belongs here: the jobs together. What does not: a single one (`job`), how it is called (`settings`), and what a
-campaign does with an input.
-
 The folder, beside what afl-fuzz makes itself (`JOB/queue`, `JOB/crashes`, ..): `JOB.log` is afl-fuzz's output,
 `JOB.target` what the target process complained of, `JOB.counts` what it was fed. A folder that holds a campaign is gone
 on with: afl-fuzz reads its queue again, and renames `JOB/crashes` to `JOB/crashes.DATE`.

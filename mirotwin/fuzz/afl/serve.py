@@ -1,8 +1,5 @@
 """The target process: one machine behind AFL++'s fork-server protocol. It never forks.
 
-What belongs here: the protocol, and a single run of standard input where no AFL++ is. What does not: the target
-(`mirotwin.fuzz.target`) and starting AFL++ (`run`).
-
     python -m mirotwin.fuzz.afl.serve SPECIFICATION [BESIDE]
 
 SPECIFICATION is the JSON of a `TargetSpec`. BESIDE is a path without ending: `BESIDE.target` gets what went wrong,

@@ -1,7 +1,4 @@
-"""How afl-fuzz is called: its environment, with the reason for each variable, and its options.
-
-What belongs here: the tables and the command line. What does not: starting it (`run`).
-"""
+"""How afl-fuzz is called: its environment, with the reason for each variable, and its options."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """Shared memory of System V, as AFL++ hands it to its targets.
 
-What belongs here: attaching a segment by its number. What does not: what lies in it (`serve`). Segments are made and
-removed by AFL++; one stays attached until the process ends.
+Segments are made and removed by AFL++; one stays attached until the process ends.
 """
 
 from __future__ import annotations

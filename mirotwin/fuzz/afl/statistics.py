@@ -1,9 +1,6 @@
 """What afl-fuzz writes about its own progress: `fuzzer_stats` and `plot_data`.
 
-What belongs here: reading both strictly, and adding up the jobs of a campaign. What does not: what AFL++ does not know
-(`counts`). afl-fuzz writes `fuzzer_stats` when it has tried its seeds, each 60 s and at its end, a line of `plot_data`
-each 5 s from the first minute on. It writes into the file itself: a reader may meet a file that has no end yet, which
-counts as none.
+It writes into the file itself: a reader may meet a file that has no end yet, which counts as none.
 """
 
 from __future__ import annotations

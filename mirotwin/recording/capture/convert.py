@@ -1,7 +1,4 @@
-"""Transmissions as a capture or a stream file.
-
-What belongs here: transmissions to blocks and lines. What does not: the grammar of either (`miro_protocol`), and files.
-"""
+"""Transmissions as a capture or a stream file."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Which format a file is in, told from its first bytes.
 
-What belongs here: the rules, in the order in which they are tried. What does not: reading.
-
 | the file begins with | it is |
 |---|---|
 | the four bytes that a pcapng or an old pcap file begins with | pcapng |

@@ -1,7 +1,4 @@
-"""The bytes on the wire as people read them: one line a frame, or a run of bytes that is none.
-
-What belongs here: decoded rows to lines. What does not: decoding (`recording.capture.rows`), and printing (`cli`).
-"""
+"""The bytes on the wire as people read them: one line a frame, or a run of bytes that is none."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """Characters written as hexadecimal digits: `55 55 ff 2d d4`, `0x55,0xff`, `5555ff2dd4`, comments after `#`.
 
-What belongs here: digits to bytes, piece by piece. What does not: files. UTF-8's byte-order mark, which some editors
-put first (and `cat` into the middle), separates and counts in no column.
+UTF-8's byte-order mark, which some editors put first (and `cat` into the middle), separates and counts in no column.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""An open file or pipe whose first bytes can be looked at and which knows how far it was read.
-
-What belongs here: bytes. What does not: what they mean.
-"""
+"""An open file or pipe whose first bytes can be looked at and which knows how far it was read."""
 
 from __future__ import annotations
 

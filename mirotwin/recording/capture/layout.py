@@ -1,7 +1,4 @@
-"""How many robots a network has, if the file does not say: the number with which more frames can be decoded.
-
-What belongs here: looking at the first transmissions of a file. What does not: decoding for the user (`rows`).
-"""
+"""How many robots a network has, if the file does not say: the number with which more frames can be decoded."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """The characters in a recording (`run.mcap`), in the order of time.
 
-What belongs here: the wire messages of a recording as transmissions. What does not: reading messages
-(`recording.messages`), and all other channels.
-
 A recording holds the characters of each control period. A transmission of a robot that goes on over the end of a
 period is put together again here.
 """

@@ -1,7 +1,5 @@
 """Rows as lines of a table and as JSON objects, one a line.
 
-What belongs here: labels, columns and units. What does not: decoding (`rows`).
-
 The JSON form, for programs:
 
 * first `{"event": "input", "file", "format", "timed", "units": {field: unit}}`

@@ -1,8 +1,4 @@
-"""Transmissions decoded: frames with their contents and whether they are fresh, and damage with its reason.
-
-What belongs here: one decoder a network and direction, and one freshness a network. What does not: how rows look
-(`render`).
-"""
+"""Transmissions decoded: frames with their contents and whether they are fresh, and damage with its reason."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Opens a file of any format as transmissions.
-
-What belongs here: which reader a format has. What does not: telling formats apart (`detect`).
-"""
+"""Opens a file of any format as transmissions."""
 
 from __future__ import annotations
 

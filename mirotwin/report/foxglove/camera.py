@@ -1,8 +1,5 @@
 """The camera as it hangs: its frame, and its optics in the words of OpenCV.
 
-What belongs here: a scenario's lens as Foxglove takes it. What does not: what the PC believes about it, which is wrong
-by as much as the scenario says (`miro_sim.scenario.build.calibration_for`).
-
 The lens draws a point at the tangent r from its axis at r (1 + k1 r^2): the model `plumb_bob` with one number. Our
 pixel (i, j) covers i <= u < i + 1, and OpenCV's has its middle at (i, j): so half a pixel less.
 """

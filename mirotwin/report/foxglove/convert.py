@@ -1,8 +1,5 @@
 """A recording with Foxglove's topics beside its own, as another recording: `mirotwin export run.mcap --out fox.mcap`.
 
-What belongs here: passing on a recording's records, and adding what follows from them. What does not: what follows
-(`derived`), files and the command line.
-
 The result holds every record of the recording as it is, but for the frames of cameras, which stand in it once, in
 Foxglove's form. So what reads recordings reads it too. The same recording gives the same bytes.
 """

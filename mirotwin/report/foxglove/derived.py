@@ -1,8 +1,5 @@
 """From a run to Foxglove's messages: what control periods, frames, faults and checks become.
 
-What belongs here: which message goes to which topic, and when. What does not: what single ones say (`frames`, `pitch`,
-`robots`, `paths`, `camera`, `notes`), where periods come from and where messages go (`convert`, `server`).
-
 Pure: of the same periods the same messages come out, whether the run is under way or was recorded. What stands still is
 said again each second, for viewers that come late or jump.
 """

@@ -1,12 +1,10 @@
 """Where things are: the frames of a run as one tree, under the pitch's own.
 
-What belongs here: names of frames, and transforms of a control period. What does not: what is drawn in a frame.
-
-    pitch                          the paper's axes on the floor, z up, m
-      net0/robot0                  the robot's truth: x ahead, y left, origin on the floor under its centre
-      net0/robot0/measured         what its PC measured last; it stays where it was while the robot is lost
-      net0/robot0/reference        where it should be
-      net0/camera                  the lens: x right in the picture, y down, z into it
+pitch                          the paper's axes on the floor, z up, m
+  net0/robot0                  the robot's truth: x ahead, y left, origin on the floor under its centre
+  net0/robot0/measured         what its PC measured last; it stays where it was while the robot is lost
+  net0/robot0/reference        where it should be
+  net0/camera                  the lens: x right in the picture, y down, z into it
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Messages of Foxglove's schemas, field for field: those that are written here, in the order of the schemas.
 
-What belongs here: one struct a schema. What does not: the schemas' text (`published`), ways to make the usual shapes
-(`shapes`), and what a run says with them (`derived`). Lengths in m, angles as unit quaternions, colours from 0 to 1.
+Lengths in m, angles as unit quaternions, colours from 0 to 1.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 """What is worth a line in a log: faults of the firmware, frames and robots that were lost, resets, failed checks.
 
-What belongs here: when something becomes a line, and its words. What does not: judging (`checks`).
-
 A line is written when something begins and when it is over, not once a control period.
 """
 

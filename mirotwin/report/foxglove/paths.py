@@ -1,7 +1,4 @@
-"""Where robots were, and where they are to go: trails of the last seconds, and references as whole lines.
-
-What belongs here: lines on the pitch that belong to a robot. What does not: the robot (`robots`).
-"""
+"""Where robots were, and where they are to go: trails of the last seconds, and references as whole lines."""
 
 from __future__ import annotations
 

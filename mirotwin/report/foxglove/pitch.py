@@ -1,8 +1,5 @@
 """The pitch as a scene: floor, lines, walls and goals, and the ball.
 
-What belongs here: what stands still in the pitch's own frame. What does not: robots (`robots`), paths (`paths`), and
-what the camera makes of it all (`miro_sim.pitch.scene`, where the same sizes stand for rays).
-
 As flat as it can be: lines lie on the floor, the triangles in the corners are tops without sides.
 """
 

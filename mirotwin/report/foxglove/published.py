@@ -1,7 +1,6 @@
 """The schemas that Foxglove published, as text.
 
-What belongs here: finding the schema of a message. What does not: the messages (`messages`). Where they come from:
-`schemas/LICENSE.txt`.
+Where they come from: `schemas/LICENSE.txt`.
 """
 
 from __future__ import annotations

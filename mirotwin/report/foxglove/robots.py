@@ -1,8 +1,4 @@
-"""Robots as a scene: bodies with their patches in the frames of the truth, outlines in those of the PC.
-
-What belongs here: what moves with a robot's frames, drawn once in them. What does not: where the frames are (`frames`),
-and where they were (`paths`).
-"""
+"""Robots as a scene: bodies with their patches in the frames of the truth, outlines in those of the PC."""
 
 from __future__ import annotations
 

@@ -3,9 +3,6 @@
     world's thread    send() ──► each viewer's queue ──┐
     server's thread                                    └──► WebSocket ──► viewer
 
-What belongs here: Foxglove's protocol for servers (github.com/foxglove/ws-protocol, docs/spec.md), who may connect, and
-what a viewer may hold up. What does not: what is sent (`derived`), and when (`run.run_live`).
-
 Nothing that a viewer says reaches a run. A viewer that is too slow loses the oldest messages, and one that takes
 nothing is put out. The end waits for no viewer longer than LINGER_S.
 """

@@ -1,8 +1,4 @@
-"""The usual shapes of a scene: boxes, balls, lines and marks, made of few numbers.
-
-What belongs here: ways to make primitives, and how paints look on a screen. What does not: what is drawn (`pitch`,
-`robots`, `paths`).
-"""
+"""The usual shapes of a scene: boxes, balls, lines and marks, made of few numbers."""
 
 from __future__ import annotations
 

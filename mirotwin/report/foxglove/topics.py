@@ -1,14 +1,12 @@
 """The topics that are derived: their names begin with /foxglove, so that they stand apart from what was recorded.
 
-What belongs here: the names. What does not: what is said there (`derived`).
-
-    /foxglove/transforms            foxglove.FrameTransforms, each control period
-    /foxglove/scene                 foxglove.SceneUpdate: pitch, ball, robots, references; each second
-    /foxglove/trails                foxglove.SceneUpdate: where robots were; each control period
-    /foxglove/log                   foxglove.Log
-    /foxglove/net0/image            foxglove.CompressedImage: each recorded frame of the camera of network 0
-    /foxglove/net0/calibration      foxglove.CameraCalibration, each second
-    /foxglove/net0/robot0/error     ours, for plots: truth against reference, each control period
+/foxglove/transforms            foxglove.FrameTransforms, each control period
+/foxglove/scene                 foxglove.SceneUpdate: pitch, ball, robots, references; each second
+/foxglove/trails                foxglove.SceneUpdate: where robots were; each control period
+/foxglove/log                   foxglove.Log
+/foxglove/net0/image            foxglove.CompressedImage: each recorded frame of the camera of network 0
+/foxglove/net0/calibration      foxglove.CameraCalibration, each second
+/foxglove/net0/robot0/error     ours, for plots: truth against reference, each control period
 """
 
 PREFIX = "/foxglove/"

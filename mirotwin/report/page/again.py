@@ -1,8 +1,5 @@
 """The run of a page once more, under the eyes of checks and watchers: what a recording does not hold.
 
-What belongs here: running a world to the end of what is shown, and what comes of it. What does not: where the world
-comes from (`report.report_subject`, `mirotwin.testing`), and words.
-
 The first robot's processor is watched instruction by instruction; the bits of the run do not depend on it.
 """
 

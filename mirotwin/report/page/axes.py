@@ -1,8 +1,4 @@
-"""What all figures look like: frame, axes, grid, tools, and colours by name.
-
-What belongs here: an empty figure in the style of the pages. What does not: what is drawn in it, and Bokeh's document
-(`bokeh_page`).
-"""
+"""What all figures look like: frame, axes, grid, tools, and colours by name."""
 
 from __future__ import annotations
 

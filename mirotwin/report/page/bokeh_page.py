@@ -1,7 +1,5 @@
 """Bokeh's part of a page: its JavaScript from the wheel, and the figures as JSON that is the same each time.
 
-What belongs here: what all pages need of Bokeh. What does not: figures (`plots`, `mirotwin.campaign.plots`), and HTML.
-
 Bokeh numbers its models from 1000 on in each process, so a second page in one process would have other numbers: they
 are given anew, from 1 on in the order in which they stand. Colours are names (`ink`, `truth`): tags like
 `line_color=truth` on a model say which of its properties has which colour, and the page puts them in, for light and for

@@ -1,7 +1,6 @@
 """The course of each robot as columns of numbers, one a control period: what pitch and plots draw.
 
-What belongs here: records of control periods to columns. What does not: drawing them (`plots`, `pitch`), and frames on
-the air (`link`). Postures are the recorded numbers, unchanged; what a period does not have is NaN.
+Postures are the recorded numbers, unchanged; what a period does not have is NaN.
 
 The LM629's velocity is known at each exposure. The actual one is the mean over the period before it: counts that the
 encoder has moved on, in the samples of 8192 ticks that lie between. NaN where the position was set anew meanwhile.

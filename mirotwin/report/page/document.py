@@ -1,8 +1,5 @@
 """From a template and its values to the bytes of a page.
 
-What belongs here: rendering, and the limit of a page's size. What does not: what a page says (`run_page`,
-`mirotwin.campaign.page`), and where the file goes (`report.report_command`).
-
 A page names no address: its policy forbids the browser every request, and the same values give the same bytes.
 """
 

@@ -1,7 +1,5 @@
 """What the firmware did, as rows of a page: cycles by function, interrupts, and the lines that ran.
 
-What belongs here: numbers to rows. What does not: counting them (`miro_robot.inspect`), and HTML (`assets`).
-
 Source files go by their names alone: a page says nothing of the folders of the machine that made it.
 """
 

@@ -1,7 +1,5 @@
 """Camera frames out of a recording, small enough for a page.
 
-What belongs here: reading them, and making them small. What does not: the tracker's view (`mirotwin.camera`).
-
 A frame is recorded as PNG, 0.2 MB of mostly noise; here it becomes a JPEG of a tenth of that.
 """
 

@@ -1,7 +1,5 @@
 """What was on the air: each transmission of a host, what became of it at each robot, and the answers.
 
-What belongs here: events of a world's logs to marks on lanes, and their fates. What does not: drawing them (`plots`).
-
 A host's transmission that holds a frame has a fate at each robot of its network: `fresh` (a valid frame with a new
 number arrived), `repeated` (a valid frame that is not), `damaged` (characters that are no frame), `lost` (nothing),
 `open` where the run ended before it could have arrived.

@@ -1,8 +1,4 @@
-"""The pitch of a run as SVG: field, paths, and robots that the page's JavaScript moves.
-
-What belongs here: shapes in centimetres, y upwards. What does not: their colours (`page.css`) and where robots are at a
-time (`page.js`, from the recorded postures).
-"""
+"""The pitch of a run as SVG: field, paths, and robots that the page's JavaScript moves."""
 
 from __future__ import annotations
 

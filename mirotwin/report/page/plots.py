@@ -1,8 +1,5 @@
 """The figures of a run against time: errors, speeds, wheels, and the air.
 
-What belongs here: which columns are drawn, and how. What does not: the columns (`course`, `link`), the figures' style
-(`axes`), and their place on the page (`assets`).
-
 All share one range of time. A renderer of one robot has the tag `robot:N`, its place among the robots; the page shows
 those of one robot at a time.
 """

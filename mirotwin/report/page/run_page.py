@@ -1,8 +1,4 @@
-"""The page of one run: what its header says, its sections, and the data that its JavaScript moves.
-
-What belongs here: putting them together. What does not: where a run comes from (`report.report_subject`), numbers
-(`course`, `link`, `again`), figures (`plots`), and HTML (`assets/run.html`).
-"""
+"""The page of one run: what its header says, its sections, and the data that its JavaScript moves."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""The examples that the pages use, and writing one of them into a folder.
-
-What belongs here: which there are, and what each consists of. What does not: their contents (`examples/` of the
-repository, which `setup.py` puts into a wheel) and how files are written (`writing`).
-"""
+"""The examples that the pages use, and writing one of them into a folder."""
 
 from __future__ import annotations
 

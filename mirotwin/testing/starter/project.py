@@ -1,8 +1,4 @@
-"""The files of the sample project, and writing them into a folder.
-
-What belongs here: which files. What does not: their contents (`examples/hil`, and the firmware's own folder);
-`setup.py` puts both into a wheel.
-"""
+"""The files of the sample project, and writing them into a folder."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Writing given files into a folder of the user's, all or none.
-
-What belongs here: what is refused, and the writing. What does not: which files (`project`, `examples`).
-"""
+"""Writing given files into a folder of the user's, all or none."""
 
 from __future__ import annotations
 

@@ -1,13 +1,10 @@
 """What a failure leaves in a folder of its own, in one form for pytest, `mirotwin test` and `mirotwin conform`.
 
-What belongs here: names, clearing, writing, and the commands that look into the folder. What does not: the form of a
-case (`case`), the text of a report, and pages (`mirotwin report FOLDER` makes them).
-
-    report.txt        what failed, and the commands that give it again
-    case.stream       what was sent and done, with the check that failed: `mirotwin replay` gives its verdict again
-    sent.stream       the same without a verdict, where no check can judge the failure
-    firmware.ihx      the image, with its .map and .cdb: `replay` and `report` find it beside the stream; not where it
-                      is the robot's own, which every installation has
+report.txt        what failed, and the commands that give it again
+case.stream       what was sent and done, with the check that failed: `mirotwin replay` gives its verdict again
+sent.stream       the same without a verdict, where no check can judge the failure
+firmware.ihx      the image, with its .map and .cdb: `replay` and `report` find it beside the stream; not where it
+                  is the robot's own, which every installation has
 """
 
 from __future__ import annotations

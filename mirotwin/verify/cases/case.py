@@ -1,21 +1,18 @@
 """A failure as one text file: what went into the world, the world itself, and the check that failed.
 
-What belongs here: writing that file. What does not: the format (`miro_protocol.stream`), running it again
-(`mirotwin replay`), and collecting what went in (`trace`).
-
-    # mirotwin stream 2
-    #: version = "0.1.0"
-    #: seed = 7
-    #: firmware_sha256 = ".."
-    #: verdict = "failsafe_stop_ms: net0/robot0: tick 4665120 (..): wanted .., found .."
-    #: end_tick = 6000000
-    #:
-    #: [expect]
-    #: failsafe_stop_ms = true
-    #:
-    #: [scenario]
-    #: ..
-    1440120 > 55 55 ..
+# mirotwin stream 2
+#: version = "0.1.0"
+#: seed = 7
+#: firmware_sha256 = ".."
+#: verdict = "failsafe_stop_ms: net0/robot0: tick 4665120 (..): wanted .., found .."
+#: end_tick = 6000000
+#:
+#: [expect]
+#: failsafe_stop_ms = true
+#:
+#: [scenario]
+#: ..
+1440120 > 55 55 ..
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""What went into a world from outside: all that its hosts sent, and all that was done to its robots and radios.
-
-What belongs here: keeping it while the world runs. What does not: how it is written down (`case`).
-"""
+"""What went into a world from outside: all that its hosts sent, and all that was done to its robots and radios."""
 
 from __future__ import annotations
 

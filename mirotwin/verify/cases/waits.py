@@ -1,7 +1,4 @@
-"""What a wait that was in vain comes to as a check, so that its case can be judged again.
-
-What belongs here: from a condition of `World.run_until` to `happens` or `never_happens`. What does not: the checks.
-"""
+"""What a wait that was in vain comes to as a check, so that its case can be judged again."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """The check that a robot does anything at all with frames that reach it: dead, deaf and lame robots fail every run.
 
-What belongs here: that check, which is always on. What does not: how soon and how exactly a robot acts (`reception`).
-
 It asks for little, so that firmware which is merely different passes: of several frames in a row that ask a wheel to
 turn at another speed than before, one is followed by an STT to that wheel; and a wheel that is asked to turn has its
 motor driven or its encoder counting. It does not go by the robot's serial port, which a dead firmware never starts:

@@ -1,8 +1,5 @@
 """Checks of a robot's answers: each question to it is answered in time, and it never speaks unasked.
 
-What belongs here: the robot's own transmitter, character by character. What does not: what the PC received of it by
-radio.
-
 A question is a fresh frame of type 3 whose number mod N is the robot's slot (protocol/README.md, "Turns").
 """
 

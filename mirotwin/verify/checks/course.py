@@ -1,7 +1,5 @@
 """Checks of where a robot is: near its reference, settled in time, on the pitch.
 
-What belongs here: those three. What does not: what a tracking error is (`recording.track`).
-
 They look once a control period, at its begin, as the summary does. A failure is noted where the robot begins to be
 wrong.
 """

@@ -1,15 +1,12 @@
 """What a scenario expects: its `[expect]` tables as checks, for each robot.
 
-What belongs here: from a key and its value to a check, and what is wrong with either. What does not: the scenario's
-other keys (`miro_sim.scenario` passes these tables on as they are), and judging (`watching`).
+[expect]                                 for all robots
+inside_pitch = true                      a check with its defaults
+tracks_within_cm = 3.0                   .. with its main parameter
+settles_within_s = { within_s = 2.0, position_cm = 2.0 }       .. with any of them
 
-    [expect]                                 for all robots
-    inside_pitch = true                      a check with its defaults
-    tracks_within_cm = 3.0                   .. with its main parameter
-    settles_within_s = { within_s = 2.0, position_cm = 2.0 }       .. with any of them
-
-    [network.robot.expect]                   for one robot: instead of the key of the same name above
-    inside_pitch = false                     not for this one
+[network.robot.expect]                   for one robot: instead of the key of the same name above
+inside_pitch = false                     not for this one
 """
 
 from __future__ import annotations

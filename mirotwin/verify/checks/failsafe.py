@@ -1,8 +1,5 @@
 """Checks of the failsafe: without a fresh frame the wheels are told to stop in time, and the motors go off in time.
 
-What belongs here: the two times. What does not: which frame is fresh (`hearing`) and what a command tells a wheel
-(`orders`).
-
 Times count from the end of the last fresh frame's last character, when a robot can know of it (protocol/README.md,
 "Freshness and failsafe"). Too early is as wrong as too late. An order within `ACTING_MS` of a fresh frame is what that
 frame says and no failsafe. A robot that receives characters when the time comes may be testing a frame, which may be

@@ -1,7 +1,6 @@
 """What firmware must not do, by kinds of firmware fault: four checks that are always on.
 
-What belongs here: which faults fail which check, and the LM629's own complaint. What does not: finding faults. CPU and
-board do that while they run (`miro_robot.faults`), so these checks cost next to nothing.
+CPU and board do that while they run (`miro_robot.faults`), so these checks cost next to nothing.
 """
 
 from __future__ import annotations

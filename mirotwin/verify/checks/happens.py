@@ -1,8 +1,4 @@
-"""Checks of one event: that it happens between two ticks, or that it never does.
-
-What belongs here: what a wait (`World.run_until`) or a step of a scenario asks for, as a check that can be judged
-again. What does not: waiting.
-"""
+"""Checks of one event: that it happens between two ticks, or that it never does."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """What a robot's receiver heard: its characters as valid frames, fresh or not, and as damage.
 
-What belongs here: decoding beside the firmware, by the rules that it has to apply (protocol/README.md, "Reception").
-What does not: what the firmware made of it.
-
 Characters are those that the robot's own serial port delivered, so radio noise is in them already. The port sets RI in
 the stop bit; the rules count from the start bit.
 """

@@ -1,8 +1,5 @@
 """What a check is given, what it answers, and what it must declare about itself.
 
-What belongs here: the interface. What does not: any check, how a scenario names one (`expect`), how a check is found by
-its name (`registry`), and who feeds it (`watching`).
-
 A check is two classes. Its parameters are a frozen struct whose tag is the check's name and its key in `[expect]`;
 their `judge` method makes a `Judge`, one for each robot. The judge is fed in the order of time:
 

@@ -1,7 +1,4 @@
-"""The judge that a check makes, looked at before the run: a plug-in's mistakes are told then, with file and function.
-
-What belongs here: what a judge must have. What does not: what is raised while it judges (`watching`).
-"""
+"""A judge, looked at before the run: that it is one, hears events that there are, and has been begun."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """What an LM629 has been told to do: its commands as orders to a wheel.
 
-What belongs here: from LTRJ and STT to "off", "stop" or "drive" with a velocity. What does not: what the chip makes of
-it (`miro_robot.lm629`) and whether it should have been told so (the checks).
-
 The control word of LTRJ (LM629 data sheet, table "trajectory control word"): bits 8 to 10 turn the motor off, stop
 abruptly, stop smoothly; bit 11 is velocity mode, bit 12 forward; bits 5, 3, 1 announce acceleration, velocity and
 position, bits 4, 2, 0 make them relative to what was loaded before.

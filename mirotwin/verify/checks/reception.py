@@ -1,8 +1,4 @@
-"""Checks of what a robot makes of the frames that it hears.
-
-What belongs here: that it moves by fresh frames only, by frames that its host sent, and by each of them in time. What
-does not: which frame is fresh (`hearing`), answers (`answers`) and silence (`failsafe`).
-"""
+"""Checks of what a robot makes of the frames that it hears."""
 
 from __future__ import annotations
 

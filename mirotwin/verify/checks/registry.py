@@ -1,7 +1,6 @@
 """The names of the checks.
 
-What belongs here: the table of our own checks, and which are always on. What does not: the interface (`interface`) and
-the checks. No check is imported before it is named.
+No check is imported before it is named.
 """
 
 from miro_host.parts import Registry

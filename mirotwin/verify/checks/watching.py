@@ -1,8 +1,5 @@
 """Feeds the checks of a run while it is under way, and says what came of them.
 
-What belongs here: reading the logs of a world once a control period, and the order in which judges are told. What does
-not: judging (the checks) and what a scenario expects (`expect`).
-
     checks = Checks(world)
     while not world.finished:
         world.step()

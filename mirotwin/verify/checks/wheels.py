@@ -1,7 +1,4 @@
-"""The check of the wheels' speed: what they are told, and how fast they are.
-
-What belongs here: that check. What does not: why a wheel turns at all (`reception`, `failsafe`).
-"""
+"""The check of the wheels' speed: what they are told, and how fast they are."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""What to begin with: rules that failed by themselves, and those that are not judged because of them.
-
-What belongs here: the order in which outcomes are shown, and the sentence above them. What does not: which rule is
-judged (`run`), and tables (`cli`).
-"""
+"""What to begin with: rules that failed by themselves, and those that are not judged because of them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Writes the table of docs/conformance.md from the rules: `python -m mirotwin.verify.conform.document`.
-
-What belongs here: turning rules into Markdown. What does not: prose, which is in that page.
-"""
+"""Writes the table of docs/conformance.md from the rules: `python -m mirotwin.verify.conform.document`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The timeline of a rule's trial: what was sent, received, commanded and answered, and what was wanted when.
-
-What belongs here: the lines. What does not: running the trial (`listening`) and judging it (`judgement`).
-"""
+"""The timeline of a rule's trial: what was sent, received, commanded and answered, and what was wanted when."""
 
 from __future__ import annotations
 

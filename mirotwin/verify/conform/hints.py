@@ -1,8 +1,4 @@
-"""What a robot does instead, in words, where one usual mistake explains all that it does.
-
-What belongs here: velocities, characters and numbers for people. What does not: finding out more by other trials
-(`probe`), and CRC and whitening (`sealing`).
-"""
+"""What a robot does instead, in words, where one usual mistake explains all that it does."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """The check `conforms_to`: whether a robot keeps a rule, in the trial of that rule.
 
-What belongs here: the check and its judge. What does not: rules and their trials.
-
 The judge keeps what it is told and judges at the end, each expectation by itself, but those that are over later than
 the run. In a run in which the hosts say anything else than in the rule's trial nothing is judged: the check is for
 trials alone.

@@ -1,6 +1,6 @@
 """What came of the rules as JUnit XML, for the test pages of CI systems.
 
-What belongs here: the document. What does not: judging. No wall time is in it: the same image gives the same bytes.
+No wall time is in it: the same image gives the same bytes.
 """
 
 from __future__ import annotations

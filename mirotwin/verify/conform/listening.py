@@ -1,7 +1,4 @@
-"""A trial to look at: everything that its robots hear, say and are told.
-
-What belongs here: running a trial with a listener at each robot. What does not: judging (`judgement`, `run`).
-"""
+"""A trial to look at: everything that its robots hear, say and are told."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""What a robot does that obeys no plain team frame: found out by a trial of its own.
-
-What belongs here: frames sealed in wrong ways, and what the robot's serial port makes of the right one. What does not:
-the wrong ways (`sealing`).
-"""
+"""What a robot does that obeys no plain team frame: found out by a trial of its own."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""A rule: one sentence of the protocol that binds a robot, and how it is tried.
-
-What belongs here: the record, and the air in which a rule is tried. What does not: the rules (`rules/`), what a trial
-says (`talk`) and how it is judged (`judgement`).
-"""
+"""A rule: one sentence of the protocol that binds a robot, and how it is tried."""
 
 from __future__ import annotations
 

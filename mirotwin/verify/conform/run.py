@@ -1,7 +1,5 @@
 """Tries rules on an image: a world for each rule, run to the end of its trial.
 
-What belongs here: one trial as a run, and what comes of it. What does not: rules (`rules/`), files and tables (`cli`).
-
 Every trial ends at a tick that is known in advance, whatever the firmware does: one that never boots or sends without
 end costs the same virtual time. Trials go on behind a firmware fault, but end behind a thousand. Faults break the rules
 about them, whichever trial they came in.

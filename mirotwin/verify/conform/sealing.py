@@ -1,8 +1,4 @@
-"""Usual mistakes in CRC and whitening: how a frame looks to a robot that makes one of them.
-
-What belongs here: the table of mistakes, and frames sealed with one. What does not: trying them on a robot (`probe`)
-and the right way (`miro_protocol.frames`).
-"""
+"""Usual mistakes in CRC and whitening: how a frame looks to a robot that makes one of them."""
 
 from __future__ import annotations
 

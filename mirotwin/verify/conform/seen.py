@@ -1,8 +1,5 @@
 """What one robot was seen to do in a trial, by its wires and chips: nothing here knows a symbol of the firmware.
 
-What belongs here: what is kept of the events, and the questions that rules ask about it. What does not: what the robot
-should have done (`rules/`), and who tells the events (`judgement`).
-
 What a wheel is told is what its LM629 was told; what the robot says is what the PC heard; what the chips are doing is
 read at the begin of each control period.
 """

@@ -1,7 +1,4 @@
-"""All rules, in the order of their numbers, finding one, and what one presupposes.
-
-What belongs here: the list of chapters. What does not: the rules themselves (`rules/`).
-"""
+"""All rules, in the order of their numbers, finding one, and what one presupposes."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """What the host of a network says in a trial, and what is expected of its robots: the words in which rules are written.
 
-What belongs here: frames and damage at known ticks, and the expectations that many rules share. What does not: the
-rules (`rules/`), and running a trial (`trial`).
-
     frame = talk.team()                 velocities that no frame before it had
     talk.obeyed(frame)                  expected of each robot of the network
     talk.wait(5.0)

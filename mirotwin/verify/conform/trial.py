@@ -1,8 +1,5 @@
 """A rule's trial: the world in which it is tried, what is said in it, and what is expected.
 
-What belongs here: from a rule to a scenario, a script and expectations, and how long it runs. What does not: what comes
-of it (`run`) and judging (`judgement`).
-
 Robots stand far apart; the radio has no errors; the camera sees nothing, because nobody steers. A trial depends on its
 rule alone: the seed changes the noise on RXD between keyed frames, and nothing else.
 """

@@ -1,7 +1,4 @@
-"""Finds the scenario files that are tests: `*.scenario.toml`.
-
-What belongs here: which files a list of paths means, in which order. What does not: running them (`running`).
-"""
+"""Finds the scenario files that are tests: `*.scenario.toml`."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """What a step can wait for: one frozen struct a kind, with the keys that a step may give it.
 
-What belongs here: the keys, and from them to the conditions of `World.run_until`. What does not: the times (`keys`),
-and waiting (`player`).
-
 A kind has two conditions: `kind` is true for every event of it, `fits` says whether an event is the one that is meant.
 `wait_for` passes over those that do not fit; `expect` fails at the first of them.
 

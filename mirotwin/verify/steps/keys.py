@@ -1,8 +1,5 @@
 """The steps that a scenario may have: one frozen struct a kind, each a deed or a wait.
 
-What belongs here: the keys with unit, default and range, and how a step is named in a message. What does not: what can
-be sent (`sends`) and waited for (`happenings`), reading (`reading`), and doing (`player`).
-
 A table of a step has one key that says what it is, its verb: `VERBS`. The others are the verb's own.
 """
 

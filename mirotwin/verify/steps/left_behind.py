@@ -1,13 +1,10 @@
 """What a scenario file that failed leaves in its folder: its report, the scenario as a whole, the case of its failure.
 
-What belongs here: the case of a step or check. What does not: the form of a case, and the other files of the folder
-(`mirotwin.verify.cases`).
-
-    report.txt        the lines of the verdict, and the command that gives it again
-    scenario.toml     the whole scenario with all that was set: `mirotwin run` gives the verdict again
-    case.stream       what was sent and done, with the check that failed: `mirotwin replay` does; not where no check can
-                      judge it, as for pins, wheels, places in the program and single fields of an answer: there
-                      sent.stream
+report.txt        the lines of the verdict, and the command that gives it again
+scenario.toml     the whole scenario with all that was set: `mirotwin run` gives the verdict again
+case.stream       what was sent and done, with the check that failed: `mirotwin replay` does; not where no check can
+                  judge it, as for pins, wheels, places in the program and single fields of an answer: there
+                  sent.stream
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""Whether a run can get to a step and do it, as far as the file and the image say.
-
-What belongs here: robots, networks and symbols that are not there, times beyond the run's end. What does not: keys
-that cannot be read (`reading`), and what happens in the run (`player`).
-"""
+"""Whether a run can get to a step and do it, as far as the file and the image say."""
 
 from __future__ import annotations
 

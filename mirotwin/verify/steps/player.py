@@ -1,8 +1,5 @@
 """Does the steps of a scenario in a world, in virtual time, one after the other.
 
-What belongs here: doing, waiting, and what a step that fails leaves behind. What does not: reading steps (`reading`),
-what a host sends (`sender`), and files.
-
     player = Player(world, steps_of(scenario, origin), origin)
     player.play()                          to the first step that fails, or to the last
     player.finish()                        and on to the end of the run

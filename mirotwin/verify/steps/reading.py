@@ -1,12 +1,9 @@
 """A scenario's `[[step]]` tables to steps, and in one line what is wrong with one of them.
 
-What belongs here: which verb a table has, its keys, units and ranges. What does not: the keys (`keys`, `sends`,
-`happenings`), and whether the run can get to a step (`plan`).
-
-    [[step]]
-    send = "team"                          the verb, and for some what of it
-    left_m_s = 0.2                         its keys
-    note = "drives off"                    for people
+[[step]]
+send = "team"                          the verb, and for some what of it
+left_m_s = 0.2                         its keys
+note = "drives off"                    for people
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""One scenario file run to its verdict: its steps, what it expects, and what every run has to fulfil.
-
-What belongs here: reading such a file, running it, and what came of it. What does not: finding files (`collecting`),
-and saying it (`testing.test_command`, `mirotwin.testing.scenario_items`).
-"""
+"""One scenario file run to its verdict: its steps, what it expects, and what every run has to fulfil."""
 
 from __future__ import annotations
 

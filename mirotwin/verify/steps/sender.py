@@ -1,8 +1,5 @@
 """The hosts of a run with steps: what they send, under which numbers, and the stream of frames that goes on by itself.
 
-What belongs here: sequence numbers, the velocities that were told last, when the next frame of a stream is due. What
-does not: the keys of a step (`sends`), and moving the world (`player`).
-
 Numbers: each frame takes the next of 64; a poll the next whose turn is the robot's that is asked. A stream announces
 each frame just before it goes out, so that a step can change or end it at any time; a frame that finds the transmitter
 busy follows behind.

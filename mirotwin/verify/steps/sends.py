@@ -1,8 +1,4 @@
-"""What a host may say in a step: one frozen struct a kind, with its keys, and the frame that it becomes.
-
-What belongs here: the keys and their units. What does not: sequence numbers and the velocities that were told before
-(`sender`), and the form of frames (`miro_protocol.frames`).
-"""
+"""What a host may say in a step: one frozen struct a kind, with its keys, and the frame that it becomes."""
 
 from __future__ import annotations
 

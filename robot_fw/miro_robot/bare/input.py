@@ -1,8 +1,5 @@
 """What comes in on RXD of the bare machine: bytes from a file or a keyboard, as a person at a terminal would send them.
 
-What belongs here: when the next character is sent, and its edges. What does not: the options of the command
-line (`mirotwin.commands`), and other pins (`pins.py`).
-
 The order of things: a piece of input begins when its condition is met (a text seen on the program's output, a time).
 Each character then waits until the one before is over, the gap has passed and the program listens: its receiver is on
 with RI down, or it polls P3 as a program does that measures the first character. The first character of a piece that

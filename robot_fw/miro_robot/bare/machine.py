@@ -1,7 +1,7 @@
 """A bare board for `mirotwin fw run`: the CPU, 64 KB of external RAM, a terminal on the serial port, levels on pins.
 
-What belongs here: running an image to an address, a limit or its end, and dumping its memory. What comes in on RXD is
-in `input.py`, what comes in on other pins in `pins.py`, the robot's board with its motion controllers in `board.py`.
+What comes in on RXD is in `input.py`, what comes in on other pins in `pins.py`, the robot's board with its motion
+controllers in `board.py`.
 
 A program has ended when no input can make it do anything more: in power-down, asleep with nothing that could wake it,
 or in a jump to itself while no interrupt is enabled. The run goes on until the last character has been sent.

@@ -1,8 +1,5 @@
 """Levels that the outside puts on port pins of the bare machine, from a text file.
 
-What belongs here: reading the file, and handing its edges to the CPU in time. What does not: characters on RXD
-(`input.py`).
-
     # TICK * PIN LEVEL, in the order of time; a tick is a period of the crystal, 12 a machine cycle
     0 * P3.2 1
     24000 * P3.2 0     # /INT0 falls after 1 ms at 24 MHz

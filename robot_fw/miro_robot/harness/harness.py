@@ -1,8 +1,5 @@
 """A machine put back to one moment over and over: fed through RXD, run until its firmware sleeps or a deadline.
 
-What belongs here: putting back, edges on RXD, how far to run. What does not: what is sent (`program.py`), what is wrong
-with what comes of it (`judge.py`, `referee.py`), and reports.
-
     saved moment --> machine <-- RXD: levels, as an ideal radio would give them <-- characters of a program
                         |
                         +--> edges between branches, stack, event log --> judge

@@ -1,8 +1,4 @@
-"""A bus with 64 KB of RAM that keeps what the serial port received and sent, and the judge of such a machine.
-
-What belongs here: what a bare processor did in a run, in arrays, with no call of Python on the way. What does not: what
-is put on RXD (`harness.py`), and what to make of it (`mirotwin.fuzz`).
-"""
+"""A bus with 64 KB of RAM that keeps what the serial port received and sent, and the judge of such a machine."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Who judges a machine in a harness, while it runs.
-
-What belongs here: the base class, which finds nothing. What does not: judging the MIRO (`referee.py`) and what a find
-is good for (`mirotwin.fuzz`).
-"""
+"""Who judges a machine in a harness, while it runs."""
 
 from __future__ import annotations
 

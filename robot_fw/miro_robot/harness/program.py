@@ -1,8 +1,5 @@
 """The bytes of a fuzz input as what a robot hears: characters, pauses, bad stop bits, resets.
 
-What belongs here: the three ways to read an input, and sealing frames (number, CRC, whitening), so that a fuzzer that
-knows nothing of them gets past them. What does not: sending (`harness.py`) and judging (`referee.py`).
-
     BYTES       each byte is a character; all follow each other without a pause
     FRAMES      HDR and payload of one frame after the other, sealed. Bits 7 and 6 of HDR are the type, bits 2 to 0 how
                 many steps the number goes on (1 to 8)

@@ -1,8 +1,7 @@
 """What a MIRO must do with what its serial port received, judged from the event log while it runs.
 
-What belongs here: a quick reading of the rules of protocol/README.md ("Reception", "Freshness and failsafe", "Turns").
-What does not: the verdict. A find counts once the check of the same name fails for it in a world 
-(`mirotwin.verify.checks`, which this follows in a shorter form: one frame and one question wait at a time).
+A find counts once the check of the same name fails for it in a world (`mirotwin.verify.checks`, which this follows in
+a shorter form: one frame and one question wait at a time).
 
     RECEIVED --> window of the decoder --> fresh? --> what the wheels have to be told, and until when
     COMMAND of an LM629 --> order to a wheel -----> compared with it

@@ -1,8 +1,5 @@
 """The types of C variables as SDCC's debug file writes them, and what the bytes of a variable mean.
 
-What belongs here: types, bytes to values and back. What does not: which variables there are and where they lie
-(`variables`).
-
 A type record is `{SIZE}CHAIN:SIGN`, the chain from the variable inwards: `DA4d` an array of 4, `DG` `DC` `DX` `DD`
 `DI` `DP` pointers, `DF` a function, `SC` `SS` `SI` `SL` whole numbers, `SF` a float, `SX` a bit, `SB3$5` 5 bits from
 bit 3 on, `STname` a struct or union, nothing at all a `_Bool` (SDCC CDB file format). SIZE is that of the whole in

@@ -1,9 +1,6 @@
 """The debug information of an image: the C line of each instruction, and the functions.
 
-What belongs here: lines, from the `.rst` listings beside an image or else from its `.cdb`, functions from the `.cdb`,
-and finding source files. (SDCC 4.2 leaves the lines of inlined functions out of the `.cdb`.) What does not: reading
-these files (`symbol_files`), names of addresses (`symbols`), and the use of lines (`inspect/`). An image
-without these files has an empty DebugInfo: everything works by address then.
+An image without these files has an empty DebugInfo: everything works by address then.
 """
 
 from __future__ import annotations

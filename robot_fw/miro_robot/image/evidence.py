@@ -1,7 +1,5 @@
 """Whether the `.map` and `.cdb` beside an image were written with it, or belong to another one.
 
-What belongs here: evidence, and how much of it is enough. What does not: reading these files (`symbol_files`).
-
 A file that is only unusual must pass: images are filled up, merged with a boot loader, cut apart; symbols are
 absolute, mark the end of an area, or name data that has no bytes. So a file is refused on contradictions alone:
 * SDCC's start-up code jumps to `_main`, and the file has `_main` elsewhere (one displaced byte is enough for that);

@@ -1,8 +1,4 @@
-"""The firmware image: an Intel HEX file.
-
-What belongs here: reading one, with errors that say what to do, and finding the files of names beside it. What
-does not: what is in these (`symbol_files`), and whether the image runs (`mcs51/`).
-"""
+"""The firmware image: an Intel HEX file."""
 
 from __future__ import annotations
 

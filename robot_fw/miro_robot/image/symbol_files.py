@@ -1,8 +1,5 @@
 """What SDCC writes beside an image: its `.map`, `.cdb` and `.rst` files, each read in one pass.
 
-What belongs here: from the text of a file to its records, as they stand in it. What does not: whether a file belongs to
-the image (`evidence`), names of addresses (`symbols`), C lines and functions (`debug_info`).
-
 What was read is kept by content: a file that is read again within the process, for another image or another world, is
 not parsed again. Lines count from 1, as `str.splitlines` has them.
 """

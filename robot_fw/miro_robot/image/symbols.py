@@ -1,8 +1,5 @@
 """Names of an image: what the linker wrote into the `.map` and `.cdb` beside it.
 
-What belongs here: names to addresses and back. What does not: reading the files (`symbol_files`), whether they belong
-to the image (`evidence`), and C lines and functions (`debug_info`).
-
 The files are read with the first look-up of a name. Most programs that load an image look up none.
 """
 

@@ -1,8 +1,5 @@
 """The variables of an image, with their C types: what the `.cdb` beside it says.
 
-What belongs here: which variables there are, and finding one by the name that people write. What does not: the meaning
-of their bytes (`c_types`), and whose memory is read.
-
     last_left            a global, or a static of any one file
     failsafe:age         .. of this file, where several have one; `foo:count` a static of this function
     body[3]  pt.x        an element, a member

@@ -1,6 +1,6 @@
 """What a CPU spent its time on besides instructions: interrupts, sleep, and how deep its stack went.
 
-What belongs here: measuring. Cycles by address are in `counters.py`, the printed table in `profile.py`.
+Cycles by address are in `counters.py`, the printed table in `profile.py`.
 
 The latency of an interrupt is counted as Atmel's 8051 Hardware Manual does (4316E, section 2.16, response time): full
 machine cycles between the one in which the flag is latched and the first one of the routine; 3 at least. A request that

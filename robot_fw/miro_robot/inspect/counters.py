@@ -1,7 +1,6 @@
 """How often each instruction ran, how long it took, and which way its branch went.
 
-What belongs here: counting by address. What functions, lines and percentages follow from it is in `profile.py` and
-`coverage.py`.
+What functions, lines and percentages follow from it is in `profile.py` and `coverage.py`.
 """
 
 from __future__ import annotations

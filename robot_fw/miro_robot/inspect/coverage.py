@@ -1,7 +1,5 @@
 """Which instructions, branches and C lines ran: from counts by address to counts by line.
 
-What belongs here: the mapping. What does not: counting (`counters.py`), and the file format (`lcov.py`).
-
 A line ran as often as the instruction of it that ran most often. Of a conditional jump both ways are counted. An
 image without debug files is covered by the lines of its own listing.
 """

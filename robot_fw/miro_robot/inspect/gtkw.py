@@ -1,6 +1,6 @@
 """The GTKWave save file that goes with a waveform: groups, and bits put together to numbers.
 
-What belongs here: what GTKWave shows when both files are opened. The signals themselves are in `signals.py`.
+The signals themselves are in `signals.py`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The lcov tracefile: which lines, functions and branches ran, in the form that genhtml and CI services read.
 
-What belongs here: the format, reading and writing, and adding up runs. What does not: where the numbers come from
-(`coverage.py`). Form: geninfo(1), section FILES, in lcov 2 TRACEFILE FORMAT. Functions are read in the form of lcov 2.2
-as well (FNL, FNA) and written in the older one (FN, FNDA), which all versions read; their last lines are dropped.
+Form: geninfo(1), section FILES, in lcov 2 TRACEFILE FORMAT. Functions are read in the form of lcov 2.2 as well (FNL,
+FNA) and written in the older one (FN, FNDA), which all versions read; their last lines are dropped.
 """
 
 from __future__ import annotations

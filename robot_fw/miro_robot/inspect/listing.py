@@ -1,8 +1,4 @@
-"""An image as a listing: every loaded byte once, as an instruction or as data, with its C line.
-
-What belongs here: going through an image and the form of a row. What does not: names (`symbol_names`), and the notation
-of an instruction (`mcs51.opcodes`).
-"""
+"""An image as a listing: every loaded byte once, as an instruction or as data, with its C line."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Where the time went: a profile of one CPU, as data.
-
-What belongs here: putting counters and activity together by function. What does not: counting, and tables for people.
-"""
+"""Where the time went: a profile of one CPU, as data."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """The signals of a waveform: their names, where they are picked up, and what they mean.
 
-What belongs here: one table. It is the single source for the VCD, the GTKWave save file and the list in README.md.
-What does not: picking up (`tap.py`), writing (`waveform.py`, `gtkw.py`).
-
 Every signal of one bit is a 1-bit wire, and every signal of more bits is as many 1-bit wires, since sigrok's reader
 gives up at the first vector; the save file puts them together again. Names are unique without their scope, because
 sigrok drops scopes.

@@ -3,9 +3,6 @@
     reset ──► start-up ──► main ──► function ──► function        calls: 2 bytes each, PUSH, room for local variables
     interrupt ──► routine ──► function                           comes on top of wherever the others are
 
-What belongs here: following the code. What does not: what a run really used (`activity`), and where the stack may be
-(`image.symbols`).
-
 Each instruction that can be reached has the height of the stack above its function's entry, the largest of all ways
 to it. What cannot be told from the code is named (`unknown`): jumps by a table, recursion, and SP set in a way that
 SDCC does not use. So the result is a lower bound.

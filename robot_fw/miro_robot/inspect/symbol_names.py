@@ -1,7 +1,4 @@
-"""Addresses by name: symbols of the image, registers of the chip, numbers for the rest.
-
-What belongs here: writing operands and places with names. What does not: reading symbols (`miro_robot.image`).
-"""
+"""Addresses by name: symbols of the image, registers of the chip, numbers for the rest."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """Where the wires of a robot are picked up: levels with the exact ticks at which they change.
 
-What belongs here: reading CPU, board and chips whenever a level may change, and noting each change as (tick, place,
-level). What does not: putting parts together to pins, and files (`waveform.py`).
-
 Lines, CPU, chips and plant run ahead of each other, so changes are not noted in the order of their ticks;
 below the tick that `CpuTap.known` gives, all changes have been noted.
 """

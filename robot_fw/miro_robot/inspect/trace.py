@@ -1,7 +1,4 @@
-"""Every step of a CPU as a line: tick, address, place, instruction, and the registers and port pins that it changed.
-
-What belongs here: the watcher and the form of a line. What does not: the window of time (who attaches it), and files.
-"""
+"""Every step of a CPU as a line: tick, address, place, instruction, and the registers and port pins that it changed."""
 
 from __future__ import annotations
 

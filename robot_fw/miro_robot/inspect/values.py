@@ -1,8 +1,4 @@
-"""The values of a firmware's variables, by name and type: `read_value(cpu, image, "last_left")`.
-
-What belongs here: fetching the bytes from the CPU's memories and putting them back. What does not: which variables
-there are (`image.variables`) and what their bytes mean (`image.c_types`).
-"""
+"""The values of a firmware's variables, by name and type: `read_value(cpu, image, "last_left")`."""
 
 from __future__ import annotations
 

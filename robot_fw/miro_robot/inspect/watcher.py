@@ -1,7 +1,7 @@
 """Runs a CPU step by step and tells watchers what it did.
 
-What belongs here: the second run loop, one instruction at a time, and what a watcher is told. Each watcher has
-its own file. The CPU's hot loop stays free of all this: without an inspector it costs one test per run.
+Each watcher has its own file. The CPU's hot loop stays free of all this: without an inspector it costs one test per
+run.
 """
 
 from __future__ import annotations

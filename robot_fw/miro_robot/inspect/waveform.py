@@ -1,9 +1,5 @@
 """What happened on a robot's wires, as a VCD file.
 
-What belongs here: bringing what the tap noted into the order of time, putting port pins together from their sources,
-cutting the window out, and the VCD's header. What does not: when to look (`tap.py`), which signals there are
-(`signals.py`), and where files go (`mirotwin.commands`).
-
 Time stamps are nanoseconds, rounded down (tick * 125 // 3 at 24 MHz, as in recordings): a crystal's period fits no
 decimal timescale, and this one loses nothing, since rounding up gives the tick again.
 """

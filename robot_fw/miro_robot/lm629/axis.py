@@ -1,9 +1,7 @@
 """What an LM629 does by itself as time goes by: resets, samples and the order inside one, PWM.
 
-What belongs here: the state of the axis and its clockwork. What does not: the parts (encoder inputs, profile
-generator, filter, signals register, buffers), which live in their own files, and the host's side (`chip.py`). Time is
-in 24 MHz ticks; a chip clock is 4, a PWM period 2048, a sample 8192 of them. Rule names in comments (T1, D1, ...) are
-those of README.md in this folder.
+Time is in 24 MHz ticks; a chip clock is 4, a PWM period 2048, a sample 8192 of them. Rule names in comments (T1, D1,
+...) are those of README.md in this folder.
 
 Long because reset, sample and PWM share one clock and one class, and a compiled class is one file.
 """

@@ -1,8 +1,7 @@
 """The LM629's bus limits, against the ticks at which its pins move.
 
-What belongs here: the limits of the data sheet's timing page (6 MHz grade), and measuring. What the bytes mean is in
-`host_port.py`; the board reports violations. The modelled chip goes on as if the access was in time: what silicon does
-after a violation is not documented.
+What the bytes mean is in `host_port.py`; the board reports violations. The modelled chip goes on as if the access was
+in time: what silicon does after a violation is not documented.
 
 A tick is 125/3 ns. Only edges within one instruction can be too close: those of two instructions are at least 8
 ticks (333 ns) apart, from a port pin that moves as one ends to the address that a MOVX puts out in the next. So

@@ -1,7 +1,7 @@
 """Registers and memory of the core, and the hooks through which instructions reach the rest of the chip.
 
-What belongs here: state, and the hooks that `Cpu` fills in. Instructions are in `execute.py`. README.md in this folder
-draws the three classes `Core`, `Executor`, `Cpu` and their hooks.
+Instructions are in `execute.py`. README.md in this folder draws the three classes `Core`, `Executor`, `Cpu` and their
+hooks.
 """
 
 from __future__ import annotations

@@ -21,10 +21,8 @@
    pins -> ports -> INT0 INT1, T0 T1, T2 T2EX, RXD -> timers, serial port -> flags -> interrupts -> LCALL
                                    instructions -> SFRs -> timers, serial port, latches -> pins
 
-What belongs here: the registers of the core (ACC, B, PSW, SP, DPTR, PCON), when interrupts are taken, idle and
-power-down, MOVX, and the public face. Instructions are in `execute.py`, the rest of the chip in `peripherals.py`.
-README.md in this folder draws how `Core`, `Executor`, `Cpu` and their hooks fit together; rules with letters (C1, I1,
-..) are in it, and sources like 4316E.
+Instructions are in `execute.py`, the rest of the chip in `peripherals.py`. README.md in this folder draws how `Core`,
+`Executor`, `Cpu` and their hooks fit together; rules with letters (C1, I1, ..) are in it, and sources like 4316E.
 
 Long because it is the chip's one public class, with pins and data flow drawn above; a compiled class is one file.
 """

@@ -1,7 +1,7 @@
 """The instructions: registers, internal RAM, ALU, and the loop that executes code.
 
-What belongs here: what each line of `opcodes.TABLE` does. Special function registers, time passing in peripherals,
-interrupts and idle mode are in `Cpu` (cpu.py), which fills in the hooks of `Core` (drawn in README.md).
+Special function registers, time passing in peripherals, interrupts and idle mode are in `Cpu` (cpu.py), which fills
+in the hooks of `Core` (drawn in README.md).
 
 Timing inside an instruction (4316E section 2.4; what it leaves open is rule C1 in README.md): operands are read in the
 instruction's first cycle, `start`; results are written at the end of its last, `cycles`. The loop compares `cycles`

@@ -7,8 +7,7 @@
    serial --> RI TI --+
    timer 2 --> TF2 EXF2
 
-What belongs here: since when each source requests an interrupt, and the source that the CPU has to take at the end of
-an instruction. Flags are raised elsewhere (timers, serial port); the two-cycle LCALL itself is in `Cpu`.
+Flags are raised elsewhere (timers, serial port); the two-cycle LCALL itself is in `Cpu`.
 
 Timing (4316E section 2.16; letters are rules in README.md): flags are latched at S5P2 of every cycle and the latched
 copies are polled in the next one; an LCALL follows the polling cycle if that was the last of an instruction. So at the

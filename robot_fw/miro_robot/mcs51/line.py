@@ -1,7 +1,6 @@
 """A wire's level over time: what one chip drove and another one samples.
 
-What belongs here: edges with their ticks, and the queries a sampling receiver needs. What a level means (a
-UART bit, a strobe) belongs to the chips at both ends.
+What a level means (a UART bit, a strobe) belongs to the chips at both ends.
 
 A Line has one producer, which appends edges in order and says up to where its content is final, and consumers
 that never look beyond that tick. Edges live in a ring; the consumer forgets what is no longer needed. A line

@@ -1,8 +1,7 @@
 """Names of the AT89C52's registers, of their bits, and how an operand is written.
 
-What belongs here: the tables, and `Names`, which writes operands as numbers. With the symbols of an image,
-`miro_robot.inspect.symbol_names` writes them. Source: Atmel AT89C52 data sheet, SFR map; 8051 Hardware Manual,
-2.1.
+With the symbols of an image, `miro_robot.inspect.symbol_names` writes them. Source: Atmel AT89C52 data sheet, SFR
+map; 8051 Hardware Manual, 2.1.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The instruction set, one line per instruction: its name, its operands, its length and its time.
 
-What belongs here: the table and what follows from it (lengths, cycle counts, rows, disassembly). What an
-instruction does is in `execute.py`. Source: Atmel 8051 Hardware Manual, instruction table.
+What an instruction does is in `execute.py`. Source: Atmel 8051 Hardware Manual, instruction table.
 """
 
 from __future__ import annotations

@@ -9,9 +9,7 @@
    P3.0 RXD -------------> serial port ----------- RI TI -----+
    P3.1 TXD <------------- (uart, shift)
 
-What belongs here: the part that owns each register address, the part that each pin goes to, the timer that clocks the
-serial port, and the event horizon: `sync(cycle)` does everything below `cycle` that the core can notice; `next_event`
-is the cycle of the next `sync`. Registers of the core itself (ACC, PSW, PCON ...) are in `Cpu`.
+Registers of the core itself (ACC, PSW, PCON ...) are in `Cpu`.
 
 Timers and serial port are not stepped until one of them could raise a flag (`timer_wait`, `serial_wait`) or one of
 their registers is read or written (`settle`). Letters are rules in README.md.

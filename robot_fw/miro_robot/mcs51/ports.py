@@ -1,6 +1,6 @@
 """The four ports: latches, what the outside puts on the pins, and pushes that have not taken effect yet.
 
-What belongs here: levels. Which pins carry timer inputs and interrupts is `peripherals.py`'s.
+Which pins carry timer inputs and interrupts is `peripherals.py`'s.
 
 A pin is the wired AND of its latch and the outside (P1 to P3 quasi-bidirectional, P0 open drain with pull-
 ups). The CPU samples pins at S5P2, so a push with a tick takes effect in the first cycle whose S5P2 is not

@@ -1,6 +1,6 @@
 """The serial port in mode 0: a shift register clocked at fosc/12.
 
-What belongs here: its eight bit cycles. Registers and flags are the `Uart`'s.
+Registers and flags are the `Uart`'s.
 
 Timing (4316E section 2.13, mode 0): one full cycle lies between the write that starts it and the first bit;
 each bit takes one cycle, lowest first, sampled at S5P2; the shift clock on TXD is low from S3P1 to S6P1; TI

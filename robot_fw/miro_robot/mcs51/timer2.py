@@ -6,8 +6,7 @@
                          capture v     | reload
    fall of T2EX, EXEN2 ----> [RCAP2H|RCAP2L], and EXF2; with DCEN T2EX says up or down
 
-What belongs here: T2CON, T2MOD, TL2 TH2, RCAP2L RCAP2H, computed lazily like timers 0 and 1: `sync(cycle)`
-does all that happens in the cycles below `cycle`. Dividing its overflows down to bits is the serial port's.
+Dividing its overflows down to bits is the serial port's.
 
 Timing (4316E section 2.12, 1919D sections 10 to 13; letters are rules in README.md): as a timer it counts once per
 cycle, as a baud rate generator or clock output six times (fosc/2). TF2 is set at S2P2 and polled in the same cycle, a

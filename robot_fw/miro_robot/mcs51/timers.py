@@ -4,8 +4,7 @@
    Tx pin ---+                                     mode 2: [TL] <-- TH   mode 3: [TL0], [TH0] --> TF0, TF1
                                                    overflows of timer 1 also clock the serial port
 
-What belongs here: TMOD, the upper half of TCON, TL0 TH0 TL1 TH1, computed lazily: `sync(cycle)` does
-everything that happens in the cycles below `cycle` in one calculation. Timer 2 is in `timer2.py`.
+Timer 2 is in `timer2.py`.
 
 Timing (4316E section 2.9; what it leaves open: T1 to T3 in README.md): TR and TMOD written at the end of cycle n
 act from n + 1 on, which counts. A gate and a counter input are sampled at S5P2, and the register counts at S3P1 of the

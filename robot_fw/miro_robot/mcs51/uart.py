@@ -7,8 +7,8 @@
    RXD ----(&)--+--> 1 then 0 at a 16x tick: reset and start --> /16
                 +--> levels in its states 7, 8, 9 --> majority in state 10 --> [ D0 .. D7 | RB8 ] --> SBUF, RI
 
-What belongs here: SCON, SBUF, the two divide-by-16 counters, start bit search and majority vote. Where the 16x ticks
-come from (timer 1, timer 2, crystal) is worked out by `Peripherals`, which calls `set_clock`; mode 0 is in `shift.py`.
+Where the 16x ticks come from (timer 1, timer 2, crystal) is worked out by `Peripherals`, which calls `set_clock`;
+mode 0 is in `shift.py`.
 
 Timing (4316E section 2.13; letters are rules in README.md), all in crystal ticks: `sync(tick)` does everything below
 `tick`. Transmitter: the start bit begins at S1P1 after the first rollover that follows the write to SBUF, further bits

@@ -1,8 +1,7 @@
 """Random machine states for single-step vectors.
 
-What belongs here: which states are drawn for which opcode, and which are not because no data sheet says what
-follows. The format and the execution are in `vectors.py`. The source of chance is a function given by the
-caller: `draw(n)` returns an integer from 0 to n - 1.
+The format and the execution are in `vectors.py`. The source of chance is a function given by the caller: `draw(n)`
+returns an integer from 0 to n - 1.
 """
 
 from __future__ import annotations

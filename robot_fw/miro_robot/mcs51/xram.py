@@ -1,7 +1,6 @@
 """A bus with 64 KB of RAM on it and nothing else.
 
-What belongs here: the RAM, and handing on what the CPU reports. Feeding the serial port is
-`miro_robot.bare.machine`'s.
+Feeding the serial port is `miro_robot.bare.machine`'s.
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
 """The camera: robots and the scene behind them, sampled into windows of a picture.
 
-What belongs here: which paints a pixel sees, and assembling a window. What does not: what stands still (`scene`), how
-paints become bytes (`sensor`), which window is looked at (whoever asks).
-
 A pixel is 4 x 4 samples for each instant of the exposure. A sample's ray falls from the height of the robots' tops to
 the floor; in a robot's axes that is a straight line from `top` on by `fall`:
 

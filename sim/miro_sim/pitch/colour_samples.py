@@ -1,8 +1,4 @@
-"""The colours as a camera shows them: what somebody would sample who holds each robot under it once.
-
-What belongs here: pictures of one robot at a time at a few places, and the pixels in the middle of its patches. What
-does not: what classes are made of the samples (`miro_host.eye.colours`).
-"""
+"""The colours as a camera shows them: what somebody would sample who holds each robot under it once."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """Whether robots touch: squares seen from above, checked at the ticks of a grid in time.
 
-What belongs here: geometry, the grid, and when two robots can touch at the earliest. What does not: what contact does
-to them; so far it is only reported. Pushing will need the robots at one tick, so the grid is where they meet.
+Pushing will need the robots at one tick, so the grid is where they meet.
 
 A check is needed only while two bodies can touch before the next one: they are further apart than their circumscribed
 circles, and each of them closes in by no more than its top speed.

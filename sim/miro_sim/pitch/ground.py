@@ -1,7 +1,6 @@
 """The pitch: its size, where the paper's axes lie on it, and whether a robot stands on it.
 
-What belongs here: the geometry. What does not: refusing scenarios (`scenario.places`), counting the time off the pitch
-(`summary`). There are no walls yet: a robot that drives off the pitch drives on.
+There are no walls yet: a robot that drives off the pitch drives on.
 
     top 80 cm     +--------------------------------------+
                   |                                      |   130 x 90 cm, robots of 7.5 x 7.5 cm:

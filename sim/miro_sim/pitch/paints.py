@@ -1,7 +1,6 @@
 """The paints of the scene: how much of red, green and blue light each surface throws back.
 
-What belongs here: the paints. What does not: where they are (`scene`, `camera`), and what a camera makes of them
-(`sensor`). Chosen to look like photographs of MiroSot pitches: nothing was measured on a real one.
+Chosen to look like photographs of MiroSot pitches: nothing was measured on a real one.
 
 Shares of the light, linear, in 1/1000. A camera with gain 1 shows 1000 as white.
 """

@@ -1,8 +1,4 @@
-"""What a camera makes of light, apart from its geometry: exposure, brightness, the television signal, noise.
-
-What belongs here: the numbers, with units and ranges. What does not: what they do (`camera`, `sensor`), where the
-camera hangs (`miro_host.eye.camera_parameters`), and what the grabber does with whole frames.
-"""
+"""What a camera makes of light, apart from its geometry: exposure, brightness, the television signal, noise."""
 
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """Where the corners of all pixels look, in integers: the camera's geometry, worked out once.
 
-What belongs here: rays, and how far apart they are. What does not: what they hit (`scene`, `camera`).
-
        camera                        corner (i, j) of pixel (i, j), 321 x 241 of them
          /\\                          slope: how far a ray goes for each unit that it falls, times 2^22
         /  \\                         top: where it passes the height of the robots' tops, in um

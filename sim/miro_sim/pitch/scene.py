@@ -1,7 +1,5 @@
 """What stands still while the camera looks: floor, lines, goals, walls and the ball.
 
-What belongs here: which paint a ray hits, and the picture of all that. What does not: robots (`camera`).
-
         +---------[ 40 cm goal is 15 cm deep ]--+
         |/ 7 cm              |                 \\|      walls 5 cm high, 2.5 cm wide, white inside, black on top
      +--+         circle     |                  +--+    lines 3 mm wide

@@ -1,8 +1,5 @@
 """From light to the grabber's bytes, a line at a time: brightness, gamma, composite video, noise, quantisation.
 
-What belongs here: what happens to a pixel after it is known which paints it sees. What does not: geometry (`rays`), and
-what is in the picture (`scene`, `camera`).
-
     sum of paints -> falloff, flicker, gain, offset -> gamma -> Y Cb Cr -> line jitter -> chroma low-pass
                   -> + noise of this pixel and frame -> quantised to `bits` -> Y, Cb, Cr bytes
 

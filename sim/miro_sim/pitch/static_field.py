@@ -1,7 +1,4 @@
-"""What a calibration alone gets wrong: a posture as somebody reads it who sees the patches without any error.
-
-What belongs here: the patches through the true lens and back through the calibration. What does not: pixels, noise.
-"""
+"""What a calibration alone gets wrong: a posture as somebody reads it who sees the patches without any error."""
 
 from __future__ import annotations
 

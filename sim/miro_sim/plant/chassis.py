@@ -1,8 +1,6 @@
 """The rigid robot on two wheels: impulses on the motor shafts in, shaft speeds and posture out.
 
-What belongs here: the inertia that couples the two shafts, Coulomb friction, the posture. What does not:
-where the impulses come from, encoders, and a body whose wheels may slip (`rough`). Wheels roll without slipping (keep
-below 7.8 m/s2).
+Wheels roll without slipping (keep below 7.8 m/s2).
 
 With the shaft speeds w = (left, right) and c = wheel radius / gear ratio the robot goes at
 v = (cl wl + cr wr) / 2 and turns at (cr wr - cl wl) / b; its energy is w' M w / 2 with

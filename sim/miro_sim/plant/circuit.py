@@ -1,8 +1,5 @@
 """One motor winding and its half of the H-bridge: the current through an interval with frozen back-EMF.
 
-What belongs here: the piecewise linear circuit and its exact solution. What does not: torque, speed, who
-switches the bridge and when.
-
 The winding's time constant (13 us driven, 22 us through the diodes) is shorter than a PWM period (85 us):
 the current ripples fully and stands at zero for part of the period at light load, so no average-voltage model
 holds. With the current i positive the bridge puts a voltage `up` on the winding, with i negative `down`:

@@ -1,8 +1,5 @@
 """The force and the yaw torque that disturb one robot's body, as a function of the tick.
 
-What belongs here: constant, sine and noise added up. What does not: what they do to the body (`rough`), their sizes
-(`params`).
-
 Noise is uniform within +- its bound and holds for a period: draws 2 k (force) and 2 k + 1 (torque) in period k.
 """
 

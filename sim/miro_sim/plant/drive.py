@@ -6,9 +6,6 @@
                                                 |
     A, B to the LM629 <-- quadrature <-- angle -+--> posture (x, y, heading)        once per step, left and right
 
-What belongs here: the order of a step and the reporting of edges. What does not: the physics of the parts
-(`circuit`, `chassis`, `rough`, `encoder`), figures (`params`).
-
 A step of at most one PWM period: currents with the back-EMF of its start, shaft impulses kM * charge,
 friction, mean of old and new speed into angle and posture, edges interpolated inside it. Holding the back-EMF
 makes energy only to second order, (kM charge)2 / 2J: by Cauchy-Schwarz less than step / (2 time constant),

@@ -1,8 +1,5 @@
 """A two-channel incremental encoder on a motor shaft: angle in, edges with their ticks out.
 
-What belongs here: angle -> count -> levels of A and B, and the tick of each edge inside a step. What does
-not: the LM629's filter and counter.
-
 Count n stands for positions n <= p < n + 1 (in quarter lines). Forward A leads B: (A, B) goes 00, 10, 11, 01.
 Inside a step the shaft turns evenly; an edge falls on the first integer tick at which p has the new count.
 """

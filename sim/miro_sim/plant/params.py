@@ -1,8 +1,5 @@
 """What a robot's drive is made of: the figures of the default robot, each with its source.
 
-What belongs here: frozen, checked parameter structures in SI units, the disturbances of the drive among them (all off
-by default), and what follows from them by plain arithmetic. What does not: equations of motion, state.
-
 Sources: Faulhaber 2224 006 SR catalogue figures, which close on themselves (no-load speed, stall torque and
 the 11 ms time constant follow from them); ST L298 data sheet, total saturation drop; the robot is a MiroSot
 cube of 7.5 cm and 0.5 kg.

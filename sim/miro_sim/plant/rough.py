@@ -1,9 +1,5 @@
 """The robot where `chassis` is too kind: wheels slip, a ball drags, shafts stick, gears have play, a force pushes.
 
-What belongs here: the body with five velocities (two shafts; forward, sideways and turning of the chassis) and the
-friction between them. What does not: the body whose wheels only roll (`chassis`, used while all of this is off), the
-disturbing force as a function of time (`disturbance`), figures (`params`).
-
     motor --> shaft (inertia, Coulomb friction) --c--> contact (grip times load) --> chassis <-- ball, disturbing force
 
 A step turns the velocity into the new heading, adds the impulses of motors and disturbance, and then looks for the

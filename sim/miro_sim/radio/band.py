@@ -1,6 +1,6 @@
 """The band up, as the PC's receiver hears it: the TXD wires of all robots of a network mixed into one level.
 
-What belongs here: the level as a function of time. At tick t, with u = t - latency,
+At tick t, with u = t - latency,
 
 * a robot's carrier is up while its TXD had an edge in (u - 50000, u], from its first start bit until two
   characters after its last edge, unless its `dropouts` chain is bad in slot u // 2500;

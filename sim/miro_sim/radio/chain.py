@@ -1,7 +1,5 @@
 """A two-state Markov chain over bit times that can be asked about any of them, in any order.
 
-What belongs here: is the chain in its bad state in slot i? What that does to a bit belongs to who asks.
-
 A chain's state depends on its whole past, unless the draws are coupled. Here one draw u of slot i decides
 for both states at once:
 

@@ -1,10 +1,8 @@
 """Whether the radio of a network works: as it does, switched off, or drowned in noise.
 
-What belongs here: the three conditions. What does not: what a receiver makes of them (`listener` down, `band` up).
-
-    up      as the parameters say
-    down    the transmitters are off: receivers hear no carrier, which is mark if squelched, else noise
-    noise   a stronger transmitter sends noise: receivers hear a fair random bit in each bit time, squelched or not
+up      as the parameters say
+down    the transmitters are off: receivers hear no carrier, which is mark if squelched, else noise
+noise   a stronger transmitter sends noise: receivers hear a fair random bit in each bit time, squelched or not
 """
 
 from typing import Literal

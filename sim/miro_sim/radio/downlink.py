@@ -1,7 +1,6 @@
 """The band down: one transmitter, and one receiver per robot of the network.
 
-What belongs here: announced transmissions, and the tick up to which the robots' wires are final. What is on the air is
-in `sender`, what a robot receives of it in `listener`.
+What is on the air is in `sender`, what a robot receives of it in `listener`.
 
 A transmission handed over for tick s arrives at s + latency + jitter, or when the one before it is over.
 The jitter is drawn from `NAME/jitter` at index s // 2500: 0 .. jitter_ticks, all alike. A transmission that

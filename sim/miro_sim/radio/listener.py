@@ -1,7 +1,5 @@
 """One robot's receiver: from what is on the air to the level on its RXD wire.
 
-What belongs here: the chain that a bit goes through, in this order, and its draws:
-
     collision   another carrier on the frequency has another level: a fair coin           `NAME/collision`
     carrier     lost in a drop-out: noise, or mark if squelched          `NAME/dropouts`, `NAME/noise`
     slicer      its threshold gives the chance of an error

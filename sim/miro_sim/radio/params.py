@@ -1,8 +1,4 @@
-"""The parameters of a radio band, in the units of the models: ticks and 2^-32.
-
-What belongs here: the parameters, their ranges and their conversion from the units that people write. What
-does not: the keys of a scenario (`miro_sim.scenario.radio_keys`) and what a parameter does (the part it is for).
-"""
+"""The parameters of a radio band, in the units of the models: ticks and 2^-32."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Probabilities as thresholds of a 32-bit draw, and the bit errors of non-coherent FSK.
-
-What belongs here: conversions that run once, when a band is built; what comes out are integers. What does
-not: the draws (`miro_exact.rng`) and who makes them.
-"""
+"""Probabilities as thresholds of a 32-bit draw, and the bit errors of non-coherent FSK."""
 
 from __future__ import annotations
 

@@ -1,9 +1,5 @@
 """A transmitter as the robots hear it: what it has on the air, and when each bit of it begins.
 
-What belongs here: transmissions under way and their bit times on the robots' clock. A robot's clock is the
-tick, so the PC's baud rate and the robot's crystal show as one ratio; a bit begins at a whole tick, rounded
-down from the exact fraction, so that nothing adds up. What does not: what receivers make of it (`listener`).
-
 A character with a bad stop bit has space in place of it for three quarters of a bit, and mark for the last one. An 8051
 samples the stop bit at 7, 8 and 9 sixteenths and looks for the next start bit from 10 sixteenths on, a UART that
 samples once does both in the middle: all of them take the stop bit for bad and see the fall of the next start bit.

@@ -1,8 +1,5 @@
 """The data slicer of a receiver: a threshold that follows the mean of the signal it decides about.
 
-What belongs here: where the threshold is, and how likely a bit is then decided wrongly. What does not: the
-draw (`listener`), and the noise of a receiver without a carrier.
-
 The discriminator puts out +1 for mark and -1 for space (here times 65536), plus a constant `offset` while
 there is a carrier (the crystals of the two ends differ), and noise of mean 0 without one. The threshold is
 that, smoothed with one time constant (AC coupling): at rest it is at 0, so after key-up it has to climb to

@@ -4,9 +4,8 @@
     duration_s = 1.0                       any key of a scenario: stands instead of the other one's, a table as a whole
     set = { network.robot.slot = 1 }       single keys of tables, as `--set` on the command line
 
-What belongs here: putting the tables of both together. What does not: finding the other one's text (`file`), the rules
-of settings (`settings`). The words are those of a stream file's header. The result is a whole scenario, which is what a
-recording keeps: it depends on no other file.
+The words are those of a stream file's header. The result is a whole scenario, which is what a recording keeps: it
+depends on no other file.
 """
 
 from collections.abc import Callable

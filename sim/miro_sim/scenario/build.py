@@ -1,8 +1,4 @@
-"""From the keys of a scenario to the objects that they describe.
-
-What belongs here: conversion of units and names. What does not: the meaning of a key (`keys.py`), and what an object
-does (its own module).
-"""
+"""From the keys of a scenario to the objects that they describe."""
 
 from __future__ import annotations
 

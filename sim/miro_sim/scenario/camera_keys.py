@@ -1,8 +1,5 @@
 """The scenario's `[camera]`: which kinds there are and their keys, with unit, default and range.
 
-What belongs here: the structs and the rules between their keys. What does not: what a key does (`pitch`, `world.sight`,
-`miro_host.eye`), and whether the camera sees what it should (`places`).
-
 A kind is chosen by `kind`:
 
     pixels     a picture is rendered, and a tracker finds the robots in it

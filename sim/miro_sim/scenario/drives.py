@@ -1,8 +1,5 @@
 """Checks that a robot can drive its reference under its law: speed, accelerations, and the law's origin.
 
-What belongs here: these checks and their messages. What does not: whether the reference stays on the pitch, and the
-times at which a path is looked at (`places`).
-
 Speeds and accelerations are compared with the limits that hold for the commands: the speed of a wheel, and the law's
 limits of z_cmd and of its change from one camera frame to the next. The robot starts at rest.
 """

@@ -1,8 +1,4 @@
-"""What is wrong with a scenario, in one line: file, key path, what, and what to write instead.
-
-What belongs here: the messages. msgspec finds the mistakes and their places; this file turns them into the
-scenario's terms. What does not: reading files (`file`) and the rules themselves (`keys`).
-"""
+"""What is wrong with a scenario, in one line: file, key path, what, and what to write instead."""
 
 import re
 from difflib import get_close_matches

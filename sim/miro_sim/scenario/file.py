@@ -1,8 +1,6 @@
 """Scenario files: finding one, reading it, and saying in one line what is wrong with it.
 
-What belongs here: TOML text to `Scenario`, and the built-in scenarios. What does not: which keys there are
-(`keys`), and the words of an error (`errors`). Nothing but `ScenarioError` leaves these
-functions, whatever the text.
+Nothing but `ScenarioError` leaves these functions, whatever the text.
 """
 
 import re

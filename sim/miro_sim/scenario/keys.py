@@ -1,11 +1,5 @@
 """The scenario: everything about a run that is chosen rather than drawn, as frozen structs.
 
-What belongs here: the keys a scenario file may have, with unit, default and range, and the rules between
-them; those of the radio are in `radio_keys`, those of the camera in `camera_keys`, those of laws and references in
-`miro_host`. What does not: reading
-files (`file`) and reporting what is wrong in them (`errors`), and what the keys do (`miro_host`, `radio`, `plant`,
-`world`).
-
 Every key carries its unit. Defaults are the "realistic" set: a rendered picture, a calibration that is wrong by up to
 2.40 cm, one camera frame of vision delay, 3 ms of computing, a keyed carrier and a
 bit-error rate of 1e-4.

@@ -1,8 +1,4 @@
-"""Tables of a scenario whose keys depend on the part that they name: `law = "yang_kim"` and the keys of that law.
-
-What belongs here: which table names which kind of part, and reading such a table. What does not: finding a part
-(`miro_host.parts`), the other keys (`keys`), and the words of an error (`errors`).
-"""
+"""Tables of a scenario whose keys depend on the part that they name: `law = "yang_kim"` and the keys of that law."""
 
 import re
 from typing import Any

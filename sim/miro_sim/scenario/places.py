@@ -1,8 +1,6 @@
 """Checks that the robots of a scenario start on the pitch, and that their references stay on it and can be driven.
 
-What belongs here: the check and its messages. What does not: the geometry (`pitch`), what can be driven under which
-law (`drives`), all other rules (`keys`). The time that a robot spends off the pitch during a run is counted by
-`summary`.
+The time that a robot spends off the pitch during a run is counted by `summary`.
 
 Checked are the square of the robot at its start, and the same square at the reference, along the whole of its path: a
 robot that follows the reference without error has it there. Of a reference from another distribution, whose path is not

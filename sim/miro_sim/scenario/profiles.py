@@ -1,8 +1,4 @@
-"""Radio profiles: named sets of `[network.radio]` keys, and how a scenario's table is made of them.
-
-What belongs here: the names, and which key wins. What does not: what the keys mean (`radio_keys`) and
-whether their values are good (`file`).
-"""
+"""Radio profiles: named sets of `[network.radio]` keys, and how a scenario's table is made of them."""
 
 import tomllib
 from collections.abc import Mapping

@@ -1,8 +1,4 @@
-"""The scenario's `[network.radio]`: which keys there are, with unit, default and range.
-
-What belongs here: the structs and the rules between their keys. What does not: the named sets of these keys
-(`profiles`), what a key does (`radio/README.md`) and the rest of a scenario (`scenario`).
-"""
+"""The scenario's `[network.radio]`: which keys there are, with unit, default and range."""
 
 from typing import Annotated, Literal
 

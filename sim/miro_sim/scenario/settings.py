@@ -1,9 +1,5 @@
 """Single keys of a scenario that are set from outside: `KEY=VALUE`, as the command line's `--set` takes them.
 
-What belongs here: reading a setting, putting it into a scenario's tables, and naming the setting in an error that it
-caused. What does not: which keys there are (`keys`), and what is wrong with a value (`errors`): a scenario is checked
-as a whole after all settings were made, in their order, as if its file had said so.
-
 KEY is the path of a key, `network.0.robot.0.controller.gamma1_per_s`. An index may be left out where a list has one
 entry: `network.robot.controller.gamma1_per_s`. VALUE is read as TOML, and as text if it is none; an inline table
 replaces a whole table. `variant=NAME` stands for all that the variant changes (`variants`).

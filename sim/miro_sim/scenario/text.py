@@ -1,8 +1,4 @@
-"""The text of a scenario as TOML: what may be given to the parser, and writing one.
-
-What belongs here: limits of the text, tables to text. What does not: what the tables mean (`keys`), finding and reading
-files (`file`).
-"""
+"""The text of a scenario as TOML: what may be given to the parser, and writing one."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,8 +1,5 @@
 """Variants: named amounts of disturbance for a whole scenario, `ideal` and `realistic`.
 
-What belongs here: the names, the keys that disturb, and which key wins. What does not: what the keys mean (`keys`) and
-whether their values are good (`file`).
-
 Two rules. On the command line (`--set variant=ideal`) a variant wins over the file, because that is what it is asked
 for: all keys that disturb are taken out of the scenario, and those of the variant put in; settings after it win over
 it. In a file (`variant = "ideal"`) it is a default: keys that the file gives win.

@@ -1,8 +1,4 @@
-"""Checks that the camera of a scenario sees the pitch and the robots that start on it.
-
-What belongs here: the check and its messages. What does not: the geometry (`miro_host.eye.lens`), all other rules about
-the camera (`camera_keys`).
-"""
+"""Checks that the camera of a scenario sees the pitch and the robots that start on it."""
 
 from __future__ import annotations
 

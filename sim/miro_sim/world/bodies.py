@@ -1,6 +1,6 @@
 """The robots of a world as bodies on one pitch: when pairs have to be checked for contact, and which robots touch.
 
-What belongs here: pairs, and the reports. What does not: the geometry (`pitch/contact.py`). A report changes nothing.
+A report changes nothing.
 """
 
 from __future__ import annotations

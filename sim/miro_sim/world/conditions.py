@@ -1,7 +1,6 @@
 """The conditions of a wait: `World.run_until(condition)`.
 
-What belongs here: one small frozen struct a kind of condition, and whether an event fulfils it. What does not: moving
-the world (`waits.py`). `slot` None is the network's first robot; conditions of the PC have none.
+`slot` None is the network's first robot; conditions of the PC have none.
 """
 
 from __future__ import annotations

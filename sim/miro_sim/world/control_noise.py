@@ -1,7 +1,5 @@
 """Noise in the control signal: what the paper's analogue link added to a command, as a valid frame carries it.
 
-What belongs here: the draw, and where it is added. What does not: bit errors (`radio/`), which the CRC finds.
-
 Yang & Kim, section V-A, disturbance 2: "The control commands are sent to the mobile robot as the RF signal,
 which is inevitably contaminated with added noises ... the upper bounds of the noises were set
 heuristically." A digital frame has no such noise, so it is put where that signal had it: behind controller

@@ -1,8 +1,5 @@
 """What somebody does to the robots and the radio of a network at a tick: reset pins, supplies, radio on and off.
 
-What belongs here: the deeds that wait, in order, and doing them. What does not: what a part makes of it (`Board`,
-`radio/`), and when the world stops for it (`world.py`).
-
 A deed takes effect before anything else happens at its tick. The radio is settled a little ahead of the robots, so its
 band down changes `SETTLE_TICKS` earlier than the rest, for the same tick: RADIO_DOWN and RADIO_UP are two entries. What
 waits is saved, but no part of the digest: a run does not depend on when a deed was announced.

@@ -1,24 +1,21 @@
 """What happened in a world: one record per event, from the logs of the boards and of the PC.
 
-What belongs here: the record, the PC's log, and reading the boards' logs. What does not: the conditions of a wait
-(`conditions.py`) and the waiting (`waits.py`).
-
-    what        at the tick at which                                          fields
-    sent        the first start bit of a host's transmission leaves           data, good_stop (of all characters)
-    heard       the PC has sampled the stop bit of a character                value, good_stop
-    answer      the PC has sampled the last stop bit of a robot's answer      frame, slot
-    received    a robot's serial port sets RI for a character                 value, good_stop
-    transmitted a robot's serial port sets TI for a character                 value
-    frame       ... for the last character of a valid frame                   frame
-    command     an LM629 has taken the last byte of a command                 side, opcode, data
-    fault       the firmware did what it must not                             value (the kind), address
-    reached     the instruction at an address is next                         address
-    edge        a pin changes                                                 pin, value (the new level)
-    true        a predicate is true                                           -
-    reset       the level at a robot's reset pin is set                       value, slot
-    power       a robot's supply is switched                                  value (1: on), slot
-    radio       a network's radio works, is off, or gives noise               value (of `radio.condition`)
-    touch       two robots have begun to touch, seen every millisecond        value (slot), other (network, slot)
+what        at the tick at which                                          fields
+sent        the first start bit of a host's transmission leaves           data, good_stop (of all characters)
+heard       the PC has sampled the stop bit of a character                value, good_stop
+answer      the PC has sampled the last stop bit of a robot's answer      frame, slot
+received    a robot's serial port sets RI for a character                 value, good_stop
+transmitted a robot's serial port sets TI for a character                 value
+frame       ... for the last character of a valid frame                   frame
+command     an LM629 has taken the last byte of a command                 side, opcode, data
+fault       the firmware did what it must not                             value (the kind), address
+reached     the instruction at an address is next                         address
+edge        a pin changes                                                 pin, value (the new level)
+true        a predicate is true                                           -
+reset       the level at a robot's reset pin is set                       value, slot
+power       a robot's supply is switched                                  value (1: on), slot
+radio       a network's radio works, is off, or gives noise               value (of `radio.condition`)
+touch       two robots have begun to touch, seen every millisecond        value (slot), other (network, slot)
 """
 
 from __future__ import annotations

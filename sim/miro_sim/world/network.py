@@ -1,8 +1,4 @@
-"""One radio network: a host station, the air both ways, and the robots that share the frequency.
-
-What belongs here: what happens to all robots of a network together in a control period. What does not: the air
-itself (`radio/`), the order of networks and the clock (`world.py`).
-"""
+"""One radio network: a host station, the air both ways, and the robots that share the frequency."""
 
 from __future__ import annotations
 

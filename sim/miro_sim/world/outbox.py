@@ -1,9 +1,7 @@
 """What a network's host is going to send: frames of the station, a script, and characters that are injected.
 
-What belongs here: the order in which they get the transmitter. What does not: the air (`radio/`), and when it is
-settled (`network.py`). The transmitter is a serial port: one transmission after the other, in the order of their
-first start bits. A frame of the station is dropped and counted while the transmitter is busy; an injected
-transmission is refused then.
+The transmitter is a serial port: one transmission after the other, in the order of their first start bits. A frame of
+the station is dropped and counted while the transmitter is busy; an injected transmission is refused then.
 
 A transmission waits here until its carrier may come up before the tick up to which the air is settled next. What waits
 is saved, but no part of the digest: a run does not depend on when it was announced.

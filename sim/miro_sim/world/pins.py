@@ -1,8 +1,6 @@
 """Pins of a robot's board that one can wait for, and their edges with exact ticks.
 
-What belongs here: names, and the edges of those that a wait asked for. What does not: where levels are picked up
-(`miro_robot.inspect.tap`). Encoder channels and busy bits are not among them: the board learns of
-their edges late.
+Encoder channels and busy bits are not among them: the board learns of their edges late.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """One robot of the world: its electronics and drive, and the pilot on the PC that steers it.
 
-What belongs here: building both from a scenario's `[[network.robot]]` table, and reading off what observers record.
-What does not: time (`world.py`) and the radio that joins the two (`network.py`). The pilot never reads the robot:
-it gets the camera's measurement and the robot's last answer by radio, and answers with a command.
+The pilot never reads the robot: it gets the camera's measurement and the robot's last answer by radio, and answers
+with a command.
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
 """The form of a saved world: what it belongs to, its state, and a checksum over both.
 
-What belongs here: writing that form and refusing everything else. What does not: the state itself, whose values the
-world's tables check (`miro_exact.state`).
-
     magic               8 bytes
     version             16 bytes, of the program that saved it: ASCII, filled up with zeros
     tables              32 bytes, SHA-256 over names and forms of all fields of the state

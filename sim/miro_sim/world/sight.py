@@ -1,8 +1,5 @@
 """What a host is told of where its robots are: an exposure of the world in, measurements out, whole frames late.
 
-What belongs here: the kinds of camera as the world runs them, and the draws that they need. What does not: pixels and
-tracking (`pitch`, `miro_host.eye`), and what is done with a measurement (`network`).
-
     pixels      robots of all networks -> picture -> tracker -> grabber
     geometric   own robots -> patches through the lens, back through the calibration -> grabber
     gaussian    own robots -> white noise (`miro_host.vision`)

@@ -1,8 +1,5 @@
 """Waiting in virtual time: moves a world to the first tick at which a condition is true.
 
-What belongs here: the search for that tick. What does not: the conditions (`conditions.py`), what has to be
-watched for them (`watch.py`), the record of an event (`events.py`), and moving the world (`world.py`).
-
 The world runs in pieces that end before the control period does. If the condition came true inside one, the world
 goes back to the piece's begin and runs again to the tick of the event: a run gives the same bits however it is cut, so
 nothing is lost and nothing is changed. Events behind that tick are left to the next wait.

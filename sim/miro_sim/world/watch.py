@@ -1,8 +1,4 @@
-"""What has to be watched for the conditions of one wait: marked addresses, pins, predicates.
-
-What belongs here: setting up in robots what the conditions need, and removing it again. What does not: moving the
-world and the order of events (`waits.py`).
-"""
+"""What has to be watched for the conditions of one wait: marked addresses, pins, predicates."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """The world: every robot, radio and pilot of a scenario, moved on by one integer clock.
 
-What belongs here: the order in which the parties act, the digest chain, and save and load. What does not: what a
-party does (`network.py`, `robot.py`, `miro_host`, `miro_robot`), files, and the wall clock.
-
 Order on the tick of a camera frame: networks by index; within one, all robots are exposed (slot order), all pilots
 compute, the station composes its frame. Then everything runs piece by piece from rendezvous to rendezvous: the end of
 the control period, where the caller wants to stop, the contact grid. In a piece the transmitters put on the air what

@@ -1,7 +1,4 @@
-"""The ports of `serve`: telnet negotiation fed with bytes, and TCP and terminals with a client that does anything.
-
-What belongs here: what a client can do. What does not: the world behind, of which a buffer is enough.
-"""
+"""The ports of `serve`: telnet negotiation fed with bytes, and TCP and terminals with a client that does anything."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Files of characters: streams, pcapng, hex text, and what `decode` and `export` make of any file.
-
-What belongs here: readers of characters. What does not: recordings in full (`recordings`).
-"""
+"""Files of characters: streams, pcapng, hex text, and what `decode` and `export` make of any file."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""A firmware and what stands beside it: images, symbol and debug files, tracefiles.
-
-What belongs here: readers that the `fw` commands use. What does not: what a machine is given beside its firmware
-(`machines`).
-"""
+"""A firmware and what stands beside it: images, symbol and debug files, tracefiles."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""What a machine is given beside its firmware: levels on pins, serial input with conditions, a board file.
-
-What belongs here: `--pins`, `--stdin` and their conditions, and boards other than the robot's. What does not: files of
-names (`firmware`).
-"""
+"""What a machine is given beside its firmware: levels on pins, serial input with conditions, a board file."""
 
 from __future__ import annotations
 

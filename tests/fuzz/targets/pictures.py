@@ -1,7 +1,4 @@
-"""What the tracker reads: pictures, calibrations, colours, control points, samples; and the tracker on drawn patches.
-
-What belongs here: files of `track` and `calibrate`. What does not: pictures inside a recording's container.
-"""
+"""What the tracker reads: pictures, calibrations, colours, points, samples; and the tracker on drawn patches."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Recordings: MCAP files as they are, and files whose records are drawn and whose lengths and sums are right.
-
-What belongs here: all that reads a `run.mcap`. What does not: pictures in it (`pictures`).
-"""
+"""Recordings: MCAP files as they are, and files whose records are drawn and whose lengths and sums are right."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What people write to say what runs: scenarios with steps and expectations, settings, cases, URLs.
-
-What belongs here: readers of a scenario's words. What does not: the run itself, but for its first moments.
-"""
+"""What people write to say what runs: scenarios with steps and expectations, settings, cases, URLs."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """Saved states whose fields are others and whose checksum is right: worlds, a board, a bare machine.
 
-What belongs here: loading. What does not: how a world is saved, and bytes that are changed blindly
-(`tests.sim.mutated_worlds`).
-
 An input names fields by number, each with the bytes that stand there instead. A field of fixed size keeps it unless
 the input says otherwise. The state must be refused with a ValueError and without a change, or run on.
 """

@@ -1,7 +1,4 @@
-"""The wire: the window decoder by each way of feeding it, frames, the host's ear.
-
-What belongs here: characters in, events out. What does not: files of characters (`captures`).
-"""
+"""The wire: the window decoder by each way of feeding it, frames, the host's ear."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
 """Prints what the paper claims beside what its law does on robots without delay, noise or quantum.
 
-    python -m tests.host.theory.claims [--starts 100]
-
-What belongs here: the table. What does not: assertions (`test_theorem`, `test_stability`), and the whole loop.
+python -m tests.host.theory.claims [--starts 100]
 """
 
 import argparse

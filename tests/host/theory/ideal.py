@@ -1,7 +1,4 @@
-"""Robots of the theory on their way: laws as demands for `miro_host.theory.simulation`, and the paper's starts.
-
-What belongs here: what the tests of this folder and `claims` share. What does not: assertions.
-"""
+"""Robots of the theory on their way: laws as demands for `miro_host.theory.simulation`, and the paper's starts."""
 
 import math
 import random

@@ -1,7 +1,4 @@
-"""The rates of s and V under the law, and states inside and outside of the boundary layer of theta_e.
-
-What belongs here: what `test_stability` and `claims` share. What does not: assertions, runs (`ideal`).
-"""
+"""The rates of s and V under the law, and states inside and outside of the boundary layer of theta_e."""
 
 import random
 

@@ -1,7 +1,4 @@
-"""Campaigns that the tests run: short ones.
-
-What belongs here: making a plan of a text, and reading its results. What does not: what is expected of them.
-"""
+"""Campaigns that the tests run: short ones."""
 
 from concurrent.futures import Executor, Future
 from pathlib import Path

@@ -1,7 +1,4 @@
-"""An engine for tests: it changes inputs by chance, in this process, and keeps those that reach new edges.
-
-What belongs here: enough of an engine to test a campaign. What does not: fuzzing well.
-"""
+"""An engine for tests: it changes inputs by chance, in this process, and keeps those that reach new edges."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What a target makes of some inputs: `python -m tests.mirotwin.fuzz.target_digest --engine python`.
-
-What belongs here: the inputs, and one line for each. What does not: the comparison (`test_target.py`).
-"""
+"""What a target makes of some inputs: `python -m tests.mirotwin.fuzz.target_digest --engine python`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""A target for tests of engines, without a robot: it fails for an input that begins with FZ.
-
-What belongs here: the smallest thing that an engine can run. What does not: tests.
-"""
+"""A target for tests of engines, without a robot: it fails for an input that begins with FZ."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Ports in the test's own process: a world, a selector, and clients that are waited for.
-
-What belongs here: what the tests of sockets, of RFC 2217 and of terminals share. What does not: sessions as processes
-(`rig`).
-"""
+"""Ports in the test's own process: a world, a selector, and clients that are waited for."""
 
 import socket
 import time

@@ -1,7 +1,4 @@
-"""What the tests of plugs share: a served session, frames, and whether a recording replays to its own digests.
-
-What belongs here: starting `mirotwin serve` and reading what it leaves. What does not: clients, which each test brings.
-"""
+"""What the tests of plugs share: a served session, frames, and whether a recording replays to its own digests."""
 
 from __future__ import annotations
 

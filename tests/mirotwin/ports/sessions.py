@@ -1,9 +1,9 @@
 """Live sessions under load, each replayed: `python -m tests.mirotwin.ports.sessions --count 50`.
 
-What belongs here: the sessions and what must hold of each; `test_sessions` runs a few. Some run at once, beside
-processes that keep all processors busy, so worlds are late and bytes arrive at any time. A client asks robots at random
-moments, in pieces that may end anywhere, and vanishes in some sessions in the middle of a frame. Then the recording has
-to give the same digest in every control period when what the hosts sent is sent again.
+Some run at once, beside processes that keep all processors busy, so worlds are late and bytes arrive at any time. A
+client asks robots at random moments, in pieces that may end anywhere, and vanishes in some sessions in the middle of
+a frame. Then the recording has to give the same digest in every control period when what the hosts sent is sent
+again.
 """
 
 from __future__ import annotations

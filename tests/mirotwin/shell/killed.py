@@ -1,10 +1,9 @@
 """Kills runs at random moments and looks at what is left: `python -m tests.mirotwin.shell.killed --times 200`.
 
-What belongs here: the rounds and what must hold after each; `test_broken_off` runs a few. A run writes the time at
-which each control period was computed into memory that it shares with this process (by a callback put in here, the
-program knows nothing of it). SIGKILL comes at a random moment after its first control period. Then the recording has to
-be readable, what it lacks has to be at most half a second of wall time, its digests have to be those of the other
-rounds, and nothing else may be in the folder.
+A run writes the time at which each control period was computed into memory that it shares with this process (by a
+callback put in here, the program knows nothing of it). SIGKILL comes at a random moment after its first control
+period. Then the recording has to be readable, what it lacks has to be at most half a second of wall time, its digests
+have to be those of the other rounds, and nothing else may be in the folder.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""A board with a few assembled lines in its flash, on the bench: no radio, no motors.
-
-What belongs here: building it, the programs' common parts, and other wirings. What does not: expectations.
-"""
+"""A board with a few assembled lines in its flash, on the bench: no radio, no motors."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""A robot on the bench: the real image on the board, a transmitter on RXD, a receiver on TXD, no motors.
-
-What belongs here: putting characters on the wire, reading variables and what the chips were told.
-What does not: expectations.
-"""
+"""A robot on the bench: the real image on the board, a transmitter on RXD, a receiver on TXD, no motors."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Reads a VCD back with pyvcd's reader, which shares no code with its writer.
-
-What belongs here: from bytes to changes per wire. What does not: expectations.
-"""
+"""Reads a VCD back with pyvcd's reader, which shares no code with its writer."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
 """The LM629's property tests for as long as one likes: `python -m tests.robot.lm629.long --minutes 30`.
 
-What belongs here: which tests are run, for how long, what is reported. What does not: the tests. Every test of this
-folder that takes drawn input is called in turn, with ten times the examples it draws in the test suite and new ones
-each time, until the process has used so much CPU time. A test that fails prints its example, as it does in the suite,
-and is not called again. Hypothesis keeps the example, so that `pytest` shows it again.
+Every test of this folder that takes drawn input is called in turn, with ten times the examples it draws in the test
+suite and new ones each time, until the process has used so much CPU time. A test that fails prints its example, as it
+does in the suite, and is not called again. Hypothesis keeps the example, so that `pytest` shows it again.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""C programs of SDCC on both machines: `python -m tests.robot.ucsim.compiled --instructions 20000000`.
-
-What belongs here: compiling `programs/`, running the same number of instructions on both, comparing at checkpoints:
-PC, cycles since the last one, all internal RAM, the registers both have, and the external RAM that is used.
-"""
+"""C programs of SDCC on both machines: `python -m tests.robot.ucsim.compiled --instructions 20000000`."""
 
 from __future__ import annotations
 

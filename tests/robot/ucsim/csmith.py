@@ -3,9 +3,6 @@
     csmith --seed N ──► C ──► sdcc ──► image ──┬──► twin, to its end ──┐
                                                └──► s51, as many steps ┴──► PC, RAM, registers, UART equal?
 
-What belongs here: making, running and comparing whole programs. What does not: single instructions (`lockstep`), and a
-program of ours at checkpoints (`compiled`).
-
 A program that SDCC refuses, that does not fit 64 KB, or that has not ended after MOST_CYCLES is counted and left out.
 """
 

@@ -1,10 +1,10 @@
 """Where ucsim 0.6.4 does not do what the data sheets say; there the data sheets win. Where they leave open what
 happens, the entry says what was chosen.
 
-What belongs here: the list. How a random walk keeps away from these is in `exclusions.py`; each is shown on both
-machines in `test_disagreements.py`. `tests/vectors/README.md` repeats the list: `python -m
-tests.robot.ucsim.disagreements` prints the table that has to stand there. Sources: Atmel's 8051 Hardware Manual
-(4316E), the AT89S52 data sheet (1919D) and the AT89C51AC2 data sheet (4127H).
+How a random walk keeps away from these is in `exclusions.py`; each is shown on both machines in
+`test_disagreements.py`. `tests/vectors/README.md` repeats the list: `python -m tests.robot.ucsim.disagreements`
+prints the table that has to stand there. Sources: Atmel's 8051 Hardware Manual (4316E), the AT89S52 data sheet
+(1919D) and the AT89C51AC2 data sheet (4127H).
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """What a random walk must not do, because ucsim is known to do it wrong.
 
-What belongs here: which instruction may be executed in which state. The names in the comments are those of
-`disagreements.py`.
+The names in the comments are those of `disagreements.py`.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """Random single steps in lockstep with ucsim: `python -m tests.robot.ucsim.lockstep --steps 2000000`.
 
-What belongs here: running walks on the simulator, comparing after each instruction, reporting. Each step is
-compared in PC, cycles, all of internal RAM and every register that both machines have; external RAM at the
-end of a walk. Of two walks one is scattered: each of its steps begins in a random state of all that is compared.
-The other is a program: each step begins in the state that the one before left. Walk number i of seed s is the
-same wherever it runs.
+Each step is compared in PC, cycles, all of internal RAM and every register that both machines have; external RAM at
+the end of a walk. Of two walks one is scattered: each of its steps begins in a random state of all that is compared.
+The other is a program: each step begins in the state that the one before left. Walk number i of seed s is the same
+wherever it runs.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Driving ucsim's `s51 -t C52`: images in, commands in, the state after each command out.
 
-What belongs here: the process, its command file, and reading its output. What to run and what to compare is
-in `walk.py` and `lockstep.py`. The simulator is started once for thousands of commands: `exec FILE` echoes
-each command before its output, and `dump /b` prints raw bytes, so the output can be cut without guessing.
+What to run and what to compare is in `walk.py` and `lockstep.py`. The simulator is started once for thousands of
+commands: `exec FILE` echoes each command before its output, and `dump /b` prints raw bytes, so the output can be cut
+without guessing.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A program that puts a machine into a random state: all of internal RAM and every register.
 
-What belongs here: that program and the random bytes it takes. Both machines run it, because setting memory by the
-simulator's own commands takes thirty milliseconds a state. A state is an offset into the table of random bytes,
-passed in DPTR. Timers stand, the receiver is off and EA is 0 in such a state: what time does is the walks' task.
+Both machines run it, because setting memory by the simulator's own commands takes thirty milliseconds a state. A
+state is an offset into the table of random bytes, passed in DPTR. Timers stand, the receiver is off and EA is 0 in
+such a state: what time does is the walks' task.
 """
 
 from __future__ import annotations

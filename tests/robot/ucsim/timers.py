@@ -1,8 +1,7 @@
 """Programs that read running timers, on ucsim and on our CPU.
 
-What belongs here: drawing such programs. A random walk seldom meets an overflow; here a timer is started
-shortly before one by SETB, instructions of known length pass, and its registers are copied to internal RAM
-all the time.
+A random walk seldom meets an overflow; here a timer is started shortly before one by SETB, instructions of known
+length pass, and its registers are copied to internal RAM all the time.
 """
 
 from __future__ import annotations

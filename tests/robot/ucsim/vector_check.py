@@ -1,7 +1,6 @@
 """Single-step vectors on ucsim: `python -m tests.robot.ucsim.vector_check DIR`, for what `mirotwin vectors` wrote.
 
-What belongs here: putting the simulator into a vector's initial state by hand, one step, comparing with its
-final state. Vectors that `exclusions.py` rules out, or that hold pins low from outside, are not run.
+Vectors that `exclusions.py` rules out, or that hold pins low from outside, are not run.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """A random walk: instructions drawn one by one, each in the machine state its predecessors left.
 
-What belongs here: drawing the walk on our CPU and writing down what it should do. Code is invented where the
-walk arrives: a byte of code memory is drawn when it is first fetched (or read by MOVC) and stays. So each
-opcode comes up about equally often, in states that the walk itself keeps random. A walk that is `scattered` is a
-row of single steps instead: each begins at a random place in a state of `states.py`.
+Code is invented where the walk arrives: a byte of code memory is drawn when it is first fetched (or read by MOVC) and
+stays. So each opcode comes up about equally often, in states that the walk itself keeps random. A walk that is
+`scattered` is a row of single steps instead: each begins at a random place in a state of `states.py`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
 """Six robots of two teams and both trackers: `python -m tests.sim.pitch.crowd --frames 100000`.
 
-What belongs here: robots that do not touch, pictures of them, and what the trackers make of these: lost robots, swapped
-ones, and postures that are wrong by more than three times the worst case. What does not: radio and firmware.
-
 A robot drives at up to 1.46 m/s, gains and loses 6 m/s2 and turns at up to 8 rad/s. It likes to be near another one, so
 that two are often in one window; where it would touch, or leave the pitch, it stops at once and thinks again.
 """

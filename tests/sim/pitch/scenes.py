@@ -1,7 +1,4 @@
-"""Random scenes for the camera: anywhere in the picture, crowded, at borders, with every setting.
-
-What belongs here: drawing them. What does not: what they are compared with (`windows`, the tests).
-"""
+"""Random scenes for the camera: anywhere in the picture, crowded, at borders, with every setting."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Windows beside the slow twin and the whole picture: `python -m tests.sim.pitch.windows --count 100000`.
 
-What belongs here: both comparisons, byte for byte. What does not: drawing scenes (`scenes`).
-
 Windows are compared with the whole picture in every scene, 200 of them; with the slow twin once a scene.
 """
 

@@ -1,7 +1,4 @@
-"""The radio on a real UART: a bare CPU that stores what it receives, and the robot with its firmware.
-
-What belongs here: putting a downlink on RXD and running the chip. What does not: expectations.
-"""
+"""The radio on a real UART: a bare CPU that stores what it receives, and the robot with its firmware."""
 
 from __future__ import annotations
 

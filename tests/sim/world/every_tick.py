@@ -1,8 +1,4 @@
-"""Worlds saved at every tick of a window, and run on from there: `python -m tests.sim.world.every_tick --window-ms 2`.
-
-What belongs here: each of them has to have the digest of the run that never stopped, at the end of the control period
-behind the window. What does not: random stops over whole runs (`random_cuts`).
-"""
+"""Worlds saved at every tick of a window, and run on: `python -m tests.sim.world.every_tick --window-ms 2`."""
 
 from __future__ import annotations
 

@@ -1,8 +1,5 @@
 """Runs that are cut anywhere, beside the same run that is not: `python -m tests.sim.world.random_cuts --count 10000`.
 
-What belongs here: random stops, input announced at random moments, worlds saved and loaded in between; every digest has
-to be that of the run in one piece. What does not: single cases (`test_inject.py`, `test_waits.py`).
-
 Input that is announced early keeps a frame of the station off the air which late input would meet, so only a silent
 host is told at random moments; a controller is told everything at the begin.
 """

@@ -1,8 +1,4 @@
-"""A target of a few branches: what the fork server and the launcher are tested with.
-
-What belongs here: a target that finds something for known inputs, and the specification that makes it. What does not:
-machines.
-"""
+"""A target of a few branches: what the fork server and the launcher are tested with."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The other end of the fork-server protocol: what AFL++ does with a target process, by pipes and shared memory.
-
-What belongs here: starting the server, giving it inputs, and taking its answers. What does not: choosing inputs.
-"""
+"""The other end of the fork-server protocol: what AFL++ does with a target process, by pipes and shared memory."""
 
 from __future__ import annotations
 

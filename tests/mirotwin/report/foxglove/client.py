@@ -1,7 +1,5 @@
 """A viewer that asks for every topic and keeps what it is sent: the protocol `foxglove.sdk.v1`, by hand.
 
-What belongs here: messages of the protocol as far as they are needed. What does not: what is expected.
-
 The SDK tells of a topic a moment before it takes subscriptions to it, so the viewer asks when it has heard
 nothing for a moment.
 """

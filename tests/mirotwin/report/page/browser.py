@@ -1,8 +1,6 @@
 """Chromium without a screen, for tests of pages, and the pictures that they are compared with.
 
-What belongs here: starting it, opening a page, taking pictures. What does not: what is tested.
-
-    python -m tests.mirotwin.report.page.browser          makes the pictures in `pictures/` anew
+python -m tests.mirotwin.report.page.browser          makes the pictures in `pictures/` anew
 """
 
 from __future__ import annotations

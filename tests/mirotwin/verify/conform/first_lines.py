@@ -1,7 +1,4 @@
-"""Usual mistakes, and words that the first three lines of `mirotwin conform` must say of firmware with one of them.
-
-What belongs here: the table. What does not: mistakes that `tests.mutants.planted` has, of which the name suffices.
-"""
+"""Usual mistakes, and words that the first three lines of `mirotwin conform` must say of firmware with one of them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Mistakes to plant in the firmware's source, and the rules that each must fail.
 
-What belongs here: the table. What does not: building images (`tests.mirotwin.verify.checks.rig`) and trying them.
-
 Long because it is one table, with a mistake for each rule at least.
 """
 
