@@ -11,7 +11,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_exact.seed import MAX_SEED
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
-from mirotwin.run.run_command import report_faults
+from mirotwin.rerun.faults import report_faults
 from mirotwin.shell.options import (
     Place,
     Whole,

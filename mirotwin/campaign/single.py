@@ -22,12 +22,12 @@ from mirotwin.campaign.wall import now_s
 from mirotwin.campaign.worker import Outcome, Work
 from mirotwin.recording.track import Tracks
 from mirotwin.report.seen import Seen
-from mirotwin.report.summary import Expectation, summarise
+from mirotwin.report.summary import summarise
 from mirotwin.report.theory import gains_of
 from mirotwin.rerun import runner
 from mirotwin.shell.tracebacks import show_traceback
 from mirotwin.verify.checks.expect import Place, expectations_of
-from mirotwin.verify.checks.interface import Check
+from mirotwin.verify.checks.interface import Check, Expectation
 from mirotwin.verify.checks.watching import Checks
 from mirotwin.verify.steps.keys import Step
 from mirotwin.verify.steps.plan import check_symbols

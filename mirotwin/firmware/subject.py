@@ -27,9 +27,9 @@ from mirotwin.firmware.bare_options import (
     take_bare,
     target_of,
 )
+from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.inspected_run import BareRun, RobotRun, Run, watch
 from mirotwin.rerun.job import load_job
-from mirotwin.run.run_command import report_faults
 from mirotwin.shell.options import (
     Place,
     Whole,

@@ -114,18 +114,6 @@ def bare_court(checks: tuple[str, ...]) -> tuple[BareCourt, dict[str, Any]]:
     return BareCourt(check), {check.name: True}
 
 
-def is_bare_case(path: str | Path) -> bool:
-    """Whether a file is a stream for a bare processor. Raises StreamError for a stream file that is wrong."""
-    from miro_protocol import stream
-
-    if not Path(path).is_file():
-        return False
-    with open(path, "rb") as file:
-        if not file.read(32).lstrip(b"\xef\xbb\xbf").startswith(b"# mirotwin stream 2"):
-            return False
-    return stream.read(path).header.bare is not None
-
-
 def replay_bare_case(path: str, firmware: str | None, checks: tuple[str, ...]) -> int:
     """`mirotwin replay` of such a file; the exit code is that of its check. Raises BadInput without --firmware.
 

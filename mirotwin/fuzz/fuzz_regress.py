@@ -16,11 +16,12 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import Image
 from miro_sim.radio.downlink import TransmissionError
-from mirotwin.fuzz.fuzz_bare import check_given, is_bare_case, problem_of_bare_case
+from mirotwin.fuzz.fuzz_bare import check_given, problem_of_bare_case
 from mirotwin.rerun.job import Job, load_stream
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.program import BAD_INPUT, DONE, EXPECTATION_FAILED, complain, show_line
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.registry import ALWAYS_ON
 from mirotwin.verify.checks.watching import Checks

@@ -14,11 +14,10 @@ from mirotwin.firmware.held_signals import held_signals
 from mirotwin.ports.live import LONGEST_S, live_scenario
 from mirotwin.ports.serve_ports import Wanted, open_ports, ports_option
 from mirotwin.ports.session import Session
-from mirotwin.ports.url import FASTEST
 from mirotwin.recording.source import source_of
 from mirotwin.report.live import Live
-from mirotwin.rerun.pacing import Pace
-from mirotwin.run.run_command import report_faults
+from mirotwin.rerun.faults import report_faults
+from mirotwin.rerun.pacing import FASTEST, Pace
 from mirotwin.run.run_files import RunFiles
 from mirotwin.shell.options import (
     Number,

@@ -18,9 +18,9 @@ from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
 from miro_sim.scenario.keys import MAX_NETWORKS
 from mirotwin.ports.live import LONGEST_S
+from mirotwin.rerun.pacing import FASTEST
 
 SCHEME = "miro://"
-FASTEST = 1000.0
 
 
 class Target(msgspec.Struct, frozen=True):

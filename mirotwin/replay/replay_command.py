@@ -14,7 +14,7 @@ from miro_sim.periods import Period
 from miro_sim.radio.downlink import TransmissionError
 from miro_sim.world.world import World
 from mirotwin.firmware.sources_option import checked_sources, sources_option
-from mirotwin.fuzz.fuzz_bare import is_bare_case, replay_bare_case
+from mirotwin.fuzz.fuzz_bare import replay_bare_case
 from mirotwin.recording.compare import differences
 from mirotwin.recording.difference import Difference
 from mirotwin.replay.compare_options import Asked, compare_options
@@ -24,8 +24,8 @@ from mirotwin.replay.replay_case import replay_case
 from mirotwin.replay.replay_firmware import firmwares_apart, lines_from_option, load_images, program_of
 from mirotwin.replay.replay_tables import SHOWN, print_frames, print_response
 from mirotwin.rerun import runner
+from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.job import Job, load_job
-from mirotwin.run.run_command import report_faults
 from mirotwin.shell.console import show
 from mirotwin.shell.options import (
     Place,
@@ -39,6 +39,7 @@ from mirotwin.shell.options import (
 )
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.checks.expect import expectations_of, says_anything
 from mirotwin.verify.checks.watching import Checks
 from mirotwin.verify.expectations import (

@@ -14,7 +14,6 @@ from miro_exact.inputs import read_input
 from miro_robot.image import Image
 from miro_sim.radio.downlink import TransmissionError
 from mirotwin.firmware.coverage_files import source_folders
-from mirotwin.fuzz.fuzz_bare import is_bare_case
 from mirotwin.recording.compare import Rule, differences
 from mirotwin.report.page.again import Again, run_again
 from mirotwin.report.page.bokeh_page import require_bokeh
@@ -27,7 +26,7 @@ from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING, part_name
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.artifacts import CASE, REPORT, SENT
-from mirotwin.verify.cases.case import tables_of
+from mirotwin.verify.cases.case import is_bare_case, tables_of
 from mirotwin.verify.checks.expect import expectations_of
 
 RECORDINGS = (RECORDING, part_name(RECORDING))

@@ -12,6 +12,7 @@ from mirotwin.report.learnt_calibration import LearntCalibration
 from mirotwin.report.learnt_wheels import LearntWheels
 from mirotwin.report.live import Live
 from mirotwin.report.theory import Gains, Theory, theory_of
+from mirotwin.verify.checks.interface import Expectation
 
 
 class Tracking(msgspec.Struct, frozen=True):
@@ -78,30 +79,6 @@ class Firmware(msgspec.Struct, frozen=True):
     machine_cycles: int
     idle_cycles: int
     faults: int
-
-
-class FirstFailure(msgspec.Struct, frozen=True):
-    """The earliest failure of a check: of which robot, at which tick, what was wanted and found."""
-
-    network: int
-    slot: int
-    tick: int
-    wanted: str
-    found: str
-
-
-class Expectation(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What came of a check (`mirotwin.verify.checks`), over all robots.
-
-    `kind`: safety (never) or liveness (within a time). `verdict`: passed, failed, or "not judged" where the run had no
-    occasion for it. `failures`: how many; `first`: the earliest.
-    """
-
-    name: str
-    kind: str
-    verdict: str
-    failures: int = 0
-    first: FirstFailure | None = None
 
 
 class Steps(msgspec.Struct, frozen=True, omit_defaults=True):

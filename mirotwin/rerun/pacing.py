@@ -10,6 +10,8 @@ import time
 
 from miro_exact.clock import TICKS_PER_SECOND, seconds, ticks
 
+FASTEST = 1000.0
+"""Virtual seconds in one, at most."""
 LATE_TICKS = ticks(0.020)
 """What counts as late: a little more than the 16 ms for which an adapter of USB may keep a character."""
 

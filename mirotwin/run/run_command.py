@@ -14,7 +14,7 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.firmware.held_signals import held_signals
 from mirotwin.recording.source import source_of
-from mirotwin.rerun import runner
+from mirotwin.rerun.faults import report_faults
 from mirotwin.run.run_files import RunFiles
 from mirotwin.run.run_live_options import live_options
 from mirotwin.run.run_stops import Stops
@@ -30,7 +30,7 @@ from mirotwin.shell.options import (
     stack_option,
 )
 from mirotwin.shell.outputs import FILES, OutputFolder
-from mirotwin.shell.program import DONE, FIRMWARE_FAULT, complain, show_line, tell_notes
+from mirotwin.shell.program import complain, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, TimeType
 from mirotwin.verify.checks.expect import expectations_of
@@ -221,12 +221,3 @@ def _live(
     server = opened.enter_context(Server(*at, f"{world.scenario.name}-{world.seed}", complain))
     show_line(f"live {server.url}")
     return LiveView(server, world, checks, pace, wait)
-
-
-def report_faults(world: World) -> int:
-    """Says on stderr what the firmware did wrong; returns the exit code."""
-    found = runner.faults_by_robot(world)
-    for network, slot, faults in found:
-        more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-        complain(f"firmware fault: net{network}/robot{slot}: {faults[0]}{more}")
-    return FIRMWARE_FAULT if found else DONE

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from msgspec.structs import replace
 
@@ -22,6 +22,7 @@ from mirotwin.recording.recorder import Recorder, Source
 from mirotwin.recording.track import Tracks
 from mirotwin.report.learnt_calibration import learnt_calibrations
 from mirotwin.report.learnt_wheels import learnt_wheels
+from mirotwin.report.live import Live
 from mirotwin.report.summary import Steps, Summary, summarise, to_json
 from mirotwin.report.theory import gains_of
 from mirotwin.rerun import runner
@@ -32,7 +33,6 @@ from mirotwin.verify.checks.watching import Checks
 
 if TYPE_CHECKING:
     from mirotwin.camera.view import View
-    from mirotwin.ports.session import Session
     from mirotwin.run.run_live import LiveView
     from mirotwin.run.run_stops import Stops
     from mirotwin.verify.steps.player import Player
@@ -41,6 +41,12 @@ SUMMARY = "summary.json"
 FIGURE = "figure.png"
 FLUSH_S = 0.2
 """Wall time between two flushes of the recording, which comes to half a second on a busy machine too."""
+
+
+class LiveSession(runner.Simulation, Protocol):
+    """A world that a wall clock and clients drive."""
+
+    def live(self) -> Live: ...
 
 
 class RunFiles:
@@ -61,7 +67,7 @@ class RunFiles:
         settings: tuple[str, ...] = (),
         views: Sequence[View] = (),
         player: Player | None = None,
-        session: Session | None = None,
+        session: LiveSession | None = None,
         stops: Stops | None = None,
         live: LiveView | None = None,
     ) -> None:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 
 from miro_exact.bad_input import shortened
-from mirotwin.ports.url import FASTEST
+from mirotwin.rerun.pacing import FASTEST
 from mirotwin.shell.options import Number
 
 Command = TypeVar("Command", bound=Callable[..., Any])

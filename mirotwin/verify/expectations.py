@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from miro_sim.scenario.settings import EXPECT
-from mirotwin.report.summary import Expectation
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain
+from mirotwin.verify.checks.interface import Expectation
 from mirotwin.verify.checks.registry import ALWAYS_ON
 from mirotwin.verify.checks.watching import Checks
 

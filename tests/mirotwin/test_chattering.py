@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mirotwin.report.chattering import Chattering
+from mirotwin.recording.chattering import Chattering
 from tests.naive import theory_terms as naive
 
 WHEEL = st.integers(-16633, 16633)

@@ -21,9 +21,8 @@ from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.report.page.link import LinkLog, Mark
-from mirotwin.report.summary import Expectation
 from mirotwin.verify.checks.expect import Place
-from mirotwin.verify.checks.interface import Check, Failure
+from mirotwin.verify.checks.interface import Check, Expectation, Failure
 from mirotwin.verify.checks.watching import Checks
 
 

@@ -98,3 +98,13 @@ def case_of_checks(world: World, trace: Trace, checks: Checks) -> str:
 def write_case(path: str | os.PathLike[str], text: str) -> None:
     """Writes it whole or not at all."""
     files.replace(Path(path), text.encode())
+
+
+def is_bare_case(path: str | Path) -> bool:
+    """Whether a file is a stream for a bare processor. Raises StreamError for a stream file that is wrong."""
+    if not Path(path).is_file():
+        return False
+    with open(path, "rb") as file:
+        if not file.read(32).lstrip(b"\xef\xbb\xbf").startswith(b"# mirotwin stream 2"):
+            return False
+    return stream.read(path).header.bare is not None

@@ -160,3 +160,27 @@ def ms_ticks(time_ms: float) -> int:
 def in_ms(duration_ticks: int) -> str:
     """A duration for people."""
     return f"{duration_ticks / TICKS_PER_MS:.3f} ms"
+
+
+class FirstFailure(msgspec.Struct, frozen=True):
+    """The earliest failure of a check: of which robot, at which tick, what was wanted and found."""
+
+    network: int
+    slot: int
+    tick: int
+    wanted: str
+    found: str
+
+
+class Expectation(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What came of a check, over all robots.
+
+    `kind`: safety (never) or liveness (within a time). `verdict`: passed, failed, or "not judged" where the run had no
+    occasion for it. `failures`: how many; `first`: the earliest.
+    """
+
+    name: str
+    kind: str
+    verdict: str
+    failures: int = 0
+    first: FirstFailure | None = None

@@ -27,10 +27,9 @@ from miro_sim.world.events import Event, of_board
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
-from mirotwin.report.summary import Expectation, FirstFailure
 from mirotwin.verify.checks.expect import Place, expectations_of
 from mirotwin.verify.checks.hearing import Hearing
-from mirotwin.verify.checks.interface import Check, Failure, Judge, Subject
+from mirotwin.verify.checks.interface import Check, Expectation, Failure, FirstFailure, Judge, Subject
 from mirotwin.verify.checks.judges import checked_judge
 
 T = TypeVar("T")
