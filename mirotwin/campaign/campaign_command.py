@@ -13,6 +13,7 @@ COMMANDS = {
     "show": Lazy(
         "mirotwin.campaign.campaign_show", "Statistics of RESULTS.parquet, alone or against a baseline."
     ),
+    "page": Lazy("mirotwin.campaign.campaign_page", "Makes one page of RESULTS.parquet."),
 }
 
 

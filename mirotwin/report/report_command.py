@@ -1,4 +1,4 @@
-"""`mirotwin report`: a run, a case, a failed test or a campaign as one page."""
+"""`mirotwin report`: a run, a case or a failed test as one page."""
 
 from __future__ import annotations
 
@@ -6,23 +6,20 @@ from pathlib import Path
 
 import click
 
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.firmware.sources_option import checked_sources, sources_option
-from mirotwin.report.page.bokeh_page import require_bokeh
-from mirotwin.report.page.document import check_size, is_page
+from mirotwin.report.page.document import check_size, place_of_page, write_page
 from mirotwin.report.page.run_page import run_page
 from mirotwin.report.report_subject import Wanted, is_campaign, material_of
 from mirotwin.shell.options import Place, engine_option, firmware_option
-from mirotwin.shell.outputs import check_new, check_not_input, whole_file
-from mirotwin.shell.program import DONE, show_line
 from mirotwin.shell.times import Time, TimeType
 
 SMALLER = "leave the camera's frames out with --no-frames, or look at a part with --from and --to"
-FEWER = "give the results of a campaign with fewer runs"
 
 
-@click.command(short_help="Makes one page of a run, a case, a failed test or a campaign.")
-@click.argument("subject", metavar="RUN|CASE|TEST-FAILURE|CAMPAIGN", type=Place())
+@click.command(short_help="Makes one page of a run, a case or a failed test.")
+@click.argument("subject", metavar="RUN|CASE|TEST-FAILURE", type=Place())
 @click.option(
     "-o",
     "--out",
@@ -54,38 +51,26 @@ def report(
     """Writes one HTML file that needs no network: look at it in any browser, send it, keep it with a build.
 
     RUN is a folder of `mirotwin run`, or a recording (run.mcap, run.part.mcap); CASE a case (FILE.stream) as `test`,
-    `fuzz` and `conform` leave it; TEST-FAILURE the folder that a failed test of pytest or `mirotwin test` leaves;
-    CAMPAIGN the .parquet of `mirotwin campaign`.
+    `fuzz` and `conform` leave it; TEST-FAILURE the folder that a failed test of pytest or `mirotwin test` leaves.
+    `mirotwin campaign page` makes the page of a campaign.
 
     A run is made again for its page, with the recorded bytes: the profile of the firmware, its coverage, the fate of
     each frame and the verdicts of the checks come from that, and where it differs from the recording is said.
     """
-    if out is None:
-        out = Path("report.html")
-        force = force or is_page(out)
-    check_new(out, "--out", force)
-    check_not_input(out, "--out", subject, firmware)
-    require_bokeh()
+    place = place_of_page(out, force, subject, firmware)
     if is_campaign(subject):
-        from mirotwin.campaign.page import campaign_page
-
-        page = campaign_page(Path(subject))
-        check_size(page, subject, FEWER)
-    else:
-        wanted = Wanted(
-            subject=subject,
-            from_tick=from_tick.ticks(TICKS_PER_SECOND),
-            to_tick=None if to_tick is None else to_tick.ticks(TICKS_PER_SECOND),
-            frames=not no_frames,
-            firmware=firmware,
-            sources=tuple(checked_sources(sources)),
-            engine=engine,
-            quiet=quiet,
-        )
-        page = run_page(material_of(wanted))
-        check_size(page, subject, SMALLER)
-    with whole_file(out, "--out") as part:
-        part.write_bytes(page)
-    if not quiet:
-        show_line(f"{out}: {len(page) / 1e6:.1f} MB")
-    return DONE
+        remedy = f"`mirotwin campaign page {subject}` makes its page"
+        raise BadInput(subject, "", "holds the results of a campaign", remedy)
+    wanted = Wanted(
+        subject=subject,
+        from_tick=from_tick.ticks(TICKS_PER_SECOND),
+        to_tick=None if to_tick is None else to_tick.ticks(TICKS_PER_SECOND),
+        frames=not no_frames,
+        firmware=firmware,
+        sources=tuple(checked_sources(sources)),
+        engine=engine,
+        quiet=quiet,
+    )
+    made = run_page(material_of(wanted))
+    check_size(made, subject, SMALLER)
+    return write_page(place, made, quiet)

@@ -11,6 +11,8 @@ from typing import Any
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.report.page.bokeh_page import document_json, island, javascript, require_bokeh
+from mirotwin.shell.outputs import check_new, check_not_input, whole_file
+from mirotwin.shell.program import DONE, show_line
 
 MOST_BYTES = 50_000_000
 """Of a page: browsers take more, people and mail do not."""
@@ -61,6 +63,26 @@ def check_size(page: bytes, name: str, remedy: str) -> None:
     if len(page) > MOST_BYTES:
         what = f"the page has {len(page) / 1e6:.0f} MB, {MOST_BYTES / 1e6:.0f} are allowed"
         raise BadInput(name, "", what, remedy)
+
+
+def place_of_page(out: Path | None, force: bool, *inputs: str | None) -> Path:
+    """Where a page goes: `out`, else report.html, which replaces an earlier page. Raises BadInput; needs Bokeh."""
+    if out is None:
+        out = Path("report.html")
+        force = force or is_page(out)
+    check_new(out, "--out", force)
+    check_not_input(out, "--out", *inputs)
+    require_bokeh()
+    return out
+
+
+def write_page(out: Path, page: bytes, quiet: bool = False) -> int:
+    """Writes it whole or not at all; the exit code."""
+    with whole_file(out, "--out") as part:
+        part.write_bytes(page)
+    if not quiet:
+        show_line(f"{out}: {len(page) / 1e6:.1f} MB")
+    return DONE
 
 
 def number(value: float | None, digits: int = 4) -> str:

@@ -41,7 +41,7 @@ def results(tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(results):
     path = results.with_name("mine.html")
-    assert called("report", results, "-o", path, "-q") == (0, "")
+    assert called("campaign", "page", results, "-o", path, "-q") == (0, "")
     return path
 
 
@@ -97,7 +97,7 @@ def test_the_command_of_a_row_gives_its_digest_again(results, markup, tmp_path):
 
 def test_the_same_results_give_the_same_bytes(results, page, tmp_path):
     again = tmp_path / "again.html"
-    assert called("report", results, "-o", again, "-q") == (0, "")
+    assert called("campaign", "page", results, "-o", again, "-q") == (0, "")
     assert again.read_bytes() == page.read_bytes()
 
 
@@ -107,11 +107,11 @@ def test_what_is_no_campaign_is_refused(tmp_path):
 
     path = tmp_path / "other.parquet"
     pq.write_table(pa.table({"x": [1]}), path)
-    code, said = called("report", path, "-o", tmp_path / "page.html", "-q")
+    code, said = called("campaign", "page", path, "-o", tmp_path / "page.html", "-q")
     assert (code, len(said.splitlines())) == (2, 1)
     assert "is no campaign's results" in said
     path.write_bytes(b"PAR1 and no more")
-    assert called("report", path, "-o", tmp_path / "page.html", "-q")[0] == 2
+    assert called("campaign", "page", path, "-o", tmp_path / "page.html", "-q")[0] == 2
     assert not (tmp_path / "page.html").exists()
 
 
