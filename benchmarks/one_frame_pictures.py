@@ -143,9 +143,9 @@ def _after(way: Way, axes: Any) -> None:
                 )
     _level(way, axes, "left_wr_n", first, last, 1.0, color=DARK, lw=0.8)
     _level(way, axes, "left_busy", first, last, 0.0, color=LEFT, lw=0.8)
-    for event, name in zip(way.commands, ("left loaded", "right", "STT"), strict=True):
+    for event, name in zip(way.commands, ("left loaded ", "right loaded ", " STT"), strict=True):
         axes.axvline(way.us(event.tick) / 1000, color="#999999", lw=0.8, zorder=0)
-        axes.text(way.us(event.tick) / 1000, 6.0, f" {name}", ha="left", va="bottom", fontsize=8)
+        axes.text(way.us(event.tick) / 1000, 6.0, name, ha="left" if name == " STT" else "right", va="bottom")
     labels = [*names, "/WR", "left LM629 busy"]
     axes.set(yticks=[5.4 - lane for lane in range(6)], yticklabels=labels, ylim=(-0.3, 6.7))
     axes.grid(visible=False)
