@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from sybil import Sybil
 from sybil.example import SybilFailure
-from tests.docs import blocks, sandbox
+from tests.docs import blocks, running, sandbox
 from tests.docs.shell import Shell, commands_of, fits, plain
 from tests.mutants import build
 
@@ -122,6 +122,26 @@ def test_a_comment_in_front_of_a_block_is_about_that_block_alone() -> None:
     assert (one.language, one.not_run, one.line) == ("sh", "no network", 2)
     assert (two.language, two.not_run, two.text) == ("indented", "", "mirotwin\n")
     assert (three.not_run, three.file) == ("", "a.toml")
+
+
+def test_a_slow_block_is_left_to_the_command_for_the_first_pages() -> None:
+    slow, quick = blocks.blocks_of("<!-- slow: 30 s -->\n```sh\nmirotwin\n```\n\n```sh\nmirotwin\n```\n")
+    assert (slow.slow, slow.not_run) == ("30 s", "")
+    assert blocks.evaluator_of(slow) is blocks.nothing
+    assert blocks.evaluator_of(quick) is running.shell
+
+
+def test_a_newcomer_finds_an_empty_folder(tmp_path: Path) -> None:
+    for document in sandbox.FIRST_USE:
+        folder = tmp_path / document / "here"
+        folder.mkdir(parents=True)
+        sandbox.prepare(folder, document)
+        assert not list(folder.iterdir())
+        assert document not in sandbox.COMMANDS
+
+
+def test_the_first_page_stays_short() -> None:
+    assert len((sandbox.ROOT / "README.md").read_text("utf-8").splitlines()) < 110
 
 
 def test_a_comment_that_text_parts_from_a_block_is_not_about_it() -> None:
