@@ -30,7 +30,7 @@ from mirotwin.cli.options import (
 )
 from mirotwin.cli.program import DONE, FIRMWARE_FAULT, complain, show_line, tell_notes
 from mirotwin.cli.progress import ProgressBar
-from mirotwin.cli.run_files import RunFiles
+from mirotwin.cli.run_files import RunFiles, digest_in
 from mirotwin.cli.run_live_options import live_options
 from mirotwin.cli.run_stops import Stops
 from mirotwin.cli.times import Time, TimeType
@@ -155,6 +155,7 @@ def run(
         raise click.UsageError("--plain-frames needs --frames.")
     if live is None and (pace is not None or wait):
         raise click.UsageError("--pace and --live-wait need --live.")
+    earlier = "" if out is not None else digest_in(folder.path)
     image = load_image(firmware, stack_from=stack_from)
     check_symbols(steps, image, text.origin)
 
@@ -192,6 +193,9 @@ def run(
         )
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
+    if earlier not in ("", summary.digest):
+        note = f"{folder.path} held a run with other bits (digest {earlier[:12]}..), now replaced"
+        tell_notes([f"{note}; --out keeps both"])
     if not quiet:
         from mirotwin.cli.run_table import print_table  # loads rich
 
