@@ -35,7 +35,7 @@ LANES = {
         "_free",
         "_wait",
         "_read_cycle",
-        "_write_c",
+        "_write_cycle",
         "_start_both",
     ),
 }
@@ -43,14 +43,16 @@ LANES = {
 
 def draw(way: Way, folder: Path) -> None:
     """Writes the three files."""
-    for name, height, make in (("picture", 3.9, _picture), ("wire", 6.4, _wire), ("wheels", 6.0, _wheels)):
+    for name, height, make in (("picture", 3.6, _picture), ("wire", 6.4, _wire), ("wheels", 6.0, _wheels)):
         with matplotlib.style.context(STYLE, after_reset=True):
             figure = Figure(figsize=(9.6, height), dpi=100, layout="constrained")
             make(way, figure)
             drawn = io.BytesIO()
             FigureCanvasAgg(figure).print_png(drawn)  # type: ignore[no-untyped-call]
-        small = Image.open(drawn).convert("RGB").quantize(128, dither=Image.Dither.NONE)
-        small.save(folder / f"one-frame-{name}.png", optimize=True)
+        image = Image.open(drawn).convert("RGB")
+        if name != "picture":  # its pixels stay what they are
+            image = image.quantize(128, dither=Image.Dither.NONE)
+        image.save(folder / f"one-frame-{name}.png", optimize=True)
 
 
 def _picture(way: Way, figure: Figure) -> None:
@@ -67,7 +69,7 @@ def _picture(way: Way, figure: Figure) -> None:
     part.set_ylim(window.top + window.height + AROUND_PX, window.top - AROUND_PX)
     tail, tip = way.arrow
     part.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": "white", "lw": 2.0})
-    for u, v, up in ((pair.u, pair.v, 64), (pair.identity_u, pair.identity_v, -64)):
+    for u, v, up in ((pair.u, pair.v, 50), (pair.identity_u, pair.identity_v, -48)):
         part.plot(u, v, "+", color="white", markersize=16, markeredgewidth=4)
         part.plot(u, v, "+", color="black", markersize=14, markeredgewidth=1.5)
         text = f"{u:.2f}, {v:.2f}"
@@ -140,9 +142,9 @@ def _after(way: Way, axes: Any) -> None:
                 )
     _level(way, axes, "left_wr_n", first, last, 1.0, color=DARK, lw=0.8)
     _level(way, axes, "left_busy", first, last, 0.0, color=LEFT, lw=0.8)
-    for event, name in zip(way.commands, ("left loaded", "right loaded", "STT"), strict=True):
+    for event, name in zip(way.commands, ("left loaded ", "right loaded ", " STT"), strict=True):
         axes.axvline(way.us(event.tick) / 1000, color="#999999", lw=0.8, zorder=0)
-        axes.text(way.us(event.tick) / 1000, 6.0, f"{name} ", ha="right", va="bottom")
+        axes.text(way.us(event.tick) / 1000, 6.0, name, ha="left" if name == " STT" else "right", va="bottom")
     labels = [*names, "/WR", "left LM629 busy"]
     axes.set(yticks=[5.4 - lane for lane in range(6)], yticklabels=labels, ylim=(-0.3, 6.7))
     axes.grid(visible=False)

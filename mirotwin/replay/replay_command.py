@@ -86,7 +86,8 @@ def replay(
 
     A recording that was broken off, or a part of one, is compared as far as it goes, with a note.
     A text stream runs over an ideal link in the default
-    scenario, and there is nothing to compare.
+    scenario, and there is nothing to compare. A capture (pcapng) is made one by `mirotwin export`; of bytes without
+    times write one, a line `TICK > HEX BYTES` a transmission.
 
     A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
     1, or 3 for a firmware fault; 0 if other firmware or settings cure it, 4 if it does not fail again without them.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -30,6 +31,7 @@ from mirotwin.rerun.script import (
     script_of,
     script_of_stream,
 )
+from mirotwin.shell.command_line import command_line, operand
 from mirotwin.shell.options import choose_engine, load_image
 from mirotwin.shell.outputs import RECORDING
 from mirotwin.shell.program import complain
@@ -137,14 +139,22 @@ def load_stream(file: str, engine: str | None) -> Job:
     return msgspec.structs.replace(_job_of_stream(given, file, (), None), case=case)
 
 
+_PAIRS = re.compile(rb"^\s*[0-9a-fA-F]{2}", re.MULTILINE)
+_BINARY = re.compile(rb"[\0-\x08\x0e-\x1f]")
+_WRITE_TIMES = "of bytes alone make a stream file, whose lines are `TICK > HEX BYTES` (24 000 ticks are 1 ms)"
+
+
 def _refuse_other_formats(data: bytes, path: str) -> None:
     format, _ = detect(data[:HEAD_BYTES])
     if format == "pcapng":
-        remedy = "make a stream file of it with `mirotwin export --out NAME.stream`"
-        raise BadInput(path, "offset 0", "a capture, which cannot be replayed", remedy)
-    if format != "stream" and b"\0" in data[:4096]:
+        line = command_line("export", operand(path), "--out", "NAME.stream")
+        what = "a capture, which cannot be replayed"
+        raise BadInput(path, "offset 0", what, f"make a stream file of it with `{line}`")
+    if format == "hex" and _PAIRS.search(data):
+        raise BadInput(path, "offset 0", "hex text without times, which cannot be replayed", _WRITE_TIMES)
+    if format != "stream" and _BINARY.search(data[:4096]):
         what = "neither a recording nor a stream file (UTF-8 text)"
-        raise BadInput(path, "offset 0", what, "give a run.mcap that `mirotwin run` wrote, or a stream file")
+        raise BadInput(path, "offset 0", what, f"give a run.mcap that `mirotwin run` wrote; {_WRITE_TIMES}")
 
 
 def _job_of_recording(

@@ -105,9 +105,10 @@ def scenario_of_stream(sent: Sequence[Doing], path: str, header: Header | None =
     scenario = _scenario_of_header(header.scenario, f"{path}: header: scenario")
     check_script(script, path, len(scenario.networks))
     check_deeds(script, path, scenario)
-    end_tick = ticks(scenario.duration_s)
+    end_tick = -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS
     for one in script:
-        last_tick = one.end_tick if isinstance(one, Transmission) else one.tick
+        # What was recorded may still be on the air when its run ends.
+        last_tick = one.end_tick if isinstance(one, Transmission) and header.end_tick is None else one.tick
         if last_tick > end_tick:
             what = f"ends at tick {last_tick}, but the scenario ends at tick {end_tick}"
             raise BadInput(path, f"tick {one.tick}", what, "raise its duration_s")

@@ -15,7 +15,7 @@ from miro_sim.world.world import World
 from mirotwin.firmware.held_signals import held_signals
 from mirotwin.recording.source import source_of
 from mirotwin.rerun.faults import report_faults
-from mirotwin.run.run_files import RunFiles
+from mirotwin.run.run_files import RunFiles, digest_in
 from mirotwin.run.run_live_options import live_options
 from mirotwin.run.run_stops import Stops
 from mirotwin.shell.options import (
@@ -155,6 +155,7 @@ def run(
         raise click.UsageError("--plain-frames needs --frames.")
     if live is None and (pace is not None or wait):
         raise click.UsageError("--pace and --live-wait need --live.")
+    earlier = "" if out is not None else digest_in(folder.path)
     image = load_image(firmware, stack_from=stack_from)
     check_symbols(steps, image, text.origin)
 
@@ -192,6 +193,9 @@ def run(
         )
         bar = ProgressBar(f"simulating {world.scenario.name}", world.periods, quiet)
         summary = run_files.fill(bar, None if no_figure else text.scenario.title)
+    if earlier not in ("", summary.digest):
+        note = f"{folder.path} held a run with other bits (digest {earlier[:12]}..), now replaced"
+        tell_notes([f"{note}; --out keeps both"])
     if not quiet:
         from mirotwin.run.run_table import print_table  # loads rich
 

@@ -10,11 +10,14 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+import msgspec
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
+from miro_exact.inputs import read_input
 from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin.firmware.held_signals import Hold
@@ -204,3 +207,11 @@ class RunFiles:
             f"the run broke off after {self.tracks.count} control periods;"
             f" they are in {self.folder.path / part_name(RECORDING)}"
         )
+
+
+def digest_in(folder: Path) -> str:
+    """That of the summary which an earlier run left there; "" where there is none that can be read."""
+    try:
+        return msgspec.json.decode(read_input(folder / SUMMARY), type=Summary).digest
+    except (BadInput, OSError, msgspec.DecodeError):
+        return ""

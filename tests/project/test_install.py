@@ -136,3 +136,22 @@ def test_an_installation_puts_one_file_beside_pyserials_handlers_and_replaces_no
     own = resources.files("serial") / "urlhandler"
     assert {entry.name for entry in own.iterdir()} >= {"__init__.py", "protocol_loop.py"}
     assert (tree / "built/mirotwin/bridges/serial_port.py").exists()
+
+
+def test_a_wheel_carries_the_examples_without_what_tools_leave_behind(tree):
+    shutil.copytree(ROOT / "examples", tree / "examples")
+    for name in ("laws/build/x.py", "laws/example_laws.egg-info/PKG-INFO", "laws/__pycache__/x.pyc"):
+        (tree / "examples" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tree / "examples" / name).write_text("")
+    built = python(tree, "setup.py", "-q", "build_py", "--build-lib", "built")
+    assert built.returncode == 0, built.stderr
+    examples = tree / "built/mirotwin/starter/examples"
+    assert (examples / "firmware/late.ihx").is_file()
+    assert (examples / "hil/.github/workflows/firmware.yml").is_file()
+    assert {path.name for path in (examples / "laws").iterdir()} == {
+        "pursuit.toml",
+        "pursuit_law.py",
+        "pyproject.toml",
+        "samson.toml",
+        "samson_law.py",
+    }

@@ -95,7 +95,11 @@ def test_a_whole_number_is_a_number() -> None:
         ),
         ("duration_s = 6.0", "duration_s = nan", "duration_s: nan is not a number"),
         ("duration_s = 6.0", "duration_s = inf", "duration_s: inf is not a number"),
-        ("robots = 3", "robots = 4", "network[0].robots: 4 is not one of the choices; use 3 or 5"),
+        (
+            "robots = 3",
+            "robots = 4",
+            "network[0].robots: 4 is not one of the choices; use 3 or 5: slots of a",
+        ),
         (
             "slot = 0",
             "slot = 3",

@@ -84,7 +84,9 @@ def _objection(check: Check, origin: str, place: str, end_tick: int) -> str:
 
 def _no_check(origin: str, place: str, name: str, error: PartError) -> ScenarioError:
     if "is not one of the choices" in error.what:
-        return ScenarioError(origin, place, "there is no such check", remedy_for_key(name, CHECKS.names()))
+        remedy = remedy_for_key(name, CHECKS.names())
+        own = "; one of your own: `mirotwin examples checks`" if remedy.startswith("keys here") else ""
+        return ScenarioError(origin, place, "there is no such check", f"{remedy}{own}")
     return ScenarioError(origin, place, error.what, error.remedy)
 
 

@@ -62,6 +62,10 @@ TYPE_NAMES = {
 }
 
 
+PARTS_OF_A_ROBOT = ("reference", "controller")
+"""Tables that every robot of a scenario needs."""
+
+
 class ScenarioError(BadInput):
     """A scenario that cannot be used: file or built-in name, key path or line, what, remedy."""
 
@@ -76,11 +80,14 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
         known = _keys_at(raw, path)
         place = f"{path}.{unknown[1]}" if path else unknown[1]
         remedy = _other_part(raw, path, unknown[1]) or remedy_for_key(unknown[1], known)
+        if not path and remedy.startswith("keys here"):
+            remedy += "; `mirotwin scenarios show fig6` has those of their tables, too"
         return ScenarioError(origin, place, "unknown key", remedy)
     missing = re.fullmatch(r"Object missing required field `(.*)`", what)
     if missing:
         place = f"{path}.{missing[1]}" if path else missing[1]
-        return ScenarioError(origin, place, "this key is missing", _choices_at(raw, place) or "add it")
+        shown = "add it, as in `mirotwin scenarios show fig6`" if missing[1] in PARTS_OF_A_ROBOT else "add it"
+        return ScenarioError(origin, place, "this key is missing", _choices_at(raw, place) or shown)
     inner = re.fullmatch(r"(?s)([a-z0-9_.]+(?:\[\d+\])?(?:\.[a-z0-9_]+)*): (.*)", what)
     if inner:  # a rule between keys (`Network.__post_init__`) names the place below its own table
         path = f"{path}.{inner[1]}" if path else inner[1]
@@ -255,4 +262,6 @@ def _choices_at(raw: Any, path: str) -> str:
     if not choices:
         return ""
     *others, last = choices
+    if key == "robots":
+        return f"use {', '.join(others)} or {last}: slots of a frame; each [[network.robot]] is a robot"
     return f"use {', '.join(others)} or {last}" if others else f"use {last}"

@@ -181,7 +181,10 @@ class _Path:
         number = int(index[:9])
         if number >= len(at):
             what = f"{path} has {len(at)} {'entry' if len(at) == 1 else 'entries'}, numbered from 0"
-            raise _Refused(what, "give the whole list to add one")
+            raise _Refused(
+                what,
+                "give the whole list to add one, or add it to the file that `mirotwin scenarios show NAME` prints",
+            )
         place = f"{path}[{number}]"
         if rest:
             return self.put(at[number], rest, value, place)

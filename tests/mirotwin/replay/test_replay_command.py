@@ -102,11 +102,20 @@ def test_other_firmware_is_shown_where_it_answers_otherwise(
     [
         (b"", "offset 0: empty file"),
         (b"\x89PNG\r\n\x1a\n\0\0", "offset 0: neither a recording nor a stream file"),
+        (
+            b"\xdf\xe4\x77\x05",
+            "(UTF-8 text); give a run.mcap that `mirotwin run` wrote; of bytes alone make a",
+        ),
         ("0 > 55\n".encode("utf-16"), "neither a recording nor a stream file (UTF-8 text)"),
         (
             render([Transmission(0, ">", b"a")]),
-            "offset 0: a capture, which cannot be replayed; make a stream file",
+            "offset 0: a capture, which cannot be replayed; make a stream file of it with `mirotwin export ",
         ),
+        (
+            b"55 55 2d d4 7f f1\n",
+            "offset 0: hex text without times, which cannot be replayed; of bytes alone make a",
+        ),
+        (b"55552dd47ff1\n", "offset 0: hex text without times"),
         (b"0 > 55\0\n", ":1:5: '55\\x00' is not a character"),
         (b"12 > zz\n", ":1:6: 'zz' is not a character"),
         (b"# only a comment\n", "no line from host to robot"),

@@ -248,3 +248,14 @@ def test_a_table_in_a_pipe_has_no_trailing_blanks(
     lines = mirotwin(*arguments)[1].splitlines()
     assert lines
     assert [line for line in lines if line != line.rstrip()] == []
+
+
+def test_a_run_that_takes_the_default_place_of_another_one_says_so(mirotwin, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    short = ("run", "fig6", "-q", "--no-figure", "--set", "duration_s=0.2")
+    assert mirotwin(*short) == (0, "", "")
+    assert mirotwin(*short) == (0, "", "")
+    code, _, err = mirotwin(*short, "--set", "network.radio.bit_error_rate=0.01")
+    assert code == 0
+    assert err.startswith("mirotwin: note: runs/fig6-0 held a run with other bits (digest ")
+    assert err.endswith("..), now replaced; --out keeps both\n")

@@ -227,3 +227,15 @@ def test_pages_are_made_when_they_are_asked_for(mirotwin: Call, folder: Path) ->
             if b"failsafe_stop_ms" in path.read_bytes()
         ]
         assert len(found) == pages
+
+
+def test_what_a_failed_test_leaves_of_a_whole_run_replays_by_the_line_it_prints(
+    mirotwin: Call, folder: Path
+) -> None:
+    """A frame is on the air when the run ends, in the middle of a control period of the scenario's duration."""
+    Path("late.scenario.toml").write_text('scenario = "fig6"\nexpect = { settles_within_s = 0.1 }\n')
+    code, out, _ = mirotwin("test", "late.scenario.toml", "--artifacts", "left")
+    assert code == 1
+    (line,) = [line for line in out.splitlines() if "mirotwin replay left/" in line]
+    replayed, _, said = mirotwin(*line.split("mirotwin ")[1].split())
+    assert (replayed, said.startswith("mirotwin: fails as recorded: ")) == (1, True)

@@ -70,6 +70,11 @@ def test_each_check_says_its_name_and_kind(name: str) -> None:
     assert struct.__doc__
 
 
+def test_who_asks_for_a_check_that_is_none_is_told_how_one_is_made() -> None:
+    with pytest.raises(ScenarioError, match="; one of your own: `mirotwin examples checks`"):
+        parse(TWO.format(all="[expect]\nfast = 1\n", one=""), "two", (), expectations_of)
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [
