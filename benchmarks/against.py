@@ -30,12 +30,8 @@ MEMORY_PAIRS = 3
 COMMAND = """
 import sys
 sys.meta_path[:] = [f for f in sys.meta_path if not getattr(f, "__module__", "").startswith("__editable__")]
-from importlib.util import find_spec
 sys.argv[0] = "mirotwin"
-if find_spec("mirotwin"):
-    from mirotwin.entry import main
-else:
-    from miro_sim.cli import main
+from mirotwin.entry import main
 sys.exit(main())
 """
 SLOW_SPEED = "speed_m_s = 0.005"  # stays on the pitch for three minutes

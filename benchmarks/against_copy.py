@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent.parent
+OURS = "mirotwin"
 _BUILT = "built"
 """Name of a file that is written when the extensions are built."""
 
@@ -33,7 +34,8 @@ class Tree(NamedTuple):
 
 def this_tree() -> Tree:
     """The working tree as it is, with the extensions that are built in it."""
-    names = sorted(path.parent.relative_to(HERE).as_posix() for path in HERE.glob("*/*/__init__.py"))
+    found = (*HERE.glob("*/__init__.py"), *HERE.glob("*/*/__init__.py"))
+    names = sorted(path.parent.relative_to(HERE).as_posix() for path in found)
     return Tree("this tree", HERE, _roots(HERE, names))
 
 
@@ -55,9 +57,12 @@ def copy_of(commit: str) -> Tree:
 
 
 def _roots(folder: Path, packages: list[str]) -> tuple[Path, ...]:
-    """Folders directly in `folder` that hold a package `miro..`."""
+    """Folders directly in `folder` that hold a package `miro..`, and `folder` itself where it holds one."""
     tops = [name.split("/") for name in packages if name.count("/") == 1]
-    return tuple(folder / root for root in sorted({root for root, name in tops if name.startswith("miro")}))
+    roots = [
+        folder / root for root in sorted({root for root, name in tops if name.startswith("miro")} - {OURS})
+    ]
+    return (*roots, folder) if OURS in packages else tuple(roots)
 
 
 def _extract(content: str, folder: Path) -> None:

@@ -27,12 +27,8 @@ NEW = {
     "scenario": "miro_sim.scenario.file",
     "world": "miro_sim.world.world",
 }
-OLD = {
-    "runner": "miro_sim.runner",
-    "recording": "miro_sim.recording",
-    "scenario": "miro_sim.scenario_file",
-    "world": "miro_sim.world",
-}
+OLD = {**NEW, "runner": "mirotwin.runner"}
+"""Before `mirotwin` became a top folder."""
 
 
 def without_editable_installs() -> None:
@@ -46,7 +42,7 @@ class Tasks:
     """What is measured. Each method returns (processor seconds of one execution, result to compare)."""
 
     def __init__(self) -> None:
-        layout = NEW if find_spec("mirotwin") else OLD
+        layout = NEW if find_spec("mirotwin.rerun") else OLD
         self.parts: dict[str, Any] = {name: import_module(module) for name, module in layout.items()}
         self.load_hex = import_module("miro_robot.image").load_hex
         self.image_path = import_module("miro_robot.firmware").image_path

@@ -71,7 +71,7 @@ SECTIONS = {
         "info": Lazy("mirotwin.shell.info_command", "Shows versions, engine and firmware."),
     },
 }
-COMMANDS = {name: lazy.about for section in SECTIONS.values() for name, lazy in section.items()}
+COMMANDS = {name: lazy for section in SECTIONS.values() for name, lazy in section.items()}
 
 
 @click.group(

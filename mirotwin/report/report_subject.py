@@ -57,7 +57,7 @@ class Wanted(msgspec.Struct, frozen=True):
 def is_campaign(subject: str) -> bool:
     """Whether it is a Parquet file, by its first bytes."""
     if not Path(subject).is_file():
-        return subject.endswith(".parquet")
+        return False
     with open(subject, "rb") as file:
         return file.read(len(PARQUET)) == PARQUET
 

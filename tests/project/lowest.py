@@ -101,7 +101,7 @@ def install(tree: Path, python: Path, smoke: bool) -> None:
         ).stdout.strip()
     )
     children.run([str(python), "setup.py", "-q", "dist_info", "-o", str(site)], cwd=tree, check=True)
-    roots = (str(tree / package) for package in PACKAGE_FOLDERS)
+    roots = (str(tree), *(str(tree / package) for package in PACKAGE_FOLDERS))
     (site / "mirotwin.pth").write_text("\n".join(roots) + "\n", encoding="utf-8")
     program = python.with_name("mirotwin")
     program.write_text(f"#!{python}\nfrom mirotwin.entry import main\n\nmain()\n", encoding="utf-8")

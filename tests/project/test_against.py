@@ -6,16 +6,16 @@ from benchmarks import against, against_copy
 
 
 def test_packages_of_either_layout_are_found():
-    old = ["protocol/miro_protocol", "robot_fw/miro_robot", "robot_fw/miro_robot/mcs51", "sim/miro_sim"]
-    new = ["exact/miro_exact", "sim/miro_sim", "mirotwin", "tests/naive", "examples/laws"]
+    old = ["protocol/miro_protocol", "robot_fw/miro_robot", "robot_fw/miro_robot/mcs51", "sim/mirotwin"]
+    new = ["exact/miro_exact", "sim/miro_sim", "mirotwin", "mirotwin/run", "tests/naive", "examples/laws"]
     folder = Path("copy")
     assert against_copy._roots(folder, old) == (folder / "protocol", folder / "robot_fw", folder / "sim")
-    assert against_copy._roots(folder, new) == (folder / "exact", folder / "sim")
+    assert against_copy._roots(folder, new) == (folder / "exact", folder / "sim", folder)
 
 
-def test_this_tree_has_its_five_folders():
+def test_this_tree_has_its_folders():
     folders = [root.name for root in against_copy.this_tree().roots]
-    assert folders == ["exact", "host", "protocol", "robot_fw", "sim"]
+    assert folders == ["exact", "host", "protocol", "robot_fw", "sim", against_copy.HERE.name]
 
 
 def test_a_row_states_medians_ratio_and_quartiles():

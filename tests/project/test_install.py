@@ -19,7 +19,7 @@ from tests import children
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
-SOURCES = ("exact", "protocol", "robot_fw", "host", "sim")
+SOURCES = ("exact", "protocol", "robot_fw", "host", "sim", "mirotwin")
 
 
 @pytest.fixture
@@ -135,7 +135,7 @@ def test_an_installation_puts_one_file_beside_pyserials_handlers_and_replaces_no
     assert put == ["serial/urlhandler/protocol_miro.py"]
     own = resources.files("serial") / "urlhandler"
     assert {entry.name for entry in own.iterdir()} >= {"__init__.py", "protocol_loop.py"}
-    assert (tree / "built/mirotwin/bridges/serial_port.py").exists()
+    assert (tree / "built/mirotwin/ports/serial_port.py").exists()
 
 
 def test_a_wheel_carries_the_examples_without_what_tools_leave_behind(tree):
@@ -145,7 +145,7 @@ def test_a_wheel_carries_the_examples_without_what_tools_leave_behind(tree):
         (tree / "examples" / name).write_text("")
     built = python(tree, "setup.py", "-q", "build_py", "--build-lib", "built")
     assert built.returncode == 0, built.stderr
-    examples = tree / "built/mirotwin/starter/examples"
+    examples = tree / "built/mirotwin/testing/starter/examples"
     assert (examples / "firmware/late.ihx").is_file()
     assert (examples / "hil/.github/workflows/firmware.yml").is_file()
     assert {path.name for path in (examples / "laws").iterdir()} == {

@@ -2,11 +2,11 @@
 
 import pytest
 from click.testing import CliRunner
-from mirotwin.cli import main
 from msgspec import ValidationError
 
 from miro_robot.mcs51.opcodes import CYCLES, LENGTH
 from miro_robot.mcs51.vectors import DISCARD, FETCH, LATCH, READ, TABLE, WRITE, Bench, State, decode
+from mirotwin.commands import main
 from tests.vectors.paths import MCS51
 
 NAMES = [f"{opcode:02x}.json" for opcode in range(256)]

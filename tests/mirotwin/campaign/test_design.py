@@ -19,7 +19,7 @@ from mirotwin.campaign.seeds import seeds_of
 from tests.mirotwin.campaign.plans import SHORT, plan_of
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "campaign.toml"
-README = Path(__file__).parents[3] / "sim" / "mirotwin" / "campaign" / "README.md"
+README = Path(__file__).parents[3] / "mirotwin" / "campaign" / "README.md"
 
 VALUES = st.recursive(
     st.booleans()

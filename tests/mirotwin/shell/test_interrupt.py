@@ -28,7 +28,7 @@ def interrupted(delay_s: float, *arguments: str) -> tuple[int, bytes, bytes]:
         [sys.executable, "-c", PROGRAM, *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": str(ROOT / "sim")},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     ) as process:
         assert process.stderr is not None
         assert process.stderr.readline() == MARK
@@ -68,7 +68,7 @@ def test_a_program_that_was_started_with_ctrl_c_ignored_ignores_it() -> None:
         [sys.executable, *program],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": str(ROOT / "sim")},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     ) as process:
         assert process.stderr is not None
         assert process.stderr.readline() == MARK

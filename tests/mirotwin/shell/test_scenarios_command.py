@@ -58,7 +58,7 @@ def test_bad_input_is_one_line_on_stderr_and_exit_code_2(arguments: list[str], e
 def test_without_a_command_the_help_is_shown() -> None:
     code, _, err = mirotwin()
     assert code == 2
-    assert "Commands:" in err
+    assert "Simulate:" in err
 
 
 FULL_DISK = OSError(28, "No space left on device", "out/run.mcap")

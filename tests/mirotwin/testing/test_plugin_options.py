@@ -94,7 +94,7 @@ def test_a_session_without_worlds_imports_nothing_else_of_ours(tmp_path: Path) -
     tests = "import sys\ndef test_one(tmp_path):\n    pass\n"
     (tmp_path / "test_mine.py").write_text(tests)
     out = session(tmp_path, "-s").stdout
-    assert "LOADED ['mirotwin', 'mirotwin.testing.pytest_plugin']" in out
+    assert "LOADED ['mirotwin', 'mirotwin.testing', 'mirotwin.testing.pytest_plugin']" in out
 
 
 def test_the_help_names_options_and_the_marker(tmp_path: Path) -> None:

@@ -297,7 +297,7 @@ def test_the_limit_is_50_mb():
         (["nothing"], "nothing: No such file or directory"),
         (["empty"], "empty: holds neither run.mcap nor case.stream; give a run's folder"),
         (["text.txt"], "text.txt:1:1: 'hello' is not a tick"),
-        (["gone.parquet"], "gone.parquet: there is no such file"),
+        (["gone.parquet"], "gone.parquet: No such file or directory"),
         (["fig6", "--from", "9s"], "--from 216000000t: the recording goes from tick 0 to"),
         (["fig6", "--from", "1s", "--to", "1s"], "the window is empty; --to must be later"),
         (["fig6", "--sources", "gone"], "there is no such folder"),
