@@ -6,14 +6,29 @@ from typing import Any
 import click
 from rich.table import Table
 
+from miro_exact.bad_input import shortened
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as radio_profiles
 from miro_sim.scenario import variants as scenario_variants
 from mirotwin.cli.console import show as print_result
 from mirotwin.cli.options import set_option
+from mirotwin.cli.program import LazyGroup
 
 
-@click.group(invoke_without_command=True, short_help="Lists the built-in scenarios, or shows one.")
+class ScenariosGroup(LazyGroup):
+    """Tells what was meant where a scenario is named instead of a command."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if name in scenario_file.builtin_names() or name.endswith(".toml"):
+            what = f"No such command {shortened(repr(name))}"
+            ctx.fail(f"{what}; did you mean `scenarios show {shortened(name)}`?")
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=ScenariosGroup, invoke_without_command=True, short_help="Lists the built-in scenarios, or shows one.")
 @click.pass_context
 def scenarios(context: click.Context) -> None:
     """Lists the built-in scenarios."""
@@ -29,6 +44,7 @@ def scenarios(context: click.Context) -> None:
         robots = len([robot for network in scenario.networks for robot in network.robot])
         table.add_row(name, f"{scenario.duration_s:g} s", str(robots), scenario.title)
     print_result(table)
+    print_result("write one out, to start from: mirotwin scenarios show NAME")
 
 
 @scenarios.command()

@@ -23,6 +23,7 @@ def test_the_built_in_scenarios_are_listed_with_what_they_show() -> None:
     assert (code, err) == (0, "")
     assert "fig6" in out
     assert "Arc, initial errors (11.20 cm, 28.92 cm, -1.31 rad)" in out
+    assert out.endswith("\nwrite one out, to start from: mirotwin scenarios show NAME\n")
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig10"])
@@ -44,6 +45,9 @@ def test_show_prints_the_file_as_it_stands(name: str) -> None:
         (["run"], "error: Missing argument 'SCENARIO'"),
         (["rnu"], "error: No such command 'rnu'; did you mean run?"),
         (["fw", "trce"], "error: No such command 'trce'; did you mean trace?"),
+        (["scenarios", "fig6"], "error: No such command 'fig6'; did you mean `scenarios show fig6`?"),
+        (["scenarios", "x.toml"], "error: No such command 'x.toml'; did you mean `scenarios show x.toml`?"),
+        (["scenarios", "shwo"], "error: No such command 'shwo'; did you mean show?"),
         (["xyz"], "error: No such command 'xyz'; there are run, "),
         (["replay", "absent.mcap"], "error: absent.mcap: No such file or directory"),
     ],
