@@ -28,7 +28,9 @@ class ScenariosGroup(LazyGroup):
         return super().resolve_command(ctx, args)
 
 
-@click.group(cls=ScenariosGroup, invoke_without_command=True, short_help="Lists the built-in scenarios, or shows one.")
+@click.group(
+    cls=ScenariosGroup, invoke_without_command=True, short_help="Lists the built-in scenarios, or shows one."
+)
 @click.pass_context
 def scenarios(context: click.Context) -> None:
     """Lists the built-in scenarios."""
