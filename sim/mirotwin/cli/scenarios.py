@@ -55,7 +55,15 @@ def scenarios(context: click.Context) -> None:
     "A key to set in it, as for `run`; may be repeated. The file is then checked, and its comments are left out."
 )
 def show(name: str, settings: tuple[str, ...]) -> None:
-    """Prints the file of the built-in scenario NAME, to read or to start one's own from. NAME may be a file, too."""
+    """Prints the file of the built-in scenario NAME, to read or to start one's own from. NAME may be a file, too.
+
+    A file of three lines is that scenario with single keys changed:
+
+    \b
+        scenario = "fig6"
+        name = "mine"
+        set = { network.robot.controller.q1_per_s = 0.3 }
+    """
     text = scenario_file.load(name, settings).text if settings else scenario_file.source_text(name)
     click.echo(text, nl=False)
 

@@ -7,7 +7,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from miro_sim.scenario.file import builtin_text
+from miro_sim.scenario.file import builtin_text, parse
 from mirotwin.cli import main
 from mirotwin.cli.program import Program
 
@@ -30,6 +30,14 @@ def test_the_built_in_scenarios_are_listed_with_what_they_show() -> None:
 def test_show_prints_the_file_as_it_stands(name: str) -> None:
     assert mirotwin("scenarios", "show", name) == (0, builtin_text(name), "")
     assert tomllib.loads(mirotwin("scenarios", "show", name)[1])["name"] == name
+
+
+@pytest.mark.parametrize("command", [["scenarios", "show"], ["run"]])
+def test_the_help_has_the_three_lines_that_derive_a_scenario(command: list[str]) -> None:
+    lines = mirotwin(*command, "--help")[1].splitlines()
+    first = next(number for number, line in enumerate(lines) if line.strip() == 'scenario = "fig6"')
+    mine = parse("\n".join(lines[first : first + 3]).replace("    ", ""), "mine.toml")
+    assert (mine.name, mine.networks[0].robot[0].controller.q1_per_s) == ("mine", 0.3)
 
 
 @pytest.mark.parametrize(
