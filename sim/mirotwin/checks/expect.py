@@ -30,6 +30,9 @@ from mirotwin.checks.registry import ALWAYS_ON, CHECKS
 
 EXAMPLE_VALUES = {"what": '"fault"', "until_tick": "24000000"}
 """What a message writes for a parameter without a default."""
+WHERE_CHECKS_ARE = (
+    "`mirotwin scenarios checks` lists them, `mirotwin examples checks` writes one of your own to pip install"
+)
 Place = tuple[int, int]
 """Network and slot of a robot."""
 
@@ -89,7 +92,9 @@ def _objection(check: Check, origin: str, place: str, end_tick: int) -> str:
 
 def _no_check(origin: str, place: str, name: str, error: PartError) -> ScenarioError:
     if "is not one of the choices" in error.what:
-        return ScenarioError(origin, place, "there is no such check", remedy_for_key(name, CHECKS.names()))
+        near = remedy_for_key(name, CHECKS.names())
+        remedy = f"{near}{'' if near.endswith('?') else ';'} {WHERE_CHECKS_ARE}"
+        return ScenarioError(origin, place, "there is no such check", remedy)
     return ScenarioError(origin, place, error.what, error.remedy)
 
 

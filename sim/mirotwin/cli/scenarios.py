@@ -7,9 +7,12 @@ import click
 from rich.table import Table
 
 from miro_exact.bad_input import shortened
+from miro_host.parts import PartError
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as radio_profiles
 from miro_sim.scenario import variants as scenario_variants
+from mirotwin.checks.expect import struct_of
+from mirotwin.checks.registry import CHECKS
 from mirotwin.cli.console import show as print_result
 from mirotwin.cli.options import set_option
 from mirotwin.cli.program import LazyGroup
@@ -93,6 +96,25 @@ def variants() -> None:
     for name, variant in scenario_variants.variants().items():
         keys = _keys({key: value for key, value in variant.items() if key != "about"})
         table.add_row(name, variant["about"], keys)
+    print_result(table)
+
+
+@scenarios.command()
+def checks() -> None:
+    """Lists the checks, for --expect and [expect], and their parameters; a bare value is that of the one with a *."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("check", style="bold")
+    table.add_column("what it checks")
+    table.add_column("parameters")
+    for name in CHECKS.names():
+        try:
+            struct = struct_of(name)
+        except PartError as error:
+            table.add_row(name, error.what, "")
+            continue
+        keys = [f"{key}*" if key == struct.MAIN else key for key in struct.__struct_encode_fields__]
+        about = " ".join((struct.__doc__ or "").partition("\n\n")[0].split())
+        table.add_row(name, about, ", ".join(keys))
     print_result(table)
 
 

@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from miro_sim.scenario.file import builtin_text, parse
+from mirotwin.checks.registry import CHECKS
 from mirotwin.cli import main
 from mirotwin.cli.program import Program
 
@@ -30,6 +31,14 @@ def test_the_built_in_scenarios_are_listed_with_what_they_show() -> None:
 def test_show_prints_the_file_as_it_stands(name: str) -> None:
     assert mirotwin("scenarios", "show", name) == (0, builtin_text(name), "")
     assert tomllib.loads(mirotwin("scenarios", "show", name)[1])["name"] == name
+
+
+def test_the_checks_are_listed_with_their_parameters() -> None:
+    code, out, err = mirotwin("scenarios", "checks")
+    assert (code, err) == (0, "")
+    rows = {line.split()[0]: line for line in out.splitlines() if line.strip()}
+    assert set(CHECKS.own) <= set(rows)
+    assert rows["tracks_within_cm"].endswith("limit_cm*, from_s")
 
 
 @pytest.mark.parametrize("command", [["scenarios", "show"], ["run"]])
