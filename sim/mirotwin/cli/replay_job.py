@@ -148,7 +148,11 @@ def _refuse_other_formats(data: bytes, path: str) -> None:
         raise BadInput(path, "offset 0", "a capture, which cannot be replayed", remedy)
     if format != "stream" and b"\0" in data[:4096]:
         what = "neither a recording nor a stream file (UTF-8 text)"
-        raise BadInput(path, "offset 0", what, "give a run.mcap that `mirotwin run` wrote, or a stream file")
+        remedy = (
+            "give a run.mcap that `mirotwin run` wrote, or a stream file;"
+            " a stream line is `TICK > HEX`, ticks of 24 MHz; `mirotwin decode` reads raw bytes"
+        )
+        raise BadInput(path, "offset 0", what, remedy)
 
 
 def _job_of_recording(

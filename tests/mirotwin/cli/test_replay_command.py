@@ -112,6 +112,7 @@ def test_other_firmware_is_shown_where_it_answers_otherwise(
     [
         (b"", "offset 0: empty file"),
         (b"\x89PNG\r\n\x1a\n\0\0", "offset 0: neither a recording nor a stream file"),
+        (b"\x55\0\x55", "a stream line is `TICK > HEX`, ticks of 24 MHz; `mirotwin decode` reads raw bytes"),
         ("0 > 55\n".encode("utf-16"), "neither a recording nor a stream file (UTF-8 text)"),
         (
             render([Transmission(0, ">", b"a")]),
