@@ -22,6 +22,7 @@ from mirotwin.cases.case import write_case
 from mirotwin.files import command_line
 
 REPORT, CASE, SENT = "report.txt", "case.stream", "sent.stream"
+CASES = (CASE, SENT)
 PAGE = "report.html"
 FIRMWARE = "firmware.ihx"
 DEBUG_FILES = (".map", ".cdb")

@@ -14,6 +14,7 @@ from miro_sim.periods import Period
 from miro_sim.radio.downlink import TransmissionError
 from miro_sim.world.world import World
 from mirotwin import runner
+from mirotwin.cases.artifacts import CASES
 from mirotwin.checks.expect import expectations_of, says_anything
 from mirotwin.checks.watching import Checks
 from mirotwin.cli.compare_options import Asked, compare_options
@@ -45,6 +46,7 @@ from mirotwin.cli.replay_firmware import firmwares_apart, lines_from_option, loa
 from mirotwin.cli.replay_job import Job, load_job
 from mirotwin.cli.replay_tables import SHOWN, print_frames, print_response
 from mirotwin.cli.run import report_faults
+from mirotwin.files.outputs import RECORDINGS, file_in
 from mirotwin.replay.compare import differences
 from mirotwin.replay.difference import Difference
 from mirotwin.replay.firmwares import FirmwareDifference
@@ -77,7 +79,9 @@ def replay(
     everything: bool,
     quiet: bool,
 ) -> int:
-    """Sends the bytes of FILE (run.mcap, or a text stream) again and compares what the robot does.
+    """Sends the bytes of FILE again and compares what the robot does.
+
+    FILE is a run.mcap, a text stream, or the folder of a run or of a failed test.
 
     Exit code 4 when it differs from the recording, also where a firmware fault comes of it: 4 goes before 3. The first
     difference is said on stderr, and the first of each channel in a table. Where another --firmware makes it differ,
@@ -97,6 +101,7 @@ def replay(
 
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
+    file = file_in(file, (*RECORDINGS, *CASES))
     if is_bare_case(file):
         _check_bare(file, asked, settings, seed)
         choose_engine(engine)

@@ -17,7 +17,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import read_input
 from miro_robot.image import Image
 from miro_sim.radio.downlink import TransmissionError
-from mirotwin.cases.artifacts import CASE, REPORT, SENT
+from mirotwin.cases.artifacts import CASES, REPORT
 from mirotwin.cases.case import tables_of
 from mirotwin.checks.expect import expectations_of
 from mirotwin.cli.fuzz_bare import is_bare_case
@@ -25,7 +25,7 @@ from mirotwin.cli.options import plain_parameters
 from mirotwin.cli.progress import ProgressBar
 from mirotwin.cli.replay_job import Job, load_job
 from mirotwin.files.command_line import replay_line
-from mirotwin.files.outputs import RECORDING, part_name
+from mirotwin.files.outputs import RECORDING, RECORDINGS, file_in
 from mirotwin.page.again import Again, run_again
 from mirotwin.page.bokeh_page import require_bokeh
 from mirotwin.page.frames import Extras, extras_of
@@ -34,8 +34,6 @@ from mirotwin.replay.compare import Rule, differences
 from mirotwin.report.firmware_coverage import source_folders
 from mirotwin.report.summary import Summary
 
-RECORDINGS = (RECORDING, part_name(RECORDING))
-CASES = (CASE, SENT)
 SUMMARIES = ("summary.json", "summary.part.json")
 PARQUET = b"PAR1"
 
@@ -91,12 +89,9 @@ def page_of_failure(folder: str) -> bytes:
 
 def _file_of(subject: str) -> str:
     """The file that is meant: of a folder, the recording or the case in it."""
-    folder = Path(subject)
-    if not folder.is_dir():
-        return subject
-    for name in (*RECORDINGS, *CASES):
-        if (folder / name).is_file():
-            return str(folder / name)
+    file = file_in(subject, (*RECORDINGS, *CASES))
+    if not Path(file).is_dir():
+        return file
     what = f"holds neither {RECORDING} nor {CASES[0]}"
     raise BadInput(subject, "", what, "give a run's folder, or that of one failed test")
 

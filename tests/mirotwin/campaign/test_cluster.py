@@ -141,3 +141,15 @@ def test_an_address_where_no_scheduler_answers_is_exit_code_2_with_a_remedy(tmp_
     assert "no Dask scheduler answers at" in result.output
     assert "start one (dask scheduler), or leave --cluster out" in result.output
     assert [path.name for path in tmp_path.iterdir()] == ["short.toml"]
+
+
+def test_a_client_that_finds_no_scheduler_is_closed_at_once(monkeypatch):
+    """Collected later it closes itself, which waits for ever where another client is just being made."""
+    closed = []
+    monkeypatch.setattr(cluster_module, "PATIENCE_S", 1)
+    monkeypatch.setattr(distributed.Client, "close", lambda client, *given, **named: closed.append(client))
+    with pytest.raises(BadInput, match="no Dask scheduler answers at"):
+        campaign.Cluster("tcp://127.0.0.1:9")
+    assert len(closed) == 1
+    monkeypatch.undo()
+    closed[0].close()
