@@ -71,7 +71,8 @@ def test_each_check_says_its_name_and_kind(name: str) -> None:
 
 
 def test_who_asks_for_a_check_that_is_none_is_told_how_one_is_made() -> None:
-    with pytest.raises(ScenarioError, match="; `mirotwin scenarios checks` lists them, `mirotwin examples checks` writes one"):
+    both = "; `mirotwin scenarios checks` lists them, `mirotwin examples checks` writes one"
+    with pytest.raises(ScenarioError, match=both):
         parse(TWO.format(all="[expect]\nfast = 1\n", one=""), "two", (), expectations_of)
 
 
