@@ -27,7 +27,7 @@ NEW = {
     "scenario": "miro_sim.scenario.file",
     "world": "miro_sim.world.world",
 }
-OLD = {**NEW, "runner": "mirotwin.runner"}
+OLD = {**NEW, "runner": "mirotwin.rerun.runner"}
 """Before `mirotwin` became a top folder."""
 
 

@@ -16,7 +16,7 @@ SECTIONS = {
         "campaign": Lazy(
             "mirotwin.campaign.campaign_command", "Runs a scenario many times, varied, and compares."
         ),
-        "scenarios": Lazy("mirotwin.shell.scenarios_command", "Lists the built-in scenarios, or shows one."),
+        "scenarios": Lazy("mirotwin.run.scenarios_command", "Lists the built-in scenarios, or shows one."),
     },
     "Test firmware": {
         "init": Lazy(

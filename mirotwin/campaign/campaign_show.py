@@ -12,9 +12,10 @@ import numpy as np
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput
+from mirotwin.campaign.columns import CHECK
 from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, Difference, difference
 from mirotwin.campaign.design import Value
-from mirotwin.campaign.rows import VERDICTS, Rows, paired, paired_levels
+from mirotwin.campaign.rows import UNSETTLED, VERDICTS, Rows, paired, paired_levels
 from mirotwin.campaign.statistics import Figures, Interval, figures
 from mirotwin.shell.console import show as show_table
 from mirotwin.shell.options import Number, Place
@@ -132,9 +133,16 @@ def _groups_table(groups: Sequence[Group]) -> Table:
         head = [*(f"{level}" for level in group.factors.values()), f"{group.runs}"]
         head += [f"{group.verdicts[name]}" for name in VERDICTS]
         for name, found in group.metrics.items():
-            table.add_row(*head, name, *_cells(found))
+            table.add_row(*head, _labelled(name), *_cells(found))
             head = [""] * len(head)
     return table
+
+
+def _labelled(metric: str) -> str:
+    """A metric that is 0 or 1 for each run, with what 1 means."""
+    if metric.startswith(CHECK):
+        return f"{metric} (1: failed)"
+    return f"{metric} (1: yes)" if metric in (*VERDICTS, UNSETTLED) else metric
 
 
 def _cells(found: Figures | None) -> list[str]:
@@ -210,7 +218,7 @@ def _differences_table(found: Sequence[Difference], first: str, second: str) -> 
         table.add_column(name, justify="right")
     for one in found:
         table.add_row(
-            one.metric,
+            _labelled(one.metric),
             f"{one.pairs}",
             f"{one.without}",
             f"{one.seeds}",

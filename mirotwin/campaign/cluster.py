@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from concurrent.futures import Executor
+from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
@@ -24,6 +25,11 @@ class Cluster(Workers):
     """The workers of the scheduler at `address` (tcp://host:8786). Raises BadInput where it does not answer."""
 
     option = OPTION
+    gone = (
+        *Workers.gone,
+        TypeError,
+        UnboundLocalError,
+    )  # Dask, of a result whose scheduler ends at that moment
 
     def __init__(self, address: str) -> None:
         super().__init__()
@@ -78,17 +84,25 @@ def ours() -> Versions:
 def _connected(address: str) -> Any:
     if find_spec("distributed") is None:
         raise BadInput("", OPTION, "Dask is not installed", "pip install 'mirotwin[cluster]'")
-    connect: Any = import_module("distributed").Client  # has no types
+    client_type: Any = import_module("distributed").Client  # has no types
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it says is said here, in one line
+    if not address.strip():  # it would start one
+        raise _no_answer(address, "the address is empty")
+    client = client_type.__new__(client_type)
     try:
-        if not address.strip():  # it would start one
-            raise ValueError("the address is empty")
-        return connect(address, timeout=PATIENCE_S, set_as_default=False)
+        client.__init__(address, timeout=PATIENCE_S, set_as_default=False)
+        return client
     except (OSError, ValueError, TypeError) as error:
-        reason = f"{error}".partition("\n")[0] or type(error).__name__
-        what = f"no Dask scheduler answers at {address}: {reason}"
-        raise BadInput("", OPTION, what, "start one (dask scheduler), or leave --cluster out") from None
+        # Collected later, it would close itself, perhaps while the next one holds the lock of Dask's event loop.
+        with suppress(Exception):
+            client.close()
+        raise _no_answer(address, f"{error}".partition("\n")[0] or type(error).__name__) from None
+
+
+def _no_answer(address: str, reason: str) -> BadInput:
+    what = f"no Dask scheduler answers at {address}: {reason}"
+    return BadInput("", OPTION, what, "start one (dask scheduler), or leave --cluster out")
 
 
 def _killed_worker() -> type[Exception]:

@@ -90,7 +90,7 @@ class Drive:
             except self.workers.ended as error:
                 yield Outcome(run, error=f"ended its worker (killed, or out of memory): {error}")
                 continue
-            except futures.CancelledError:
+            except self.workers.gone:
                 raise self._gone() from None
             if outcome.refused:
                 what = f"has {outcome.refused}"

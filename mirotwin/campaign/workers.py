@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
+from concurrent.futures import CancelledError, Executor
 
 from mirotwin.campaign.processes import cores, processes
 
@@ -14,11 +14,13 @@ class Workers:
     """An executor that is the caller's own, and stays open.
 
     `ahead`: jobs that are handed over at once. `restarts`: whether `start` gives another executor when one is broken.
-    `ended`: errors that say of one job that its workers have ended. `option` names the workers in errors.
+    `ended`: errors that say of one job that its workers have ended; `gone`: that all have.
+    `option` names the workers in errors.
     """
 
     restarts = False
     ended: tuple[type[Exception], ...] = ()
+    gone: tuple[type[BaseException], ...] = (CancelledError,)
     option = "executor"
 
     def __init__(self, executor: Executor | None = None) -> None:

@@ -24,7 +24,7 @@ from mirotwin.replay.sources import Made, SourceDifference, source_differences
 from mirotwin.rerun.rerun import image_if_any
 from mirotwin.shell.console import show
 from mirotwin.shell.options import Place, choose_engine, engine_option
-from mirotwin.shell.outputs import RECORDING
+from mirotwin.shell.outputs import file_in
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
 
 WORDS = ("A", "B")
@@ -47,7 +47,7 @@ def diff(
     engine: str | None,
     quiet: bool,
 ) -> int:
-    """Compares the recordings A and B (run.mcap): what they were made from, then all that they hold.
+    """Compares the recordings A and B (run.mcap, or a run's folder): what they were made from, then all they hold.
 
     `bits` compares what the PCs did as well, and the digests of the states. Where both can be run again, the first
     tick is looked for at which their states differ, with the fields that do; and with two firmwares the first
@@ -57,6 +57,7 @@ def diff(
     """
     choose_engine(engine)
     checked_sources(sources)
+    a, b = file_in(a), file_in(b)
     recordings = _read(a), _read(b)
     made = _made(recordings[0], a), _made(recordings[1], b)
     origins = list(source_differences(*made))
@@ -94,7 +95,7 @@ def diff(
 
 
 def _read(path: str) -> Recording:
-    check_no_folder(path, RECORDING)
+    check_no_folder(path)
     data = read_input(path, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
     if not MAGIC.startswith(data[: len(MAGIC)]):
         raise BadInput(path, "offset 0", "not a recording", "give a run.mcap that `mirotwin run` wrote")

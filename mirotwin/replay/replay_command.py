@@ -37,8 +37,10 @@ from mirotwin.shell.options import (
     set_option,
     stack_option,
 )
+from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.checks.expect import expectations_of, says_anything
 from mirotwin.verify.checks.watching import Checks
@@ -78,7 +80,9 @@ def replay(
     everything: bool,
     quiet: bool,
 ) -> int:
-    """Sends the bytes of FILE (run.mcap, or a text stream) again and compares what the robot does.
+    """Sends the bytes of FILE again and compares what the robot does.
+
+    FILE is a run.mcap, a text stream, or the folder of a run or of a failed test.
 
     Exit code 4 when it differs from the recording, also where a firmware fault comes of it: 4 goes before 3. The first
     difference is said on stderr, and the first of each channel in a table. Where another --firmware makes it differ,
@@ -98,6 +102,7 @@ def replay(
 
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
+    file = file_in(file, (*RECORDINGS, *CASES))
     if is_bare_case(file):
         _check_bare(file, asked, settings, seed)
         choose_engine(engine)

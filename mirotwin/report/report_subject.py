@@ -23,14 +23,12 @@ from mirotwin.report.summary import Summary
 from mirotwin.rerun.job import Job, load_job
 from mirotwin.shell.command_line import replay_line
 from mirotwin.shell.options import plain_parameters
-from mirotwin.shell.outputs import RECORDING, part_name
+from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.verify.cases.artifacts import CASE, REPORT, SENT
+from mirotwin.verify.cases.artifacts import CASES, REPORT
 from mirotwin.verify.cases.case import is_bare_case, tables_of
 from mirotwin.verify.checks.expect import expectations_of
 
-RECORDINGS = (RECORDING, part_name(RECORDING))
-CASES = (CASE, SENT)
 SUMMARIES = ("summary.json", "summary.part.json")
 PARQUET = b"PAR1"
 
@@ -86,12 +84,9 @@ def page_of_failure(folder: str) -> bytes:
 
 def _file_of(subject: str) -> str:
     """The file that is meant: of a folder, the recording or the case in it."""
-    folder = Path(subject)
-    if not folder.is_dir():
-        return subject
-    for name in (*RECORDINGS, *CASES):
-        if (folder / name).is_file():
-            return str(folder / name)
+    file = file_in(subject, (*RECORDINGS, *CASES))
+    if not Path(file).is_dir():
+        return file
     what = f"holds neither {RECORDING} nor {CASES[0]}"
     raise BadInput(subject, "", what, "give a run's folder, or that of one failed test")
 

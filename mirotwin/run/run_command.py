@@ -128,6 +128,13 @@ def run(
     all that was recorded; one that is killed leaves run.part.mcap with all but the last half second. decode, export
     and replay read it. Files of an earlier run stay as they are until the new ones are complete.
 
+    A file of three lines is another scenario with single keys changed:
+
+    \b
+        scenario = "fig6"
+        name = "mine"
+        set = { network.robot.controller.q1_per_s = 0.3 }
+
     The steps of a scenario (`[[step]]`) are done, as by `mirotwin test`.
 
     A run that is resumed has the bits of one that never stopped. Its recording begins with the first whole control

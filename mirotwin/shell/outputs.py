@@ -39,6 +39,16 @@ def part_name(name: str) -> str:
     return f"{path.stem}.part{path.suffix}"
 
 
+RECORDINGS = (RECORDING, part_name(RECORDING))
+"""What a run's folder has one of."""
+
+
+def file_in(path: str, names: Sequence[str] = RECORDINGS) -> str:
+    """Of a folder, the first of these files that is in it; else the path itself."""
+    inside = (os.path.join(path, name) for name in names)
+    return next(filter(os.path.isfile, inside), path)
+
+
 class OutputFolder:
     """`path` as the target of a command that writes files called `names`, by default those of a run.
 

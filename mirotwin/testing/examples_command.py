@@ -20,7 +20,10 @@ def examples(name: str | None, folder: Path, force: bool) -> None:
     """Lists the examples, or writes the one called NAME into FOLDER (here, if none is named).
 
     The pages of the documentation use these files. One that is there already with other content is replaced only
-    with --force. A whole project, with sources, tests and CI, is begun by `mirotwin init`.
+    with --force. `firmware` writes its files into FOLDER itself. Its late.ihx is late only when the host falls silent:
+    `replay` of a run of fig6 shows no difference, hil-steps/failsafe.scenario.toml does.
+
+    A whole project, with sources, tests and CI, is begun by `mirotwin init`.
     """
     if name is None:
         width = max(map(len, EXAMPLES))
@@ -35,3 +38,5 @@ def examples(name: str | None, folder: Path, force: bool) -> None:
         raise BadInput(error.filename or folder, "", what, "choose another folder") from None
     for one in names:
         click.echo(folder / one)
+    if folder == Path():
+        click.echo(f"files written into this folder: {len(names)}")

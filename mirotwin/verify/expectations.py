@@ -32,7 +32,10 @@ def refuse_files(given: Sequence[str]) -> None:
     for text in given:
         if is_in_file(text):
             what = "a check in a file is for firmware on a bare processor"
-            remedy = "a check of a run is in an installed distribution, and named by its key"
+            remedy = (
+                "a check of a run is in an installed distribution, and named by its key:"
+                " `mirotwin examples checks` writes one of your own; pip install it"
+            )
             raise click.UsageError(f"--expect {text}: {what}; {remedy}.")
 
 

@@ -87,13 +87,47 @@ def test_the_text_that_is_kept_says_the_same_alone(tables: dict[str, object]) ->
             "set.network.1.robots=5: network has 1 entry",
         ),
         ('scenario = "silent"\nduration = 3', "duration: unknown key; use duration_s, in seconds"),
-        ("set = { duration_s = 3 }", "set: unknown key"),
+        ("set = { duration_s = 3 }", 'set: unknown key; it goes with scenario = "NAME"'),
+        ('base = "fig6"', "base: unknown key; did you mean scenario?"),
+        ('sceanrio = "fig6"', "sceanrio: unknown key; did you mean scenario?"),
     ],
 )
 def test_what_is_wrong_is_named_where_it_stands(text: str, what: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         parse(text, "mine.toml")
     assert f"{caught.value}".startswith(f"mine.toml: {what}")
+
+
+def test_the_keys_of_a_file_are_listed_with_those_of_a_scenario() -> None:
+    with pytest.raises(ScenarioError, match=r"keys here: name, .*, network, scenario, set, variant;"):
+        parse('qqq = "fig6"', "mine.toml")
+    with pytest.raises(
+        ScenarioError, match=r"--set scenario=fig7: unknown key; it goes at the top of a file$"
+    ):
+        load("fig6", ["scenario=fig7"])
+
+
+@pytest.mark.parametrize(
+    ("header", "key"),
+    [
+        ("[network.robot.controller]\nq1_per_s = 0.4", "network.robot.controller.q1_per_s = 0.4"),
+        ("[[network.robot.controller]]\nq1_per_s = 0.4", "network.robot.controller.q1_per_s = 0.4"),
+        (
+            "[[network]]\n[network.robot.controller]\nq1_per_s = 0.4",
+            "network.robot.controller.q1_per_s = 0.4",
+        ),
+        ('[network]\nradio.profile = "late"', 'network.radio.profile = "late"'),
+        ("[network.robot.controller]", "network.robot.controller.q1_per_s = 0.3"),
+    ],
+)
+def test_a_header_of_a_part_of_a_network_is_answered_with_the_setting_that_is_meant(
+    header: str, key: str
+) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        parse(f'scenario = "fig6"\n{header}\n', "mine.toml")
+    what = "changes no single key of fig6; at the top of the file write"
+    assert f"{caught.value}".endswith(f"{what} set = {{ {key} }} instead")
+    parse(f'scenario = "fig6"\nset = {{ {key} }}', "mine.toml")
 
 
 def test_a_scenario_that_names_itself_or_one_that_names_another_is_refused(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from mirotwin.testing.starter.writing import all_files
 _IN_WHEEL = Path(__file__).parent / "examples"
 _IN_TREE = Path(__file__).parents[3] / "examples"
 EXAMPLES = {
-    "firmware": "Two images: mine.ihx, the robot's own; late.ihx stops 15 ms late.",
+    "firmware": "mine.ihx; late.ihx stops 15 ms late when the host falls silent.",
     "hil-steps": "Scenario files with steps: send, wait, expect, reset.",
     "campaign": "A campaign of 240 runs: radio, latency, two controllers.",
     "two_teams": "A scenario with six robots, to look at pictures.",

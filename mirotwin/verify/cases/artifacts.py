@@ -19,6 +19,7 @@ from mirotwin.shell import command_line
 from mirotwin.verify.cases.case import write_case
 
 REPORT, CASE, SENT = "report.txt", "case.stream", "sent.stream"
+CASES = (CASE, SENT)
 PAGE = "report.html"
 FIRMWARE = "firmware.ihx"
 DEBUG_FILES = (".map", ".cdb")

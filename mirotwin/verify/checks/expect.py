@@ -25,6 +25,11 @@ from mirotwin.verify.checks.interface import Check
 from mirotwin.verify.checks.judges import problem_of_class
 from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS
 
+EXAMPLE_VALUES = {"what": '"fault"', "until_tick": "24000000"}
+"""What a message writes for a parameter without a default."""
+WHERE_CHECKS_ARE = (
+    "`mirotwin scenarios checks` lists them, `mirotwin examples checks` writes one of your own to pip install"
+)
 Place = tuple[int, int]
 """Network and slot of a robot."""
 
@@ -84,9 +89,9 @@ def _objection(check: Check, origin: str, place: str, end_tick: int) -> str:
 
 def _no_check(origin: str, place: str, name: str, error: PartError) -> ScenarioError:
     if "is not one of the choices" in error.what:
-        remedy = remedy_for_key(name, CHECKS.names())
-        own = "; one of your own: `mirotwin examples checks`" if remedy.startswith("keys here") else ""
-        return ScenarioError(origin, place, "there is no such check", f"{remedy}{own}")
+        near = remedy_for_key(name, CHECKS.names())
+        remedy = f"{near}{'' if near.endswith('?') else ';'} {WHERE_CHECKS_ARE}"
+        return ScenarioError(origin, place, "there is no such check", remedy)
     return ScenarioError(origin, place, error.what, error.remedy)
 
 
@@ -98,6 +103,8 @@ def _check(
             raise ScenarioError(origin, place, "this check is always on", "remove the key")
         return None
     bare = not isinstance(value, dict) and value is not True
+    if (bare or value is True) and not struct.MAIN and _required(struct):
+        raise ScenarioError(origin, place, *_takes_a_table(struct, name))
     if bare and not struct.MAIN:
         raise ScenarioError(origin, place, f"expected true or false, got {value!r}", f"write {name} = true")
     given = {} if value is True else {struct.MAIN: value} if bare else value
@@ -111,6 +118,22 @@ def _check(
         raise _wrong(scenario, origin, place, struct, value, str(error)) from None
     except (Exception, SystemExit) as error:  # from the check's own look at its parameters
         raise ScenarioError(origin, place, f"cannot check its parameters: {raised(error)}") from error
+
+
+def _required(struct: type[Check]) -> list[str]:
+    """The parameters that have no default."""
+    return [field.encode_name for field in msgspec.structs.fields(struct) if field.required]
+
+
+def _takes_a_table(struct: type[Check], name: str) -> tuple[str, str]:
+    """What, and the remedy: the table with all that it needs, and the words that may stand there."""
+    keys = ", ".join(f"{key} = {EXAMPLE_VALUES.get(key, '..')}" for key in _required(struct))
+    remedy = f"write {name} = {{ {keys} }}"
+    info = cast(msgspec.inspect.StructType, msgspec.inspect.type_info(struct))
+    for field in info.fields:
+        if field.required and isinstance(field.type, msgspec.inspect.LiteralType):
+            remedy += f"; {field.encode_name}: {', '.join(map(str, field.type.values))}"
+    return f"{name} takes a table", remedy
 
 
 def _wrong(

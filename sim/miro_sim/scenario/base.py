@@ -18,6 +18,7 @@ from miro_sim.scenario.text import check_integers
 
 Table = dict[str, Any]
 SCENARIO, SET = "scenario", "set"
+NETWORK = "network"
 
 
 def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tuple[Table, list[Setting]]:
@@ -36,6 +37,7 @@ def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tup
     if not isinstance(settings, dict):
         raise ScenarioError(origin, SET, "expected a table of keys", "write set = { KEY = VALUE }")
     check_integers(raw, origin)  # they could not be written as text either
+    _check_no_part_of_network(own.get(NETWORK), origin, name)
     try:
         base = tables_of(_beside(origin, name))
     except ScenarioError as error:
@@ -46,6 +48,32 @@ def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tup
         raise ScenarioError(origin, SCENARIO, what, f"name {base[SCENARIO]!r}, and repeat its keys")
     complete = {**base, **own}
     return complete, make(complete, in_text(settings), origin, SET)
+
+
+def _check_no_part_of_network(given: Any, origin: str, name: str) -> None:
+    """Refuses headers such as [network.robot.controller], which are meant to change single keys of the other's."""
+    entries = given if isinstance(given, list) else [given]
+    part = isinstance(given, dict) or any(
+        isinstance(entry, dict) and isinstance(entry.get("robot"), dict) for entry in entries
+    )
+    if part:
+        what = f"a header such as [network.robot.controller] changes no single key of {name}"
+        remedy = f"at the top of the file write set = {{ {_key_in(given)} }} instead"
+        raise ScenarioError(origin, NETWORK, what, remedy)
+
+
+def _key_in(given: Any) -> str:
+    """The first single key that a part of a network sets, as `set` takes it; else any."""
+    path = NETWORK
+    while isinstance(given, (dict, list)) and given:
+        if isinstance(given, dict):
+            key, given = next(iter(given.items()))
+            path += f".{key}"
+        else:
+            given = given[0]
+    if isinstance(given, (bool, int, float, str)):
+        return in_text({path: given})[0].replace("=", " = ", 1)
+    return "network.robot.controller.q1_per_s = 0.3"
 
 
 def _beside(origin: str, name: str) -> str:

@@ -64,6 +64,9 @@ TYPE_NAMES = {
 
 PARTS_OF_A_ROBOT = ("reference", "controller")
 """Tables that every robot of a scenario needs."""
+FILE_KEYS = ("scenario", "set", "variant")
+"""What a file may also say at its top (`base`, `variants`)."""
+SCENARIO_IS_MEANT = ("base", "based_on", "extends", "from", "inherits", "parent")
 
 
 class ScenarioError(BadInput):
@@ -79,7 +82,8 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
     if unknown:
         known = _keys_at(raw, path)
         place = f"{path}.{unknown[1]}" if path else unknown[1]
-        remedy = _other_part(raw, path, unknown[1]) or remedy_for_key(unknown[1], known)
+        remedy = _other_part(raw, path, unknown[1]) or ("" if path else _of_a_file(unknown[1]))
+        remedy = remedy or remedy_for_key(unknown[1], known if path else [*known, *FILE_KEYS])
         if not path and remedy.startswith("keys here"):
             remedy += "; `mirotwin scenarios show fig6` has those of their tables, too"
         return ScenarioError(origin, place, "unknown key", remedy)
@@ -121,6 +125,15 @@ def _explain(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
     if "matching regex" in what:
         return f"{value!r} is not a name", "use a-z, 0-9, - and _, at most 64 characters"
     return what[:1].lower() + what[1:], remedy
+
+
+def _of_a_file(key: str) -> str:
+    """The remedy for a key that only the top of a file may have, or that is meant as one."""
+    if key in SCENARIO_IS_MEANT:
+        return "did you mean scenario?"
+    if key == "set":
+        return 'it goes with scenario = "NAME", the one whose keys it changes'
+    return "it goes at the top of a file" if key == "scenario" else ""
 
 
 def remedy_for_key(key: str, known: list[str]) -> str:

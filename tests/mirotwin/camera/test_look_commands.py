@@ -232,7 +232,7 @@ def test_the_folder_of_a_run_has_its_recording_named(
     mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "x.pcapng"
-    for command in (("fw", "profile"), ("replay",), ("decode",), ("export", "--out", out)):
+    for command in (("fw", "profile"), ("decode",), ("export", "--out", out)):
         said = f"{finished}: is a folder; name a file in it, such as {finished / 'run.mcap'}"
         assert one_line(mirotwin(*command, finished)) == said
     assert not out.exists()

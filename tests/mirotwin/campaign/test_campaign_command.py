@@ -218,6 +218,16 @@ def test_statistics_are_shown_for_each_combination_of_factors(results):
     assert document["groups"][0]["metrics"]["rms_x_cm"]["median"] == near[9] + (near[10] - near[9]) * 0.5
 
 
+@pytest.mark.parametrize(
+    ("metric", "label"),
+    [("unsettled", "unsettled (1: yes)"), ("check.no_fault", "check.no_fault (1: failed)")],
+)
+def test_a_metric_of_0_and_1_says_what_1_is(results, metric, label):
+    result = called("show", results, "--metric", metric)
+    assert result.exit_code == 0, result.output
+    assert label in result.output
+
+
 def test_two_levels_are_compared_on_the_same_seeds(results):
     document = json.loads(called("show", results, "--compare", "start=near,far", "--json").output)
     (found,) = [one for one in document["differences"] if one["metric"] == "rms_position_cm"]

@@ -92,15 +92,17 @@ def test_a_scheduler_that_ends_ends_the_campaign_in_a_line_and_it_goes_on_elsewh
     text = SHORT.replace("3-5", "0-19")
     with running(1) as found:
         cluster = campaign.Cluster(found.scheduler_address)
+        ending = threading.Thread(target=found.close, daemon=True)
 
         def end(tally, outcome):
             if tally.new == 3:
-                threading.Thread(target=found.close, daemon=True).start()
+                ending.start()
                 time.sleep(0.1)
 
         with pytest.raises(BadInput, match="--cluster: workers have ended"):
             campaign.run(plan_of(text), path, cluster, on_outcome=end)
         cluster.close()
+        ending.join()  # Dask cannot close a cluster from two threads at once
     there = journal_path(path).read_bytes().count(b"\n") - 1
     assert there >= 3
     assert campaign.run(plan_of(text), path, InThisProcess()).new == 40 - there
@@ -141,3 +143,15 @@ def test_an_address_where_no_scheduler_answers_is_exit_code_2_with_a_remedy(tmp_
     assert "no Dask scheduler answers at" in result.output
     assert "start one (dask scheduler), or leave --cluster out" in result.output
     assert [path.name for path in tmp_path.iterdir()] == ["short.toml"]
+
+
+def test_a_client_that_finds_no_scheduler_is_closed_at_once(monkeypatch):
+    """Collected later it closes itself, which waits for ever where another client is just being made."""
+    closed = []
+    monkeypatch.setattr(cluster_module, "PATIENCE_S", 1)
+    monkeypatch.setattr(distributed.Client, "close", lambda client, *given, **named: closed.append(client))
+    with pytest.raises(BadInput, match="no Dask scheduler answers at"):
+        campaign.Cluster("tcp://127.0.0.1:9")
+    assert len(closed) == 1
+    monkeypatch.undo()
+    closed[0].close()

@@ -5,7 +5,6 @@ import os
 import signal
 import sys
 import threading
-import time
 from concurrent.futures import Executor, Future
 
 import pytest
@@ -54,26 +53,21 @@ def test_a_process_keeps_nothing_of_the_runs_that_it_has_done():
 
 def test_a_worker_that_is_killed_in_the_middle_loses_nothing(alone, tmp_path):
     path = tmp_path / "short.parquet"
-    killed = []
+    executors, killed = [], []
 
     class Watched(Processes):
         def start(self):
-            executor = super().start()
-            if not killed:
+            executors.append(super().start())
+            return executors[-1]
 
-                def kill():
-                    while not executor._processes:
-                        time.sleep(0.01)
-                    time.sleep(1.0)
-                    process = next(iter(executor._processes.values()))
-                    killed.append(process.pid)
-                    os.kill(process.pid, signal.SIGKILL)
-
-                threading.Thread(target=kill, daemon=True).start()
-            return executor
+    def kill(tally, outcome):
+        if tally.new == 5:
+            process = next(iter(executors[0]._processes.values()))
+            killed.append(process.pid)
+            os.kill(process.pid, signal.SIGKILL)
 
     text = SHORT.replace("3-5", "0-39")
-    tally = campaign.run(plan_of(text), path, Watched(2))
+    tally = campaign.run(plan_of(text), path, Watched(2), on_outcome=kill)
     assert killed
     assert (tally.done, tally.verdicts) == (80, {"passed": 80})
     whole = {(row["network.radio.bit_error_rate"], row["seed"]): row["digest"] for row in rows(alone)}

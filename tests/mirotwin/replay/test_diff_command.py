@@ -224,7 +224,17 @@ def test_what_is_no_recording_is_refused_on_either_side(
         assert expected in err
 
 
-def test_a_folder_is_told_which_file_is_meant(mirotwin: Callable[..., Result], finished: Path) -> None:
-    code, _, err = mirotwin("diff", finished, finished / "run.mcap")
-    assert code == 2
-    assert f"{finished}: is a folder; name a file in it, such as {finished / 'run.mcap'}" in err
+def test_the_folder_of_a_run_stands_for_its_recording(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "run.part.mcap").write_bytes((finished / "run.mcap").read_bytes())
+    code, out, err = mirotwin("diff", finished, tmp_path)
+    assert (code, err) == (0, "")
+    assert "the recordings hold the same in all 6 control periods" in out
+
+
+def test_a_folder_without_a_recording_is_refused(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
+) -> None:
+    code, _, err = mirotwin("diff", finished, tmp_path)
+    assert (code, err) == (2, f"mirotwin: error: {tmp_path}: is a folder; name a file in it\n")

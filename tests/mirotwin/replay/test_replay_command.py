@@ -36,6 +36,16 @@ def test_a_recording_replays_to_the_same_response(mirotwin: Callable[..., Result
     assert "equals the recorded one in all 6 control periods" in out
 
 
+@pytest.mark.parametrize("name", ["run.mcap", "run.part.mcap"])
+def test_the_folder_of_a_run_stands_for_its_recording(
+    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path, name: str
+) -> None:
+    (tmp_path / name).write_bytes((finished / "run.mcap").read_bytes())
+    code, out, err = mirotwin("replay", tmp_path)
+    assert (code, err) == (0, "")
+    assert "equals the recorded one in all 6 control periods" in out
+
+
 def test_it_needs_no_other_file_than_the_recording(
     mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
 ) -> None:

@@ -128,7 +128,10 @@ def test_an_unknown_check_is_refused_before_anything_runs(
     given = (short, "--out", tmp_path / "run") if command == "run" else (finished / "run.mcap",)
     code, out, err = mirotwin(command, *given, "--expect", "inside_pich=true")
     assert (code, out) == (2, "")
-    assert "--expect inside_pich=true: there is no such check; did you mean inside_pitch?\n" in err
+    assert (
+        "--expect inside_pich=true: there is no such check; did you mean inside_pitch? `mirotwin scenarios checks` "
+        in err
+    )
     assert not (tmp_path / "run").exists()
 
 

@@ -40,6 +40,15 @@ def test_an_example_is_written_file_by_file(
     assert all(path.is_file() for path in map(Path, out.splitlines()))
 
 
+def test_what_is_written_into_the_current_folder_is_said_to_be_there(
+    mirotwin: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    *names, last = mirotwin("examples", "firmware")[1].splitlines()
+    assert sorted(names) == sorted(os.listdir(tmp_path))
+    assert last == f"files written into this folder: {len(names)}"
+
+
 def test_a_file_with_other_content_is_replaced_by_force_alone(
     mirotwin: Callable[..., Result], tmp_path: Path
 ) -> None:

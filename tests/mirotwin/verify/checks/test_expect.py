@@ -71,7 +71,8 @@ def test_each_check_says_its_name_and_kind(name: str) -> None:
 
 
 def test_who_asks_for_a_check_that_is_none_is_told_how_one_is_made() -> None:
-    with pytest.raises(ScenarioError, match="; one of your own: `mirotwin examples checks`"):
+    both = "; `mirotwin scenarios checks` lists them, `mirotwin examples checks` writes one"
+    with pytest.raises(ScenarioError, match=both):
         parse(TWO.format(all="[expect]\nfast = 1\n", one=""), "two", (), expectations_of)
 
 
@@ -130,6 +131,15 @@ def test_what_cannot_be_expected_is_said_with_its_path(line: str, said: str) -> 
     text = TWO.format(all=f"[expect]\n{line}\n", one="")
     with pytest.raises(ScenarioError, match=re.escape(f"two: {said}")):
         parse(text, "two", (), expectations_of)
+
+
+@pytest.mark.parametrize("value", ["true", "'v<0.05'", "3"])
+def test_a_check_that_takes_a_table_is_answered_with_one_that_can_be_used(value: str) -> None:
+    table = '{ what = "fault", until_tick = 24000000 }'
+    said = f"two: expect.never_happens: never_happens takes a table; write never_happens = {table}; what: answer, "
+    with pytest.raises(ScenarioError, match=re.escape(said)):
+        names(f"[expect]\nnever_happens = {value}")
+    assert names(f"[expect]\nnever_happens = {table}")[0, 0] == [*ALWAYS_ON, "never_happens"]
 
 
 def test_the_path_of_one_robots_expectation_is_its_own() -> None:

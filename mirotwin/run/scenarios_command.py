@@ -6,14 +6,34 @@ from typing import Any
 import click
 from rich.table import Table
 
+from miro_exact.bad_input import shortened
+from miro_host.parts import PartError
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as radio_profiles
 from miro_sim.scenario import variants as scenario_variants
 from mirotwin.shell.console import show as print_result
 from mirotwin.shell.options import set_option
+from mirotwin.shell.program import LazyGroup
+from mirotwin.verify.checks.expect import struct_of
+from mirotwin.verify.checks.registry import CHECKS
 
 
-@click.group(invoke_without_command=True, short_help="Lists the built-in scenarios, or shows one.")
+class ScenariosGroup(LazyGroup):
+    """Tells what was meant where a scenario is named instead of a command."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if name in scenario_file.builtin_names() or name.endswith(".toml"):
+            what = f"No such command {shortened(repr(name))}"
+            ctx.fail(f"{what}; did you mean `scenarios show {shortened(name)}`?")
+        return super().resolve_command(ctx, args)
+
+
+@click.group(
+    cls=ScenariosGroup, invoke_without_command=True, short_help="Lists the built-in scenarios, or shows one."
+)
 @click.pass_context
 def scenarios(context: click.Context) -> None:
     """Lists the built-in scenarios."""
@@ -29,6 +49,7 @@ def scenarios(context: click.Context) -> None:
         robots = len([robot for network in scenario.networks for robot in network.robot])
         table.add_row(name, f"{scenario.duration_s:g} s", str(robots), scenario.title)
     print_result(table)
+    print_result("write one out, to start from: mirotwin scenarios show NAME")
 
 
 @scenarios.command()
@@ -37,7 +58,15 @@ def scenarios(context: click.Context) -> None:
     "A key to set in it, as for `run`; may be repeated. The file is then checked, and its comments are left out."
 )
 def show(name: str, settings: tuple[str, ...]) -> None:
-    """Prints the file of the built-in scenario NAME, to read or to start one's own from. NAME may be a file, too."""
+    """Prints the file of the built-in scenario NAME, to read or to start one's own from. NAME may be a file, too.
+
+    A file of three lines is that scenario with single keys changed:
+
+    \b
+        scenario = "fig6"
+        name = "mine"
+        set = { network.robot.controller.q1_per_s = 0.3 }
+    """
     text = scenario_file.load(name, settings).text if settings else scenario_file.source_text(name)
     click.echo(text, nl=False)
 
@@ -67,6 +96,25 @@ def variants() -> None:
     for name, variant in scenario_variants.variants().items():
         keys = _keys({key: value for key, value in variant.items() if key != "about"})
         table.add_row(name, variant["about"], keys)
+    print_result(table)
+
+
+@scenarios.command()
+def checks() -> None:
+    """Lists the checks, for --expect and [expect], and their parameters; a bare value is that of the one with a *."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("check", style="bold")
+    table.add_column("what it checks")
+    table.add_column("parameters")
+    for name in CHECKS.names():
+        try:
+            struct = struct_of(name)
+        except PartError as error:
+            table.add_row(name, error.what, "")
+            continue
+        keys = [f"{key}*" if key == struct.MAIN else key for key in struct.__struct_encode_fields__]
+        about = " ".join((struct.__doc__ or "").partition("\n\n")[0].split())
+        table.add_row(name, about, ", ".join(keys))
     print_result(table)
 
 

@@ -7,9 +7,10 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from miro_sim.scenario.file import builtin_text
+from miro_sim.scenario.file import builtin_text, parse
 from mirotwin.commands import main
 from mirotwin.shell.program import Program
+from mirotwin.verify.checks.registry import CHECKS
 
 
 def mirotwin(*arguments: str) -> tuple[int, str, str]:
@@ -23,12 +24,29 @@ def test_the_built_in_scenarios_are_listed_with_what_they_show() -> None:
     assert (code, err) == (0, "")
     assert "fig6" in out
     assert "Arc, initial errors (11.20 cm, 28.92 cm, -1.31 rad)" in out
+    assert out.endswith("\nwrite one out, to start from: mirotwin scenarios show NAME\n")
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig10"])
 def test_show_prints_the_file_as_it_stands(name: str) -> None:
     assert mirotwin("scenarios", "show", name) == (0, builtin_text(name), "")
     assert tomllib.loads(mirotwin("scenarios", "show", name)[1])["name"] == name
+
+
+def test_the_checks_are_listed_with_their_parameters() -> None:
+    code, out, err = mirotwin("scenarios", "checks")
+    assert (code, err) == (0, "")
+    rows = {line.split()[0]: line for line in out.splitlines() if line.strip()}
+    assert set(CHECKS.own) <= set(rows)
+    assert rows["tracks_within_cm"].endswith("limit_cm*, from_s")
+
+
+@pytest.mark.parametrize("command", [["scenarios", "show"], ["run"]])
+def test_the_help_has_the_three_lines_that_derive_a_scenario(command: list[str]) -> None:
+    lines = mirotwin(*command, "--help")[1].splitlines()
+    first = next(number for number, line in enumerate(lines) if line.strip() == 'scenario = "fig6"')
+    mine = parse("\n".join(lines[first : first + 3]).replace("    ", ""), "mine.toml")
+    assert (mine.name, mine.networks[0].robot[0].controller.q1_per_s) == ("mine", 0.3)
 
 
 @pytest.mark.parametrize(
@@ -44,6 +62,9 @@ def test_show_prints_the_file_as_it_stands(name: str) -> None:
         (["run"], "error: Missing argument 'SCENARIO'"),
         (["rnu"], "error: No such command 'rnu'; did you mean run?"),
         (["fw", "trce"], "error: No such command 'trce'; did you mean trace?"),
+        (["scenarios", "fig6"], "error: No such command 'fig6'; did you mean `scenarios show fig6`?"),
+        (["scenarios", "x.toml"], "error: No such command 'x.toml'; did you mean `scenarios show x.toml`?"),
+        (["scenarios", "shwo"], "error: No such command 'shwo'; did you mean show?"),
         (["xyz"], "error: No such command 'xyz'; there are run, "),
         (["replay", "absent.mcap"], "error: absent.mcap: No such file or directory"),
     ],
