@@ -43,24 +43,13 @@ SECTIONS = {
             "mirotwin.report.export_command", "Writes a run for Foxglove, Wireshark, or as a stream file."
         ),
     },
-    "Camera": {
-        "look": Lazy(
-            "mirotwin.camera.look_command", "Draws what the camera sees and what the tracker makes of it."
+    "Camera and firmware": {
+        "camera": Lazy(
+            "mirotwin.camera.camera_command", "Camera: look, calibrate, track robots in pictures."
         ),
-        "calibrate": Lazy(
-            "mirotwin.camera.calibrate_command", "Finds a camera's parameters from control points."
-        ),
-        "track": Lazy(
-            "mirotwin.camera.track_command", "Finds robots in pictures of your own, or in recorded ones."
-        ),
-    },
-    "Firmware": {
         "fw": Lazy(
             "mirotwin.firmware.fw_command",
             "Firmware: run on the bare processor, disassemble, trace, profile.",
-        ),
-        "vectors": Lazy(
-            "mirotwin.firmware.vectors_command", "Writes single-step test vectors of the processor."
         ),
     },
     "Paper and installation": {

@@ -1,4 +1,4 @@
-"""`mirotwin calibrate`: a camera's parameters from control points, of a real camera or of a scenario's."""
+"""`mirotwin camera calibrate`: a camera's parameters from control points, of a real camera or of a scenario's."""
 
 from __future__ import annotations
 
@@ -102,8 +102,8 @@ def calibrate(
     tops tell all. Points of a simulated camera show the form:
 
     \b
-        mirotwin calibrate --scenario fig6 --out camera.toml --points-out points.csv
-        mirotwin calibrate --points points.csv --out camera.toml --force
+        mirotwin camera calibrate --scenario fig6 --out camera.toml --points-out points.csv
+        mirotwin camera calibrate --points points.csv --out camera.toml --force
 
     Pixels sampled from one's own pictures, at least 4 of each patch's colour, of the floor and of the ball if there is
     one, tell the colour classes: --samples. Names: yellow, blue, magenta, cyan, green, violet, lime, orange, floor.

@@ -1,4 +1,4 @@
-"""`mirotwin track`: the tracker on pictures of one's own."""
+"""`mirotwin camera track`: the tracker on pictures of one's own."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ def track(
 
     \b
         mirotwin run fig6 --frames frames --plain-frames
-        mirotwin calibrate --scenario fig6 --out camera.toml --colours-out colours.toml
-        mirotwin track frames --calibration camera.toml --colours colours.toml --robots 0
+        mirotwin camera calibrate --scenario fig6 --out camera.toml --colours-out colours.toml
+        mirotwin camera track frames --calibration camera.toml --colours colours.toml --robots 0
     """
     choose_engine(engine)
     tracker = _tracker(calibration, colours, team, robots, pattern, centroid)

@@ -12,6 +12,7 @@ COMMANDS = {
     "coverage": Lazy("mirotwin.firmware.fw_coverage", "Shows which lines of the firmware ran."),
     "vcd": Lazy("mirotwin.firmware.fw_vcd", "Writes the wires as a VCD file."),
     "header": Lazy("mirotwin.firmware.fw_header", "Writes protocol.h: the numbers of the wire for C."),
+    "vectors": Lazy("mirotwin.firmware.vectors_command", "Writes single-step test vectors of the processor."),
 }
 
 

@@ -1,4 +1,4 @@
-"""`mirotwin vectors`: single-step vectors of the processor, for other emulators to be tested with."""
+"""`mirotwin fw vectors`: single-step vectors of the processor, for other emulators to be tested with."""
 
 from __future__ import annotations
 

@@ -85,9 +85,9 @@ FILES = {
     "a calibration": (
         "big.toml",
         b"#",
-        ["calibrate", "--scenario", "fig6", "--start", "big.toml", "--out", "x"],
+        ["camera", "calibrate", "--scenario", "fig6", "--start", "big.toml", "--out", "x"],
     ),
-    "points": ("big.toml", b"#", ["calibrate", "--points", "big.toml", "--out", "x.toml"]),
+    "points": ("big.toml", b"#", ["camera", "calibrate", "--points", "big.toml", "--out", "x.toml"]),
 }
 
 

@@ -179,19 +179,19 @@ class Seeds:
         brief = ["--set", "duration_s=0.04", "--no-figure", "-q", "--frames", "frames", "--plain-frames"]
         self._run("run", "short.toml", "--out", "seen", *brief, "--record-frames")
         files = ["--points-out", "points.csv", "--colours-out", "colours.toml"]
-        self._run("calibrate", "--scenario", "short.toml", "--out", "camera.toml", *files)
+        self._run("camera", "calibrate", "--scenario", "short.toml", "--out", "camera.toml", *files)
         track = ["--calibration", "camera.toml", "--colours", "colours.toml", "--robots", "0"]
-        calibrate = [["calibrate", "--points", "@", "--out", "new.toml", "--force"]]
+        calibrate = [["camera", "calibrate", "--points", "@", "--out", "new.toml", "--force"]]
         reads = {
             "control points": ("points.csv", calibrate),
-            "calibration": ("camera.toml", [["track", "frames", *track, "--json"]]),
-            "colours": ("colours.toml", [["track", "frames", *track]]),
-            "picture": ("frames/frame-000001.png", [["track", "frames", *track]]),
+            "calibration": ("camera.toml", [["camera", "track", "frames", *track, "--json"]]),
+            "colours": ("colours.toml", [["camera", "track", "frames", *track]]),
+            "picture": ("frames/frame-000001.png", [["camera", "track", "frames", *track]]),
         }
         for kind, (name, commands) in reads.items():
             self.kinds[kind] = (name, (self.folder / name).read_bytes(), commands)
         recording = without_sums((self.folder / "seen" / "run.mcap").read_bytes())
-        self.kinds["recorded pictures"] = ("b.mcap", recording, [["track", "@", *track]])
+        self.kinds["recorded pictures"] = ("b.mcap", recording, [["camera", "track", "@", *track]])
 
     def _add_texts(self, image: Path) -> None:
         steps = ["--max-cycles", "300"]

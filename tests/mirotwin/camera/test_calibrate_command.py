@@ -1,4 +1,4 @@
-"""`mirotwin calibrate`: a camera from control points, and what is said of points that tell none."""
+"""`mirotwin camera calibrate`: a camera from control points, and what is said of points that tell none."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_without_noise_the_scenarios_camera_is_found_as_it_is(
 ) -> None:
     out = tmp_path / "camera.toml"
     given = ("--scenario", short, *settings(*LENS), "--noise-px", 0, "--out", out)
-    code, table, err = mirotwin("calibrate", *given)
+    code, table, err = mirotwin("camera", "calibrate", *given)
     assert (code, err) == (0, "")
     found = calibration.read(out)
     assert calibration_kinds.worst_error_m(TRUE, found) < 1e-5
@@ -47,8 +47,10 @@ def test_points_of_a_scenario_give_the_same_calibration_from_their_file(
     mirotwin: Callable[..., Result], short: Path, tmp_path: Path
 ) -> None:
     first, second, points = (tmp_path / name for name in ("first.toml", "second.toml", "points.csv"))
-    made = mirotwin("calibrate", "--scenario", short, "--seed", 3, "--out", first, "--points-out", points)
-    read = mirotwin("calibrate", "--points", points, "--out", second)
+    made = mirotwin(
+        "camera", "calibrate", "--scenario", short, "--seed", 3, "--out", first, "--points-out", points
+    )
+    read = mirotwin("camera", "calibrate", "--points", points, "--out", second)
     assert (made[0], made[2]) == (read[0], read[2]) == (0, "")
     assert calibration_kinds.worst_error_m(calibration.read(first).camera, calibration.read(second)) < 1e-6
     residuals = calibration.read(second).residuals
@@ -70,7 +72,7 @@ def test_the_noise_is_that_of_the_seed_and_as_large_as_asked_for(
     for number, (seed, noise) in enumerate([(1, 0.3), (1, 0.3), (2, 0.3), (1, 1.5)]):
         points = tmp_path / f"{number}.csv"
         given = ("--scenario", short, "--seed", seed, "--noise-px", noise, "--points-out", points)
-        assert mirotwin("calibrate", *given, "--out", tmp_path / f"{number}.toml")[0] == 0
+        assert mirotwin("camera", "calibrate", *given, "--out", tmp_path / f"{number}.toml")[0] == 0
         texts.append(points.read_text())
     assert texts[0] == texts[1]
     assert len(set(texts)) == 3
@@ -85,7 +87,7 @@ def test_colours_are_those_that_the_scenarios_tracker_would_use(
 ) -> None:
     colours = tmp_path / "colours.toml"
     given = ("--scenario", short, "--out", tmp_path / "camera.toml", "--colours-out", colours)
-    assert mirotwin("calibrate", *given)[0] == 0
+    assert mirotwin("camera", "calibrate", *given)[0] == 0
     expected = colours_of(CameraParameters(), PictureSettings(), "diagonal", ball=False)
     assert eye_file.read(colours, ColourClasses) == expected
 
@@ -95,17 +97,17 @@ def test_sampled_pixels_of_ones_own_pictures_give_colour_classes(
 ) -> None:
     points, samples, colours = (tmp_path / name for name in ("points.csv", "samples.csv", "colours.toml"))
     made = ("--scenario", short, "--points-out", points, "--out", tmp_path / "first.toml")
-    assert mirotwin("calibrate", *made)[0] == 0
+    assert mirotwin("camera", "calibrate", *made)[0] == 0
     yellow, blue = "yellow,200,40,140\n" * 4, "blue,60,190,110\n" * 4
     samples.write_text("colour,y,cb,cr\n" + yellow + blue)
     given = ("--points", points, "--out", tmp_path / "camera.toml", "--samples", samples)
-    assert mirotwin("calibrate", *given, "--colours-out", colours)[0] == 0
+    assert mirotwin("camera", "calibrate", *given, "--colours-out", colours)[0] == 0
     assert set(eye_file.read(colours, ColourClasses).colours) == {"yellow", "blue"}
     samples.write_text("colour,y,cb,cr\n" + yellow + yellow.replace("yellow", "lime"))
-    code, _, err = mirotwin("calibrate", *given, "--colours-out", colours, "--force")
+    code, _, err = mirotwin("camera", "calibrate", *given, "--colours-out", colours, "--force")
     assert code == 2
     assert f"{samples}: colours.lime: cannot be told from yellow" in err.replace("\n", "")
-    code, _, err = mirotwin("calibrate", *given, "--force")
+    code, _, err = mirotwin("camera", "calibrate", *given, "--force")
     assert code == 2
     assert "give both --samples and --colours-out or neither" in err
 
@@ -115,13 +117,13 @@ def test_what_the_points_cannot_tell_is_taken_from_the_start(
 ) -> None:
     points, flat, start, out = (tmp_path / name for name in ("all.csv", "flat.csv", "start.toml", "out.toml"))
     given = ("--scenario", short, *settings(*LENS, "camera.lens.height_m=2.1"), "--noise-px", 0)
-    assert mirotwin("calibrate", *given, "--points-out", points, "--out", start)[0] == 0
+    assert mirotwin("camera", "calibrate", *given, "--points-out", points, "--out", start)[0] == 0
     flat.write_text(HEADER + "".join(line for line in points.open() if line.split(",")[2] == "0"))
-    assert mirotwin("calibrate", "--points", flat, "--start", start, "--out", out)[0] == 0
+    assert mirotwin("camera", "calibrate", "--points", flat, "--start", start, "--out", out)[0] == 0
     found = calibration.read(out)
     assert "height_m" not in found.free
     assert found.camera.height_m == calibration.read(start).camera.height_m
-    code, _, err = mirotwin("calibrate", "--points", flat, "--out", tmp_path / "else.toml")
+    code, _, err = mirotwin("camera", "calibrate", "--points", flat, "--out", tmp_path / "else.toml")
     assert code == 2
     assert f"{flat}: no convergence" in err
 
@@ -162,7 +164,7 @@ def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
 ) -> None:
     points = tmp_path / "points.csv"
     points.write_text(text)
-    code, out, err = mirotwin("calibrate", "--points", points, "--out", tmp_path / "camera.toml")
+    code, out, err = mirotwin("camera", "calibrate", "--points", points, "--out", tmp_path / "camera.toml")
     assert (code, out) == (2, "")
     assert err.startswith(f"mirotwin: error: {points}{expected}")
     assert (err.count("\n"), names(tmp_path)) == (1, ["points.csv"])
@@ -208,7 +210,7 @@ def test_what_cannot_be_calibrated_is_refused_and_nothing_is_written(
     if "out.toml" in options:
         Path("out.toml").write_text(csv(GRID))
     before = names(tmp_path)
-    code, out, err = mirotwin("calibrate", *options, "--out", "out.toml")
+    code, out, err = mirotwin("camera", "calibrate", *options, "--out", "out.toml")
     assert (code, out) == (2, "")
     assert err.startswith(f"mirotwin: error: {expected}")
     assert (err.count("\n"), names(tmp_path)) == (1, before)
@@ -219,7 +221,7 @@ def test_a_camera_without_a_lens_is_refused_after_the_note_of_what_its_kind_leav
 ) -> None:
     out = tmp_path / "out.toml"
     code, printed, err = mirotwin(
-        "calibrate", "--scenario", "fig6", "--set", "camera.kind=gaussian", "--out", out
+        "camera", "calibrate", "--scenario", "fig6", "--set", "camera.kind=gaussian", "--out", out
     )
     note, error = err.splitlines()
     assert (code, printed, out.exists()) == (2, "", False)
@@ -232,11 +234,11 @@ def test_a_camera_without_pixels_has_no_colours_and_one_without_a_lens_no_points
     mirotwin: Callable[..., Result], short: Path, tmp_path: Path, kind: str
 ) -> None:
     given = ("--scenario", short, "--set", f"camera.kind={kind}", "--out", tmp_path / "camera.toml")
-    code, _, err = mirotwin("calibrate", *given, "--colours-out", tmp_path / "colours.toml")
+    code, _, err = mirotwin("camera", "calibrate", *given, "--colours-out", tmp_path / "colours.toml")
     assert code == 2
     assert f"{short}: camera.kind: this camera {'has no lens' if kind == 'gaussian' else 'renders no'}" in err
     assert names(tmp_path) == []
-    assert mirotwin("calibrate", *given)[0] == (2 if kind == "gaussian" else 0)
+    assert mirotwin("camera", "calibrate", *given)[0] == (2 if kind == "gaussian" else 0)
 
 
 def test_files_that_are_there_are_replaced_with_force_only(
@@ -244,7 +246,16 @@ def test_files_that_are_there_are_replaced_with_force_only(
 ) -> None:
     points = tmp_path / "points.csv"
     points.write_text("before")
-    given = ("calibrate", "--scenario", short, "--out", tmp_path / "camera.toml", "--points-out", points)
+    given = (
+        "camera",
+        "calibrate",
+        "--scenario",
+        short,
+        "--out",
+        tmp_path / "camera.toml",
+        "--points-out",
+        points,
+    )
     code, _, err = mirotwin(*given)
     assert (code, "is there already" in err, points.read_text()) == (2, True, "before")
     assert mirotwin(*given, "--force")[0] == 0
@@ -255,6 +266,6 @@ def test_noise_that_is_no_number_is_refused(
     mirotwin: Callable[..., Result], short: Path, tmp_path: Path
 ) -> None:
     given = ("--scenario", short, "--noise-px", "nan", "--out", tmp_path / "camera.toml")
-    code, _, err = mirotwin("calibrate", *given)
+    code, _, err = mirotwin("camera", "calibrate", *given)
     assert code == 2
     assert "'nan' is not a number." in err

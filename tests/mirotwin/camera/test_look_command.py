@@ -1,4 +1,4 @@
-"""`mirotwin look`: the picture of a frame, with and without what the tracker made of it."""
+"""`mirotwin camera look`: the picture of a frame, with and without what the tracker made of it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_the_plain_picture_is_the_frame_at_or_before_the_time(
     mirotwin: Callable[..., Result], short: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "frame.png"
-    assert mirotwin("look", short, "--at", "0.12s", "--plain", "--out", out) == (0, f"{out}\n", "")
+    assert mirotwin("camera", "look", short, "--at", "0.12s", "--plain", "--out", out) == (0, f"{out}\n", "")
     world = world_of(short)
     world.run_to(3 * CONTROL_PERIOD_TICKS + 1)
     expected = taken(world.networks[0].sight.eye)
@@ -41,13 +41,16 @@ def test_the_picture_with_the_overlay_is_enlarged_and_says_what_it_shows(
     mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert mirotwin("look", short, "--at", "120ms", "--seed", 4)[:2] == (0, "short-4-net0-frame-000003.png\n")
+    assert mirotwin("camera", "look", short, "--at", "120ms", "--seed", 4)[:2] == (
+        0,
+        "short-4-net0-frame-000003.png\n",
+    )
     with Image.open("short-4-net0-frame-000003.png") as image:
         assert image.size == (960, 744)
     first = Path("short-4-net0-frame-000003.png").read_bytes()
-    assert mirotwin("look", short, "--at", "2880000t", "--seed", 4, "--force")[0] == 0
+    assert mirotwin("camera", "look", short, "--at", "2880000t", "--seed", 4, "--force")[0] == 0
     assert Path("short-4-net0-frame-000003.png").read_bytes() == first
-    code, _, err = mirotwin("look", short, "--at", "0.12s", "--seed", 4)
+    code, _, err = mirotwin("camera", "look", short, "--at", "0.12s", "--seed", 4)
     assert (code, "is there already" in err) == (2, True)
 
 
@@ -114,7 +117,7 @@ def test_what_cannot_be_looked_at_is_refused_with_the_remedy(
     expected: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    code, out, err = mirotwin("look", short, *options)
+    code, out, err = mirotwin("camera", "look", short, *options)
     assert (code, out) == (2, "")
     assert err.startswith(f"mirotwin: error: {expected.format(short=short)}")
     assert err.count("\n") == 1
@@ -126,7 +129,7 @@ def test_a_run_that_a_fault_stops_before_is_not_drawn(
 ) -> None:
     image = hex_file(tmp_path / "faulty.ihx", b"\xa5")
     out = tmp_path / "frame.png"
-    code, _, err = mirotwin("look", short, "--at", "0.1s", "--firmware", image, "--out", out)
+    code, _, err = mirotwin("camera", "look", short, "--at", "0.1s", "--firmware", image, "--out", out)
     assert (code, out.exists()) == (3, False)
     assert "firmware fault: net0/robot0" in err
 

@@ -1,4 +1,4 @@
-"""`mirotwin track`: the tracker on pictures from files and recordings, and what is said of those that are none."""
+"""`mirotwin camera track`: the tracker on pictures from files and recordings, and what is said of those that are not."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_frames_of_a_run_give_the_postures_that_its_recording_has(
     mirotwin: Callable[..., Result], seen: Path, path: str
 ) -> None:
     """Rounding to red, green and blue moves a few pixels over the border of a class."""
-    code, out, err = mirotwin("track", seen / path, *files(seen), "--robots", "0,2", "--json")
+    code, out, err = mirotwin("camera", "track", seen / path, *files(seen), "--robots", "0,2", "--json")
     assert (code, err) == (0, "")
     lines = [json.loads(line) for line in out.splitlines()]
     expected = measured(seen)
@@ -79,7 +79,7 @@ def test_frames_of_a_run_give_the_postures_that_its_recording_has(
 def test_the_table_has_a_row_a_robot_and_frame_and_says_who_is_lost(
     mirotwin: Callable[..., Result], seen: Path
 ) -> None:
-    code, out, err = mirotwin("track", seen / "frames", *files(seen), "--robots", "2,1")
+    code, out, err = mirotwin("camera", "track", seen / "frames", *files(seen), "--robots", "2,1")
     assert (code, err) == (0, "")
     head, *rows, last = [line.split() for line in out.splitlines()]
     assert head == ["frame", "robot", "x_cm", "y_cm", "heading_deg", "confidence", "picture"]
@@ -91,7 +91,9 @@ def test_the_table_has_a_row_a_robot_and_frame_and_says_who_is_lost(
 
 
 def test_a_lost_robot_has_no_numbers_in_json(mirotwin: Callable[..., Result], seen: Path) -> None:
-    _, out, _ = mirotwin("track", seen / "frames", *files(seen), "--team", "blue", "--robots", "0", "--json")
+    _, out, _ = mirotwin(
+        "camera", "track", seen / "frames", *files(seen), "--team", "blue", "--robots", "0", "--json"
+    )
     lost = {"lost": True, "x_m": None, "y_m": None, "theta_rad": None, "confidence": None}
     for frame, line in enumerate(out.splitlines()):
         picture = {"frame": frame, "picture": f"frame-{frame:06d}.png", "tick": 800_800 * frame, "robot": 0}
@@ -106,8 +108,8 @@ def test_ppm_files_say_the_same_and_other_files_are_passed_over(
             image.save(tmp_path / f"{number}.PPM", "PPM")
     (tmp_path / "notes.txt").write_text("mine")
     given = (*files(seen), "--robots", "0,2", "--json", "--centroid", "weighted")
-    one = mirotwin("track", seen / "frames", *given)[1].splitlines()
-    other = mirotwin("track", tmp_path, *given)[1].splitlines()
+    one = mirotwin("camera", "track", seen / "frames", *given)[1].splitlines()
+    other = mirotwin("camera", "track", tmp_path, *given)[1].splitlines()
     without: Callable[[str], dict[str, Any]] = lambda line: {**json.loads(line), "picture": ""}  # noqa: E731
     assert [without(line) for line in one] == [without(line) for line in other] != []
 
@@ -119,12 +121,12 @@ def test_of_several_networks_one_is_taken(
         for network in (0, 3):
             name = f"net{network}-frame-{number:06d}.png"
             shutil.copy(seen / "frames" / f"frame-{number:06d}.png", tmp_path / name)
-    _, out, _ = mirotwin("track", tmp_path, *files(seen), "--network", 3, "--robots", "0")
+    _, out, _ = mirotwin("camera", "track", tmp_path, *files(seen), "--network", 3, "--robots", "0")
     assert [line.split()[-1] for line in out.splitlines()[1:3]] == [
         "net3-frame-000000.png",
         "net3-frame-000001.png",
     ]
-    code, _, err = mirotwin("track", tmp_path, *files(seen), "--network", 1)
+    code, _, err = mirotwin("camera", "track", tmp_path, *files(seen), "--network", 1)
     assert (code, f"{tmp_path}: --network 1: no picture of it" in err) == (2, True)
 
 
@@ -149,7 +151,7 @@ def test_recorded_frames_are_images_for_viewers_and_change_nothing_else(
         assert sorted(content) == sorted(json.loads(schema.data)["properties"])
         stamp = content["timestamp"]
         assert stamp["sec"] * 10**9 + stamp["nsec"] == message.log_time == nanoseconds(800_800 * frame)
-    code, _, err = mirotwin("track", tmp_path / "plain" / "run.mcap", *files(seen))
+    code, _, err = mirotwin("camera", "track", tmp_path / "plain" / "run.mcap", *files(seen))
     assert code == 2
     assert "no frames of the camera of network 0; record them: mirotwin run .. --record-frames" in err
 
@@ -160,7 +162,7 @@ def test_a_recording_that_was_broken_off_is_tracked_as_far_as_it_goes(
     part = tmp_path / "run.part.mcap"
     data = (seen / "run" / "run.mcap").read_bytes()
     part.write_bytes(data[: len(data) // 2])
-    code, out, err = mirotwin("track", part, *files(seen), "--robots", "0")
+    code, out, err = mirotwin("camera", "track", part, *files(seen), "--robots", "0")
     assert code in (0, 2)
     assert str(part) in err
     assert len(out.splitlines()) < FRAMES + 2
@@ -182,7 +184,7 @@ def test_a_picture_that_is_none_is_named(
     mirotwin: Callable[..., Result], seen: Path, tmp_path: Path, name: str, content: bytes, expected: str
 ) -> None:
     (tmp_path / name).write_bytes(content)
-    code, out, err = mirotwin("track", tmp_path, *files(seen))
+    code, out, err = mirotwin("camera", "track", tmp_path, *files(seen))
     assert (code, out) == (2, "")
     assert err.startswith(f"mirotwin: error: {tmp_path}{'' if expected[0] == ':' else '/'}{expected}")
     assert err.count("\n") == 1
@@ -194,7 +196,7 @@ def test_a_damaged_picture_is_named(mirotwin: Callable[..., Result], seen: Path,
         file = tmp_path / f"{number}" / "x.png"
         file.parent.mkdir()
         file.write_bytes(broken)
-        code, out, err = mirotwin("track", file.parent, *files(seen))
+        code, out, err = mirotwin("camera", "track", file.parent, *files(seen))
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert err.startswith(f"mirotwin: error: {file}: is ")
 
@@ -238,7 +240,7 @@ def test_colours_that_cannot_be_used_are_named_with_file_and_key(
     colours = tmp_path / "colours.toml"
     colours.write_text(change((seen / "colours.toml").read_text()))
     given = ("--calibration", seen / "camera.toml", "--colours", colours)
-    code, out, err = mirotwin("track", seen / "frames", *given)
+    code, out, err = mirotwin("camera", "track", seen / "frames", *given)
     assert (code, out) == (2, "")
     assert err.startswith(f"mirotwin: error: {colours}{expected}")
     assert err.count("\n") == 1
@@ -261,7 +263,7 @@ def test_colours_that_cannot_be_used_are_named_with_file_and_key(
 def test_what_cannot_be_tracked_is_refused(
     mirotwin: Callable[..., Result], seen: Path, options: tuple[str, ...], expected: str
 ) -> None:
-    code, out, err = mirotwin("track", seen / "frames", *files(seen), *options)
+    code, out, err = mirotwin("camera", "track", seen / "frames", *files(seen), *options)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith(f"mirotwin: error: {expected}")
 
@@ -270,7 +272,7 @@ def test_what_cannot_be_tracked_is_refused(
 def test_a_path_that_is_neither_folder_nor_recording_is_named(
     mirotwin: Callable[..., Result], seen: Path, path: str
 ) -> None:
-    code, out, err = mirotwin("track", seen / path, *files(seen))
+    code, out, err = mirotwin("camera", "track", seen / path, *files(seen))
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith(f"mirotwin: error: {seen / path}: ")
 

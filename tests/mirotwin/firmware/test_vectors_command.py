@@ -1,4 +1,4 @@
-"""`mirotwin vectors` that does not get to its end. (What is in the files: tests/vectors.)"""
+"""`mirotwin fw vectors` that does not get to its end. (What is in the files: tests/vectors.)"""
 
 import resource
 import signal
@@ -26,13 +26,13 @@ def test_a_file_where_the_folder_should_be_is_refused_with_the_way_out(
 ) -> None:
     (tmp_path / "mine").write_text("mine")
     expected = f"mirotwin: error: {tmp_path / 'mine'}: exists and is not a folder; choose another folder with --out\n"
-    assert mirotwin("vectors", "--out", tmp_path / "mine", "--force") == (2, "", expected)
+    assert mirotwin("fw", "vectors", "--out", tmp_path / "mine", "--force") == (2, "", expected)
     assert (tmp_path / "mine").read_text() == "mine"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_set_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
-    command = [MIROTWIN, "vectors", "--out", tmp_path / "set", "--per-opcode", "2000"]
+    command = [MIROTWIN, "fw", "vectors", "--out", tmp_path / "set", "--per-opcode", "2000"]
     with children.start(command, stderr=subprocess.PIPE) as running:
         while running.poll() is None and not any(tmp_path.rglob("*.json")):
             time.sleep(0.01)
@@ -47,7 +47,7 @@ def test_a_disk_that_is_full_leaves_nothing_and_is_named(tmp_path: Path) -> None
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES, FILE_BYTES))
 
-    command = [MIROTWIN, "vectors", "--out", tmp_path / "set", "--per-opcode", "100"]
+    command = [MIROTWIN, "fw", "vectors", "--out", tmp_path / "set", "--per-opcode", "100"]
     done = children.run(command, preexec_fn=limit, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.splitlines()[-1] == (

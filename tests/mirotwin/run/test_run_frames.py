@@ -32,7 +32,7 @@ def test_every_frame_is_saved_and_the_run_is_the_same(
             assert image.size == ((320, 240) if plain else (960, 744))
     out = tmp_path / "look.png"
     at = ("--at", "0.167s", "--seed", 5, "--out", out)
-    assert mirotwin("look", short, *at, *(["--plain"] if plain else []))[0] == 0
+    assert mirotwin("camera", "look", short, *at, *(["--plain"] if plain else []))[0] == 0
     assert out.read_bytes() == (tmp_path / "frames" / FRAMES[5]).read_bytes()
 
 

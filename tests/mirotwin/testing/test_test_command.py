@@ -202,9 +202,9 @@ def test_run_does_steps_too_and_its_recording_replays(mirotwin: Call, folder: Pa
     assert "--record full does not go with the steps of hil/a.scenario.toml" in err
 
 
-@pytest.mark.parametrize("command", [["fw", "trace"], ["look"]])
+@pytest.mark.parametrize("command", [["fw", "trace"], ["camera", "look"]])
 def test_commands_that_would_leave_steps_out_say_so(mirotwin: Call, folder: Path, command: list[str]) -> None:
-    time = ["--at", "0.1s"] if command == ["look"] else ["--to", "1ms"]
+    time = ["--at", "0.1s"] if command == ["camera", "look"] else ["--to", "1ms"]
     code, _, err = mirotwin(*command, "hil/a.scenario.toml", *time)
     assert code == 2
     assert (

@@ -105,7 +105,7 @@ def test_the_other_commands_tell_the_same(mirotwin, here: Path) -> None:
     (here / "c.toml").write_text('scenario = "fig6"\nseeds = "0-2"\nset = { duration_s = 0.2 }\n')
     said = told(mirotwin("campaign", "run", "c.toml", "-q", "--jobs", 1, "--expect", "raises"))
     assert f"error: runs 0, 1, 2: net0/robot0: {RAISED}" in said
-    for command in (("look", "fig6", "--at", "0.1s"), ("run", "fig6", *SHORT, "-q")):
+    for command in (("camera", "look", "fig6", "--at", "0.1s"), ("run", "fig6", *SHORT, "-q")):
         said = told(mirotwin(*command, "--set", "network.robot.controller={law='law_raises'}"))
         assert PARTS_TOLD["controller={law='law_raises'}"] in said, command
 

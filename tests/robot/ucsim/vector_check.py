@@ -1,4 +1,4 @@
-"""Single-step vectors on ucsim: `python -m tests.robot.ucsim.vector_check DIR`, for what `mirotwin vectors` wrote.
+"""Single-step vectors on ucsim: `python -m tests.robot.ucsim.vector_check DIR`, for what `mirotwin fw vectors` wrote.
 
 Vectors that `exclusions.py` rules out, or that hold pins low from outside, are not run.
 """
