@@ -1,4 +1,4 @@
-"""`mirotwin camera track`: the tracker on pictures from files and recordings, and what is said of those that are not."""
+"""`mirotwin camera track`: the tracker on pictures from files and recordings, and what is said of others."""
 
 from __future__ import annotations
 
