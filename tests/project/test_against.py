@@ -6,7 +6,7 @@ from benchmarks import against, against_copy
 
 
 def test_packages_of_either_layout_are_found():
-    old = ["protocol/miro_protocol", "robot_fw/miro_robot", "robot_fw/miro_robot/mcs51", "mirotwin"]
+    old = ["protocol/miro_protocol", "robot_fw/miro_robot", "robot_fw/miro_robot/mcs51", "sim/miro_sim"]
     new = ["exact/miro_exact", "sim/miro_sim", "mirotwin", "mirotwin/run", "tests/naive", "examples/laws"]
     folder = Path("copy")
     assert against_copy._roots(folder, old) == (folder / "protocol", folder / "robot_fw", folder / "sim")

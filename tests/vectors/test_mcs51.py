@@ -18,7 +18,7 @@ def vectors_of(opcode):
 
 
 def mirotwin(*arguments: str) -> tuple[int, str]:
-    result = CliRunner().invoke(main, ["vectors", *arguments])
+    result = CliRunner().invoke(main, ["fw", "vectors", *arguments])
     return result.exit_code, result.stderr
 
 
