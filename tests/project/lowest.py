@@ -32,7 +32,7 @@ SMOKE = (
     "tests/sim/test_scenario.py",
     "tests/mirotwin/test_recording.py",
     "tests/mirotwin/test_pytest_plugin.py",
-    "tests/mirotwin/shell/test_scenarios_command.py",
+    "tests/mirotwin/run/test_scenarios_command.py",
 )
 
 
