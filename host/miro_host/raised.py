@@ -12,7 +12,7 @@ from typing import Any
 
 OURS = ("miro_exact", "miro_protocol", "miro_robot", "miro_host", "miro_sim", "mirotwin")
 _LOADERS = ("importlib_metadata",)
-"""What loads plug-ins in place of Python's own module of metadata, once somebody has imported it."""
+"""Loads plug-ins instead of `importlib.metadata` in a process that has imported it."""
 _STANDARD = os.path.dirname(os.__file__) + os.sep
 _INSTALLED = ("site-packages", "dist-packages")
 

@@ -25,11 +25,7 @@ class Cluster(Workers):
     """The workers of the scheduler at `address` (tcp://host:8786). Raises BadInput where it does not answer."""
 
     option = OPTION
-    gone = (
-        *Workers.gone,
-        TypeError,
-        UnboundLocalError,
-    )  # Dask, of a result whose scheduler ends at that moment
+    gone = (*Workers.gone, TypeError)  # Dask raises it of a result whose scheduler ends at that moment
 
     def __init__(self, address: str) -> None:
         super().__init__()

@@ -119,11 +119,11 @@ class Journal:
             return
         if difference:
             what = f"holds the unfinished results of another campaign: {difference}"
-            raise BadInput(self.path, "", what, "choose another file with --out, or begin anew with --force")
+            raise BadInput(self.path, "", what, "choose another file with --out, or start again with --force")
         for outcome, end in outcomes(self.path):
             if not 0 <= outcome.run < self.head.runs:
                 raise BadInput(
-                    self.path, "", f"has an outcome of run {outcome.run}", "begin anew with --force"
+                    self.path, "", f"has an outcome of run {outcome.run}", "start again with --force"
                 )
             whole = end
             if not self.done[outcome.run]:
@@ -169,7 +169,9 @@ def outcomes(path: Path) -> Iterator[tuple[Outcome, int]]:
         end = len(stream.readline(_LINE_BYTES))
         for number, line in enumerate(iter(lambda: stream.readline(_LINE_BYTES), b""), 2):
             if len(line) == _LINE_BYTES:
-                raise BadInput(path, number, "the line is longer than any outcome", "begin anew with --force")
+                raise BadInput(
+                    path, number, "the line is longer than any outcome", "start again with --force"
+                )
             if not line.endswith(b"\n"):
                 return
             end += len(line)
@@ -177,7 +179,7 @@ def outcomes(path: Path) -> Iterator[tuple[Outcome, int]]:
             with suppress(msgspec.DecodeError, UnicodeDecodeError):
                 found = decoder.decode(line)
             if found is None:
-                raise BadInput(path, number, "is no outcome of a run", "begin anew with --force")
+                raise BadInput(path, number, "is no outcome of a run", "start again with --force")
             yield found, end
 
 

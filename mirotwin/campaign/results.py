@@ -160,7 +160,7 @@ def _check_columns(path: str | Path, schema: Any, about: About) -> None:
     kinds = ("int64", "double", "bool", "string")
     named = (*about.factors, *about.drawn)
     if len(set(named)) < len(named) or set(named) & OWN_COLUMNS:
-        raise BadInput(path, "", "names a factor twice, or one that is none", GIVE)
+        raise BadInput(path, "", "names a factor twice, or one that does not exist", GIVE)
     for name in (*named, *EACH_ROW):
         places = schema.get_all_field_indices(name)
         kind = f"{schema.field(places[0]).type}" if len(places) == 1 else None
@@ -257,7 +257,7 @@ def _table(rows: list[dict[str, Any]], schema: pa.Schema) -> pa.Table:
             columns.append(pa.array([row[field.name] for row in rows], field.type))
         except (pa.ArrowException, TypeError, OverflowError):
             what = f"runs {rows[0]['run']} to {rows[-1]['run']} have a value that is no {field.type}"
-            raise BadInput("", field.name, what, "begin anew with --force") from None
+            raise BadInput("", field.name, what, "start again with --force") from None
     return pa.Table.from_arrays(columns, schema=schema)
 
 

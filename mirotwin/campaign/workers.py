@@ -1,4 +1,4 @@
-"""Where workers come from: processes of this machine, or an executor that somebody else has."""
+"""The workers of a campaign: processes of this machine, or an executor of the caller."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ from mirotwin.shell.outputs import OutputError, told_when_full
 FOLDERS = ("finds", "unconfirmed", "covering", "corpus", "seeds", "engine")
 FILES = ("coverage.info", "coverage.info.lst", "summary.json", "dictionary")
 SCRATCH = ("corpus", "seeds", "engine")
-"""What a campaign that could not end leaves to nobody."""
+"""Folders of these that are taken away where a campaign breaks off with an error."""
 OPTION = "--out"
 
 

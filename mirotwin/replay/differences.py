@@ -51,7 +51,7 @@ def print_firmwares(found: FirmwareDifference, words: tuple[str, str] = WORDS) -
     if found.effect is not None and found.effect != found.changed:
         _print_instruction("the states differ for good from here on", found.effect, words)
     if found.effect is not None and found.effect.parted is not None:
-        complain(f"they go on at different places behind {found.effect.parted}")
+        complain(f"they go on at different places after {found.effect.parted}")
     for one in found.variables[:LISTED]:
         _print_variable(one, words)
     if len(found.variables) > LISTED:

@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+from concurrent.futures import Future
 
 import pytest
 from click.testing import CliRunner
@@ -16,6 +17,7 @@ from mirotwin import campaign
 from mirotwin.campaign import cluster as cluster_module
 from mirotwin.campaign.journal import journal_path
 from mirotwin.campaign.versions import versions
+from mirotwin.campaign.workers import Workers
 from mirotwin.commands import main
 from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of
 
@@ -155,3 +157,17 @@ def test_a_client_that_finds_no_scheduler_is_closed_at_once(monkeypatch):
     assert len(closed) == 1
     monkeypatch.undo()
     closed[0].close()
+
+
+def test_a_result_that_dask_loses_with_its_scheduler_is_the_end_of_the_workers(tmp_path):
+    class Losing(InThisProcess):
+        def submit(self, function, /, *arguments, **named):
+            future = Future()
+            future.set_exception(TypeError("cannot unpack non-iterable Outcome object"))
+            return future
+
+    class Lost(Workers):
+        gone = campaign.Cluster.gone
+
+    with pytest.raises(BadInput, match="workers have ended, and with them what was under way"):
+        campaign.run(plan_of(), tmp_path / "short.parquet", Lost(Losing()))
