@@ -16,9 +16,21 @@ from matplotlib.patches import Rectangle
 from PIL import Image
 
 from benchmarks.one_frame import Way
-from mirotwin.report.figure import COLOURS, STYLE
 
+COLOURS = ("#1f5fa8", "#c8452d", "#2e8b57", "#8a5bb0", "#b07d12")
 LEFT, RIGHT, DARK = COLOURS[0], COLOURS[1], "#333333"
+STYLE: dict[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "axes.edgecolor": "#777777",
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+}
 AROUND_PX = 6
 """What is shown around the tracker's window."""
 CHARACTER = 8

@@ -1,164 +1,86 @@
-"""The picture of a run: the four panels of the paper's Figs. 6 to 10, and below them the laws' inner values.
-
-The same run gives the same bytes: fixed size, fixed fonts, no date.
-"""
+"""The picture of a run: the four panels of the paper's Figs. 6 to 10, and below them the laws' inner values."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from miro_exact.clock import seconds
-from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD, Errors, ErrorSample, Line, Place, Track, Tracks
+from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD, ErrorSample, Tracks
 from mirotwin.report.summary import rms_name, settling_text, tracking_of
+from mirotwin.report.svg import COLOURS, Box, Drawing, Panel
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-COLOURS = ("#1f5fa8", "#c8452d", "#2e8b57", "#8a5bb0", "#b07d12")
-REFERENCE = "#222222"
-COLUMNS = 4
+ERRORS = (
+    ("(b)  x_e", "x_e [cm]", "x_cm", SETTLED_CM, "cm"),
+    ("(c)  y_e", "y_e [cm]", "y_cm", SETTLED_CM, "cm"),
+    ("(d)  \u03b8_e", "\u03b8_e [rad]", "theta_rad", SETTLED_RAD, "rad"),
+)
+"""Title, label of the axis, column, and the band that counts as settled, with its unit."""
 MOST_INNER = 8
 """So many inner values are drawn; a recording holds them all."""
-WIDTH_INCHES = 9.6
-PANEL_INCHES = 2.5
-INNER_INCHES = 1.25
-LEFT_INCHES, RIGHT_INCHES, TOP_INCHES, BOTTOM_INCHES = 0.7, 0.15, 0.85, 0.3
-GAP_INCHES = 0.7
-"""Between panels, for titles, labels and numbers. A layout that is computed from them takes as long as the drawing."""
-STYLE: dict[str, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9.0,
-    "axes.grid": True,
-    "grid.color": "#e3e3e3",
-    "grid.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "axes.edgecolor": "#777777",
-    "axes.titlesize": 9.5,
-    "axes.titlelocation": "left",
-    "legend.frameon": False,
-    "lines.linewidth": 1.5,
-    "lines.solid_capstyle": "round",
-    "agg.path.chunksize": 500,  # points that are drawn at once: 5000 of a noisy line take 6 MB
-}
+WIDTH = 1000
+LEFT, RIGHT, TOP, BOTTOM = 66, 20, 86, 20
+PANEL, INNER, GAP = 260, 110, 74
+COLUMNS = 4
 
 
 def draw(tracks: Tracks, path: Path, *, scenario: str, seed: int, title: str = "") -> None:
-    """Writes the PNG; raises ValueError when there is no period to draw."""
-    errors = {place: track.errors for place, track in tracks.robots.items()}
-    if not errors:
+    """Writes the SVG; raises ValueError when there is no period to draw."""
+    if not tracks.robots:
         raise ValueError("nothing to draw: the run has no control period")
-    import matplotlib.style  # here, because it takes longer to load than all the rest of the program
-
-    with matplotlib.style.context(STYLE, after_reset=True):
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        inner = {name: tracks.inner[name] for name in list(tracks.inner)[:MOST_INNER]}
-        rows = -(-len(inner) // COLUMNS)
-        heights = [PANEL_INCHES, PANEL_INCHES, *[INNER_INCHES] * rows]
-        height = sum(heights) + GAP_INCHES * (len(heights) - 1) + TOP_INCHES + BOTTOM_INCHES
-        figure = Figure(figsize=(WIDTH_INCHES, height), dpi=150)
-        canvas = FigureCanvasAgg(figure)
-        grid = figure.add_gridspec(2 + rows, COLUMNS, height_ratios=heights, **_margins(heights, height))
-        half = COLUMNS // 2
-        places = [(row, side) for row in (0, 1) for side in (slice(half), slice(half, None))]
-        path_axes, *error_axes = [figure.add_subplot(grid[place]) for place in places]
-        figure.suptitle(
-            _heading(scenario, seed, title, next(iter(errors.values()))),
-            fontsize=10.5,
-            y=1.0 - 0.12 / height,
-            va="top",
-        )
-        _draw_path(path_axes, tracks.robots)
-        _draw_error(error_axes[0], errors, "(b)  $x_e$", "cm", SETTLED_CM, lambda one: one.x_cm)
-        _draw_error(error_axes[1], errors, "(c)  $y_e$", "cm", SETTLED_CM, lambda one: one.y_cm)
-        _draw_error(error_axes[2], errors, r"(d)  $\theta_e$", "rad", SETTLED_RAD, lambda one: one.theta_rad)
-        for index, (name, lines) in enumerate(inner.items()):
-            axes = figure.add_subplot(grid[2 + index // COLUMNS, index % COLUMNS])
-            _draw_inner(axes, name, lines, list(errors))
-        canvas.print_png(path, metadata={"Software": None}, pil_kwargs={"compress_level": 3})  # type: ignore[no-untyped-call]
+    inner = list(tracks.inner)[:MOST_INNER]
+    rows = -(-len(inner) // COLUMNS)
+    height = TOP + 2 * (PANEL + GAP) + rows * (INNER + 36) + BOTTOM
+    errors = next(iter(tracks.robots.values())).errors
+    drawing = Drawing(WIDTH, height, _heading(scenario, seed, title, errors))
+    panels = [path_panel(tracks), *(error_panel(tracks, *one) for one in ERRORS)]
+    for index, panel in enumerate(panels):
+        drawing.add(panel, _box(2, index % 2, TOP + index // 2 * (PANEL + GAP), PANEL))
+    for index, name in enumerate(inner):
+        top = TOP + 2 * (PANEL + GAP) + index // COLUMNS * (INNER + 36)
+        drawing.add(_inner_panel(tracks, name), _box(COLUMNS, index % COLUMNS, top, INNER))
+    drawing.write(path)
 
 
-def _margins(heights: Sequence[float], height: float) -> dict[str, float]:
-    """Where the panels are, in the terms of a GridSpec: gaps are parts of the mean panel."""
-    width = WIDTH_INCHES - LEFT_INCHES - RIGHT_INCHES - GAP_INCHES * (COLUMNS - 1)
-    return {
-        "left": LEFT_INCHES / WIDTH_INCHES,
-        "right": 1.0 - RIGHT_INCHES / WIDTH_INCHES,
-        "top": 1.0 - TOP_INCHES / height,
-        "bottom": BOTTOM_INCHES / height,
-        "wspace": GAP_INCHES * COLUMNS / width,
-        "hspace": GAP_INCHES * len(heights) / sum(heights),
-    }
+def path_panel(tracks: Tracks) -> Panel:
+    panel = Panel("(a)  x-y, from the circle", "x [cm]", "y [cm]", equal=True)
+    for index, (place, track) in enumerate(tracks.robots.items()):
+        colour, first = 1 + index % COLOURS, index == 0
+        panel.dots(track.seen.x_cm, track.seen.y_cm, colour=colour, label="camera" if first else "")
+        label = "reference" if first else ""
+        panel.line(track.reference.x_cm, track.reference.y_cm, colour=0, style="dotted", label=label)
+        label = "robot" if len(tracks.robots) == 1 else f"robot {place[0]}/{place[1]}"
+        panel.line(track.truth.x_cm, track.truth.y_cm, colour=colour, label=label)
+        panel.start(track.truth.x_cm[0], track.truth.y_cm[0], colour=colour)
+    return panel
 
 
-def _heading(scenario: str, seed: int, title: str, errors: Sequence[ErrorSample]) -> str:
+def error_panel(tracks: Tracks, title: str, label: str, column: str, band: float, unit: str) -> Panel:
+    panel = Panel(f"{title}   (shaded: within {band:g} {unit})", "t [s]", label, band=band)
+    for index, track in enumerate(tracks.robots.values()):
+        times_s = [seconds(tick) for tick in track.errors.ticks]
+        if index == 0:
+            panel.line([times_s[0], times_s[-1]], [0.0, 0.0], colour=0, style="thin dotted")
+        panel.line(times_s, getattr(track.errors, column), colour=1 + index % COLOURS)
+    return panel
+
+
+def _inner_panel(tracks: Tracks, name: str) -> Panel:
+    panel = Panel(name.replace("_", "\u00a0"))
+    panel.small = True
+    robots = list(tracks.robots)
+    for place, line in tracks.inner[name].items():
+        panel.line(line.times_s, line.values, colour=1 + robots.index(place) % COLOURS, style="thin")
+    return panel
+
+
+def _box(columns: int, column: int, top: float, height: float) -> Box:
+    width = (WIDTH - LEFT - RIGHT - GAP * (columns - 1)) / columns
+    return Box(LEFT + column * (width + GAP), top, width, height)
+
+
+def _heading(scenario: str, seed: int, title: str, errors: Sequence[ErrorSample]) -> tuple[str, str]:
     tracking = tracking_of(errors)
     rms = f"{rms_name(errors)} {tracking.rms_position_cm:.2f} cm, {tracking.rms_theta_deg:.2f} degrees"
-    first = f"{scenario}, seed {seed}" + (f": {_plain(title)}" if title else "")
-    return f"{first}\n{rms}; {settling_text(errors)}"
-
-
-def _plain(text: str) -> str:
-    """Text that matplotlib prints as it stands."""
-    return text.replace("$", r"\$")
-
-
-def _draw_path(axes: Axes, robots: dict[Place, Track]) -> None:
-    for index, (place, track) in enumerate(robots.items()):
-        colour = COLOURS[index % len(COLOURS)]
-        first = index == 0
-        axes.plot(
-            track.seen.x_cm,
-            track.seen.y_cm,
-            linestyle="none",
-            marker=".",
-            markersize=2.5,
-            color=colour,
-            alpha=0.35,
-            label="camera" if first else None,
-        )
-        reference, truth = track.reference, track.truth
-        label = "reference" if first else None
-        axes.plot(reference.x_cm, reference.y_cm, ":", color=REFERENCE, label=label)
-        axes.plot(truth.x_cm, truth.y_cm, color=colour, label=_label(place, list(robots)))
-        axes.plot(truth.x_cm[0], truth.y_cm[0], "o", color=colour, markersize=5, markerfacecolor="white")
-    axes.set_title("(a)  x-y, from the circle")
-    axes.set_xlabel("x [cm]")
-    axes.set_ylabel("y [cm]")
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.legend(loc="best", fontsize=8)
-
-
-def _draw_error(
-    axes: Axes,
-    errors: dict[Place, Errors],
-    title: str,
-    unit: str,
-    band: float,
-    value_of: Callable[[ErrorSample], float],
-) -> None:
-    axes.axhspan(-band, band, color="#f0f3f7", linewidth=0, zorder=0)
-    axes.axhline(0.0, linestyle=":", color=REFERENCE, linewidth=1.0)
-    for index, samples in enumerate(errors.values()):
-        times = [seconds(one.tick) for one in samples]
-        axes.plot(times, [value_of(one) for one in samples], color=COLOURS[index % len(COLOURS)])
-    axes.margins(x=0)
-    axes.set_title(f"{title}   (shaded: within {band:g} {unit})")
-    axes.set_xlabel("t [s]")
-    axes.set_ylabel(f"{title.split('  ')[1]} [{unit}]")
-
-
-def _draw_inner(axes: Axes, name: str, lines: dict[Place, Line], places: Sequence[Place]) -> None:
-    for place, line in lines.items():
-        axes.plot(line.times_s, line.values, color=COLOURS[places.index(place) % len(COLOURS)], linewidth=1.0)
-    axes.margins(x=0)
-    axes.set_title(_plain(name))
-    axes.tick_params(labelsize=7, labelbottom=False)  # time as in the panels above
-    axes.locator_params(nbins=3)  # labels are most of the time that a panel takes to draw
-
-
-def _label(place: Place, places: Sequence[Place]) -> str:
-    return "robot" if len(places) == 1 else f"robot {place[0]}/{place[1]}"
+    first = f"{scenario}, seed {seed}" + (f": {title}" if title else "")
+    return first, f"{rms}; {settling_text(errors)}"

@@ -95,9 +95,7 @@ if TYPE_CHECKING:
 )
 @live_options
 @click.option("--force", is_flag=True, help="Replace the files of an earlier run in the folders.")
-@click.option(
-    "--no-figure", is_flag=True, help="Do not draw figure.png, which takes most of the time of a short run."
-)
+@click.option("--no-figure", is_flag=True, help="Do not draw figure.svg.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress bar and no table.")
 def run(
     scenario: str,
@@ -122,7 +120,7 @@ def run(
     no_figure: bool,
     quiet: bool,
 ) -> int:
-    """Runs SCENARIO (a built-in name, or a .toml file) and writes run.mcap, figure.png and summary.json.
+    """Runs SCENARIO (a built-in name, or a .toml file) and writes run.mcap, figure.svg and summary.json.
 
     A run that is broken off (Ctrl-C, a full disk, an error) leaves run.part.mcap and summary.part.json instead, with
     all that was recorded; one that is killed leaves run.part.mcap with all but the last half second. decode, export

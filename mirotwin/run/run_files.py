@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from mirotwin.verify.steps.player import Player
 
 SUMMARY = "summary.json"
-FIGURE = "figure.png"
+FIGURE = "figure.svg"
 FLUSH_S = 0.2
 """Wall time between two flushes of the recording, which comes to half a second on a busy machine too."""
 
@@ -103,7 +103,7 @@ class RunFiles:
             summary = self._summary(complete=True)
             self.folder.part(SUMMARY).write_bytes(to_json(summary))
             if self.tracks.count and title is not None:
-                from mirotwin.report.figure import draw  # takes half a second to load
+                from mirotwin.report.figure import draw
 
                 scenario, seed = self.source.scenario_name, self.source.seed
                 draw(self.tracks, self.folder.part(FIGURE), scenario=scenario, seed=seed, title=title)

@@ -19,7 +19,6 @@ PACKAGES = (
     "click",
     "rich",
     "mcap",
-    "matplotlib",
     "pillow",
     "pyserial",
     "crcmod-plus",

@@ -18,7 +18,7 @@ from types import TracebackType
 from miro_exact.bad_input import BadInput
 
 RECORDING = "run.mcap"
-FILES = (RECORDING, "figure.png", "summary.json")
+FILES = (RECORDING, "figure.svg", "summary.json")
 """What a run writes; `--force` replaces these, and the parts of them that a run broken off has left."""
 KEPT = (RECORDING, "summary.json")
 """Of these, a run that is broken off leaves the parts."""

@@ -145,7 +145,6 @@ def load_modules() -> None:
     for name in COMMANDS:
         main.get_command(context, name)
     import_module("mirotwin.report.figure")
-    import_module("matplotlib.backends.backend_agg")
 
 
 def plain(line: str) -> list[str] | None:

@@ -40,13 +40,13 @@ def test_a_folder_with_other_content_is_refused_with_the_way_out(tmp_path: Path)
 
 def test_force_replaces_the_files_of_a_run_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    for name in ("run.mcap", "summary.json", "figure.png"):
+    for name in ("run.mcap", "summary.json", "figure.svg"):
         (tmp_path / name).write_text("old")
     with OutputFolder(tmp_path, force=True) as staging:
         write_run(staging)
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
     assert (tmp_path / "run.mcap").read_text() == "new"
-    assert not (tmp_path / "figure.png").exists()
+    assert not (tmp_path / "figure.svg").exists()
 
 
 @pytest.mark.parametrize("kind", [ZeroDivisionError, KeyboardInterrupt])
@@ -84,9 +84,9 @@ def test_a_folder_takes_one_writer_at_a_time_and_is_free_after_it(tmp_path: Path
 
 
 def test_parts_of_before_are_named_and_never_taken_for_new_ones(tmp_path: Path) -> None:
-    (tmp_path / "figure.part.png").write_text("old")
+    (tmp_path / "figure.part.svg").write_text("old")
     with pytest.raises(
-        OutputError, match=r"the folder holds parts of an interrupted command \(figure\.part\.png\)"
+        OutputError, match=r"the folder holds parts of an interrupted command \(figure\.part\.svg\)"
     ):
         OutputFolder(tmp_path)
     with OutputFolder(tmp_path, force=True) as folder:

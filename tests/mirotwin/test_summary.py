@@ -3,7 +3,6 @@
 import json
 import math
 import tracemalloc
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -11,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_sim.periods import Control, Period
+from miro_sim.periods import Period
 from mirotwin.recording.track import ErrorSample, Tracks, error_of, wrapped
-from mirotwin.report.figure import draw
 from mirotwin.report.summary import (
     Summary,
     off_pitch_text,
@@ -168,47 +166,6 @@ def test_a_heading_error_is_wrapped_whatever_turns_lie_behind_it(angle: float, t
 
 def test_half_a_turn_is_positive() -> None:
     assert wrapped(-math.pi) == math.pi
-
-
-def test_the_same_run_gives_the_same_picture(tmp_path: Path) -> None:
-    run = list(periods(40, [(0, 0), (0, 1)]))
-    draw(Tracks(run), tmp_path / "a.png", scenario="fig6", seed=1, title="costs $5 _ \\alpha")
-    draw(Tracks(run), tmp_path / "b.png", scenario="fig6", seed=1, title="costs $5 _ \\alpha")
-    picture = (tmp_path / "a.png").read_bytes()
-    assert picture.startswith(b"\x89PNG")
-    assert picture == (tmp_path / "b.png").read_bytes()
-    assert b"tEXt" not in picture
-    assert b"tIME" not in picture
-
-
-def size(picture: bytes) -> tuple[int, int]:
-    return int.from_bytes(picture[16:20], "big"), int.from_bytes(picture[20:24], "big")
-
-
-def test_inner_values_have_panels_below_up_to_eight_of_them(tmp_path: Path) -> None:
-    sizes = []
-    for count in (0, 4, 8, 40):
-        inner = {f"value_{index}": 0.5 * index for index in range(count)}
-        run = [
-            msgspec.structs.replace(
-                period,
-                robots=tuple(
-                    msgspec.structs.replace(robot, control=Control(0.2, 0.0, 1, 1, inner))
-                    for robot in period.robots
-                ),
-            )
-            for period in periods(5)
-        ]
-        draw(Tracks(run), tmp_path / "a.png", scenario="fig6", seed=1)
-        sizes.append(size((tmp_path / "a.png").read_bytes()))
-    widths, heights = zip(*sizes, strict=True)
-    assert len(set(widths)) == 1
-    assert heights[0] < heights[1] < heights[2] == heights[3]
-
-
-def test_nothing_cannot_be_drawn(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="nothing to draw"):
-        draw(Tracks(), tmp_path / "a.png", scenario="fig6", seed=1)
 
 
 def test_the_columns_of_a_run_say_what_its_periods_say() -> None:

@@ -25,7 +25,7 @@ PAPER = "https://doi.org/10.1109/70.768190"
 PROGRAM = "#mirotwin"
 FORMATS = {
     ".md": ("text/markdown", "the page: each claim of the paper, what was measured, and a verdict"),
-    ".png": ("image/png", "a figure of the paper again, the runs with the median error"),
+    ".svg": ("image/svg+xml", "a figure of the paper again, the runs with the median error"),
     ".csv": ("text/csv", "one row a run"),
     ".parquet": ("application/vnd.apache.parquet", "one row a run, with types"),
     ".mcap": (

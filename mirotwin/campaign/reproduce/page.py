@@ -32,7 +32,7 @@ HEAD = """\
 
 J.-M. Yang, J.-H. Kim, "Sliding Mode Control for Trajectory Tracking of Nonholonomic Wheeled Mobile Robots", IEEE
 Trans. Robotics and Automation 15(3), 1999. `mirotwin reproduce` makes this page, its pictures and its recordings; it
-gives the same figures on every computer, and the same bytes of pictures with the same matplotlib. In every run are
+gives the same figures on every computer and the same bytes of pictures. In every run are
 firmware, LM629, motors, radio and camera of the robot: {runs} runs, seeds {seeds}, 6 s each. An error is the root mean
 square over the last second. Pictures show, of each controller, the run with the median error.
 
@@ -77,7 +77,7 @@ def _figures(table: Table, folder: str) -> Iterator[str]:
     for start in STARTS:
         errors = f"({start.x_cm:.2f} cm, {start.y_cm:.2f} cm, {start.theta_rad:.2f} rad)"
         yield f"### Fig. {start.figure}: {start.path}, initial errors {errors}\n"
-        yield f"![Fig. {start.figure}: in truth, and as the camera sees it]({folder}/{start.name}.png)\n"
+        yield f"![Fig. {start.figure}: in truth, and as the camera sees it]({folder}/{start.name}.svg)\n"
         yield (
             "| controller | truth cm: median | 95 % | worst | camera cm: median | x / y cm | heading deg"
             " | not settled | backward | across | chattering m/s2 |"

@@ -162,7 +162,7 @@ def _describe(deposit: Path, names: Sequence[str], seeds: str, day: str) -> None
 
 
 def _pictures() -> list[str]:
-    return [f"{start.name}.png" for start in STARTS]
+    return [f"{start.name}.svg" for start in STARTS]
 
 
 def _run(plan: Sequence[Job], count: int, path: Path, hold: Hold, quiet: bool) -> list[Row]:
@@ -214,7 +214,7 @@ def _draw(start: Start, folder: OutputFolder, seeds: Mapping[str, int]) -> None:
         return
     errors = f"{start.x_cm:.2f} cm, {start.y_cm:.2f} cm, {start.theta_rad:.2f} rad"
     title = f"Fig. {start.figure} again: {start.path}, initial errors ({errors})"
-    draw(folder.part(f"{start.name}.png"), title, courses)
+    draw(folder.part(f"{start.name}.svg"), title, courses)
 
 
 def _failures(found: Sequence[Row]) -> int:

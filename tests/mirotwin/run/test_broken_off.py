@@ -154,7 +154,7 @@ def test_the_next_run_names_the_parts_and_replaces_them_by_force(
     assert "with --force" in err
     (parts / "thesis.tex").write_text("years of work")
     assert mirotwin("run", short, "--seed", 5, "--out", parts, "-q", "--force") == (0, "", "")
-    assert names(parts) == ["figure.png", "run.mcap", "summary.json", "thesis.tex"]
+    assert names(parts) == ["figure.svg", "run.mcap", "summary.json", "thesis.tex"]
     assert (parts / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
 
 
@@ -216,7 +216,7 @@ def test_a_second_interruption_waits_until_the_files_are_closed(
     assert len(recording_reader.read(tmp_path / "out" / "run.part.mcap").periods) == 3
     code, _, err = mirotwin("run", short, "--out", tmp_path / "whole", "-q")  # it was complete by then
     assert (code, err) == (130, "\nmirotwin: interrupted\n")
-    assert names(tmp_path / "whole") == ["figure.png", "run.mcap", "summary.json"]
+    assert names(tmp_path / "whole") == ["figure.svg", "run.mcap", "summary.json"]
 
 
 def test_two_runs_into_one_folder_the_second_is_refused(

@@ -23,7 +23,7 @@ UNDEFINED_OPCODE = b"\xa5"
 
 
 def test_a_run_writes_a_recording_a_figure_and_a_summary(finished: Path) -> None:
-    assert sorted(path.name for path in finished.iterdir()) == ["figure.png", "run.mcap", "summary.json"]
+    assert sorted(path.name for path in finished.iterdir()) == ["figure.svg", "run.mcap", "summary.json"]
     summary = json.loads((finished / "summary.json").read_bytes())
     recording = recording_reader.read(finished / "run.mcap")
     assert summary["digest"] == recording.digest
@@ -49,7 +49,7 @@ def test_the_same_run_gives_the_same_bytes_and_a_full_recording_the_same_digest(
 ) -> None:
     assert mirotwin("run", short, "--seed", 5, "--out", tmp_path / "again", "--quiet") == (0, "", "")
     assert mirotwin("run", short, "--seed", 5, "--out", tmp_path / "full", "-q", "--record", "full")[0] == 0
-    for name in ("run.mcap", "figure.png"):
+    for name in ("run.mcap", "figure.svg"):
         assert (tmp_path / "again" / name).read_bytes() == (finished / name).read_bytes()
     full = recording_reader.read(tmp_path / "full" / "run.mcap")
     assert full.periods == recording_reader.read(finished / "run.mcap").periods
@@ -122,7 +122,7 @@ def test_a_firmware_fault_ends_the_run_with_code_3_and_complete_files(
     recording = recording_reader.read(tmp_path / "out" / "run.mcap")
     assert len(recording.periods) == 1
     assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["firmware"]["faults"] >= 1
-    assert (tmp_path / "out" / "figure.png").exists()
+    assert (tmp_path / "out" / "figure.svg").exists()
 
 
 SHORT_RESET = bytes.fromhex("00 C2A5 D2A5 80FE")  # NOP; CLR P2.5; SETB P2.5; SJMP $

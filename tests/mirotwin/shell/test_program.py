@@ -30,7 +30,7 @@ def test_help_lists_every_command(mirotwin):
 def test_the_version_loads_no_command_and_nothing_hot():
     script = (
         "import sys\ntry:\n    from mirotwin.commands import main; main()\nexcept SystemExit: pass\n"
-        "print(*sorted(n for n in sys.modules if n.startswith(('matplotlib', 'numpy', 'mirotwin.commands.r'))))"
+        "print(*sorted(n for n in sys.modules if n.startswith(('numpy', 'mirotwin.commands.r'))))"
     )
     done = children.run(
         [sys.executable, "-c", script, "--version"], capture_output=True, text=True, check=True
@@ -68,7 +68,7 @@ def test_help_loads_click_and_nothing_that_is_slow() -> None:
     done = children.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("Usage: mirotwin")
     loaded = done.stderr.rpartition("loaded: ")[2].split()
-    slow = {"numpy", "msgspec", "rich", "mcap", "matplotlib", "hashlib", "tomllib", "importlib.metadata"}
+    slow = {"numpy", "msgspec", "rich", "mcap", "hashlib", "tomllib", "importlib.metadata"}
     assert not slow.intersection(loaded)
     ours = [name for name in loaded if name.startswith("miro")]
     assert ours == [
@@ -145,12 +145,12 @@ def test_with_the_python_engine_a_command_loads_sources_alone(name, tmp_path):
     assert done.stderr == ""
 
 
-def test_a_quiet_run_without_a_figure_loads_neither_rich_nor_matplotlib(tmp_path):
+def test_a_quiet_run_with_its_figure_loads_neither_rich_nor_numpy(tmp_path):
     script = (
         "import sys\nfrom mirotwin.commands import main\ntry:\n    main()\nexcept SystemExit: pass\n"
-        "print({'rich', 'matplotlib', 'numpy'}.intersection(sys.modules))"
+        "print({'rich', 'numpy'}.intersection(sys.modules))"
     )
-    command = ["run", "fig6", "--set", "duration_s=0.05", "--no-figure", "-q"]
+    command = ["run", "fig6", "--set", "duration_s=0.05", "-q"]
     done = children.run(
         [sys.executable, "-c", script, *command], cwd=tmp_path, capture_output=True, text=True, check=True
     )

@@ -261,7 +261,7 @@ def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_
     assert table["label"].to_pylist() == [group.label for group in GROUPS]
     assert table.column_names == list(Row.__struct_fields__)
     names = {path.name for path in first}
-    assert {"reproduction.md", "rows.csv", *(f"fig{n}.png" for n in range(6, 11))} <= names
+    assert {"reproduction.md", "rows.csv", *(f"fig{n}.svg" for n in range(6, 11))} <= names
     assert len([name for name in names if name.endswith(".mcap")]) == len(GROUPS)
     with (tmp_path / "a/reproduction/rows.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
