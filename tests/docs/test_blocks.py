@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
-from pathlib import Path
 
 import pytest
 from sybil import Sybil
@@ -31,7 +30,7 @@ def my_receiver(n, symbols):
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
-def test_the_blocks_of(document: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_blocks_of(document, tmp_path, monkeypatch):
     if document in sandbox.COMPILED and not build.compiler() and not os.environ.get("CI"):
         pytest.skip("needs make and SDCC 4.2.0")
     folder = tmp_path / "here"
@@ -98,12 +97,12 @@ def blocks_in(document: str) -> list[blocks.Block]:
     return list(blocks.blocks_of((sandbox.ROOT / document).read_text("utf-8"), document))
 
 
-def test_the_blocks_that_are_not_run_are_these() -> None:
+def test_the_blocks_that_are_not_run_are_these():
     found = {document: sum(bool(block.not_run) for block in blocks_in(document)) for document in DOCUMENTS}
     assert {name: count for name, count in found.items() if count and name != "README.md"} == NOT_RUN
 
 
-def test_documents_are_found_and_have_blocks() -> None:
+def test_documents_are_found_and_have_blocks():
     kinds = Counter(block.language for document in DOCUMENTS for block in blocks_in(document))
     assert set(DOCUMENTS) >= {
         "README.md",
@@ -115,7 +114,7 @@ def test_documents_are_found_and_have_blocks() -> None:
     assert kinds["sh"] + kinds["console"] + kinds["indented"] > 60
 
 
-def test_a_comment_in_front_of_a_block_is_about_that_block_alone() -> None:
+def test_a_comment_in_front_of_a_block_is_about_that_block_alone():
     text = (
         "<!-- not run: no network -->\n```sh\npip\n```\n\nText\n\n"
         "    mirotwin\n\n<!-- file: a.toml -->\n```toml\n```\n"
@@ -126,14 +125,14 @@ def test_a_comment_in_front_of_a_block_is_about_that_block_alone() -> None:
     assert (three.not_run, three.file) == ("", "a.toml")
 
 
-def test_a_slow_block_is_left_to_the_command_for_the_first_pages() -> None:
+def test_a_slow_block_is_left_to_the_command_for_the_first_pages():
     slow, quick = blocks.blocks_of("<!-- slow: 30 s -->\n```sh\nmirotwin\n```\n\n```sh\nmirotwin\n```\n")
     assert (slow.slow, slow.not_run) == ("30 s", "")
     assert blocks.evaluator_of(slow) is blocks.nothing
     assert blocks.evaluator_of(quick) is running.shell
 
 
-def test_a_newcomer_finds_an_empty_folder(tmp_path: Path) -> None:
+def test_a_newcomer_finds_an_empty_folder(tmp_path):
     for document in sandbox.FIRST_USE:
         folder = tmp_path / document / "here"
         folder.mkdir(parents=True)
@@ -142,11 +141,11 @@ def test_a_newcomer_finds_an_empty_folder(tmp_path: Path) -> None:
         assert document not in sandbox.COMMANDS
 
 
-def test_the_first_page_stays_short() -> None:
+def test_the_first_page_stays_short():
     assert len((sandbox.ROOT / "README.md").read_text("utf-8").splitlines()) < 120
 
 
-def test_a_comment_that_text_parts_from_a_block_is_not_about_it() -> None:
+def test_a_comment_that_text_parts_from_a_block_is_not_about_it():
     (block,) = blocks.blocks_of("<!-- not run: why -->\n\nText\n\n```sh\npip\n```\n")
     assert not block.not_run
 
@@ -162,11 +161,11 @@ def test_a_comment_that_text_parts_from_a_block_is_not_about_it() -> None:
         ("wanted ..", "found x", False),
     ],
 )
-def test_output_is_compared_line_by_line(wanted: str, printed: str, same: bool) -> None:
+def test_output_is_compared_line_by_line(wanted, printed, same):
     assert fits(wanted, printed) == same
 
 
-def test_commands_of_a_console_have_their_output() -> None:
+def test_commands_of_a_console_have_their_output():
     one, two = commands_of("$ mirotwin a\nx\ny\n$ echo $?\n1\n")
     assert (one.line, one.output, one.asked) == ("mirotwin a", "x\ny", True)
     assert (two.line, two.output) == ("echo $?", "1")
@@ -182,11 +181,11 @@ def test_commands_of_a_console_have_their_output() -> None:
         ("mirotwin test *.toml", None),
     ],
 )
-def test_what_needs_a_shell(line: str, words: list[str] | None) -> None:
+def test_what_needs_a_shell(line, words):
     assert plain(line) == words
 
 
-def test_a_command_has_its_own_process_and_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_command_has_its_own_process_and_exit_code(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     programs = sandbox.programs(tmp_path / "programs", tmp_path / "none")
     shell = Shell(programs)

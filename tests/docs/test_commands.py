@@ -36,7 +36,7 @@ def command_of(line: str) -> tuple[click.Command, set[str]]:
 
 
 @pytest.mark.parametrize("document", [name for name in sandbox.documents() if commands(name)])
-def test_options_in_the_text_exist(document: str) -> None:
+def test_options_in_the_text_exist(document):
     wrong = []
     for line in commands(document):
         command, options = command_of(line)
@@ -47,7 +47,7 @@ def test_options_in_the_text_exist(document: str) -> None:
     assert not wrong
 
 
-def test_a_wrong_option_would_be_seen() -> None:
+def test_a_wrong_option_would_be_seen():
     command, options = command_of("fw trace fig6 --from 30ms")
     assert command.name == "trace"
     assert "--from" in options

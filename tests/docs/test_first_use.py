@@ -1,7 +1,6 @@
 """What `python -m tests.docs.first_use` counts, with a shell that is nobody's installation."""
 
 import os
-from pathlib import Path
 
 import pytest
 
@@ -36,7 +35,7 @@ false
 
 
 @pytest.fixture
-def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def page(tmp_path, monkeypatch):
     (tmp_path / "tree").mkdir()
     (tmp_path / "tree/page.md").write_text(PAGE)
     monkeypatch.setattr(sandbox, "ROOT", tmp_path / "tree")
@@ -45,7 +44,7 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "page.md"
 
 
-def test_each_line_is_run_and_the_refused_ones_are_named(page: str) -> None:
+def test_each_line_is_run_and_the_refused_ones_are_named(page):
     count = first_use.Count()
     first_use.follow(page, Literal(os.environ), count)
     assert str(count) == "4 lines run, 2 not run, 2 refused"
@@ -55,7 +54,7 @@ def test_each_line_is_run_and_the_refused_ones_are_named(page: str) -> None:
     ]
 
 
-def test_a_file_is_there_only_when_the_reader_has_come_to_it(page: str) -> None:
+def test_a_file_is_there_only_when_the_reader_has_come_to_it(page):
     path = sandbox.ROOT / page
     path.write_text("```sh\ncat a.txt\n```\n\n" + PAGE)
     count = first_use.Count()
@@ -63,7 +62,7 @@ def test_a_file_is_there_only_when_the_reader_has_come_to_it(page: str) -> None:
     assert count.refused[0].startswith("page.md, line 1: cat a.txt")
 
 
-def test_the_extras_that_are_installed_are_those_of_the_page_for_beginners() -> None:
+def test_the_extras_that_are_installed_are_those_of_the_page_for_beginners():
     found = first_use.EXTRAS.search((sandbox.ROOT / "docs/start.md").read_text("utf-8"))
     assert found
     assert found[1] == "[report,campaign,strategies]"

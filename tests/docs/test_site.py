@@ -28,7 +28,7 @@ LINK = re.compile(r"\]\(([^()\s#:]+)(?:#[^()\s]*)?\)")
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(tmp_path_factory):
     pytest.importorskip("properdocs", reason="needs the extra docs")
     folder = tmp_path_factory.mktemp("site")
     path = os.pathsep.join([str(ROOT), *(str(ROOT / name) for name in sandbox.PACKAGES)])
@@ -49,7 +49,7 @@ def pages(site: Path) -> Iterator[tuple[str, str]]:
         yield path.relative_to(site).as_posix(), path.read_text("utf-8")
 
 
-def test_every_command_has_its_heading(site: Path) -> None:
+def test_every_command_has_its_heading(site):
     text = (site / "reference/cli.html").read_text("utf-8")
     headings = set(re.findall(r'<h\d id="([\w-]+)"', text))
     wanted = {f"mirotwin-{name}" for name in COMMANDS}
@@ -58,7 +58,7 @@ def test_every_command_has_its_heading(site: Path) -> None:
     assert "--save-at" in text
 
 
-def test_every_public_name_is_in_the_reference(site: Path) -> None:
+def test_every_public_name_is_in_the_reference(site):
     text = html.unescape((site / "reference/mirotwin.html").read_text("utf-8"))
     anchors = set(re.findall(r'id="([\w.]+)"', text))
     modules = {"campaign", "conditions", "frames", "recording", "replay", "testing"}
@@ -70,7 +70,7 @@ def test_every_public_name_is_in_the_reference(site: Path) -> None:
     assert not missing
 
 
-def test_keys_channels_and_columns_are_the_codes(site: Path) -> None:
+def test_keys_channels_and_columns_are_the_codes(site):
     keys = (site / "formats/scenario.html").read_text("utf-8")
     for key in (
         "bit_error_rate",
@@ -85,11 +85,11 @@ def test_keys_channels_and_columns_are_the_codes(site: Path) -> None:
     assert "rms_position_cm" in (site / "formats/parquet.html").read_text("utf-8")
 
 
-def test_no_page_fetches_anything_from_elsewhere(site: Path) -> None:
+def test_no_page_fetches_anything_from_elsewhere(site):
     assert not [(name, found[0]) for name, text in pages(site) for found in FETCHED.finditer(text)]
 
 
-def test_no_markdown_is_left_in_a_page(site: Path) -> None:
+def test_no_markdown_is_left_in_a_page(site):
     """What Python-Markdown takes otherwise than GitHub does: a list behind a line of text, a table behind one."""
     left = []
     for name, text in pages(site):
@@ -104,7 +104,7 @@ def test_no_markdown_is_left_in_a_page(site: Path) -> None:
 
 
 @pytest.mark.parametrize("document", sandbox.documents())
-def test_links_lead_to_files_of_the_tree(document: str) -> None:
+def test_links_lead_to_files_of_the_tree(document):
     text = re.sub(r"```.*?```|`[^`\n]*`", "", (ROOT / document).read_text("utf-8"), flags=re.DOTALL)
     folder = (ROOT / document).parent
     assert not [target for target in LINK.findall(text) if not (folder / target).exists()]
@@ -114,7 +114,7 @@ def words(markup: str) -> str:
     return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", markup)).split())
 
 
-def test_every_page_says_its_version_and_licence(site: Path) -> None:
+def test_every_page_says_its_version_and_licence(site):
     for name, text in pages(site):
         footer = re.search(r'<div class="md-copyright">.*?</div>', text, re.DOTALL)
         header = re.search(r'<div class="md-header__source">.*?</a>', text, re.DOTALL)
@@ -125,7 +125,7 @@ def test_every_page_says_its_version_and_licence(site: Path) -> None:
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="an archive of the source is made of a commit")
-def test_without_an_address_the_source_is_an_archive_beside_the_pages(site: Path) -> None:
+def test_without_an_address_the_source_is_an_archive_beside_the_pages(site):
     with tarfile.open(site / f"mirotwin-{VERSION}.tar.gz") as archive:
         names = set(archive.getnames())
     assert {f"mirotwin-{VERSION}/README.md", f"mirotwin-{VERSION}/setup.py"} <= names
@@ -138,13 +138,13 @@ def test_without_an_address_the_source_is_an_archive_beside_the_pages(site: Path
         assert f'<a href="{archive_link}mirotwin-{VERSION}.tar.gz"' in text
 
 
-def test_programs_that_make_documents_are_not_published(site: Path) -> None:
+def test_programs_that_make_documents_are_not_published(site):
     assert not (site / "film").exists()
     assert not list(site.rglob("*.py"))
     assert not (site / "site/theme").exists()
 
 
-def test_the_index_of_how_tos_has_each_with_its_first_sentence(site: Path) -> None:
+def test_the_index_of_how_tos_has_each_with_its_first_sentence(site):
     nav = (
         (ROOT / "properdocs.yml").read_text("utf-8").partition("- How to:\n")[2].partition("  - Files:\n")[0]
     )
@@ -164,7 +164,7 @@ def test_the_index_of_how_tos_has_each_with_its_first_sentence(site: Path) -> No
 
 
 @pytest.mark.skipif(bool(browser.MISSING), reason=browser.MISSING)
-def test_search_works_in_a_page_that_is_opened_from_a_disk(site: Path) -> None:
+def test_search_works_in_a_page_that_is_opened_from_a_disk(site):
     from selenium.webdriver.support.ui import WebDriverWait
 
     with browser.chromium() as driver:
@@ -180,7 +180,7 @@ def test_search_works_in_a_page_that_is_opened_from_a_disk(site: Path) -> None:
 
 @pytest.mark.skipif(bool(browser.MISSING), reason=browser.MISSING)
 @pytest.mark.parametrize("width", [360, 1280])
-def test_pages_of_the_site_are_no_wider_than_their_window(site: Path, width: int) -> None:
+def test_pages_of_the_site_are_no_wider_than_their_window(site, width):
     metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
     with browser.chromium() as driver:
         driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)

@@ -19,15 +19,15 @@ from miro_exact.bad_input import BadInput
         (("", "", "no such engine"), "no such engine"),
     ],
 )
-def test_file_place_what_and_remedy_make_one_line(parts: tuple[str, str, str], line: str) -> None:
+def test_file_place_what_and_remedy_make_one_line(parts, line):
     assert str(BadInput(*parts)) == line
 
 
-def test_what_a_terminal_would_obey_is_escaped() -> None:
+def test_what_a_terminal_would_obey_is_escaped():
     assert str(BadInput("a\nb", "key\x1b[2J", "what", "")) == "a\\nb: key\\x1b[2J: what"
 
 
-def test_a_value_of_a_megabyte_is_shown_by_its_ends() -> None:
+def test_a_value_of_a_megabyte_is_shown_by_its_ends():
     error = BadInput("a.toml", "key", "x" * 1_000_000 + "end", "remedy")
     assert len(str(error)) < 700
     assert str(error).startswith("a.toml: key: xxx")
@@ -35,7 +35,7 @@ def test_a_value_of_a_megabyte_is_shown_by_its_ends() -> None:
     assert len(error.what) == 1_000_003
 
 
-def test_the_parts_can_be_read_from_the_error() -> None:
+def test_the_parts_can_be_read_from_the_error():
     error = BadInput("a.ihx", 3, "bad checksum", "rebuild it")
     assert (error.path, error.place, error.what, error.remedy) == ("a.ihx", 3, "bad checksum", "rebuild it")
     assert isinstance(error, ValueError)

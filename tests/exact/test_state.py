@@ -102,7 +102,7 @@ def test_loading_puts_every_field_back_and_works_out_the_rest():
 
 
 @given(cut=st.integers(0, len(LAYOUT) - 1))
-def test_bytes_that_end_early_are_refused_without_a_change(cut: int):
+def test_bytes_that_end_early_are_refused_without_a_change(cut):
     cart = Cart()
     flat = Flat(cart)
     with pytest.raises(ValueError, match=r"ends .* early"):
@@ -138,7 +138,7 @@ def changed(place: int, form: str, *values: object) -> bytes:
         (changed(0, "<q", 99), "tick 99 contradicts the rest"),
     ],
 )
-def test_a_value_out_of_its_range_is_refused_by_name_and_changes_nothing(data: bytes, message: str):
+def test_a_value_out_of_its_range_is_refused_by_name_and_changes_nothing(data, message):
     cart = Cart()
     flat = Flat(cart)
     with pytest.raises(ValueError, match=message):
@@ -148,7 +148,7 @@ def test_a_value_out_of_its_range_is_refused_by_name_and_changes_nothing(data: b
 
 
 @given(st.binary(max_size=2 * len(LAYOUT)), st.integers(0, len(LAYOUT)))
-def test_any_bytes_are_loaded_or_refused_without_a_change(data: bytes, place: int):
+def test_any_bytes_are_loaded_or_refused_without_a_change(data, place):
     cart = Cart()
     flat = Flat(cart)
     data = LAYOUT[:place] + data
@@ -197,9 +197,7 @@ edges = st.lists(st.integers(1, 50), max_size=40).map(
 
 
 @given(ticks=edges, forget=st.integers(0, 500), more=edges)
-def test_a_wire_is_written_as_its_live_edges_whatever_engine_runs(
-    ticks: list[int], forget: int, more: list[int]
-):
+def test_a_wire_is_written_as_its_live_edges_whatever_engine_runs(ticks, forget, more):
     line, level = Line(), 1
     for tick in ticks:
         level ^= 1
@@ -219,7 +217,7 @@ def test_a_wire_is_written_as_its_live_edges_whatever_engine_runs(
 
 
 @given(data=st.binary(max_size=60))
-def test_a_wire_takes_any_bytes_or_refuses_them_without_a_change(data: bytes):
+def test_a_wire_takes_any_bytes_or_refuses_them_without_a_change(data):
     line = Line()
     line.append(5, 0)
     before = state.snapshot(line)

@@ -14,7 +14,7 @@ PROGRAM = "from mirotwin.commands import main; main()"
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(tmp_path_factory):
     """A folder with the example as pip installs it."""
     folder = tmp_path_factory.mktemp("site")
     source = shutil.copytree(EXAMPLE, folder / "source")
@@ -41,7 +41,7 @@ def run(site: Path | str, out: Path, *options: str) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-def test_its_scenario_meets_it_and_a_tighter_one_fails(site: Path, tmp_path: Path) -> None:
+def test_its_scenario_meets_it_and_a_tighter_one_fails(site, tmp_path):
     assert run(site, tmp_path / "met") == (0, "")
     tighter = "network.robot.expect.turns_at_most_rad_s={limit_rad_s=0.05, from_s=0.5}"
     code, err = run(site, tmp_path / "tighter", "--set", tighter)
@@ -50,7 +50,7 @@ def test_its_scenario_meets_it_and_a_tighter_one_fails(site: Path, tmp_path: Pat
     assert "wanted at most 0.05 rad/s, found " in err
 
 
-def test_without_the_distribution_its_key_is_refused(tmp_path: Path) -> None:
+def test_without_the_distribution_its_key_is_refused(tmp_path):
     code, err = run("", tmp_path / "refused")
     assert code == 2
     assert "turning.toml: expect.turns_at_most_rad_s: there is no such check; " in err

@@ -15,9 +15,9 @@ def error_in(module: str) -> BaseException:
     raise AssertionError
 
 
-def test_code_of_a_plug_in_is_the_place() -> None:
+def test_code_of_a_plug_in_is_the_place():
     assert raised_at(error_in("plugged")) == "plugged.py:2 in load"
 
 
-def test_what_loads_plug_ins_is_no_place() -> None:
+def test_what_loads_plug_ins_is_no_place():
     assert raised_at(error_in("importlib_metadata")) == ""

@@ -1,6 +1,5 @@
 """What the tests of the commands share: a short scenario, and a way to call the program in this process."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -31,7 +30,7 @@ Result = tuple[int, str, str]
 
 
 @pytest.fixture(scope="session")
-def mirotwin() -> Callable[..., Result]:
+def mirotwin():
     """Calls the command; gives exit code, stdout and stderr. Anything but a clean exit fails the test."""
 
     def call(*arguments: object) -> Result:
@@ -44,7 +43,7 @@ def mirotwin() -> Callable[..., Result]:
 
 
 @pytest.fixture(scope="session")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def short(tmp_path_factory):
     """The short scenario as a file."""
     path = tmp_path_factory.mktemp("scenario") / "short.toml"
     path.write_text(SHORT)
@@ -52,7 +51,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def finished(mirotwin: Callable[..., Result], short: Path) -> Path:
+def finished(mirotwin, short):
     """The folder of a finished run of the short scenario with seed 5."""
     folder = short.parent / "finished"
     code, _, err = mirotwin("run", short, "--seed", 5, "--out", folder)

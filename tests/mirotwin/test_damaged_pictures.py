@@ -39,9 +39,7 @@ def with_chunk(kind: bytes, data: bytes, at: int) -> bytes:
 
 @pytest.mark.parametrize("at", [BEHIND_HEAD, BEFORE_END])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_chunk_of_any_kind_and_size_is_passed_over_or_refused_without_a_warning(
-    kind: bytes, at: int
-) -> None:
+def test_a_chunk_of_any_kind_and_size_is_passed_over_or_refused_without_a_warning(kind, at):
     for size in range(0, 30, 3):
         for data in (bytes(size), b"\xff" * size, b"a\0\0" + zlib.compress(bytes(size))):
             with warnings.catch_warnings(), suppress(BadInput):
@@ -49,6 +47,6 @@ def test_a_chunk_of_any_kind_and_size_is_passed_over_or_refused_without_a_warnin
                 assert parse(with_chunk(kind, data, at), "x.png").width == 320
 
 
-def test_a_colour_profile_of_nothing_is_damage() -> None:
+def test_a_colour_profile_of_nothing_is_damage():
     with pytest.raises(BadInput, match=r"x\.png: is damaged: .*; write the picture again"):
         parse(with_chunk(b"iCCP", b"", BEFORE_END), "x.png")

@@ -1,7 +1,6 @@
 """The MCAP writer: the bytes of the library's writer, and a file that can be read at any moment of its making."""
 
 import io
-from collections.abc import Iterator
 
 import pytest
 from hypothesis import given, settings
@@ -30,7 +29,7 @@ CHUNK = 1000
 
 
 @pytest.fixture(autouse=True, scope="module")
-def short_chunks() -> Iterator[None]:
+def short_chunks():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mcap_writer, "CHUNK_SIZE", CHUNK)
         yield
@@ -83,7 +82,7 @@ def written(steps: list[Step]) -> bytes:
 
 @settings(deadline=None, max_examples=400)
 @given(STEPS)
-def test_a_file_is_the_bytes_of_the_librarys_writer_whenever_it_was_flushed(steps: list[Step]) -> None:
+def test_a_file_is_the_bytes_of_the_librarys_writer_whenever_it_was_flushed(steps):
     assert written(steps) == of_the_library(steps)
 
 
@@ -91,7 +90,7 @@ ROWS: list[Step] = [("schema", 1, 0, b"{}"), ("channel", 1, 0, b"")]
 ROWS += [("message", 1, index, bytes([index]) * (7 * index)) for index in range(100)]
 
 
-def test_the_librarys_readers_find_all_messages() -> None:
+def test_the_librarys_readers_find_all_messages():
     data = written(ROWS)
     indexed = [
         (message.log_time, message.data) for _, _, message in make_reader(io.BytesIO(data)).iter_messages()
@@ -134,7 +133,7 @@ def readable(data: bytes) -> list[int]:
     return times
 
 
-def test_killed_after_any_write_it_leaves_all_that_was_flushed_before() -> None:
+def test_killed_after_any_write_it_leaves_all_that_was_flushed_before():
     journal = Journal()
     writer = begun(journal)
     journal.states.clear()
@@ -156,7 +155,7 @@ def test_killed_after_any_write_it_leaves_all_that_was_flushed_before() -> None:
     assert journal.getvalue() == written(ROWS)
 
 
-def test_after_a_full_disk_nothing_more_is_written() -> None:
+def test_after_a_full_disk_nothing_more_is_written():
     class Full(io.BytesIO):
         room = 2500
 

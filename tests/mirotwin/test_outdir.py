@@ -15,7 +15,7 @@ def write_run(folder: OutputFolder, text: str = "new") -> None:
         folder.part(name).write_text(text)
 
 
-def test_a_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
+def test_a_new_folder_is_made_with_its_parents(tmp_path):
     target = tmp_path / "runs" / "fig6-1"
     with OutputFolder(target) as staging:
         write_run(staging)
@@ -24,13 +24,13 @@ def test_a_new_folder_is_made_with_its_parents(tmp_path: Path) -> None:
     assert [path.name for path in target.parent.iterdir()] == ["fig6-1"]
 
 
-def test_an_empty_folder_may_be_used(tmp_path: Path) -> None:
+def test_an_empty_folder_may_be_used(tmp_path):
     with OutputFolder(tmp_path / ".") as staging:
         write_run(staging)
     assert (tmp_path / "run.mcap").read_text() == "new"
 
 
-def test_a_folder_with_other_content_is_refused_with_the_way_out(tmp_path: Path) -> None:
+def test_a_folder_with_other_content_is_refused_with_the_way_out(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(
         OutputError, match=r"not empty \(thesis\.tex\); choose another with --out, or .*--force"
@@ -38,7 +38,7 @@ def test_a_folder_with_other_content_is_refused_with_the_way_out(tmp_path: Path)
         OutputFolder(tmp_path)
 
 
-def test_force_replaces_the_files_of_a_run_and_nothing_else(tmp_path: Path) -> None:
+def test_force_replaces_the_files_of_a_run_and_nothing_else(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     for name in ("run.mcap", "summary.json", "figure.svg"):
         (tmp_path / name).write_text("old")
@@ -50,7 +50,7 @@ def test_force_replaces_the_files_of_a_run_and_nothing_else(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("kind", [ZeroDivisionError, KeyboardInterrupt])
-def test_a_run_that_breaks_off_leaves_things_as_they_were(tmp_path: Path, kind: type[BaseException]) -> None:
+def test_a_run_that_breaks_off_leaves_things_as_they_were(tmp_path, kind):
     target = tmp_path / "out"
     target.mkdir()
     (target / "run.mcap").write_text("old")
@@ -67,7 +67,7 @@ def test_a_run_that_breaks_off_leaves_things_as_they_were(tmp_path: Path, kind: 
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-def test_a_folder_takes_one_writer_at_a_time_and_is_free_after_it(tmp_path: Path) -> None:
+def test_a_folder_takes_one_writer_at_a_time_and_is_free_after_it(tmp_path):
     refusal = "another process is writing into the folder; wait until it has finished"
     early = OutputFolder(tmp_path / "new")
     with OutputFolder(tmp_path / "new") as folder:
@@ -83,7 +83,7 @@ def test_a_folder_takes_one_writer_at_a_time_and_is_free_after_it(tmp_path: Path
     assert list((tmp_path / "new").iterdir()) == []
 
 
-def test_parts_of_before_are_named_and_never_taken_for_new_ones(tmp_path: Path) -> None:
+def test_parts_of_before_are_named_and_never_taken_for_new_ones(tmp_path):
     (tmp_path / "figure.part.svg").write_text("old")
     with pytest.raises(
         OutputError, match=r"the folder holds parts of an interrupted command \(figure\.part\.svg\)"
@@ -94,7 +94,7 @@ def test_parts_of_before_are_named_and_never_taken_for_new_ones(tmp_path: Path) 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.mcap", "summary.json"]
 
 
-def test_a_file_where_the_folder_should_be_is_refused(tmp_path: Path) -> None:
+def test_a_file_where_the_folder_should_be_is_refused(tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(OutputError, match="not a folder"):
         OutputFolder(tmp_path / "out", force=True)
@@ -105,9 +105,7 @@ def test_a_file_where_the_folder_should_be_is_refused(tmp_path: Path) -> None:
         OutputFolder(tmp_path / "made", force=True)
 
 
-def test_a_folder_that_cannot_be_written_to_is_refused_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_cannot_be_written_to_is_refused_at_once(tmp_path, monkeypatch):
     monkeypatch.setattr("os.access", lambda path, mode: False)  # root may write everywhere
     with pytest.raises(OutputError, match="the folder cannot be written to; choose another"):
         OutputFolder(tmp_path)
@@ -118,7 +116,7 @@ def test_a_folder_that_cannot_be_written_to_is_refused_at_once(
         check_file(tmp_path / "old.json", "--dump")
 
 
-def test_a_link_to_nothing_is_called_that(tmp_path: Path) -> None:
+def test_a_link_to_nothing_is_called_that(tmp_path):
     (tmp_path / "link").symlink_to("nowhere")
     with pytest.raises(OutputError, match="is a symbolic link to nowhere, which does not exist"):
         OutputFolder(tmp_path / "link")
@@ -127,7 +125,7 @@ def test_a_link_to_nothing_is_called_that(tmp_path: Path) -> None:
 
 
 @pytest.fixture(params=["a folder that is there", "a link to one"])
-def made(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+def made(request, tmp_path):
     (tmp_path / "target").mkdir()
     if request.param == "a folder that is there":
         return tmp_path / "target"
@@ -135,14 +133,14 @@ def made(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return tmp_path / "link"
 
 
-def test_a_folder_that_is_there_is_filled_from_inside_because_it_may_be_another_disk(made: Path) -> None:
+def test_a_folder_that_is_there_is_filled_from_inside_because_it_may_be_another_disk(made):
     with OutputFolder(made) as staging:
         assert staging.part("run.mcap").parent.samefile(made)
         write_run(staging)
     assert sorted(path.name for path in made.iterdir()) == ["run.mcap", "summary.json"]
 
 
-def test_a_full_disk_is_named_with_the_way_out(tmp_path: Path) -> None:
+def test_a_full_disk_is_named_with_the_way_out(tmp_path):
     full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     said = "new: No space left on device; make room, or choose another"
     with pytest.raises(OutputError, match=f"{said} folder with --out"), OutputFolder(tmp_path / "new"):
@@ -152,7 +150,7 @@ def test_a_full_disk_is_named_with_the_way_out(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_whole_file_is_written_through_a_link(tmp_path: Path) -> None:
+def test_a_whole_file_is_written_through_a_link(tmp_path):
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "real").write_text("old")
     (tmp_path / "link").symlink_to("data/real")
@@ -164,7 +162,7 @@ def test_a_whole_file_is_written_through_a_link(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o664, 0o755])
-def test_a_whole_file_keeps_the_mode_of_the_one_before(tmp_path: Path, mode: int) -> None:
+def test_a_whole_file_keeps_the_mode_of_the_one_before(tmp_path, mode):
     (tmp_path / "mine").touch()
     (tmp_path / "mine").chmod(mode)
     with whole_file(tmp_path / "mine", "--out") as staging:
@@ -173,7 +171,7 @@ def test_a_whole_file_keeps_the_mode_of_the_one_before(tmp_path: Path, mode: int
 
 
 @pytest.mark.parametrize("umask", [0o022, 0o077, 0o002])
-def test_a_new_whole_file_has_the_mode_that_any_new_file_has(tmp_path: Path, umask: int) -> None:
+def test_a_new_whole_file_has_the_mode_that_any_new_file_has(tmp_path, umask):
     before = os.umask(umask)
     try:
         with whole_file(tmp_path / "whole", "--out") as staging:
@@ -184,7 +182,7 @@ def test_a_new_whole_file_has_the_mode_that_any_new_file_has(tmp_path: Path, uma
     assert (tmp_path / "whole").stat().st_mode == (tmp_path / "any").stat().st_mode
 
 
-def test_a_file_that_is_there_stays_unless_it_is_to_be_replaced(tmp_path: Path) -> None:
+def test_a_file_that_is_there_stays_unless_it_is_to_be_replaced(tmp_path):
     check_new(tmp_path / "x", "--out", force=False)
     (tmp_path / "x").touch()
     check_new(tmp_path / "x", "--out", force=True)
@@ -194,7 +192,7 @@ def test_a_file_that_is_there_stays_unless_it_is_to_be_replaced(tmp_path: Path) 
         check_new(tmp_path / "x", "--out", force=False)
 
 
-def test_a_whole_file_does_not_take_the_place_of_a_device() -> None:
+def test_a_whole_file_does_not_take_the_place_of_a_device():
     refusal = "exists and is not a regular file; choose another file with --out"
     with pytest.raises(OutputError, match=refusal), whole_file(Path(os.devnull), "--out"):
         pass

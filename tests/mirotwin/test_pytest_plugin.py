@@ -45,14 +45,14 @@ def counted(folder: Path, *arguments: str) -> str:
     return (folder / "fw.info").read_text()
 
 
-def test_a_session_counts_what_all_its_tests_ran_also_in_several_processes(tmp_path: Path) -> None:
+def test_a_session_counts_what_all_its_tests_ran_also_in_several_processes(tmp_path):
     alone = counted(tmp_path)
     assert "FNDA:2,_main" in alone
     assert alone == counted(tmp_path, "-n", "2")
     assert alone != counted(tmp_path, "-k", "reset")
 
 
-def test_a_session_fails_under_the_share_that_was_asked_for(tmp_path: Path) -> None:
+def test_a_session_fails_under_the_share_that_was_asked_for(tmp_path):
     wanted = ("--firmware-coverage=fw.info", "--firmware-coverage-fail-under")
     assert session(tmp_path, *wanted, "5").returncode == 0
     failed = session(tmp_path, *wanted, "99")
@@ -95,9 +95,7 @@ firmware_coverage.collect = counted
         ([], "down", 3),
     ],
 )
-def test_too_few_lines_do_not_hide_what_else_went_wrong(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], how: str, code: int
-) -> None:
+def test_too_few_lines_do_not_hide_what_else_went_wrong(tmp_path, monkeypatch, arguments, how, code):
     """pytest: 2 interrupted, 3 an internal error, 4 a usage error, 5 no tests."""
     (tmp_path / "conftest.py").write_text(BREAKS)
     monkeypatch.setenv("BREAK", how)
@@ -105,7 +103,7 @@ def test_too_few_lines_do_not_hide_what_else_went_wrong(
     assert done.returncode == code, done.stdout + done.stderr
 
 
-def test_the_report_is_built_and_written_once_however_many_processes_there_are(tmp_path: Path) -> None:
+def test_the_report_is_built_and_written_once_however_many_processes_there_are(tmp_path):
     (tmp_path / "conftest.py").write_text(COUNTS)
     counted(tmp_path, "--firmware-coverage-fail-under=5", "-n", "1")
     assert (tmp_path / "collected").read_text() == "once\n"
@@ -122,20 +120,20 @@ def test_the_report_is_built_and_written_once_however_many_processes_there_are(t
         ("--firmware-coverage-fail-under=900", "900.0 is no percentage"),
     ],
 )
-def test_bad_input_is_a_usage_error(tmp_path: Path, option: str, said: str) -> None:
+def test_bad_input_is_a_usage_error(tmp_path, option, said):
     done = session(tmp_path, "--firmware-coverage=fw.info", option)
     assert done.returncode == 4
     assert said in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_a_share_without_a_tracefile_is_a_usage_error(tmp_path: Path) -> None:
+def test_a_share_without_a_tracefile_is_a_usage_error(tmp_path):
     done = session(tmp_path, "--firmware-coverage-fail-under=90")
     assert done.returncode == 4
     assert "goes with --firmware-coverage=FILE.info" in done.stderr
 
 
-def test_collecting_tests_writes_nothing(tmp_path: Path) -> None:
+def test_collecting_tests_writes_nothing(tmp_path):
     done = session(tmp_path, "--firmware-coverage=fw.info", "--collect-only")
     assert done.returncode == 0
     assert not (tmp_path / "fw.info").exists()

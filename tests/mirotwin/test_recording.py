@@ -9,7 +9,6 @@ import re
 import struct
 import time
 import tracemalloc
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -50,14 +49,14 @@ def recorded(count: int = 3, source: Source = SOURCE) -> bytes:
 RECORDED = recorded()
 
 
-def test_what_goes_in_comes_out_to_the_last_bit() -> None:
+def test_what_goes_in_comes_out_to_the_last_bit():
     recording = parse(RECORDED, "run.mcap")
     assert recording.source == SOURCE
     assert recording.periods == tuple(periods(3, [(0, 0), (0, 2), (1, 0)]))
     assert recording.digest == recording.periods[-1].digest
 
 
-def test_what_was_done_to_robots_and_radios_comes_out_again() -> None:
+def test_what_was_done_to_robots_and_radios_comes_out_again():
     deeds = (Reset(5, 0, 2, 1), Power(6, 1, 0, 0), RadioState(7, 1, "noise"), RadioState(8, 1, "up"))
     period = msgspec.structs.replace(next(periods(1)), deeds=deeds)
     stream = io.BytesIO()
@@ -69,14 +68,14 @@ def test_what_was_done_to_robots_and_radios_comes_out_again() -> None:
 
 
 def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     monkeypatch.setattr(time, "time", lambda: 4e9)
     monkeypatch.setattr(time, "time_ns", lambda: 4 * 10**18)
     assert recorded() == RECORDED
 
 
-def test_frames_stand_at_the_same_place_whenever_the_recording_was_flushed() -> None:
+def test_frames_stand_at_the_same_place_whenever_the_recording_was_flushed():
     def with_frames(flushed: int) -> bytes:
         stream = io.BytesIO()
         with Recorder(stream, SOURCE) as recorder:
@@ -90,7 +89,7 @@ def test_frames_stand_at_the_same_place_whenever_the_recording_was_flushed() -> 
     assert {with_frames(flushed) for flushed in range(12)} == {with_frames(-1)}
 
 
-def test_an_ordinary_mcap_reader_finds_channels_schemas_and_attachments() -> None:
+def test_an_ordinary_mcap_reader_finds_channels_schemas_and_attachments():
     reader = make_reader(io.BytesIO(RECORDED))
     summary = reader.get_summary()
     assert summary is not None
@@ -112,7 +111,7 @@ def test_an_ordinary_mcap_reader_finds_channels_schemas_and_attachments() -> Non
         assert message.log_time == content["tick"] * 125 // 3
 
 
-def test_inner_values_of_different_laws_have_schemas_that_name_them() -> None:
+def test_inner_values_of_different_laws_have_schemas_that_name_them():
     stream = io.BytesIO()
     with Recorder(stream, SOURCE) as recorder:
         for period in periods(3, [(0, 0), (0, 1), (0, 2)]):
@@ -152,19 +151,19 @@ def message_type_of(topic: str) -> type[msgspec.Struct] | None:
         ("/period/", None),
     ],
 )
-def test_a_topic_says_what_it_names(topic: str, place: topics.Place | None) -> None:
+def test_a_topic_says_what_it_names(topic, place):
     assert topics.place_of(topic) == place
 
 
 @pytest.mark.parametrize("change", [b'"bad_stop":[3,19]', b'"bad_stop":[18,3]', b'"bad_stop":[3,-1]'])
-def test_bad_stop_bits_of_no_characters_are_refused(change: bytes) -> None:
+def test_bad_stop_bits_of_no_characters_are_refused(change):
     data = recorded().replace(b'"bad_stop":[3,18]', change)
     assert data != recorded()
     with pytest.raises(RecordingError, match="damaged record"):
         parse(data, "run.mcap")
 
 
-def test_a_recording_of_the_format_before_is_refused_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_recording_of_the_format_before_is_refused_with_the_reason(monkeypatch):
     monkeypatch.setattr(recorder_module, "FORMAT", "2")
     with pytest.raises(
         RecordingError, match="recording format '2'; this program reads format 3; use the version"
@@ -172,7 +171,7 @@ def test_a_recording_of_the_format_before_is_refused_with_the_reason(monkeypatch
         parse(recorded(), "run.mcap")
 
 
-def test_every_channel_has_a_message_type_and_foreign_topics_have_none() -> None:
+def test_every_channel_has_a_message_type_and_foreign_topics_have_none():
     for name, kind in channels.ROBOT_CHANNELS.items():
         assert message_type_of(topics.robot_topic(1, 2, name)) is kind
     assert message_type_of(topics.wire_topic(7)) is channels.WireMessage
@@ -180,7 +179,7 @@ def test_every_channel_has_a_message_type_and_foreign_topics_have_none() -> None
     assert message_type_of("/net0/robot0/unknown") is None
 
 
-def test_samples_and_faults_are_for_people_and_do_not_disturb_the_periods() -> None:
+def test_samples_and_faults_are_for_people_and_do_not_disturb_the_periods():
     stream = io.BytesIO()
     with Recorder(stream, SOURCE) as recorder:
         recorder.write_sample(0, 0, channels.SampleMessage(8192, 1, 2, 3, -4, 5, 6, 7, 8))
@@ -194,7 +193,7 @@ def broken_off(recorder: Recorder) -> None:
     raise ZeroDivisionError
 
 
-def test_what_was_written_up_to_an_error_is_a_recording_that_says_it_was_broken_off() -> None:
+def test_what_was_written_up_to_an_error_is_a_recording_that_says_it_was_broken_off():
     stream = io.BytesIO()
     with pytest.raises(ZeroDivisionError), Recorder(stream, SOURCE) as recorder:
         broken_off(recorder)
@@ -205,7 +204,7 @@ def test_what_was_written_up_to_an_error_is_a_recording_that_says_it_was_broken_
     assert make_reader(io.BytesIO(stream.getvalue())).get_summary() is not None
 
 
-def test_a_file_that_is_no_recording_is_named_with_its_place(tmp_path: Path) -> None:
+def test_a_file_that_is_no_recording_is_named_with_its_place(tmp_path):
     path = tmp_path / "run.mcap"
     path.write_bytes(b"PK\x03\x04")
     with pytest.raises(RecordingError, match=r"run\.mcap: offset 0: not an MCAP file; give a run\.mcap"):
@@ -215,7 +214,7 @@ def test_a_file_that_is_no_recording_is_named_with_its_place(tmp_path: Path) -> 
         read(path)
 
 
-def test_an_mcap_file_of_another_program_is_not_read_as_a_recording() -> None:
+def test_an_mcap_file_of_another_program_is_not_read_as_a_recording():
     stream = io.BytesIO()
     writer = Writer(stream)
     writer.start()
@@ -239,7 +238,7 @@ def blown_up(compression: CompressionType) -> bytes:
 @pytest.mark.parametrize(
     ("compression", "name"), [(CompressionType.ZSTD, "zstd"), (CompressionType.LZ4, "lz4")]
 )
-def test_a_compressed_chunk_is_refused_and_not_unpacked(compression: CompressionType, name: str) -> None:
+def test_a_compressed_chunk_is_refused_and_not_unpacked(compression, name):
     data = blown_up(compression)
     complaint = (
         rf"run\.mcap: offset \d+: a chunk is compressed \({name}\), .*; make .* with `mcap decompress`"
@@ -280,7 +279,7 @@ def nested(depth: int) -> bytes:
     ],
     ids=["size", "length of the data", "last record", "too short", "two deep", "3000 deep"],
 )
-def test_a_chunk_that_says_more_than_it_holds_is_damaged(record: bytes, what: str) -> None:
+def test_a_chunk_that_says_more_than_it_holds_is_damaged(record, what):
     with pytest.raises(RecordingError, match=rf"offset 8: damaged record \({what}\)"):
         parse(MAGIC + record, "run.mcap")
 
@@ -298,7 +297,7 @@ COMPLAINT = (
 
 @settings(deadline=None, max_examples=150)
 @given(st.integers(1, len(RECORDED) - 1))
-def test_a_recording_cut_short_anywhere_gives_its_whole_periods_and_says_so(size: int) -> None:
+def test_a_recording_cut_short_anywhere_gives_its_whole_periods_and_says_so(size):
     if size < MESSAGES_OF_PERIODS[0]:
         with pytest.raises(RecordingError, match=COMPLAINT):
             parse(RECORDED[:size], "run.mcap")
@@ -324,7 +323,7 @@ def sections(data: bytes) -> dict[str, tuple[int, int]]:
 SECTIONS = sections(RECORDED)
 
 
-def test_a_recording_has_records_of_all_these_kinds() -> None:
+def test_a_recording_has_records_of_all_these_kinds():
     kinds = {"HEADER", "METADATA", "ATTACHMENT", "CHUNK", "MESSAGE_INDEX", "DATA_END", "FOOTER"}
     summary = {"SCHEMA", "CHANNEL", "STATISTICS", "CHUNK_INDEX", "ATTACHMENT_INDEX", "SUMMARY_OFFSET"}
     assert kinds | summary < SECTIONS.keys()
@@ -338,25 +337,25 @@ def refused_with_bit_turned(at: int, bit: int) -> None:
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_one_wrong_bit_at_either_end_of_any_section_is_noticed(section: str) -> None:
+def test_one_wrong_bit_at_either_end_of_any_section_is_noticed(section):
     first, last = SECTIONS[section]
     for at in (*range(first, first + 5), last - 4, last):
         refused_with_bit_turned(at, at % 8)
 
 
 @pytest.mark.parametrize("place", range(4))
-def test_one_wrong_bit_in_the_length_of_a_compressions_name_is_damage(place: int) -> None:
+def test_one_wrong_bit_in_the_length_of_a_compressions_name_is_damage(place):
     for bit in range(8):
         refused_with_bit_turned(SECTIONS["CHUNK"][0] + 9 + 28 + place, bit)
 
 
 @settings(deadline=None, max_examples=150)
 @given(st.integers(0, len(RECORDED) - 1), st.integers(0, 7))
-def test_one_wrong_bit_anywhere_is_noticed(at: int, bit: int) -> None:
+def test_one_wrong_bit_anywhere_is_noticed(at, bit):
     refused_with_bit_turned(at, bit)
 
 
-def test_checksums_of_zero_say_nothing_as_other_programs_write_them() -> None:
+def test_checksums_of_zero_say_nothing_as_other_programs_write_them():
     stream = io.BytesIO()
     writer = Writer(stream, enable_crcs=False, enable_data_crcs=False)
     writer.start()

@@ -43,17 +43,17 @@ def team(robots: int, seq: int = 3) -> bytes:
     return encode(TeamFrame(0, seq, tuple((10 * slot, -slot) for slot in range(robots))), robots)
 
 
-def test_a_script_is_what_the_hosts_sent_and_nothing_else() -> None:
+def test_a_script_is_what_the_hosts_sent_and_nothing_else():
     script = script_of(periods(3))
     assert [sent.tick for sent in script] == [96_000 + index * CONTROL_PERIOD_TICKS for index in range(3)]
     assert {sent.data for sent in script} == {bytes(range(23))}
 
 
-def test_a_period_equals_itself() -> None:
+def test_a_period_equals_itself():
     assert compare(PERIOD, PERIOD) is None
 
 
-def test_the_hosts_own_state_is_not_the_robots_response() -> None:
+def test_the_hosts_own_state_is_not_the_robots_response():
     assert compare(PERIOD, changed(control=None, measurement=None)) is None
     assert compare(PERIOD, msgspec.structs.replace(PERIOD, digest="00" * 32)) is None
 
@@ -75,16 +75,14 @@ def test_the_hosts_own_state_is_not_the_robots_response() -> None:
         (changed(truth=Posture(0.0, 0.0, 0.0)), "/net1/robot2/truth x_m: recorded "),
     ],
 )
-def test_the_first_difference_is_named_with_tick_robot_channel_and_both_values(
-    replayed: Period, expected: str
-) -> None:
+def test_the_first_difference_is_named_with_tick_robot_channel_and_both_values(replayed, expected):
     found = compare(PERIOD, replayed)
     assert found is not None
     assert expected in str(found)
     assert str(found).startswith("tick 240240")
 
 
-def test_a_different_command_comes_before_what_it_leads_to() -> None:
+def test_a_different_command_comes_before_what_it_leads_to():
     recorded = changed("left", commands=((PERIOD.tick - 100, 0x1F, "1800002a"),))
     other = (PERIOD.tick - 99, 0x1F, "1800002b")
     found = compare(recorded, changed("left", commands=(other,), real_position=5))
@@ -93,7 +91,7 @@ def test_a_different_command_comes_before_what_it_leads_to() -> None:
     assert found.tick == PERIOD.tick - 100
 
 
-def test_an_answer_that_is_not_there_is_a_difference() -> None:
+def test_an_answer_that_is_not_there_is_a_difference():
     silent = msgspec.structs.replace(PERIOD, wire=PERIOD.wire[:1])
     found = compare(PERIOD, silent)
     assert found is not None
@@ -103,14 +101,14 @@ def test_an_answer_that_is_not_there_is_a_difference() -> None:
 @given(
     st.sampled_from([name for name in Axis.__struct_fields__ if name != "commands"]), st.sampled_from("lr")
 )
-def test_no_register_of_a_motion_controller_is_left_out(name: str, side: str) -> None:
+def test_no_register_of_a_motion_controller_is_left_out(name, side):
     whole = {"l": "left", "r": "right"}[side]
     value = getattr(getattr(PERIOD.robots[1], whole), name)
     assert compare(PERIOD, changed(whole, **{name: value + 1})) is not None
 
 
 @pytest.mark.parametrize("robots", [3, 5])
-def test_the_layout_of_a_stream_is_the_one_in_which_it_can_be_read(robots: int) -> None:
+def test_the_layout_of_a_stream_is_the_one_in_which_it_can_be_read(robots):
     sent = [Transmission(index * 900_000, ">", team(robots, index)) for index in range(3)]
     assert robots_of_stream(sent) == robots
     scenario = scenario_of_stream(sent, "a.txt")
@@ -123,7 +121,7 @@ def test_the_layout_of_a_stream_is_the_one_in_which_it_can_be_read(robots: int) 
     assert scenario.duration_s * TICKS_PER_SECOND >= 1_800_000 + TICKS_PER_SECOND
 
 
-def test_answers_in_a_stream_are_not_sent() -> None:
+def test_answers_in_a_stream_are_not_sent():
     sent = [Transmission(0, ">", b"\x01"), Transmission(5, "<", b"\x02"), Transmission(50_000, ">", b"\x03")]
     assert script_of_stream(sent) == [sent[0], sent[2]]
 
@@ -140,12 +138,12 @@ def test_answers_in_a_stream_are_not_sent() -> None:
         ([Transmission(NEVER_TICK, ">", b"\x01")], "more than a day"),
     ],
 )
-def test_a_stream_that_cannot_have_been_sent_is_refused(sent: list[Transmission], expected: str) -> None:
+def test_a_stream_that_cannot_have_been_sent_is_refused(sent, expected):
     with pytest.raises(BadInput, match=expected):
         scenario_of_stream(sent, "a.txt")
 
 
-def test_frames_are_listed_as_people_read_them_and_no_byte_is_dropped() -> None:
+def test_frames_are_listed_as_people_read_them_and_no_byte_is_dropped():
     answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
     sent = [
         Transmission(1000, ">", team(3)),
@@ -162,7 +160,7 @@ def test_frames_are_listed_as_people_read_them_and_no_byte_is_dropped() -> None:
 
 
 @pytest.mark.parametrize("place", [5, 12, 18])
-def test_an_answer_with_a_bad_stop_bit_is_not_listed_as_valid(place: int) -> None:
+def test_an_answer_with_a_bad_stop_bit_is_not_listed_as_valid(place):
     answer = encode(TelemetryFrame(4, 1, accepted=7), 3)
     (line,) = frame_lines([Transmission(0, "<", answer, 0, (place,))], {0: 3})
     assert (line.tick, line.slot) == (0, -1)

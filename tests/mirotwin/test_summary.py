@@ -61,28 +61,28 @@ def samples(*errors: tuple[float, float, float]) -> list[ErrorSample]:
     return [ErrorSample(index * CONTROL_PERIOD_TICKS, *error) for index, error in enumerate(errors)]
 
 
-def test_the_file_has_exactly_the_keys_that_others_read() -> None:
+def test_the_file_has_exactly_the_keys_that_others_read():
     written = json.loads(to_json(summary_of(list(periods(60)))))
     for table, keys in KEYS.items():
         found = written[table] if table else written
         assert list(found) == keys.split()
 
 
-def test_several_robots_are_listed_beside_the_first() -> None:
+def test_several_robots_are_listed_beside_the_first():
     written = json.loads(to_json(summary_of(list(periods(60, [(0, 0), (0, 2), (1, 1)])))))
     assert [(one["network"], one["slot"]) for one in written["robots"]] == [(0, 0), (0, 2), (1, 1)]
     assert written["robots"][0]["tracking"] == written["tracking"]
     assert written["robots"][0]["theory"] == written["theory"]
 
 
-def test_times_and_factor_follow_from_the_ticks() -> None:
+def test_times_and_factor_follow_from_the_ticks():
     summary = summary_of(list(periods(180)))
     assert summary.simulated_s == 180 * 800_800 / 24e6
     assert summary.realtime_factor == summary.simulated_s / 0.5
     assert summary.digest == list(periods(180))[-1].digest
 
 
-def test_rms_is_taken_over_the_last_second_only() -> None:
+def test_rms_is_taken_over_the_last_second_only():
     run = samples(*[(100.0, 0.0, 0.0)] * 40, *[(3.0, 4.0, math.radians(2.0))] * 30)
     tracking = tracking_of(run)
     assert (tracking.rms_x_cm, tracking.rms_y_cm, tracking.rms_position_cm) == (3.0, 4.0, 5.0)
@@ -98,7 +98,7 @@ def test_rms_is_taken_over_the_last_second_only() -> None:
         (24, 156, "rms of the last second"),
     ],
 )
-def test_rms_over_less_than_a_second_says_what_time_it_covers(first: int, count: int, text: str) -> None:
+def test_rms_over_less_than_a_second_says_what_time_it_covers(first, count, text):
     assert rms_name(samples(*[(0.0, 0.0, 0.0)] * (first + count))[first:]) == text
 
 
@@ -114,9 +114,7 @@ def test_rms_over_less_than_a_second_says_what_time_it_covers(first: int, count:
         ([(3.0, 0.0, 0.15)], 0.0),
     ],
 )
-def test_settling_is_the_last_time_outside_three_centimetres_or_0_15_radian(
-    errors: list[tuple[float, float, float]], settling: float | None
-) -> None:
+def test_settling_is_the_last_time_outside_three_centimetres_or_0_15_radian(errors, settling):
     assert tracking_of(samples(*errors)).settling_s == settling
 
 
@@ -128,13 +126,11 @@ def test_settling_is_the_last_time_outside_three_centimetres_or_0_15_radian(
         ([(5.0, 0.0, 0.0), (0.0, 0.0, 0.2)], "not settled"),
     ],
 )
-def test_a_robot_that_ends_outside_is_not_called_settled(
-    errors: list[tuple[float, float, float]], text: str
-) -> None:
+def test_a_robot_that_ends_outside_is_not_called_settled(errors, text):
     assert settling_text(samples(*errors)) == text
 
 
-def test_the_time_off_the_pitch_is_counted_by_the_corners_of_the_robot() -> None:
+def test_the_time_off_the_pitch_is_counted_by_the_corners_of_the_robot():
     run = list(
         periods(200)
     )  # along y = 0 at 0.2 m/s: its front edge crosses x = 120 cm at 116.25 cm, after 5.81 s
@@ -148,27 +144,27 @@ def test_the_time_off_the_pitch_is_counted_by_the_corners_of_the_robot() -> None
     )
 
 
-def test_each_robot_that_left_the_pitch_is_named_and_no_other() -> None:
+def test_each_robot_that_left_the_pitch_is_named_and_no_other():
     assert off_pitch_text(summary_of(list(periods(60)))) == ""
     text = off_pitch_text(summary_of(list(periods(200, [(0, 0), (0, 2)]))))
     assert "(net0/robot0)" in text
     assert "(net0/robot2)" in text
 
 
-def test_a_run_without_a_period_has_no_tracking() -> None:
+def test_a_run_without_a_period_has_no_tracking():
     assert set(msgspec.structs.astuple(tracking_of([]))) == {None}
 
 
 @given(st.floats(-3.14, 3.14), st.integers(-20, 20))
-def test_a_heading_error_is_wrapped_whatever_turns_lie_behind_it(angle: float, turns: int) -> None:
+def test_a_heading_error_is_wrapped_whatever_turns_lie_behind_it(angle, turns):
     assert wrapped(angle + turns * 2.0 * math.pi) == pytest.approx(angle, abs=1e-12)
 
 
-def test_half_a_turn_is_positive() -> None:
+def test_half_a_turn_is_positive():
     assert wrapped(-math.pi) == math.pi
 
 
-def test_the_columns_of_a_run_say_what_its_periods_say() -> None:
+def test_the_columns_of_a_run_say_what_its_periods_say():
     run = list(periods(40, [(0, 0), (1, 2)]))
     tracks = Tracks(run)
     assert list(tracks.robots) == [(0, 0), (1, 2)]
@@ -184,7 +180,7 @@ def test_the_columns_of_a_run_say_what_its_periods_say() -> None:
         ]
 
 
-def test_inner_values_are_kept_by_name_and_robot_in_the_order_of_the_laws() -> None:
+def test_inner_values_are_kept_by_name_and_robot_in_the_order_of_the_laws():
     tracks = Tracks(periods(3, [(0, 0), (1, 2)]))
     assert list(tracks.inner) == ["u1", "u2", "s1", "s2"]
     line = tracks.inner["s2"][1, 2]
@@ -192,7 +188,7 @@ def test_inner_values_are_kept_by_name_and_robot_in_the_order_of_the_laws() -> N
     assert list(line.times_s) == [800_800 / 24e6, 2 * 800_800 / 24e6]
 
 
-def test_a_control_period_leaves_less_than_250_bytes() -> None:
+def test_a_control_period_leaves_less_than_250_bytes():
     tracks = Tracks(periods(10))
     tracemalloc.start()
     try:

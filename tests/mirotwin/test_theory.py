@@ -76,13 +76,13 @@ def commanded(v: float, w: float = 0.0, **inner: float) -> Control:
 
 @settings(deadline=None)
 @given(STEPS)
-def test_f_is_what_was_commanded_less_what_came_of_it(run: list[RobotPeriod]) -> None:
+def test_f_is_what_was_commanded_less_what_came_of_it(run):
     track, expected = track_of(run), naive.disturbances(run)
     assert list(track.f1_m_s2) == pytest.approx(list(expected[:, 0]), abs=1e-9)
     assert list(track.f2_rad_s2) == pytest.approx(list(expected[:, 1]), abs=1e-9)
 
 
-def test_a_robot_that_does_at_once_what_it_is_told_has_no_disturbance() -> None:
+def test_a_robot_that_does_at_once_what_it_is_told_has_no_disturbance():
     speeds = [0.0, 0.1, 0.3, 0.2]
     run = [
         period(HERE, (v, 0.0), commanded(after)) for v, after in zip(speeds, [*speeds[1:], 0.0], strict=True)
@@ -93,7 +93,7 @@ def test_a_robot_that_does_at_once_what_it_is_told_has_no_disturbance() -> None:
     assert (found.f1_above_p1, found.f2_above_p2) == (0.0, 0.0)
 
 
-def test_a_robot_that_is_a_period_late_has_the_change_of_its_command_as_disturbance() -> None:
+def test_a_robot_that_is_a_period_late_has_the_change_of_its_command_as_disturbance():
     """Up by 0.1 m/s in one period, which is 3 m/s2, too little; and too much in the next."""
     told, did = [0.1, 0.1, 0.1, 0.1], [0.0, 0.0, 0.1, 0.1]
     run = [period(HERE, (v, 0.0), commanded(given)) for given, v in zip(told, did, strict=True)]
@@ -115,9 +115,7 @@ SURFACES = st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
     st.floats(0.0, 20.0),
     st.floats(0.01, 2.0),
 )
-def test_inside_a_layer_f_is_measured_against_the_part_of_p_that_is_left(
-    told: list[tuple[float, tuple[float, float]]], p1: float, layer: float
-) -> None:
+def test_inside_a_layer_f_is_measured_against_the_part_of_p_that_is_left(told, p1, layer):
     run = [period(HERE, (0.0, 0.0), commanded(v, s1=s1, s2=s2)) for v, (s1, s2) in told]
     found = theory(run, Gains(p1, None, layer, None)).disturbance
     assert found is not None
@@ -132,7 +130,7 @@ def test_inside_a_layer_f_is_measured_against_the_part_of_p_that_is_left(
     assert found.f2_above_authority is None
 
 
-def test_without_a_layer_all_of_p_is_left_wherever_the_surface_is_not_zero() -> None:
+def test_without_a_layer_all_of_p_is_left_wherever_the_surface_is_not_zero():
     run = [period(HERE, (0.0, 0.0), commanded(0.001, s1=s1, s2=0.0)) for s1 in (0.01, -0.01, 0.0, 0.0)]
     found = theory(run, Gains(0.05, None)).disturbance
     assert found is not None
@@ -141,14 +139,14 @@ def test_without_a_layer_all_of_p_is_left_wherever_the_surface_is_not_zero() -> 
     assert authority(0.0, 0.05, None) == 0.0
 
 
-def test_of_a_law_that_does_not_say_its_surfaces_no_authority_is_known() -> None:
+def test_of_a_law_that_does_not_say_its_surfaces_no_authority_is_known():
     run = [period(HERE, (0.0, 0.0), commanded(0.1)) for _ in range(3)]
     found = theory(run, Gains(0.05, 1.0, 0.1, 0.1)).disturbance
     assert found is not None
     assert (found.f1_above_authority, found.f2_above_authority) == (None, None)
 
 
-def test_a_period_without_a_command_has_no_f() -> None:
+def test_a_period_without_a_command_has_no_f():
     run = [period(HERE, (0.0, 0.0), commanded(0.1)), period(HERE, (0.3, 0.0)), period(HERE, (0.3, 0.0))]
     track = track_of(run)
     assert len(track.f1_m_s2) == 1
@@ -167,7 +165,7 @@ def on_the_seam(angles: list[float]) -> bool:
 
 @settings(deadline=None)
 @given(STEPS)
-def test_the_assumptions_are_those_of_the_slow_twin(run: list[RobotPeriod]) -> None:
+def test_the_assumptions_are_those_of_the_slow_twin(run):
     run = [msgspec.structs.replace(run[0], control=commanded(0.0), reference=ORIGIN), *run[1:]]
     distances = [naive.across(one.truth) for one in run]
     rho = [math.hypot(one.truth.x_m, one.truth.y_m) for one in run]
@@ -187,7 +185,7 @@ def test_the_assumptions_are_those_of_the_slow_twin(run: list[RobotPeriod]) -> N
     assert found.assumption_1.broken_s == pytest.approx(PERIOD_S * sum(sides[0][0] | sides[1][0]))
 
 
-def test_a_heading_that_turns_past_half_a_turn_breaks_assumption_1_until_it_comes_back() -> None:
+def test_a_heading_that_turns_past_half_a_turn_breaks_assumption_1_until_it_comes_back():
     angles = [3.0, 3.1, 3.2, 3.3, 3.1]
     run = [period(Posture(0.5, 0.0, angle), control=commanded(0.0)) for angle in angles]
     found = theory(run).assumption_1
@@ -195,7 +193,7 @@ def test_a_heading_that_turns_past_half_a_turn_breaks_assumption_1_until_it_come
     assert (found.first_s, found.last_s) == (pytest.approx(2 * PERIOD_S), pytest.approx(3 * PERIOD_S))
 
 
-def test_a_robot_in_the_origin_and_a_reference_that_starts_elsewhere_break_assumption_2() -> None:
+def test_a_robot_in_the_origin_and_a_reference_that_starts_elsewhere_break_assumption_2():
     as_it_should = [period(HERE, control=commanded(0.0), reference=at) for at in (ORIGIN, HERE)]
     assert theory(as_it_should).assumption_2.broken_s == 0.0
     late = [period(HERE, control=commanded(0.0), reference=at) for at in (HERE, HERE)]
@@ -208,7 +206,7 @@ def test_a_robot_in_the_origin_and_a_reference_that_starts_elsewhere_break_assum
     assert found.last_s == pytest.approx(PERIOD_S)
 
 
-def test_a_heading_across_the_line_of_sight_breaks_assumption_3_and_passing_it_is_a_crossing() -> None:
+def test_a_heading_across_the_line_of_sight_breaks_assumption_3_and_passing_it_is_a_crossing():
     run = [period(Posture(0.5, 0.0, angle), control=commanded(0.0)) for angle in (1.3, 1.5, 1.6, 2.0)]
     found = theory(run).assumption_3
     assert (found.frames, found.crossings) == (2, 1)
@@ -219,7 +217,7 @@ def test_a_heading_across_the_line_of_sight_breaks_assumption_3_and_passing_it_i
 # Forward and backward.
 
 
-def test_a_change_of_direction_counts_and_trembling_at_rest_does_not() -> None:
+def test_a_change_of_direction_counts_and_trembling_at_rest_does_not():
     speeds = [0.0, 0.001, -0.002, 0.2, 0.005, -0.005, 0.1, -0.1, -0.2, 0.3]
     found = theory([period(HERE, (v, 0.0), commanded(0.0)) for v in speeds])
     assert found.reversals == 2
@@ -229,13 +227,13 @@ def test_a_change_of_direction_counts_and_trembling_at_rest_does_not() -> None:
 # What is said of them.
 
 
-def test_a_robot_that_nobody_steers_has_no_theory() -> None:
+def test_a_robot_that_nobody_steers_has_no_theory():
     track = track_of([period(HERE), period(HERE)])
     assert theory_of(track, Gains()) is None
     assert track.now is None
 
 
-def test_the_line_on_the_screen_names_what_does_not_hold() -> None:
+def test_the_line_on_the_screen_names_what_does_not_hold():
     told, did = [0.1, 0.1, 0.1, 0.1], [0.0, -0.2, 0.1, 0.1]
     run = [
         period(Posture(0.5, 0.0, angle), (v, 0.0), commanded(given), reference=at)
@@ -253,7 +251,7 @@ def test_the_line_on_the_screen_names_what_does_not_hold() -> None:
     assert theory_text(theory(still)) == ""
 
 
-def test_the_gains_are_those_of_each_robots_law() -> None:
+def test_the_gains_are_those_of_each_robots_law():
     scenario = load("fig6").scenario
     assert gains_of(scenario) == {(0, 0): Gains(0.77, 1.48, 0.4, 0.149)}
     signs = load("fig6", ['network.robot.controller.switching="sign"']).scenario
@@ -279,7 +277,7 @@ def recorded(count: int, with_theory: bool) -> bytes:
 
 
 @pytest.mark.parametrize("count", [2, 10, 23])
-def test_a_recording_has_the_terms_and_reads_the_same_with_and_without_them(count: int) -> None:
+def test_a_recording_has_the_terms_and_reads_the_same_with_and_without_them(count):
     """So recordings of before they were written are read as they were."""
     data = recorded(count, True)
     assert data != recorded(count, False)
@@ -294,14 +292,14 @@ def test_a_recording_has_the_terms_and_reads_the_same_with_and_without_them(coun
     assert ticks == [index * CONTROL_PERIOD_TICKS for index in range(1, count)]
 
 
-def test_terms_that_make_no_sense_do_not_spoil_a_recording() -> None:
+def test_terms_that_make_no_sense_do_not_spoil_a_recording():
     data = recorded(2, True)
     changed = data.replace(b'"holds_1":true', b'"holds_1":7777')
     assert changed != data
     assert parse(without_sums(changed), "run.mcap") == parse(data, "run.mcap")
 
 
-def test_the_terms_of_a_whole_run_follow_from_its_recording() -> None:
+def test_the_terms_of_a_whole_run_follow_from_its_recording():
     """Fig. 6 in the whole loop: written along the run, and computed again from what was read back."""
     text = load("fig6", ["duration_s=1.5"])
     world, stream, tracks = World(text.scenario, 3, load_hex(image_path())), io.BytesIO(), Tracks()

@@ -1,7 +1,5 @@
 """Changed firmware is built as its Makefile builds it, each text once."""
 
-from pathlib import Path
-
 import pytest
 
 from miro_robot.firmware import image_path
@@ -19,7 +17,7 @@ def changed(file: str, right: str, wrong: str) -> dict[str, str]:
     return {file: SOURCES[file].replace(right, wrong)}
 
 
-def test_the_sources_as_they_are_make_the_shipped_image() -> None:
+def test_the_sources_as_they_are_make_the_shipped_image():
     assert shipped().image.read_bytes() == image_path().read_bytes()
     assert build(changed("main.c", "/* The robot's", "/* A robot's")).is_shipped
 
@@ -32,7 +30,7 @@ def test_the_sources_as_they_are_make_the_shipped_image() -> None:
     ],
     ids=["a C file", "a header"],
 )
-def test_an_image_is_that_of_a_build_from_nothing(change: dict[str, str], tmp_path: Path) -> None:
+def test_an_image_is_that_of_a_build_from_nothing(change, tmp_path):
     for name, text in (SOURCES | change).items():
         (tmp_path / name).write_text(text)
     for name in ("Makefile", "sdcc.version"):
@@ -44,7 +42,7 @@ def test_an_image_is_that_of_a_build_from_nothing(change: dict[str, str], tmp_pa
     assert not built.is_shipped
 
 
-def test_a_text_is_built_once(tmp_path: Path) -> None:
+def test_a_text_is_built_once(tmp_path):
     change = changed("failsafe.c", "age == FAILSAFE_STOP_MS", "age == 90")
     first = build(change, tmp_path)
     time_ns = first.image.stat().st_mtime_ns
@@ -53,7 +51,7 @@ def test_a_text_is_built_once(tmp_path: Path) -> None:
     assert build(change, tmp_path / "other").image.read_bytes() == first.image.read_bytes()
 
 
-def test_what_does_not_compile_says_why_and_leaves_no_image(tmp_path: Path) -> None:
+def test_what_does_not_compile_says_why_and_leaves_no_image(tmp_path):
     built = build(changed("main.c", "    EA = 1;", "    EB = 1;"), tmp_path)
     assert built.error == "main.c:45: error 20: Undefined identifier 'EB'"
     assert not built.image.exists()
@@ -61,6 +59,6 @@ def test_what_does_not_compile_says_why_and_leaves_no_image(tmp_path: Path) -> N
     assert not list(tmp_path.glob("making-*"))
 
 
-def test_a_file_that_the_firmware_does_not_have_is_refused() -> None:
+def test_a_file_that_the_firmware_does_not_have_is_refused():
     with pytest.raises(ValueError, match=r"^the firmware has no file mian\.c$"):
         build({"mian.c": ""})

@@ -29,7 +29,7 @@ C_TEXT = st.lists(st.sampled_from(PIECES) | st.text(max_size=4), max_size=30).ma
 
 @settings(deadline=None)
 @given(C_TEXT)
-def test_the_tokens_of_any_text_are_that_text_again(text: str) -> None:
+def test_the_tokens_of_any_text_are_that_text_again(text):
     found = list(tokens(text))
     assert "".join(token.text for token in found) == text
     assert all(text.startswith(token.text, token.start) for token in found)
@@ -37,7 +37,7 @@ def test_the_tokens_of_any_text_are_that_text_again(text: str) -> None:
 
 
 @pytest.mark.parametrize("file", source_files())
-def test_every_file_of_the_firmware_consists_of_tokens_of_c(file: str) -> None:
+def test_every_file_of_the_firmware_consists_of_tokens_of_c(file):
     assert words(source_files()[file])
 
 
@@ -58,14 +58,14 @@ def test_every_file_of_the_firmware_consists_of_tokens_of_c(file: str) -> None:
         ("#if A > 1\n#pragma save\n#endif\n", ["#if A > 1", "#pragma save", "#endif"]),
     ],
 )
-def test_a_text_has_these_words(text: str, expected: list[str]) -> None:
+def test_a_text_has_these_words(text, expected):
     assert [token.text for token in words(text)][: len(expected)] == expected
 
 
-def test_only_the_body_of_a_definition_belongs_to_a_macro() -> None:
+def test_only_the_body_of_a_definition_belongs_to_a_macro():
     assert [token.text for token in words("#define N (2 + 1)\nint x = 5;") if token.macro] == list("(2+1)")
 
 
-def test_what_begins_no_token_is_named_with_its_line() -> None:
+def test_what_begins_no_token_is_named_with_its_line():
     with pytest.raises(ValueError, match=r"^line 2: '@' begins no token of C$"):
         words("int x;\n@")

@@ -14,7 +14,7 @@ MS = 24_000
 SECONDS = 1.5
 
 
-def test_a_host_never_says_two_things_at_once() -> None:
+def test_a_host_never_says_two_things_at_once():
     sent = list(Host(3, 0, 3, 1).transmissions(20_000 * MS))
     assert all(one.end_tick <= other.tick for one, other in pairwise(sent))
     assert len(sent) > 300
@@ -24,7 +24,7 @@ def test_a_host_never_says_two_things_at_once() -> None:
 
 
 @needs_sdcc
-def test_the_shipped_firmware_does_the_same_twice_and_swapped_wheels_show() -> None:
+def test_the_shipped_firmware_does_the_same_twice_and_swapped_wheels_show():
     right = seen_of(shipped().image, SECONDS, 0)
     assert all(len(events) > 100 for events in right)
     assert str(difference(right, seen_of(shipped().image, SECONDS, 0))) == "the same"
@@ -32,6 +32,6 @@ def test_the_shipped_firmware_does_the_same_twice_and_swapped_wheels_show() -> N
     assert "command left LTRJ" in swapped.first
 
 
-def test_a_name_that_is_no_mutant_is_refused() -> None:
+def test_a_name_that_is_no_mutant_is_refused():
     with pytest.raises(ValueError, match=r"there is no mutant 'main\.c:1:1:constant:0'"):
         image_of("main.c:1:1:constant:0")

@@ -23,7 +23,7 @@ def row(*trials: Trial) -> list[str]:
     return [cell.strip() for cell in lines[0].split("|")[4:-1]]
 
 
-def test_a_cell_has_one_number_a_seed_in_their_order() -> None:
+def test_a_cell_has_one_number_a_seed_in_their_order():
     check = (FOR_FUZZING[NAME].check,)
     assert row(trial("afl", 2, None), trial("afl", 1, 3.14, check), trial("hypothesis", 1, 5.0, check)) == [
         "3.1 >60",
@@ -31,31 +31,31 @@ def test_a_cell_has_one_number_a_seed_in_their_order() -> None:
     ]
 
 
-def test_a_find_by_another_check_is_marked_and_the_link_machine_has_none() -> None:
+def test_a_find_by_another_check_is_marked_and_the_link_machine_has_none():
     found = (trial("afl", 1, 3.0, ("no_fault",)), trial("link", 1, 4.0, ("the link machine",)))
     assert row(*found) == ["3.0*", "4.0"]
     assert "* is not by the check that the mistake names" in render(found)
 
 
-def test_what_a_seed_shows_is_said_once() -> None:
+def test_what_a_seed_shows_is_said_once():
     check = (FOR_FUZZING[NAME].check,)
     assert row(*(trial("afl", seed, 0.0, check, seeded=True) for seed in (1, 2, 3))) == ["0.0 (a seed)"]
 
 
-def test_a_find_answers_for_any_limit_and_none_for_shorter_ones_of_the_same_image() -> None:
+def test_a_find_answers_for_any_limit_and_none_for_shorter_ones_of_the_same_image():
     found, none = trial("afl", 1, 3.0), trial("afl", 1, None)
     longer, shorter = (msgspec.structs.replace(none.wanted, limit_s=limit_s) for limit_s in (90.0, 30.0))
     assert (found.answers(longer), none.answers(longer), none.answers(shorter)) == (True, False, True)
     assert not found.answers(msgspec.structs.replace(none.wanted, image="other"))
 
 
-def test_firmware_that_does_not_come_up_is_told_with_what_was_said_of_it() -> None:
+def test_firmware_that_does_not_come_up_is_told_with_what_was_said_of_it():
     wanted = Wanted("planted", "pushes for ever", "", "afl", 1, 15.0, "folder")
     table = render([Trial(wanted, 0.0, 0.0, refused="it comes up with a fault")])
     assert "| pushes for ever | not fuzzed | it comes up with a fault |" in table
 
 
-def test_what_was_found_is_counted_seed_by_seed() -> None:
+def test_what_was_found_is_counted_seed_by_seed():
     table = render([trial("afl", 1, None), trial("afl", 2, 3.0), trial("afl", 3, 4.0)])
     assert "| found |  |  | 0 1 1 of 1 |" in table
     other = msgspec.structs.replace(trial("afl", 1, 3.0).wanted, mistake="waits for standstill")
@@ -63,7 +63,7 @@ def test_what_was_found_is_counted_seed_by_seed() -> None:
     assert "| found |  |  | 1 of 2, 0 of 1 |" in table
 
 
-def test_planted_mistakes_stand_beside_each_other_by_engine() -> None:
+def test_planted_mistakes_stand_beside_each_other_by_engine():
     def planted(engine: str, seed: int, found_s: float | None) -> Trial:
         checks = ("no_fault",) if found_s else ()
         return Trial(
@@ -78,17 +78,17 @@ def test_planted_mistakes_stand_beside_each_other_by_engine() -> None:
     assert "| found | 1 0 of 1 | 0 of 1 |  |" in table
 
 
-def test_another_part_is_put_between_the_marks() -> None:
+def test_another_part_is_put_between_the_marks():
     assert replaced(f"a\n{BEGIN}old\n{END}b\n", "new\n") == f"a\n{BEGIN}new\n{END}b\n"
 
 
-def test_the_page_has_every_mistake_with_what_it_needs_and_its_check() -> None:
+def test_the_page_has_every_mistake_with_what_it_needs_and_its_check():
     page = PAGE.read_text("utf-8")
     for one in FOR_FUZZING.values():
         assert f"| {one.name} | {one.needs} | `{one.check}` |" in page
 
 
-def test_the_processor_time_of_a_child_is_counted_while_it_lives() -> None:
+def test_the_processor_time_of_a_child_is_counted_while_it_lives():
     before_s = of_descendants()
     with children.start(["python3", "-c", "while True: pass"]) as busy:
         while of_descendants() <= before_s:

@@ -23,7 +23,7 @@ def made(source: str, operator: str) -> list[str]:
 
 @settings(deadline=None)
 @given(st.sampled_from(OF_A_TOKEN))
-def test_a_changed_token_is_the_only_difference(mutant) -> None:
+def test_a_changed_token_is_the_only_difference(mutant):
     before, after = texts(SOURCES[mutant.file]), texts(mutant.change.applied(SOURCES[mutant.file]))
     same = next(place for place, (one, other) in enumerate(zip(before, after, strict=False)) if one != other)
     new = texts(mutant.change.new)
@@ -33,7 +33,7 @@ def test_a_changed_token_is_the_only_difference(mutant) -> None:
 
 @settings(deadline=None)
 @given(st.sampled_from(MUTANTS))
-def test_a_mutant_keeps_the_balance_of_brackets_and_is_not_its_source(mutant) -> None:
+def test_a_mutant_keeps_the_balance_of_brackets_and_is_not_its_source(mutant):
     source = SOURCES[mutant.file]
     after = texts(mutant.change.applied(source))
     assert after != texts(source)
@@ -41,7 +41,7 @@ def test_a_mutant_keeps_the_balance_of_brackets_and_is_not_its_source(mutant) ->
         assert after.count(opening) - after.count(closing) == 0
 
 
-def test_all_operators_apply_to_the_firmware() -> None:
+def test_all_operators_apply_to_the_firmware():
     assert {one.change.operator for one in MUTANTS} == set(OPERATORS)
 
 
@@ -75,7 +75,7 @@ def test_all_operators_apply_to_the_firmware() -> None:
         ("condition", "for (;;) switch (x) { }", []),
     ],
 )
-def test_an_operator_makes_these_mutants(operator: str, source: str, expected: list[str]) -> None:
+def test_an_operator_makes_these_mutants(operator, source, expected):
     assert made(source, operator) == expected
 
 
@@ -104,6 +104,6 @@ int z;
 """
 
 
-def test_simple_statements_are_deleted_and_declarations_stay() -> None:
+def test_simple_statements_are_deleted_and_declarations_stay():
     deleted = [change.old for change in changes(BODY) if change.operator == "statement"]
     assert deleted == ["g(x, (y));", "y = 2;", "--y;", "break;", "h();", "return y;"]

@@ -12,18 +12,18 @@ from tests.mutants.planted import PLANTED
 from tests.mutants.sdcc import needs_sdcc
 
 
-def test_the_sessions_are_the_same_every_time_and_all_differ() -> None:
+def test_the_sessions_are_the_same_every_time_and_all_differ():
     assert sessions() == sessions()
     assert len(set(sessions())) == len(sessions()) > 60
 
 
-def test_the_shipped_firmware_fails_neither_by_the_oracle_nor_by_the_checks() -> None:
+def test_the_shipped_firmware_fails_neither_by_the_oracle_nor_by_the_checks():
     assert judged("none", shipped().image, sessions()[::6]) == Row("none")
 
 
 @needs_sdcc
 @pytest.mark.parametrize("name", ["stops 15 ms late", "never answers"])
-def test_the_oracle_fails_the_sessions_that_the_checks_fail(name: str) -> None:
+def test_the_oracle_fails_the_sessions_that_the_checks_fail(name):
     one = PLANTED[name]
     image = load_hex(build({one.file: one.applied(source_files()[one.file])}).image)
     row = judged(name, image, sessions()[:8])
@@ -33,8 +33,8 @@ def test_the_oracle_fails_the_sessions_that_the_checks_fail(name: str) -> None:
 
 @needs_sdcc
 def test_a_failure_that_the_oracle_does_not_see_is_counted_with_its_check(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     class Blind:
         """A target whose oracle finds nothing."""
 
@@ -60,7 +60,7 @@ def test_a_failure_that_the_oracle_does_not_see_is_counted_with_its_check(
     assert (row.found, row.extra) == (0, 0)
 
 
-def test_the_table_gives_recall_over_all_sessions_and_what_was_missed() -> None:
+def test_the_table_gives_recall_over_all_sessions_and_what_was_missed():
     text = render([Row("a", 3, 1, 2, {"no_fault": 1}), Row("b", refused="comes up with a fault"), Row("c")])
     assert "fails 3 of the 4 sessions that the checks fail (75.0 %), and 2 that they do not" in text
     assert "Of 1 mistakes that some session shows to the checks it finds 1. In 0" in text
@@ -68,7 +68,7 @@ def test_the_table_gives_recall_over_all_sessions_and_what_was_missed() -> None:
     assert "| b | not fuzzed | not fuzzed | not fuzzed |  |" in text
 
 
-def test_the_page_has_every_mistake_once() -> None:
+def test_the_page_has_every_mistake_once():
     page = PAGE.read_text("utf-8")
     part = page.split(BEGIN)[1].split(END)[0]
     assert replaced(page, part) == page

@@ -55,26 +55,26 @@ BREAKS = {
 
 
 @pytest.mark.parametrize("name", PLANTED)
-def test_a_mistake_applies_to_the_present_source_and_says_what_it_breaks(name: str) -> None:
+def test_a_mistake_applies_to_the_present_source_and_says_what_it_breaks(name):
     one = PLANTED[name]
     assert one.applied(SOURCES[one.file]) != SOURCES[one.file]
     assert one.breaks.endswith(".")
     assert "\n" not in one.breaks
 
 
-def test_no_two_mistakes_have_a_name_or_a_source_in_common() -> None:
+def test_no_two_mistakes_have_a_name_or_a_source_in_common():
     made = {(one.file, one.applied(SOURCES[one.file])) for one in PLANTED.values()}
     assert len(made) == len(PLANTED) >= 15
 
 
 @pytest.mark.parametrize("text", ["", "x; x;"])
-def test_a_text_that_does_not_stand_there_once_is_refused(text: str) -> None:
+def test_a_text_that_does_not_stand_there_once_is_refused(text):
     with pytest.raises(ValueError, match=r"^late: a\.c has [02] times 'x;', wanted once$"):
         Planted("late", "a.c", "x;", "y;", "").applied(text)
 
 
 @needs_sdcc
-def test_every_mistake_builds_to_an_image_of_its_own() -> None:
+def test_every_mistake_builds_to_an_image_of_its_own():
     built = [build({one.file: one.applied(SOURCES[one.file])}) for one in PLANTED.values()]
     assert [one.error for one in built] == [""] * len(PLANTED)
     images = {one.image.read_bytes() for one in built}
@@ -82,13 +82,13 @@ def test_every_mistake_builds_to_an_image_of_its_own() -> None:
     assert not any(one.is_shipped for one in built)
 
 
-def test_a_rule_is_known_for_every_mistake() -> None:
+def test_a_rule_is_known_for_every_mistake():
     assert set(BREAKS) == set(PLANTED)
 
 
 @needs_sdcc
 @pytest.mark.parametrize("name", PLANTED)
-def test_a_mistake_breaks_its_rule(name: str) -> None:
+def test_a_mistake_breaks_its_rule(name):
     one = PLANTED[name]
     built = build({one.file: one.applied(SOURCES[one.file])})
     assert judged(built.image, (BREAKS[name],)).rules == (BREAKS[name],)

@@ -29,14 +29,14 @@ def objected(*fates: Fate, known: dict[str, Survivor]) -> list[str]:
     return objections(Score(0, ("P01", "P02"), 2.0, (*KILLED, *OTHERS, *fates)), known)
 
 
-def test_what_no_right_rule_can_kill_is_not_counted() -> None:
+def test_what_no_right_rule_can_kill_is_not_counted():
     alive = [of_draw(number, "alive") for number in range(50, 55)]
     verdicts = ("equivalent", "allowed", "unreachable", "missing")
     known = {one.id: Survivor(verdict, "") for one, verdict in zip(alive, verdicts, strict=False)}
     assert share([*KILLED, *OTHERS, *alive], known) == (19, 22)
 
 
-def test_a_score_of_95_percent_with_all_survivors_explained_is_as_it_has_to_be() -> None:
+def test_a_score_of_95_percent_with_all_survivors_explained_is_as_it_has_to_be():
     alive = of_draw(50, "alive")
     assert objected(alive, known={alive.id: MISSING}) == []
 
@@ -58,24 +58,24 @@ def test_a_score_of_95_percent_with_all_survivors_explained_is_as_it_has_to_be()
         ((planted("alive"),), (), "planted mistake 'never stops': alive"),
     ],
 )
-def test_what_is_not_as_it_has_to_be_is_said(fates, known, objection: str) -> None:
+def test_what_is_not_as_it_has_to_be_is_said(fates, known, objection):
     table = {of_draw(number, "alive").id: MISSING for number in known}
     assert objected(*fates, known=table) == [objection]
 
 
-def test_a_rule_that_kills_nobody_is_named() -> None:
+def test_a_rule_that_kills_nobody_is_named():
     score = Score(0, ("P01", "P02", "P03"), 2.0, (*KILLED, *OTHERS))
     assert objections(score, {}) == ["rule P03 kills nobody"]
 
 
-def test_every_survivor_of_the_table_is_a_mutant_of_the_draw_and_its_reason_a_sentence() -> None:
+def test_every_survivor_of_the_table_is_a_mutant_of_the_draw_and_its_reason_a_sentence():
     there = {one.id for one in drawn(mutants_of(source_files()))}
     for name, one in survivors().items():
         assert name in there
         assert one.because.endswith(".")
 
 
-def test_the_page_shows_each_fate_and_can_be_written_again() -> None:
+def test_the_page_shows_each_fate_and_can_be_written_again():
     alive = of_draw(50, "alive")
     score = Score(7, ("P01", "P02"), 2.25, (*KILLED, *OTHERS, alive))
     part = render(score, {alive.id: EQUIVALENT}, 2000)
@@ -89,14 +89,14 @@ def test_the_page_shows_each_fate_and_can_be_written_again() -> None:
     assert page.split(BEGIN)[1].split(END)[0].startswith("Seed ")
 
 
-def test_every_survivor_stands_on_the_page_with_its_reason() -> None:
+def test_every_survivor_stands_on_the_page_with_its_reason():
     page = PAGE.read_text("utf-8")
     for name, one in survivors().items():
         assert f"| `{name.replace('|', chr(92) + '|')}` |" in page
         assert one.because in page
 
 
-def test_rules_that_are_tried_again_replace_their_old_verdict_alone() -> None:
+def test_rules_that_are_tried_again_replace_their_old_verdict_alone():
     rules = ("P01", "P02", "P03")
     killed, alive = of_draw(1, "killed", "P01", "P02"), of_draw(1, "alive")
     assert merged(killed, of_draw(1, "killed", "P03"), ("P02", "P03"), rules).rules == ("P01", "P03")
@@ -106,7 +106,7 @@ def test_rules_that_are_tried_again_replace_their_old_verdict_alone() -> None:
 
 
 @needs_sdcc
-def test_mutants_of_the_draw_meet_their_fate() -> None:
+def test_mutants_of_the_draw_meet_their_fate():
     wanted = {
         "decode.h:17:31:arithmetic:/": "does not compile",
         "lm629.c:51:18:constant:-1": "same bytes",

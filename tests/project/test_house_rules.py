@@ -1,5 +1,6 @@
-"""The house rules: ruff, mypy --strict, the layering contract, and the length of files."""
+"""The house rules: ruff, mypy --strict, the layering contract, the length of files, and tests without annotations."""
 
+import ast
 import sys
 from pathlib import Path
 
@@ -51,3 +52,30 @@ def test_no_file_is_longer_than_800_lines():
 @pytest.mark.parametrize(("lines", "refused"), [(800, None), (801, "801 lines, 800 are allowed: split it")])
 def test_what_is_said_about_the_length_of_a_file(lines, refused):
     assert objection("y = 2\n" * lines) == refused
+
+
+def annotated_tests(source: str) -> list[str]:
+    """The names of the test functions in `source` that annotate a parameter or what they return."""
+    tests = [
+        node
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
+    ]
+    return [test.name for test in tests if test.returns or any(arg.annotation for arg in test.args.args)]
+
+
+def test_no_test_is_annotated():
+    found = {
+        str(path.relative_to(ROOT)): annotated_tests(path.read_text("utf-8"))
+        for path in (ROOT / "tests").rglob("*.py")
+    }
+    assert not {path: names for path, names in found.items() if names}
+    assert len(found) > 200
+
+
+@pytest.mark.parametrize(
+    "source",
+    ["def test_a() -> None: ...", "def test_a(b: int): ...", "class A:\n def test_a(self, b: int): ..."],
+)
+def test_an_annotated_test_is_found(source):
+    assert annotated_tests(source) == ["test_a"]

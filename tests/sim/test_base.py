@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from miro_sim.scenario.file import ScenarioError, builtin_text, load, parse
 
 
-def test_keys_stand_instead_of_those_of_the_scenario_that_is_named() -> None:
+def test_keys_stand_instead_of_those_of_the_scenario_that_is_named():
     silent = load("silent").scenario
     mine = parse(
         'scenario = "silent"\nname = "mine"\nduration_s = 0.5\nset = { network.robot.slot = 2 }', "mine"
@@ -21,14 +21,14 @@ def test_keys_stand_instead_of_those_of_the_scenario_that_is_named() -> None:
     assert mine.networks[0].radio == silent.networks[0].radio
 
 
-def test_a_table_stands_as_a_whole(tmp_path: Path) -> None:
+def test_a_table_stands_as_a_whole(tmp_path):
     (tmp_path / "late.toml").write_text(builtin_text("fig6").replace("delay_frames = 1", "delay_frames = 3"))
     (tmp_path / "mine.toml").write_text('scenario = "late.toml"\n[camera]\nkind = "geometric"\n')
     assert load(str(tmp_path / "late.toml")).scenario.camera.delay_frames == 3
     assert load(str(tmp_path / "mine.toml")).scenario.camera.delay_frames == 1
 
 
-def test_a_file_is_named_from_the_folder_of_the_file_that_names_it(tmp_path: Path) -> None:
+def test_a_file_is_named_from_the_folder_of_the_file_that_names_it(tmp_path):
     (tmp_path / "bench").mkdir()
     (tmp_path / "bench" / "five.toml").write_text(
         'name = "five"\nduration_s = 1.0\nnetwork = [{ robots = 5, robot = [{ slot = 4, reference.kind = "line" }] }]'
@@ -39,7 +39,7 @@ def test_a_file_is_named_from_the_folder_of_the_file_that_names_it(tmp_path: Pat
     assert parse(loaded.text, "elsewhere") == loaded.scenario
 
 
-def test_settings_of_the_command_line_win_over_those_of_the_file() -> None:
+def test_settings_of_the_command_line_win_over_those_of_the_file():
     text = 'scenario = "silent"\nset = { duration_s = 0.5, network.robot.slot = 2 }'
     assert parse(text, "mine", ["duration_s=0.25"]).duration_s == 0.25
     assert parse(text, "mine", ["duration_s=0.25"]).networks[0].robot[0].slot == 2
@@ -57,7 +57,7 @@ def test_settings_of_the_command_line_win_over_those_of_the_file() -> None:
         },
     )
 )
-def test_the_text_that_is_kept_says_the_same_alone(tables: dict[str, object]) -> None:
+def test_the_text_that_is_kept_says_the_same_alone(tables):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "mine.toml")
         path.write_text(tomli_w.dumps(tables))
@@ -92,13 +92,13 @@ def test_the_text_that_is_kept_says_the_same_alone(tables: dict[str, object]) ->
         ('sceanrio = "fig6"', "sceanrio: unknown key; did you mean scenario?"),
     ],
 )
-def test_what_is_wrong_is_named_where_it_stands(text: str, what: str) -> None:
+def test_what_is_wrong_is_named_where_it_stands(text, what):
     with pytest.raises(ScenarioError) as caught:
         parse(text, "mine.toml")
     assert f"{caught.value}".startswith(f"mine.toml: {what}")
 
 
-def test_the_keys_of_a_file_are_listed_with_those_of_a_scenario() -> None:
+def test_the_keys_of_a_file_are_listed_with_those_of_a_scenario():
     with pytest.raises(ScenarioError, match=r"keys here: name, .*, network, scenario, set, variant;"):
         parse('qqq = "fig6"', "mine.toml")
     with pytest.raises(
@@ -120,9 +120,7 @@ def test_the_keys_of_a_file_are_listed_with_those_of_a_scenario() -> None:
         ("[network.robot.controller]", "network.robot.controller.q1_per_s = 0.3"),
     ],
 )
-def test_a_header_of_a_part_of_a_network_is_answered_with_the_setting_that_is_meant(
-    header: str, key: str
-) -> None:
+def test_a_header_of_a_part_of_a_network_is_answered_with_the_setting_that_is_meant(header, key):
     with pytest.raises(ScenarioError) as caught:
         parse(f'scenario = "fig6"\n{header}\n', "mine.toml")
     what = "changes no single key of fig6; at the top of the file write"
@@ -130,7 +128,7 @@ def test_a_header_of_a_part_of_a_network_is_answered_with_the_setting_that_is_me
     parse(f'scenario = "fig6"\nset = {{ {key} }}', "mine.toml")
 
 
-def test_a_scenario_that_names_itself_or_one_that_names_another_is_refused(tmp_path: Path) -> None:
+def test_a_scenario_that_names_itself_or_one_that_names_another_is_refused(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('scenario = "mine.toml"')
     with pytest.raises(
@@ -140,7 +138,7 @@ def test_a_scenario_that_names_itself_or_one_that_names_another_is_refused(tmp_p
 
 
 @pytest.mark.parametrize("place", ["network.robot.slot", "expect.inside_pitch", "duration_s"])
-def test_an_integer_that_is_too_long_to_be_shown_is_refused(place: str) -> None:
+def test_an_integer_that_is_too_long_to_be_shown_is_refused(place):
     with pytest.raises(ScenarioError, match="an integer of 20000 bits; give a smaller one"):
         parse(f'scenario = "silent"\nset = {{ {place} = 0x{5000 * "f"} }}', "mine.toml")
     with pytest.raises(

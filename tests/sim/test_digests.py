@@ -12,11 +12,11 @@ from tests.sim.digest_of import digest
 GOLDEN: dict[str, str] = json.loads(digests.GOLDEN.read_text())
 
 
-def test_the_table_has_a_run_of_everything_and_no_other() -> None:
+def test_the_table_has_a_run_of_everything_and_no_other():
     assert list(GOLDEN) == list(digests.names())
 
 
 @pytest.mark.parametrize("name", GOLDEN)
-def test_a_run_has_its_bits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_has_its_bits(name, monkeypatch):
     monkeypatch.chdir(digests.ROOT)
     assert digest(name) == GOLDEN[name]

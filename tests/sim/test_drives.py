@@ -1,7 +1,6 @@
 """References that no robot could drive, or that the law cannot follow, are refused with place and remedy."""
 
 import re
-from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -66,13 +65,13 @@ def refusal(*arguments: object) -> str:
         (f"{WAY}], speed_m_s = 1.0, accel_m_s2 = 3.0, lateral_accel_m_s2 = 9.0", POLAR, "it needs 0.9"),
     ],
 )
-def test_what_is_beyond_wheels_or_law_is_refused(reference: str, controller: str, expected: str) -> None:
+def test_what_is_beyond_wheels_or_law_is_refused(reference, controller, expected):
     message = refusal(reference, controller)
     assert re.match(re.escape(PLACE) + r"after \d+\.\d\d s, at \(-?\d+\.\d, -?\d+\.\d\) cm, ", message)
     assert expected in message
 
 
-def test_what_limits_just_allow_is_not_refused() -> None:
+def test_what_limits_just_allow_is_not_refused():
     parse(
         text('kind = "line", speed_m_s = 0.4, ramp_s = 0.5, drive_s = 2', f"{POLAR}, max_v_m_s = 0.4"),
         "my.toml",
@@ -80,7 +79,7 @@ def test_what_limits_just_allow_is_not_refused() -> None:
     parse(text('kind = "line", drive_s = 2', f"{POLAR}, max_v_dot_m_s2 = 0.4"), "my.toml")
 
 
-def test_a_start_at_full_speed_is_a_change_within_one_camera_frame() -> None:
+def test_a_start_at_full_speed_is_a_change_within_one_camera_frame():
     parse(text('kind = "line", speed_m_s = 0.26, ramp_s = 0.0, drive_s = 2'), "my.toml")
     assert "needs 8.991 m/s2" in refusal('kind = "line", speed_m_s = 0.3, ramp_s = 0.0, drive_s = 2')
 
@@ -101,9 +100,7 @@ def test_a_start_at_full_speed_is_a_change_within_one_camera_frame() -> None:
         (f"{WAY}{{ x_cm = 40.0, y_cm = 50.0 }}, {{ x_cm = 1.0, y_cm = 1.0 }}]", "it is 1.41 cm away"),
     ],
 )
-def test_a_path_past_the_origin_is_refused_under_a_law_in_polar_coordinates_only(
-    reference: str, expected: str
-) -> None:
+def test_a_path_past_the_origin_is_refused_under_a_law_in_polar_coordinates_only(reference, expected):
     message = refusal(reference, POLAR, 11.0)
     assert message.startswith(PLACE + "passes the origin: after ")
     assert expected in message
@@ -121,11 +118,11 @@ def test_a_path_past_the_origin_is_refused_under_a_law_in_polar_coordinates_only
         f"{WAY}]",
     ],
 )
-def test_a_path_that_starts_in_the_origin_or_keeps_away_from_it_is_not_refused(reference: str) -> None:
+def test_a_path_that_starts_in_the_origin_or_keeps_away_from_it_is_not_refused(reference):
     parse(text(reference, POLAR, 5.0), "my.toml")
 
 
-def test_a_closed_path_may_belong_to_a_run_of_a_day() -> None:
+def test_a_closed_path_may_belong_to_a_run_of_a_day():
     closed = (
         'kind = "waypoints", closed = true, points = [{ x_cm = 20, y_cm = 10 }, { x_cm = 70, y_cm = 20 }, '
     )
@@ -160,9 +157,7 @@ def test_a_closed_path_may_belong_to_a_run_of_a_day() -> None:
         (CIRCLE, "reference: passes the origin"),
     ],
 )
-def test_the_command_line_ends_with_one_line_and_exit_code_2(
-    reference: str, expected: str, tmp_path: Path
-) -> None:
+def test_the_command_line_ends_with_one_line_and_exit_code_2(reference, expected, tmp_path):
     file = tmp_path / "my.toml"
     file.write_text(text(reference, POLAR, 12.0))
     result = CliRunner().invoke(main, ["run", str(file), "--out", str(tmp_path / "out")])

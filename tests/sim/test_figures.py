@@ -36,7 +36,7 @@ def set_to(gains: EpsilonTrackingParameters) -> list[str]:
     return [f"network.robot.controller={{{table}}}"]
 
 
-def test_the_built_in_scenarios_are_paths_of_our_own_and_the_figures_of_the_paper_in_its_order() -> None:
+def test_the_built_in_scenarios_are_paths_of_our_own_and_the_figures_of_the_paper_in_its_order():
     assert builtin_names() == ["curve", *CAPTIONS, "line", "silent", "sine", "waypoints"]
     for name, (start, path, law) in CAPTIONS.items():
         robot = only_robot(name)
@@ -46,7 +46,7 @@ def test_the_built_in_scenarios_are_paths_of_our_own_and_the_figures_of_the_pape
 
 
 @pytest.mark.parametrize("name", CAPTIONS)
-def test_the_figures_differ_in_start_path_and_law_alone(name: str) -> None:
+def test_the_figures_differ_in_start_path_and_law_alone(name):
     six, scenario, kept = load("fig6").scenario, load(name).scenario, only_robot("fig6")
     robot = msgspec.structs.replace(
         only_robot(name),
@@ -60,13 +60,13 @@ def test_the_figures_differ_in_start_path_and_law_alone(name: str) -> None:
     assert msgspec.structs.replace(scenario, name=six.name, title=six.title, networks=(network,)) == six
 
 
-def test_figs_6_and_7_have_one_set_of_gains_and_figs_9_and_10_another() -> None:
+def test_figs_6_and_7_have_one_set_of_gains_and_figs_9_and_10_another():
     assert only_robot("fig7").controller == only_robot("fig6").controller
     assert only_robot("fig9").controller == only_robot("fig10").controller == ILLUSTRATIVE
 
 
 @pytest.mark.parametrize("name", ["fig9", "fig10"])
-def test_the_commented_gains_of_figs_9_and_10_are_the_other_two_sets(name: str) -> None:
+def test_the_commented_gains_of_figs_9_and_10_are_the_other_two_sets(name):
     before, _, *others = load(name).text.replace("# " + TABLE, TABLE).split(TABLE)
     found = []
     for block in others:
@@ -76,7 +76,7 @@ def test_the_commented_gains_of_figs_9_and_10_are_the_other_two_sets(name: str) 
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig7", "fig8"])
-def test_the_papers_law_ends_within_the_papers_measurement_error(name: str) -> None:
+def test_the_papers_law_ends_within_the_papers_measurement_error(name):
     """Measured with seeds 0 to 49: median 1.20, 1.24, 1.22 cm, worst 2.62, 2.34, 2.64 cm, all settled."""
     found = outcomes(name, (), range(8))
     assert row(found).median_cm <= 2.0
@@ -86,12 +86,12 @@ def test_the_papers_law_ends_within_the_papers_measurement_error(name: str) -> N
 
 
 @pytest.mark.parametrize("name", ["fig7", "fig8"])
-def test_with_large_initial_errors_the_robot_goes_back_as_well_as_forward(name: str) -> None:
+def test_with_large_initial_errors_the_robot_goes_back_as_well_as_forward(name):
     """The forward and backward motion that the paper reports of both figures; 50 of 50 seeds."""
     assert all(one.backwards for one in outcomes(name, (), range(4)))
 
 
-def test_a_row_counts_up_what_its_runs_came_to() -> None:
+def test_a_row_counts_up_what_its_runs_came_to():
     runs = [
         Outcome(seed, float(seed), 0.5, 2.0, 1.0, None if seed > 47 else 1.0, seed > 44, 0)
         for seed in range(50)
@@ -103,7 +103,7 @@ def test_a_row_counts_up_what_its_runs_came_to() -> None:
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_a_scenario_that_cannot_be_run_is_a_line_from_any_process(jobs: int) -> None:
+def test_a_scenario_that_cannot_be_run_is_a_line_from_any_process(jobs):
     with pytest.raises(ValueError, match=r"^fig6: --set camera.kind=3: .*"):
         outcomes("fig6", ["camera.kind=3"], range(2), jobs)
 
@@ -112,7 +112,7 @@ def ratio(found: list[Outcome]) -> float:
     return row(found).y_cm / row(found).x_cm
 
 
-def test_with_gains_searched_for_fig_9_looks_like_the_papers() -> None:
+def test_with_gains_searched_for_fig_9_looks_like_the_papers():
     """The robot stays off the line, in Y three times as far as in X. A demonstration: the next tests say of what."""
     found = outcomes("fig9", (), range(6))
     assert ratio(found) >= 3.0
@@ -120,7 +120,7 @@ def test_with_gains_searched_for_fig_9_looks_like_the_papers() -> None:
 
 
 @pytest.mark.parametrize("name", ["fig9", "fig10"])
-def test_with_the_gains_of_the_theory_the_robot_never_settles(name: str) -> None:
+def test_with_the_gains_of_the_theory_the_robot_never_settles(name):
     """The same gains hold epsilon in continuous time (`tests/host/test_epsilon_tracking.py`)."""
     found = outcomes(name, set_to(THEORY), range(4))
     assert all(one.settled_s is None for one in found)
@@ -128,6 +128,6 @@ def test_with_the_gains_of_the_theory_the_robot_never_settles(name: str) -> None
 
 
 @pytest.mark.parametrize("name", CAPTIONS)
-def test_retuned_for_the_loop_the_same_law_comes_to_the_path_from_all_five_starts(name: str) -> None:
+def test_retuned_for_the_loop_the_same_law_comes_to_the_path_from_all_five_starts(name):
     """So Figs. 9 and 10 show gains and sampling; they do not show that the paper's law is the better one."""
     assert row(outcomes(name, set_to(RETUNED), range(4))).median_cm < 3.0

@@ -26,19 +26,19 @@ def refusal(law: str, **keys: object) -> str:
 
 @pytest.mark.parametrize(("law", "key"), NUMBERS)
 @pytest.mark.parametrize("value", ["-1e9", "1e9", "nan", "inf", "'1'", "true"])
-def test_a_number_that_no_law_can_use_is_refused_with_its_path(law: str, key: str, value: str) -> None:
+def test_a_number_that_no_law_can_use_is_refused_with_its_path(law, key, value):
     message = refusal(law, **{key: value})
     assert message.startswith("fig6: ")
     assert f"controller.{key}: " in message
 
 
 @pytest.mark.parametrize(("law", "key"), [(law, key) for law, key in NUMBERS if key.startswith("layer_")])
-def test_a_boundary_layer_may_be_thinner_than_a_period_sees_but_not_0(law: str, key: str) -> None:
+def test_a_boundary_layer_may_be_thinner_than_a_period_sees_but_not_0(law, key):
     load("fig6", [f'{PLACE}={{law = "{law}", {key} = 1e-6}}'])
     assert f"controller.{key}: 0 is out of range" in refusal(law, **{key: 0})
 
 
-def test_the_layers_are_those_of_three_laws() -> None:
+def test_the_layers_are_those_of_three_laws():
     assert {law for law, key in NUMBERS if key.startswith("layer_")} == {
         "yang_kim",
         "body_frame",
@@ -72,7 +72,5 @@ def test_the_layers_are_those_of_three_laws() -> None:
         ),
     ],
 )
-def test_values_that_make_no_sense_together_or_here_are_refused(
-    law: str, keys: dict[str, object], expected: str
-) -> None:
+def test_values_that_make_no_sense_together_or_here_are_refused(law, keys, expected):
     assert expected in refusal(law, **keys)

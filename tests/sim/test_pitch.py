@@ -1,7 +1,6 @@
 """The pitch: starts and references that are not on it are refused with place and limits."""
 
 import math
-from pathlib import Path
 
 import pytest
 from hypothesis import example, given
@@ -42,7 +41,7 @@ def refusal(*arguments: object, **options: object) -> str:
 @given(SPOTS)
 @example(Posture(1.1625, 0.0, 0.0))
 @example(Posture(1.1625, 0.0, math.pi / 4))
-def test_a_robot_is_on_the_pitch_when_its_four_corners_are(at: Posture) -> None:
+def test_a_robot_is_on_the_pitch_when_its_four_corners_are(at):
     corners = [
         (
             at.x_m + ahead * math.cos(at.theta_rad) - aside * math.sin(at.theta_rad),
@@ -57,7 +56,7 @@ def test_a_robot_is_on_the_pitch_when_its_four_corners_are(at: Posture) -> None:
 
 
 @pytest.mark.parametrize("name", builtin_names())
-def test_the_built_in_scenarios_are_on_the_pitch(name: str) -> None:
+def test_the_built_in_scenarios_are_on_the_pitch(name):
     load(name)
 
 
@@ -74,11 +73,11 @@ def test_the_built_in_scenarios_are_on_the_pitch(name: str) -> None:
         ("start_error_x_cm = -6.3", "takes x = -10.05 to -2.55 cm"),
     ],
 )
-def test_a_start_off_the_pitch_is_refused(start: str, expected: str) -> None:
+def test_a_start_off_the_pitch_is_refused(start, expected):
     assert expected in refusal(start)
 
 
-def test_a_start_at_the_very_edge_is_none_of_these() -> None:
+def test_a_start_at_the_very_edge_is_none_of_these():
     for start in ("start_error_y_cm = 76.2", "start_error_x_cm = -6.2", "start_error_y_cm = 74"):
         parse(text(start), "my.toml")
 
@@ -99,9 +98,7 @@ def test_a_start_at_the_very_edge_is_none_of_these() -> None:
         ('kind = "arc", curvature_per_m = 1.0', 6.0, "reference: leaves the pitch after"),
     ],
 )
-def test_a_reference_that_leads_off_the_pitch_is_refused(
-    reference: str, duration_s: float, expected: str
-) -> None:
+def test_a_reference_that_leads_off_the_pitch_is_refused(reference, duration_s, expected):
     message = refusal("", reference, duration_s)
     assert message.startswith(f"my.toml: {HERE}.reference")
     assert expected in message
@@ -118,18 +115,18 @@ def test_a_reference_that_leads_off_the_pitch_is_refused(
         'kind = "arc", curvature_per_m = 30.0, drive_s = 0.5, heading_deg = 0.0',
     ],
 )
-def test_a_reference_that_stands_in_time_may_belong_to_a_run_of_any_length(reference: str) -> None:
+def test_a_reference_that_stands_in_time_may_belong_to_a_run_of_any_length(reference):
     parse(text("", reference, 86_400.0), "my.toml")
 
 
-def test_the_remedy_that_is_named_is_one() -> None:
+def test_the_remedy_that_is_named_is_one():
     for reference in (LINE, 'kind = "arc", curvature_per_m = 1.0'):
         message = refusal("", reference, 20.0)
         drive_s = message.partition("drive_s = ")[2].partition(",")[0]
         parse(text("", f"{reference}, drive_s = {drive_s}", 20.0), "my.toml")
 
 
-def test_drive_s_says_when_the_reference_stands() -> None:
+def test_drive_s_says_when_the_reference_stands():
     scenario = parse(text("", f"{LINE}, drive_s = 2.0", 5.0), "my.toml")
     reference = reference_for(scenario.networks[0].robot[1], 5.0)
     assert reference.at(2.0).posture.x_m == pytest.approx(0.2 * 1.5)
@@ -177,8 +174,8 @@ class Path:
     ],
 )
 def test_a_reference_of_another_distribution_is_checked_at_each_camera_frame(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str, expected: str
-) -> None:
+    tmp_path, monkeypatch, how, expected
+):
     monkeypatch.syspath_prepend(str(tmp_path))
     install(tmp_path, "odd", "1", {"odd": "plug_odd:Odd"}, "references", plug_odd=FOREIGN)
     message = refusal("", f'kind = "odd", how = "{how}"', 3.0)

@@ -47,7 +47,7 @@ def refusal(lines: str) -> str:
     return str(caught.value).removeprefix("air.toml: network[0].radio")
 
 
-def test_everything_is_off_unless_asked_for() -> None:
+def test_everything_is_off_unless_asked_for():
     """Only what every scenario has had: errors of 1e-4, a key-up, noise between frames."""
     params = msgspec.structs.asdict(radio_for(radio("")))
     names = (
@@ -61,32 +61,32 @@ def test_everything_is_off_unless_asked_for() -> None:
     assert (params["bursts"], params["dropouts"], params["slicer"]) == (None, None, None)
 
 
-def test_a_profile_sets_its_keys() -> None:
+def test_a_profile_sets_its_keys():
     found = radio('profile = "fade15"')
     assert found.bursts == Bursts(good_to_bad=9.8e-5, bad_to_good=3.1e-3, bit_error_rate=0.5)
     assert found.bit_error_rate == 1e-5
     assert radio_for(found).bursts == ChainParams.of(9.8e-5, 3.1e-3)
 
 
-def test_a_key_of_the_scenario_wins_over_the_profiles_also_inside_a_table() -> None:
+def test_a_key_of_the_scenario_wins_over_the_profiles_also_inside_a_table():
     found = radio('profile = "fade15"\nbit_error_rate = 0.0\nbursts.bad_to_good = 0.5')
     assert found.bit_error_rate == 0.0
     assert found.bursts == Bursts(good_to_bad=9.8e-5, bad_to_good=0.5, bit_error_rate=0.5)
 
 
-def test_of_several_profiles_the_later_one_wins() -> None:
+def test_of_several_profiles_the_later_one_wins():
     found = radio('profile = ["fade15", "late", "weak"]')
     assert (found.jitter_s, found.eb_n0_db, found.bit_error_rate) == (0.003, 10.94, None)
     assert found.bursts is not None
     assert radio('profile = ["weak", "fade15"]').eb_n0_db is None
 
 
-def test_a_bit_error_rate_takes_the_place_of_a_profiles_signal_to_noise_ratio() -> None:
+def test_a_bit_error_rate_takes_the_place_of_a_profiles_signal_to_noise_ratio():
     assert radio('profile = "weak"\nbit_error_rate = 0.01').eb_n0_db is None
 
 
 @pytest.mark.parametrize("name", profiles.profiles())
-def test_every_profile_is_a_good_radio_that_says_what_it_does(name: str) -> None:
+def test_every_profile_is_a_good_radio_that_says_what_it_does(name):
     radio_for(radio(f'profile = "{name}"'))
     assert profiles.profiles()[name]["about"]
     assert f"`{name}`" in README.read_text()
@@ -132,11 +132,11 @@ def test_every_profile_is_a_good_radio_that_says_what_it_does(name: str) -> None
         ("channel = -1", ".channel: -1 is out of range; must be >= 0"),
     ],
 )
-def test_a_bad_radio_is_named_with_its_place_and_its_remedy(lines: str, expected: str) -> None:
+def test_a_bad_radio_is_named_with_its_place_and_its_remedy(lines, expected):
     assert refusal(lines).startswith(expected)
 
 
-def test_profiles_that_contradict_are_named_with_the_key_and_the_ways_out() -> None:
+def test_profiles_that_contradict_are_named_with_the_key_and_the_ways_out():
     assert refusal('profile = ["slicer", "fade15"]') == (
         ".profile: slicer needs eb_n0_db, and fade15 sets bit_error_rate in its place;"
         " leave one of them out, name slicer after fade15, or give eb_n0_db"
@@ -145,7 +145,7 @@ def test_profiles_that_contradict_are_named_with_the_key_and_the_ways_out() -> N
     assert radio('profile = ["slicer", "fade15"]\neb_n0_db = 12.0').eb_n0_db == 12.0
 
 
-def test_a_key_that_contradicts_a_profile_is_named_with_it() -> None:
+def test_a_key_that_contradicts_a_profile_is_named_with_it():
     assert refusal('profile = "slicer"\nbit_error_rate = 0.01') == (
         ".profile: slicer needs eb_n0_db, and bit_error_rate is given in its place;"
         " leave one of them out, or give eb_n0_db instead"
@@ -153,7 +153,7 @@ def test_a_key_that_contradicts_a_profile_is_named_with_it() -> None:
 
 
 @pytest.mark.parametrize("first", profiles.profiles())
-def test_two_profiles_go_together_or_are_both_named(first: str) -> None:
+def test_two_profiles_go_together_or_are_both_named(first):
     for second in profiles.profiles():
         try:
             radio(f'profile = ["{first}", "{second}"]')
@@ -162,7 +162,7 @@ def test_two_profiles_go_together_or_are_both_named(first: str) -> None:
             assert {first, second} <= set(re.findall(r"\w+", said))
 
 
-def test_a_pc_so_slow_that_its_frame_outlasts_the_period_is_refused() -> None:
+def test_a_pc_so_slow_that_its_frame_outlasts_the_period_is_refused():
     slow = text("baud_offset_ppm = -40000").replace("[[network]]", "[[network]]\nrobots = 5", 1)
     with pytest.raises(
         ScenarioError, match=r"network\[0\]\.radio\.baud_offset_ppm: -40000 makes a frame of 31"
@@ -175,7 +175,7 @@ def test_a_pc_so_slow_that_its_frame_outlasts_the_period_is_refused() -> None:
         parse(late, "air.toml")
 
 
-def test_the_command_line_lists_the_profiles_with_their_keys() -> None:
+def test_the_command_line_lists_the_profiles_with_their_keys():
     result = CliRunner().invoke(main, ["scenarios", "profiles"])
     assert result.exit_code == 0
     listed = re.sub(r"\s+", " ", result.stdout)
@@ -198,7 +198,7 @@ ALL = 'profile = ["late", "slicer", "dropouts", "offset", "clicks", "lossy"]\neb
 BURSTS = "bursts = { good_to_bad = 0.002, bad_to_good = 0.01 }"
 
 
-def test_a_run_with_everything_on_is_the_same_however_it_is_cut_saved_and_loaded() -> None:
+def test_a_run_with_everything_on_is_the_same_however_it_is_cut_saved_and_loaded():
     whole = ran(world(ALL, ALL + "\nchannel = 1\n" + BURSTS, "channel = 1\nlatency_s = 0.01"))
     cut = world(ALL, ALL + "\nchannel = 1\n" + BURSTS, "channel = 1\nlatency_s = 0.01")
     for tick in range(0, 6 * CONTROL_PERIOD_TICKS, 333_333):
@@ -215,13 +215,13 @@ def accepted(world: World) -> list[int | None]:
     return [network.robots[0].counter(0) for network in world.networks]
 
 
-def test_networks_side_by_side_do_not_know_of_each_other() -> None:
+def test_networks_side_by_side_do_not_know_of_each_other():
     """A network's robots have the same bits whether there is another one or not."""
     alone, beside = ran(world(BURSTS)), ran(world(BURSTS, ALL))
     assert snapshot(beside.networks[0]) == snapshot(alone.networks[0])
 
 
-def test_networks_on_one_channel_spoil_each_others_frames() -> None:
+def test_networks_on_one_channel_spoil_each_others_frames():
     wire = 'profile = "wire"\nkeyup_s = 0.001'
     assert accepted(ran(world(wire, wire))) == [6, 6]
     assert accepted(ran(world(wire + "\nchannel = 1", wire + "\nchannel = 2"))) == [6, 6]
@@ -229,7 +229,7 @@ def test_networks_on_one_channel_spoil_each_others_frames() -> None:
     assert accepted(shared) == [0, 0]
 
 
-def test_what_is_off_is_not_in_the_state() -> None:
+def test_what_is_off_is_not_in_the_state():
     """Parts that a scenario does not have are not in its state."""
     plain = world("").state.decode(world("").state.save())
     assert not [path for path in plain if "slicer" in path or "overheard" in path]

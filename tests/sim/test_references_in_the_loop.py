@@ -22,27 +22,27 @@ def errors_cm(name: str, seed: int, *settings: str) -> list[float]:
 
 
 @pytest.mark.parametrize("name", ["line", "curve", "sine"])
-def test_the_robot_stays_within_half_a_centimetre_of_the_path_where_the_camera_is_right(name: str) -> None:
+def test_the_robot_stays_within_half_a_centimetre_of_the_path_where_the_camera_is_right(name):
     """Measured over seeds 0 to 9, in the last two thirds of the run: 0.37 cm at worst."""
     errors = errors_cm(name, 4, 'camera={kind="pixels", calibration="exact"}')
     assert max(errors[len(errors) // 3 :]) < 0.5
 
 
 @pytest.mark.parametrize("name", ["line", "curve", "sine"])
-def test_a_wrong_calibration_is_what_is_left(name: str) -> None:
+def test_a_wrong_calibration_is_what_is_left(name):
     """2.40 cm is what the calibration is wrong by at worst; measured over seeds 0 to 9: 2.11 cm."""
     assert max(errors_cm(name, 4)[60:]) < 2.4
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_the_papers_law_drives_a_path_that_has_no_closed_form(seed: int) -> None:
+def test_the_papers_law_drives_a_path_that_has_no_closed_form(seed):
     """Measured over seeds 0 to 9, in the last two thirds: 2.9 cm at worst, for a start 7.3 cm beside the path."""
     errors = errors_cm("waypoints", seed)
     assert errors[0] > 7.0
     assert max(errors[len(errors) // 3 :]) < 3.5
 
 
-def test_a_closed_path_is_driven_lap_after_lap() -> None:
+def test_a_closed_path_is_driven_lap_after_lap():
     errors = errors_cm(
         "sine",
         2,

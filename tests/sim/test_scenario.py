@@ -5,7 +5,6 @@ Long because each mistake in a scenario file is listed with its message.
 
 import math
 import time
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -43,7 +42,7 @@ def edited(old: str, new: str) -> str:
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig8"])
-def test_a_built_in_scenario_names_itself_and_names_every_key(name: str) -> None:
+def test_a_built_in_scenario_names_itself_and_names_every_key(name):
     loaded = load(name)
     assert loaded.scenario.name == name
     raw = msgspec.to_builtins(loaded.scenario)
@@ -56,7 +55,7 @@ def test_a_built_in_scenario_names_itself_and_names_every_key(name: str) -> None
         assert leaves <= keys
 
 
-def test_what_is_left_out_is_the_realistic_loop() -> None:
+def test_what_is_left_out_is_the_realistic_loop():
     scenario = parse(SMALL, "small")
     camera, radio = scenario.camera, scenario.networks[0].radio
     assert isinstance(camera, PixelCamera)
@@ -67,7 +66,7 @@ def test_what_is_left_out_is_the_realistic_loop() -> None:
     assert scenario.networks[0].robot[0].wheel_radius_mismatch == 0.015
 
 
-def test_a_whole_number_is_a_number() -> None:
+def test_a_whole_number_is_a_number():
     assert parse(SMALL, "small").duration_s == 1.0
 
 
@@ -162,11 +161,11 @@ def test_a_whole_number_is_a_number() -> None:
         ("stop_on_fault = true", "stop_on_fault = yes", "line 9, column 17: not TOML: Invalid value"),
     ],
 )
-def test_a_bad_key_is_named_with_its_place_and_its_remedy(old: str, new: str, expected: str) -> None:
+def test_a_bad_key_is_named_with_its_place_and_its_remedy(old, new, expected):
     assert expected in refusal(edited(old, new))
 
 
-def test_an_estimator_is_chosen_and_checked_like_a_law() -> None:
+def test_an_estimator_is_chosen_and_checked_like_a_law():
     table = "[network.robot.estimator]\n"
     chosen = (
         parse(SMALL + table + 'kind = "predict"\nahead_s = 0.02\n', "small").networks[0].robot[0].estimator
@@ -198,23 +197,23 @@ def test_an_estimator_is_chosen_and_checked_like_a_law() -> None:
         ("battery.voltage_v = '7.2 V'", "drive.battery.voltage_v: expected a number in volts, got a string"),
     ],
 )
-def test_parameters_of_the_drive_are_checked_like_keys(lines: str, expected: str) -> None:
+def test_parameters_of_the_drive_are_checked_like_keys(lines, expected):
     assert expected in refusal(builtin_text("fig6") + f"[network.robot.drive]\n{lines}\n")
 
 
-def test_two_robots_in_one_slot_are_refused() -> None:
+def test_two_robots_in_one_slot_are_refused():
     twice = SMALL + "[[network.robot]]\nreference.kind = 'arc'\n"
     assert "network[0].robot[1]: slot 0 is taken by robot[0]" in refusal(twice)
 
 
-def test_a_frame_of_five_robots_leaves_no_time_for_a_long_key_up() -> None:
+def test_a_frame_of_five_robots_leaves_no_time_for_a_long_key_up():
     five = SMALL.replace("[[network]]", "[[network]]\nrobots = 5\nradio.keyup_s = {}")
     assert parse(five.replace("{}", "0.001"), "five").networks[0].robots == 5
     assert "at most 0.001075 s" in refusal(five.replace("{}", "0.0011"))
 
 
 @pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "a = " + "9" * 10_000, "\0", "a = 1\na = 2"])
-def test_text_that_breaks_a_toml_parser_is_refused_in_one_line(text: str) -> None:
+def test_text_that_breaks_a_toml_parser_is_refused_in_one_line(text):
     refusal(text)
 
 
@@ -235,32 +234,32 @@ MANY_NETWORKS = "[[network]]\n[[network.robot]]\nreference.kind = 'line'\n"
         ),
     ],
 )
-def test_a_scenario_that_would_take_minutes_is_refused_at_once(text: str, expected: str) -> None:
+def test_a_scenario_that_would_take_minutes_is_refused_at_once(text, expected):
     began_s = time.process_time()
     assert f"my.toml: {expected}" in refusal(text)
     assert time.process_time() - began_s < 2.0
 
 
-def test_a_scenario_may_have_32_networks_and_a_comment_any_dots() -> None:
+def test_a_scenario_may_have_32_networks_and_a_comment_any_dots():
     text = "# ........................\n# www.a.b.c.example.org\nname = 'a'\nduration_s = 1\n"
     text += "camera.kind = 'gaussian'\n"
     assert len(parse(text + MANY_NETWORKS * 32, "many").networks) == 32
 
 
-def test_a_long_value_is_shown_by_its_ends() -> None:
+def test_a_long_value_is_shown_by_its_ends():
     message = refusal(SMALL.replace("small", "x" * 100_000))
     assert len(message) < 1000
     assert message.endswith("is not a name; use a-z, 0-9, - and _, at most 64 characters")
 
 
-def test_a_name_that_is_no_scenario_gets_the_list_and_the_nearest_one() -> None:
+def test_a_name_that_is_no_scenario_gets_the_list_and_the_nearest_one():
     with pytest.raises(
         ScenarioError, match=r"fig5: no such scenario; did you mean fig\d+\? .*: curve, fig6, fig7,"
     ):
         load("fig5")
 
 
-def test_a_path_is_a_file_and_its_text_is_kept_as_it_stands(tmp_path: Path) -> None:
+def test_a_path_is_a_file_and_its_text_is_kept_as_it_stands(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(SMALL + "# ä\n", encoding="utf-8")
     loaded = load(str(path))
@@ -272,7 +271,7 @@ def test_a_path_is_a_file_and_its_text_is_kept_as_it_stands(tmp_path: Path) -> N
         load(f"{tmp_path}/")
 
 
-def test_a_file_that_is_not_text_is_refused_with_its_line(tmp_path: Path) -> None:
+def test_a_file_that_is_not_text_is_refused_with_its_line(tmp_path):
     path = tmp_path / "binary.toml"
     path.write_bytes(b"# one\n# \xff\n")
     with pytest.raises(ScenarioError, match=r"line 2: not UTF-8 text"):
@@ -311,7 +310,7 @@ def damaged(draw: st.DrawFn) -> str:
 
 @settings(deadline=None, max_examples=300)
 @given(st.one_of(damaged(), st.text(), st.text(alphabet='[]{}="\n.a1')))
-def test_any_text_is_a_scenario_or_one_line_of_refusal(text: str) -> None:
+def test_any_text_is_a_scenario_or_one_line_of_refusal(text):
     outcome: Scenario | ScenarioError
     try:
         outcome = parse(text, "any")

@@ -3,7 +3,6 @@
 import json
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
@@ -31,7 +30,7 @@ def refusal(*settings: str, source: str = "fig6") -> str:
 
 
 @given(st.sampled_from(SCALARS), st.booleans())
-def test_a_key_set_to_its_own_value_changes_nothing(place: tuple[str, str, Any], with_indices: bool) -> None:
+def test_a_key_set_to_its_own_value_changes_nothing(place, with_indices):
     name, path, value = place
     key = path if with_indices else path.replace(".0.", ".")
     assert load(name, [f"{key}={json.dumps(value)}"]).scenario == load(name).scenario
@@ -54,7 +53,7 @@ EDITS = [
 
 
 @given(st.lists(st.sampled_from(EDITS), unique_by=lambda edit: edit[0], max_size=6))
-def test_settings_do_what_an_editor_does(edits: list[tuple[str, str, str]]) -> None:
+def test_settings_do_what_an_editor_does(edits):
     text = builtin_text("fig6")
     for old, new, _ in edits:
         assert old in text
@@ -64,16 +63,16 @@ def test_settings_do_what_an_editor_does(edits: list[tuple[str, str, str]]) -> N
     assert parse(loaded.text, "written") == loaded.scenario
 
 
-def test_without_settings_the_text_is_the_file() -> None:
+def test_without_settings_the_text_is_the_file():
     assert load("fig6").text == builtin_text("fig6")
 
 
-def test_the_text_says_which_keys_were_set() -> None:
+def test_the_text_says_which_keys_were_set():
     text = load("fig6", ["duration_s=2", "title=a\nb"]).text
     assert text.startswith("# fig6 with these keys set:\n#   duration_s=2\n#   title=a\\nb\n\n")
 
 
-def test_of_two_settings_of_a_key_the_later_one_holds() -> None:
+def test_of_two_settings_of_a_key_the_later_one_holds():
     assert load("fig6", ["duration_s=2", "duration_s=3"]).scenario.duration_s == 3.0
     host = load("fig6", ["host.compute_s=0.001", "host={}"]).scenario.host
     assert host.compute_s == 0.003
@@ -85,12 +84,12 @@ def test_of_two_settings_of_a_key_the_later_one_holds() -> None:
     assert (radio.eb_n0_db, radio.bit_error_rate) == (None, 0.0)
 
 
-def test_a_file_that_is_wrong_without_its_settings_is_read_with_them() -> None:
+def test_a_file_that_is_wrong_without_its_settings_is_read_with_them():
     text = builtin_text("fig6").replace("duration_s = 6.0", "duration_s = -1")
     assert parse(text, "my.toml", ["duration_s=6"]) == FIG6
 
 
-def test_several_robots_are_told_apart_by_index() -> None:
+def test_several_robots_are_told_apart_by_index():
     robots = builtin_text("fig6") + "\n[[network.robot]]\nslot = 1\nreference.kind = 'line'\n"
     read = parse(robots, "my.toml", ["network.robot.1.slot=2"])
     assert [robot.slot for robot in read.networks[0].robot] == [0, 2]
@@ -98,7 +97,7 @@ def test_several_robots_are_told_apart_by_index() -> None:
         parse(robots, "my.toml", ["network.robot.slot=2"])
 
 
-def test_a_scenario_that_stands_in_no_file_takes_settings_too() -> None:
+def test_a_scenario_that_stands_in_no_file_takes_settings_too():
     assert changed(FIG6, "x", []) is FIG6
     assert changed(FIG6, "x", ["duration_s=2"]) == msgspec.structs.replace(FIG6, duration_s=2.0)
     with pytest.raises(ScenarioError, match=r"x: --set duration_s=0: 0 is out of range; must be > 0"):
@@ -140,7 +139,7 @@ def test_a_scenario_that_stands_in_no_file_takes_settings_too() -> None:
         ("x\ny\x1b[2J=1", "unknown key"),
     ],
 )  # fmt: skip
-def test_a_setting_that_cannot_be_is_refused_and_named(setting: str, said: str) -> None:
+def test_a_setting_that_cannot_be_is_refused_and_named(setting, said):
     message = refusal(setting)
     assert message.startswith(f"fig6: --set {setting[:20].encode('unicode_escape').decode()}")
     assert said in message
@@ -150,18 +149,18 @@ def test_a_setting_that_cannot_be_is_refused_and_named(setting: str, said: str) 
 @pytest.mark.parametrize(
     "setting", ["na\udca9me=x", "name=\udca9", "expect.\udca9=true", "network.radio={a='\udcff'}"]
 )
-def test_bytes_of_a_command_line_that_are_no_text_are_refused(setting: str) -> None:
+def test_bytes_of_a_command_line_that_are_no_text_are_refused(setting):
     assert "is not UTF-8 text" in refusal(setting)
 
 
-def test_an_error_that_no_setting_made_alone_names_them_all() -> None:
+def test_an_error_that_no_setting_made_alone_names_them_all():
     message = refusal("duration_s=60", "stop_on_fault=false")
     assert message.startswith(
         "fig6 with --set duration_s=60 --set stop_on_fault=false: network[0].robot[0].reference: leaves the pitch"
     )
 
 
-def test_of_several_settings_the_one_that_is_wrong_is_named() -> None:
+def test_of_several_settings_the_one_that_is_wrong_is_named():
     message = refusal("duration_s=2", "network.robot.slot=9", "stop_on_fault=false")
     assert message.startswith("fig6: --set network.robot.slot=9: 9 is out of range")
 
@@ -179,29 +178,29 @@ def test_of_several_settings_the_one_that_is_wrong_is_named() -> None:
         ),
     ],
 )
-def test_another_kind_drops_the_keys_of_the_old_one_with_a_note(setting: str, left_out: str) -> None:
+def test_another_kind_drops_the_keys_of_the_old_one_with_a_note(setting, left_out):
     found = load("fig6", [setting])
     assert found.notes == ((f"--set {setting} leaves out {left_out}",) if left_out else ())
     assert not [key for key in left_out.split(", ") if key and f"\n{key} =" in found.text]
 
 
-def test_a_key_of_the_old_kind_that_is_set_after_it_is_refused() -> None:
+def test_a_key_of_the_old_kind_that_is_set_after_it_is_refused():
     message = refusal("network.robot.controller.law=body_frame", "network.robot.controller.switching=sign")
     assert message.startswith("fig6: --set network.robot.controller.switching=sign: unknown key")
 
 
-def test_a_file_with_another_law_is_two_lines(tmp_path: Path) -> None:
+def test_a_file_with_another_law_is_two_lines(tmp_path):
     mine = tmp_path / "mine.toml"
     mine.write_text('scenario = "fig6"\nset = { network.robot.controller.law = "body_frame" }\n')
     assert type(load(str(mine)).scenario.networks[0].robot[0].controller).__name__ == "BodyFrameParameters"
 
 
-def test_a_key_of_a_robot_at_the_top_is_shown_its_place() -> None:
+def test_a_key_of_a_robot_at_the_top_is_shown_its_place():
     message = refusal("controller.law=body_frame")
     assert message.endswith("controller: unknown key; write --set network.robot.controller.law=body_frame")
 
 
-def test_another_kind_needs_the_keys_that_it_has() -> None:
+def test_another_kind_needs_the_keys_that_it_has():
     whole = "network.robot.reference={kind = 'line', drive_s = 1}"
     assert load("fig8", [whole]).scenario.networks[0].robot[0].reference.name() == "line"
 
@@ -216,7 +215,7 @@ VALUES = st.recursive(
 
 
 @given(st.dictionaries(TEXT, VALUES, max_size=4), st.text())
-def test_what_is_written_is_read_as_it_was(tables: dict[str, Any], setting: str) -> None:
+def test_what_is_written_is_read_as_it_was(tables, setting):
     assert tomllib.loads(written(tables, "origin", [setting])) == tables
 
 
@@ -227,7 +226,7 @@ def test_what_is_written_is_read_as_it_was(tables: dict[str, Any], setting: str)
     )
     | st.text(st.characters(codec="utf-8"), max_size=40)
 )
-def test_any_setting_is_made_or_refused_in_one_line(setting: str) -> None:
+def test_any_setting_is_made_or_refused_in_one_line(setting):
     refused = None
     try:
         loaded = load("fig6", [setting])
@@ -245,7 +244,7 @@ LAWS_OF_OURS = LAWS.names()
 
 @pytest.mark.parametrize("law", LAWS_OF_OURS)
 @pytest.mark.parametrize("other", LAWS_OF_OURS)
-def test_any_law_takes_the_place_of_any_other(law: str, other: str) -> None:
+def test_any_law_takes_the_place_of_any_other(law, other):
     key = "network.robot.controller.law"
     text = load("fig6", [f"{key}={law}"]).text
     assert parse(text, "written.toml", [f"{key}={other}"]).networks[0].robot[0].controller.name() == other
@@ -269,7 +268,7 @@ def test_any_law_takes_the_place_of_any_other(law: str, other: str) -> None:
         "network.0.robot.0.controller=kanayama",
     ],
 )
-def test_what_an_error_advises_to_write_is_accepted(source: str, setting: str) -> None:
+def test_what_an_error_advises_to_write_is_accepted(source, setting):
     with pytest.raises(ScenarioError) as caught:
         load(source, [setting])
     advised = caught.value.remedy.removeprefix("write --set ")
@@ -277,12 +276,12 @@ def test_what_an_error_advises_to_write_is_accepted(source: str, setting: str) -
     load(source, [advised])
 
 
-def test_the_advice_keeps_the_network_and_the_robot_that_were_named() -> None:
+def test_the_advice_keeps_the_network_and_the_robot_that_were_named():
     said = refusal("network.1.robot.1.law=kanayama", source=str(TWO_TEAMS))
     assert said.endswith("write --set network.1.robot.1.controller.law=kanayama")
 
 
-def test_a_setting_does_not_leave_out_its_own_key() -> None:
+def test_a_setting_does_not_leave_out_its_own_key():
     assert "kind=gaussian: unknown key; keys here: name," in refusal("kind=gaussian")
     assert "controller.kind=gaussian: unknown key; keys here: law," in refusal(
         "network.robot.controller.kind=gaussian"

@@ -51,9 +51,7 @@ def refusal(settings: list[str], source: str = "fig6") -> str:
 
 @pytest.mark.parametrize("disturbed", [[], DISTURBED])
 @pytest.mark.parametrize("name", ["fig6", "fig8"])
-def test_ideal_on_the_command_line_wins_over_the_file_and_what_is_set_before_it(
-    name: str, disturbed: list[str]
-) -> None:
+def test_ideal_on_the_command_line_wins_over_the_file_and_what_is_set_before_it(name, disturbed):
     scenario = load(name, [*disturbed, "variant=ideal"]).scenario
     network = scenario.networks[0]
     robot = network.robot[0]
@@ -74,27 +72,27 @@ def test_ideal_on_the_command_line_wins_over_the_file_and_what_is_set_before_it(
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig8"])
-def test_realistic_is_the_defaults_and_so_the_built_in_scenarios(name: str) -> None:
+def test_realistic_is_the_defaults_and_so_the_built_in_scenarios(name):
     mass = ["network.robot.drive.chassis.mass_kg=0.6"]
     assert load(name, [*DISTURBED, "variant=realistic"]).scenario == load(name, mass).scenario
     assert load(name, ["variant=ideal", "variant=realistic"]).scenario == load(name).scenario
 
 
-def test_a_setting_after_the_variant_wins() -> None:
+def test_a_setting_after_the_variant_wins():
     scenario = load("fig6", ["variant=ideal", "camera.delay_frames=2", "network.radio.eb_n0_db=9"]).scenario
     assert scenario.camera == msgspec.structs.replace(EXACT, delay_frames=2)
     radio = scenario.networks[0].radio
     assert (radio.eb_n0_db, radio.bit_error_rate) == (9.0, None)
 
 
-def test_what_is_no_disturbance_stays() -> None:
+def test_what_is_no_disturbance_stays():
     kept = ["camera.window_px=40", "network.radio.channel=3", "network.radio.telemetry=false"]
     scenario = load("fig6", [*kept, "camera.calibration=exact", "variant=realistic"]).scenario
     assert scenario.camera == PixelCamera(window_px=40)
     assert (scenario.networks[0].radio.channel, scenario.networks[0].radio.telemetry) == (3, False)
 
 
-def test_in_a_file_the_variant_fills_in_what_the_file_does_not_say() -> None:
+def test_in_a_file_the_variant_fills_in_what_the_file_does_not_say():
     plain = parse(SMALL.format('variant = "ideal"', "", ""), "small")
     assert plain == parse(SMALL.format("", "", ""), "small", ["variant=ideal"])
     given = parse(
@@ -112,7 +110,7 @@ def test_in_a_file_the_variant_fills_in_what_the_file_does_not_say() -> None:
     assert given.networks[0].robot[0].wheel_radius_mismatch == 0.02
 
 
-def test_a_camera_of_another_kind_and_a_profile_in_a_file_are_what_the_file_says() -> None:
+def test_a_camera_of_another_kind_and_a_profile_in_a_file_are_what_the_file_says():
     found = parse(
         SMALL.format(
             'variant = "ideal"\ncamera = { kind = "pixels", window_px = 40 }', 'profile = "fade15"', ""
@@ -123,12 +121,12 @@ def test_a_camera_of_another_kind_and_a_profile_in_a_file_are_what_the_file_says
     assert found.networks[0].radio.bit_error_rate == 1e-5
 
 
-def test_on_the_command_line_a_variant_replaces_that_of_the_file() -> None:
+def test_on_the_command_line_a_variant_replaces_that_of_the_file():
     text = SMALL.format('variant = "ideal"', "", "")
     assert parse(text, "small", ["variant=realistic"]) == parse(SMALL.format("", "", ""), "small")
 
 
-def test_the_text_that_a_recording_keeps_says_the_same() -> None:
+def test_the_text_that_a_recording_keeps_says_the_same():
     for settings in (
         ["variant=ideal"],
         ["variant=ideal", "camera.delay_frames=1"],
@@ -138,7 +136,7 @@ def test_the_text_that_a_recording_keeps_says_the_same() -> None:
         assert parse(loaded.text, "kept") == loaded.scenario
 
 
-def test_another_name_is_refused_in_one_line() -> None:
+def test_another_name_is_refused_in_one_line():
     assert refusal(["variant=idael"]) == (
         "fig6: --set variant=idael: 'idael' is no variant; did you mean ideal? variants: ideal, realistic"
     )
@@ -149,7 +147,7 @@ def test_another_name_is_refused_in_one_line() -> None:
         parse('name = "a"\nduration_s = 1.0\nnetwork = 3', "odd", ["variant=ideal"])
 
 
-def test_the_command_line_lists_them() -> None:
+def test_the_command_line_lists_them():
     done = CliRunner().invoke(main, ["scenarios", "variants"], env={"COLUMNS": "300"})
     assert done.exit_code == 0
     assert "ideal" in done.output
@@ -157,7 +155,7 @@ def test_the_command_line_lists_them() -> None:
     assert "wheel_radius_mismatch = 0.0" in done.output
 
 
-def test_in_the_ideal_loop_body_frame_follows_the_line_within_a_millimetre() -> None:
+def test_in_the_ideal_loop_body_frame_follows_the_line_within_a_millimetre():
     settings = ["variant=ideal", 'network.robot.controller={law="body_frame"}']
     one, squares = World(load("fig6", settings).scenario, 0, load_hex(image_path())), []
     while not one.finished:

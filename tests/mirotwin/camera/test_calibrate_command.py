@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,6 @@ from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.colours import ColourClasses
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.pitch.picture_settings import PictureSettings
-from tests.mirotwin.conftest import Result
 
 HEADER = "x_cm,y_cm,height_cm,u_px,v_px\n"
 LENS = ("camera.kind=pixels", "camera.lens.tilt_x_rad=0.01", "camera.lens.turn_rad=3.14")
@@ -27,9 +25,7 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_without_noise_the_scenarios_camera_is_found_as_it_is(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_without_noise_the_scenarios_camera_is_found_as_it_is(mirotwin, short, tmp_path):
     out = tmp_path / "camera.toml"
     given = ("--scenario", short, *settings(*LENS), "--noise-px", 0, "--out", out)
     code, table, err = mirotwin("camera", "calibrate", *given)
@@ -43,9 +39,7 @@ def test_without_noise_the_scenarios_camera_is_found_as_it_is(
     assert "worst error   0.000 cm over the pitch" in table
 
 
-def test_points_of_a_scenario_give_the_same_calibration_from_their_file(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_points_of_a_scenario_give_the_same_calibration_from_their_file(mirotwin, short, tmp_path):
     first, second, points = (tmp_path / name for name in ("first.toml", "second.toml", "points.csv"))
     made = mirotwin(
         "camera", "calibrate", "--scenario", short, "--seed", 3, "--out", first, "--points-out", points
@@ -65,9 +59,7 @@ def test_points_of_a_scenario_give_the_same_calibration_from_their_file(
     assert shown == sorted(shown, reverse=True)
 
 
-def test_the_noise_is_that_of_the_seed_and_as_large_as_asked_for(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_the_noise_is_that_of_the_seed_and_as_large_as_asked_for(mirotwin, short, tmp_path):
     texts = []
     for number, (seed, noise) in enumerate([(1, 0.3), (1, 0.3), (2, 0.3), (1, 1.5)]):
         points = tmp_path / f"{number}.csv"
@@ -82,9 +74,7 @@ def test_the_noise_is_that_of_the_seed_and_as_large_as_asked_for(
     assert 4.0 < residuals[1].rms_px / residuals[0].rms_px < 6.0
 
 
-def test_colours_are_those_that_the_scenarios_tracker_would_use(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_colours_are_those_that_the_scenarios_tracker_would_use(mirotwin, short, tmp_path):
     colours = tmp_path / "colours.toml"
     given = ("--scenario", short, "--out", tmp_path / "camera.toml", "--colours-out", colours)
     assert mirotwin("camera", "calibrate", *given)[0] == 0
@@ -92,9 +82,7 @@ def test_colours_are_those_that_the_scenarios_tracker_would_use(
     assert eye_file.read(colours, ColourClasses) == expected
 
 
-def test_sampled_pixels_of_ones_own_pictures_give_colour_classes(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_sampled_pixels_of_ones_own_pictures_give_colour_classes(mirotwin, short, tmp_path):
     points, samples, colours = (tmp_path / name for name in ("points.csv", "samples.csv", "colours.toml"))
     made = ("--scenario", short, "--points-out", points, "--out", tmp_path / "first.toml")
     assert mirotwin("camera", "calibrate", *made)[0] == 0
@@ -112,9 +100,7 @@ def test_sampled_pixels_of_ones_own_pictures_give_colour_classes(
     assert "give both --samples and --colours-out or neither" in err
 
 
-def test_what_the_points_cannot_tell_is_taken_from_the_start(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_what_the_points_cannot_tell_is_taken_from_the_start(mirotwin, short, tmp_path):
     points, flat, start, out = (tmp_path / name for name in ("all.csv", "flat.csv", "start.toml", "out.toml"))
     given = ("--scenario", short, *settings(*LENS, "camera.lens.height_m=2.1"), "--noise-px", 0)
     assert mirotwin("camera", "calibrate", *given, "--points-out", points, "--out", start)[0] == 0
@@ -160,8 +146,8 @@ def csv(rows: list[tuple[float, ...]]) -> str:
     ],
 )
 def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
-    mirotwin: Callable[..., Result], tmp_path: Path, text: str, expected: str
-) -> None:
+    mirotwin, tmp_path, text, expected
+):
     points = tmp_path / "points.csv"
     points.write_text(text)
     code, out, err = mirotwin("camera", "calibrate", "--points", points, "--out", tmp_path / "camera.toml")
@@ -198,12 +184,12 @@ def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
     ],
 )
 def test_what_cannot_be_calibrated_is_refused_and_nothing_is_written(
-    mirotwin: Callable[..., Result],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    options: tuple[object, ...],
-    expected: str,
-) -> None:
+    mirotwin,
+    tmp_path,
+    monkeypatch,
+    options,
+    expected,
+):
     monkeypatch.chdir(tmp_path)
     Path("p.csv").write_text(csv(GRID))
     Path("bytes").write_bytes(b"\xff\xfe")
@@ -216,9 +202,7 @@ def test_what_cannot_be_calibrated_is_refused_and_nothing_is_written(
     assert (err.count("\n"), names(tmp_path)) == (1, before)
 
 
-def test_a_camera_without_a_lens_is_refused_after_the_note_of_what_its_kind_leaves_out(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_camera_without_a_lens_is_refused_after_the_note_of_what_its_kind_leaves_out(mirotwin, tmp_path):
     out = tmp_path / "out.toml"
     code, printed, err = mirotwin(
         "camera", "calibrate", "--scenario", "fig6", "--set", "camera.kind=gaussian", "--out", out
@@ -231,8 +215,8 @@ def test_a_camera_without_a_lens_is_refused_after_the_note_of_what_its_kind_leav
 
 @pytest.mark.parametrize("kind", ["gaussian", "geometric"])
 def test_a_camera_without_pixels_has_no_colours_and_one_without_a_lens_no_points(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, kind: str
-) -> None:
+    mirotwin, short, tmp_path, kind
+):
     given = ("--scenario", short, "--set", f"camera.kind={kind}", "--out", tmp_path / "camera.toml")
     code, _, err = mirotwin("camera", "calibrate", *given, "--colours-out", tmp_path / "colours.toml")
     assert code == 2
@@ -241,9 +225,7 @@ def test_a_camera_without_pixels_has_no_colours_and_one_without_a_lens_no_points
     assert mirotwin("camera", "calibrate", *given)[0] == (2 if kind == "gaussian" else 0)
 
 
-def test_files_that_are_there_are_replaced_with_force_only(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_files_that_are_there_are_replaced_with_force_only(mirotwin, short, tmp_path):
     points = tmp_path / "points.csv"
     points.write_text("before")
     given = (
@@ -262,9 +244,7 @@ def test_files_that_are_there_are_replaced_with_force_only(
     assert points.read_text().startswith(HEADER)
 
 
-def test_noise_that_is_no_number_is_refused(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_noise_that_is_no_number_is_refused(mirotwin, short, tmp_path):
     given = ("--scenario", short, "--noise-px", "nan", "--out", tmp_path / "camera.toml")
     code, _, err = mirotwin("camera", "calibrate", *given)
     assert code == 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,7 +14,7 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.camera.picture import Picture, taken
 from mirotwin.camera.view import View, views_of
-from tests.mirotwin.conftest import Result, hex_file
+from tests.mirotwin.conftest import hex_file
 
 GAUSSIAN = ("--set", "camera.kind=gaussian")
 
@@ -24,9 +23,7 @@ def world_of(path: object) -> World:
     return World(load(str(path)).scenario, 0, load_hex(image_path()))
 
 
-def test_the_plain_picture_is_the_frame_at_or_before_the_time(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_the_plain_picture_is_the_frame_at_or_before_the_time(mirotwin, short, tmp_path):
     out = tmp_path / "frame.png"
     assert mirotwin("camera", "look", short, "--at", "0.12s", "--plain", "--out", out) == (0, f"{out}\n", "")
     world = world_of(short)
@@ -38,8 +35,8 @@ def test_the_plain_picture_is_the_frame_at_or_before_the_time(
 
 
 def test_the_picture_with_the_overlay_is_enlarged_and_says_what_it_shows(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    mirotwin, short, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     assert mirotwin("camera", "look", short, "--at", "120ms", "--seed", 4)[:2] == (
         0,
@@ -55,7 +52,7 @@ def test_the_picture_with_the_overlay_is_enlarged_and_says_what_it_shows(
 
 
 @pytest.mark.parametrize("plain", [True, False])
-def test_looking_changes_no_bit_of_a_run(short: Path, plain: bool) -> None:
+def test_looking_changes_no_bit_of_a_run(short, plain):
     seen, unseen = world_of(short), world_of(short)
     pictures: list[bytes] = []
     views_of(seen, "short")[0].shows.append(lambda view: pictures.append(view.png(plain)))
@@ -67,7 +64,7 @@ def test_looking_changes_no_bit_of_a_run(short: Path, plain: bool) -> None:
     assert len(set(pictures)) == len(pictures) == unseen.index
 
 
-def test_a_frame_that_the_pc_never_got_is_shown_as_it_was_and_named(short: Path) -> None:
+def test_a_frame_that_the_pc_never_got_is_shown_as_it_was_and_named(short):
     scenario = load(str(short), ("camera.kind=pixels", "camera.dropped_frames=0.5")).scenario
     seen, unseen = (World(scenario, 0, load_hex(image_path())) for _ in range(2))
     captions, pictures = [], []
@@ -109,13 +106,13 @@ def test_a_frame_that_the_pc_never_got_is_shown_as_it_was_and_named(short: Path)
     ],
 )
 def test_what_cannot_be_looked_at_is_refused_with_the_remedy(
-    mirotwin: Callable[..., Result],
-    short: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    options: tuple[object, ...],
-    expected: str,
-) -> None:
+    mirotwin,
+    short,
+    tmp_path,
+    monkeypatch,
+    options,
+    expected,
+):
     monkeypatch.chdir(tmp_path)
     code, out, err = mirotwin("camera", "look", short, *options)
     assert (code, out) == (2, "")
@@ -124,9 +121,7 @@ def test_what_cannot_be_looked_at_is_refused_with_the_remedy(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_run_that_a_fault_stops_before_is_not_drawn(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_a_run_that_a_fault_stops_before_is_not_drawn(mirotwin, short, tmp_path):
     image = hex_file(tmp_path / "faulty.ihx", b"\xa5")
     out = tmp_path / "frame.png"
     code, _, err = mirotwin("camera", "look", short, "--at", "0.1s", "--firmware", image, "--out", out)
@@ -134,7 +129,7 @@ def test_a_run_that_a_fault_stops_before_is_not_drawn(
     assert "firmware fault: net0/robot0" in err
 
 
-def test_windows_of_a_picture_are_its_pixels_and_none_lies_outside(short: Path) -> None:
+def test_windows_of_a_picture_are_its_pixels_and_none_lies_outside(short):
     world = world_of(short)
     world.step()
     eye = world.networks[0].sight.eye

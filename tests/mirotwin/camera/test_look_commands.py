@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -27,12 +26,12 @@ LOOP = b"\x80\xfe"
 
 
 @pytest.fixture(scope="session")
-def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bare(tmp_path_factory):
     """The robot's image without any debug file."""
     return Path(shutil.copy(image_path(), tmp_path_factory.mktemp("bare") / "bare.ihx"))
 
 
-def test_the_robots_own_firmware_is_listed_with_symbols_and_c_lines(mirotwin: Callable[..., Result]) -> None:
+def test_the_robots_own_firmware_is_listed_with_symbols_and_c_lines(mirotwin):
     code, out, _ = mirotwin("fw", "disasm")
     assert code == 0
     assert "\n_decode_character:\n" in out
@@ -40,7 +39,7 @@ def test_the_robots_own_firmware_is_listed_with_symbols_and_c_lines(mirotwin: Ca
     assert "  MOV PCON,_sleep\n" in out
 
 
-def test_one_function_can_be_listed_alone(mirotwin: Callable[..., Result]) -> None:
+def test_one_function_can_be_listed_alone(mirotwin):
     code, out, _ = mirotwin("fw", "disasm", image_path(), "--symbol", "uart_send")
     assert code == 0
     assert out.startswith("_uart_send:\n")
@@ -48,13 +47,13 @@ def test_one_function_can_be_listed_alone(mirotwin: Callable[..., Result]) -> No
     assert "RET" in out
 
 
-def test_a_bare_image_is_listed_with_addresses(mirotwin: Callable[..., Result], bare: Path) -> None:
+def test_a_bare_image_is_listed_with_addresses(mirotwin, bare):
     code, out, _ = mirotwin("fw", "disasm", bare)
     assert code == 0
     assert "LJMP 0029h" in out
 
 
-def test_a_trace_begins_and_ends_with_its_window(mirotwin: Callable[..., Result], short: Path) -> None:
+def test_a_trace_begins_and_ends_with_its_window(mirotwin, short):
     code, out, _ = mirotwin("fw", "trace", short, "--from", "40ms", "--to", "40.5ms")
     ticks = [int(line[:12]) for line in out.splitlines()[1:]]
     assert code == 0
@@ -63,9 +62,7 @@ def test_a_trace_begins_and_ends_with_its_window(mirotwin: Callable[..., Result]
     assert ticks == sorted(ticks)
 
 
-def test_a_window_shows_what_the_whole_trace_shows_there(
-    mirotwin: Callable[..., Result], short: Path
-) -> None:
+def test_a_window_shows_what_the_whole_trace_shows_there(mirotwin, short):
     whole = mirotwin("fw", "trace", short, "--to", "9ms")[1].splitlines()[1:]
     window = mirotwin("fw", "trace", short, "--from", "5ms", "--to", "8ms")[1].splitlines()[1:]
     first, last = int(window[1][:12]), int(window[-1][:12])
@@ -74,7 +71,7 @@ def test_a_window_shows_what_the_whole_trace_shows_there(
     assert [line for line in window[1:] if "asleep" not in line] == inside
 
 
-def test_both_engines_trace_and_profile_alike(short: Path) -> None:
+def test_both_engines_trace_and_profile_alike(short):
     def shown(*arguments: str) -> str:
         command = [MIROTWIN, "fw", arguments[0], short, "--to", "12ms", *arguments[1:]]
         return children.run(command, check=True, capture_output=True, text=True).stdout
@@ -85,7 +82,7 @@ def test_both_engines_trace_and_profile_alike(short: Path) -> None:
         assert python == shown(*arguments, "--engine", "compiled")
 
 
-def test_a_profile_adds_up(mirotwin: Callable[..., Result], short: Path) -> None:
+def test_a_profile_adds_up(mirotwin, short):
     code, out, _ = mirotwin("fw", "profile", short, "--json", "--robot", 2)
     found = json.loads(out)
     assert code == 0
@@ -98,18 +95,14 @@ def test_a_profile_adds_up(mirotwin: Callable[..., Result], short: Path) -> None
     assert found["stack"]["highest"] >= found["stack"]["first"] > 0x80
 
 
-def test_a_profile_for_people_names_functions_interrupts_and_stack(
-    mirotwin: Callable[..., Result], short: Path
-) -> None:
+def test_a_profile_for_people_names_functions_interrupts_and_stack(mirotwin, short):
     _, out, _ = mirotwin("fw", "profile", short, "--to", "50ms")
     assert "_uart_interrupt" in out
     assert "serial" in out
     assert "stack: from " in out
 
 
-def test_coverage_of_several_runs_adds_up_in_one_file(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_coverage_of_several_runs_adds_up_in_one_file(mirotwin, short, tmp_path):
     info = tmp_path / "fw.info"
     code, _, _ = mirotwin("fw", "coverage", short, "--to", "30ms", "--out", info)
     first = info.read_text()
@@ -130,9 +123,7 @@ def _hits(info: str) -> list[str]:
     ]
 
 
-def test_coverage_of_a_bare_image_comes_with_its_listing(
-    mirotwin: Callable[..., Result], bare: Path, tmp_path: Path
-) -> None:
+def test_coverage_of_a_bare_image_comes_with_its_listing(mirotwin, bare, tmp_path):
     info = tmp_path / "bare.info"
     code, _, _ = mirotwin("fw", "coverage", bare, "--to", "1ms", "--out", info)
     assert code == 0
@@ -141,18 +132,14 @@ def test_coverage_of_a_bare_image_comes_with_its_listing(
     assert "LJMP 0029h" in listing.read_text()
 
 
-def test_a_recording_is_looked_into_with_its_own_scenario_seed_and_firmware(
-    mirotwin: Callable[..., Result], finished: Path, short: Path
-) -> None:
+def test_a_recording_is_looked_into_with_its_own_scenario_seed_and_firmware(mirotwin, finished, short):
     window = ("--from", "100ms", "--to", "101ms")
     recorded = mirotwin("fw", "trace", finished / "run.mcap", *window)
     assert recorded[0] == 0
     assert recorded == mirotwin("fw", "trace", short, "--seed", 5, *window)
 
 
-def test_a_stream_file_is_looked_into_as_replay_runs_it(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_stream_file_is_looked_into_as_replay_runs_it(mirotwin, tmp_path):
     stream = tmp_path / "a.stream"
     stream.write_text("# mirotwin stream 1\n240000 > 55 55 55\n")
     code, out, _ = mirotwin("fw", "profile", stream, "--to", "20ms", "--json")
@@ -160,7 +147,7 @@ def test_a_stream_file_is_looked_into_as_replay_runs_it(
     assert json.loads(out)["interrupts"][4]["count"] == 3
 
 
-def test_looking_changes_no_bit_of_the_world(short: Path) -> None:
+def test_looking_changes_no_bit_of_the_world(short):
     from miro_robot.inspect.activity import Activity
     from miro_robot.inspect.counters import Counters
 
@@ -190,9 +177,7 @@ def test_looking_changes_no_bit_of_the_world(short: Path) -> None:
         (("gone.mcap",), "no such scenario"),
     ],
 )
-def test_what_cannot_be_looked_at_is_one_line(
-    mirotwin: Callable[..., Result], arguments: tuple[str, ...], said: str
-) -> None:
+def test_what_cannot_be_looked_at_is_one_line(mirotwin, arguments, said):
     for command in ("trace", "profile", "coverage"):
         code, out, err = mirotwin("fw", command, *arguments)
         assert (code, out) == (2, "")
@@ -222,15 +207,11 @@ def one_line(result: Result) -> str:
     ],
     ids=" ".join,
 )
-def test_a_folder_is_called_one_and_the_way_out_is_to_name_a_file_in_it(
-    mirotwin: Callable[..., Result], tmp_path: Path, command: tuple[str, ...]
-) -> None:
+def test_a_folder_is_called_one_and_the_way_out_is_to_name_a_file_in_it(mirotwin, tmp_path, command):
     assert one_line(mirotwin(*command, tmp_path)) == f"{tmp_path}: is a folder; name a file in it"
 
 
-def test_the_folder_of_a_run_has_its_recording_named(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_the_folder_of_a_run_has_its_recording_named(mirotwin, finished, tmp_path):
     out = tmp_path / "x.pcapng"
     for command in (("fw", "profile"), ("decode",), ("export", "--out", out)):
         said = f"{finished}: is a folder; name a file in it, such as {finished / 'run.mcap'}"
@@ -239,7 +220,7 @@ def test_the_folder_of_a_run_has_its_recording_named(
     assert "run.mcap" not in one_line(mirotwin("fw", "profile", "fig6", "--firmware", finished))
 
 
-def test_a_window_after_the_end_of_an_image_is_empty(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_window_after_the_end_of_an_image_is_empty(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", LOOP)
     out = tmp_path / "a.trace"
     code, _, err = mirotwin("fw", "trace", image, "--from", "1s", "--out", out)
@@ -248,17 +229,13 @@ def test_a_window_after_the_end_of_an_image_is_empty(mirotwin: Callable[..., Res
     assert not out.exists()
 
 
-def test_the_options_of_a_scenario_do_not_apply_to_an_image(
-    mirotwin: Callable[..., Result], bare: Path
-) -> None:
+def test_the_options_of_a_scenario_do_not_apply_to_an_image(mirotwin, bare):
     code, _, err = mirotwin("fw", "profile", bare, "--seed", 1)
     assert code == 2
     assert "--seed does not apply" in err
 
 
-def test_coverage_is_not_added_to_the_listing_of_another_image(
-    mirotwin: Callable[..., Result], bare: Path, tmp_path: Path
-) -> None:
+def test_coverage_is_not_added_to_the_listing_of_another_image(mirotwin, bare, tmp_path):
     other, out = tmp_path / "other.hex", tmp_path / "fw.info"
     hex_file(other, b"\x00" + LOOP)
     arguments = ("--max-cycles", 1000, "--out", out)
@@ -271,32 +248,26 @@ def test_coverage_is_not_added_to_the_listing_of_another_image(
     assert mirotwin("fw", "coverage", bare, *arguments, "--append")[0] == 42
 
 
-def test_a_trace_whose_window_is_never_reached_prints_nothing(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_trace_whose_window_is_never_reached_prints_nothing(mirotwin, tmp_path):
     image = tmp_path / "a.hex"
     hex_file(image, LOOP)
     assert mirotwin("fw", "trace", image, "--from", "1s")[:2] == (2, "")
 
 
-def test_an_unknown_symbol_is_named_with_its_nearest(mirotwin: Callable[..., Result]) -> None:
+def test_an_unknown_symbol_is_named_with_its_nearest(mirotwin):
     code, _, err = mirotwin("fw", "trace", "fig6", "--symbol", "uart_sent", "--to", "1ms")
     assert code == 2
     assert "did you mean _uart_send?" in err
 
 
 @pytest.mark.parametrize("command", [("trace", "--to", "1ms"), ("disasm",)])
-def test_an_address_without_code_is_no_function(
-    mirotwin: Callable[..., Result], bare: Path, command: tuple[str, ...]
-) -> None:
+def test_an_address_without_code_is_no_function(mirotwin, bare, command):
     code, _, err = mirotwin("fw", command[0], bare, *command[1:], "--symbol", "0x5000")
     assert code == 2
     assert "bare.ihx: --symbol: the image has no code at 0x5000; see mirotwin fw disasm" in err
 
 
-def test_static_functions_that_share_a_name_are_all_shown(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_static_functions_that_share_a_name_are_all_shown(mirotwin, tmp_path):
     module = "static char step(char c) { return c + %d; }\nvolatile char %s;\nvoid run_%s(void) { %s = step(%s); }\n"
     main = "void run_b(void);\nvoid main(void) { run_a(); run_b(); while (1); }\n"
     (tmp_path / "a.c").write_text(module % (1, "a", "a", "a", "a") + main)
@@ -310,9 +281,7 @@ def test_static_functions_that_share_a_name_are_all_shown(
     assert {line.split()[1] for line in one if line.split()[2] == "_step"} == {min(starts)}
 
 
-def test_output_that_cannot_be_written_is_refused_before_the_run(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_output_that_cannot_be_written_is_refused_before_the_run(mirotwin, tmp_path):
     for command in ("trace", "coverage"):
         code, _, err = mirotwin("fw", command, "fig6", "--out", tmp_path / "gone" / "x")
         assert code == 2
@@ -324,9 +293,7 @@ def test_output_that_cannot_be_written_is_refused_before_the_run(
 
 
 @pytest.mark.parametrize("command", ["trace", "coverage", "vcd"])
-def test_a_file_that_is_there_stays_unless_it_is_to_be_replaced(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, command: str
-) -> None:
+def test_a_file_that_is_there_stays_unless_it_is_to_be_replaced(mirotwin, short, tmp_path, command):
     mine = tmp_path / "mine"
     mine.write_text("years of work")
     asked = ("fw", command, short, "--to", "1ms", "--out", mine)
@@ -340,9 +307,7 @@ def test_a_file_that_is_there_stays_unless_it_is_to_be_replaced(
     assert "years" not in mine.read_text()
 
 
-def test_coverage_either_adds_to_a_file_or_replaces_it(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_coverage_either_adds_to_a_file_or_replaces_it(mirotwin, short, tmp_path):
     code, _, err = mirotwin("fw", "coverage", short, "--out", tmp_path / "x", "--append", "--force")
     assert (code, err.count("\n")) == (2, 1)
     assert "--append adds to the file, --force replaces it; give one of the two" in err
@@ -350,8 +315,8 @@ def test_coverage_either_adds_to_a_file_or_replaces_it(
 
 
 def test_a_listing_that_is_there_stays_unless_it_is_to_be_replaced_and_is_not_asked_about_needlessly(
-    mirotwin: Callable[..., Result], bare: Path, tmp_path: Path
-) -> None:
+    mirotwin, bare, tmp_path
+):
     listing = tmp_path / "fw.info.lst"
     listing.write_text("mine")
     asked = ("--to", "1ms", "--out", tmp_path / "fw.info")
@@ -366,7 +331,7 @@ def test_a_listing_that_is_there_stays_unless_it_is_to_be_replaced_and_is_not_as
     assert mirotwin("fw", "coverage", bare, *asked, "--append")[0] == 0
 
 
-def test_a_fault_is_reported_after_what_was_seen(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_fault_is_reported_after_what_was_seen(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", b"\x00\xa5")
     code, out, err = mirotwin("fw", "trace", image)
     assert code == 3
@@ -374,18 +339,14 @@ def test_a_fault_is_reported_after_what_was_seen(mirotwin: Callable[..., Result]
     assert "undefined opcode A5" in err
 
 
-def test_the_cycle_limit_of_an_image_has_its_exit_code(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_the_cycle_limit_of_an_image_has_its_exit_code(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", b"\x00\x80\xfd")
     assert mirotwin("fw", "profile", image, "--max-cycles", 10)[0] == 42
     assert mirotwin("fw", "profile", image, "--to", "100t")[0] == 0
     assert mirotwin("fw", "profile", hex_file(tmp_path / "b.ihx", LOOP), "--max-cycles", 10)[0] == 0
 
 
-def test_nothing_is_written_over_what_is_read(
-    mirotwin: Callable[..., Result], bare: Path, tmp_path: Path
-) -> None:
+def test_nothing_is_written_over_what_is_read(mirotwin, bare, tmp_path):
     image = Path(shutil.copy(bare, tmp_path / "mine.ihx"))
     before = image.read_bytes()
     for command in (
@@ -400,16 +361,14 @@ def test_nothing_is_written_over_what_is_read(
     assert image.read_bytes() == before
 
 
-def test_a_reader_that_goes_away_ends_it_as_a_shell_reports_that(short: Path) -> None:
+def test_a_reader_that_goes_away_ends_it_as_a_shell_reports_that(short):
     command = f"{MIROTWIN} fw trace {short} | head -1; echo ${{PIPESTATUS[0]}}"
     done = children.run(["bash", "-c", command], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "141"
     assert done.stderr == ""
 
 
-def test_input_that_cannot_be_received_does_not_keep_an_ended_program_running(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_input_that_cannot_be_received_does_not_keep_an_ended_program_running(mirotwin, tmp_path):
     """Receives one character by timer 1, never clears RI, and sleeps with interrupts off."""
     image = hex_file(tmp_path / "a.ihx", bytes.fromhex("758df3 758920 d28e 759850 438701"))
     (tmp_path / "in").write_bytes(b"abc")
@@ -418,9 +377,7 @@ def test_input_that_cannot_be_received_does_not_keep_an_ended_program_running(
     assert "no interrupt can wake it" in err
 
 
-def test_a_waveform_of_an_image_has_its_pins_and_its_crystal(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_waveform_of_an_image_has_its_pins_and_its_crystal(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.hex", b"\x80\x00\x80\xfc")
     pins, out = tmp_path / "a.pins", tmp_path / "a.vcd"
     pins.write_text("1105920 * P1.2 0  # 100 ms\n1105921 * P1.2 1\n")
@@ -445,7 +402,7 @@ def test_a_waveform_of_an_image_has_its_pins_and_its_crystal(
     assert f"#100000000\n0{wire}\n#100000090\n1{wire}\n" in whole
 
 
-def test_a_bad_line_of_pins_is_named(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_bad_line_of_pins_is_named(mirotwin, tmp_path):
     image, pins = hex_file(tmp_path / "a.hex", LOOP), tmp_path / "a.pins"
     pins.write_text("0 * P1.2 0\n0 * P9.2 1\n")
     code, out, err = mirotwin("fw", "trace", image, "--pins", pins)
@@ -462,15 +419,13 @@ def test_a_bad_line_of_pins_is_named(mirotwin: Callable[..., Result], tmp_path: 
 @pytest.mark.parametrize(
     "option", [("--crystal", 12_000_000), ("--go-on",), ("--stdin-gap", "1ms"), ("--code-size", "64k")]
 )
-def test_the_options_of_an_image_do_not_apply_to_a_scenario(
-    mirotwin: Callable[..., Result], short: Path, option: tuple[object, ...]
-) -> None:
+def test_the_options_of_an_image_do_not_apply_to_a_scenario(mirotwin, short, option):
     code, _, err = mirotwin("fw", "profile", short, *option)
     assert code == 2
     assert err.endswith(f": is no image, {option[0]} does not apply to it; leave it out\n")
 
 
-def test_a_trace_goes_on_after_faults_and_lists_them(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_trace_goes_on_after_faults_and_lists_them(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.hex", b"\xa5\xa5" + LOOP)
     assert mirotwin("fw", "trace", image)[2].count("undefined opcode") == 1
     code, out, err = mirotwin("fw", "trace", image, "--go-on")

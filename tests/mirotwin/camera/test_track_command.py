@@ -21,7 +21,6 @@ from miro_host.eye.patterns import IDENTITIES, TEAMS
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.pitch.picture_settings import PictureSettings
 from mirotwin.recording import reader as recording_reader
-from tests.mirotwin.conftest import Result
 
 FRAMES = 6
 CAMERA = (
@@ -31,7 +30,7 @@ CAMERA = (
 
 
 @pytest.fixture(scope="module")
-def seen(mirotwin: Callable[..., Result], short: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def seen(mirotwin, short, tmp_path_factory):
     """A run whose measurements arrive at once, its plain frames in a folder and in the recording; and the files."""
     folder = tmp_path_factory.mktemp("seen")
     camera = [word for key in CAMERA for word in ("--set", key)]
@@ -58,9 +57,7 @@ def measured(seen: Path) -> dict[tuple[int, int], tuple[float, float, float]]:
 
 
 @pytest.mark.parametrize("path", ["frames", "run/run.mcap"])
-def test_frames_of_a_run_give_the_postures_that_its_recording_has(
-    mirotwin: Callable[..., Result], seen: Path, path: str
-) -> None:
+def test_frames_of_a_run_give_the_postures_that_its_recording_has(mirotwin, seen, path):
     """Rounding to red, green and blue moves a few pixels over the border of a class."""
     code, out, err = mirotwin("camera", "track", seen / path, *files(seen), "--robots", "0,2", "--json")
     assert (code, err) == (0, "")
@@ -76,9 +73,7 @@ def test_frames_of_a_run_give_the_postures_that_its_recording_has(
         assert 0.0 <= line["confidence"] <= 1.0
 
 
-def test_the_table_has_a_row_a_robot_and_frame_and_says_who_is_lost(
-    mirotwin: Callable[..., Result], seen: Path
-) -> None:
+def test_the_table_has_a_row_a_robot_and_frame_and_says_who_is_lost(mirotwin, seen):
     code, out, err = mirotwin("camera", "track", seen / "frames", *files(seen), "--robots", "2,1")
     assert (code, err) == (0, "")
     head, *rows, last = [line.split() for line in out.splitlines()]
@@ -90,7 +85,7 @@ def test_the_table_has_a_row_a_robot_and_frame_and_says_who_is_lost(
     assert " ".join(last) == "6 pictures: robot 2 in 6, robot 1 in 0"
 
 
-def test_a_lost_robot_has_no_numbers_in_json(mirotwin: Callable[..., Result], seen: Path) -> None:
+def test_a_lost_robot_has_no_numbers_in_json(mirotwin, seen):
     _, out, _ = mirotwin(
         "camera", "track", seen / "frames", *files(seen), "--team", "blue", "--robots", "0", "--json"
     )
@@ -100,9 +95,7 @@ def test_a_lost_robot_has_no_numbers_in_json(mirotwin: Callable[..., Result], se
         assert json.loads(line) == {**picture, **lost}
 
 
-def test_ppm_files_say_the_same_and_other_files_are_passed_over(
-    mirotwin: Callable[..., Result], seen: Path, tmp_path: Path
-) -> None:
+def test_ppm_files_say_the_same_and_other_files_are_passed_over(mirotwin, seen, tmp_path):
     for number in range(FRAMES):
         with Image.open(seen / "frames" / f"frame-{number:06d}.png") as image:
             image.save(tmp_path / f"{number}.PPM", "PPM")
@@ -114,9 +107,7 @@ def test_ppm_files_say_the_same_and_other_files_are_passed_over(
     assert [without(line) for line in one] == [without(line) for line in other] != []
 
 
-def test_of_several_networks_one_is_taken(
-    mirotwin: Callable[..., Result], seen: Path, tmp_path: Path
-) -> None:
+def test_of_several_networks_one_is_taken(mirotwin, seen, tmp_path):
     for number in (0, 1):
         for network in (0, 3):
             name = f"net{network}-frame-{number:06d}.png"
@@ -130,9 +121,7 @@ def test_of_several_networks_one_is_taken(
     assert (code, f"{tmp_path}: --network 1: no picture of it" in err) == (2, True)
 
 
-def test_recorded_frames_are_images_for_viewers_and_change_nothing_else(
-    mirotwin: Callable[..., Result], short: Path, seen: Path, tmp_path: Path
-) -> None:
+def test_recorded_frames_are_images_for_viewers_and_change_nothing_else(mirotwin, short, seen, tmp_path):
     camera = [word for key in CAMERA for word in ("--set", key)]
     assert mirotwin("run", short, "--out", tmp_path / "plain", "-q", "--no-figure", *camera)[0] == 0
     plain = recording_reader.read(tmp_path / "plain" / "run.mcap")
@@ -156,9 +145,7 @@ def test_recorded_frames_are_images_for_viewers_and_change_nothing_else(
     assert "no frames of the camera of network 0; record them: mirotwin run .. --record-frames" in err
 
 
-def test_a_recording_that_was_broken_off_is_tracked_as_far_as_it_goes(
-    mirotwin: Callable[..., Result], seen: Path, tmp_path: Path
-) -> None:
+def test_a_recording_that_was_broken_off_is_tracked_as_far_as_it_goes(mirotwin, seen, tmp_path):
     part = tmp_path / "run.part.mcap"
     data = (seen / "run" / "run.mcap").read_bytes()
     part.write_bytes(data[: len(data) // 2])
@@ -180,9 +167,7 @@ def test_a_recording_that_was_broken_off_is_tracked_as_far_as_it_goes(
         ("0.txt", b"", ": holds no .png and no .ppm; give a folder of pictures, or a run.mcap"),
     ],
 )
-def test_a_picture_that_is_none_is_named(
-    mirotwin: Callable[..., Result], seen: Path, tmp_path: Path, name: str, content: bytes, expected: str
-) -> None:
+def test_a_picture_that_is_none_is_named(mirotwin, seen, tmp_path, name, content, expected):
     (tmp_path / name).write_bytes(content)
     code, out, err = mirotwin("camera", "track", tmp_path, *files(seen))
     assert (code, out) == (2, "")
@@ -190,7 +175,7 @@ def test_a_picture_that_is_none_is_named(
     assert err.count("\n") == 1
 
 
-def test_a_damaged_picture_is_named(mirotwin: Callable[..., Result], seen: Path, tmp_path: Path) -> None:
+def test_a_damaged_picture_is_named(mirotwin, seen, tmp_path):
     data = (seen / "frames" / "frame-000000.png").read_bytes()
     for number, broken in enumerate((data[:5000], data[:60] + b"\0" * 90 + data[150:], data[:20])):
         file = tmp_path / f"{number}" / "x.png"
@@ -231,12 +216,12 @@ def same_colour(text: str) -> str:
     ],
 )
 def test_colours_that_cannot_be_used_are_named_with_file_and_key(
-    mirotwin: Callable[..., Result],
-    seen: Path,
-    tmp_path: Path,
-    change: Callable[[str], str],
-    expected: str,
-) -> None:
+    mirotwin,
+    seen,
+    tmp_path,
+    change,
+    expected,
+):
     colours = tmp_path / "colours.toml"
     colours.write_text(change((seen / "colours.toml").read_text()))
     given = ("--calibration", seen / "camera.toml", "--colours", colours)
@@ -260,24 +245,20 @@ def test_colours_that_cannot_be_used_are_named_with_file_and_key(
         (("--calibration", "."), ".: is a folder"),
     ],
 )
-def test_what_cannot_be_tracked_is_refused(
-    mirotwin: Callable[..., Result], seen: Path, options: tuple[str, ...], expected: str
-) -> None:
+def test_what_cannot_be_tracked_is_refused(mirotwin, seen, options, expected):
     code, out, err = mirotwin("camera", "track", seen / "frames", *files(seen), *options)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith(f"mirotwin: error: {expected}")
 
 
 @pytest.mark.parametrize("path", ["absent", "camera.toml"])
-def test_a_path_that_is_neither_folder_nor_recording_is_named(
-    mirotwin: Callable[..., Result], seen: Path, path: str
-) -> None:
+def test_a_path_that_is_neither_folder_nor_recording_is_named(mirotwin, seen, path):
     code, out, err = mirotwin("camera", "track", seen / path, *files(seen))
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith(f"mirotwin: error: {seen / path}: ")
 
 
-def test_every_colour_of_the_tracker_is_in_the_file_that_calibrate_writes(seen: Path) -> None:
+def test_every_colour_of_the_tracker_is_in_the_file_that_calibrate_writes(seen):
     text = (seen / "colours.toml").read_text()
     for name in (*TEAMS, *IDENTITIES):
         assert f"[colours.{name}]" in text

@@ -4,7 +4,6 @@ import hashlib
 import json
 import resource
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -14,19 +13,19 @@ from click.testing import CliRunner
 from miro_robot.firmware import image_path
 from mirotwin.commands import main
 from tests import children
-from tests.mirotwin.conftest import Result, hex_file
+from tests.mirotwin.conftest import hex_file
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 LOOP = b"\x80\xfe"
 HELLO = bytes.fromhex("759850 758bff 758920 d28e 7599c3 80fe".replace(" ", ""))
 
 
-def test_reaching_the_address_is_success(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_reaching_the_address_is_success(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", b"\x00\x00\x00" + LOOP)
     assert mirotwin("fw", "run", image, "--until", "0x0002", "--max-cycles", 100) == (0, "", "")
 
 
-def test_a_symbol_is_found_with_or_without_its_underscore(mirotwin: Callable[..., Result]) -> None:
+def test_a_symbol_is_found_with_or_without_its_underscore(mirotwin):
     for name in ("main", "_main"):
         assert mirotwin("fw", "run", image_path(), "--until", name, "--max-cycles", 100_000) == (0, "", "")
 
@@ -50,12 +49,12 @@ def with_a_map_of_the_robot(tmp_path: Path, suffix: str = ".map", code: bytes = 
     ],
 )
 def test_a_command_that_needs_symbols_refuses_those_of_another_image(
-    mirotwin: Callable[..., Result],
-    tmp_path: Path,
-    suffix: str,
-    command: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    mirotwin,
+    tmp_path,
+    suffix,
+    command,
+    monkeypatch,
+):
     image, beside = with_a_map_of_the_robot(tmp_path, suffix)
     monkeypatch.chdir(tmp_path)
     code, out, err = mirotwin(*(str(image) if word == "IMAGE" else word for word in command))
@@ -65,17 +64,13 @@ def test_a_command_that_needs_symbols_refuses_those_of_another_image(
     assert sorted(tmp_path.iterdir()) == sorted([image, beside])
 
 
-def test_a_command_that_needs_no_symbols_does_not_read_them(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_command_that_needs_no_symbols_does_not_read_them(mirotwin, tmp_path):
     image, _ = with_a_map_of_the_robot(tmp_path)
     assert mirotwin("fw", "run", image, "--until", "0x0000") == (0, "", "")
     assert mirotwin("info", "--firmware", image)[0] == 0
 
 
-def test_a_fault_is_reported_by_address_beside_symbols_of_another_image(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_fault_is_reported_by_address_beside_symbols_of_another_image(mirotwin, tmp_path):
     image, beside = with_a_map_of_the_robot(tmp_path, code=b"\xa5")
     code, _, err = mirotwin("fw", "run", image, "--max-cycles", 100)
     fault, names = err.splitlines()
@@ -85,23 +80,19 @@ def test_a_fault_is_reported_by_address_beside_symbols_of_another_image(
     assert names.startswith(f"mirotwin: addresses have no names: {beside}:")
 
 
-def test_the_cycle_limit_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result]) -> None:
+def test_the_cycle_limit_has_an_exit_code_of_its_own(mirotwin):
     code, out, err = mirotwin("fw", "run", image_path(), "--max-cycles", 5000)
     assert (code, out) == (42, "")
     assert err.startswith("mirotwin: stopped at the limit, at 0x")
 
 
-def test_a_program_that_ends_is_done_unless_it_should_have_got_somewhere(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_program_that_ends_is_done_unless_it_should_have_got_somewhere(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", LOOP)
     assert mirotwin("fw", "run", image)[0] == 0
     assert mirotwin("fw", "run", image, "--until", "0x10")[0] == 1
 
 
-def test_an_endless_loop_ends_a_program_that_has_a_cycle_limit_too(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_an_endless_loop_ends_a_program_that_has_a_cycle_limit_too(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", b"\x00" + LOOP)
     code, _, err = mirotwin("fw", "run", image, "--max-cycles", 1)
     assert (code, err) == (42, "mirotwin: stopped at the limit, at 0x0001 after 1 machine cycles\n")
@@ -111,7 +102,7 @@ def test_an_endless_loop_ends_a_program_that_has_a_cycle_limit_too(
         assert err.startswith("mirotwin: the program ended at 0x0001 after 3 machine cycles")
 
 
-def test_a_fault_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_fault_has_an_exit_code_of_its_own(mirotwin, tmp_path):
     code, out, err = mirotwin("fw", "run", hex_file(tmp_path / "a.ihx", b"\xa5"), "--max-cycles", 100)
     assert (code, out) == (3, "")
     assert "firmware fault: firmware executed the undefined opcode A5" in err
@@ -127,20 +118,20 @@ def test_a_fault_has_an_exit_code_of_its_own(mirotwin: Callable[..., Result], tm
         ("0xyz", "not a hexadecimal number"),
     ],
 )
-def test_a_place_that_is_none_is_refused(mirotwin: Callable[..., Result], until: str, expected: str) -> None:
+def test_a_place_that_is_none_is_refused(mirotwin, until, expected):
     code, out, err = mirotwin("fw", "run", image_path(), "--until", until)
     assert (code, out) == (2, "")
     assert expected in err
     assert err.count("\n") == 1
 
 
-def test_characters_go_to_stdout_as_they_are_and_everything_else_to_stderr(tmp_path: Path) -> None:
+def test_characters_go_to_stdout_as_they_are_and_everything_else_to_stderr(tmp_path):
     image = hex_file(tmp_path / "a.ihx", HELLO)
     result = CliRunner().invoke(main, ["fw", "run", str(image), "--max-cycles", "300000"])
     assert result.stdout_bytes == b"\xc3"
 
 
-def test_the_dump_holds_registers_and_memories(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_the_dump_holds_registers_and_memories(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", b"\x75\x40\x5a" + LOOP)
     mirotwin("fw", "run", image, "--until", "0x0003", "--dump", tmp_path / "dump.json")
     dump = json.loads((tmp_path / "dump.json").read_bytes())
@@ -150,9 +141,7 @@ def test_the_dump_holds_registers_and_memories(mirotwin: Callable[..., Result], 
     assert dump["sfr"]["81"] == 7
 
 
-def test_a_dump_that_cannot_be_written_is_refused_before_the_firmware_runs(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_dump_that_cannot_be_written_is_refused_before_the_firmware_runs(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", HELLO)
     for place, what in ((tmp_path, "is a folder"), (tmp_path / "no" / "dump.json", "there is no folder")):
         code, out, err = mirotwin("fw", "run", image, "--dump", place)
@@ -160,9 +149,7 @@ def test_a_dump_that_cannot_be_written_is_refused_before_the_firmware_runs(
         assert err.startswith(f"mirotwin: error: {place}: {what}")
 
 
-def test_a_dump_takes_the_place_of_no_device_and_is_refused_before_the_firmware_runs(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_dump_takes_the_place_of_no_device_and_is_refused_before_the_firmware_runs(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", HELLO)
     code, out, err = mirotwin("fw", "run", image, "--max-cycles", 100, "--dump", "/dev/full")
     assert (code, out) == (2, "")
@@ -171,7 +158,7 @@ def test_a_dump_takes_the_place_of_no_device_and_is_refused_before_the_firmware_
     )
 
 
-def test_a_dump_that_does_not_fit_the_disk_leaves_the_one_before(tmp_path: Path) -> None:
+def test_a_dump_that_does_not_fit_the_disk_leaves_the_one_before(tmp_path):
     """A limit on the length of files stands in for the disk."""
 
     def limit() -> None:
@@ -189,18 +176,14 @@ def test_a_dump_that_does_not_fit_the_disk_leaves_the_one_before(tmp_path: Path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.ihx", "dump.json"]
 
 
-def test_the_8_kb_limit_is_lifted_when_code_is_in_ram(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_the_8_kb_limit_is_lifted_when_code_is_in_ram(mirotwin, tmp_path):
     image = tmp_path / "a.ihx"
     image.write_text(":0200000080FE80\n:02200000AABB79\n:00000001FF\n")
     assert "does not fit 8192 bytes" in mirotwin("fw", "run", image)[2]
     assert mirotwin("fw", "run", image, "--code-in-xram", "--until", "0x0000")[0] == 0
 
 
-def test_a_run_goes_on_after_faults_and_counts_those_that_are_not_listed(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_run_goes_on_after_faults_and_counts_those_that_are_not_listed(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", b"\xa5\x80\xfd")
     code, _, err = mirotwin("fw", "run", image, "--go-on", "--max-cycles", 330)
     assert code == 3
@@ -212,7 +195,7 @@ def test_a_run_goes_on_after_faults_and_counts_those_that_are_not_listed(
     assert err.endswith("mirotwin: stopped at the limit, at 0x0000 after 330 machine cycles\n")
 
 
-def test_a_time_is_one_of_the_crystal(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_time_is_one_of_the_crystal(mirotwin, tmp_path):
     """The program waits for RXD to fall and ends."""
     image = hex_file(tmp_path / "a.ihx", b"\x20\xb0\xfd" + LOOP)
     given = tmp_path / "given"
@@ -250,9 +233,7 @@ def test_a_time_is_one_of_the_crystal(mirotwin: Callable[..., Result], tmp_path:
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
-def test_input_that_cannot_be_meant_is_refused(
-    mirotwin: Callable[..., Result], tmp_path: Path, options: tuple[str, ...], said: str
-) -> None:
+def test_input_that_cannot_be_meant_is_refused(mirotwin, tmp_path, options, said):
     image, given = hex_file(tmp_path / "a.ihx", LOOP), tmp_path / "given"
     given.write_text("x")
     code, out, err = mirotwin("fw", "run", image, *(given if part == "F" else part for part in options))
@@ -260,7 +241,7 @@ def test_input_that_cannot_be_meant_is_refused(
     assert said in err
 
 
-def test_info_names_versions_engine_and_firmware(mirotwin: Callable[..., Result]) -> None:
+def test_info_names_versions_engine_and_firmware(mirotwin):
     code, out, err = mirotwin("info")
     assert (code, err) == (0, "")
     sha256 = hashlib.sha256(image_path().read_bytes()).hexdigest()
@@ -268,7 +249,7 @@ def test_info_names_versions_engine_and_firmware(mirotwin: Callable[..., Result]
         assert word in out
 
 
-def test_every_command_and_option_explains_itself() -> None:
+def test_every_command_and_option_explains_itself():
     def walk(command: click.Command) -> None:
         assert command.help
         for parameter in command.params:

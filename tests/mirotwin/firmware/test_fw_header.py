@@ -1,31 +1,23 @@
 """`mirotwin fw header`: the wire's numbers for the C of a firmware."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import pytest
 
 from miro_protocol import c_header
 from tests import children
-from tests.mirotwin.conftest import Result
 from tests.mutants.sdcc import needs_sdcc
 
 
-def test_the_header_goes_to_stdout(mirotwin: Callable[..., Result]) -> None:
+def test_the_header_goes_to_stdout(mirotwin):
     assert mirotwin("fw", "header") == (0, c_header.render(), "")
 
 
 @pytest.mark.parametrize("option", ["-o", "--out"])
-def test_the_header_goes_to_the_file_that_is_named(
-    mirotwin: Callable[..., Result], tmp_path: Path, option: str
-) -> None:
+def test_the_header_goes_to_the_file_that_is_named(mirotwin, tmp_path, option):
     assert mirotwin("fw", "header", option, tmp_path / "protocol.h") == (0, "", "")
     assert (tmp_path / "protocol.h").read_bytes() == c_header.render().encode()
 
 
-def test_a_header_that_is_there_is_replaced_by_force_only(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_header_that_is_there_is_replaced_by_force_only(mirotwin, tmp_path):
     file = tmp_path / "protocol.h"
     file.write_text("mine")
     code, out, err = mirotwin("fw", "header", "-o", file)
@@ -38,7 +30,7 @@ def test_a_header_that_is_there_is_replaced_by_force_only(
 
 
 @needs_sdcc
-def test_a_program_with_the_header_compiles(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_program_with_the_header_compiles(mirotwin, tmp_path):
     mirotwin("fw", "header", "-o", tmp_path / "protocol.h")
     (tmp_path / "mine.c").write_text(
         '#define PROTOCOL_TABLES\n#include "protocol.h"\n'

@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
@@ -64,7 +63,7 @@ US_TICKS = TICKS_PER_SECOND // 1_000_000
 
 
 @pytest.fixture(scope="module")
-def quiet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def quiet(tmp_path_factory):
     path = tmp_path_factory.mktemp("quiet") / "quiet.toml"
     path.write_text(QUIET)
     return path
@@ -85,9 +84,7 @@ def characters(vcd: Path, wire: str, baud: int = 9600) -> list[tuple[int, int]]:
     return [(int(line[1]), int(line[2], 16)) for line in lines if line is not None]
 
 
-def test_sigrok_reads_the_bytes_that_the_link_carried(
-    mirotwin: Callable[..., Result], quiet: Path, tmp_path: Path
-) -> None:
+def test_sigrok_reads_the_bytes_that_the_link_carried(mirotwin, quiet, tmp_path):
     out = tmp_path / "quiet.vcd"
     code, _, err = mirotwin("fw", "vcd", quiet, "--seed", 3, "--out", out)
     assert (code, err) == (0, "")
@@ -118,9 +115,7 @@ def test_sigrok_reads_the_bytes_that_the_link_carried(
     assert bytes(byte for _, byte in sent) == up
 
 
-def test_sigrok_reads_what_a_bare_processor_hears_and_says(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_sigrok_reads_what_a_bare_processor_hears_and_says(mirotwin, tmp_path):
     image = tmp_path / "echo.ihx"
     program = IntelHex()
     program.frombytes(assemble(ECHO))
@@ -138,9 +133,7 @@ def test_sigrok_reads_what_a_bare_processor_hears_and_says(
     assert vcd.last_tick == 12 * 100_000
 
 
-def test_a_save_file_shows_every_wire_of_the_waveform(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_a_save_file_shows_every_wire_of_the_waveform(mirotwin, short, tmp_path):
     out = tmp_path / "short.vcd"
     code, said, _ = mirotwin("fw", "vcd", short, "--to", "40ms", "--out", out)
     assert code == 0
@@ -154,9 +147,7 @@ def test_a_save_file_shows_every_wire_of_the_waveform(
     assert str(tmp_path) not in save
 
 
-def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(
-    short: Path, tmp_path: Path
-) -> None:
+def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(short, tmp_path):
     def written(name: str, *options: str) -> bytes:
         out = tmp_path / f"{name}.vcd"
         command = [MIROTWIN, "fw", "vcd", short, "--robot", "0", "--out", out, *options]
@@ -174,17 +165,13 @@ def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(
     assert len(part.wires["left_pwm"]) > 10
 
 
-def test_a_recording_is_a_subject_as_well(
-    mirotwin: Callable[..., Result], short: Path, finished: Path, tmp_path: Path
-) -> None:
+def test_a_recording_is_a_subject_as_well(mirotwin, short, finished, tmp_path):
     for name, subject in (("a", (short, "--seed", 5)), ("b", (finished / "run.mcap",))):
         assert mirotwin("fw", "vcd", *subject, "--to", "50ms", "--out", tmp_path / f"{name}.vcd")[0] == 0
     assert (tmp_path / "a.vcd").read_bytes() == (tmp_path / "b.vcd").read_bytes()
 
 
-def test_a_faulty_firmware_leaves_its_waveform_up_to_the_fault(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_faulty_firmware_leaves_its_waveform_up_to_the_fault(mirotwin, tmp_path):
     image = hex_file(
         tmp_path / "bad.ihx", b"\xb2\x90\xb2\x90\xa5"
     )  # CPL P1.0 twice, then the undefined opcode
@@ -201,9 +188,7 @@ def refused(result: Result, message: str) -> None:
     assert re.search(message, err), err
 
 
-def test_what_cannot_be_written_is_refused_and_nothing_is_left(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_what_cannot_be_written_is_refused_and_nothing_is_left(mirotwin, short, tmp_path):
     out = tmp_path / "x.vcd"
 
     def vcd(*arguments: object) -> Result:
@@ -223,9 +208,7 @@ def test_what_cannot_be_written_is_refused_and_nothing_is_left(
 
 
 @pytest.mark.parametrize("there", ["x.vcd", "x.gtkw"])
-def test_what_is_there_stays_unless_it_is_to_be_replaced(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, there: str
-) -> None:
+def test_what_is_there_stays_unless_it_is_to_be_replaced(mirotwin, short, tmp_path, there):
     (tmp_path / there).write_text("mine")
     command = ("fw", "vcd", short, "--to", "1ms", "--out", tmp_path / "x.vcd")
     refused(mirotwin(*command), f"{there}: is there already; .* --force")
@@ -235,12 +218,12 @@ def test_what_is_there_stays_unless_it_is_to_be_replaced(
     assert "mine" not in (tmp_path / there).read_text()
 
 
-def test_a_device_is_not_replaced(mirotwin: Callable[..., Result], short: Path) -> None:
+def test_a_device_is_not_replaced(mirotwin, short):
     refused(mirotwin("fw", "vcd", short, "--force", "--out", os.devnull), "is not a regular file")
     assert not os.path.isfile(os.devnull)
 
 
-def test_the_encoder_wires_count_what_the_chip_counts(tmp_path: Path) -> None:
+def test_the_encoder_wires_count_what_the_chip_counts(tmp_path):
     world = World(scenario_file.load("fig8").scenario, 0, load_hex(image_path()))
     board = world.networks[0].robots[0].board
     out = io.StringIO()
@@ -266,9 +249,7 @@ def test_the_encoder_wires_count_what_the_chip_counts(tmp_path: Path) -> None:
         assert abs(sum(steps) - chip.real_position) <= 1  # the chip's filter may hold back the last one
 
 
-def test_a_watched_world_has_the_digest_of_an_unwatched_one(
-    mirotwin: Callable[..., Result], short: Path
-) -> None:
+def test_a_watched_world_has_the_digest_of_an_unwatched_one(mirotwin, short):
     def digest(watched: bool, pieces: int) -> str:
         world = World(scenario_file.load(str(short)).scenario, 5, load_hex(image_path()))
         waveforms = []

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import termios
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -45,7 +45,7 @@ PATIENCE_S = 60
 
 
 @pytest.fixture(scope="module")
-def monitor(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def monitor(tmp_path_factory):
     """The image, with `space` and `commands` beside it."""
     folder = tmp_path_factory.mktemp("monitor")
     (folder / "space").write_text(" ")
@@ -71,9 +71,7 @@ def talk(image: Path, *options: object) -> Result:
     ],
     ids=lambda options: " ".join(map(str, options)),
 )
-def test_a_monitor_that_measures_the_bit_rate_answers_a_script(
-    monitor: Path, options: tuple[object, ...]
-) -> None:
+def test_a_monitor_that_measures_the_bit_rate_answers_a_script(monitor, options):
     script = ("--stdin-when", "> ", "--stdin", monitor.with_name("commands"), "--stdin-by-line")
     code, out, err = talk(monitor, *options, *script)
     assert (code, out) == (0, DIALOGUE)
@@ -81,7 +79,7 @@ def test_a_monitor_that_measures_the_bit_rate_answers_a_script(
     assert err.count("\n") == 1
 
 
-def test_pairs_of_text_and_file_are_one_conversation(monitor: Path, tmp_path: Path) -> None:
+def test_pairs_of_text_and_file_are_one_conversation(monitor, tmp_path):
     (tmp_path / "ask").write_text("= 6*7\r")
     (tmp_path / "leave").write_text("q\r")
     pairs = ("--stdin-when", "ready\r\n> ", "--stdin", tmp_path / "ask")
@@ -90,7 +88,7 @@ def test_pairs_of_text_and_file_are_one_conversation(monitor: Path, tmp_path: Pa
     assert (code, out) == (0, "\r\nMonitor ready\r\n> = 6*7\r\n42\r\n> q\r\nbye\r\n")
 
 
-def test_a_text_that_never_comes_is_named(monitor: Path) -> None:
+def test_a_text_that_never_comes_is_named(monitor):
     script = ("--stdin-when", "READY", "--stdin", monitor.with_name("commands"))
     code, out, err = talk(monitor, "--baud", 9600, *script, "--max-cycles", 100_000)
     assert (code, out) == (42, "\r\nMonitor ready\r\n> ")
@@ -98,17 +96,17 @@ def test_a_text_that_never_comes_is_named(monitor: Path) -> None:
     assert f"mirotwin: --stdin-when: b'READY' was not seen; {left} bytes of --stdin were not sent\n" in err
 
 
-def test_without_a_rate_the_monitor_hears_nothing(monitor: Path) -> None:
+def test_without_a_rate_the_monitor_hears_nothing(monitor):
     assert talk(monitor, "--max-cycles", 100_000)[:2] == (42, "")
 
 
-def test_standard_input_is_sent_too(monitor: Path) -> None:
+def test_standard_input_is_sent_too(monitor):
     command = [MIROTWIN, "fw", "run", monitor, "--baud", "9600", "--stdin", "-", "--stdin-gap", "20ms"]
     done = children.run(command, input=b" = 1+1\rq\r", capture_output=True, timeout=PATIENCE_S)
     assert (done.returncode, done.stdout) == (0, b"\r\nMonitor ready\r\n> = 1+1\r\n2\r\n> q\r\nbye\r\n")
 
 
-def test_the_look_commands_take_the_same_dialogue(monitor: Path, mirotwin: Callable[..., Result]) -> None:
+def test_the_look_commands_take_the_same_dialogue(monitor, mirotwin):
     options = ("--baud", 9600, "--stdin", monitor.with_name("space"))
     script = ("--stdin-when", "> ", "--stdin", monitor.with_name("commands"), "--stdin-by-line")
     code, out, _ = mirotwin("fw", "coverage", monitor, *options, *script)
@@ -157,7 +155,7 @@ def terminal(*arguments: object) -> Iterator[Talk]:
         os.close(slave)
 
 
-def test_a_person_at_a_terminal_is_answered_and_leaves(monitor: Path) -> None:
+def test_a_person_at_a_terminal_is_answered_and_leaves(monitor):
     with terminal(monitor, "--baud", 9600, "--stdin", monitor.with_name("space")) as talk:
         talk.until("Monitor ready\r\n> ")
         talk.type("= 12*12\r")
@@ -168,7 +166,7 @@ def test_a_person_at_a_terminal_is_answered_and_leaves(monitor: Path) -> None:
     assert talk.child.returncode == 0
 
 
-def test_the_key_that_is_measured_may_be_typed(monitor: Path) -> None:
+def test_the_key_that_is_measured_may_be_typed(monitor):
     with terminal(monitor, "--baud", 9600) as talk:
         time.sleep(1)
         talk.type(" ")
@@ -179,20 +177,20 @@ def test_the_key_that_is_measured_may_be_typed(monitor: Path) -> None:
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
-def test_a_signal_gives_the_terminal_back(monitor: Path, number: signal.Signals, code: int) -> None:
+def test_a_signal_gives_the_terminal_back(monitor, number, code):
     with terminal(monitor, "--baud", 9600, "--stdin", monitor.with_name("space")) as talk:
         talk.until("> ")
         talk.child.send_signal(number)
     assert talk.child.returncode == code
 
 
-def test_a_fault_gives_the_terminal_back(tmp_path: Path) -> None:
+def test_a_fault_gives_the_terminal_back(tmp_path):
     with terminal(hex_file(tmp_path / "a.ihx", b"\xa5")) as talk:
         pass
     assert talk.child.returncode == 3
 
 
-def test_without_a_terminal_there_is_no_live_one(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_without_a_terminal_there_is_no_live_one(mirotwin, tmp_path):
     code, out, err = mirotwin("fw", "run", hex_file(tmp_path / "a.ihx", b"\x80\xfe"), "--terminal")
     assert (code, out) == (2, "")
     assert err == (
@@ -200,9 +198,7 @@ def test_without_a_terminal_there_is_no_live_one(mirotwin: Callable[..., Result]
     )
 
 
-def test_a_program_with_more_than_8_kb_keeps_its_external_ram_apart(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_program_with_more_than_8_kb_keeps_its_external_ram_apart(mirotwin, tmp_path):
     """SDCC's large model: variables from 0000h of external RAM on, where the code is as well."""
     table = ",".join(str(number * 7 % 251) for number in range(9000))
     program = f"""\
@@ -232,7 +228,7 @@ void main(void)
     assert "--code-in-xram: the program has overwritten " in shared[2]
 
 
-def test_sizes_of_a_program_are_checked(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_sizes_of_a_program_are_checked(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", b"\x00\x80\xfe")
     assert mirotwin("fw", "run", image, "--code-size", "3")[0] == 0
     assert "does not fit 2 bytes" in mirotwin("fw", "run", image, "--code-size", "2")[2]

@@ -5,13 +5,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests import children
-from tests.mirotwin.conftest import Result
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
 FILE_BYTES = 16384
@@ -21,9 +19,7 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_a_file_where_the_folder_should_be_is_refused_with_the_way_out(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_file_where_the_folder_should_be_is_refused_with_the_way_out(mirotwin, tmp_path):
     (tmp_path / "mine").write_text("mine")
     expected = f"mirotwin: error: {tmp_path / 'mine'}: exists and is not a folder; choose another folder with --out\n"
     assert mirotwin("fw", "vectors", "--out", tmp_path / "mine", "--force") == (2, "", expected)
@@ -31,7 +27,7 @@ def test_a_file_where_the_folder_should_be_is_refused_with_the_way_out(
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_set_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
+def test_an_interrupted_set_leaves_nothing(tmp_path, number):
     command = [MIROTWIN, "fw", "vectors", "--out", tmp_path / "set", "--per-opcode", "2000"]
     with children.start(command, stderr=subprocess.PIPE) as running:
         while running.poll() is None and not any(tmp_path.rglob("*.json")):
@@ -41,7 +37,7 @@ def test_an_interrupted_set_leaves_nothing(tmp_path: Path, number: signal.Signal
     assert names(tmp_path) == []
 
 
-def test_a_disk_that_is_full_leaves_nothing_and_is_named(tmp_path: Path) -> None:
+def test_a_disk_that_is_full_leaves_nothing_and_is_named(tmp_path):
     """A limit on the length of files stands in for the disk."""
 
     def limit() -> None:

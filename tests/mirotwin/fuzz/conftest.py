@@ -1,6 +1,5 @@
 """What the tests of campaigns share: the command in this process, with an engine that needs no other program."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,7 @@ from tests.mirotwin.fuzz.random_engine import RandomEngine
 
 
 @pytest.fixture
-def engines(monkeypatch: pytest.MonkeyPatch) -> list[RandomEngine]:
+def engines(monkeypatch):
     """The engines that `mirotwin fuzz` makes in a test: in this process, by chance."""
     made: list[RandomEngine] = []
 
@@ -26,7 +25,7 @@ def engines(monkeypatch: pytest.MonkeyPatch) -> list[RandomEngine]:
 
 
 @pytest.fixture
-def built() -> Callable[[str], Path]:
+def built():
     """The image of the firmware with a planted mistake, by its name."""
     from tests.mirotwin.verify.checks.rig import planted
 

@@ -24,7 +24,7 @@ TOY = TargetSpec(input="bytes", maker="tests.mirotwin.fuzz.toy:toy")
 
 
 @pytest.fixture(autouse=True)
-def importable_toy(monkeypatch: pytest.MonkeyPatch) -> None:
+def importable_toy(monkeypatch):
     """Processes of the engine do not import from the current folder."""
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
 
@@ -38,7 +38,7 @@ def kept_after(
     return kept, explorer
 
 
-def test_an_input_is_kept_when_it_executes_an_edge_or_a_class_of_counts_that_is_new() -> None:
+def test_an_input_is_kept_when_it_executes_an_edge_or_a_class_of_counts_that_is_new():
     kept: list[tuple[str, bytes]] = []
     explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
     for data in (b"a", b"b", b"ab", b"F", b"abcd", b"1234567", b"12345678", b"Fa"):
@@ -47,7 +47,7 @@ def test_an_input_is_kept_when_it_executes_an_edge_or_a_class_of_counts_that_is_
     assert explorer.edges == 3
 
 
-def test_a_finding_is_kept_once_for_each_check_and_place() -> None:
+def test_a_finding_is_kept_once_for_each_check_and_place():
     kept: list[tuple[str, bytes]] = []
     explorer = Explorer(Toy(), lambda kind, data: kept.append((kind, data)))
     for data in (b"FZ\x01", b"FZ\x01\x02", b"FZ\x02"):
@@ -56,15 +56,15 @@ def test_a_finding_is_kept_once_for_each_check_and_place() -> None:
     assert explorer.edges == 0
 
 
-def test_the_seeds_are_run_first_and_the_number_of_runs_is_kept_to() -> None:
+def test_the_seeds_are_run_first_and_the_number_of_runs_is_kept_to():
     kept, explorer = kept_after(3, 0, (b"a", b"FZ"))
     assert kept[:2] == [("queue", b"a"), ("crashes", b"FZ")]
     assert explorer.target.executions == 3
 
 
 def test_the_same_seed_keeps_the_same_inputs_over_several_rounds_and_another_one_others(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     monkeypatch.setattr(hypothesis_search, "ROUND_EXAMPLES", 60)
     one, two, other = (kept_after(200, seed)[0] for seed in (1, 1, 2))
     assert one == two
@@ -73,7 +73,7 @@ def test_the_same_seed_keeps_the_same_inputs_over_several_rounds_and_another_one
 
 @pytest.mark.parametrize("kind", INPUTS)
 @pytest.mark.parametrize("foreign", [False, True])
-def test_inputs_of_all_kinds_are_drawn(kind: str, foreign: bool) -> None:
+def test_inputs_of_all_kinds_are_drawn(kind, foreign):
     @settings(max_examples=20)
     @given(inputs(kind, 5, 4, foreign), st.data())
     def is_read(data: bytes, draw: st.DataObject) -> None:
@@ -83,7 +83,7 @@ def test_inputs_of_all_kinds_are_drawn(kind: str, foreign: bool) -> None:
     is_read()
 
 
-def test_a_session_is_made_of_whole_operations() -> None:
+def test_a_session_is_made_of_whole_operations():
     target = target_for(load_hex(image_path()))
 
     @settings(max_examples=30)
@@ -96,7 +96,7 @@ def test_a_session_is_made_of_whole_operations() -> None:
     is_whole()
 
 
-def test_the_shipped_firmware_is_fed_and_its_edges_are_found() -> None:
+def test_the_shipped_firmware_is_fed_and_its_edges_are_found():
     kept: list[str] = []
     target = target_for(load_hex(image_path()))
     explorer = Explorer(target, lambda kind, data: kept.append(kind))
@@ -106,7 +106,7 @@ def test_the_shipped_firmware_is_fed_and_its_edges_are_found() -> None:
 
 
 @pytest.fixture
-def seeds(tmp_path: Path) -> Path:
+def seeds(tmp_path):
     folder = tmp_path / "seeds"
     folder.mkdir()
     (folder / "one").write_bytes(b"FZ\x07")
@@ -121,9 +121,7 @@ def waited(run: HypothesisRun, limit_s: float = 60.0) -> Iterator[None]:
     raise AssertionError(f"nothing came in {limit_s} s: {run.progress()}")
 
 
-def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once(
-    tmp_path: Path, seeds: Path
-) -> None:
+def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once(tmp_path, seeds):
     crashes: list[Path] = []
     queue: list[Path] = []
     with HypothesisRun([TOY.text()], seeds, tmp_path / "out", jobs=2, seed=5) as run:
@@ -145,7 +143,7 @@ def test_a_campaign_hands_out_each_find_once_tells_its_progress_and_ends_at_once
     run.stop()
 
 
-def test_a_process_that_somebody_kills_is_told(tmp_path: Path, seeds: Path) -> None:
+def test_a_process_that_somebody_kills_is_told(tmp_path, seeds):
     with HypothesisRun([TOY.text()], seeds, tmp_path / "out", seed=5) as run:
         for _ in waited(run):
             if run.progress().executions:
@@ -156,9 +154,7 @@ def test_a_process_that_somebody_kills_is_told(tmp_path: Path, seeds: Path) -> N
             run.progress()
 
 
-def test_a_target_that_cannot_be_made_ends_the_campaign_with_its_own_line(
-    tmp_path: Path, seeds: Path
-) -> None:
+def test_a_target_that_cannot_be_made_ends_the_campaign_with_its_own_line(tmp_path, seeds):
     spec = TargetSpec(image=str(tmp_path / "none.ihx"))
     with (
         HypothesisRun([spec.text()], seeds, tmp_path / "out") as run,
@@ -172,6 +168,6 @@ def _wait_for_ever(run: HypothesisRun) -> None:
         run.progress()
 
 
-def test_no_job_is_refused(tmp_path: Path, seeds: Path) -> None:
+def test_no_job_is_refused(tmp_path, seeds):
     with pytest.raises(BadInput, match=r"^--jobs: 0: there is nothing to do; give 1 or more$"):
         HypothesisRun([TOY.text()], seeds, tmp_path / "out", jobs=0)

@@ -6,7 +6,7 @@ from mirotwin.fuzz.target import target_for
 from tests.mutants.heard import verdicts
 
 
-def test_characters_behind_the_tested_frame_do_not_end_the_time_that_its_test_has() -> None:
+def test_characters_behind_the_tested_frame_do_not_end_the_time_that_its_test_has():
     target = target_for(load_hex(image_path()))
     # A frame, repeated until its test falls into the end of the 110 ms, and the next frame without a pause behind it.
     data = bytes.fromhex("0000000088889a8888888800")

@@ -1,7 +1,5 @@
 """What the tests of plugs get: the command line in this process, and a world with ports."""
 
-from collections.abc import Iterator
-
 import pytest
 
 from tests.mirotwin.conftest import mirotwin
@@ -11,7 +9,7 @@ __all__ = ["mirotwin", "rig"]
 
 
 @pytest.fixture
-def rig() -> Iterator[Rig]:
+def rig():
     found = Rig()
     yield found
     found.close()

@@ -34,7 +34,7 @@ ANSWERED = "19 55555555ff2d\n" * 4
 
 
 @pytest.fixture
-def site(tmp_path: Path) -> Path:
+def site(tmp_path):
     """pyserial with our handler beside its own, as an installation lays them out."""
     folder = tmp_path / "site"
     shutil.copytree(
@@ -53,19 +53,19 @@ def questions() -> list[str]:
     return [question(seq).hex() for seq in range(0, 12, 3)]
 
 
-def test_a_program_that_knows_pyserial_talks_to_a_robot_in_its_own_process(site: Path) -> None:
+def test_a_program_that_knows_pyserial_talks_to_a_robot_in_its_own_process(site):
     url = "miro://fig6?set=network.radio.bit_error_rate=0"
     done = python(A_PROGRAM, url, *questions(), env=with_site(site))
     assert (done.returncode, done.stdout, done.stderr) == (0, ANSWERED, "")
 
 
-def test_importing_pyserial_loads_nothing_of_ours(site: Path) -> None:
+def test_importing_pyserial_loads_nothing_of_ours(site):
     code = "import serial, sys; print([name for name in sys.modules if name.startswith('miro') or 'protocol_' in name])"
     assert python(code, env=with_site(site)).stdout == "[]\n"
 
 
 @pytest.mark.parametrize("kind", ["pty", "tcp", "rfc2217"])
-def test_the_same_program_talks_to_a_served_robot(kind: str, tmp_path: Path) -> None:
+def test_the_same_program_talks_to_a_served_robot(kind, tmp_path):
     option = ("--pty", tmp_path / "radio") if kind == "pty" else (f"--{kind}", 0)
     with served("fig6", *option, *SETTINGS, "--once", "--realtime", 2, "--out", tmp_path / "out") as session:
         done = python(A_PROGRAM, session.ports[kind][0], *questions())
@@ -107,9 +107,7 @@ class Terminal:
 
 
 @pytest.mark.parametrize("kind", ["miro", "pty", "tcp", "rfc2217"])
-def test_miniterm_sends_what_is_typed_and_shows_what_the_robot_answers(
-    kind: str, site: Path, tmp_path: Path
-) -> None:
+def test_miniterm_sends_what_is_typed_and_shows_what_the_robot_answers(kind, site, tmp_path):
     def use(url: str) -> None:
         command = [sys.executable, "-m", "serial.tools.miniterm", "--encoding", "hexlify", url]
         terminal = Terminal(command, env=with_site(site))
@@ -137,7 +135,7 @@ def test_miniterm_sends_what_is_typed_and_shows_what_the_robot_answers(
 
 @pytest.mark.skipif(shutil.which("socat") is None, reason="needs socat")
 @pytest.mark.parametrize("kind", ["pty", "tcp"])
-def test_socat_talks_to_a_robot(kind: str, tmp_path: Path) -> None:
+def test_socat_talks_to_a_robot(kind, tmp_path):
     option = ("--pty", tmp_path / "radio") if kind == "pty" else (f"--{kind}", 0)
     with served("fig6", *option, *SETTINGS, "--once", "--out", tmp_path / "out") as session:
         where = f"TCP:127.0.0.1:{session.number()}" if kind == "tcp" else f"{tmp_path / 'radio'},raw,echo=0"
@@ -148,7 +146,7 @@ def test_socat_talks_to_a_robot(kind: str, tmp_path: Path) -> None:
     assert replays(tmp_path / "out/run.mcap") > 3
 
 
-def test_two_programs_on_two_ports_both_send_and_both_hear(tmp_path: Path) -> None:
+def test_two_programs_on_two_ports_both_send_and_both_hear(tmp_path):
     ports = ("--tcp", 0, "--pty", tmp_path / "radio")
     with served("fig6", *ports, *SETTINGS, "--once", "--out", tmp_path / "out") as session:
         one = serial.serial_for_url(session.ports["tcp"][0], timeout=2)
@@ -166,7 +164,7 @@ def test_two_programs_on_two_ports_both_send_and_both_hear(tmp_path: Path) -> No
     assert sent_bytes(tmp_path / "out/run.mcap") == question(0) + question(3)
 
 
-def test_a_port_of_each_network(tmp_path: Path) -> None:
+def test_a_port_of_each_network(tmp_path):
     scenario = ROOT / "examples/two_teams.toml"
     settings = [word for index in (0, 1) for word in ("--set", f"network.{index}.radio.bit_error_rate=0")]
     ports = ("--tcp", 0, "--tcp", "0@1")

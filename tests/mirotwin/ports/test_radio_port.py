@@ -1,7 +1,6 @@
 """The radio's port in virtual time: when bytes go on the air, and that a replay gives the same digests."""
 
 import time
-from pathlib import Path
 
 import pytest
 
@@ -23,7 +22,7 @@ def live_world(*settings: str, scenario: str = "fig6") -> World:
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.005])
 @pytest.mark.parametrize("off_ticks", [-121, -1, 0, 1, 120, 24_000, 119_999, 120_000, 400_000])
-def test_what_is_sent_at_any_tick_replays_to_the_same_digests(latency_s: float, off_ticks: int) -> None:
+def test_what_is_sent_at_any_tick_replays_to_the_same_digests(latency_s, off_ticks):
     world = live_world(f"network.radio.latency_s={latency_s}")
     periods: list[Period] = []
     world.observers.append(periods.append)
@@ -35,7 +34,7 @@ def test_what_is_sent_at_any_tick_replays_to_the_same_digests(latency_s: float, 
     assert len(script_of(periods)) == 1
 
 
-def test_bytes_queue_behind_each_other_and_the_buffer_has_room_for_4096() -> None:
+def test_bytes_queue_behind_each_other_and_the_buffer_has_room_for_4096():
     world = live_world()
     port = RadioPort(world)
     assert (port.waiting, port.room) == (0, TRANSMIT_CHARACTERS)
@@ -47,7 +46,7 @@ def test_bytes_queue_behind_each_other_and_the_buffer_has_room_for_4096() -> Non
     assert (port.waiting, port.room) == (0, TRANSMIT_CHARACTERS)
 
 
-def test_purging_takes_back_what_has_not_begun() -> None:
+def test_purging_takes_back_what_has_not_begun():
     world = live_world()
     port = RadioPort(world)
     port.send(b"a" * 10)
@@ -59,7 +58,7 @@ def test_purging_takes_back_what_has_not_begun() -> None:
     assert world.networks[0].frames_sent == 1
 
 
-def test_what_the_pc_hears_is_given_once() -> None:
+def test_what_the_pc_hears_is_given_once():
     world = live_world("network.radio.bit_error_rate=0")
     port = RadioPort(world)
     port.send(question(0))
@@ -72,7 +71,7 @@ def test_what_the_pc_hears_is_given_once() -> None:
 @pytest.mark.parametrize(
     "scenario", ["fig6", "fig7", "fig8", "fig9", "fig10", "curve", "line", "sine", "waypoints"]
 )
-def test_every_scenario_that_comes_with_the_package_can_be_lived_in_for_a_day(scenario: str) -> None:
+def test_every_scenario_that_comes_with_the_package_can_be_lived_in_for_a_day(scenario):
     world = live_world(scenario=scenario)
     assert world.scenario.duration_s == 86_400.0
     assert {network.host for network in world.networks} == {"silent"}
@@ -80,7 +79,7 @@ def test_every_scenario_that_comes_with_the_package_can_be_lived_in_for_a_day(sc
         assert RadioPort(world, network.index).waiting == 0
 
 
-def test_a_scenario_with_steps_is_refused(tmp_path: Path) -> None:
+def test_a_scenario_with_steps_is_refused(tmp_path):
     path = tmp_path / "steps.toml"
     path.write_text(source_text("fig6") + '\n[[step]]\nradio = "down"\n')
     with pytest.raises(
@@ -89,12 +88,12 @@ def test_a_scenario_with_steps_is_refused(tmp_path: Path) -> None:
         live_scenario(str(path))
 
 
-def test_a_network_that_is_not_there_is_refused() -> None:
+def test_a_network_that_is_not_there_is_refused():
     with pytest.raises(ValueError, match="there is no network 1; there are 1, from 0 on"):
         RadioPort(live_world(), 1)
 
 
-def test_what_was_sent_in_an_hour_is_announced_within_seconds() -> None:
+def test_what_was_sent_in_an_hour_is_announced_within_seconds():
     sent = [Transmission(100_000 + index * 1_000_000, DOWN, b"x") for index in range(80_000)]
     begun_s = time.process_time()
     world = World(live_world().scenario, 1, own_image(), script=sent)

@@ -1,7 +1,6 @@
 """A port with telnet negotiation, with clients that talk sense and nonsense."""
 
 import socket
-from collections.abc import Iterator
 
 import pytest
 from hypothesis import given, settings
@@ -20,7 +19,7 @@ def sent_to(port: Rfc2217Endpoint, data: bytes) -> bytes:
     return b"".join(port.heard_from(data[at : at + 7]) for at in range(0, len(data), 7))
 
 
-def test_bytes_pass_with_ff_doubled(rig: Rig) -> None:
+def test_bytes_pass_with_ff_doubled(rig):
     port = rig.opened(Rfc2217Endpoint(rig.place, "127.0.0.1", 0))
     client = connected(port)
     everything = bytes(range(256))
@@ -29,7 +28,7 @@ def test_bytes_pass_with_ff_doubled(rig: Rig) -> None:
     client.close()
 
 
-def test_the_rate_is_answered_with_the_one_there_is(rig: Rig) -> None:
+def test_the_rate_is_answered_with_the_one_there_is(rig):
     port = rig.opened(Rfc2217Endpoint(rig.place, "127.0.0.1", 0))
     client = connected(port)
     client.recv(100)
@@ -41,7 +40,7 @@ def test_the_rate_is_answered_with_the_one_there_is(rig: Rig) -> None:
     client.close()
 
 
-def test_purging_empties_the_buffers(rig: Rig) -> None:
+def test_purging_empties_the_buffers(rig):
     port = rig.opened(Rfc2217Endpoint(rig.place, "127.0.0.1", 0))
     client = connected(port)
     port.port.send(b"a" * 100)
@@ -61,7 +60,7 @@ def test_purging_empties_the_buffers(rig: Rig) -> None:
         IAC + SB + COM_PORT + bytes(100_000) + IAC + SE,
     ],
 )
-def test_nonsense_is_ignored_and_what_follows_passes(rig: Rig, nonsense: bytes) -> None:
+def test_nonsense_is_ignored_and_what_follows_passes(rig, nonsense):
     port = rig.opened(Rfc2217Endpoint(rig.place, "127.0.0.1", 0))
     client = connected(port)
     assert sent_to(port, nonsense + b"through").endswith(b"through")
@@ -79,7 +78,7 @@ _pieces = st.one_of(
 
 
 @pytest.fixture(scope="module")
-def fuzzed() -> Iterator[Rig]:
+def fuzzed():
     found = Rig()
     yield found
     found.close()
@@ -87,7 +86,7 @@ def fuzzed() -> Iterator[Rig]:
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(_pieces, max_size=40))
-def test_no_negotiation_raises_or_grows_without_bound(fuzzed: Rig, pieces: list[bytes]) -> None:
+def test_no_negotiation_raises_or_grows_without_bound(fuzzed, pieces):
     if not fuzzed.open:
         fuzzed.opened(Rfc2217Endpoint(fuzzed.place, "127.0.0.1", 0))
         fuzzed.client = connected(fuzzed.open[0])  # type: ignore[attr-defined, arg-type]
@@ -102,7 +101,7 @@ def test_no_negotiation_raises_or_grows_without_bound(fuzzed: Rig, pieces: list[
     assert sent_to(port, b"55") == b"55"
 
 
-def test_a_client_that_asks_without_reading_answers_is_put_out(rig: Rig) -> None:
+def test_a_client_that_asks_without_reading_answers_is_put_out(rig):
     port = rig.opened(Rfc2217Endpoint(rig.place, "127.0.0.1", 0))
     client = connected(port)
     client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)

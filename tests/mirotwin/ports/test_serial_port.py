@@ -3,9 +3,8 @@
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,7 +19,7 @@ Open = Callable[..., Serial]
 
 
 @pytest.fixture
-def miro(monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
+def miro(monkeypatch):
     """Opens URLs as a program does; all are closed at the end."""
     monkeypatch.setattr(serial, "protocol_handler_packages", ["serial.urlhandler", "mirotwin.ports"])
     opened: list[Any] = []
@@ -42,7 +41,7 @@ def asked(port: Serial, seq: int = 0) -> bytes:
 # ---- what passes time ------------------------------------------------------------------------------------
 
 
-def test_a_read_ends_at_the_tick_at_which_its_last_byte_is_known(miro: Open) -> None:
+def test_a_read_ends_at_the_tick_at_which_its_last_byte_is_known(miro):
     one, other = miro(timeout=1), miro(timeout=1)
     whole = asked(one)
     assert len(whole) == ANSWER_BYTES
@@ -56,13 +55,13 @@ def test_a_read_ends_at_the_tick_at_which_its_last_byte_is_known(miro: Open) -> 
     assert all(abs(gap - HOST_CHARACTER_TICKS) <= 60 for gap in gaps)  # the robot's crystal: 0.16 % faster
 
 
-def test_a_read_that_gets_nothing_takes_its_timeout_to_the_tick(miro: Open) -> None:
+def test_a_read_that_gets_nothing_takes_its_timeout_to_the_tick(miro):
     port = miro(timeout=0.25)
     assert port.read(1) == b""
     assert port.world.tick == ticks(0.25)
 
 
-def test_a_read_that_gets_too_little_gives_what_there_is_at_its_timeout(miro: Open) -> None:
+def test_a_read_that_gets_too_little_gives_what_there_is_at_its_timeout(miro):
     port = miro(timeout=0.3)
     port.write(question(0))
     begun = port.world.tick
@@ -70,14 +69,14 @@ def test_a_read_that_gets_too_little_gives_what_there_is_at_its_timeout(miro: Op
     assert port.world.tick == begun + ticks(0.3)
 
 
-def test_a_pause_between_bytes_ends_a_read(miro: Open) -> None:
+def test_a_pause_between_bytes_ends_a_read(miro):
     port = miro(timeout=1, inter_byte_timeout=0.005)
     port.write(question(0))
     assert len(port.read(100)) == ANSWER_BYTES
     assert port.world.tick < ticks(0.1)
 
 
-def test_looking_sleeping_and_writing_let_no_time_pass(miro: Open) -> None:
+def test_looking_sleeping_and_writing_let_no_time_pass(miro):
     port = miro(timeout=0)
     port.write(question(0))
     time.sleep(0.01)
@@ -85,7 +84,7 @@ def test_looking_sleeping_and_writing_let_no_time_pass(miro: Open) -> None:
     assert port.world.tick == 0
 
 
-def test_flush_passes_the_time_that_the_characters_take(miro: Open) -> None:
+def test_flush_passes_the_time_that_the_characters_take(miro):
     port = miro()
     port.write(b"x" * 96)
     port.flush()
@@ -93,7 +92,7 @@ def test_flush_passes_the_time_that_the_characters_take(miro: Open) -> None:
     assert abs(port.world.tick - ticks(0.101)) < ticks(0.0002)  # 0.1 s and 1 ms of key-up
 
 
-def test_a_write_waits_for_room_in_the_buffer_and_no_longer(miro: Open) -> None:
+def test_a_write_waits_for_room_in_the_buffer_and_no_longer(miro):
     port = miro()
     assert port.write(bytes(4000)) == 4000
     assert port.world.tick == 0
@@ -102,7 +101,7 @@ def test_a_write_waits_for_room_in_the_buffer_and_no_longer(miro: Open) -> None:
     assert 0.9 < port.world.tick / ticks(1) < 1.0
 
 
-def test_a_write_that_finds_no_room_in_time_says_so(miro: Open) -> None:
+def test_a_write_that_finds_no_room_in_time_says_so(miro):
     port = miro(write_timeout=0.1)
     with pytest.raises(serial.SerialTimeoutException):
         port.write(bytes(5000))
@@ -111,7 +110,7 @@ def test_a_write_that_finds_no_room_in_time_says_so(miro: Open) -> None:
     assert 0 <= port.write(bytes(5000)) < 100
 
 
-def test_the_same_calls_give_the_same_digest(miro: Open) -> None:
+def test_the_same_calls_give_the_same_digest(miro):
     digests = []
     for _ in range(2):
         port = miro("miro://fig6?seed=3", timeout=0.05)
@@ -124,7 +123,7 @@ def test_the_same_calls_give_the_same_digest(miro: Open) -> None:
 # ---- what a program may rely on --------------------------------------------------------------------------
 
 
-def test_each_open_is_a_robot_that_has_just_been_switched_on(miro: Open) -> None:
+def test_each_open_is_a_robot_that_has_just_been_switched_on(miro):
     port = miro(timeout=0.1)
     first = asked(port)
     port.close()
@@ -134,7 +133,7 @@ def test_each_open_is_a_robot_that_has_just_been_switched_on(miro: Open) -> None
     assert asked(port) == first
 
 
-def test_purging_forgets_what_was_heard_and_what_waits(miro: Open) -> None:
+def test_purging_forgets_what_was_heard_and_what_waits(miro):
     port = miro(timeout=0.1)
     port.write(question(0))
     port.flush()
@@ -146,7 +145,7 @@ def test_purging_forgets_what_was_heard_and_what_waits(miro: Open) -> None:
     assert port.out_waiting == 0
 
 
-def test_a_reading_thread_is_ended_by_cancel_read(miro: Open) -> None:
+def test_a_reading_thread_is_ended_by_cancel_read(miro):
     port = miro(URL + "&realtime=1", timeout=None)
     found: list[bytes] = []
     thread = threading.Thread(target=lambda: found.append(port.read(100)))
@@ -158,7 +157,7 @@ def test_a_reading_thread_is_ended_by_cancel_read(miro: Open) -> None:
     assert len(found[0]) == ANSWER_BYTES
 
 
-def test_in_real_time_a_read_takes_as_long_as_it_says(miro: Open) -> None:
+def test_in_real_time_a_read_takes_as_long_as_it_says(miro):
     port = miro(URL + "&realtime=2", timeout=1.0)
     begun_s = time.monotonic()
     assert asked(port) != b""
@@ -169,7 +168,7 @@ def test_in_real_time_a_read_takes_as_long_as_it_says(miro: Open) -> None:
     assert port.world.tick > ticks(1.3)  # time passes between calls too
 
 
-def test_polling_where_no_time_passes_is_warned_of_once(miro: Open) -> None:
+def test_polling_where_no_time_passes_is_warned_of_once(miro):
     port = miro()
     with pytest.warns(RuntimeWarning, match="use realtime=1 in the URL") as warned:
         assert [port.in_waiting for _ in range(2500)] == [0] * 2500
@@ -181,7 +180,7 @@ def test_polling_where_no_time_passes_is_warned_of_once(miro: Open) -> None:
             assert port.in_waiting == 0
 
 
-def test_lines_that_a_radio_does_not_have_are_there_and_do_nothing(miro: Open) -> None:
+def test_lines_that_a_radio_does_not_have_are_there_and_do_nothing(miro):
     port = miro(rtscts=True, dsrdtr=True)
     port.dtr = port.rts = False
     port.break_condition = True
@@ -193,7 +192,7 @@ def test_lines_that_a_radio_does_not_have_are_there_and_do_nothing(miro: Open) -
 # ---- what ends it ----------------------------------------------------------------------------------------
 
 
-def test_a_limit_ends_a_read_that_would_wait_for_ever(miro: Open) -> None:
+def test_a_limit_ends_a_read_that_would_wait_for_ever(miro):
     port = miro(URL + "&limit_s=0.5", timeout=None)
     with pytest.raises(
         serial.SerialException, match=r"the limit of 0.5 s of virtual time is reached \(limit_s\)"
@@ -204,7 +203,7 @@ def test_a_limit_ends_a_read_that_would_wait_for_ever(miro: Open) -> None:
     assert port.world.tick == ticks(0.5)
 
 
-def test_a_firmware_fault_ends_every_call_with_its_name(miro: Open, tmp_path: Path) -> None:
+def test_a_firmware_fault_ends_every_call_with_its_name(miro, tmp_path):
     image = tmp_path / "undefined.ihx"
     image.write_text(":01000000A55A\n:00000001FF\n")
     port = miro(f"miro://fig6?firmware={image}", timeout=1)
@@ -222,7 +221,7 @@ def test_a_firmware_fault_ends_every_call_with_its_name(miro: Open, tmp_path: Pa
         ("miro://fig6?speed=9600", "is no option of the URL"),
     ],
 )
-def test_what_cannot_be_opened_is_a_serial_exception_of_one_line(miro: Open, url: str, said: str) -> None:
+def test_what_cannot_be_opened_is_a_serial_exception_of_one_line(miro, url, said):
     with pytest.raises(serial.SerialException) as raised:
         miro(url)
     assert said in str(raised.value)
@@ -233,7 +232,7 @@ def test_what_cannot_be_opened_is_a_serial_exception_of_one_line(miro: Open, url
     "named",
     [{"baudrate": 115200}, {"parity": "E"}, {"stopbits": 2}, {"bytesize": 7}, {"xonxoff": True}],
 )
-def test_a_rate_or_format_that_the_radio_does_not_have_is_refused(miro: Open, named: dict[str, Any]) -> None:
+def test_a_rate_or_format_that_the_radio_does_not_have_is_refused(miro, named):
     with pytest.raises(ValueError, match=r"this radio has|xonxoff"):
         miro(**named)
     port = miro()
@@ -242,7 +241,7 @@ def test_a_rate_or_format_that_the_radio_does_not_have_is_refused(miro: Open, na
             setattr(port, name, value)
 
 
-def test_a_port_that_is_not_open_says_so(miro: Open) -> None:
+def test_a_port_that_is_not_open_says_so(miro):
     port = miro(do_not_open=True)
     for use in (port.read, port.flush, lambda: port.write(b"x"), lambda: port.in_waiting, lambda: port.world):
         with pytest.raises(serial.PortNotOpenError):
@@ -253,7 +252,7 @@ def test_a_port_that_is_not_open_says_so(miro: Open) -> None:
 # ---- what it leaves --------------------------------------------------------------------------------------
 
 
-def test_a_recording_of_the_port_replays_to_the_same_digests(miro: Open, tmp_path: Path) -> None:
+def test_a_recording_of_the_port_replays_to_the_same_digests(miro, tmp_path):
     port = miro(f"miro://fig6?seed=5&out={tmp_path / 'out'}", timeout=0.05)
     for seq in range(5):
         asked(port, seq)
@@ -266,7 +265,7 @@ def test_a_recording_of_the_port_replays_to_the_same_digests(miro: Open, tmp_pat
         miro(f"miro://fig6?out={tmp_path / 'out'}")
 
 
-def test_a_full_disk_is_an_error_of_the_port_and_what_was_recorded_stays(tmp_path: Path) -> None:
+def test_a_full_disk_is_an_error_of_the_port_and_what_was_recorded_stays(tmp_path):
     code = (
         "import resource, sys, serial\n"
         "sys.dont_write_bytecode = True\n"

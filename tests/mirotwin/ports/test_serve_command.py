@@ -6,8 +6,6 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -40,9 +38,7 @@ def talk(session: Served, seq: int = 0) -> socket.socket:
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_leaves_parts_that_replay(
-    mirotwin: Callable[..., Result], number: int, code: int, tmp_path: Path
-) -> None:
+def test_a_signal_leaves_parts_that_replay(mirotwin, number, code, tmp_path):
     with served("fig6", "--tcp", 0, *SETTINGS, "--out", tmp_path / "out") as session:
         client = talk(session)
         time.sleep(0.2)
@@ -58,9 +54,7 @@ def test_a_signal_leaves_parts_that_replay(
     assert mirotwin("replay", tmp_path / "out/case.part.stream", "-q")[0] == 0
 
 
-def test_a_check_that_fails_is_exit_code_1_and_leaves_a_case_that_fails_the_same_way(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_check_that_fails_is_exit_code_1_and_leaves_a_case_that_fails_the_same_way(mirotwin, tmp_path):
     asked = ("--expect", "frames_accepted_min=150", "--duration", "1s")
     with served("fig6", "--tcp", 0, *SETTINGS, *asked, "--out", tmp_path / "out") as session:
         talk(session).close()
@@ -70,7 +64,7 @@ def test_a_check_that_fails_is_exit_code_1_and_leaves_a_case_that_fails_the_same
     assert (code, "fails as recorded: frames_accepted_min: " in out + err) == (1, True)
 
 
-def test_a_session_that_is_killed_leaves_all_but_the_last_half_second(tmp_path: Path) -> None:
+def test_a_session_that_is_killed_leaves_all_but_the_last_half_second(tmp_path):
     with served(
         "fig6", "--tcp", 0, "--pty", tmp_path / "radio", *SETTINGS, "--out", tmp_path / "out"
     ) as session:
@@ -86,7 +80,7 @@ def test_a_session_that_is_killed_leaves_all_but_the_last_half_second(tmp_path: 
     assert session.code == 0
 
 
-def test_a_full_disk_ends_it_with_what_was_recorded(tmp_path: Path) -> None:
+def test_a_full_disk_ends_it_with_what_was_recorded(tmp_path):
     def limited() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
@@ -100,7 +94,7 @@ def test_a_full_disk_ends_it_with_what_was_recorded(tmp_path: Path) -> None:
     assert replays(tmp_path / "out/run.part.mcap") > 3
 
 
-def test_clients_that_vanish_are_followed_by_others_and_what_they_sent_was_sent(tmp_path: Path) -> None:
+def test_clients_that_vanish_are_followed_by_others_and_what_they_sent_was_sent(tmp_path):
     with served("fig6", "--tcp", 0, *SETTINGS, "--realtime", 2, "--out", tmp_path / "out") as session:
         for seq in (0, 3, 6):
             client = talk(session, seq)
@@ -115,7 +109,7 @@ def test_clients_that_vanish_are_followed_by_others_and_what_they_sent_was_sent(
     assert replays(tmp_path / "out/run.part.mcap") > 3
 
 
-def test_a_second_client_is_refused_with_a_line(tmp_path: Path) -> None:
+def test_a_second_client_is_refused_with_a_line(tmp_path):
     with served("fig6", "--tcp", 0, *SETTINGS, "--once", "--out", tmp_path / "out") as session:
         first = talk(session)
         with socket.create_connection(first.getpeername(), timeout=5) as second:
@@ -127,14 +121,14 @@ def test_a_second_client_is_refused_with_a_line(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "out/summary.json").read_bytes())["live"]["plugs"][0]["refused"] == 1
 
 
-def test_a_duration_ends_it_whoever_is_there(tmp_path: Path) -> None:
+def test_a_duration_ends_it_whoever_is_there(tmp_path):
     with served("fig6", "--duration", "0.5s", "--realtime", 4, "--out", tmp_path / "out") as session:
         session.wait()
     assert session.code == 0
     assert replays(tmp_path / "out/run.mcap") == 15
 
 
-def test_a_firmware_fault_ends_it_with_exit_code_3(tmp_path: Path) -> None:
+def test_a_firmware_fault_ends_it_with_exit_code_3(tmp_path):
     image = tmp_path / "undefined.ihx"
     image.write_text(":01000000A55A\n:00000001FF\n")
     command = [sys.executable, "-c", PROGRAM, "serve", "fig6", "--firmware", image, "--out", tmp_path / "out"]
@@ -143,7 +137,7 @@ def test_a_firmware_fault_ends_it_with_exit_code_3(tmp_path: Path) -> None:
     assert "mirotwin: firmware fault: net0/robot0: " in done.stderr
 
 
-def test_the_command_line_replays_a_session(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_the_command_line_replays_a_session(mirotwin, tmp_path):
     with served("fig6", "--tcp", 0, *SETTINGS, "--once", "--out", tmp_path / "out") as session:
         talk(session).close()
         session.wait()
@@ -163,9 +157,7 @@ def test_the_command_line_replays_a_session(mirotwin: Callable[..., Result], tmp
         (["fig6", "--pty", "/no/such/folder/radio"], "/no/such/folder/radio: No such file or directory"),
     ],
 )
-def test_what_cannot_be_served_is_one_line_and_exit_code_2(
-    mirotwin: Callable[..., Result], tmp_path: Path, arguments: list[str], said: str
-) -> None:
+def test_what_cannot_be_served_is_one_line_and_exit_code_2(mirotwin, tmp_path, arguments, said):
     code, _, err = mirotwin("serve", *arguments, "--out", tmp_path / "out")
     assert (code, err.count("\n")) == (2, 1)
     assert said in err

@@ -50,7 +50,7 @@ def session_of(
     return session, found, told
 
 
-def test_a_session_ends_with_the_period_in_which_its_duration_does_and_replays_to_its_digests() -> None:
+def test_a_session_ends_with_the_period_in_which_its_duration_does_and_replays_to_its_digests():
     session, (client,), _ = session_of((ticks(0.05), question(0)), (ticks(0.2), question(3)))
     session.pace.per_look = ticks(0.0007)  # type: ignore[attr-defined]
     periods: list[Period] = []
@@ -64,7 +64,7 @@ def test_a_session_ends_with_the_period_in_which_its_duration_does_and_replays_t
     assert [again.step().digest for _ in periods] == [period.digest for period in periods]
 
 
-def test_what_is_sent_goes_on_the_air_where_the_world_stands_when_it_arrives() -> None:
+def test_what_is_sent_goes_on_the_air_where_the_world_stands_when_it_arrives():
     session, _, _ = session_of((ticks(0.1), question(0)))
     session.pace.per_look = ticks(0.0003)  # type: ignore[attr-defined]
     periods: list[Period] = []
@@ -74,7 +74,7 @@ def test_what_is_sent_goes_on_the_air_where_the_world_stands_when_it_arrives() -
     assert ticks(0.101) <= sent.tick < ticks(0.101 + 0.002) + 121 + 1  # at most a slice later, and the key-up
 
 
-def test_all_ports_of_a_network_hear_its_robots() -> None:
+def test_all_ports_of_a_network_hear_its_robots():
     session, clients, _ = session_of((0, question(0)), ports=3)
     session.pace.per_look = ticks(0.001)  # type: ignore[attr-defined]
     runner.run(session)
@@ -82,7 +82,7 @@ def test_all_ports_of_a_network_hear_its_robots() -> None:
     assert clients[0].got == clients[1].got == clients[2].got
 
 
-def test_a_world_that_is_behind_catches_up_without_skipping_and_says_by_how_much() -> None:
+def test_a_world_that_is_behind_catches_up_without_skipping_and_says_by_how_much():
     session, _, told = session_of()
     session.pace.per_look = ticks(0.0005)  # type: ignore[attr-defined]
     session.run_to(ticks(0.1))
@@ -96,7 +96,7 @@ def test_a_world_that_is_behind_catches_up_without_skipping_and_says_by_how_much
     assert session.world.tick == ticks(0.8)
 
 
-def test_once_ends_it_when_the_last_client_has_gone() -> None:
+def test_once_ends_it_when_the_last_client_has_gone():
     session, (client, other), _ = session_of(ports=2, once=True)
     session.pace.per_look = ticks(0.001)  # type: ignore[attr-defined]
     session.step()
@@ -110,7 +110,7 @@ def test_once_ends_it_when_the_last_client_has_gone() -> None:
     assert session.finished
 
 
-def test_a_full_buffer_drops_what_comes_in_and_counts_it() -> None:
+def test_a_full_buffer_drops_what_comes_in_and_counts_it():
     buffer = Bounded(10)
     buffer.add(b"abcdefgh")
     buffer.add(b"ijkl")
@@ -121,7 +121,7 @@ def test_a_full_buffer_drops_what_comes_in_and_counts_it() -> None:
 
 
 @pytest.mark.parametrize("reads", [True, False])
-def test_a_client_that_does_not_read_loses_what_comes_when_its_buffer_is_full(reads: bool) -> None:
+def test_a_client_that_does_not_read_loses_what_comes_when_its_buffer_is_full(reads):
     _, (client,), told = session_of()
     client.out = Bounded(16)
     for _ in range(4):

@@ -1,11 +1,9 @@
 """A few of the sessions that `python -m tests.mirotwin.ports.sessions` runs by the dozen."""
 
-from pathlib import Path
-
 from tests.mirotwin.ports import sessions
 
 
-def test_live_sessions_under_load_replay_to_their_own_digests(tmp_path: Path) -> None:
+def test_live_sessions_under_load_replay_to_their_own_digests(tmp_path):
     with sessions.load(1):
         for seed in (0, 1):
             periods, _ = sessions.session(seed, tmp_path)

@@ -9,11 +9,11 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import ticks
 from mirotwin.ports.rfc2217 import Rfc2217Endpoint
 from mirotwin.ports.sockets import TcpEndpoint
-from tests.mirotwin.ports.ports import Rig, connected, soon
+from tests.mirotwin.ports.ports import connected, soon
 from tests.mirotwin.ports.rig import question
 
 
-def test_bytes_pass_as_they_are_both_ways(rig: Rig) -> None:
+def test_bytes_pass_as_they_are_both_ways(rig):
     port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
     client = connected(port)
     everything = bytes(range(256))
@@ -30,7 +30,7 @@ def test_bytes_pass_as_they_are_both_ways(rig: Rig) -> None:
     assert (port.plug().clients, port.plug().bytes_out) == (1, 256)
 
 
-def test_a_second_client_is_refused_and_the_first_one_stays(rig: Rig) -> None:
+def test_a_second_client_is_refused_and_the_first_one_stays(rig):
     port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
     first = connected(port)
     with socket.create_connection(first.getpeername(), timeout=5) as second:
@@ -44,7 +44,7 @@ def test_a_second_client_is_refused_and_the_first_one_stays(rig: Rig) -> None:
     first.close()
 
 
-def test_a_client_that_breaks_the_connection_is_gone_and_the_next_one_is_welcome(rig: Rig) -> None:
+def test_a_client_that_breaks_the_connection_is_gone_and_the_next_one_is_welcome(rig):
     port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
     for _ in range(2):
         client = connected(port)
@@ -55,7 +55,7 @@ def test_a_client_that_breaks_the_connection_is_gone_and_the_next_one_is_welcome
     assert port.plug().clients == 2
 
 
-def test_a_client_whose_input_is_over_gets_answers_for_half_a_second(rig: Rig) -> None:
+def test_a_client_whose_input_is_over_gets_answers_for_half_a_second(rig):
     port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
     client = connected(port)
     client.sendall(b"?")
@@ -72,7 +72,7 @@ def test_a_client_whose_input_is_over_gets_answers_for_half_a_second(rig: Rig) -
     assert client.recv(100) == b""
 
 
-def test_bytes_wait_in_the_kernel_while_the_transmit_buffer_is_full(rig: Rig) -> None:
+def test_bytes_wait_in_the_kernel_while_the_transmit_buffer_is_full(rig):
     port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
     client = connected(port)
     client.sendall(bytes(6000))
@@ -92,7 +92,7 @@ def test_bytes_wait_in_the_kernel_while_the_transmit_buffer_is_full(rig: Rig) ->
     client.close()
 
 
-def test_a_slow_reader_is_dropped_bytes_and_not_waited_for(rig: Rig) -> None:
+def test_a_slow_reader_is_dropped_bytes_and_not_waited_for(rig):
     port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
     client = connected(port)
     for _ in range(2000):
@@ -106,7 +106,7 @@ def test_a_slow_reader_is_dropped_bytes_and_not_waited_for(rig: Rig) -> None:
     assert plug.bytes_out + plug.dropped == 2000 * 8192
 
 
-def test_a_port_that_is_taken_is_bad_input(rig: Rig) -> None:
+def test_a_port_that_is_taken_is_bad_input(rig):
     port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
     number = int(port.where.rpartition(":")[2])
     with pytest.raises(
@@ -118,8 +118,8 @@ def test_a_port_that_is_taken_is_bad_input(rig: Rig) -> None:
 
 
 def test_the_kernel_gives_up_a_client_that_has_vanished_whether_answers_are_on_their_way_or_not(
-    rig: Rig,
-) -> None:
+    rig,
+):
     port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
     with connected(port):
         assert port._socket is not None

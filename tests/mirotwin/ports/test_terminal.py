@@ -2,17 +2,16 @@
 
 import os
 import select
-from pathlib import Path
 
 import pytest
 
 from miro_exact.bad_input import BadInput
 from mirotwin.ports import terminal
 from mirotwin.ports.terminal import PtyEndpoint
-from tests.mirotwin.ports.ports import Rig, soon
+from tests.mirotwin.ports.ports import soon
 
 
-def test_a_terminal_passes_all_bytes_unchanged_and_without_echo(rig: Rig, tmp_path: Path) -> None:
+def test_a_terminal_passes_all_bytes_unchanged_and_without_echo(rig, tmp_path):
     port = rig.opened(PtyEndpoint(rig.place, tmp_path / "radio"))
     client = os.open(tmp_path / "radio", os.O_RDWR | os.O_NOCTTY)
     soon(port, lambda: port.client)
@@ -29,7 +28,7 @@ def test_a_terminal_passes_all_bytes_unchanged_and_without_echo(rig: Rig, tmp_pa
     soon(port, lambda: not port.client)
 
 
-def test_what_a_program_has_not_read_is_gone_when_the_next_one_opens_the_terminal(rig: Rig) -> None:
+def test_what_a_program_has_not_read_is_gone_when_the_next_one_opens_the_terminal(rig):
     port = rig.opened(PtyEndpoint(rig.place, None))
     client = os.open(port.path, os.O_RDWR | os.O_NOCTTY)
     soon(port, lambda: port.client)
@@ -44,7 +43,7 @@ def test_what_a_program_has_not_read_is_gone_when_the_next_one_opens_the_termina
     os.close(client)
 
 
-def test_a_program_that_writes_and_closes_at_once_is_heard(rig: Rig) -> None:
+def test_a_program_that_writes_and_closes_at_once_is_heard(rig):
     port = rig.opened(PtyEndpoint(rig.place, None))
     client = os.open(port.path, os.O_WRONLY | os.O_NOCTTY)
     os.write(client, b"short visit")
@@ -52,7 +51,7 @@ def test_a_program_that_writes_and_closes_at_once_is_heard(rig: Rig) -> None:
     assert soon(port, lambda: port.clients and not port.client) == b"short visit"
 
 
-def test_a_full_terminal_holds_nothing_up_and_what_is_dropped_is_counted(rig: Rig) -> None:
+def test_a_full_terminal_holds_nothing_up_and_what_is_dropped_is_counted(rig):
     port = rig.opened(PtyEndpoint(rig.place, None))
     client = os.open(port.path, os.O_RDWR | os.O_NOCTTY)
     soon(port, lambda: port.client)
@@ -66,7 +65,7 @@ def test_a_full_terminal_holds_nothing_up_and_what_is_dropped_is_counted(rig: Ri
     assert port.plug().bytes_out + port.plug().dropped == 100 * 4096
 
 
-def test_another_baud_rate_is_told_once(rig: Rig) -> None:
+def test_another_baud_rate_is_told_once(rig):
     termios = pytest.importorskip("termios")
     port = rig.opened(PtyEndpoint(rig.place, None))
     client = os.open(port.path, os.O_RDWR | os.O_NOCTTY)
@@ -83,9 +82,7 @@ def test_another_baud_rate_is_told_once(rig: Rig) -> None:
     assert len([line for line in rig.told if "has set another baud rate; the radio has 9600" in line]) == 1
 
 
-def test_a_link_is_made_and_removed_and_replaces_only_one_that_leads_nowhere(
-    rig: Rig, tmp_path: Path
-) -> None:
+def test_a_link_is_made_and_removed_and_replaces_only_one_that_leads_nowhere(rig, tmp_path):
     link = tmp_path / "radio"
     link.symlink_to(tmp_path / "gone")
     port = PtyEndpoint(rig.place, link)
@@ -111,9 +108,7 @@ def test_a_link_is_made_and_removed_and_replaces_only_one_that_leads_nowhere(
     assert link.read_text() == "years of work"
 
 
-def test_a_lock_whose_file_another_session_has_just_removed_is_taken_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_lock_whose_file_another_session_has_just_removed_is_taken_again(tmp_path, monkeypatch):
     """Two sessions that began while a third ended had both the lock, of two files of one name."""
     fcntl = pytest.importorskip("fcntl")
     path, flock, removed = tmp_path / ".radio.lock", fcntl.flock, []

@@ -21,7 +21,7 @@ from mirotwin.ports.url import Target, parse_url
         ("miro://fig6?limit_s=10&out=runs/x", Target("fig6", limit_s=10.0, out="runs/x")),
     ],
 )
-def test_a_url_says_what_to_open(url: str, target: Target) -> None:
+def test_a_url_says_what_to_open(url, target):
     assert parse_url(url) == target
 
 
@@ -41,7 +41,7 @@ def test_a_url_says_what_to_open(url: str, target: Target) -> None:
         ("miro://fig6?out=", "out: '' is empty"),
     ],
 )
-def test_one_that_cannot_be_used_is_named_with_the_place_and_a_remedy(url: str, said: str) -> None:
+def test_one_that_cannot_be_used_is_named_with_the_place_and_a_remedy(url, said):
     with pytest.raises(BadInput) as raised:
         parse_url(url)
     assert f"{url}: " in str(raised.value)
@@ -49,7 +49,7 @@ def test_one_that_cannot_be_used_is_named_with_the_place_and_a_remedy(url: str, 
 
 
 @given(st.text(max_size=40))
-def test_any_text_is_a_target_or_bad_input(text: str) -> None:
+def test_any_text_is_a_target_or_bad_input(text):
     for url in (text, f"miro://{text}", f"miro://fig6?{text}"):
         try:
             assert parse_url(url).scenario

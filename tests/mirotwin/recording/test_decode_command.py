@@ -6,8 +6,6 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -20,7 +18,6 @@ from miro_protocol.stream import format_stream
 from miro_protocol.transmission import Transmission
 from mirotwin.commands import main
 from tests import children
-from tests.mirotwin.conftest import Result
 
 PROGRAM = [sys.executable, "-c", "from mirotwin.commands import main; main()"]
 
@@ -48,7 +45,7 @@ def as_json(data: bytes, *options: str) -> tuple[int, list[dict], str]:  # type:
 
 
 @pytest.mark.parametrize("data", [DOWN, DOWN.hex().encode(), b", ".join(b"0x%02x" % byte for byte in DOWN)])
-def test_bytes_without_times_are_told_by_their_offsets(data: bytes) -> None:
+def test_bytes_without_times_are_told_by_their_offsets(data):
     code, lines, err = decode(data)
     assert (code, err) == (0, "")
     assert lines[0].endswith(", network 0 of 3 robots")
@@ -65,7 +62,7 @@ def test_bytes_without_times_are_told_by_their_offsets(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("data", [PCAPNG, STREAM])
-def test_captures_with_times_and_both_directions_are_told_by_their_ticks(data: bytes) -> None:
+def test_captures_with_times_and_both_directions_are_told_by_their_ticks(data):
     code, found, err = as_json(data)
     assert (code, err) == (0, "")
     first, *rows, last = found
@@ -94,9 +91,7 @@ def test_captures_with_times_and_both_directions_are_told_by_their_ticks(data: b
     assert (last["accepted"], last["telemetry"], last["damaged"]) == (2, 1, 1)
 
 
-def test_a_recording_says_how_many_robots_it_has_and_gives_both_directions(
-    mirotwin: Callable[..., Result], finished: Path
-) -> None:
+def test_a_recording_says_how_many_robots_it_has_and_gives_both_directions(mirotwin, finished):
     code, out, err = mirotwin("decode", finished / "run.mcap", "--json")
     assert (code, err) == (0, "")
     rows = [json.loads(line) for line in out.splitlines()]
@@ -106,13 +101,13 @@ def test_a_recording_says_how_many_robots_it_has_and_gives_both_directions(
     assert rows[-1]["telemetry"] >= 1
 
 
-def test_repeated_numbers_are_stale() -> None:
+def test_repeated_numbers_are_stale():
     lines = decode(TEAM + SERVICE + SERVICE)[1]
     assert [line.split()[5] for line in lines[3:-1]] == ["accepted", "accepted", "stale"]
 
 
 @pytest.mark.parametrize("n", [3, 5])
-def test_the_layout_is_that_in_which_frames_can_be_read_unless_it_is_said(n: int) -> None:
+def test_the_layout_is_that_in_which_frames_can_be_read_unless_it_is_said(n):
     wire = encode(TeamFrame(0, 1, ((1, 2),) * n), n)
     assert as_json(wire)[1][1]["event"] == "frame"
     code, found, err = as_json(wire, "--robots", str(8 - n))
@@ -120,7 +115,7 @@ def test_the_layout_is_that_in_which_frames_can_be_read_unless_it_is_said(n: int
     assert found[1]["event"] == "damage"
 
 
-def test_a_layout_that_cannot_be_told_is_said_to_be_a_guess() -> None:
+def test_a_layout_that_cannot_be_told_is_said_to_be_a_guess():
     assert "no frame of 3 or 5 robots at the beginning; 3 robots assumed (--robots" in decode(b"\0" * 50)[2]
     both = TEAM + encode(TeamFrame(0, 2, ((1, 2),) * 5), 5) * 2
     assert (
@@ -129,7 +124,7 @@ def test_a_layout_that_cannot_be_told_is_said_to_be_a_guess() -> None:
     assert decode(both, "--robots", "3", "--direction", "down")[2] == ""
 
 
-def test_raw_telemetry_is_found_to_come_from_a_robot() -> None:
+def test_raw_telemetry_is_found_to_come_from_a_robot():
     code, found, _ = as_json(ANSWER)
     assert (code, found[1]["direction"], found[1]["type"]) == (0, "<", "telemetry")
     assert as_json(TEAM, "--direction", "up")[1][1]["event"] == "damage"
@@ -137,13 +132,13 @@ def test_raw_telemetry_is_found_to_come_from_a_robot() -> None:
 
 @settings(deadline=None, max_examples=50)
 @given(st.binary(max_size=200))
-def test_any_bytes_are_decoded(data: bytes) -> None:
+def test_any_bytes_are_decoded(data):
     code, found, _ = as_json(data, "--format", "raw")
     assert code == 0
     assert b"".join(bytes.fromhex(row["data"]) for row in found[1:-1]) == data
 
 
-def test_plain_text_is_taken_for_bytes_with_a_word_about_it() -> None:
+def test_plain_text_is_taken_for_bytes_with_a_word_about_it():
     code, lines, err = decode(b"hello world, how are you?")
     assert code == 0
     assert "standard input: is text, but neither pairs of hex digits nor a stream file" in err
@@ -169,9 +164,7 @@ def test_plain_text_is_taken_for_bytes_with_a_word_about_it() -> None:
         (b"\x89MCAP0\r\n\1\2", (), 0, "offset 8: the file ends in the middle of a record"),
     ],
 )
-def test_what_cannot_be_read_is_named_after_all_that_could(
-    data: bytes, options: tuple[str, ...], rows: int, message: str
-) -> None:
+def test_what_cannot_be_read_is_named_after_all_that_could(data, options, rows, message):
     code, lines, err = decode(data, *options)
     assert code == 2
     assert message in err.splitlines()[-1]
@@ -183,7 +176,7 @@ def test_what_cannot_be_read_is_named_after_all_that_could(
     assert message in found[-2]["text"]
 
 
-def test_a_capture_of_very_many_networks_does_not_fill_the_memory() -> None:
+def test_a_capture_of_very_many_networks_does_not_fill_the_memory():
     crowd = render([Transmission(at, ">", TEAM, at) for at in range(200)])
     code, lines, err = decode(crowd)
     assert code == 2
@@ -192,9 +185,7 @@ def test_a_capture_of_very_many_networks_does_not_fill_the_memory() -> None:
     assert len(lines) == 3 + 64 + 1
 
 
-def test_a_damaged_recording_gives_what_came_before(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_a_damaged_recording_gives_what_came_before(mirotwin, finished, tmp_path):
     whole = (finished / "run.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
     code, out, err = mirotwin("decode", tmp_path / "cut.mcap")
@@ -203,14 +194,14 @@ def test_a_damaged_recording_gives_what_came_before(
     assert out.count("team_ask") >= 1
 
 
-def test_no_such_file_and_devices_are_refused(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_no_such_file_and_devices_are_refused(mirotwin, tmp_path):
     assert mirotwin("decode", tmp_path / "none")[0] == 2
     assert mirotwin("decode", tmp_path)[0] == 2
     assert "is a device; name a file or a pipe" in mirotwin("decode", "/dev/zero")[2]
     assert mirotwin("decode", "/dev/null")[0] == 0
 
 
-def test_it_works_in_a_pipe_and_shows_a_frame_before_the_input_ends() -> None:
+def test_it_works_in_a_pipe_and_shows_a_frame_before_the_input_ends():
     command = [*PROGRAM, "decode", "-", "--json"]
     options = ["--format", "raw", "--robots", "3", "--direction", "down"]
     with children.start([*command, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
@@ -229,9 +220,7 @@ def test_it_works_in_a_pipe_and_shows_a_frame_before_the_input_ends() -> None:
     ("command", "arguments"), [("decode", ()), ("decode", ("--json",)), ("export", ("--out", "-"))]
 )
 @pytest.mark.parametrize("cut", [0, 3])
-def test_packets_of_unknown_events_are_counted_on_stderr(
-    mirotwin: Callable[..., Result], tmp_path: Path, command: str, arguments: tuple[str, ...], cut: int
-) -> None:
+def test_packets_of_unknown_events_are_counted_on_stderr(mirotwin, tmp_path, command, arguments, cut):
     odd = bytearray(
         render(
             [
@@ -254,9 +243,7 @@ def test_packets_of_unknown_events_are_counted_on_stderr(
 
 @pytest.mark.parametrize("arguments", [(), ("--json",)])
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
-def test_a_file_whose_name_is_no_utf_8_is_decoded(
-    tmp_path: Path, arguments: tuple[str, ...], encoding: str
-) -> None:
+def test_a_file_whose_name_is_no_utf_8_is_decoded(tmp_path, arguments, encoding):
     name = os.fsencode(tmp_path) + b"/odd\xff.hex"
     with open(name, "wb") as file:
         file.write(DOWN.hex().encode())
@@ -270,7 +257,7 @@ def test_a_file_whose_name_is_no_utf_8_is_decoded(
     assert b"odd" in found.stdout.splitlines()[0]
 
 
-def test_a_device_that_never_ends_is_refused_as_standard_input_too() -> None:
+def test_a_device_that_never_ends_is_refused_as_standard_input_too():
     with open("/dev/zero", "rb") as zeros:
         found = children.run(
             [*PROGRAM, "decode", "-"], stdin=zeros, capture_output=True, timeout=30, check=False
@@ -280,7 +267,7 @@ def test_a_device_that_never_ends_is_refused_as_standard_input_too() -> None:
 
 
 @pytest.mark.parametrize(("closed", "name"), [("<&-", b"standard input"), (">&-", b"standard output")])
-def test_a_closed_standard_stream_is_named(closed: str, name: bytes) -> None:
+def test_a_closed_standard_stream_is_named(closed, name):
     line = shlex.join([*PROGRAM, "decode", "-"])
     found = children.run(f"{line} {closed}", shell=True, capture_output=True, input=b"", check=False)
     assert found.returncode == 2

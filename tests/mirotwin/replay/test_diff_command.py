@@ -2,8 +2,6 @@
 
 import json
 import math
-from collections.abc import Callable
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -15,14 +13,14 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording.recorder import Recorder
 from mirotwin.recording.source import source_of
-from tests.mirotwin.conftest import SHORT, Result
+from tests.mirotwin.conftest import SHORT
 from tests.mirotwin.replay.rig import STOP_AT, Planted
 from tests.mirotwin.replay.test_replay_command import rewritten
 from tests.mirotwin.verify.checks.rig import own_image
 
 
 @pytest.fixture(scope="module")
-def runs(mirotwin: Callable[..., Result], short: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def runs(mirotwin, short, tmp_path_factory):
     """A folder of runs: the short one again, and with one thing changed each."""
     folder = tmp_path_factory.mktemp("runs")
     patched = folder / "patched.ihx"
@@ -55,17 +53,13 @@ def with_stop_after(ms: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def test_two_runs_of_the_same_hold_the_same(
-    mirotwin: Callable[..., Result], finished: Path, runs: Path
-) -> None:
+def test_two_runs_of_the_same_hold_the_same(mirotwin, finished, runs):
     code, out, err = mirotwin("diff", finished / "run.mcap", runs / "same" / "run.mcap")
     assert (code, err) == (0, "")
     assert out == "the recordings hold the same in all 6 control periods\n"
 
 
-def test_what_they_were_made_from_is_told_first_key_by_key(
-    mirotwin: Callable[..., Result], finished: Path, runs: Path
-) -> None:
+def test_what_they_were_made_from_is_told_first_key_by_key(mirotwin, finished, runs):
     code, out, err = mirotwin("diff", finished / "run.mcap", runs / "gain" / "run.mcap")
     assert code == 4
     lines = out.splitlines()
@@ -79,9 +73,7 @@ def test_what_they_were_made_from_is_told_first_key_by_key(
     )
 
 
-def test_another_seed_is_named_and_so_is_the_field_that_shows_it_first(
-    mirotwin: Callable[..., Result], finished: Path, runs: Path
-) -> None:
+def test_another_seed_is_named_and_so_is_the_field_that_shows_it_first(mirotwin, finished, runs):
     code, out, err = mirotwin("diff", finished / "run.mcap", runs / "seed" / "run.mcap", "--json")
     document = json.loads(out)
     assert (code, document["exit_code"], document["period"]) == (4, 4, 0)
@@ -93,27 +85,21 @@ def test_another_seed_is_named_and_so_is_the_field_that_shows_it_first(
     assert "the recordings differ in control period 0" in err
 
 
-def test_runs_of_other_sources_may_hold_the_same(
-    mirotwin: Callable[..., Result], finished: Path, runs: Path
-) -> None:
+def test_runs_of_other_sources_may_hold_the_same(mirotwin, finished, runs):
     code, out, _ = mirotwin("diff", finished / "run.mcap", runs / "expecting" / "run.mcap")
     assert code == 0
     assert "expect" in out.splitlines()[1]
     assert "the recordings hold the same in all 6 control periods; they were not made from the same" in out
 
 
-def test_a_longer_run_differs_in_its_length_alone(
-    mirotwin: Callable[..., Result], finished: Path, runs: Path
-) -> None:
+def test_a_longer_run_differs_in_its_length_alone(mirotwin, finished, runs):
     code, _, err = mirotwin("diff", finished / "run.mcap", runs / "longer" / "run.mcap")
     assert code == 4
     assert err == "mirotwin: A has 6 control periods, B has 9\n"
     assert mirotwin("diff", finished / "run.mcap", runs / "longer" / "run.mcap", "--to", "100ms")[0] == 0
 
 
-def test_two_firmwares_are_compared_by_hash_byte_and_instruction(
-    mirotwin: Callable[..., Result], short: Path, runs: Path, tmp_path: Path
-) -> None:
+def test_two_firmwares_are_compared_by_hash_byte_and_instruction(mirotwin, short, runs, tmp_path):
     noise = ("--set", "network.radio.bit_error_rate=0.008", "--set", "duration_s=1.5", "--seed", 5)
     for name, firmware in (("a", ()), ("b", ("--firmware", runs / "patched.ihx"))):
         options = (*noise, *firmware, "--out", tmp_path / name, "-q", "--no-figure")
@@ -131,8 +117,8 @@ def test_two_firmwares_are_compared_by_hash_byte_and_instruction(
 
 @pytest.mark.parametrize("what", ["ram", "float"])
 def test_a_bit_that_somebody_changed_is_found_in_its_control_period(
-    mirotwin: Callable[..., Result], finished: Path, short: Path, tmp_path: Path, what: str
-) -> None:
+    mirotwin, finished, short, tmp_path, what
+):
     """The change is in no recording, so running again shows no tick; the digests show the control period."""
     text = load(str(short))
     tick = 3 * CONTROL_PERIOD_TICKS + 123_456
@@ -159,9 +145,7 @@ def test_a_bit_that_somebody_changed_is_found_in_its_control_period(
     assert "run again, their states do not differ up to the end of control period" in err
 
 
-def test_recordings_that_do_not_repeat_are_compared_as_far_as_they_tell(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_recordings_that_do_not_repeat_are_compared_as_far_as_they_tell(mirotwin, finished, tmp_path):
     def change(period: Period) -> Period:
         digest = f"{period.index:064x}"
         robot = msgspec.structs.replace(period.robots[0], accepted=9)
@@ -174,9 +158,7 @@ def test_recordings_that_do_not_repeat_are_compared_as_far_as_they_tell(
     assert "/net0/robot0/firmware accepted: A " in err
 
 
-def test_robots_that_only_one_has_are_named_and_the_others_compared(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_robots_that_only_one_has_are_named_and_the_others_compared(mirotwin, finished, tmp_path):
     alone = tmp_path / "alone.toml"
     alone.write_text(SHORT.partition("[[network.robot]]\nslot = 2")[0])
     assert mirotwin("run", alone, "--seed", 5, "--out", tmp_path / "out", "-q", "--no-figure")[0] == 0
@@ -192,9 +174,7 @@ def test_robots_that_only_one_has_are_named_and_the_others_compared(
     assert "the recordings have no robot in common" in err
 
 
-def test_half_a_recording_is_compared_as_far_as_it_goes(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_half_a_recording_is_compared_as_far_as_it_goes(mirotwin, finished, tmp_path):
     data, half = (finished / "run.mcap").read_bytes(), tmp_path / "half.mcap"
     half.write_bytes(data[: len(data) * 3 // 4])
     code, _, err = mirotwin("diff", finished / "run.mcap", half)
@@ -212,9 +192,7 @@ def test_half_a_recording_is_compared_as_far_as_it_goes(
         (b"\x89MCAP0\r\n" + bytes(100), "offset"),
     ],
 )
-def test_what_is_no_recording_is_refused_on_either_side(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path, content: bytes, expected: str
-) -> None:
+def test_what_is_no_recording_is_refused_on_either_side(mirotwin, finished, tmp_path, content, expected):
     path = tmp_path / "file"
     path.write_bytes(content)
     for pair in ((path, finished / "run.mcap"), (finished / "run.mcap", path)):
@@ -224,17 +202,13 @@ def test_what_is_no_recording_is_refused_on_either_side(
         assert expected in err
 
 
-def test_the_folder_of_a_run_stands_for_its_recording(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_the_folder_of_a_run_stands_for_its_recording(mirotwin, finished, tmp_path):
     (tmp_path / "run.part.mcap").write_bytes((finished / "run.mcap").read_bytes())
     code, out, err = mirotwin("diff", finished, tmp_path)
     assert (code, err) == (0, "")
     assert "the recordings hold the same in all 6 control periods" in out
 
 
-def test_a_folder_without_a_recording_is_refused(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_a_folder_without_a_recording_is_refused(mirotwin, finished, tmp_path):
     code, _, err = mirotwin("diff", finished, tmp_path)
     assert (code, err) == (2, f"mirotwin: error: {tmp_path}: is a folder; name a file in it\n")

@@ -14,13 +14,13 @@ from mirotwin.recording.compare import KINDS, WITHIN_COUNTS, WITHIN_COUNTS_PER_S
 PAGE = (Path(__file__).parents[3] / "mirotwin/replay/README.md").read_text(encoding="utf-8")
 
 
-def test_the_example_in_python_prints_what_the_page_says(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_in_python_prints_what_the_page_says(capsys):
     code = PAGE.split("```python\n")[1].split("```")[0]
     exec(code, {})
     assert capsys.readouterr().out == code.rpartition("# ")[2]
 
 
-def test_every_rule_and_tolerance_is_there_with_its_default() -> None:
+def test_every_rule_and_tolerance_is_there_with_its_default():
     assert tuple(re.findall(r"^\| `(\w+)`(?: \(default\))? \|.*\|.*\|$", PAGE, re.M))[:4] == KINDS
     for option, default in (
         ("--within-ms", WITHIN_TICKS / 24_000),
@@ -33,7 +33,7 @@ def test_every_rule_and_tolerance_is_there_with_its_default() -> None:
 
 
 @pytest.mark.parametrize("name", ["replay", "diff"])
-def test_every_option_on_the_page_is_one_of_the_commands(name: str) -> None:
+def test_every_option_on_the_page_is_one_of_the_commands(name):
     context = click.Context(main)
     there = {
         option
@@ -50,7 +50,7 @@ def run(*arguments: object) -> str:
     return CliRunner().invoke(main, list(map(str, arguments))).stdout
 
 
-def test_every_key_of_the_json_is_on_the_page(tmp_path: Path) -> None:
+def test_every_key_of_the_json_is_on_the_page(tmp_path):
     for seed in (1, 2):
         out = ("--out", tmp_path / f"{seed}", "-q", "--no-figure")
         run("run", "fig6", "--set", "duration_s=0.1", "--seed", seed, *out)

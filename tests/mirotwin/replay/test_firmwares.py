@@ -25,7 +25,7 @@ def apart(other: Image, folder: Path | None = None, until_tick: int = END) -> Fi
 
 
 @pytest.fixture(scope="module")
-def images(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Image, Path]]:
+def images(tmp_path_factory):
     found = {}
     for name in ("late", "late and moved", "slower"):
         folder = tmp_path_factory.mktemp("build")
@@ -35,8 +35,8 @@ def images(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Image, P
 
 @needs_sdcc
 def test_a_constant_is_named_with_instruction_c_line_register_and_both_values(
-    images: dict[str, tuple[Image, Path]],
-) -> None:
+    images,
+):
     image, folder = images["late"]
     found = apart(image, folder)
     assert found.changed is not None
@@ -55,8 +55,8 @@ def test_a_constant_is_named_with_instruction_c_line_register_and_both_values(
 
 @needs_sdcc
 def test_the_effect_is_where_the_states_differ_for_good_and_go_different_ways(
-    images: dict[str, tuple[Image, Path]],
-) -> None:
+    images,
+):
     image, folder = images["late"]
     found = apart(image, folder).effect
     assert found is not None
@@ -71,8 +71,8 @@ def test_the_effect_is_where_the_states_differ_for_good_and_go_different_ways(
 
 @needs_sdcc
 def test_a_build_of_another_layout_is_compared_by_variables_with_who_wrote_them(
-    images: dict[str, tuple[Image, Path]],
-) -> None:
+    images,
+):
     image, folder = images["late and moved"]
     assert not same_layout(own_image(), image)
     first = differences(periods(world()), periods(world(image)), Rule(kind="commands"))[0]
@@ -92,8 +92,8 @@ def test_a_build_of_another_layout_is_compared_by_variables_with_who_wrote_them(
 
 @needs_sdcc
 def test_builds_that_differ_in_speed_alone_send_the_same_commands(
-    images: dict[str, tuple[Image, Path]],
-) -> None:
+    images,
+):
     image, _ = images["slower"]
     assert not same_layout(own_image(), image)
     recorded, replayed = periods(world()), periods(world(image))
@@ -107,7 +107,7 @@ def test_builds_that_differ_in_speed_alone_send_the_same_commands(
     assert differences(recorded, replayed, Rule(kind="commands", within_ticks=100)) != []
 
 
-def test_without_a_compiler_a_patched_constant_is_found_too() -> None:
+def test_without_a_compiler_a_patched_constant_is_found_too():
     image = with_byte(own_image(), STOP_AT, 125)
     found = apart(image)
     assert found.changed is not None
@@ -117,7 +117,7 @@ def test_without_a_compiler_a_patched_constant_is_found_too() -> None:
     assert found.effect.slot == 1
 
 
-def test_data_that_no_instruction_lies_in_is_found_by_its_effect() -> None:
+def test_data_that_no_instruction_lies_in_is_found_by_its_effect():
     """A nibble of the CRC table in code memory: read by MOVC, executed by nobody."""
     own = own_image()
     table = own.symbols.names["_crc_nibble_low"].address
@@ -129,7 +129,7 @@ def test_data_that_no_instruction_lies_in_is_found_by_its_effect() -> None:
     assert "no changed instruction is executed: what differs is data in code memory" in found.notes
 
 
-def test_what_is_never_executed_has_no_effect() -> None:
+def test_what_is_never_executed_has_no_effect():
     own = own_image()
     found = apart(
         with_byte(own, 0x0003, 0x22), until_tick=2_400_000
@@ -138,7 +138,7 @@ def test_what_is_never_executed_has_no_effect() -> None:
     assert "no instruction has a lasting effect" in found.notes[0]
 
 
-def test_an_image_without_symbols_is_told_to_have_none() -> None:
+def test_an_image_without_symbols_is_told_to_have_none():
     own = own_image()
     bare = msgspec.structs.replace(
         with_byte(own, STOP_AT, 125), symbols=Symbols({}), path=Path("nowhere/bare.ihx"), used=((0, 10),)
@@ -148,7 +148,7 @@ def test_an_image_without_symbols_is_told_to_have_none() -> None:
     assert any("no symbols of nowhere/bare.ihx" in note for note in found.notes)
 
 
-def test_the_places_of_a_changed_byte_are_the_instructions_that_may_hold_it() -> None:
+def test_the_places_of_a_changed_byte_are_the_instructions_that_may_hold_it():
     own = own_image()
     assert changed_instructions(own, own) == []
     places = changed_instructions(own, with_byte(own, STOP_AT, 125))
@@ -156,7 +156,7 @@ def test_the_places_of_a_changed_byte_are_the_instructions_that_may_hold_it() ->
     assert set(places) <= {STOP_AT - 2, STOP_AT - 1, STOP_AT}
 
 
-def test_bytes_of_internal_ram_have_names() -> None:
+def test_bytes_of_internal_ram_have_names():
     own = own_image()
     assert name_of_byte(own, own.symbols.names["_age"].address) == "_age"
     assert name_of_byte(own, own.symbols.names["_last_left"].address + 1) == "_last_left+1"
@@ -167,7 +167,7 @@ def test_bytes_of_internal_ram_have_names() -> None:
     assert "__start__stack" not in extents(own)
 
 
-def test_where_the_last_variable_ends_is_not_guessed() -> None:
+def test_where_the_last_variable_ends_is_not_guessed():
     own = own_image()
     names = {name: at for name, at in own.symbols.names.items() if name != "__start__stack"}
     stackless = msgspec.structs.replace(own, symbols=Symbols(names), path=Path("nowhere/a.ihx"))
@@ -177,8 +177,8 @@ def test_where_the_last_variable_ends_is_not_guessed() -> None:
 
 @needs_sdcc
 def test_a_build_whose_code_moved_is_mapped_by_symbols_and_the_changed_instruction_is_named(
-    images: dict[str, tuple[Image, Path]],
-) -> None:
+    images,
+):
     image, folder = images["late and moved"]
     found = apart(image, folder)
     assert found.mapped is not None
@@ -193,7 +193,7 @@ def test_a_build_whose_code_moved_is_mapped_by_symbols_and_the_changed_instructi
 
 
 @needs_sdcc
-def test_code_that_only_moved_counts_as_the_same(images: dict[str, tuple[Image, Path]]) -> None:
+def test_code_that_only_moved_counts_as_the_same(images):
     image, folder = images["slower"]
     map_ = moved(Program(own_image(), [SOURCE]), Program(image, [folder]))
     assert len(map_.same) > 30

@@ -37,13 +37,13 @@ def nudged(name: str) -> Callable[[World], None]:
     return change
 
 
-def test_two_runs_of_the_same_never_differ() -> None:
+def test_two_runs_of_the_same_never_differ():
     one, other = world(), world()
     assert first_difference(one, other) is None
     assert one.tick == other.tick == one.periods * 800_800
 
 
-def test_a_bit_in_ram_is_named_by_tick_address_and_variable() -> None:
+def test_a_bit_in_ram_is_named_by_tick_address_and_variable():
     found = first_difference(world(), planted_world(1_234_567, flipped(LAST_LEFT + 1)))
     assert found is not None
     assert (found.tick, found.period) == (1_234_567, 1)
@@ -57,7 +57,7 @@ def test_a_bit_in_ram_is_named_by_tick_address_and_variable() -> None:
 
 
 @pytest.mark.parametrize("name", ["x_m", "theta_rad"])
-def test_the_last_bit_of_a_float_of_the_plant_is_named_with_both_values(name: str) -> None:
+def test_the_last_bit_of_a_float_of_the_plant_is_named_with_both_values(name):
     found = first_difference(world(), planted_world(3_333_333, nudged(name)))
     assert found is not None
     assert found.tick == 3_333_333
@@ -69,7 +69,7 @@ def test_the_last_bit_of_a_float_of_the_plant_is_named_with_both_values(name: st
 
 @settings(max_examples=12, deadline=None)
 @given(st.integers(24_000, 9_000_000), st.integers(0, 7))
-def test_a_bit_is_found_at_whatever_tick_it_was_planted(tick: int, bit: int) -> None:
+def test_a_bit_is_found_at_whatever_tick_it_was_planted(tick, bit):
     found = first_difference(world(), planted_world(tick, flipped(0xF0, bit)))  # deep in the stack
     assert found is not None
     assert found.tick == tick
@@ -77,7 +77,7 @@ def test_a_bit_is_found_at_whatever_tick_it_was_planted(tick: int, bit: int) -> 
     assert found.fields[0].symbol == "stack"
 
 
-def test_what_is_overwritten_at_once_is_seen_by_who_looks_often_enough() -> None:
+def test_what_is_overwritten_at_once_is_seen_by_who_looks_often_enough():
     """The accumulator, while the processor runs: written again by one of the next instructions."""
     tick = 40_001
 
@@ -94,7 +94,7 @@ def test_what_is_overwritten_at_once_is_seen_by_who_looks_often_enough() -> None
         assert [field.path for field in found.fields] == ["networks[0].robots[0].board.cpu.a"]
 
 
-def test_worlds_that_differ_from_the_beginning_differ_at_tick_0() -> None:
+def test_worlds_that_differ_from_the_beginning_differ_at_tick_0():
     other = parse(
         'name = "pair"\nduration_s = 0.4\n[[network]]\n[[network.robot]]\nslot = 1\nreference.kind = "line"\n'
         "start_error_x_cm = 1.0\n",
@@ -107,18 +107,18 @@ def test_worlds_that_differ_from_the_beginning_differ_at_tick_0() -> None:
     assert f"{BODY}.x_m" in [field.path for field in found.fields]
 
 
-def test_both_worlds_are_left_where_they_differ_first() -> None:
+def test_both_worlds_are_left_where_they_differ_first():
     one, other = world(), planted_world(1_000_001, flipped(0xF0))
     first_difference(one, other)
     assert (one.tick, other.tick) == (1_000_001, 1_000_001)
 
 
-def test_the_search_ends_where_it_is_told_to() -> None:
+def test_the_search_ends_where_it_is_told_to():
     assert first_difference(world(), planted_world(900_000, flipped(0xF0)), until_tick=899_999) is None
     assert first_difference(world(), planted_world(900_000, flipped(0xF0)), until_tick=900_000) is not None
 
 
-def test_worlds_at_two_ticks_cannot_be_compared() -> None:
+def test_worlds_at_two_ticks_cannot_be_compared():
     ahead = world()
     ahead.run_to(1000)
     with pytest.raises(ValueError, match="the worlds stand at ticks 1000 and 0: move them to one tick"):
@@ -126,12 +126,12 @@ def test_worlds_at_two_ticks_cannot_be_compared() -> None:
 
 
 @pytest.mark.parametrize("step", [0, -5])
-def test_a_step_that_is_none_is_refused(step: int) -> None:
+def test_a_step_that_is_none_is_refused(step):
     with pytest.raises(ValueError, match=f"look_ticks is {step}: give 1 or more"):
         first_difference(world(), world(), look_ticks=step)
 
 
-def test_its_json_holds_tick_path_and_both_values() -> None:
+def test_its_json_holds_tick_path_and_both_values():
     found = first_difference(world(), planted_world(24_000, flipped(LAST_LEFT + 1)))
     assert found is not None
     document: dict[str, Any] = found.as_json()

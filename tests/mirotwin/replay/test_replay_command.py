@@ -13,7 +13,7 @@ from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
 from mirotwin.recording import reader as recording_reader
 from mirotwin.recording.recorder import Recorder, Source
-from tests.mirotwin.conftest import Result, hex_file
+from tests.mirotwin.conftest import hex_file
 
 IDLE_FOR_EVER = b"\x80\xfe"
 
@@ -27,7 +27,7 @@ def rewritten(path: Path, target: Path, change: Callable[[Period], Period]) -> P
     return target
 
 
-def test_a_recording_replays_to_the_same_response(mirotwin: Callable[..., Result], finished: Path) -> None:
+def test_a_recording_replays_to_the_same_response(mirotwin, finished):
     code, out, err = mirotwin("replay", finished / "run.mcap")
     assert (code, err) == (0, "")
     assert "team_ask seq=0" in out
@@ -37,26 +37,20 @@ def test_a_recording_replays_to_the_same_response(mirotwin: Callable[..., Result
 
 
 @pytest.mark.parametrize("name", ["run.mcap", "run.part.mcap"])
-def test_the_folder_of_a_run_stands_for_its_recording(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path, name: str
-) -> None:
+def test_the_folder_of_a_run_stands_for_its_recording(mirotwin, finished, tmp_path, name):
     (tmp_path / name).write_bytes((finished / "run.mcap").read_bytes())
     code, out, err = mirotwin("replay", tmp_path)
     assert (code, err) == (0, "")
     assert "equals the recorded one in all 6 control periods" in out
 
 
-def test_it_needs_no_other_file_than_the_recording(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_it_needs_no_other_file_than_the_recording(mirotwin, finished, tmp_path):
     alone = tmp_path / "alone.mcap"
     alone.write_bytes((finished / "run.mcap").read_bytes())
     assert mirotwin("replay", alone, "-q")[0] == 0
 
 
-def test_the_list_of_frames_is_cut_unless_all_are_asked_for(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_the_list_of_frames_is_cut_unless_all_are_asked_for(mirotwin, tmp_path):
     path = tmp_path / "stream.txt"
     frames = [encode(TeamFrame(0, seq, ((100, 100), (0, 0), (0, 0))), 3) for seq in range(25)]
     write(path, [Transmission(index * 800_800, ">", data) for index, data in enumerate(frames)])
@@ -66,7 +60,7 @@ def test_the_list_of_frames_is_cut_unless_all_are_asked_for(
     assert mirotwin("replay", path, "--all")[1].count("team seq=") == 25
 
 
-def test_a_stream_drives_robots_over_an_ideal_link(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_stream_drives_robots_over_an_ideal_link(mirotwin, tmp_path):
     path = tmp_path / "stream.txt"
     frames = [encode(TeamFrame(0, seq, ((500, 500), (0, 0), (-500, -500))), 3) for seq in range(10)]
     write(path, [Transmission(index * 800_800, ">", data) for index, data in enumerate(frames)])
@@ -79,9 +73,7 @@ def test_a_stream_drives_robots_over_an_ideal_link(mirotwin: Callable[..., Resul
     assert int(rows[2][5]) < -500
 
 
-def test_a_changed_recording_is_a_divergence_with_its_first_place(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_a_changed_recording_is_a_divergence_with_its_first_place(mirotwin, finished, tmp_path):
     def change(period: Period) -> Period:
         if period.index < 3:
             return period
@@ -97,9 +89,7 @@ def test_a_changed_recording_is_a_divergence_with_its_first_place(
     assert "the replay differs in control period 3, tick 2402400 (0.100100 s), /net0/robot2/lm629 left" in err
 
 
-def test_other_firmware_is_shown_where_it_answers_otherwise(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_other_firmware_is_shown_where_it_answers_otherwise(mirotwin, finished, tmp_path):
     image = hex_file(tmp_path / "idle.ihx", IDLE_FOR_EVER)
     code, _, err = mirotwin("replay", finished / "run.mcap", "--firmware", image, "-q")
     assert code == 4
@@ -132,9 +122,7 @@ def test_other_firmware_is_shown_where_it_answers_otherwise(
         (b"\xff\xfe\n", ":1:1: byte ffh is not UTF-8"),
     ],
 )
-def test_a_file_of_another_kind_is_refused_with_its_place(
-    mirotwin: Callable[..., Result], tmp_path: Path, content: bytes, expected: str
-) -> None:
+def test_a_file_of_another_kind_is_refused_with_its_place(mirotwin, tmp_path, content, expected):
     path = tmp_path / "file"
     path.write_bytes(content)
     code, out, err = mirotwin("replay", path)
@@ -143,9 +131,7 @@ def test_a_file_of_another_kind_is_refused_with_its_place(
     assert expected in err
 
 
-def test_a_recording_cut_short_in_its_end_is_compared_as_far_as_it_goes(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_a_recording_cut_short_in_its_end_is_compared_as_far_as_it_goes(mirotwin, finished, tmp_path):
     path = tmp_path / "cut.mcap"
     path.write_bytes((finished / "run.mcap").read_bytes()[:-1000])
     code, out, err = mirotwin("replay", path)
@@ -155,9 +141,7 @@ def test_a_recording_cut_short_in_its_end_is_compared_as_far_as_it_goes(
     assert "ends in the middle" in err
 
 
-def test_a_recording_without_a_control_period_is_refused(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_recording_without_a_control_period_is_refused(mirotwin, tmp_path):
     source = Source(
         scenario_name="x", scenario_text="", seed=1, firmware=b"rubbish", firmware_sha256="", symbols={}
     )
@@ -169,9 +153,7 @@ def test_a_recording_without_a_control_period_is_refused(
     assert "holds no control period" in err
 
 
-def test_half_a_recording_is_said_to_be_cut_short_and_what_to_do(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_half_a_recording_is_said_to_be_cut_short_and_what_to_do(mirotwin, finished, tmp_path):
     data, half = (finished / "run.mcap").read_bytes(), tmp_path / "half.mcap"
     half.write_bytes(data[: len(data) // 2])
     code, out, err = mirotwin("replay", half)
@@ -182,9 +164,7 @@ def test_half_a_recording_is_said_to_be_cut_short_and_what_to_do(
 
 
 @pytest.mark.parametrize("length", range(1, 8))
-def test_a_recording_cut_short_in_its_first_bytes_is_called_truncated(
-    mirotwin: Callable[..., Result], tmp_path: Path, length: int
-) -> None:
+def test_a_recording_cut_short_in_its_first_bytes_is_called_truncated(mirotwin, tmp_path, length):
     (tmp_path / "run.mcap").write_bytes(b"\x89MCAP0\r\n"[:length])
     code, out, err = mirotwin("replay", tmp_path / "run.mcap")
     assert (code, out) == (2, "")
@@ -199,8 +179,8 @@ def test_a_recording_cut_short_in_its_first_bytes_is_called_truncated(
     ],
 )
 def test_a_recording_whose_characters_no_host_can_have_sent_is_refused(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path, change: dict[str, int], what: str
-) -> None:
+    mirotwin, finished, tmp_path, change, what
+):
     def changed(period: Period) -> Period:
         if period.index:
             return period

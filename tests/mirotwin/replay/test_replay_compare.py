@@ -4,8 +4,6 @@ Long because every option has its odd inputs, and all share two recordings.
 """
 
 import json
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -18,14 +16,14 @@ from miro_sim.world.world import World
 from mirotwin.recording import recorder as recording_recorder
 from mirotwin.recording.recorder import Recorder
 from mirotwin.recording.source import source_of
-from tests.mirotwin.conftest import SHORT, Result, hex_file
+from tests.mirotwin.conftest import SHORT, hex_file
 from tests.mirotwin.replay.rig import built
 from tests.mirotwin.replay.test_replay_command import IDLE_FOR_EVER, rewritten
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
 
 
 @pytest.fixture(scope="module")
-def silent(mirotwin: Callable[..., Result], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def silent(mirotwin, tmp_path_factory):
     """A recording of a link that loses most frames: the failsafe stops the robot now and then."""
     folder = tmp_path_factory.mktemp("silent")
     scenario = folder / "silent.toml"
@@ -37,19 +35,17 @@ def silent(mirotwin: Callable[..., Result], tmp_path_factory: pytest.TempPathFac
 
 
 @pytest.fixture(scope="module")
-def late(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def late(tmp_path_factory):
     return built(tmp_path_factory.mktemp("late"), "late").path
 
 
 @pytest.fixture(scope="module")
-def slower(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def slower(tmp_path_factory):
     return built(tmp_path_factory.mktemp("slower"), "slower").path
 
 
 @pytest.mark.parametrize("kind", ["bits", "bytes", "commands", "wheels"])
-def test_a_recording_replays_alike_under_every_rule(
-    mirotwin: Callable[..., Result], silent: Path, kind: str
-) -> None:
+def test_a_recording_replays_alike_under_every_rule(mirotwin, silent, kind):
     code, out, err = mirotwin("replay", silent, "--compare", kind, "-q")
     assert (code, err) == (0, "")
     assert "equals the recorded one in all 45 control periods" in out
@@ -57,9 +53,7 @@ def test_a_recording_replays_alike_under_every_rule(
 
 
 @needs_sdcc
-def test_a_build_that_is_only_slower_has_no_difference_under_commands(
-    mirotwin: Callable[..., Result], silent: Path, slower: Path
-) -> None:
+def test_a_build_that_is_only_slower_has_no_difference_under_commands(mirotwin, silent, slower):
     assert mirotwin("replay", silent, "--firmware", slower, "-q")[0] == 4
     code, out, err = mirotwin("replay", silent, "--firmware", slower, "--compare", "commands", "-q")
     assert (code, err) == (0, "")
@@ -72,9 +66,7 @@ def test_a_build_that_is_only_slower_has_no_difference_under_commands(
 
 
 @needs_sdcc
-def test_firmware_with_another_constant_is_told_by_instruction_and_c_line(
-    mirotwin: Callable[..., Result], silent: Path, late: Path
-) -> None:
+def test_firmware_with_another_constant_is_told_by_instruction_and_c_line(mirotwin, silent, late):
     sources = late.parent.parent / "firmware"
     code, out, err = mirotwin(
         *("replay", silent, "--firmware", late, "--sources", sources, "--compare", "commands")
@@ -94,9 +86,7 @@ def test_firmware_with_another_constant_is_told_by_instruction_and_c_line(
 
 
 @needs_sdcc
-def test_json_holds_the_same_and_nothing_else_is_on_stdout(
-    mirotwin: Callable[..., Result], silent: Path, late: Path
-) -> None:
+def test_json_holds_the_same_and_nothing_else_is_on_stdout(mirotwin, silent, late):
     command = ("replay", silent, "--firmware", late, "--compare", "commands", "--json")
     code, out, _ = mirotwin(*command)
     document = json.loads(out)
@@ -125,9 +115,7 @@ def shifted(period: Period) -> Period:
     return msgspec.structs.replace(period, robots=(period.robots[0], changed))
 
 
-def test_the_first_of_each_channel_is_listed_and_all_on_request(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_the_first_of_each_channel_is_listed_and_all_on_request(mirotwin, finished, tmp_path):
     path = rewritten(finished / "run.mcap", tmp_path / "shifted.mcap", shifted)
     code, out, _ = mirotwin("replay", path)
     assert code == 4
@@ -139,9 +127,7 @@ def test_the_first_of_each_channel_is_listed_and_all_on_request(
     assert len([line for line in out.splitlines() if "/net0/robot2/lm629" in line]) == 12
 
 
-def test_wheels_have_a_tolerance_in_counts(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_wheels_have_a_tolerance_in_counts(mirotwin, finished, tmp_path):
     path = rewritten(finished / "run.mcap", tmp_path / "shifted.mcap", shifted)
     wheels = ("replay", path, "--compare", "wheels", "-q")
     assert mirotwin(*wheels)[0] == 0
@@ -151,9 +137,7 @@ def test_wheels_have_a_tolerance_in_counts(
     assert "lm629 left real_position: recorded 3, replayed 0" in err
 
 
-def test_a_window_leaves_the_rest_out(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_a_window_leaves_the_rest_out(mirotwin, finished, tmp_path):
     def late_change(period: Period) -> Period:
         return shifted(period) if period.index == 2 else period
 
@@ -166,14 +150,12 @@ def test_a_window_leaves_the_rest_out(
     assert "in all 2 control periods" in out
 
 
-def test_another_seed_is_another_run(mirotwin: Callable[..., Result], silent: Path) -> None:
+def test_another_seed_is_another_run(mirotwin, silent):
     assert mirotwin("replay", silent, "-q", "--seed", 5)[0] == 0
     assert mirotwin("replay", silent, "-q", "--seed", 6)[0] == 4
 
 
-def test_a_digest_is_compared_where_the_host_was_silent(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_digest_is_compared_where_the_host_was_silent(mirotwin, tmp_path):
     """Then a replay computes all states again; those of a controller's PC it does not."""
     for host, wanted in (("silent", 4), ("controller", 0)):
         scenario = tmp_path / f"{host}.toml"
@@ -192,9 +174,7 @@ def test_a_digest_is_compared_where_the_host_was_silent(
         assert mirotwin("replay", path, "-q", "--compare", "bytes")[0] == 0
 
 
-def test_a_live_session_with_deeds_replays_to_the_same_digests(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_live_session_with_deeds_replays_to_the_same_digests(mirotwin, tmp_path):
     path = tmp_path / "live.toml"
     path.write_text(SHORT.replace("[[network]]", '[[network]]\nhost = "silent"', 1))
     text = load(str(path))
@@ -220,9 +200,7 @@ def test_a_live_session_with_deeds_replays_to_the_same_digests(
     assert (code, err) == (0, "")
 
 
-def test_firmware_without_symbols_says_what_is_missing(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_firmware_without_symbols_says_what_is_missing(mirotwin, finished, tmp_path):
     image = hex_file(tmp_path / "idle.ihx", IDLE_FOR_EVER)
     code, _, err = mirotwin("replay", finished / "run.mcap", "--firmware", image, "-q")
     assert code == 4
@@ -232,12 +210,12 @@ def test_firmware_without_symbols_says_what_is_missing(
 
 @pytest.mark.parametrize("format", ["2", "4", "next"])
 def test_a_recording_of_another_format_is_refused_with_the_reason(
-    mirotwin: Callable[..., Result],
-    finished: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    format: str,
-) -> None:
+    mirotwin,
+    finished,
+    tmp_path,
+    monkeypatch,
+    format,
+):
     with monkeypatch.context() as patched:
         patched.setattr(recording_recorder, "FORMAT", format)
         path = rewritten(finished / "run.mcap", tmp_path / "other.mcap", lambda period: period)
@@ -275,9 +253,7 @@ def test_a_recording_of_another_format_is_refused_with_the_reason(
         (("--lines-from", "nowhere.ihx"), "nowhere.ihx: there is no such file"),
     ],
 )
-def test_options_that_cannot_be_meant_are_refused_in_one_line(
-    mirotwin: Callable[..., Result], finished: Path, options: tuple[str, ...], expected: str
-) -> None:
+def test_options_that_cannot_be_meant_are_refused_in_one_line(mirotwin, finished, options, expected):
     code, out, err = mirotwin("replay", finished / "run.mcap", *options)
     assert (code, out) == (2, "")
     assert err.startswith("mirotwin: error: ")
@@ -285,9 +261,7 @@ def test_options_that_cannot_be_meant_are_refused_in_one_line(
     assert expected in err
 
 
-def test_lines_come_from_a_recorded_image_alone(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_lines_come_from_a_recorded_image_alone(mirotwin, finished, tmp_path):
     image = hex_file(tmp_path / "idle.ihx", IDLE_FOR_EVER)
     for command in (
         ("replay", finished / "run.mcap"),
@@ -301,9 +275,7 @@ def test_lines_come_from_a_recorded_image_alone(
 @pytest.mark.parametrize(
     "options", [("--compare", "bytes"), ("--from", "1t"), ("--all-differences",), ("--lines-from", "IMAGE")]
 )
-def test_a_text_stream_has_nothing_to_compare_with(
-    mirotwin: Callable[..., Result], tmp_path: Path, options: tuple[str, ...]
-) -> None:
+def test_a_text_stream_has_nothing_to_compare_with(mirotwin, tmp_path, options):
     path = tmp_path / "a.stream"
     path.write_text("792000 > 55 55\n")
     image = str(hex_file(tmp_path / "idle.ihx", IDLE_FOR_EVER))
@@ -312,9 +284,7 @@ def test_a_text_stream_has_nothing_to_compare_with(
     assert "nothing to compare with; leave it out" in err or "is not a recorded image" in err
 
 
-def test_the_json_of_a_stream_says_that_nothing_was_recorded(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_the_json_of_a_stream_says_that_nothing_was_recorded(mirotwin, tmp_path):
     path = tmp_path / "a.stream"
     path.write_text("792000 > 55 55\n")
     code, out, _ = mirotwin("replay", path, "--json", "--seed", 9, "--to", "70ms")

@@ -60,11 +60,11 @@ def with_position(offset: int, name: str = "real_position") -> list[Period]:
 
 
 @pytest.mark.parametrize("kind", ["bits", "bytes", "commands", "wheels"])
-def test_a_run_equals_itself_under_every_rule(kind: str) -> None:
+def test_a_run_equals_itself_under_every_rule(kind):
     assert differences(RUN, RUN, Rule(kind=kind, host=True, digests=True)) == []
 
 
-def test_commands_may_come_at_another_time_within_the_tolerance() -> None:
+def test_commands_may_come_at_another_time_within_the_tolerance():
     recorded, faster = with_commands([100_000, 900_000]), with_commands([97_504, 897_504])
     assert len(differences(recorded, faster)) == 2
     assert differences(recorded, faster, Rule(kind="commands")) == []
@@ -76,13 +76,13 @@ def test_commands_may_come_at_another_time_within_the_tolerance() -> None:
     )
 
 
-def test_another_value_at_the_same_time_is_a_difference_under_commands() -> None:
+def test_another_value_at_the_same_time_is_a_difference_under_commands():
     (found,) = differences(with_commands([100_000]), with_commands([100_000], "0401"), Rule(kind="commands"))
     assert found.channel == "lm629 left command"
     assert (found.network, found.slot, found.tick) == (0, 0, 100_000)
 
 
-def test_a_missing_command_shifts_none_behind_it() -> None:
+def test_a_missing_command_shifts_none_behind_it():
     every = list(range(100_000, 4_000_000, 100_000))
     (found,) = differences(
         with_commands(every),
@@ -92,13 +92,13 @@ def test_a_missing_command_shifts_none_behind_it() -> None:
     assert (found.tick, found.replayed) == (1_000_000, None)
 
 
-def test_wheels_and_pwm_are_no_matter_to_commands_nor_commands_to_wheels() -> None:
+def test_wheels_and_pwm_are_no_matter_to_commands_nor_commands_to_wheels():
     assert differences(RUN, with_position(1000), Rule(kind="commands")) == []
     assert differences(with_commands([100_000]), with_commands([]), Rule(kind="wheels")) == []
 
 
 @pytest.mark.parametrize(("name", "within"), [("real_position", 20), ("desired_position", 20)])
-def test_positions_may_differ_by_the_tolerance_and_no_count_more(name: str, within: int) -> None:
+def test_positions_may_differ_by_the_tolerance_and_no_count_more(name, within):
     for offset in (within, -within):
         assert differences(RUN, with_position(offset, name), Rule(kind="wheels")) == []
     found = differences(RUN, with_position(within + 1, name), Rule(kind="wheels"))
@@ -106,14 +106,14 @@ def test_positions_may_differ_by_the_tolerance_and_no_count_more(name: str, with
     assert len(found) == len(RUN)
 
 
-def test_desired_velocities_may_differ_by_the_tolerance() -> None:
+def test_desired_velocities_may_differ_by_the_tolerance():
     for offset, count in ((16_384, 0), (16_385, len(RUN))):
         assert len(differences(RUN, with_position(offset, "desired_velocity"), Rule(kind="wheels"))) == count
     rule = Rule(kind="wheels", within_counts_per_sample=1.0)
     assert differences(RUN, with_position(65_536, "desired_velocity"), rule) == []
 
 
-def test_bytes_are_compared_one_by_one_however_they_are_parted() -> None:
+def test_bytes_are_compared_one_by_one_however_they_are_parted():
     one = with_answers(Transmission(300_000, "<", b"\x55\x2d\xd4"))
     parted = with_answers(
         Transmission(300_100, "<", b"\x55"), Transmission(300_000 + 2 * 24_960, "<", b"\xd4")
@@ -124,7 +124,7 @@ def test_bytes_are_compared_one_by_one_however_they_are_parted() -> None:
     assert len(differences(one, parted)) == 3
 
 
-def test_a_bad_stop_bit_is_part_of_a_byte() -> None:
+def test_a_bad_stop_bit_is_part_of_a_byte():
     (found,) = differences(
         with_answers(Transmission(300_000, "<", b"\x55\x2d")),
         with_answers(Transmission(300_000, "<", b"\x55\x2d", 0, (1,))),
@@ -133,7 +133,7 @@ def test_a_bad_stop_bit_is_part_of_a_byte() -> None:
     assert found.replayed == "2d with a bad stop bit at tick 324960"
 
 
-def test_what_is_under_way_at_the_end_is_not_compared_with_a_tolerance() -> None:
+def test_what_is_under_way_at_the_end_is_not_compared_with_a_tolerance():
     end = len(RUN) * CONTROL_PERIOD_TICKS
     late = with_answers(Transmission(end - 26_000, "<", b"\x55"))
     assert differences(late, with_answers(), Rule(kind="bytes")) == []
@@ -143,14 +143,14 @@ def test_what_is_under_way_at_the_end_is_not_compared_with_a_tolerance() -> None
     assert len(differences(with_commands([command]), with_commands([]))) == 1
 
 
-def test_only_differences_in_the_window_are_told() -> None:
+def test_only_differences_in_the_window_are_told():
     moved = with_position(1)
     assert len(differences(RUN, moved)) == 6
     window = Rule(from_tick=2 * CONTROL_PERIOD_TICKS, to_tick=4 * CONTROL_PERIOD_TICKS)
     assert [one.period for one in differences(RUN, moved, window)] == [2, 3]
 
 
-def test_the_hosts_values_and_deeds_are_compared_on_request() -> None:
+def test_the_hosts_values_and_deeds_are_compared_on_request():
     deeds = (Reset(5, 0, 2, 0), Power(6, 0, 2, 1), RadioState(7, 0, "noise"))
     robots = (msgspec.structs.replace(RUN[2].robots[0], control=None), RUN[2].robots[1])
     changed = [*RUN[:2], msgspec.structs.replace(RUN[2], robots=robots, deeds=deeds), *RUN[3:]]
@@ -164,7 +164,7 @@ def test_the_hosts_values_and_deeds_are_compared_on_request() -> None:
     assert found[0].channel == "deeds"
 
 
-def test_a_digest_alone_is_a_difference_at_the_end_of_its_period() -> None:
+def test_a_digest_alone_is_a_difference_at_the_end_of_its_period():
     changed = [*RUN[:3], msgspec.structs.replace(RUN[3], digest="00" * 32), *RUN[4:]]
     assert differences(RUN, changed) == []
     (found,) = differences(RUN, changed, Rule(digests=True))
@@ -173,11 +173,11 @@ def test_a_digest_alone_is_a_difference_at_the_end_of_its_period() -> None:
     assert found.as_json()["replayed"] == "00" * 32
 
 
-def test_runs_are_compared_as_far_as_both_go() -> None:
+def test_runs_are_compared_as_far_as_both_go():
     assert differences(RUN, RUN[:2]) == differences(RUN[:1], RUN) == differences([], RUN) == []
 
 
-def test_the_first_of_each_channel_is_told_with_how_many_there_are() -> None:
+def test_the_first_of_each_channel_is_told_with_how_many_there_are():
     found = differences(RUN, with_position(1))
     ((first, count),) = first_per_channel(found)
     assert (first, count) == (found[0], 6)
@@ -189,9 +189,7 @@ happenings = st.lists(
 
 
 @given(happenings, happenings, st.integers(0, 30_000))
-def test_every_happening_is_alike_or_told_once_and_in_order(
-    one: list[Happening], other: list[Happening], within: int
-) -> None:
+def test_every_happening_is_alike_or_told_once_and_in_order(one, other, within):
     found = list(unlike(one, other, within))
     for side, whole in ((0, one), (1, other)):
         told = [pair[side] for pair in found if pair[side] is not None]
@@ -204,7 +202,7 @@ def test_every_happening_is_alike_or_told_once_and_in_order(
 
 
 @given(happenings, st.integers(-20_000, 20_000))
-def test_a_run_that_is_shifted_as_a_whole_is_alike_within_the_shift(one: list[Happening], shift: int) -> None:
+def test_a_run_that_is_shifted_as_a_whole_is_alike_within_the_shift(one, shift):
     apart = one[:1]
     for each in one[1:]:  # so far from each other that none can be taken for its neighbour
         if each.tick - apart[-1].tick > SAME_TICKS:
@@ -215,7 +213,7 @@ def test_a_run_that_is_shifted_as_a_whole_is_alike_within_the_shift(one: list[Ha
         assert len(list(unlike(apart, other, abs(shift) - 1))) == len(apart)
 
 
-def test_a_difference_has_a_line_for_people_and_json_for_programs() -> None:
+def test_a_difference_has_a_line_for_people_and_json_for_programs():
     found = Difference(24_000, 0, 1, 2, "pwm left sign", 1, None)
     assert str(found) == "tick 24000 (0.001000 s), /net1/robot2/pwm left sign: recorded 1, replayed nothing"
     assert found.said(("A", "B")).endswith("A 1, B nothing")
@@ -231,7 +229,7 @@ def test_a_difference_has_a_line_for_people_and_json_for_programs() -> None:
     }
 
 
-def test_what_a_chip_answers_is_no_part_of_a_command() -> None:
+def test_what_a_chip_answers_is_no_part_of_a_command():
     def reading(data: str) -> list[Period]:
         return [
             msgspec.structs.replace(

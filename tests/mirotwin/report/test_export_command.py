@@ -3,8 +3,6 @@
 import os
 import stat
 import sys
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -16,15 +14,12 @@ from miro_protocol.stream import format_stream
 from miro_protocol.transmission import Transmission
 from mirotwin.recording import reader as recording_reader
 from tests import children
-from tests.mirotwin.conftest import Result
 
 FRAMES = [encode(TeamFrame(0, seq, ((seq, -seq),) * 3), 3) for seq in range(3)]
 PACKETS = [Transmission(index * 800_800, ">", data) for index, data in enumerate(FRAMES)]
 
 
-def test_a_recording_becomes_packets_in_the_order_of_time_both_ways(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_a_recording_becomes_packets_in_the_order_of_time_both_ways(mirotwin, finished, tmp_path):
     out = tmp_path / "run.pcapng"
     assert mirotwin("export", finished / "run.mcap", "--out", out)[0] == 0
     packets = list(iterate(out.read_bytes()))
@@ -38,7 +33,7 @@ def test_a_recording_becomes_packets_in_the_order_of_time_both_ways(
     assert {run.tick for run in recorded if run.direction == ">"} <= set(ticks)
 
 
-def test_the_same_recording_gives_the_same_bytes_in_any_process(finished: Path, tmp_path: Path) -> None:
+def test_the_same_recording_gives_the_same_bytes_in_any_process(finished, tmp_path):
     found = []
     for seed in ("1", "2"):
         command = [sys.executable, "-c", "from mirotwin.commands import main; main()", "export"]
@@ -53,7 +48,7 @@ def test_the_same_recording_gives_the_same_bytes_in_any_process(finished: Path, 
     assert len(list(iterate(found[0]))) > 6
 
 
-def test_a_stream_and_a_capture_become_each_other(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_stream_and_a_capture_become_each_other(mirotwin, tmp_path):
     (tmp_path / "a.pcapng").write_bytes(render(PACKETS))
     code, out, err = mirotwin("export", tmp_path / "a.pcapng", "--out", tmp_path / "b.stream")
     assert (code, err) == (0, "")
@@ -67,16 +62,14 @@ def test_a_stream_and_a_capture_become_each_other(mirotwin: Callable[..., Result
     assert (tmp_path / "c.pcapng").read_bytes() == render(PACKETS)
 
 
-def test_the_stream_of_a_recording_is_taken_by_replay(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_the_stream_of_a_recording_is_taken_by_replay(mirotwin, finished, tmp_path):
     assert mirotwin("export", finished / "run.mcap", "--out", tmp_path / "run.stream")[0] == 0
     code, out, err = mirotwin("replay", tmp_path / "run.stream")
     assert (code, err) == (0, "")
     assert out.splitlines()[-1].split()[1] == "6"  # all six frames: this link has no errors
 
 
-def test_damage_is_called_so_in_the_comment(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_damage_is_called_so_in_the_comment(mirotwin, tmp_path):
     (tmp_path / "a").write_bytes(
         render([Transmission(5, ">", b"xx" + FRAMES[1]), Transmission(800_800, "<", b"abc")])
     )
@@ -85,7 +78,7 @@ def test_damage_is_called_so_in_the_comment(mirotwin: Callable[..., Result], tmp
     assert comments == ["2 bytes, no sync; team seq=1", "3 bytes, no sync"]
 
 
-def test_one_of_several_networks_can_be_chosen(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_one_of_several_networks_can_be_chosen(mirotwin, tmp_path):
     packets = [Transmission(5, ">", b"a"), Transmission(6, ">", b"b", 1), Transmission(7, "<", b"c", 1)]
     (tmp_path / "a").write_bytes(render(packets))
     assert mirotwin("export", tmp_path / "a", "--network", 1, "--out", tmp_path / "b.stream")[0] == 0
@@ -101,27 +94,21 @@ def test_one_of_several_networks_can_be_chosen(mirotwin: Callable[..., Result], 
         [Transmission(5, ">", b"abc", 0, (0, 2))],
     ],
 )
-def test_more_networks_or_bad_stop_bits_make_a_stream_of_version_2(
-    mirotwin: Callable[..., Result], tmp_path: Path, sent: list[Transmission]
-) -> None:
+def test_more_networks_or_bad_stop_bits_make_a_stream_of_version_2(mirotwin, tmp_path, sent):
     stream.write(tmp_path / "a.stream", sent)
     assert mirotwin("export", tmp_path / "a.stream", "--out", tmp_path / "b.stream")[0] == 0
     assert (tmp_path / "b.stream").read_text().startswith("# mirotwin stream 2\n")
     assert stream.read(tmp_path / "b.stream").transmissions() == sent
 
 
-def test_bad_stop_bits_that_a_capture_cannot_hold_are_counted(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_bad_stop_bits_that_a_capture_cannot_hold_are_counted(mirotwin, tmp_path):
     stream.write(tmp_path / "a.stream", [Transmission(5, ">", b"abc", 0, (0, 2))])
     code, _, err = mirotwin("export", tmp_path / "a.stream", "--out", tmp_path / "b.pcapng")
     assert code == 0
     assert "2 bad stop bits were left out" in err
 
 
-def test_of_an_input_cut_short_all_that_could_be_read_is_written(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_of_an_input_cut_short_all_that_could_be_read_is_written(mirotwin, tmp_path):
     (tmp_path / "a").write_bytes(render(PACKETS)[:-5])
     code, _, err = mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.pcapng")
     assert code == 2
@@ -130,7 +117,7 @@ def test_of_an_input_cut_short_all_that_could_be_read_is_written(
     assert (tmp_path / "b.pcapng").read_bytes() == render(PACKETS[:2])
 
 
-def test_a_run_longer_than_a_packet_may_be_is_cut(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_run_longer_than_a_packet_may_be_is_cut(mirotwin, tmp_path):
     data = bytes(300_000)
     (tmp_path / "a.stream").write_text(format_stream([Transmission(7, ">", data)]))
     assert mirotwin("export", tmp_path / "a.stream", "--out", tmp_path / "b.pcapng")[0] == 0
@@ -148,9 +135,7 @@ def test_a_run_longer_than_a_packet_may_be_is_cut(mirotwin: Callable[..., Result
         (render([PACKETS[1], PACKETS[0]]), "tick 0: comes after tick 800800; sort the capture first"),
     ],
 )
-def test_what_cannot_be_converted_is_named_and_nothing_is_written(
-    mirotwin: Callable[..., Result], tmp_path: Path, data: bytes, message: str
-) -> None:
+def test_what_cannot_be_converted_is_named_and_nothing_is_written(mirotwin, tmp_path, data, message):
     (tmp_path / "a").write_bytes(data)
     code, out, err = mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.stream")
     assert (code, out) == (2, "")
@@ -158,9 +143,7 @@ def test_what_cannot_be_converted_is_named_and_nothing_is_written(
     assert os.listdir(tmp_path) == ["a"]
 
 
-def test_a_file_that_exists_is_replaced_only_if_that_was_meant(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_file_that_exists_is_replaced_only_if_that_was_meant(mirotwin, tmp_path):
     (tmp_path / "a").write_bytes(render(PACKETS))
     (tmp_path / "b.pcapng").write_bytes(b"mine")
     code, _, err = mirotwin("export", tmp_path / "a", "--out", tmp_path / "b.pcapng")
@@ -197,9 +180,7 @@ def test_a_recording_with_one_wrong_byte_is_reported_after_all_that_could_be_rea
     assert "bad.mcap: offset" in err
 
 
-def test_the_file_that_is_read_is_never_replaced(
-    mirotwin: Callable[..., Result], finished: Path, tmp_path: Path
-) -> None:
+def test_the_file_that_is_read_is_never_replaced(mirotwin, finished, tmp_path):
     path, link = tmp_path / "run.mcap", tmp_path / "link"
     path.write_bytes((finished / "run.mcap").read_bytes())
     link.symlink_to(path)

@@ -8,7 +8,7 @@ import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
@@ -20,14 +20,13 @@ from mirotwin.recording import reader as recording_reader
 from mirotwin.run import run_files
 from mirotwin.shell.outputs import OutputFolder
 from tests import children
-from tests.mirotwin.conftest import Result
 
 PARTS = ["run.part.mcap", "summary.part.json"]
 PROGRAM = "from mirotwin.commands import main; main()"
 
 
 @pytest.fixture(autouse=True)
-def _default_interrupt() -> Iterator[None]:
+def _default_interrupt():
     """A program that a shell put into the background ignores SIGINT, and so would the tests in this process."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
@@ -86,15 +85,15 @@ CASES: list[tuple[str, Callable[[], object], int, str]] = [
     ("act", "code", "said"), [case[1:] for case in CASES], ids=[case[0] for case in CASES]
 )
 def test_what_was_recorded_stays_as_parts_and_complete_files_stay_as_they_were(
-    mirotwin: Callable[..., Result],
-    finished: Path,
-    short: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    act: Callable[[], object],
-    code: int,
-    said: str,
-) -> None:
+    mirotwin,
+    finished,
+    short,
+    tmp_path,
+    monkeypatch,
+    act,
+    code,
+    said,
+):
     before = {path.name: path.read_bytes() for path in finished.iterdir()}
     for name, data in before.items():
         (tmp_path / name).write_bytes(data)
@@ -118,18 +117,14 @@ def test_what_was_recorded_stays_as_parts_and_complete_files_stay_as_they_were(
     assert "complete" not in json.loads(before["summary.json"])
 
 
-def test_a_run_that_recorded_nothing_leaves_nothing(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_recorded_nothing_leaves_nothing(mirotwin, short, tmp_path, monkeypatch):
     at_period(monkeypatch, 0, raising(KeyboardInterrupt()))
     assert mirotwin("run", short, "--out", tmp_path / "out") == (130, "", "\nmirotwin: interrupted\n")
     assert names(tmp_path) == []
 
 
 @pytest.fixture
-def parts(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Path:
+def parts(mirotwin, short, tmp_path, monkeypatch):
     """The folder of a run that was broken off after three control periods."""
     with monkeypatch.context() as patch:
         at_period(patch, 3, raising(KeyboardInterrupt()))
@@ -145,9 +140,7 @@ def cut(path: Path, size: int) -> Path:
     return target
 
 
-def test_the_next_run_names_the_parts_and_replaces_them_by_force(
-    mirotwin: Callable[..., Result], parts: Path, short: Path, finished: Path
-) -> None:
+def test_the_next_run_names_the_parts_and_replaces_them_by_force(mirotwin, parts, short, finished):
     code, _, err = mirotwin("run", short, "--seed", 5, "--out", parts)
     assert code == 2
     assert f"{parts}: the folder holds parts of an interrupted command ({', '.join(PARTS)}); " in err
@@ -158,7 +151,7 @@ def test_the_next_run_names_the_parts_and_replaces_them_by_force(
     assert (parts / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
 
 
-def test_replay_compares_as_far_as_it_goes_and_says_so(mirotwin: Callable[..., Result], parts: Path) -> None:
+def test_replay_compares_as_far_as_it_goes_and_says_so(mirotwin, parts):
     code, out, err = mirotwin("replay", parts / "run.part.mcap")
     assert code == 0
     assert "equals the recorded one in all 3 control periods" in out
@@ -166,9 +159,7 @@ def test_replay_compares_as_far_as_it_goes_and_says_so(mirotwin: Callable[..., R
 
 
 @pytest.mark.parametrize("target", ["pcapng", "stream"])
-def test_decode_and_export_read_it_and_say_so(
-    mirotwin: Callable[..., Result], parts: Path, tmp_path: Path, target: str
-) -> None:
+def test_decode_and_export_read_it_and_say_so(mirotwin, parts, tmp_path, target):
     note = f"mirotwin: {parts / 'run.part.mcap'}: the run that wrote it was broken off\n"
     code, out, err = mirotwin("decode", parts / "run.part.mcap")
     assert (code, err) == (0, note)
@@ -186,9 +177,7 @@ def killed(parts: Path, more: int) -> Path:
     return cut(parts / "run.part.mcap", max(chunk, data.rindex(b'"index":1,') + 10 + 64 + 14 + more))
 
 
-def test_a_part_of_a_copy_is_compared_too_and_is_bad_input_for_decode(
-    mirotwin: Callable[..., Result], parts: Path
-) -> None:
+def test_a_part_of_a_copy_is_compared_too_and_is_bad_input_for_decode(mirotwin, parts):
     path = killed(parts, 30)
     code, out, err = mirotwin("replay", path, "-q")
     assert (code, err.count("\n")) == (0, 1)
@@ -199,9 +188,7 @@ def test_a_part_of_a_copy_is_compared_too_and_is_bad_input_for_decode(
     assert mirotwin("decode", path)[0] == 2
 
 
-def test_a_second_interruption_waits_until_the_files_are_closed(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_second_interruption_waits_until_the_files_are_closed(mirotwin, short, tmp_path, monkeypatch):
     encode = run_files.to_json
 
     def impatient(summary: object) -> bytes:
@@ -219,9 +206,7 @@ def test_a_second_interruption_waits_until_the_files_are_closed(
     assert names(tmp_path / "whole") == ["figure.svg", "run.mcap", "summary.json"]
 
 
-def test_two_runs_into_one_folder_the_second_is_refused(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_two_runs_into_one_folder_the_second_is_refused(mirotwin, short, tmp_path):
     with OutputFolder(tmp_path / "out"):
         for more in ((), ("--force",)):
             code, _, err = mirotwin("run", short, "--out", tmp_path / "out", "-q", *more)
@@ -238,9 +223,7 @@ def started(arguments: list[object], **more: object) -> "subprocess.CompletedPro
     return children.run(command, capture_output=True, text=True, timeout=300, check=False, **more)  # type: ignore[call-overload,no-any-return]
 
 
-def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(
-    finished: Path, short: Path, tmp_path: Path
-) -> None:
+def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(finished, short, tmp_path):
     for path in finished.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes())
     size = (finished / "run.mcap").stat().st_size * 3 // 4
@@ -257,9 +240,7 @@ def test_a_disk_that_takes_no_more_leaves_complete_files_and_what_it_took(
     assert names(tmp_path) == sorted([*names(finished), *PARTS])
 
 
-def test_a_closed_stderr_is_no_terminal_and_takes_nothing_away(
-    finished: Path, short: Path, tmp_path: Path
-) -> None:
+def test_a_closed_stderr_is_no_terminal_and_takes_nothing_away(finished, short, tmp_path):
     command = f'exec "$0" -c "{PROGRAM}" run "$1" --seed 5 --out "$2" 2>&-'
     arguments = ["sh", "-c", command, sys.executable, str(short), str(tmp_path / "out")]
     done = children.run(arguments, stdout=subprocess.PIPE, timeout=300, check=False)
@@ -268,9 +249,7 @@ def test_a_closed_stderr_is_no_terminal_and_takes_nothing_away(
     assert (tmp_path / "out" / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
 
 
-def test_an_internal_error_shows_its_place_when_asked(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_internal_error_shows_its_place_when_asked(mirotwin, short, tmp_path, monkeypatch):
     at_period(monkeypatch, 0, raising(AssertionError("angle")))
     code, out, err = mirotwin("run", short, "--out", tmp_path / "out")
     assert (code, out, err.count("\n")) == (70, "", 1)
@@ -278,7 +257,7 @@ def test_an_internal_error_shows_its_place_when_asked(
     assert "Traceback" in mirotwin("run", short, "--out", tmp_path / "out")[2]
 
 
-def test_killed_runs_leave_recordings_that_lack_half_a_second_at_most() -> None:
+def test_killed_runs_leave_recordings_that_lack_half_a_second_at_most():
     done = children.run(
         [sys.executable, "-m", "tests.mirotwin.shell.killed", "--times", "3"],
         capture_output=True,

@@ -4,7 +4,6 @@ import json
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
@@ -17,12 +16,12 @@ from miro_sim.world.world import World
 from mirotwin.recording import reader as recording_reader
 from mirotwin.rerun import runner
 from tests import children
-from tests.mirotwin.conftest import SHORT, Result, hex_file
+from tests.mirotwin.conftest import SHORT, hex_file
 
 UNDEFINED_OPCODE = b"\xa5"
 
 
-def test_a_run_writes_a_recording_a_figure_and_a_summary(finished: Path) -> None:
+def test_a_run_writes_a_recording_a_figure_and_a_summary(finished):
     assert sorted(path.name for path in finished.iterdir()) == ["figure.svg", "run.mcap", "summary.json"]
     summary = json.loads((finished / "summary.json").read_bytes())
     recording = recording_reader.read(finished / "run.mcap")
@@ -36,7 +35,7 @@ def test_a_run_writes_a_recording_a_figure_and_a_summary(finished: Path) -> None
     assert [(one["network"], one["slot"]) for one in summary["robots"]] == [(0, 0), (0, 2)]
 
 
-def test_recording_changes_nothing_and_leaves_nothing_out(finished: Path, short: Path) -> None:
+def test_recording_changes_nothing_and_leaves_nothing_out(finished, short):
     world = World(load(str(short)).scenario, 5, load_hex(image_path()))
     periods = []
     while not world.finished:
@@ -45,8 +44,8 @@ def test_recording_changes_nothing_and_leaves_nothing_out(finished: Path, short:
 
 
 def test_the_same_run_gives_the_same_bytes_and_a_full_recording_the_same_digest(
-    mirotwin: Callable[..., Result], finished: Path, short: Path, tmp_path: Path
-) -> None:
+    mirotwin, finished, short, tmp_path
+):
     assert mirotwin("run", short, "--seed", 5, "--out", tmp_path / "again", "--quiet") == (0, "", "")
     assert mirotwin("run", short, "--seed", 5, "--out", tmp_path / "full", "-q", "--record", "full")[0] == 0
     for name in ("run.mcap", "figure.svg"):
@@ -56,24 +55,22 @@ def test_the_same_run_gives_the_same_bytes_and_a_full_recording_the_same_digest(
     assert (tmp_path / "full" / "run.mcap").stat().st_size > 2 * (finished / "run.mcap").stat().st_size
 
 
-def test_the_table_names_what_matters(mirotwin: Callable[..., Result], short: Path, tmp_path: Path) -> None:
+def test_the_table_names_what_matters(mirotwin, short, tmp_path):
     code, out, err = mirotwin("run", short, "--out", tmp_path / "[out]")
     assert (code, err) == (0, "")
     for word in ("short, seed 0", "real time", "frames sent", "instructions", "digest", "[out]"):
         assert word in out
 
 
-def test_the_folder_is_named_after_scenario_and_seed(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_folder_is_named_after_scenario_and_seed(mirotwin, short, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert mirotwin("run", short, "--seed", 3, "-q")[0] == 0
     assert (tmp_path / "runs" / "short-3" / "run.mcap").exists()
 
 
 def test_a_finished_run_in_the_default_folder_is_replaced_and_nothing_else(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    mirotwin, short, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "runs" / "short-0"
     assert mirotwin("run", short, "-q")[0] == 0
@@ -101,8 +98,8 @@ def test_a_finished_run_in_the_default_folder_is_replaced_and_nothing_else(
     ],
 )
 def test_firmware_that_is_none_is_refused_before_anything_is_written(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, content: str, expected: str
-) -> None:
+    mirotwin, short, tmp_path, content, expected
+):
     image = tmp_path / "broken.ihx"
     image.write_text(content)
     code, out, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out")
@@ -112,9 +109,7 @@ def test_firmware_that_is_none_is_refused_before_anything_is_written(
     assert [path.name for path in tmp_path.iterdir()] == ["broken.ihx"]
 
 
-def test_a_firmware_fault_ends_the_run_with_code_3_and_complete_files(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_a_firmware_fault_ends_the_run_with_code_3_and_complete_files(mirotwin, short, tmp_path):
     image = hex_file(tmp_path / "faulty.ihx", UNDEFINED_OPCODE)
     code, _, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out", "-q")
     assert code == 3
@@ -133,9 +128,7 @@ C:   00000001  _pulse                             a
 """
 
 
-def test_a_fault_of_the_board_names_limit_tick_instruction_and_symbol(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_a_fault_of_the_board_names_limit_tick_instruction_and_symbol(mirotwin, short, tmp_path):
     image = hex_file(tmp_path / "bad.ihx", SHORT_RESET)
     image.with_suffix(".map").write_text(SYMBOLS)
     code, _, err = mirotwin("run", short, "--firmware", image, "--out", tmp_path / "out", "-q")
@@ -144,9 +137,7 @@ def test_a_fault_of_the_board_names_limit_tick_instruction_and_symbol(
     assert (code, err.splitlines()[0]) == (3, f"mirotwin: {first} at 0x0003 in _pulse, tick 36")
 
 
-def test_a_scenario_may_count_faults_and_go_on(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_a_scenario_may_count_faults_and_go_on(mirotwin, short, tmp_path):
     patient = tmp_path / "patient.toml"
     patient.write_text(short.read_text().replace("duration_s", "stop_on_fault = false\nduration_s"))
     image = hex_file(tmp_path / "bad.ihx", SHORT_RESET)
@@ -157,9 +148,7 @@ def test_a_scenario_may_count_faults_and_go_on(
     assert summary["simulated_s"] > 0.2
 
 
-def test_an_interrupted_run_leaves_nothing_behind(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_run_leaves_nothing_behind(mirotwin, short, tmp_path, monkeypatch):
     def interrupted(*arguments: object) -> NoReturn:
         raise KeyboardInterrupt
 
@@ -171,13 +160,13 @@ def test_an_interrupted_run_leaves_nothing_behind(
 
 @pytest.mark.parametrize(("number", "expected"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
 def test_a_terminated_run_leaves_nothing_behind(
-    mirotwin: Callable[..., Result],
-    short: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    number: signal.Signals,
-    expected: int,
-) -> None:
+    mirotwin,
+    short,
+    tmp_path,
+    monkeypatch,
+    number,
+    expected,
+):
     monkeypatch.setattr(runner, "run", lambda *arguments: signal.raise_signal(number))
     before = signal.signal(number, signal.SIG_DFL)  # a run leaves a signal alone that it finds ignored
     try:
@@ -191,7 +180,7 @@ def test_a_terminated_run_leaves_nothing_behind(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
 @pytest.mark.parametrize("arguments", [["scenarios"], ["scenarios", "show", "fig6"], ["--help"], ["info"]])
-def test_output_that_cannot_be_written_is_one_line_on_stderr(arguments: list[str]) -> None:
+def test_output_that_cannot_be_written_is_one_line_on_stderr(arguments):
     program = [sys.executable, "-c", "from mirotwin.commands import main; main()", *arguments]
     with Path("/dev/full").open("wb") as full:
         done = children.run(program, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
@@ -201,8 +190,8 @@ def test_output_that_cannot_be_written_is_one_line_on_stderr(arguments: list[str
 
 @pytest.mark.parametrize("command", [("run", "--out", "out", "-q"), ("fw", "profile")])
 def test_parameters_with_which_nothing_can_be_computed_are_bad_input(
-    mirotwin: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
-) -> None:
+    mirotwin, tmp_path, monkeypatch, command
+):
     monkeypatch.chdir(tmp_path)
     Path("far.toml").write_text(SHORT + "drive.chassis.track_m = 1e-200\n")
     words = list(command)
@@ -216,7 +205,7 @@ def test_parameters_with_which_nothing_can_be_computed_are_bad_input(
     assert [path.name for path in tmp_path.iterdir()] == ["far.toml"]
 
 
-def test_the_shortest_duration_is_one_control_period(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_the_shortest_duration_is_one_control_period(mirotwin, tmp_path):
     scenario = tmp_path / "shortest.toml"
     scenario.write_text(SHORT.replace("duration_s = 0.2", "duration_s = 1e-9"))
     assert mirotwin("run", scenario, "--out", tmp_path / "out", "-q") == (0, "", "")
@@ -233,18 +222,14 @@ def test_the_shortest_duration_is_one_control_period(mirotwin: Callable[..., Res
         (["--firmware", "/dev/null"], "/dev/null: is not a regular file; copy the content to a file first"),
     ],
 )
-def test_an_option_that_means_nothing_is_refused_in_plain_words(
-    mirotwin: Callable[..., Result], short: Path, arguments: list[str], expected: str
-) -> None:
+def test_an_option_that_means_nothing_is_refused_in_plain_words(mirotwin, short, arguments, expected):
     code, out, err = mirotwin("run", short, *arguments)
     assert (code, out) == (2, "")
     assert expected in err
 
 
 @pytest.mark.parametrize("arguments", [["info"], ["scenarios"]])
-def test_a_table_in_a_pipe_has_no_trailing_blanks(
-    mirotwin: Callable[..., Result], arguments: list[str]
-) -> None:
+def test_a_table_in_a_pipe_has_no_trailing_blanks(mirotwin, arguments):
     lines = mirotwin(*arguments)[1].splitlines()
     assert lines
     assert [line for line in lines if line != line.rstrip()] == []

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
-from tests.mirotwin.conftest import SHORT, Result
+from tests.mirotwin.conftest import SHORT
 
 FRAMES = [f"frame-{number:06d}.png" for number in range(6)]
 
@@ -19,9 +18,7 @@ def names(folder: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("plain", [(), ("--plain-frames",)])
-def test_every_frame_is_saved_and_the_run_is_the_same(
-    mirotwin: Callable[..., Result], short: Path, finished: Path, tmp_path: Path, plain: tuple[str, ...]
-) -> None:
+def test_every_frame_is_saved_and_the_run_is_the_same(mirotwin, short, finished, tmp_path, plain):
     arguments = ("run", short, "--seed", 5, "-q", "--out", tmp_path / "out")
     assert mirotwin(*arguments, "--frames", tmp_path / "frames", *plain) == (0, "", "")
     assert names(tmp_path / "frames") == FRAMES
@@ -36,9 +33,7 @@ def test_every_frame_is_saved_and_the_run_is_the_same(
     assert out.read_bytes() == (tmp_path / "frames" / FRAMES[5]).read_bytes()
 
 
-def test_frames_of_several_networks_have_the_network_in_their_names(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_frames_of_several_networks_have_the_network_in_their_names(mirotwin, tmp_path):
     two = tmp_path / "two.toml"
     two.write_text(
         SHORT.replace("duration_s = 0.2", "duration_s = 0.04")
@@ -55,9 +50,7 @@ def test_frames_of_several_networks_have_the_network_in_their_names(
     ]
 
 
-def test_a_folder_with_content_is_left_alone_unless_it_is_to_be_replaced(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_a_folder_with_content_is_left_alone_unless_it_is_to_be_replaced(mirotwin, short, tmp_path):
     folder = tmp_path / "frames"
     folder.mkdir()
     for name in ("frame-000000.png", "frame-000999.png", "frame-000003.part.png", "mine.png"):
@@ -92,13 +85,13 @@ def test_a_folder_with_content_is_left_alone_unless_it_is_to_be_replaced(
     ],
 )
 def test_frames_that_cannot_be_saved_are_refused_before_anything_is_written(
-    mirotwin: Callable[..., Result],
-    short: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    options: tuple[str, ...],
-    expected: str,
-) -> None:
+    mirotwin,
+    short,
+    tmp_path,
+    monkeypatch,
+    options,
+    expected,
+):
     monkeypatch.chdir(tmp_path)
     code, out, err = mirotwin("run", short, *(option.format(short=short) for option in options))
     assert (code, out) == (2, "")
@@ -108,12 +101,12 @@ def test_frames_that_cannot_be_saved_are_refused_before_anything_is_written(
 
 @pytest.mark.parametrize("raised", [KeyboardInterrupt(), OSError(28, "No space left on device")])
 def test_a_run_that_breaks_off_leaves_whole_frames_only(
-    mirotwin: Callable[..., Result],
-    short: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    raised: BaseException,
-) -> None:
+    mirotwin,
+    short,
+    tmp_path,
+    monkeypatch,
+    raised,
+):
     write = Path.write_bytes
 
     def breaking(path: Path, data: bytes) -> int:

@@ -1,28 +1,24 @@
 """`mirotwin run --save-at .. --resume .. --to ..`: a run that goes on has the bits of one that never stopped."""
 
 import json
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
 from mirotwin.recording.reader import read
-from tests.mirotwin.conftest import SHORT, Result
+from tests.mirotwin.conftest import SHORT
 
 QUIET = ("--no-figure", "-q")
 
 
 @pytest.fixture
-def short(tmp_path: Path) -> Path:
+def short(tmp_path):
     path = tmp_path / "short.toml"
     path.write_text(SHORT)
     return path
 
 
 @pytest.mark.parametrize("at", ["2402400t", "2500001t", "100ms"])
-def test_a_resumed_run_has_the_digests_of_one_that_never_stopped(
-    mirotwin: Callable[..., Result], tmp_path: Path, short: Path, at: str
-) -> None:
+def test_a_resumed_run_has_the_digests_of_one_that_never_stopped(mirotwin, tmp_path, short, at):
     whole, rest = tmp_path / "whole", tmp_path / "rest"
     assert mirotwin("run", short, "--out", whole, "--seed", 5, "--save-at", at, *QUIET)[0] == 0
     (saved,) = whole.glob("at-*.world")
@@ -37,8 +33,8 @@ def test_a_resumed_run_has_the_digests_of_one_that_never_stopped(
 
 @pytest.mark.parametrize("to", ["4000000t", "4004000t", "4804800t"])
 def test_a_resumed_run_that_is_told_where_to_end_has_the_digest_of_an_unbroken_one(
-    mirotwin: Callable[..., Result], tmp_path: Path, short: Path, to: str
-) -> None:
+    mirotwin, tmp_path, short, to
+):
     whole, rest = tmp_path / "whole", tmp_path / "rest"
     mirotwin("run", short, "--out", whole, "--save-at", "100ms", "--to", to, *QUIET)
     saved = whole / "at-2400000.world"
@@ -49,9 +45,7 @@ def test_a_resumed_run_that_is_told_where_to_end_has_the_digest_of_an_unbroken_o
     assert (code, err) == (0, "")
 
 
-def test_figures_of_a_resumed_run_say_what_time_they_cover(
-    mirotwin: Callable[..., Result], tmp_path: Path, short: Path
-) -> None:
+def test_figures_of_a_resumed_run_say_what_time_they_cover(mirotwin, tmp_path, short):
     whole, rest = tmp_path / "whole", tmp_path / "rest"
     _, table, _ = mirotwin("run", short, "--out", whole, "--save-at", "100ms", "--no-figure")
     assert "rms (0.00 s to 0.20 s)" in table
@@ -66,9 +60,7 @@ def test_figures_of_a_resumed_run_say_what_time_they_cover(
     assert summary["realtime_factor"] == (summary["simulated_s"] - summary["resumed_s"]) / summary["wall_s"]
 
 
-def test_a_resumed_run_is_not_compared_with_a_whole_one(
-    mirotwin: Callable[..., Result], tmp_path: Path, short: Path
-) -> None:
+def test_a_resumed_run_is_not_compared_with_a_whole_one(mirotwin, tmp_path, short):
     whole, rest = tmp_path / "whole", tmp_path / "rest"
     mirotwin("run", short, "--out", whole, "--save-at", "100ms", *QUIET)
     mirotwin("run", short, "--out", rest, "--resume", whole / "at-2400000.world", *QUIET)
@@ -77,7 +69,7 @@ def test_a_resumed_run_is_not_compared_with_a_whole_one(
     assert "a run that was resumed: it begins with control period 3" in err
 
 
-def test_a_run_ends_where_it_is_told_to(mirotwin: Callable[..., Result], tmp_path: Path, short: Path) -> None:
+def test_a_run_ends_where_it_is_told_to(mirotwin, tmp_path, short):
     assert mirotwin("run", short, "--out", tmp_path / "a", "--to", "2500000t", *QUIET)[0] == 0
     summary = json.loads((tmp_path / "a" / "summary.json").read_text())
     assert summary["simulated_s"] == 2_500_000 / 24e6
@@ -112,9 +104,7 @@ def test_a_run_ends_where_it_is_told_to(mirotwin: Callable[..., Result], tmp_pat
         (("--save-at", "soon"), "'soon' is not a time; write 2s, 20ms, 341us or 5min, or 48000t for ticks."),
     ],
 )
-def test_what_cannot_be_done_is_refused_and_nothing_is_written(
-    mirotwin: Callable[..., Result], tmp_path: Path, short: Path, arguments: tuple[str, ...], what: str
-) -> None:
+def test_what_cannot_be_done_is_refused_and_nothing_is_written(mirotwin, tmp_path, short, arguments, what):
     first = tmp_path / "first"
     mirotwin("run", short, "--out", first, "--seed", 5, "--save-at", "2402400t", *QUIET)
     given = [one.format(saved=first / "at-2402400.world", short=short) for one in arguments]
@@ -124,7 +114,7 @@ def test_what_cannot_be_done_is_refused_and_nothing_is_written(
     assert not (tmp_path / "second").exists()
 
 
-def test_full_recordings_do_not_stop(mirotwin: Callable[..., Result], tmp_path: Path, short: Path) -> None:
+def test_full_recordings_do_not_stop(mirotwin, tmp_path, short):
     code, _, err = mirotwin("run", short, "--out", tmp_path / "a", "--record", "full", "--to", "1000t")
     assert code == 2
     assert "do not go with --record full" in err

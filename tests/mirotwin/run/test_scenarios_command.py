@@ -1,7 +1,6 @@
 """`mirotwin scenarios`, and how the command line refuses what it is not meant to get."""
 
 import tomllib
-from pathlib import Path
 
 import click
 import pytest
@@ -19,7 +18,7 @@ def mirotwin(*arguments: str) -> tuple[int, str, str]:
     return result.exit_code, result.stdout, result.stderr
 
 
-def test_the_built_in_scenarios_are_listed_with_what_they_show() -> None:
+def test_the_built_in_scenarios_are_listed_with_what_they_show():
     code, out, err = mirotwin("scenarios")
     assert (code, err) == (0, "")
     assert "fig6" in out
@@ -28,12 +27,12 @@ def test_the_built_in_scenarios_are_listed_with_what_they_show() -> None:
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig10"])
-def test_show_prints_the_file_as_it_stands(name: str) -> None:
+def test_show_prints_the_file_as_it_stands(name):
     assert mirotwin("scenarios", "show", name) == (0, builtin_text(name), "")
     assert tomllib.loads(mirotwin("scenarios", "show", name)[1])["name"] == name
 
 
-def test_the_checks_are_listed_with_their_parameters() -> None:
+def test_the_checks_are_listed_with_their_parameters():
     code, out, err = mirotwin("scenarios", "checks")
     assert (code, err) == (0, "")
     rows = {line.split()[0]: line for line in out.splitlines() if line.strip()}
@@ -42,7 +41,7 @@ def test_the_checks_are_listed_with_their_parameters() -> None:
 
 
 @pytest.mark.parametrize("command", [["scenarios", "show"], ["run"]])
-def test_the_help_has_the_three_lines_that_derive_a_scenario(command: list[str]) -> None:
+def test_the_help_has_the_three_lines_that_derive_a_scenario(command):
     lines = mirotwin(*command, "--help")[1].splitlines()
     first = next(number for number, line in enumerate(lines) if line.strip() == 'scenario = "fig6"')
     mine = parse("\n".join(lines[first : first + 3]).replace("    ", ""), "mine.toml")
@@ -69,14 +68,14 @@ def test_the_help_has_the_three_lines_that_derive_a_scenario(command: list[str])
         (["replay", "absent.mcap"], "error: absent.mcap: No such file or directory"),
     ],
 )
-def test_bad_input_is_one_line_on_stderr_and_exit_code_2(arguments: list[str], expected: str) -> None:
+def test_bad_input_is_one_line_on_stderr_and_exit_code_2(arguments, expected):
     code, out, err = mirotwin(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith(f"mirotwin: {expected}")
     assert err.count("\n") == 1
 
 
-def test_without_a_command_the_help_is_shown() -> None:
+def test_without_a_command_the_help_is_shown():
     code, _, err = mirotwin()
     assert code == 2
     assert "Simulate:" in err
@@ -92,7 +91,7 @@ FULL_DISK = OSError(28, "No space left on device", "out/run.mcap")
         (FULL_DISK, 2, "mirotwin: error: out/run.mcap: No space left on device\n"),
     ],
 )
-def test_what_comes_from_outside_is_no_traceback_either(raised: BaseException, code: int, line: str) -> None:
+def test_what_comes_from_outside_is_no_traceback_either(raised, code, line):
     @click.group(cls=Program)
     def group() -> None: ...
 
@@ -104,7 +103,7 @@ def test_what_comes_from_outside_is_no_traceback_either(raised: BaseException, c
     assert (result.exit_code, result.stderr.lstrip("\n")) == (code, line)
 
 
-def test_a_mistake_of_the_program_itself_asks_for_a_report() -> None:
+def test_a_mistake_of_the_program_itself_asks_for_a_report():
     @click.group(cls=Program)
     def group() -> None: ...
 
@@ -118,7 +117,7 @@ def test_a_mistake_of_the_program_itself_asks_for_a_report() -> None:
     assert "report" in result.stderr
 
 
-def test_what_a_setting_leaves_out_is_told_on_stderr(tmp_path: Path) -> None:
+def test_what_a_setting_leaves_out_is_told_on_stderr(tmp_path):
     folder = ("--out", str(tmp_path / "out"), "--no-figure", "-q")
     code, _, err = mirotwin(
         "run", "fig6", "--set", "camera.kind=geometric", "--set", "duration_s=0.1", *folder

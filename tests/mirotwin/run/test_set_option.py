@@ -1,13 +1,11 @@
 """`--set KEY=VALUE` on the commands that take a scenario."""
 
 import json
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
 from miro_protocol.frames import TeamFrame, encode
-from tests.mirotwin.conftest import SHORT, Result, hex_file
+from tests.mirotwin.conftest import SHORT, hex_file
 
 SETTINGS = ("duration_s=0.1", "network.robot.0.start_error_x_cm=3", "network.radio.carrier=on")
 
@@ -17,7 +15,7 @@ def options(settings: tuple[str, ...] = SETTINGS) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def run(mirotwin: Callable[..., Result], short: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run(mirotwin, short, tmp_path_factory):
     """The folder of a run of the short scenario with settings."""
     folder = tmp_path_factory.mktemp("set") / "out"
     code, out, err = mirotwin("run", short, *options(), "--no-figure", "--out", folder)
@@ -26,9 +24,7 @@ def run(mirotwin: Callable[..., Result], short: Path, tmp_path_factory: pytest.T
     return folder
 
 
-def test_a_run_with_settings_is_the_run_of_the_edited_file(
-    mirotwin: Callable[..., Result], run: Path, tmp_path: Path
-) -> None:
+def test_a_run_with_settings_is_the_run_of_the_edited_file(mirotwin, run, tmp_path):
     edited = tmp_path / "edited.toml"
     text = SHORT.replace("duration_s = 0.2", "duration_s = 0.1")
     text = text.replace("start_error_x_cm = 2.0", "start_error_x_cm = 3.0")
@@ -40,13 +36,13 @@ def test_a_run_with_settings_is_the_run_of_the_edited_file(
     assert "set" not in other
 
 
-def test_its_recording_replays_to_the_same_response(mirotwin: Callable[..., Result], run: Path) -> None:
+def test_its_recording_replays_to_the_same_response(mirotwin, run):
     code, out, err = mirotwin("replay", run / "run.mcap", "-q")
     assert (code, err) == (0, "")
     assert "equals the recorded one in all 3 control periods" in out
 
 
-def test_a_recording_may_be_replayed_with_other_settings(mirotwin: Callable[..., Result], run: Path) -> None:
+def test_a_recording_may_be_replayed_with_other_settings(mirotwin, run):
     code, _, err = mirotwin("replay", run / "run.mcap", "-q", "--set", "network.robot.1.slot=1")
     assert code == 4
     assert "the replay differs in control period 0" in err
@@ -55,9 +51,7 @@ def test_a_recording_may_be_replayed_with_other_settings(mirotwin: Callable[...,
     assert "run.mcap: scenario.toml: --set network.robot.1.slot=7: 7 is out of range; must be <= 4" in err
 
 
-def test_a_stream_runs_in_the_default_scenario_with_its_settings(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_stream_runs_in_the_default_scenario_with_its_settings(mirotwin, tmp_path):
     path = tmp_path / "stream.txt"
     path.write_text(f"24000 > {encode(TeamFrame(0, 1, ((256, 256),) * 3), 3).hex(' ')}\n")
     heard = [
@@ -72,9 +66,7 @@ def test_a_stream_runs_in_the_default_scenario_with_its_settings(
     )
 
 
-def test_show_prints_a_file_that_runs_the_same(
-    mirotwin: Callable[..., Result], run: Path, tmp_path: Path
-) -> None:
+def test_show_prints_a_file_that_runs_the_same(mirotwin, run, tmp_path):
     short = tmp_path / "short.toml"
     short.write_text(SHORT)
     code, out, err = mirotwin("scenarios", "show", short, *options())
@@ -86,9 +78,7 @@ def test_show_prints_a_file_that_runs_the_same(
     assert one["digest"] == other["digest"]
 
 
-def test_the_commands_that_look_into_a_run_take_settings(
-    mirotwin: Callable[..., Result], short: Path, run: Path
-) -> None:
+def test_the_commands_that_look_into_a_run_take_settings(mirotwin, short, run):
     profiles = [
         mirotwin("fw", "profile", short, *options()),
         mirotwin("fw", "profile", short, "--set", "duration_s=0.05"),
@@ -110,12 +100,12 @@ def test_the_commands_that_look_into_a_run_take_settings(
     ],
 )  # fmt: skip
 def test_a_setting_that_cannot_be_is_one_line_and_exit_code_2(
-    mirotwin: Callable[..., Result],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    command: list[str],
-    said: str,
-) -> None:
+    mirotwin,
+    tmp_path,
+    monkeypatch,
+    command,
+    said,
+):
     image = hex_file(tmp_path / "a.ihx", b"\x80\xfe")
     monkeypatch.chdir(tmp_path)
     code, out, err = mirotwin(*(image if word == "IMAGE" else word for word in command))

@@ -1,8 +1,5 @@
 """`mirotwin replay` of stream files of version 2: scenario and seed of the header, stop bits, networks, refusals."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import pytest
 
 from miro_protocol import stream, stream_header
@@ -10,7 +7,7 @@ from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.transmission import Transmission
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from tests.mirotwin.conftest import SHORT, Result
+from tests.mirotwin.conftest import SHORT
 
 FRAMES = [encode(TeamFrame(0, seq, ((500, 500), (0, 0), (-500, -500))), 3) for seq in range(3)]
 SENT = [Transmission(100_000 + index * 800_800, ">", data) for index, data in enumerate(FRAMES)]
@@ -32,9 +29,7 @@ def counters(out: str) -> list[list[str]]:
     return [words[:4] for words in lines[head + 1 :] if words]
 
 
-def test_characters_with_a_bad_stop_bit_reach_the_robot_so(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_characters_with_a_bad_stop_bit_reach_the_robot_so(mirotwin, tmp_path):
     flawed = Transmission(SENT[1].tick, ">", FRAMES[1], 0, (22,))
     stream.write(tmp_path / "a.stream", [SENT[0], flawed, SENT[2]])
     code, out, err = mirotwin("replay", tmp_path / "a.stream")
@@ -43,7 +38,7 @@ def test_characters_with_a_bad_stop_bit_reach_the_robot_so(
     assert "23 bytes, bad stop bit" in out
 
 
-def test_every_network_has_robots_of_its_own(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_every_network_has_robots_of_its_own(mirotwin, tmp_path):
     five = encode(TeamFrame(0, 9, ((1, 1),) * 5), 5)
     stream.write(tmp_path / "a.stream", [*SENT, Transmission(2_500_000, ">", five, 1)])
     code, out, err = mirotwin("replay", tmp_path / "a.stream")
@@ -51,9 +46,7 @@ def test_every_network_has_robots_of_its_own(mirotwin: Callable[..., Result], tm
     assert [row[1] for row in counters(out)] == ["3"] * 3 + ["1"] * 5
 
 
-def test_the_scenario_of_the_header_runs_with_its_seed(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_the_scenario_of_the_header_runs_with_its_seed(mirotwin, tmp_path):
     header = stream_header.of_text("seed = 3\n" + in_header(SHORT))
     stream.write(tmp_path / "a.stream", SENT, header)
     code, out, err = mirotwin("replay", tmp_path / "a.stream")
@@ -67,7 +60,7 @@ def test_the_scenario_of_the_header_runs_with_its_seed(
     assert len(accepted) > 1
 
 
-def test_what_the_header_expects_is_judged(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_what_the_header_expects_is_judged(mirotwin, tmp_path):
     met = "[expect]\nacts_within_ms = true\naccepts_only_sent = true\nframes_accepted_min = 3"
     stream.write(tmp_path / "a.stream", SENT, stream_header.of_text(met))
     assert mirotwin("replay", "-q", tmp_path / "a.stream")[::2] == (0, "")
@@ -85,16 +78,14 @@ def test_what_the_header_expects_is_judged(mirotwin: Callable[..., Result], tmp_
     )
 
 
-def test_a_built_in_scenario_is_taken_by_its_name(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_built_in_scenario_is_taken_by_its_name(mirotwin, tmp_path):
     stream.write(tmp_path / "a.stream", SENT, stream_header.of_text("scenario = 'fig8'"))
     code, out, err = mirotwin("replay", tmp_path / "a.stream")
     assert (code, err) == (0, "")
     assert [row[0] for row in counters(out)] == ["0"]
 
 
-def test_settings_of_the_header_are_made_before_those_of_the_command(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_settings_of_the_header_are_made_before_those_of_the_command(mirotwin, tmp_path):
     slots = "set = { network = { robot = { 0 = { slot = 2 } } }, duration_s = 0.5 }"
     stream.write(tmp_path / "a.stream", SENT, stream_header.of_text(f"scenario = 'fig8'\n{slots}"))
     code, out, err = mirotwin("replay", tmp_path / "a.stream")
@@ -146,9 +137,7 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(
     ],
 )
 @pytest.mark.parametrize("command", [["replay"], ["fw", "profile"]])
-def test_what_cannot_be_done_is_refused_with_one_line(
-    mirotwin: Callable[..., Result], tmp_path: Path, command: list[str], header: str, lines: str, what: str
-) -> None:
+def test_what_cannot_be_done_is_refused_with_one_line(mirotwin, tmp_path, command, header, lines, what):
     path = tmp_path / "a.stream"
     text = stream.format_stream(SENT, stream_header.of_text(header) if header else None)
     text = text.replace("stream 1", "stream 2") + (lines + "\n" if lines else "")
@@ -160,7 +149,7 @@ def test_what_cannot_be_done_is_refused_with_one_line(
     assert err.count("\n") == 1
 
 
-def test_another_image_may_be_named(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_another_image_may_be_named(mirotwin, tmp_path):
     own = load_hex(image_path()).sha256
     stream.write(tmp_path / "own.stream", SENT, stream_header.of_text(f'firmware_sha256 = "{own}"'))
     assert mirotwin("replay", tmp_path / "own.stream", "-q")[::2] == (0, "")
@@ -171,9 +160,7 @@ def test_another_image_may_be_named(mirotwin: Callable[..., Result], tmp_path: P
 
 
 @pytest.mark.parametrize("command", [["decode"], ["export", "--out", "-", "--to", "pcapng"]])
-def test_decoding_and_exporting_refuse_an_event_after_what_came_before(
-    mirotwin: Callable[..., Result], tmp_path: Path, command: list[str]
-) -> None:
+def test_decoding_and_exporting_refuse_an_event_after_what_came_before(mirotwin, tmp_path, command):
     path = tmp_path / "a.stream"
     path.write_text(f"{V2}5 > 55\n9 *@0 radio down\n99999 > 55\n")
     code, _, err = mirotwin(*command, path)
@@ -181,9 +168,7 @@ def test_decoding_and_exporting_refuse_an_event_after_what_came_before(
     assert f"{path}:3:1: an event, which this command does not support" in err
 
 
-def test_a_robot_that_is_reset_counts_anew_and_a_radio_that_is_off_lets_nothing_through(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_robot_that_is_reset_counts_anew_and_a_radio_that_is_off_lets_nothing_through(mirotwin, tmp_path):
     (tmp_path / "a.stream").write_text(
         V2
         + f"2 > {FRAMES[0].hex(' ')}\n800000 *@0/1 reset 1\n800100 *@0/1 reset 0\n800200 *@0/2 power 0\n"
@@ -194,9 +179,7 @@ def test_a_robot_that_is_reset_counts_anew_and_a_radio_that_is_off_lets_nothing_
     assert [row[1] for row in counters(out)] == ["2", "1", "0"]
 
 
-def test_a_deed_at_a_network_beyond_the_colours_of_teams_is_done(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_deed_at_a_network_beyond_the_colours_of_teams_is_done(mirotwin, tmp_path):
     (tmp_path / "a.stream").write_text(V2 + "960000 *@5 radio up\n970000 *@5/0 reset 1\n")
     code, _, err = mirotwin("replay", tmp_path / "a.stream")
     assert (code, err) == (0, "")

@@ -19,9 +19,7 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.parametrize("stream", [io.StringIO, Terminal])
-def test_a_line_of_text_is_not_folded_however_long(
-    stream: type[io.StringIO], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_line_of_text_is_not_folded_however_long(stream, monkeypatch):
     out = stream()
     monkeypatch.setattr(sys, "stdout", out)
     monkeypatch.setenv("COLUMNS", "80")
@@ -29,7 +27,7 @@ def test_a_line_of_text_is_not_folded_however_long(
     assert out.getvalue() == f"{LINE}\n"
 
 
-def test_a_table_in_a_pipe_is_not_folded_at_80_columns_nor_padded(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_table_in_a_pipe_is_not_folded_at_80_columns_nor_padded(monkeypatch):
     monkeypatch.setattr(sys, "stdout", out := io.StringIO())
     monkeypatch.setenv("COLUMNS", "80")
     table = Table("name", "value", box=None)

@@ -1,13 +1,9 @@
 """Text of others (file names, names in .cdb and lcov files, C sources) reaches the terminal without control codes."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import pytest
 
 from miro_robot.inspect import lcov
 from miro_robot.inspect.lcov import FileRecord
-from tests.mirotwin.conftest import Result
 
 NASTY = "a\x1b[31m\x07\x9b2J\u202e.c"
 SHOWN = r"a\x1b[31m\x07\x9b2J\u202e.c"
@@ -20,7 +16,7 @@ def plain(text: str) -> bool:
 
 
 @pytest.fixture
-def image(tmp_path: Path) -> Path:
+def image(tmp_path):
     """An endless loop whose .cdb says that it comes of line 1 of a file with a nasty name and a nasty text."""
     path = tmp_path / "loop.ihx"
     path.write_text(LOOP)
@@ -31,7 +27,7 @@ def image(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_listing_shows_names_and_sources_escaped(mirotwin: Callable[..., Result], image: Path) -> None:
+def test_a_listing_shows_names_and_sources_escaped(mirotwin, image):
     code, out, _ = mirotwin("fw", "disasm", image)
     assert code == 0
     assert plain(out)
@@ -40,18 +36,14 @@ def test_a_listing_shows_names_and_sources_escaped(mirotwin: Callable[..., Resul
 
 
 @pytest.mark.parametrize("command", ["trace", "profile", "coverage"])
-def test_no_command_that_looks_on_prints_a_control_code(
-    mirotwin: Callable[..., Result], image: Path, command: str
-) -> None:
+def test_no_command_that_looks_on_prints_a_control_code(mirotwin, image, command):
     code, out, err = mirotwin("fw", command, image, "--max-cycles", 20, "--to", "200t")
     assert code in (0, 42)
     assert plain(out + err)
     assert SHOWN in out or command != "coverage"
 
 
-def test_an_lcov_name_with_codes_is_shown_escaped_and_kept_exactly(
-    mirotwin: Callable[..., Result], image: Path, tmp_path: Path
-) -> None:
+def test_an_lcov_name_with_codes_is_shown_escaped_and_kept_exactly(mirotwin, image, tmp_path):
     info = tmp_path / "fw.info"
     info.write_text(f"TN:\nSF:{NASTY}\nDA:1,1\nend_of_record\n", encoding="utf-8")
     code, out, _ = mirotwin("fw", "coverage", image, "--to", "200t", "--out", info, "--append")
@@ -61,9 +53,7 @@ def test_an_lcov_name_with_codes_is_shown_escaped_and_kept_exactly(
     assert f"SF:{NASTY}\n" in info.read_text(encoding="utf-8")
 
 
-def test_a_line_end_in_the_name_of_a_file_forges_no_line(
-    mirotwin: Callable[..., Result], image: Path, tmp_path: Path
-) -> None:
+def test_a_line_end_in_the_name_of_a_file_forges_no_line(mirotwin, image, tmp_path):
     raw = tmp_path / FORGED
     raw.write_bytes(b"\x00")
     for arguments in (["decode", raw, "--format", "raw"], ["decode", raw, "--format", "raw", "--json"]):
@@ -75,7 +65,7 @@ def test_a_line_end_in_the_name_of_a_file_forges_no_line(
     assert not any(line.startswith("all") for line in vcd.with_suffix(".gtkw").read_text().splitlines())
 
 
-def test_a_line_end_in_a_name_forges_no_record_of_a_tracefile() -> None:
+def test_a_line_end_in_a_name_forges_no_record_of_a_tracefile():
     for end in ("\n", "\r", "\x0b", "\x85", "\u2028"):
         record = FileRecord(lines={1: 0}, functions={f"f{end}DA:1,5": (1, 0)})
         text = lcov.encode({f"a{end}end_of_record": record})
@@ -84,9 +74,7 @@ def test_a_line_end_in_a_name_forges_no_record_of_a_tracefile() -> None:
         assert lcov.decode(text, "x.info")[path].lines == {1: 0}
 
 
-def test_a_tracefile_keeps_names_that_are_no_utf_8(
-    mirotwin: Callable[..., Result], image: Path, tmp_path: Path
-) -> None:
+def test_a_tracefile_keeps_names_that_are_no_utf_8(mirotwin, image, tmp_path):
     info = tmp_path / "fw.info"
     info.write_bytes(b"TN:\nSF:\xff.c\nDA:1,1\nend_of_record\n")
     code, out, _ = mirotwin("fw", "coverage", image, "--to", "200t", "--out", info, "--append")

@@ -54,15 +54,15 @@ def check(code: int, out: bytes, err: bytes) -> None:
 
 
 @pytest.mark.parametrize("delay_s", list(moments(8, 1)))
-def test_ctrl_c_is_one_line_at_any_moment(delay_s: float) -> None:
+def test_ctrl_c_is_one_line_at_any_moment(delay_s):
     check(*interrupted(delay_s, "info"))
 
 
-def test_ctrl_c_while_modules_are_loaded_ends_the_program_at_once() -> None:
+def test_ctrl_c_while_modules_are_loaded_ends_the_program_at_once():
     assert interrupted(0.0, "info") == (130, b"", b"mirotwin: interrupted\n")
 
 
-def test_a_program_that_was_started_with_ctrl_c_ignored_ignores_it() -> None:
+def test_a_program_that_was_started_with_ctrl_c_ignored_ignores_it():
     program = ["-c", f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); {PROGRAM}", "--version"]
     with children.start(
         [sys.executable, *program],

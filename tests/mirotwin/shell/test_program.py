@@ -59,7 +59,7 @@ def test_a_file_that_ends_too_soon_is_no_interruption(mirotwin, monkeypatch):
     )
 
 
-def test_help_loads_click_and_nothing_that_is_slow() -> None:
+def test_help_loads_click_and_nothing_that_is_slow():
     script = (
         "import sys\nfrom mirotwin.commands import main\n"
         "try:\n    main(['--help'])\n"

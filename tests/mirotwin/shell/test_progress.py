@@ -25,7 +25,7 @@ def drawn(
     return screen.getvalue()
 
 
-def test_a_bar_is_drawn_on_a_terminal_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bar_is_drawn_on_a_terminal_after_a_while(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     assert "simulating" in drawn(monkeypatch, Screen(), 0.0)
 
@@ -35,13 +35,11 @@ def test_a_bar_is_drawn_on_a_terminal_after_a_while(monkeypatch: pytest.MonkeyPa
     [(Screen(), 60.0, False), (io.StringIO(), 0.0, False), (Screen(), 0.0, True)],
     ids=["soon over", "no terminal", "quiet"],
 )
-def test_otherwise_nothing_is_drawn(
-    monkeypatch: pytest.MonkeyPatch, screen: io.StringIO, patience_s: float, quiet: bool
-) -> None:
+def test_otherwise_nothing_is_drawn(monkeypatch, screen, patience_s, quiet):
     assert drawn(monkeypatch, screen, patience_s, quiet) == ""
 
 
-def test_what_is_counted_is_shown_with_its_rate_and_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_counted_is_shown_with_its_rate_and_the_time_left(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setattr(sys, "stderr", screen := Screen())

@@ -26,11 +26,11 @@ from mirotwin.shell.times import UNITS_S, TimeType, WallTime
         ("0t", 0),
     ],
 )
-def test_a_time_is_a_number_with_its_unit(text: str, ticks: int) -> None:
+def test_a_time_is_a_number_with_its_unit(text, ticks):
     assert TimeType().convert(text, None, None).ticks() == ticks
 
 
-def test_ticks_are_those_of_the_crystal_that_drives_the_program() -> None:
+def test_ticks_are_those_of_the_crystal_that_drives_the_program():
     assert TimeType().convert("1s", None, None).ticks(11_059_200) == 11_059_200
     assert TimeType().convert("11059200t", None, None).seconds(11_059_200) == 1.0
 
@@ -39,7 +39,7 @@ def test_ticks_are_those_of_the_crystal_that_drives_the_program() -> None:
     "text",
     ["1", "0", "1.2", "1.t", "1.5t", "-1s", "1e3s", "nans", "2 sec", "", "s", "\u0661s", "9" * 5000 + "s"],
 )
-def test_anything_else_is_refused_with_both_spellings(text: str) -> None:
+def test_anything_else_is_refused_with_both_spellings(text):
     with pytest.raises(click.BadParameter) as refused:
         TimeType().convert(text, None, None)
     assert "ticks" in refused.value.message
@@ -47,7 +47,7 @@ def test_anything_else_is_refused_with_both_spellings(text: str) -> None:
 
 
 @given(st.integers(0, 10**9), st.sampled_from(sorted(UNITS_S)))
-def test_whatever_was_read_is_exact(number: int, unit: str) -> None:
+def test_whatever_was_read_is_exact(number, unit):
     wanted = number * UNITS_S[unit]
     if wanted > 10**9:
         with pytest.raises(click.BadParameter, match="too long"):
@@ -56,7 +56,7 @@ def test_whatever_was_read_is_exact(number: int, unit: str) -> None:
         assert TimeType().convert(f"{number}{unit}", None, None).value == Fraction(wanted)
 
 
-def test_the_wall_clock_has_no_ticks() -> None:
+def test_the_wall_clock_has_no_ticks():
     assert WallTime(100.0).convert("1min", None, None) == 60.0
     for text in ("5t", "5", "101s", "0s"):
         with pytest.raises(click.BadParameter) as refused:

@@ -1,8 +1,5 @@
 """The bench: two ears on one wire, trouble on it, and a state that can be carried on anywhere."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import msgspec
 import pytest
 
@@ -14,7 +11,7 @@ from miro_robot.mcs51.line import Line
 from miro_sim.radio import RadioParams
 from mirotwin.testing.air import Air, Trouble
 from mirotwin.testing.bench import MS, Bench, LinkFailure
-from tests.mirotwin.conftest import Result, mirotwin
+from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.testing.noise import listen
 
 __all__ = ["mirotwin"]
@@ -26,7 +23,7 @@ def team(seq: int, n: int = 3, ask: bool = False) -> TeamFrame:
 
 
 @pytest.mark.parametrize("n", [3, 5])
-def test_frames_and_answers_go_both_ways(n: int) -> None:
+def test_frames_and_answers_go_both_ways(n):
     bench = Bench(n, n - 1)
     for seq in range(2 * n):
         bench.send(team(seq, n, ask=True))
@@ -38,7 +35,7 @@ def test_frames_and_answers_go_both_ways(n: int) -> None:
     ]
 
 
-def test_a_noisy_run_is_counted_alike_and_repeats_to_the_bit() -> None:
+def test_a_noisy_run_is_counted_alike_and_repeats_to_the_bit():
     benches = [Bench(3, 0, NOISY, seed) for seed in (7, 7, 8)]
     for bench in benches:
         for seq in range(40):
@@ -52,7 +49,7 @@ def test_a_noisy_run_is_counted_alike_and_repeats_to_the_bit() -> None:
     assert stale == 0
 
 
-def test_a_burst_hits_the_frame_it_falls_into_and_no_other() -> None:
+def test_a_burst_hits_the_frame_it_falls_into_and_no_other():
     bench = Bench()
     bench.send(team(0))
     bench.trouble("burst", 12 * MS, 3 * MS)
@@ -61,7 +58,7 @@ def test_a_burst_hits_the_frame_it_falls_into_and_no_other() -> None:
     assert bench.counters[0] == 2
 
 
-def test_a_dropped_link_is_silence() -> None:
+def test_a_dropped_link_is_silence():
     bench = Bench()
     bench.trouble("mark", 0, 26 * MS)
     bench.send(team(0))
@@ -71,14 +68,14 @@ def test_a_dropped_link_is_silence() -> None:
 
 
 @pytest.mark.parametrize("n", [3, 5])
-def test_slicer_noise_alone_is_never_taken_for_a_frame_by_the_firmware(n: int) -> None:
+def test_slicer_noise_alone_is_never_taken_for_a_frame_by_the_firmware(n):
     """`python -m tests.mirotwin.testing.noise` listens for minutes."""
     bench = listen(10, n)
     assert len(bench.heard) > 7000
     assert bench.counters == (0, 0, 0)
 
 
-def test_trouble_that_comes_too_late_is_refused() -> None:
+def test_trouble_that_comes_too_late_is_refused():
     air = Air(Line(), Line(), 0, "x")
     air.trouble(Trouble(5, 10, "mark"))
     with pytest.raises(
@@ -87,7 +84,7 @@ def test_trouble_that_comes_too_late_is_refused() -> None:
         air.trouble(Trouble(7, 20, "burst"))
 
 
-def test_after_a_reset_the_robot_counts_from_nothing_and_hears_on() -> None:
+def test_after_a_reset_the_robot_counts_from_nothing_and_hears_on():
     bench = Bench(3, 0, NOISY, 3)
     for seq in range(5):
         bench.send(team(seq))
@@ -99,7 +96,7 @@ def test_after_a_reset_the_robot_counts_from_nothing_and_hears_on() -> None:
 
 
 @pytest.mark.parametrize("part", range(0, 100, 9))
-def test_a_bench_reloaded_at_any_place_goes_on_as_it_would_have(part: int) -> None:
+def test_a_bench_reloaded_at_any_place_goes_on_as_it_would_have(part):
     straight, cut = Bench(3, 0, NOISY, 11), Bench(3, 0, NOISY, 11)
     for bench in (straight, cut):
         bench.send(team(0, ask=True))
@@ -116,7 +113,7 @@ def test_a_bench_reloaded_at_any_place_goes_on_as_it_would_have(part: int) -> No
     assert cut.heard == straight.heard
 
 
-def test_a_count_that_differs_is_a_failure_with_what_was_heard() -> None:
+def test_a_count_that_differs_is_a_failure_with_what_was_heard():
     image = load_hex(image_path())
     names = dict(image.symbols.names)
     names["_frames_stale"] = names["_frames_rejected"]
@@ -127,16 +124,14 @@ def test_a_count_that_differs_is_a_failure_with_what_was_heard() -> None:
     assert [entry.comment for entry in stream.parse(caught.value.stream).entries] == ["type=0 seq=5"] * 2
 
 
-def test_an_image_without_counters_is_refused() -> None:
+def test_an_image_without_counters_is_refused():
     image = msgspec.structs.replace(load_hex(image_path()), symbols=Symbols({"x": Symbol(1, "iram")}))
     with pytest.raises(ValueError, match=r"no symbol _frames_accepted in internal RAM; put the .map or .cdb"):
         Bench(image=image)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_replay_of_what_the_robot_heard_counts_the_same(
-    mirotwin: Callable[..., Result], tmp_path: Path, seed: int
-) -> None:
+def test_replay_of_what_the_robot_heard_counts_the_same(mirotwin, tmp_path, seed):
     bench = Bench(3, 1, NOISY, seed)
     for seq in range(25):
         bench.send(team(seq if seq % 5 else 0))

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import pytest
 
 from miro_exact.bad_input import BadInput
@@ -15,7 +12,7 @@ from mirotwin.testing.waiting import WaitFailed
 from tests.mirotwin.testing.rigs import rig
 
 
-def test_numbers_count_by_themselves_and_velocities_go_by_slot() -> None:
+def test_numbers_count_by_themselves_and_velocities_go_by_slot():
     one = rig()
     link, robot = one.links[0], one.robots[0]
     assert [link.send(velocities={0: (100, -100)}).seq for _ in range(3)] == [0, 1, 2]
@@ -29,14 +26,14 @@ def test_numbers_count_by_themselves_and_velocities_go_by_slot() -> None:
     assert robot.read("frames_accepted") == 4
 
 
-def test_a_frame_of_ones_own_brings_its_number_and_the_next_one_follows_it() -> None:
+def test_a_frame_of_ones_own_brings_its_number_and_the_next_one_follows_it():
     link = rig().links[0]
     link.send(TeamFrame(0, 62, ((1, 2), (3, 4), (5, 6))))
     assert [link.ping().seq, link.poll(2).seq, link.send(velocities={}, seq=9).seq] == [63, 2, 9]
     assert link.velocities == {0: (0, 0), 1: (0, 0), 2: (0, 0)}
 
 
-def test_a_poll_asks_the_robot_in_its_turn_and_keeps_the_velocities() -> None:
+def test_a_poll_asks_the_robot_in_its_turn_and_keeps_the_velocities():
     one = rig(settings=["network.robots=5", "network.robot.slot=4"])
     link = one.links[0]
     link.send(velocities={4: (300, 300)})
@@ -46,7 +43,7 @@ def test_a_poll_asks_the_robot_in_its_turn_and_keeps_the_velocities() -> None:
     assert link.poll(4).seq == 9
 
 
-def test_a_character_with_a_bad_stop_bit_spoils_its_frame() -> None:
+def test_a_character_with_a_bad_stop_bit_spoils_its_frame():
     one = rig()
     one.links[0].send(velocities={0: (50, 50)}, bad_stop=[10])
     one.world.run_for(ms(5))
@@ -56,7 +53,7 @@ def test_a_character_with_a_bad_stop_bit_spoils_its_frame() -> None:
     assert one.robots[0].read("frames_accepted") == 1
 
 
-def test_without_wait_time_stands_and_frames_queue() -> None:
+def test_without_wait_time_stands_and_frames_queue():
     one = rig()
     begun = one.world.tick
     first, second = (one.links[0].send(velocities={}, wait=False) for _ in range(2))
@@ -67,7 +64,7 @@ def test_without_wait_time_stands_and_frames_queue() -> None:
     assert one.world.tick == later.end_tick
 
 
-def test_answers_that_nobody_has_taken_stay() -> None:
+def test_answers_that_nobody_has_taken_stay():
     one = rig(
         settings=[
             'network.robot=[{slot = 0, reference = {kind = "line", start_x_cm = 20.0, drive_s = 1.0}}, '
@@ -86,7 +83,7 @@ def test_answers_that_nobody_has_taken_stay() -> None:
     assert [answer.slot for _, answer in link.answers] == [0, 1]
 
 
-def test_the_wait_of_the_world_and_that_of_the_link_take_nothing_from_each_other() -> None:
+def test_the_wait_of_the_world_and_that_of_the_link_take_nothing_from_each_other():
     one = rig()
     one.links[0].poll(0)
     one.links[0].expect(within=ms(40))
@@ -96,14 +93,14 @@ def test_the_wait_of_the_world_and_that_of_the_link_take_nothing_from_each_other
     assert heard.tick == one.links[0].answers[0][0]
 
 
-def test_an_answer_stops_the_world_at_the_end_of_its_last_character() -> None:
+def test_an_answer_stops_the_world_at_the_end_of_its_last_character():
     one = rig()
     one.links[0].poll(0)
     one.links[0].expect(within=ms(40))
     assert one.world.tick == one.links[0].answers[0][0]
 
 
-def test_an_answer_of_other_content_is_not_the_one_that_was_asked_for() -> None:
+def test_an_answer_of_other_content_is_not_the_one_that_was_asked_for():
     one = rig()
     one.links[0].poll(0)
     with pytest.raises(WaitFailed, match="no answer with accepted=7 within 40 ms"):
@@ -111,7 +108,7 @@ def test_an_answer_of_other_content_is_not_the_one_that_was_asked_for() -> None:
     assert one.links[0].expect(accepted=1, within=0).slot == 0
 
 
-def test_what_failed_says_what_happened_instead() -> None:
+def test_what_failed_says_what_happened_instead():
     one = rig()
     one.links[0].poll(1)
     with pytest.raises(
@@ -121,7 +118,7 @@ def test_what_failed_says_what_happened_instead() -> None:
     assert caught.value.tick == caught.value.begun_tick + ms(40)
 
 
-def test_silence_is_kept_or_broken_at_the_first_character() -> None:
+def test_silence_is_kept_or_broken_at_the_first_character():
     one = rig()
     begun = one.world.tick
     one.links[0].expect_silence(ms(20))
@@ -133,7 +130,7 @@ def test_silence_is_kept_or_broken_at_the_first_character() -> None:
     one.links[0].expect_silence(ms(1))
 
 
-def test_characters_are_found_in_what_was_heard() -> None:
+def test_characters_are_found_in_what_was_heard():
     one = rig()
     one.links[0].poll(0)
     tick = one.links[0].expect_bytes(b"\x55\x55\xff\x2d", within=ms(40))
@@ -152,11 +149,11 @@ def test_characters_are_found_in_what_was_heard() -> None:
         ({"frame": b"\x00", "bad_stop": [1]}, "net0: "),
     ],
 )
-def test_what_cannot_be_sent_is_refused(keys: Mapping[str, Any], said: str) -> None:
+def test_what_cannot_be_sent_is_refused(keys, said):
     with pytest.raises(ValueError, match=said):
         rig().links[0].send(**keys)
 
 
-def test_a_field_that_telemetry_does_not_have_is_refused() -> None:
+def test_a_field_that_telemetry_does_not_have_is_refused():
     with pytest.raises(BadInput, match="telemetry has no field 'acepted'; it has seq, slot, flags"):
         rig().links[0].expect(acepted=1, within=1)

@@ -4,7 +4,6 @@
 """
 
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from hypothesis import Phase, find, given, settings
@@ -17,13 +16,13 @@ from miro_protocol import stream
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import TeamFrame
 from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from miro_robot.image import load_hex
 from miro_sim.radio import RadioParams
 from mirotwin.testing.bench import Bench, LinkFailure
 from mirotwin.testing.bench_case import case_of_bench
 from mirotwin.testing.machine import LinkMachine
 from mirotwin.testing.profiles import link_profiles, seeds
-from tests.mirotwin.conftest import Result, mirotwin
+from tests.mirotwin.conftest import mirotwin
 
 __all__ = ["mirotwin"]
 UNDEFINED = 0xA5
@@ -39,7 +38,7 @@ TestLink.settings = settings(max_examples=25, stateful_step_count=12, deadline=N
 
 @settings(deadline=None, max_examples=10)
 @given(link_profiles(), seeds(), st.sampled_from([3, 5]))
-def test_every_radio_that_is_drawn_can_be_put_on_the_bench(radio: RadioParams, seed: int, n: int) -> None:
+def test_every_radio_that_is_drawn_can_be_put_on_the_bench(radio, seed, n):
     bench = Bench(n, n - 1, radio, seed)
     for seq in range(3):
         bench.send(TeamFrame(3, seq, ((1, 1),) * n))
@@ -47,7 +46,7 @@ def test_every_radio_that_is_drawn_can_be_put_on_the_bench(radio: RadioParams, s
 
 
 @pytest.mark.parametrize("wanted", ["bit errors", "squelch", "latency", "always on"])
-def test_profiles_of_every_kind_are_drawn(wanted: str) -> None:
+def test_profiles_of_every_kind_are_drawn(wanted):
     def shows(radio: RadioParams) -> bool:
         return {
             "bit errors": radio.error_threshold > 0,
@@ -60,7 +59,7 @@ def test_profiles_of_every_kind_are_drawn(wanted: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def broken(tmp_path_factory: pytest.TempPathFactory) -> Image:
+def broken(tmp_path_factory):
     """The firmware with an undefined opcode where a poll is answered."""
     path = tmp_path_factory.mktemp("broken") / "broken.ihx"
     original = load_hex(image_path())
@@ -74,9 +73,7 @@ def broken(tmp_path_factory: pytest.TempPathFactory) -> Image:
     return load_hex(path)
 
 
-def test_a_planted_fault_is_found_and_shrunk_to_a_stream_file_that_shows_it_again(
-    mirotwin: Callable[..., Result], broken: Image, tmp_path: Path
-) -> None:
+def test_a_planted_fault_is_found_and_shrunk_to_a_stream_file_that_shows_it_again(mirotwin, broken, tmp_path):
     class Planted(LinkMachine):
         image = broken
         profiles = st.just(RadioParams.ideal())
@@ -102,7 +99,7 @@ def test_a_planted_fault_is_found_and_shrunk_to_a_stream_file_that_shows_it_agai
     assert "cured: no_fault passes" in own[1]
 
 
-def test_a_reset_is_part_of_the_case(broken: Image) -> None:
+def test_a_reset_is_part_of_the_case(broken):
     bench = Bench(3, 1, image=broken)
     bench.send(TeamFrame(0, 4, ((0, 0),) * 3))
     bench.reset()
@@ -114,7 +111,7 @@ def test_a_reset_is_part_of_the_case(broken: Image) -> None:
     assert [" reset 1\n" in case, " reset 0\n" in case] == [True, True]
 
 
-def test_shrinking_ends_when_its_time_is_over(broken: Image, tmp_path: Path) -> None:
+def test_shrinking_ends_when_its_time_is_over(broken, tmp_path):
     runs = []
 
     class Planted(LinkMachine):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from miro_exact.bad_input import BadInput
@@ -30,18 +28,18 @@ from tests.mirotwin.testing.rigs import HERE
         ({"boot": 1}, "boot=1; give True or False"),
     ],
 )
-def test_a_marker_that_cannot_be_met_is_refused_with_the_remedy(keys: dict[str, Any], said: str) -> None:
+def test_a_marker_that_cannot_be_met_is_refused_with_the_remedy(keys, said):
     mark = dict(keys)
     with pytest.raises(BadInput, match=said):
         Rig(wanted(marked([((), mark)]), HERE, None, mark.get("seed", 0)))
 
 
-def test_a_marker_without_names_is_refused() -> None:
+def test_a_marker_without_names_is_refused():
     with pytest.raises(BadInput, match="'fig6' has no name; write scenario='fig6'"):
         marked([(("fig6",), {})])
 
 
-def test_the_innermost_marker_holds_and_settings_and_expectations_add_up() -> None:
+def test_the_innermost_marker_holds_and_settings_and_expectations_add_up():
     inner = {"seed": 1, "settings": ["duration_s=2"], "expect": {"inside_pitch": True}}
     outer = {
         "seed": 2,
@@ -61,7 +59,7 @@ def test_the_innermost_marker_holds_and_settings_and_expectations_add_up() -> No
     ]
 
 
-def test_a_table_as_scenario_changes_keys_of_the_silent_one() -> None:
+def test_a_table_as_scenario_changes_keys_of_the_silent_one():
     table = {"network.radio": {"profile": "fade15", "keyup_s": 0.002}, "duration_s": 5}
     made = wanted(marked([((), {"scenario": table})]), HERE, None, 0)
     assert made.scenario.networks[0].radio.keyup_s == 0.002

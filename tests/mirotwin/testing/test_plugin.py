@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -54,7 +53,7 @@ def test_needs_no_world():
 
 
 @pytest.fixture(scope="module")
-def mixed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def mixed(tmp_path_factory):
     """The folder of a session with tests of all kinds: `out.txt`, `junit.xml`, `left/`."""
     folder = tmp_path_factory.mktemp("mixed")
     done = session(folder, "--mirotwin-artifacts=left", "--junitxml=junit.xml", tests=MIXED)
@@ -63,7 +62,7 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_each_test_has_its_verdict(mixed: Path) -> None:
+def test_each_test_has_its_verdict(mixed):
     out = (mixed / "out.txt").read_text()
     assert "6 failed, 2 passed, 2 errors" in out
     assert "INTERNALERROR" not in out
@@ -82,11 +81,11 @@ def test_each_test_has_its_verdict(mixed: Path) -> None:
         "the limit of virtual time was reached, duration_s = 60",
     ],
 )
-def test_what_went_wrong_is_said_in_one_line(mixed: Path, line: str) -> None:
+def test_what_went_wrong_is_said_in_one_line(mixed, line):
     assert line in (mixed / "out.txt").read_text()
 
 
-def test_a_traceback_ends_at_the_tests_own_line(mixed: Path) -> None:
+def test_a_traceback_ends_at_the_tests_own_line(mixed):
     out = (mixed / "out.txt").read_text()
     assert "\n>       world.run_until(conditions.Answer())\n" in out
     assert '\n>       robot.read("last_lef")\n' in out
@@ -94,7 +93,7 @@ def test_a_traceback_ends_at_the_tests_own_line(mixed: Path) -> None:
     assert "def until(" not in out
 
 
-def test_junit_has_the_facts_of_each_run_and_the_line_that_repeats_it(mixed: Path) -> None:
+def test_junit_has_the_facts_of_each_run_and_the_line_that_repeats_it(mixed):
     cases = {
         case.get("name"): case for case in ElementTree.parse(mixed / "junit.xml").getroot().iter("testcase")
     }
@@ -112,7 +111,7 @@ def test_junit_has_the_facts_of_each_run_and_the_line_that_repeats_it(mixed: Pat
     assert named["test_needs_no_world"] == {}
 
 
-def test_a_failed_test_leaves_a_folder_of_its_own_and_a_passing_one_nothing(mixed: Path) -> None:
+def test_a_failed_test_leaves_a_folder_of_its_own_and_a_passing_one_nothing(mixed):
     folders = sorted(path.name for path in (mixed / "left").iterdir())
     assert len(folders) == 6
     assert not [name for name in folders if "passes" in name or "needs_no" in name]
@@ -125,7 +124,7 @@ def test_a_failed_test_leaves_a_folder_of_its_own_and_a_passing_one_nothing(mixe
     assert report.strip() in (mixed / "out.txt").read_text()
 
 
-def test_the_printed_line_fails_in_the_same_way(mixed: Path) -> None:
+def test_the_printed_line_fails_in_the_same_way(mixed):
     out = (mixed / "out.txt").read_text()
     (line,) = re.findall(r"^  (pytest .*is_judged.*)$", out, re.MULTILINE)
     done = session(mixed, *shlex.split(line)[1:])
@@ -138,7 +137,7 @@ def test_the_printed_line_fails_in_the_same_way(mixed: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["waits_in_vain", "is_judged"])
-def test_a_case_gives_the_verdict_again_by_the_printed_line(mixed: Path, name: str) -> None:
+def test_a_case_gives_the_verdict_again_by_the_printed_line(mixed, name):
     (folder,) = [path for path in (mixed / "left").iterdir() if name in path.name]
     line = f"mirotwin replay left/{folder.name}/case.stream"
     assert f"\n  {line}\n" in (mixed / "out.txt").read_text()
@@ -147,7 +146,7 @@ def test_a_case_gives_the_verdict_again_by_the_printed_line(mixed: Path, name: s
     assert "fails as recorded: " in again.stderr
 
 
-def test_where_no_check_can_judge_what_was_sent_is_left(mixed: Path) -> None:
+def test_where_no_check_can_judge_what_was_sent_is_left(mixed):
     (folder,) = [path for path in (mixed / "left").iterdir() if "misspells_a_function" in path.name]
     assert sorted(path.name for path in folder.iterdir()) == [
         "report.txt",
@@ -157,7 +156,7 @@ def test_where_no_check_can_judge_what_was_sent_is_left(mixed: Path) -> None:
     assert run(mixed, f"mirotwin replay left/{folder.name}/sent.stream").returncode == 0
 
 
-def test_a_folder_of_a_test_that_passes_now_is_cleared(tmp_path: Path) -> None:
+def test_a_folder_of_a_test_that_passes_now_is_cleared(tmp_path):
     tests = "def test_one(world):\n    assert {}\n"
     session(tmp_path, "--mirotwin-artifacts=left", tests=tests.format("False"))
     (folder,) = (tmp_path / "left").iterdir()
@@ -167,7 +166,7 @@ def test_a_folder_of_a_test_that_passes_now_is_cleared(tmp_path: Path) -> None:
     assert [path.name for path in folder.iterdir()] == ["notes.txt"]
 
 
-def test_the_last_events_are_frames_and_what_is_none_is_characters(tmp_path: Path) -> None:
+def test_the_last_events_are_frames_and_what_is_none_is_characters(tmp_path):
     tests = """
 def test_talks(link):
     link.poll(slot=0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -28,7 +27,7 @@ def test_once():
 """
 
 
-def test_repeated_tests_show_their_seeds_and_workers_clobber_nothing(tmp_path: Path) -> None:
+def test_repeated_tests_show_their_seeds_and_workers_clobber_nothing(tmp_path):
     options = ["-v", "-rA", "--mirotwin-repeat=4", "--mirotwin-seed=10", "--mirotwin-artifacts=left"]
     alone = session(tmp_path, *options, tests=MANY)
     assert "test_noise[2-seed13] PASSED" in alone.stdout
@@ -49,7 +48,7 @@ def digests(out: str) -> list[str]:
     return sorted(re.findall(r"^DIGEST .*$", out, re.MULTILINE))
 
 
-def test_the_ini_file_says_what_options_do_not(tmp_path: Path) -> None:
+def test_the_ini_file_says_what_options_do_not(tmp_path):
     (tmp_path / "pytest.ini").write_text(
         "[pytest]\nmirotwin_seed = 3\nmirotwin_repeat = 2\nmirotwin_artifacts = left\nmirotwin_firmware = own.ihx\n"
     )
@@ -77,7 +76,7 @@ def test_one(world):
         ("-o", "mirotwin_seed: 'x' is no whole number"),
     ],
 )
-def test_an_option_that_cannot_be_is_a_usage_error(tmp_path: Path, option: str, said: str) -> None:
+def test_an_option_that_cannot_be_is_a_usage_error(tmp_path, option, said):
     arguments = [option, "mirotwin_seed=x"] if option == "-o" else [option]
     done = session(tmp_path, *arguments, tests="def test_one(world):\n    pass\n")
     assert done.returncode == 4
@@ -85,7 +84,7 @@ def test_an_option_that_cannot_be_is_a_usage_error(tmp_path: Path, option: str, 
     assert "Traceback" not in done.stderr
 
 
-def test_a_session_without_worlds_imports_nothing_else_of_ours(tmp_path: Path) -> None:
+def test_a_session_without_worlds_imports_nothing_else_of_ours(tmp_path):
     (tmp_path / "conftest.py").write_text(
         "import sys\n"
         "def pytest_unconfigure():\n"
@@ -97,7 +96,7 @@ def test_a_session_without_worlds_imports_nothing_else_of_ours(tmp_path: Path) -
     assert "LOADED ['mirotwin', 'mirotwin.testing', 'mirotwin.testing.pytest_plugin']" in out
 
 
-def test_the_help_names_options_and_the_marker(tmp_path: Path) -> None:
+def test_the_help_names_options_and_the_marker(tmp_path):
     out = session(tmp_path, "--help").stdout + session(tmp_path, "--markers").stdout
     for word in (
         "--mirotwin-firmware",
@@ -110,7 +109,7 @@ def test_the_help_names_options_and_the_marker(tmp_path: Path) -> None:
 
 
 @needs_sdcc
-def test_the_line_of_a_planted_mistake_reproduces_it_and_its_cure_passes(tmp_path: Path) -> None:
+def test_the_line_of_a_planted_mistake_reproduces_it_and_its_cure_passes(tmp_path):
     image = built_in(
         tmp_path / "bad", "failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)"
     )
@@ -147,7 +146,7 @@ def test_the_same_by_a_check(link, world):
     assert session(tmp_path).returncode == 0
 
 
-def test_coverage_counts_the_same_however_the_tests_are_spread(tmp_path: Path) -> None:
+def test_coverage_counts_the_same_however_the_tests_are_spread(tmp_path):
     tests = "@pytest.mark.parametrize('n', range(3))\ndef test_one(link, n):\n    link.poll(0)\n"
     counts = []
     for spread in ([], ["-n", "2"]):
@@ -158,7 +157,7 @@ def test_coverage_counts_the_same_however_the_tests_are_spread(tmp_path: Path) -
     assert "FNDA:3,_main" in counts[0]
 
 
-def test_a_scenario_with_steps_is_no_world_for_a_test_in_python(tmp_path: Path) -> None:
+def test_a_scenario_with_steps_is_no_world_for_a_test_in_python(tmp_path):
     (tmp_path / "a.scenario.toml").write_text('scenario = "silent"\n\n[[step]]\npause_ms = 5\n')
     tests = """
 import pytest
@@ -172,7 +171,7 @@ def test_it(world):
     assert "has 1 steps, which a test in Python does not do" in out
 
 
-def test_a_folder_of_artifacts_replays_where_the_image_is_gone(tmp_path: Path) -> None:
+def test_a_folder_of_artifacts_replays_where_the_image_is_gone(tmp_path):
     (tmp_path / "session").mkdir()
     for suffix in (".ihx", ".map", ".cdb"):
         shutil.copy(image_path().with_suffix(suffix), tmp_path / "session" / f"mine{suffix}")
@@ -201,7 +200,7 @@ def test_counts(link):
         assert "fails as recorded: frames_accepted_min" in done.stderr
 
 
-def test_an_image_beside_a_case_that_is_another_one_is_not_taken(tmp_path: Path) -> None:
+def test_an_image_beside_a_case_that_is_another_one_is_not_taken(tmp_path):
     (tmp_path / "case.stream").write_text("")
     (tmp_path / "firmware.ihx").write_text(":00000001FF\n")
     assert image_beside(tmp_path / "case.stream", "00" * 32) is None

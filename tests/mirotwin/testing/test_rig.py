@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from miro_exact.bad_input import BadInput
@@ -16,7 +14,7 @@ from mirotwin.verify.checks.watching import Checks
 from tests.mirotwin.testing.rigs import HERE, rig
 
 
-def test_a_robot_is_up_and_stands_when_its_test_begins() -> None:
+def test_a_robot_is_up_and_stands_when_its_test_begins():
     one = rig()
     assert one.world.tick == CONTROL_PERIOD_TICKS
     assert one.robots[0].wheels.told == ("off", "off")
@@ -25,7 +23,7 @@ def test_a_robot_is_up_and_stands_when_its_test_begins() -> None:
     assert one.links[0].expect(TelemetryFrame, within=ms(40)).accepted == 1
 
 
-def test_the_second_world_is_loaded_and_goes_on_as_the_first_that_booted_itself() -> None:
+def test_the_second_world_is_loaded_and_goes_on_as_the_first_that_booted_itself():
     digests = []
     for one in (rig(5), rig(5)):
         one.links[0].drive({0: (400, 300)}, ms(200))
@@ -39,21 +37,21 @@ def test_the_second_world_is_loaded_and_goes_on_as_the_first_that_booted_itself(
     assert world.digest == digests[0]
 
 
-def test_a_world_without_boot_stands_at_power_on() -> None:
+def test_a_world_without_boot_stands_at_power_on():
     one = rig(boot=False)
     assert one.world.tick == 0
     one.robots[0].break_at("main", ms(1))
     assert 0 < one.world.tick < ms(1)
 
 
-def test_a_scenario_with_a_controller_begins_at_power_on_and_drives_by_itself() -> None:
+def test_a_scenario_with_a_controller_begins_at_power_on_and_drives_by_itself():
     one = rig(scenario="fig6")
     assert one.world.tick == 0
     one.world.run_for(ms(200))
     assert one.robots[0].wheels.told == ("drive", "drive")
 
 
-def test_robots_and_links_of_all_networks_are_there() -> None:
+def test_robots_and_links_of_all_networks_are_there():
     path = HERE.parents[2] / "examples" / "two_teams.toml"
     one = rig(scenario=path)
     places = [(robot.network, robot.slot) for robot in one.robots]
@@ -62,7 +60,7 @@ def test_robots_and_links_of_all_networks_are_there() -> None:
     assert {network for network, _ in places} == {0, 1}
 
 
-def test_firmware_that_never_listens_is_said_to_be_so(tmp_path: Path) -> None:
+def test_firmware_that_never_listens_is_said_to_be_so(tmp_path):
     path = tmp_path / "loop.ihx"
     path.write_text(":0200000080FE80\n:00000001FF\n")  # SJMP $
     with pytest.raises(
@@ -73,21 +71,21 @@ def test_firmware_that_never_listens_is_said_to_be_so(tmp_path: Path) -> None:
     one.world.run_for(ms(5))
 
 
-def test_checks_judge_what_a_test_did() -> None:
+def test_checks_judge_what_a_test_did():
     one = rig(expect={"frames_accepted_min": 2})
     one.links[0].ping()
     (failure,) = one.judge()
     assert (failure.check, failure.found) == ("frames_accepted_min", "1")
 
 
-def test_a_fault_in_the_last_moment_is_judged_too() -> None:
+def test_a_fault_in_the_last_moment_is_judged_too():
     one = rig(settings=["stop_on_fault=false"])
     one.world.robot().board.fault(FaultKind.UNDEFINED_OPCODE, 0x123, one.world.tick)
     assert [failure.check for failure in one.judge()] == ["no_fault"]
     assert one.tick == CONTROL_PERIOD_TICKS
 
 
-def test_the_end_of_a_test_is_its_own_not_that_of_the_period() -> None:
+def test_the_end_of_a_test_is_its_own_not_that_of_the_period():
     one = rig()
     one.world.run_for(ms(3))
     assert one.judge() == []
@@ -96,7 +94,7 @@ def test_the_end_of_a_test_is_its_own_not_that_of_the_period() -> None:
     assert one.judge() == []
 
 
-def test_checks_of_a_world_that_was_loaded_judge_as_those_from_its_begin() -> None:
+def test_checks_of_a_world_that_was_loaded_judge_as_those_from_its_begin():
     one = rig()
     whole = World(one.world.scenario, 0, one.world.image)
     checks = Checks(whole, one.wanted.expected)

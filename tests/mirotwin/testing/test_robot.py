@@ -12,7 +12,7 @@ from mirotwin.testing.waiting import WaitFailed
 from tests.mirotwin.testing.rigs import rig
 
 
-def test_service_frames_reach_the_firmware() -> None:
+def test_service_frames_reach_the_firmware():
     one = rig()
     one.links[0].set_acceleration(0, 1000)
     one.links[0].set_filter(0, 1, 2, 3, 4)
@@ -21,7 +21,7 @@ def test_service_frames_reach_the_firmware() -> None:
     assert one.robots[0].read("filter[2]") == 2
 
 
-def test_wheels_turn_stop_and_are_switched_off_as_the_failsafe_says() -> None:
+def test_wheels_turn_stop_and_are_switched_off_as_the_failsafe_says():
     one = rig()
     link, robot = one.links[0], one.robots[0]
     link.drive({0: (2278, 1139)}, ms(500))  # 0.2 and 0.1 m/s
@@ -45,7 +45,7 @@ def test_wheels_turn_stop_and_are_switched_off_as_the_failsafe_says() -> None:
     assert one.world.tick - end.tick > ms(389)
 
 
-def test_a_breakpoint_stops_each_time_before_its_instruction() -> None:
+def test_a_breakpoint_stops_each_time_before_its_instruction():
     one = rig()
     link, robot = one.links[0], one.robots[0]
     ticks = []
@@ -58,7 +58,7 @@ def test_a_breakpoint_stops_each_time_before_its_instruction() -> None:
         robot.break_at("motion_team", within=ms(10))
 
 
-def test_a_wait_without_an_end_ends_at_the_limit_of_virtual_time() -> None:
+def test_a_wait_without_an_end_ends_at_the_limit_of_virtual_time():
     one = rig(settings=["duration_s=0.3"])
     with pytest.raises(WaitFailed, match=r"limit of virtual time was reached, duration_s = 0\.3"):
         one.robots[0].break_at("motion_team")
@@ -70,7 +70,7 @@ def test_a_wait_without_an_end_ends_at_the_limit_of_virtual_time() -> None:
         one.world.run_until(conditions.Answer())
 
 
-def test_a_symbol_that_is_no_function_is_refused_with_what_comes_close() -> None:
+def test_a_symbol_that_is_no_function_is_refused_with_what_comes_close():
     robot = rig().robots[0]
     with pytest.raises(BadInput, match=r"motion_stap: there is no such function; did you mean motion_stop"):
         robot.break_at("motion_stap")
@@ -78,7 +78,7 @@ def test_a_symbol_that_is_no_function_is_refused_with_what_comes_close() -> None
         robot.break_at("last_left")
 
 
-def test_writing_into_a_robots_memory_is_remembered() -> None:
+def test_writing_into_a_robots_memory_is_remembered():
     one = rig()
     assert not one.written
     one.robots[0].write("last_left", -5)
@@ -86,7 +86,7 @@ def test_writing_into_a_robots_memory_is_remembered() -> None:
     assert one.written
 
 
-def test_a_reset_forgets_what_the_firmware_counted_and_comes_up_again() -> None:
+def test_a_reset_forgets_what_the_firmware_counted_and_comes_up_again():
     one = rig()
     link, robot = one.links[0], one.robots[0]
     link.drive({0: (300, 300)}, ms(100))
@@ -100,7 +100,7 @@ def test_a_reset_forgets_what_the_firmware_counted_and_comes_up_again() -> None:
     assert link.expect(within=ms(40)).accepted == 1
 
 
-def test_a_robot_without_power_is_silent_and_comes_back() -> None:
+def test_a_robot_without_power_is_silent_and_comes_back():
     one = rig()
     link, robot = one.links[0], one.robots[0]
     robot.power_off()
@@ -114,7 +114,7 @@ def test_a_robot_without_power_is_silent_and_comes_back() -> None:
     link.expect(within=ms(40))
 
 
-def test_a_radio_that_is_down_loses_frames_and_the_failsafe_stops_the_wheels() -> None:
+def test_a_radio_that_is_down_loses_frames_and_the_failsafe_stops_the_wheels():
     one = rig()
     link, robot = one.links[0], one.robots[0]
     link.drive({0: (300, 300)}, ms(100))

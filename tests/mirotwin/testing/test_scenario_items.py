@@ -16,7 +16,7 @@ GOOD = HEAD + 'step = [{ pause_ms = 5 }, { send = "poll" }, { expect = "answer",
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("session")
     (folder / "pytest.ini").write_text("[pytest]\n")
     (folder / "good.scenario.toml").write_text(GOOD)
@@ -30,7 +30,7 @@ def session(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return children.run(command, cwd=folder, capture_output=True, text=True)
 
 
-def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(folder: Path) -> None:
+def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(folder):
     done = session(folder, "-p", "no:xdist", "--junitxml=out.xml")
     assert done.returncode == 1, done.stdout
     assert "2 failed, 1 passed" in done.stdout
@@ -49,7 +49,7 @@ def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(folde
     assert names == {"mirotwin_seed", "mirotwin_digest", "mirotwin_firmware_sha256", "mirotwin_reproduce"}
 
 
-def test_tests_are_chosen_spread_over_processes_and_begun_again_with_the_last_failed(folder: Path) -> None:
+def test_tests_are_chosen_spread_over_processes_and_begun_again_with_the_last_failed(folder):
     assert "1 passed" in session(folder, "-k", "good", "-n", "2").stdout
     assert session(folder, "-p", "no:xdist").returncode == 1
     assert "2 failed" in session(folder, "--lf", "-p", "no:xdist").stdout

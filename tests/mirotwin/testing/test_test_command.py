@@ -28,7 +28,7 @@ Call = Callable[..., Result]
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     """`hil` with a test that passes, one that fails and one that cannot be run; the current folder is above it."""
     monkeypatch.chdir(tmp_path)
     for name, text in {"a": GOOD, "sub/b": LATE, "sub/c": BAD, "sub/d": CHECKED, "sub/e": OTHER}.items():
@@ -39,7 +39,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_each_file_has_a_line_with_its_verdict_and_one_for_each_failure(mirotwin: Call, folder: Path) -> None:
+def test_each_file_has_a_line_with_its_verdict_and_one_for_each_failure(mirotwin, folder):
     code, out, err = mirotwin("test", "hil")
     lines = out.splitlines()
     assert (code, err) == (2, "")
@@ -60,13 +60,11 @@ def test_each_file_has_a_line_with_its_verdict_and_one_for_each_failure(mirotwin
     ("names", "code"),
     [(["a"], 0), (["a", "sub/b"], 1), (["sub/d"], 1), (["sub/c", "sub/b"], 2), (["sub/c"], 2)],
 )
-def test_the_worst_verdict_is_the_exit_code(
-    mirotwin: Call, folder: Path, names: list[str], code: int
-) -> None:
+def test_the_worst_verdict_is_the_exit_code(mirotwin, folder, names, code):
     assert mirotwin("test", *[f"hil/{name}.scenario.toml" for name in names])[0] == code
 
 
-def test_a_firmware_fault_is_exit_code_3(mirotwin: Call, folder: Path) -> None:
+def test_a_firmware_fault_is_exit_code_3(mirotwin, folder):
     (folder / "bad.ihx").write_text(":01000000A55A\n:00000001FF\n")
     code, out, _ = mirotwin("test", "hil/a.scenario.toml", "--firmware", "bad.ihx")
     assert code == 3
@@ -89,18 +87,18 @@ def test_a_firmware_fault_is_exit_code_3(mirotwin: Call, folder: Path) -> None:
         ),
     ],
 )
-def test_nothing_to_test_is_bad_input(mirotwin: Call, folder: Path, arguments: list[str], what: str) -> None:
+def test_nothing_to_test_is_bad_input(mirotwin, folder, arguments, what):
     (folder / "empty").mkdir()
     code, out, err = mirotwin("test", *arguments)
     assert (code, out) == (2, "")
     assert err.startswith(f"mirotwin: error: {what}")
 
 
-def test_no_path_at_all_is_bad_input(mirotwin: Call) -> None:
+def test_no_path_at_all_is_bad_input(mirotwin):
     assert mirotwin("test")[0] == 2
 
 
-def test_a_word_chooses_files_and_settings_hold_for_all(mirotwin: Call, folder: Path) -> None:
+def test_a_word_chooses_files_and_settings_hold_for_all(mirotwin, folder):
     code, out, _ = mirotwin("test", "hil", "-k", "HIL/A", "--set", "duration_s=0.2", "--seed", 3)
     assert code == 0
     assert out.splitlines()[0].startswith("passed  hil/a.scenario.toml (3 of 3 steps, 200.200 ms")
@@ -109,7 +107,7 @@ def test_a_word_chooses_files_and_settings_hold_for_all(mirotwin: Call, folder: 
     assert "--set duration_s=-1: -1 is out of range" in out
 
 
-def test_files_are_collected_once_in_the_order_of_their_paths(folder: Path) -> None:
+def test_files_are_collected_once_in_the_order_of_their_paths(folder):
     names = [f"hil/{name}.scenario.toml" for name in ("a", "sub/b", "sub/c", "sub/d", "sub/e")]
     assert collect(["hil"]) == names
     assert collect(["hil/sub/e.scenario.toml", "hil", "hil"]) == [names[-1], *names[:-1]]
@@ -121,7 +119,7 @@ def test_files_are_collected_once_in_the_order_of_their_paths(folder: Path) -> N
     assert collect(["hil"]) == names
 
 
-def test_junit_has_each_test_with_what_gives_it_again(mirotwin: Call, folder: Path) -> None:
+def test_junit_has_each_test_with_what_gives_it_again(mirotwin, folder):
     mirotwin("test", "hil", "--junit", "out.xml", "--seed", 4, "--set", "duration_s=0.4")
     (suite,) = ElementTree.parse(folder / "out.xml").getroot()
     assert {key: suite.get(key) for key in ("tests", "failures", "errors")} == {
@@ -143,7 +141,7 @@ def test_junit_has_each_test_with_what_gives_it_again(mirotwin: Call, folder: Pa
     assert f"    {failure.get('message')}" in out.splitlines()
 
 
-def test_a_failure_leaves_a_case_whose_replay_gives_line_and_exit_code(mirotwin: Call, folder: Path) -> None:
+def test_a_failure_leaves_a_case_whose_replay_gives_line_and_exit_code(mirotwin, folder):
     code, out, _ = mirotwin("test", "hil", "--artifacts", "left", "--set", "duration_s=0.4")
     assert code == 2
     assert "    left in left/hil-sub-b" in out.splitlines()
@@ -167,7 +165,7 @@ def test_a_failure_leaves_a_case_whose_replay_gives_line_and_exit_code(mirotwin:
     assert report[-1] == "mirotwin test hil/sub/e.scenario.toml --seed 0 --set duration_s=0.4"
 
 
-def test_a_folder_is_cleared_once_its_test_passes(mirotwin: Call, folder: Path) -> None:
+def test_a_folder_is_cleared_once_its_test_passes(mirotwin, folder):
     path = folder / "hil/sub/b.scenario.toml"
     mirotwin("test", "hil/sub/b.scenario.toml", "--artifacts", "left")
     assert (folder / "left/hil-sub-b").is_dir()
@@ -176,7 +174,7 @@ def test_a_folder_is_cleared_once_its_test_passes(mirotwin: Call, folder: Path) 
     assert not (folder / "left/hil-sub-b").exists()
 
 
-def test_what_steps_save_needs_a_folder(mirotwin: Call, folder: Path) -> None:
+def test_what_steps_save_needs_a_folder(mirotwin, folder):
     path = folder / "hil" / "save.scenario.toml"
     path.write_text(HEAD + 'step = [{ pause_ms = 5 }, { save = "booted.world" }]')
     code, out, _ = mirotwin("test", path.relative_to(folder))
@@ -188,7 +186,7 @@ def test_what_steps_save_needs_a_folder(mirotwin: Call, folder: Path) -> None:
     assert (folder / "runs/silent-0/booted.world").exists()
 
 
-def test_run_does_steps_too_and_its_recording_replays(mirotwin: Call, folder: Path) -> None:
+def test_run_does_steps_too_and_its_recording_replays(mirotwin, folder):
     code, _, err = mirotwin("run", "hil/sub/b.scenario.toml", "--out", "run", "-q", "--no-figure")
     assert code == 1
     assert err.startswith(
@@ -203,7 +201,7 @@ def test_run_does_steps_too_and_its_recording_replays(mirotwin: Call, folder: Pa
 
 
 @pytest.mark.parametrize("command", [["fw", "trace"], ["camera", "look"]])
-def test_commands_that_would_leave_steps_out_say_so(mirotwin: Call, folder: Path, command: list[str]) -> None:
+def test_commands_that_would_leave_steps_out_say_so(mirotwin, folder, command):
     time = ["--at", "0.1s"] if command == ["camera", "look"] else ["--to", "1ms"]
     code, _, err = mirotwin(*command, "hil/a.scenario.toml", *time)
     assert code == 2
@@ -212,13 +210,13 @@ def test_commands_that_would_leave_steps_out_say_so(mirotwin: Call, folder: Path
     )
 
 
-def test_the_examples_pass_from_a_user_s_folder(mirotwin: Call, folder: Path) -> None:
+def test_the_examples_pass_from_a_user_s_folder(mirotwin, folder):
     code, out, _ = mirotwin("test", ROOT / "examples" / "hil-steps")
     assert code == 0
     assert out.splitlines()[-1] == "3 passed"
 
 
-def test_pages_are_made_when_they_are_asked_for(mirotwin: Call, folder: Path) -> None:
+def test_pages_are_made_when_they_are_asked_for(mirotwin, folder):
     for more, pages in (((), 0), (("--pages",), 1)):
         assert mirotwin("test", "hil/sub/d.scenario.toml", "--artifacts", "left", *more)[0] == 1
         found = [
@@ -229,9 +227,7 @@ def test_pages_are_made_when_they_are_asked_for(mirotwin: Call, folder: Path) ->
         assert len(found) == pages
 
 
-def test_what_a_failed_test_leaves_of_a_whole_run_replays_by_the_line_it_prints(
-    mirotwin: Call, folder: Path
-) -> None:
+def test_what_a_failed_test_leaves_of_a_whole_run_replays_by_the_line_it_prints(mirotwin, folder):
     """A frame is on the air when the run ends, in the middle of a control period of the scenario's duration."""
     Path("late.scenario.toml").write_text('scenario = "fig6"\nexpect = { settles_within_s = 0.1 }\n')
     code, out, _ = mirotwin("test", "late.scenario.toml", "--artifacts", "left")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -16,7 +15,7 @@ NO_SUCH = "there is no such check; did you mean stands_still?"
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def here(tmp_path, monkeypatch):
     """The current folder with a campaign and two tests, and a check of another distribution."""
     plugins.install_all(tmp_path / "site")
     monkeypatch.chdir(tmp_path)
@@ -30,7 +29,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         del sys.modules[name]
 
 
-def test_a_test_is_judged_by_it_and_its_line_repeats_that(mirotwin) -> None:
+def test_a_test_is_judged_by_it_and_its_line_repeats_that(mirotwin):
     code, out, err = mirotwin("test", "a.scenario.toml", "--expect", "stands_still")
     assert (code, err) == (1, "")
     assert f"expectation failed: {STILL}" in out
@@ -39,7 +38,7 @@ def test_a_test_is_judged_by_it_and_its_line_repeats_that(mirotwin) -> None:
     assert (code, out.splitlines()[-1]) == (0, "1 passed")
 
 
-def test_a_campaign_has_a_column_for_it_from_every_process(mirotwin, here: Path) -> None:
+def test_a_campaign_has_a_column_for_it_from_every_process(mirotwin, here):
     from mirotwin import campaign
 
     command = ("campaign", "run", "c.toml", "--out", "c.parquet", "--jobs", 2)
@@ -51,7 +50,7 @@ def test_a_campaign_has_a_column_for_it_from_every_process(mirotwin, here: Path)
     assert {row["check.frames_accepted_min"] for row in rows} == {"passed"}
 
 
-def test_a_campaign_goes_on_with_the_same_expectations_only(mirotwin, here: Path) -> None:
+def test_a_campaign_goes_on_with_the_same_expectations_only(mirotwin, here):
     command = ("campaign", "run", "c.toml", "--out", "c.parquet", "--jobs", 1)
     assert mirotwin(*command, "--expect", "frames_accepted_min=1")[0] == 0
     code, out, _ = mirotwin(*command, "--expect", "frames_accepted_min=1")
@@ -62,7 +61,7 @@ def test_a_campaign_goes_on_with_the_same_expectations_only(mirotwin, here: Path
         assert "c.parquet: holds the results of another campaign" in err
 
 
-def test_a_find_of_it_is_a_case_that_replays_to_the_same_failure(mirotwin, here: Path) -> None:
+def test_a_find_of_it_is_a_case_that_replays_to_the_same_failure(mirotwin, here):
     code, out, _ = mirotwin(
         *("fuzz", "--time", "3s", "--jobs", 1, "--minimise", "1s", "--out", "out"), "--expect", "stands_still"
     )
@@ -82,7 +81,7 @@ def test_a_find_of_it_is_a_case_that_replays_to_the_same_failure(mirotwin, here:
         ("fuzz", "--time", "1s"),
     ],
 )
-def test_a_wrong_name_is_told_the_nearest_one_and_a_file_is_refused(mirotwin, command) -> None:
+def test_a_wrong_name_is_told_the_nearest_one_and_a_file_is_refused(mirotwin, command):
     code, out, err = mirotwin(*command, "--expect", "stands_stil")
     assert (code, NO_SUCH in out + err) == (2, True)
     assert "--expect stands_stil" in out + err
@@ -94,7 +93,7 @@ def test_a_wrong_name_is_told_the_nearest_one_and_a_file_is_refused(mirotwin, co
 NOTE = "leaves out calibration, pattern, centroid, window_px, self_calibration"
 
 
-def test_what_a_setting_leaves_out_is_told_once_for_all_tests(mirotwin) -> None:
+def test_what_a_setting_leaves_out_is_told_once_for_all_tests(mirotwin):
     code, _, err = mirotwin("test", ".", "--set", "camera.kind=gaussian")
     assert (code, err) == (0, f"mirotwin: note: --set camera.kind=gaussian {NOTE}\n")
 
@@ -120,7 +119,7 @@ def test_what_a_setting_leaves_out_is_told_once_for_all_tests(mirotwin) -> None:
         ),
     ],
 )
-def test_a_campaign_tells_once_what_leaves_keys_out(mirotwin, here: Path, text, more, place) -> None:
+def test_a_campaign_tells_once_what_leaves_keys_out(mirotwin, here, text, more, place):
     (here / "c.toml").write_text(text)
     code, _, err = mirotwin("campaign", "run", "c.toml", "-q", "--jobs", 2, *more)
     assert (code, err) == (0, f"mirotwin: note: {place} {NOTE}\n")
@@ -130,7 +129,7 @@ def test_a_campaign_tells_once_what_leaves_keys_out(mirotwin, here: Path, text, 
     "kind",
     ['camera = { kind = "gaussian" }', '[camera]\nkind = "gaussian"', 'set = { camera.kind = "gaussian" }'],
 )
-def test_a_file_may_choose_another_kind_in_each_form(mirotwin, here: Path, kind: str) -> None:
+def test_a_file_may_choose_another_kind_in_each_form(mirotwin, here, kind):
     (here / "a.scenario.toml").write_text(f"{TEST}{kind}\n")
     code, out, err = mirotwin("test", "a.scenario.toml")
     note = f'mirotwin: note: set.camera.kind="gaussian" {NOTE}\n' if kind.startswith("set") else ""

@@ -17,7 +17,7 @@ def summary(folder: Path) -> dict:
     return json.loads((folder / "summary.json").read_text())
 
 
-def test_what_is_met_costs_no_line_and_no_exit_code(mirotwin, short: Path, tmp_path: Path) -> None:
+def test_what_is_met_costs_no_line_and_no_exit_code(mirotwin, short, tmp_path):
     code, out, err = mirotwin("run", short, "--no-figure", "--out", tmp_path / "run", *MET)
     assert (code, err) == (0, "")
     assert "6 of 6 checks passed" in out
@@ -34,9 +34,7 @@ def test_what_is_met_costs_no_line_and_no_exit_code(mirotwin, short: Path, tmp_p
     ]
 
 
-def test_a_failure_is_a_line_with_what_when_wanted_and_found_and_exit_code_1(
-    mirotwin, short: Path, tmp_path: Path
-) -> None:
+def test_a_failure_is_a_line_with_what_when_wanted_and_found_and_exit_code_1(mirotwin, short, tmp_path):
     code, out, err = mirotwin("run", short, "--no-figure", "--out", tmp_path / "run", *MISSED)
     assert (code, err) == (1, f"mirotwin: expectation failed: {FAILURE}\n")
     assert "4 of 5 checks passed, tracks_within_cm failed" in out
@@ -56,22 +54,18 @@ def test_a_failure_is_a_line_with_what_when_wanted_and_found_and_exit_code_1(
     }
 
 
-def test_one_robot_may_expect_something_by_set(mirotwin, short: Path, tmp_path: Path) -> None:
+def test_one_robot_may_expect_something_by_set(mirotwin, short, tmp_path):
     key = "network.robot.1.expect.tracks_within_cm={limit_cm=1.9, from_s=0.0}"
     code, _, err = mirotwin("run", short, "-q", "--no-figure", "--out", tmp_path / "run", "--set", key)
     assert (code, err) == (0, "")
 
 
-def test_files_and_digest_are_those_of_a_run_that_expects_nothing(
-    mirotwin, short: Path, finished: Path, tmp_path: Path
-) -> None:
+def test_files_and_digest_are_those_of_a_run_that_expects_nothing(mirotwin, short, finished, tmp_path):
     mirotwin("run", short, "-q", "--seed", 5, "--no-figure", "--out", tmp_path / "run", *MET, *MISSED)
     assert summary(tmp_path / "run")["digest"] == summary(finished)["digest"]
 
 
-def test_a_recording_keeps_what_was_expected_and_replay_says_it_again(
-    mirotwin, short: Path, tmp_path: Path
-) -> None:
+def test_a_recording_keeps_what_was_expected_and_replay_says_it_again(mirotwin, short, tmp_path):
     mirotwin("run", short, "-q", "--no-figure", "--out", tmp_path / "run", *MISSED)
     code, out, err = mirotwin("replay", "-q", tmp_path / "run" / "run.mcap")
     assert (code, err) == (1, f"mirotwin: expectation failed: {FAILURE}\n")
@@ -86,7 +80,7 @@ def test_a_recording_keeps_what_was_expected_and_replay_says_it_again(
     assert (code, err) == (0, "")
 
 
-def test_what_a_replay_expects_decides_where_it_differs_too(mirotwin, finished: Path) -> None:
+def test_what_a_replay_expects_decides_where_it_differs_too(mirotwin, finished):
     other = ("--set", "network.robot.0.drive.chassis.mass_kg=0.9")
     code, _, err = mirotwin("replay", "-q", finished / "run.mcap", *other)
     assert code == 4
@@ -101,7 +95,7 @@ def test_what_a_replay_expects_decides_where_it_differs_too(mirotwin, finished: 
     assert FAILURE in err
 
 
-def test_a_text_stream_is_judged_too(mirotwin, finished: Path, tmp_path: Path) -> None:
+def test_a_text_stream_is_judged_too(mirotwin, finished, tmp_path):
     stream = tmp_path / "sent.stream"
     mirotwin("export", finished / "run.mcap", "--out", stream)
     code, out, err = mirotwin("replay", stream, "--expect", "frames_accepted_min=300")
@@ -110,7 +104,7 @@ def test_a_text_stream_is_judged_too(mirotwin, finished: Path, tmp_path: Path) -
     assert err.count("wanted at least 300 frames accepted, found 6\n") == 3  # a robot in every slot
 
 
-def test_a_check_without_an_occasion_is_named(mirotwin, short: Path, tmp_path: Path) -> None:
+def test_a_check_without_an_occasion_is_named(mirotwin, short, tmp_path):
     code, out, err = mirotwin(
         "run", short, "--no-figure", "--out", tmp_path / "run", "--expect", "failsafe_stop_ms=true"
     )
@@ -122,9 +116,7 @@ def test_a_check_without_an_occasion_is_named(mirotwin, short: Path, tmp_path: P
 
 
 @pytest.mark.parametrize("command", ["run", "replay"])
-def test_an_unknown_check_is_refused_before_anything_runs(
-    command: str, mirotwin, short: Path, finished: Path, tmp_path: Path
-) -> None:
+def test_an_unknown_check_is_refused_before_anything_runs(command, mirotwin, short, finished, tmp_path):
     given = (short, "--out", tmp_path / "run") if command == "run" else (finished / "run.mcap",)
     code, out, err = mirotwin(command, *given, "--expect", "inside_pich=true")
     assert (code, out) == (2, "")
@@ -136,7 +128,7 @@ def test_an_unknown_check_is_refused_before_anything_runs(
 
 
 @needs_sdcc
-def test_a_stream_tells_a_late_failsafe_from_the_right_one(mirotwin, finished: Path, tmp_path: Path) -> None:
+def test_a_stream_tells_a_late_failsafe_from_the_right_one(mirotwin, finished, tmp_path):
     late = planted("stops 15 ms late").path
     mirotwin("export", finished / "run.mcap", "--out", tmp_path / "sent.stream")
     stream = ("replay", "-q", tmp_path / "sent.stream", "--expect", "failsafe_stop_ms=110")
@@ -149,7 +141,7 @@ def test_a_stream_tells_a_late_failsafe_from_the_right_one(mirotwin, finished: P
 
 
 @needs_sdcc
-def test_a_firmware_fault_goes_before_what_else_failed(mirotwin, short: Path, tmp_path: Path) -> None:
+def test_a_firmware_fault_goes_before_what_else_failed(mirotwin, short, tmp_path):
     concerned = ALWAYS["stays in an interrupt"]
     image = planted("stays in an interrupt").path
     out = ("--no-figure", "--out", tmp_path / "run", "--firmware", image)

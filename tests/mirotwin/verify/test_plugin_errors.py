@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -51,7 +50,7 @@ PARTS_TOLD = {
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def here(tmp_path, monkeypatch):
     """The current folder, with all plug-ins in `site`."""
     plugins.install_all(tmp_path / "site")
     monkeypatch.chdir(tmp_path)
@@ -72,25 +71,25 @@ def told(result: tuple[int, str, str]) -> str:
 
 
 @pytest.mark.parametrize("name", CHECKS_TOLD)
-def test_a_check_that_is_wrong_is_told_with_its_file_by_run(mirotwin, name: str) -> None:
+def test_a_check_that_is_wrong_is_told_with_its_file_by_run(mirotwin, name):
     said = told(mirotwin("run", "fig6", *SHORT, "-q", "--no-figure", "--expect", name))
     assert CHECKS_TOLD[name] in said
     assert len([line for line in said.splitlines() if "error: " in line]) == 1
 
 
 @pytest.mark.parametrize("setting", PARTS_TOLD)
-def test_a_part_that_is_wrong_is_told_with_its_file_by_run(mirotwin, setting: str) -> None:
+def test_a_part_that_is_wrong_is_told_with_its_file_by_run(mirotwin, setting):
     said = told(mirotwin("run", "fig6", *SHORT, "-q", "--no-figure", "--set", f"network.robot.{setting}"))
     assert PARTS_TOLD[setting] in said
 
 
-def test_a_wrong_event_in_hears_is_told_the_nearest_one_and_the_list(mirotwin) -> None:
+def test_a_wrong_event_in_hears_is_told_the_nearest_one_and_the_list(mirotwin):
     said = told(mirotwin("run", "fig6", *SHORT, "-q", "--no-figure", "--expect", "hears_wrong"))
     assert "HEARS of HearsJudge names 'comand'" in said
     assert "; did you mean command? there are sent, heard, answer, received, " in said
 
 
-def test_the_other_commands_tell_the_same(mirotwin, here: Path) -> None:
+def test_the_other_commands_tell_the_same(mirotwin, here):
     assert mirotwin("run", "fig6", *SHORT, "-q", "--no-figure", "--out", "run")[0] == 0
     file = here / "a.scenario.toml"
     file.write_text('scenario = "fig6"\nduration_s = 0.2\n')
@@ -110,7 +109,7 @@ def test_the_other_commands_tell_the_same(mirotwin, here: Path) -> None:
         assert PARTS_TOLD["controller={law='law_raises'}"] in said, command
 
 
-def test_a_check_that_breaks_after_the_recording_is_told_by_replay_and_report(mirotwin, monkeypatch) -> None:
+def test_a_check_that_breaks_after_the_recording_is_told_by_replay_and_report(mirotwin, monkeypatch):
     code, _, _ = mirotwin(
         "run", "fig6", *SHORT, "-q", "--no-figure", "--out", "run", "--expect", "stands_still"
     )
@@ -123,7 +122,7 @@ def test_a_check_that_breaks_after_the_recording_is_told_by_replay_and_report(mi
         assert "test_plugin_errors.py:" in said
 
 
-def test_with_mirotwin_traceback_the_whole_of_it_comes_first(mirotwin, monkeypatch, here: Path) -> None:
+def test_with_mirotwin_traceback_the_whole_of_it_comes_first(mirotwin, monkeypatch, here):
     monkeypatch.setenv("MIROTWIN_TRACEBACK", "1")
     (here / "a.scenario.toml").write_text('scenario = "fig6"\nduration_s = 0.2\nexpect.raises = true\n')
     for command in (

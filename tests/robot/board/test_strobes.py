@@ -38,9 +38,7 @@ def tell_everything(board: Board, chips: dict[str, Lm629], ports: list[int], tic
 
 @settings(deadline=None, max_examples=150)
 @given(EDGES, st.booleans(), st.integers(1, 40))
-def test_both_chips_end_as_chips_that_are_told_every_level(
-    edges: list[list[tuple[int, int]]], pulse: bool, pause: int
-) -> None:
+def test_both_chips_end_as_chips_that_are_told_every_level(edges, pulse, pause):
     options = Lm629Options(reset_clocks=300)
     board = board_with("SJMP $\n", stop_on_fault=False, options=options)
     chips = {"left": Lm629(options), "right": Lm629(options)}

@@ -31,13 +31,13 @@ def made(folder: Path, text: str) -> Board:
         ("initial", "256"),
     ],
 )
-def test_a_number_that_no_bus_has_is_refused(tmp_path: Path, key: str, value: str) -> None:
+def test_a_number_that_no_bus_has_is_refused(tmp_path, key, value):
     made(tmp_path, MIRO + LATCH.format(**SOUND))
     with pytest.raises(WiringError, match=r"board\.toml: Expected `int`|too large|not in range|int. out of"):
         made(tmp_path, MIRO + LATCH.format(**{**SOUND, key: value}))
 
 
-def test_at_most_eight_pins_follow_an_interrupt_output(tmp_path: Path) -> None:
+def test_at_most_eight_pins_follow_an_interrupt_output(tmp_path):
     """The MIRO has two of them; more than there is room for were written behind the table."""
     more = [f'"{pin}" = "left.hi"\n' for pin in FREE[: MAX_HI_PINS - 2]]
     driven = made(tmp_path, MIRO + "".join(more)).wiring.cpu_inputs()
@@ -46,7 +46,7 @@ def test_at_most_eight_pins_follow_an_interrupt_output(tmp_path: Path) -> None:
         made(tmp_path, f'{MIRO}{"".join(more)}"{FREE[-1]}" = "right.hi"\n')
 
 
-def test_more_buffers_than_fit_are_refused_and_not_left_out(tmp_path: Path) -> None:
+def test_more_buffers_than_fit_are_refused_and_not_left_out(tmp_path):
     made(tmp_path, MIRO + "\n[[buffer]]\naddress = 1\n" * 8)
     with pytest.raises(WiringError, match="9 buffers, at most 8 fit"):
         made(tmp_path, MIRO + "\n[[buffer]]\naddress = 1\n" * 9)
@@ -55,6 +55,6 @@ def test_more_buffers_than_fit_are_refused_and_not_left_out(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     "text", ["a = " + "[" * 5000, "a = " + "9" * 5000, "a" + ".b" * 5000 + " = 1", "#" * 600_000]
 )
-def test_text_that_is_no_board_is_refused_at_once(tmp_path: Path, text: str) -> None:
+def test_text_that_is_no_board_is_refused_at_once(tmp_path, text):
     with pytest.raises(WiringError, match=r"board\.toml"):
         made(tmp_path, text)

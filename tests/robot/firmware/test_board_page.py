@@ -35,7 +35,7 @@ def told(rig: Rig) -> list[list[str]]:
     ]
 
 
-def test_the_set_up_on_the_page_is_the_firmwares() -> None:
+def test_the_set_up_on_the_page_is_the_firmwares():
     rig = Rig(boot=False)
     rig.run_ms(4)
     parts = ("after power-on", "no interrupts", "gains", "acceleration at the start")
@@ -44,14 +44,14 @@ def test_the_set_up_on_the_page_is_the_firmwares() -> None:
 
 
 @pytest.mark.parametrize("velocity", [300, -300])
-def test_the_velocities_on_the_page_are_the_firmwares(velocity: int) -> None:
+def test_the_velocities_on_the_page_are_the_firmwares(velocity):
     rig = Rig()
     rig.team(0, velocity, velocity)
     wanted = said(f"velocity {velocity:+d}") + said("then, for both")
     assert told(rig) == [wanted, wanted]
 
 
-def test_stop_and_motors_off_on_the_page_are_the_firmwares() -> None:
+def test_stop_and_motors_off_on_the_page_are_the_firmwares():
     rig = Rig()
     rig.team(0, 300, 300)
     told(rig)
@@ -60,7 +60,7 @@ def test_stop_and_motors_off_on_the_page_are_the_firmwares() -> None:
     assert told(rig) == [wanted, wanted]
 
 
-def test_each_opcode_and_its_words_stand_on_the_page() -> None:
+def test_each_opcode_and_its_words_stand_on_the_page():
     found = {}
     for names, opcodes, data, _ in [row for row in rows("LM629: the commands") if len(row) == 4][1:]:
         for name, opcode in zip(names.split(", "), opcodes.split(", "), strict=True):

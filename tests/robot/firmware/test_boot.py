@@ -25,18 +25,18 @@ RESET_PINS = 0x20
 
 
 @pytest.fixture
-def cold() -> Rig:
+def cold():
     return Rig(boot=False)
 
 
-def test_both_chips_are_set_up_alike(cold: Rig) -> None:
+def test_both_chips_are_set_up_alike(cold):
     cold.run_to(4 * MS)
     for chip in (cold.board.left, cold.board.right):
         assert [(command.opcode, command.data) for command in cold.told(chip)] == EXPECTED
         assert chip.status == 0x80  # motor off, no flags
 
 
-def test_reset_lasts_eight_lm629_clocks_and_is_given_once(cold: Rig) -> None:
+def test_reset_lasts_eight_lm629_clocks_and_is_given_once(cold):
     cold.run_to(4 * MS)
     control = [(tick, latch) for tick, port, latch in cold.board.writes if port == 2]
     falls = [tick for tick, latch in control if not latch & RESET_PINS]
@@ -45,7 +45,7 @@ def test_reset_lasts_eight_lm629_clocks_and_is_given_once(cold: Rig) -> None:
     assert not [tick for tick in falls if tick > rises[0]]
 
 
-def test_the_robot_is_ready_within_three_milliseconds_and_sleeps(cold: Rig) -> None:
+def test_the_robot_is_ready_within_three_milliseconds_and_sleeps(cold):
     cold.run_to(3 * MS)
     idle = cold.cpu.idle_cycles
     cold.run_ms(10)
@@ -58,7 +58,7 @@ def broken_board(**nets: str) -> Rig:
     return Rig(wiring=msgspec.structs.replace(wiring, nets={**wiring.nets, **changed}), boot=False)
 
 
-def test_a_chip_that_never_leaves_reset_keeps_both_motors_off_and_is_reported() -> None:
+def test_a_chip_that_never_leaves_reset_keeps_both_motors_off_and_is_reported():
     rig = broken_board(right_rst="0")
     rig.run_to(100 * MS)
     assert rig.cpu.sfr(0xA0) & RESET_PINS == 0
@@ -73,7 +73,7 @@ def test_a_chip_that_never_leaves_reset_keeps_both_motors_off_and_is_reported() 
     assert rig.board.left.desired_velocity == 0
 
 
-def test_the_reset_is_tried_again_eight_times_before_it_gives_up() -> None:
+def test_the_reset_is_tried_again_eight_times_before_it_gives_up():
     rig = broken_board(left_rst="0")
     rig.run_to(100 * MS)
     levels = [latch & RESET_PINS for _, port, latch in rig.board.writes if port == 2]
@@ -82,7 +82,7 @@ def test_the_reset_is_tried_again_eight_times_before_it_gives_up() -> None:
 
 
 @pytest.mark.parametrize(("busy_clocks", "works"), [(600, True), (6000, False)])
-def test_a_chip_may_be_busy_for_100_us_and_not_for_1_ms(busy_clocks: int, works: bool) -> None:
+def test_a_chip_may_be_busy_for_100_us_and_not_for_1_ms(busy_clocks, works):
     rig = Rig(options=Lm629Options(busy_clocks=busy_clocks), boot=False)
     rig.run_to(100 * MS)
     assert bool(rig.cpu.sfr(0xA0) & RESET_PINS) == works
@@ -90,7 +90,7 @@ def test_a_chip_may_be_busy_for_100_us_and_not_for_1_ms(busy_clocks: int, works:
     assert (rig.told(rig.board.left)[-1:] != []) == works
 
 
-def test_chips_that_show_c4h_after_a_reset_are_taken_at_the_first_try() -> None:
+def test_chips_that_show_c4h_after_a_reset_are_taken_at_the_first_try():
     rig = Rig(options=Lm629Options(reset_disarms_breakpoint=False), boot=False)
     rig.run_to(100 * MS)
     levels = [latch & RESET_PINS for _, port, latch in rig.board.writes if port == 2]
@@ -99,7 +99,7 @@ def test_chips_that_show_c4h_after_a_reset_are_taken_at_the_first_try() -> None:
     assert rig.told(rig.board.left)
 
 
-def test_chips_that_stop_answering_are_reset_and_set_up_again() -> None:
+def test_chips_that_stop_answering_are_reset_and_set_up_again():
     rig = Rig()
     rig.service(0, 0, 1, 11, 22, 33, 44)
     rig.service(1, 0, 2, 4000)

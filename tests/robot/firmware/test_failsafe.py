@@ -33,7 +33,7 @@ def stop_after_ms(rig: Rig, end: int) -> float:
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_both_wheels_stop_smoothly_after_110_ms_and_go_off_after_500(place: tuple[int, int]) -> None:
+def test_both_wheels_stop_smoothly_after_110_ms_and_go_off_after_500(place):
     rig, last = driving(place)
     end = last + CHARACTER
     rig.run_to(end + 600 * MS)
@@ -47,7 +47,7 @@ def test_both_wheels_stop_smoothly_after_110_ms_and_go_off_after_500(place: tupl
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_the_wheels_stand_by_110_ms_and_the_ramp_and_one_sample(place: tuple[int, int]) -> None:
+def test_the_wheels_stand_by_110_ms_and_the_ramp_and_one_sample(place):
     rig, last = driving(place)
     rig.run_to(last + CHARACTER + 110 * MS)
     assert rig.board.left.desired_velocity == 2279 << 8
@@ -56,7 +56,7 @@ def test_the_wheels_stand_by_110_ms_and_the_ramp_and_one_sample(place: tuple[int
     assert rig.board.left.desired_velocity == rig.board.right.desired_velocity == 0
 
 
-def test_fresh_frames_keep_it_driving() -> None:
+def test_fresh_frames_keep_it_driving():
     rig, _ = driving((0, 3))
     for seq in range(1, 6):
         rig.run_ms(75)  # a frame takes 24 ms and 4 to settle
@@ -68,7 +68,7 @@ def test_fresh_frames_keep_it_driving() -> None:
     assert rig.board.left.desired_velocity == 2279 << 8
 
 
-def test_stale_frames_do_not_keep_it_driving() -> None:
+def test_stale_frames_do_not_keep_it_driving():
     rig, last = driving((0, 3))
     for _ in range(4):
         rig.team(0, 2279, -2279)
@@ -77,7 +77,7 @@ def test_stale_frames_do_not_keep_it_driving() -> None:
     assert [command.data for command in rig.told(rig.board.left)][:1] == [STOP]
 
 
-def test_a_frame_during_the_stop_resumes_driving() -> None:
+def test_a_frame_during_the_stop_resumes_driving():
     rig, last = driving((0, 3))
     rig.run_to(last + 112 * MS)
     rig.team(1, 1000, 1000)
@@ -86,7 +86,7 @@ def test_a_frame_during_the_stop_resumes_driving() -> None:
     assert rig.board.left.desired_velocity == 1000 << 8
 
 
-def test_a_frame_after_motors_off_closes_the_loop_again() -> None:
+def test_a_frame_after_motors_off_closes_the_loop_again():
     rig, last = driving((0, 3))
     rig.run_to(last + 700 * MS)
     assert rig.board.left.status & 0x80
@@ -96,7 +96,7 @@ def test_a_frame_after_motors_off_closes_the_loop_again() -> None:
     assert rig.board.left.desired_velocity == rig.board.right.desired_velocity == 1000 << 8
 
 
-def test_the_same_frame_repeated_never_rearms_a_stopped_robot() -> None:
+def test_the_same_frame_repeated_never_rearms_a_stopped_robot():
     rig, last = driving((0, 3))
     rig.run_to(last + 700 * MS)
     for _ in range(3):
@@ -106,7 +106,7 @@ def test_the_same_frame_repeated_never_rearms_a_stopped_robot() -> None:
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_a_long_step_is_fresh_again_from_150_ms_on(place: tuple[int, int]) -> None:
+def test_a_long_step_is_fresh_again_from_150_ms_on(place):
     for age, accepted in ((140, 1), (149.95, 1), (150.05, 2), (170, 2)):
         rig, last = driving(place)
         length = (17 + 5 if place[1] == 3 else 25 + 5) * CHARACTER  # first to last start bit
@@ -126,7 +126,7 @@ def before_the_wrap() -> tuple[Rig, int]:
 
 
 @pytest.mark.parametrize("quarter", range(-16, 5))
-def test_110_ms_count_from_the_frame_wherever_the_millisecond_counter_wraps(quarter: int) -> None:
+def test_110_ms_count_from_the_frame_wherever_the_millisecond_counter_wraps(quarter):
     rig, wrap = before_the_wrap()
     end = wrap + quarter * MS // 4
     data = encode(TeamFrame(0, 0, ((1000, 1000),) * 3), 3)
@@ -136,7 +136,7 @@ def test_110_ms_count_from_the_frame_wherever_the_millisecond_counter_wraps(quar
 
 
 @pytest.mark.parametrize("quarter", range(-8, 9))
-def test_a_long_step_is_stale_wherever_the_millisecond_counter_wraps(quarter: int) -> None:
+def test_a_long_step_is_stale_wherever_the_millisecond_counter_wraps(quarter):
     rig, wrap = before_the_wrap()
     rig.frame(encode(TeamFrame(0, 0, ((0, 0),) * 3), 3))
     rig.send(encode(TeamFrame(0, 30, ((0, 0),) * 3), 3), at=wrap - 22 * CHARACTER + quarter * MS // 4)
@@ -144,7 +144,7 @@ def test_a_long_step_is_stale_wherever_the_millisecond_counter_wraps(quarter: in
     assert rig.counters == (1, 0, 1)
 
 
-def test_no_wheel_moves_before_the_first_frame() -> None:
+def test_no_wheel_moves_before_the_first_frame():
     rig = Rig()
     rig.run_ms(700)
     assert rig.told(rig.board.left) == rig.told(rig.board.right) == []
@@ -171,9 +171,7 @@ def loading(place: tuple[int, int], chips: Lm629Options | None = None) -> tuple[
 
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("late_ms", LOADING_MS)
-def test_110_ms_count_from_the_character_also_when_the_robot_was_loading(
-    place: tuple[int, int], late_ms: float
-) -> None:
+def test_110_ms_count_from_the_character_also_when_the_robot_was_loading(place, late_ms):
     rig, tick = loading(place)
     data = encode(TeamFrame(0, 3, ((1000, 1000),) * place[1]), place[1])
     end = tick - int(late_ms * MS)
@@ -194,9 +192,7 @@ def stop_behind(rig: Rig, seq: int, behind: int, at: int) -> float:
 
 @pytest.mark.parametrize("behind", [0, 1, 2])
 @pytest.mark.parametrize("late_us", [-2000, -1400, -600, 400])
-def test_characters_that_come_while_slow_chips_hold_the_robot_up_make_no_stop_late(
-    behind: int, late_us: int
-) -> None:
+def test_characters_that_come_while_slow_chips_hold_the_robot_up_make_no_stop_late(behind, late_us):
     chips = Lm629Options(
         busy_clocks=2000
     )  # 333 us; loading an acceleration takes more than a character's time
@@ -214,9 +210,7 @@ PAUSES_US = [0, 25, 300, 450, 600, 650, 700, 900, 1200, 1600]
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("behind", [1, 2, 5])
 @pytest.mark.parametrize("pause_us", PAUSES_US)
-def test_110_ms_count_from_the_frame_also_with_characters_behind_it(
-    place: tuple[int, int], behind: int, pause_us: int
-) -> None:
+def test_110_ms_count_from_the_frame_also_with_characters_behind_it(place, behind, pause_us):
     rig = Rig(*place)
     rig.send(encode(TeamFrame(0, 0, ((1000, 1000),) * place[1]), place[1]))
     end = rig.line_free

@@ -24,7 +24,7 @@ def busy_rig(n: int = 3) -> Rig:
 
 
 @pytest.mark.parametrize("n", [3, 5])
-def test_a_busy_robot_never_faults(n: int) -> None:
+def test_a_busy_robot_never_faults(n):
     """The rig raises on any fault: LM629 written while busy, two chips on the bus, code outside the image."""
     rig = busy_rig(n)
     rig.run_to(rig.line_free + 600 * MS)
@@ -34,7 +34,7 @@ def test_a_busy_robot_never_faults(n: int) -> None:
     assert rig.board.left.status & 0x02 == rig.board.right.status & 0x02 == 0
 
 
-def test_two_chips_are_never_selected_for_a_read() -> None:
+def test_two_chips_are_never_selected_for_a_read():
     rig = busy_rig()
     rig.run_to(rig.line_free)
     for _, port, latch in rig.board.writes:
@@ -42,7 +42,7 @@ def test_two_chips_are_never_selected_for_a_read() -> None:
             assert latch & CHIP_SELECTS
 
 
-def test_the_stack_stays_far_from_the_end_of_memory() -> None:
+def test_the_stack_stays_far_from_the_end_of_memory():
     rig = busy_rig()
     symbol = IMAGE.symbols.find("__start__stack")
     assert symbol is not None
@@ -59,7 +59,7 @@ def test_the_stack_stays_far_from_the_end_of_memory() -> None:
     assert highest - start < 48
 
 
-def test_the_serial_interrupt_is_short() -> None:
+def test_the_serial_interrupt_is_short():
     """From RI to its being cleared: what the next character's gauge and the tick must tolerate."""
     rig = Rig()
     rig.send(encode(TeamFrame(0, 0, ((1, 1),) * 3), 3))

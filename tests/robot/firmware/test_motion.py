@@ -11,7 +11,7 @@ VELOCITIES = st.integers(-32767, 32767)
 
 
 @pytest.fixture
-def rig() -> Rig:
+def rig():
     return Rig()
 
 
@@ -24,7 +24,7 @@ def expected(velocity: int) -> list[tuple[int, bytes]]:
     return [(LTRJ, bytes.fromhex(control + register(velocity))), (STT, b"")]
 
 
-def test_a_team_frame_sets_velocity_mode_in_both_chips(rig: Rig) -> None:
+def test_a_team_frame_sets_velocity_mode_in_both_chips(rig):
     rig.team(7, 4000, -2500)
     left, right = rig.told(rig.board.left), rig.told(rig.board.right)
     assert [(command.opcode, command.data) for command in left] == expected(4000)
@@ -33,7 +33,7 @@ def test_a_team_frame_sets_velocity_mode_in_both_chips(rig: Rig) -> None:
     assert (rig.u8("_last_hdr"), rig.i16("_last_left"), rig.i16("_last_right")) == (7, 4000, -2500)
 
 
-def test_both_wheels_start_in_the_same_sample(rig: Rig) -> None:
+def test_both_wheels_start_in_the_same_sample(rig):
     last = rig.team(1, 1000, 1000)
     left, right = rig.told(rig.board.left)[-1], rig.told(rig.board.right)[-1]
     assert left.opcode == right.opcode == STT
@@ -42,13 +42,13 @@ def test_both_wheels_start_in_the_same_sample(rig: Rig) -> None:
     assert left.tick < last + 4 * MS
 
 
-def test_the_trajectory_begins_within_two_and_a_half_milliseconds_of_the_last_character(rig: Rig) -> None:
+def test_the_trajectory_begins_within_two_and_a_half_milliseconds_of_the_last_character(rig):
     last = rig.team(1, 1000, 1000)
     stop_bit = last + 9 * 2500
     assert rig.told(rig.board.left)[-1].tick + SAMPLE - stop_bit < 2.5 * MS
 
 
-def test_the_desired_velocity_reaches_the_command_with_the_default_acceleration(rig: Rig) -> None:
+def test_the_desired_velocity_reaches_the_command_with_the_default_acceleration(rig):
     rig.team(0, 4000, -4000)
     start = rig.told(rig.board.left)[-1].tick
     samples = -(-(4000 << 8) // 5973)
@@ -57,14 +57,14 @@ def test_the_desired_velocity_reaches_the_command_with_the_default_acceleration(
     assert rig.board.right.desired_velocity == -(4000 << 8)
 
 
-def test_zero_is_a_velocity_and_not_a_stop(rig: Rig) -> None:
+def test_zero_is_a_velocity_and_not_a_stop(rig):
     rig.team(0, 500, 0)
     assert [(c.opcode, c.data) for c in rig.told(rig.board.right)] == expected(0)
     assert not rig.board.right.status & 0x80  # the loop is closed
 
 
 @pytest.mark.parametrize(("sent", "used"), [(16633, 16633), (16634, 16633), (32767, 16633), (-16634, -16633)])
-def test_velocities_saturate_at_the_top_speed(rig: Rig, sent: int, used: int) -> None:
+def test_velocities_saturate_at_the_top_speed(rig, sent, used):
     rig.team(0, sent, -sent)
     assert (rig.i16("_last_left"), rig.i16("_last_right")) == (used, -used)
     assert [(c.opcode, c.data) for c in rig.told(rig.board.left)] == expected(used)
@@ -75,9 +75,7 @@ def test_velocities_saturate_at_the_top_speed(rig: Rig, sent: int, used: int) ->
     st.lists(st.tuples(VELOCITIES, VELOCITIES), min_size=1, max_size=4),
     st.sampled_from([(0, 3), (2, 3), (4, 5)]),
 )
-def test_any_velocities_reach_the_registers_of_any_slot(
-    pairs: list[tuple[int, int]], place: tuple[int, int]
-) -> None:
+def test_any_velocities_reach_the_registers_of_any_slot(pairs, place):
     slot, n = place
     rig = Rig(slot=slot, n=n)
     for seq, (left, right) in enumerate(pairs):
@@ -86,14 +84,14 @@ def test_any_velocities_reach_the_registers_of_any_slot(
         assert [(c.opcode, c.data) for c in rig.told(rig.board.right)] == expected(right)
 
 
-def test_other_slots_velocities_are_not_its_own() -> None:
+def test_other_slots_velocities_are_not_its_own():
     rig = Rig(slot=1, n=5)
     rig.team(0, 3000, 3000, slot=3)
     assert (rig.i16("_last_left"), rig.i16("_last_right")) == (0, 0)
     assert rig.counters == (1, 0, 0)
 
 
-def test_a_slot_beyond_the_network_listens_and_never_moves() -> None:
+def test_a_slot_beyond_the_network_listens_and_never_moves():
     rig = Rig(slot=4, n=3)
     rig.team(0, 3000, 3000, slot=1)
     rig.team(1, 3000, 3000, ask=True, slot=1)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_protocol.strategies import Heard, damaged_streams
+from miro_protocol.strategies import damaged_streams
 from tests.robot.firmware.differential import compare, drawn_stream, frame
 from tests.robot.firmware.rig import BIT, CHARACTER, MS, US, Rig
 
@@ -15,7 +15,7 @@ LEAD = 6  # characters before the sync
 
 @pytest.mark.parametrize(("pause_us", "accepted"), [(0, 1), (20, 1), (80, 0), (200, 0)])
 @pytest.mark.parametrize("place", [0, 5, 15])
-def test_a_pause_inside_the_window_decides_by_its_length(pause_us: int, accepted: int, place: int) -> None:
+def test_a_pause_inside_the_window_decides_by_its_length(pause_us, accepted, place):
     rig = Rig()
     pauses = [0] * (LEAD + place) + [pause_us * US]
     last = rig.send(frame(0), pauses=pauses)
@@ -24,7 +24,7 @@ def test_a_pause_inside_the_window_decides_by_its_length(pause_us: int, accepted
 
 
 @pytest.mark.parametrize(("character_us", "accepted"), [(1010, 1), (1040, 1), (1080, 1), (1100, 0)])
-def test_the_gauge_tells_spacings_within_50_us_of_1040_us(character_us: int, accepted: int) -> None:
+def test_the_gauge_tells_spacings_within_50_us_of_1040_us(character_us, accepted):
     """Short bits, the stop bit stretched. Below 1001 us the receiver itself misses start edges: RI comes then."""
     rig = Rig()
     pause = character_us * US - 10 * 2400
@@ -34,7 +34,7 @@ def test_the_gauge_tells_spacings_within_50_us_of_1040_us(character_us: int, acc
 
 
 @pytest.mark.parametrize("pause_us", [20, 80])
-def test_the_gauge_holds_while_telemetry_is_sent(pause_us: int) -> None:
+def test_the_gauge_holds_while_telemetry_is_sent(pause_us):
     """The transmit branch of the interrupt delays a received character's reading; the margin covers it."""
     rig = Rig()
     rig.team(0, 0, 0, ask=True)
@@ -47,7 +47,7 @@ def test_the_gauge_holds_while_telemetry_is_sent(pause_us: int) -> None:
 
 
 @pytest.mark.parametrize("place", range(LEAD, LEAD + 17))
-def test_a_damaged_stop_bit_in_the_window_refuses_the_frame(place: int) -> None:
+def test_a_damaged_stop_bit_in_the_window_refuses_the_frame(place):
     rig = Rig()
     start = rig.now + CHARACTER
     for index, byte in enumerate(frame(0)):
@@ -56,7 +56,7 @@ def test_a_damaged_stop_bit_in_the_window_refuses_the_frame(place: int) -> None:
     assert rig.counters == (0, 0, 0)
 
 
-def test_a_damaged_frame_is_counted_and_the_next_one_taken() -> None:
+def test_a_damaged_frame_is_counted_and_the_next_one_taken():
     rig = Rig()
     data = bytearray(frame(0))
     data[LEAD + 6] ^= 0x10
@@ -66,7 +66,7 @@ def test_a_damaged_frame_is_counted_and_the_next_one_taken() -> None:
     assert rig.counters == (1, 1, 0)
 
 
-def test_a_frame_is_taken_whatever_comes_right_before_it() -> None:
+def test_a_frame_is_taken_whatever_comes_right_before_it():
     rig = Rig()
     for seq, garbage in enumerate([b"\x2d\xd4", b"\x2d", frame(0)[:-1], bytes(range(256)), b"\x2d\xd4" * 20]):
         last = rig.send(garbage + frame(seq))
@@ -74,7 +74,7 @@ def test_a_frame_is_taken_whatever_comes_right_before_it() -> None:
         assert rig.counters[0] == seq + 1
 
 
-def test_two_frames_that_follow_at_once_are_both_taken() -> None:
+def test_two_frames_that_follow_at_once_are_both_taken():
     rig = Rig()
     last = rig.send(frame(0) + frame(1))
     rig.run_to(last + 5 * CHARACTER)
@@ -88,7 +88,7 @@ def test_two_frames_that_follow_at_once_are_both_taken() -> None:
     ([63, 0, 8], (3, 0, 0)),
     ([3, 2], (1, 0, 1)),
 ])  # fmt: skip
-def test_only_one_to_eight_steps_forward_are_fresh(steps: list[int], counters: tuple[int, int, int]) -> None:
+def test_only_one_to_eight_steps_forward_are_fresh(steps, counters):
     rig = Rig()
     for seq in steps:
         rig.frame(frame(seq))
@@ -97,25 +97,25 @@ def test_only_one_to_eight_steps_forward_are_fresh(steps: list[int], counters: t
 
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from([3, 5]))
-def test_firmware_and_python_agree_on_long_damaged_streams(seed: int, n: int) -> None:
+def test_firmware_and_python_agree_on_long_damaged_streams(seed, n):
     compare(drawn_stream(seed, n, 25), n)
 
 
 @settings(max_examples=40, deadline=None)
 @given(damaged_streams())
-def test_firmware_and_python_agree_on_any_damage(heard: Heard) -> None:
+def test_firmware_and_python_agree_on_any_damage(heard):
     compare(heard.symbols, heard.n)
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.binary(max_size=200), st.sampled_from([3, 5]), st.integers(0, 63))
-def test_firmware_and_python_agree_on_any_bytes_with_frames_among_them(data: bytes, n: int, seq: int) -> None:
+def test_firmware_and_python_agree_on_any_bytes_with_frames_among_them(data, n, seq):
     cut = len(data) // 2
     wire = data[:cut] + frame(seq, n) + data[cut:] + frame(seq + 1 & 63, n)
     compare([(byte, True, place * CHARACTER) for place, byte in enumerate(wire)], n)
 
 
-def test_the_comparison_sees_a_difference() -> None:
+def test_the_comparison_sees_a_difference():
     """A character more for Python than for the firmware: the frame it spoils is missed by one of them."""
     symbols = [(byte, True, place * CHARACTER) for place, byte in enumerate(frame(1))]
     with pytest.raises(AssertionError, match="firmware"):
@@ -130,9 +130,7 @@ def test_the_comparison_sees_a_difference() -> None:
 @given(
     st.lists(st.integers(0, 1), max_size=400), st.integers(1, 2 * BIT), st.sampled_from([3, 5]), st.booleans()
 )
-def test_the_first_frame_after_any_garbage_on_the_line_is_taken(
-    levels: list[int], width: int, n: int, at_once: bool
-) -> None:
+def test_the_first_frame_after_any_garbage_on_the_line_is_taken(levels, width, n, at_once):
     """Garbage of any pulse width and phase, the frame right behind it or after a key-up."""
     rig = Rig(n=n)
     start = rig.now + CHARACTER
@@ -147,7 +145,7 @@ def test_the_first_frame_after_any_garbage_on_the_line_is_taken(
     assert rig.u8("_last_hdr") & 63 == 1
 
 
-def test_random_levels_without_a_carrier_never_make_a_frame() -> None:
+def test_random_levels_without_a_carrier_never_make_a_frame():
     rig = Rig()
     draw = random.Random(1)
     for slot in range(10_000):

@@ -12,7 +12,7 @@ STOP = bytes.fromhex("0400")
 
 
 @pytest.fixture
-def rig() -> Rig:
+def rig():
     return Rig(slot=1)
 
 
@@ -20,7 +20,7 @@ def settings_of(commands: list[Command]) -> list[tuple[int, bytes]]:
     return [(command.opcode, command.data) for command in commands if command.opcode != RDSIGS]
 
 
-def test_a_ping_is_fresh_and_changes_nothing(rig: Rig) -> None:
+def test_a_ping_is_fresh_and_changes_nothing(rig):
     rig.team(0, 1000, 1000, slot=1)
     rig.told(rig.board.left)
     for seq in range(1, 5):
@@ -31,7 +31,7 @@ def test_a_ping_is_fresh_and_changes_nothing(rig: Rig) -> None:
     assert rig.board.left.desired_velocity == 1000 << 8
 
 
-def test_filter_gains_reach_both_chips_at_once(rig: Rig) -> None:
+def test_filter_gains_reach_both_chips_at_once(rig):
     rig.team(0, 1000, 1000, slot=1)
     for chip in (rig.board.left, rig.board.right):
         rig.told(chip)
@@ -40,14 +40,14 @@ def test_filter_gains_reach_both_chips_at_once(rig: Rig) -> None:
         assert settings_of(rig.told(chip)) == [(LFIL, bytes.fromhex("030f 0102 0304 0506 0708")), (UDF, b"")]
 
 
-def test_settings_for_another_slot_are_ignored(rig: Rig) -> None:
+def test_settings_for_another_slot_are_ignored(rig):
     rig.service(0, 0, FILTER, 1, 2, 3, 4)
     rig.service(1, 2, ACCELERATION, 4000)
     assert rig.told(rig.board.left) == []
     assert rig.counters == (2, 0, 0)
 
 
-def test_an_acceleration_at_rest_is_in_force_with_the_first_velocity(rig: Rig) -> None:
+def test_an_acceleration_at_rest_is_in_force_with_the_first_velocity(rig):
     rig.service(0, 1, ACCELERATION, 0x00012345)
     rig.team(1, 16000, 16000, slot=1)
     commands = rig.told(rig.board.left)
@@ -58,7 +58,7 @@ def test_an_acceleration_at_rest_is_in_force_with_the_first_velocity(rig: Rig) -
     assert 9 <= steps <= 10
 
 
-def test_an_acceleration_in_motion_waits_for_standstill(rig: Rig) -> None:
+def test_an_acceleration_in_motion_waits_for_standstill(rig):
     rig.team(0, 8000, -8000, slot=1)
     rig.service(1, 1, ACCELERATION, 3000)
     rig.team(2, 8000, -8000, slot=1)
@@ -83,7 +83,7 @@ def test_an_acceleration_in_motion_waits_for_standstill(rig: Rig) -> None:
         assert not chip.status & 0x02  # no command error: the chip never refused an STT
 
 
-def test_an_acceleration_waits_through_the_failsafe_too(rig: Rig) -> None:
+def test_an_acceleration_waits_through_the_failsafe_too(rig):
     rig.team(0, 8000, 8000, slot=1)
     rig.service(1, 1, ACCELERATION, 3000)
     rig.run_ms(600)
@@ -104,7 +104,7 @@ def unchecked(rig: Rig, seq: int, opcode: int, data: bytes) -> None:
     rig.frame(seal(downlink(3), body.ljust(1 + downlink(3).payload_size, b"\0")))
 
 
-def test_gains_above_32767_reach_the_chips_as_they_came_and_they_keep_15_bits(rig: Rig) -> None:
+def test_gains_above_32767_reach_the_chips_as_they_came_and_they_keep_15_bits(rig):
     unchecked(rig, 1, FILTER, bytes.fromhex("ffff 0180 ffff ffff"))
     (load, update) = settings_of(rig.told(rig.board.left))
     assert (load, update) == ((LFIL, bytes.fromhex("030f ffff 8001 ffff ffff")), (UDF, b""))
@@ -112,7 +112,7 @@ def test_gains_above_32767_reach_the_chips_as_they_came_and_they_keep_15_bits(ri
     assert (rig.board.left.pid.kp, rig.board.left.pid.ki) == (0x7FFF, 1)
 
 
-def test_an_acceleration_above_30_bits_reaches_the_chips_as_it_came_and_they_keep_30_bits(rig: Rig) -> None:
+def test_an_acceleration_above_30_bits_reaches_the_chips_as_it_came_and_they_keep_30_bits(rig):
     unchecked(rig, 1, ACCELERATION, (0xC0000000 + 3000).to_bytes(4, "little"))
     assert settings_of(rig.told(rig.board.left)) == [(LTRJ, bytes.fromhex("0020 c0000bb8"))]
     rig.team(2, 8000, 8000, slot=1)
@@ -121,7 +121,7 @@ def test_an_acceleration_above_30_bits_reaches_the_chips_as_it_came_and_they_kee
     assert (rest, 9 <= steps <= 10) == (0, True)
 
 
-def test_with_acceleration_0_wheels_stay_at_rest_until_another_one_comes(rig: Rig) -> None:
+def test_with_acceleration_0_wheels_stay_at_rest_until_another_one_comes(rig):
     unchecked(rig, 1, ACCELERATION, bytes(4))
     rig.team(2, 8000, 8000, slot=1)
     rig.run_ms(50)
@@ -136,9 +136,7 @@ def test_with_acceleration_0_wheels_stay_at_rest_until_another_one_comes(rig: Ri
 
 
 @pytest.mark.parametrize(("silence_ms", "status"), [(150, 0), (550, 0x80)], ids=["stopped", "off"])
-def test_a_ping_after_the_failsafe_does_not_set_the_wheels_in_motion_again(
-    rig: Rig, silence_ms: float, status: int
-) -> None:
+def test_a_ping_after_the_failsafe_does_not_set_the_wheels_in_motion_again(rig, silence_ms, status):
     rig.team(0, 1000, 1000, slot=1)
     rig.run_ms(silence_ms)
     rig.told(rig.board.left)
@@ -149,14 +147,14 @@ def test_a_ping_after_the_failsafe_does_not_set_the_wheels_in_motion_again(
     assert rig.board.left.status & 0x80 == status
 
 
-def test_a_robot_whose_slot_is_not_below_n_takes_settings_for_that_slot() -> None:
+def test_a_robot_whose_slot_is_not_below_n_takes_settings_for_that_slot():
     rig = Rig(slot=7)
     body = bytes([1 << 6 | 1, 7, FILTER]) + bytes(range(8))
     rig.frame(seal(downlink(3), body.ljust(13, b"\0")))
     assert [command.opcode for command in rig.told(rig.board.left)] == [LFIL, UDF]
 
 
-def test_a_velocity_of_minus_32768_is_cut_off_like_others(rig: Rig) -> None:
+def test_a_velocity_of_minus_32768_is_cut_off_like_others(rig):
     body = bytes([1]) + bytes(4) + bytes.fromhex("0080 0080") + bytes(4)
     rig.frame(seal(downlink(3), body))
     assert rig.i16("_last_left") == rig.i16("_last_right") == -16633

@@ -24,7 +24,7 @@ def follow(rig: Rig, left_units: int, right_units: int, samples: int) -> list[tu
 @pytest.mark.parametrize(
     ("left", "right"), [(2279, 2279), (11393, 11393), (-11393, -11393), (5696, -5696), (1139, 570)]
 )
-def test_the_wheels_follow_a_ramp_closely_and_settle(left: int, right: int) -> None:
+def test_the_wheels_follow_a_ramp_closely_and_settle(left, right):
     """Closely: 0.5 mm (65 counts). Settled: within 4 counts (30 um) of a steady error below 20."""
     rig = Rig(plant=DifferentialDrive(DriveParams()))
     ramp_samples = abs(left) * 256 // 5973 + 100
@@ -37,7 +37,7 @@ def test_the_wheels_follow_a_ramp_closely_and_settle(left: int, right: int) -> N
         assert max(abs(error) for error in band) < 20
 
 
-def test_a_wheel_commanded_to_zero_holds_its_position() -> None:
+def test_a_wheel_commanded_to_zero_holds_its_position():
     rig = Rig(plant=DifferentialDrive(DriveParams()))
     rig.team(0, 0, 0)
     held = rig.board.left.real_position

@@ -30,13 +30,13 @@ _POINT = "T:Fmain$point[({0}S:S$x$0_0$0({4}SF:S),Z,0,0)]"
         ],  # 9 to the power of 8 numbers, all in one place
     ],
 )
-def test_a_variable_whose_type_cannot_be_is_left_out_at_once(damaged: list[str]) -> None:
+def test_a_variable_whose_type_cannot_be_is_left_out_at_once(damaged):
     good = [_POINT, "S:G$good$0_0$0({8}DA2d,STpoint:S),E,0,0", "L:G$good$0_0$0:10"]
     text = "\n".join(["M:main", *damaged, "L:G$x$0_0$0:8", *good])
     assert list(parse_variables(text).by_name) == ["good"]
 
 
-def test_a_variable_beyond_any_memory_is_left_out() -> None:
+def test_a_variable_beyond_any_memory_is_left_out():
     text = "S:G$x$0_0$0({1}SC:U),E,0,0\nL:G$x$0_0$0:{}\n"
     assert list(parse_variables(text.replace("{}", "FFFF")).by_name) == ["x"]
     for address in ("10000", "7FFFFFFF", "FFFFFFFF"):

@@ -177,7 +177,7 @@ def test_lcov_counts_what_is_written(tmp_path):
     assert "50.0% (1 of 2 branches)" in text
 
 
-def test_a_long_word_is_no_kind_of_record_and_is_not_repeated() -> None:
+def test_a_long_word_is_no_kind_of_record_and_is_not_repeated():
     for word in ("X" * 20_000, "\x00" * 20_000 + "A", "A\udcff"):
         with pytest.raises(BadInput) as caught:
             decode(f"{word}:1\n", "x.info")

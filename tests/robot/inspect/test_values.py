@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -57,7 +56,7 @@ needs_sdcc = pytest.mark.skipif(shutil.which("sdcc") is None, reason="needs SDCC
 
 
 @pytest.fixture(scope="module")
-def program(tmp_path_factory: pytest.TempPathFactory) -> Image:
+def program(tmp_path_factory):
     folder = tmp_path_factory.mktemp("typed")
     (folder / "typed.c").write_text(PROGRAM)
     (folder / "other.c").write_text(OTHER)
@@ -77,7 +76,7 @@ def at_rest(image: Image) -> Cpu:
 
 
 @pytest.fixture
-def cpu(program: Image) -> Cpu:
+def cpu(program):
     return at_rest(program)
 
 
@@ -117,14 +116,14 @@ VALUES: dict[str, Any] = {
 
 @needs_sdcc
 @pytest.mark.parametrize("name", VALUES)
-def test_a_variable_has_the_value_that_the_program_gave_it(name: str, program: Image, cpu: Cpu) -> None:
+def test_a_variable_has_the_value_that_the_program_gave_it(name, program, cpu):
     value = read_value(cpu, program, name)
     assert value == VALUES[name]
     assert type(value) is type(VALUES[name])
 
 
 @needs_sdcc
-def test_a_pointer_is_an_int_the_address_below_the_mark_of_the_memory(program: Image, cpu: Cpu) -> None:
+def test_a_pointer_is_an_int_the_address_below_the_mark_of_the_memory(program, cpu):
     places = {one.name: one.address for each in variables_of(program).by_name.values() for one in each}
     assert read_value(cpu, program, "gp") & 0xFFFF == places["pc"]
     assert read_value(cpu, program, "cp") == places["table"]
@@ -153,7 +152,7 @@ WRITTEN = {
 
 @needs_sdcc
 @pytest.mark.parametrize("name", WRITTEN)
-def test_what_is_written_is_read_and_nothing_beside_it_changes(name: str, program: Image, cpu: Cpu) -> None:
+def test_what_is_written_is_read_and_nothing_beside_it_changes(name, program, cpu):
     others = [
         other for other in VALUES if other.split(".")[0].split("[")[0] != name.split(".")[0].split("[")[0]
     ]
@@ -164,7 +163,7 @@ def test_what_is_written_is_read_and_nothing_beside_it_changes(name: str, progra
 
 
 @needs_sdcc
-def test_members_that_are_not_named_stay(program: Image, cpu: Cpu) -> None:
+def test_members_that_are_not_named_stay(program, cpu):
     write_value(cpu, program, "fl", {"b": 0})
     assert read_value(cpu, program, "fl") == {"a": 1, "b": 0, "c": 300, "d": -2}
     write_value(cpu, program, "pt", {"y": 255})
@@ -186,7 +185,7 @@ REFUSED = {
 
 @needs_sdcc
 @pytest.mark.parametrize("name", REFUSED)
-def test_a_name_that_cannot_be_read_is_refused_with_the_remedy(name: str, program: Image, cpu: Cpu) -> None:
+def test_a_name_that_cannot_be_read_is_refused_with_the_remedy(name, program, cpu):
     with pytest.raises(BadInput, match=REFUSED[name]):
         read_value(cpu, program, name)
 
@@ -204,14 +203,12 @@ def test_a_name_that_cannot_be_read_is_refused_with_the_remedy(name: str, progra
         ("table", [1, 2, 3], "is in code, not in internal RAM"),
     ],
 )
-def test_a_value_that_does_not_fit_is_refused(
-    name: str, value: object, said: str, program: Image, cpu: Cpu
-) -> None:
+def test_a_value_that_does_not_fit_is_refused(name, value, said, program, cpu):
     with pytest.raises(BadInput, match=said):
         write_value(cpu, program, name, value)
 
 
-def test_the_shipped_firmwares_variables_have_their_types() -> None:
+def test_the_shipped_firmwares_variables_have_their_types():
     image = load_hex(image_path())
     cpu = at_rest(image)
     types = {one.name: str(one.type) for each in variables_of(image).by_name.values() for one in each}
@@ -226,13 +223,13 @@ def test_the_shipped_firmwares_variables_have_their_types() -> None:
     assert (read_value(cpu, image, "acceleration_waits"), read_value(cpu, image, "tx_busy")) == (1, 0)
 
 
-def test_a_misspelt_name_of_the_shipped_firmware_is_answered_with_what_comes_close() -> None:
+def test_a_misspelt_name_of_the_shipped_firmware_is_answered_with_what_comes_close():
     image = load_hex(image_path())
     with pytest.raises(BadInput, match=r"last_lef: there is no such variable; did you mean last_left"):
         read_value(at_rest(image), image, "last_lef")
 
 
-def test_without_a_debug_file_the_test_says_the_type(tmp_path: Path) -> None:
+def test_without_a_debug_file_the_test_says_the_type(tmp_path):
     for suffix in (".ihx", ".map"):
         shutil.copy(image_path().with_suffix(suffix), tmp_path / f"bare{suffix}")
     image = load_hex(tmp_path / "bare.ihx")
@@ -249,7 +246,7 @@ def test_without_a_debug_file_the_test_says_the_type(tmp_path: Path) -> None:
 
 
 @given(st.sampled_from(["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64"]), st.data())
-def test_every_number_that_fits_survives(name: str, data: st.DataObject) -> None:
+def test_every_number_that_fits_survives(name, data):
     kind = type_named(name)
     assert kind is not None
     width = 8 * kind.size
@@ -259,12 +256,12 @@ def test_every_number_that_fits_survives(name: str, data: st.DataObject) -> None
 
 
 @given(st.text(alphabet="DASCILTF{}$,0123456789", max_size=12), st.integers(0, 9999), st.booleans())
-def test_a_damaged_type_is_a_type_or_none(chain: str, size: int, signed: bool) -> None:
+def test_a_damaged_type_is_a_type_or_none(chain, size, signed):
     assert isinstance(type_of(chain, size, signed), CType | None)
 
 
 @given(st.integers(0, 4000), st.integers(0, 255))
-def test_a_damaged_debug_file_is_read_as_far_as_it_goes(at: int, byte: int) -> None:
+def test_a_damaged_debug_file_is_read_as_far_as_it_goes(at, byte):
     text = image_path().with_suffix(".cdb").read_text()[:5000]
     damaged = text[:at] + chr(byte) + text[at + 1 :]
     found = parse_variables(damaged)

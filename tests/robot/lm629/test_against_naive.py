@@ -302,9 +302,7 @@ class Session(Bench):
     0,
     [("command", "SIP"), ("turn", 4), ("index", 0), ("turn", 2), ("command", "RESET")],
 )
-def test_random_sessions_agree_with_the_slow_twin_bit_for_bit(
-    options: Lm629Options, start: int, actions: list[tuple[object, ...]]
-):
+def test_random_sessions_agree_with_the_slow_twin_bit_for_bit(options, start, actions):
     pair = Pair(options)
     session = Session(pair, start)
     session.chip.set_encoder(start, 0, 0)

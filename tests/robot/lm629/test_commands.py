@@ -45,7 +45,7 @@ def moving(acceleration: int = 0x8000, velocity: int = 0x20000, position: int = 
         ("1F | 000A | 0000 346E | 0000 1F40; 01", (0, 13422, 8000)),
     ],
 )
-def test_published_trajectories_reach_the_working_registers(text: str, registers: tuple[int, int, int]):
+def test_published_trajectories_reach_the_working_registers(text, registers):
     bench = Bench.running()
     send(bench, text)
     bench.sample()
@@ -139,7 +139,7 @@ def test_relative_parameters_add_to_the_working_ones():
 
 
 @pytest.mark.parametrize(("base", "target"), [("target", 1100), ("desired", 108), ("real", 104)])
-def test_relative_positions_may_be_read_in_three_ways(base: str, target: int):
+def test_relative_positions_may_be_read_in_three_ways(base, target):
     bench = Bench.running(relative_base=base)
     bench.chip.set_encoder(bench.tick, 0, 0)
     bench.load(0x002A, 0x8000, 0x20000, 1000)
@@ -211,7 +211,7 @@ def test_an_abrupt_stop_takes_the_real_position_as_target():
 
 
 @pytest.mark.parametrize("word", [0x0100, 0x0900])
-def test_motor_off_drops_the_drive_and_a_new_start_begins_at_the_real_position(word: int):
+def test_motor_off_drops_the_drive_and_a_new_start_begins_at_the_real_position(word):
     bench = moving()
     bench.filter(kp=1000)
     bench.sample()

@@ -36,7 +36,7 @@ def test_initialising_with_a_software_reset():
 
 
 @pytest.mark.parametrize("word", ["0100", "0900"])
-def test_the_stop_module_of_the_programming_guide(word: str):
+def test_the_stop_module_of_the_programming_guide(word):
     bench = moving()
     send(bench, f"1F | {word}")
     bench.sample()
@@ -53,7 +53,7 @@ def test_the_threshold_of_a_published_example():
 
 
 @pytest.mark.parametrize(("word", "velocity"), [("1808", 0x10000), ("0808", -0x10000)])
-def test_velocity_alone_keeps_the_acceleration(word: str, velocity: int):
+def test_velocity_alone_keeps_the_acceleration(word, velocity):
     bench = moving()
     send(bench, f"1F | {word} | 0001 0000; 01")
     bench.sample(12)

@@ -23,9 +23,7 @@ EVENT = st.tuples(
     place=st.integers(0, 3),
     events=st.lists(EVENT, max_size=60),
 )
-def test_any_edges_count_like_a_sampler_that_looks_at_every_clock(
-    filter_clocks: int, start: int, place: int, events: list[tuple[str, int]]
-):
+def test_any_edges_count_like_a_sampler_that_looks_at_every_clock(filter_clocks, start, place, events):
     ours, theirs = Encoder(filter_clocks), NaiveEncoder(filter_clocks)
     tick, index = start, 1
     a, b = FORWARD[place]

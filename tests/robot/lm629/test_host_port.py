@@ -135,7 +135,7 @@ def test_a_status_read_between_the_bytes_of_a_word_leaves_the_byte_phase_alone()
 
 
 @pytest.mark.parametrize("ps_write", [True, False])
-def test_data_when_no_word_is_due_raises_the_command_error(ps_write: bool):
+def test_data_when_no_word_is_due_raises_the_command_error(ps_write):
     bench = Bench.running()
     bench.ready()
     if ps_write:

@@ -392,9 +392,7 @@ READINGS: tuple[Reading, ...] = (
 
 
 @pytest.mark.parametrize(("field", "other", "observe", "by_default", "otherwise"), READINGS)
-def test_the_other_reading_of_a_rule_does_otherwise(
-    field: str, other: object, observe: Callable[[Bench], object], by_default: object, otherwise: object
-):
+def test_the_other_reading_of_a_rule_does_otherwise(field, other, observe, by_default, otherwise):
     assert observe(Bench.running()) == by_default
     assert observe(Bench.running(**{field: other})) == otherwise
     assert by_default != otherwise

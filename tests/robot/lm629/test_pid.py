@@ -31,7 +31,7 @@ def loop(kp: int = 0, ki: int = 0, kd: int = 0, il: int = 0, ds: int = 0, satura
         (40000, 32767, 0, 127),
     ],
 )
-def test_proportional_term_and_output_stage(error: int, drive: int, sign: int, magnitude: int):
+def test_proportional_term_and_output_stage(error, drive, sign, magnitude):
     assert loop(kp=10).step(error) == drive
     bench = Bench.running()
     bench.filter(kp=10)
@@ -112,9 +112,7 @@ COEFFICIENT = st.integers(0, 300) | st.integers(0, 0x7FFF)
     wound_up=st.integers(-(2**23), 2**23 - 1),
     errors=st.lists(st.integers(-500, 500) | st.integers(-(2**30), 2**30 - 1), max_size=60),
 )
-def test_any_errors_give_the_drive_of_the_slow_twin(
-    coefficients: tuple[int, int, int, int, int], saturates: bool, wound_up: int, errors: list[int]
-):
+def test_any_errors_give_the_drive_of_the_slow_twin(coefficients, saturates, wound_up, errors):
     ours, theirs = Pid(saturates), NaivePid(saturates)
     ours.load(*coefficients)
     theirs.load(*coefficients)

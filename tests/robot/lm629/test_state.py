@@ -28,7 +28,7 @@ def session(name: str, seed: int, count: int) -> str:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_compiled_and_uncompiled_chips_see_the_same_session(seed: int):
+def test_compiled_and_uncompiled_chips_see_the_same_session(seed):
     if engine.active() != "compiled":
         pytest.skip("nothing is compiled here")
     compiled, python = session("compiled", seed, 400), session("python", seed, 400)
@@ -39,7 +39,7 @@ def test_compiled_and_uncompiled_chips_see_the_same_session(seed: int):
 
 @examples(60)
 @given(seed=st.integers(0, 2**32), before=st.integers(0, 40), extra=st.integers(0, 9000))
-def test_a_chip_restored_at_any_tick_goes_on_with_the_same_bits(seed: int, before: int, extra: int):
+def test_a_chip_restored_at_any_tick_goes_on_with_the_same_bits(seed, before, extra):
     script = list(steps(seed, before + 15))
     first, place = Bench(), 0
     first.chip.set_encoder(0, 0, 0)

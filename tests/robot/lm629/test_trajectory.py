@@ -91,9 +91,7 @@ def test_the_target_may_move_behind_the_axis_on_the_way():
         (1, 1, 1, 65536, 1),
     ],
 )
-def test_long_moves_take_as_many_samples_as_calculated_by_hand(
-    a: int, limit: int, target: int, samples: int, peak: int
-):
+def test_long_moves_take_as_many_samples_as_calculated_by_hand(a, limit, target, samples, peak):
     velocities, positions = run(generator(a, limit, target))
     assert (len(velocities), max(velocities), positions[-1]) == (samples, peak, target)
 
@@ -146,14 +144,14 @@ WIDE = st.integers(-(2**30), 2**30 - 1)
     samples=st.integers(1, 60),
 )
 def test_any_state_steps_like_the_slow_twin(
-    a: int,
-    limit: int,
-    target: int,
-    position: int,
-    velocity: int,
-    activity: str,
-    forward: int,
-    samples: int,
+    a,
+    limit,
+    target,
+    position,
+    velocity,
+    activity,
+    forward,
+    samples,
 ):
     ours = generator(a, limit, target, velocity_mode=int(activity == "velocity"), forward=forward)
     ours.position, ours.velocity = position, velocity
@@ -175,7 +173,7 @@ def test_any_state_steps_like_the_slow_twin(
 
 @examples(200)
 @given(a=st.integers(1, 0x20000), limit=st.integers(1, 0x40000), target=st.integers(-300, 300))
-def test_every_move_from_rest_ends_exactly_on_its_target(a: int, limit: int, target: int):
+def test_every_move_from_rest_ends_exactly_on_its_target(a, limit, target):
     trajectory = generator(max(a, 0x40), max(limit, 0x200), target)
     velocities, positions = run(trajectory)
     assert trajectory.position == target * 65536

@@ -233,7 +233,7 @@ def test_a_crystal_that_no_8051_has_is_refused():
         BareMachine(image("NOP"), crystal_hz=5)
 
 
-def test_a_limit_does_not_keep_a_program_from_ending() -> None:
+def test_a_limit_does_not_keep_a_program_from_ending():
     machine = BareMachine(image("NOP\nSJMP $"))
     assert machine.run(max_cycles=1000) == Ended.HALTED
     assert machine.cpu.cycles == 3

@@ -96,8 +96,8 @@ def state_after(code: bytes, levels: list[int], anew: bool) -> bytes:
 @example(["NOP"], ["CLR TF0", "MOV TL0,#250"], ["CLR TI"], 0x34, ["CLR TF1", "MOV SBUF,#1"], [])
 @example(["NOP"], ["NOP"], ["NOP"], 0x34, ["MOV TH0,#255", "MOV TL0,#254", "NOP", "NOP", "NOP", "NOP"], [])
 def test_it_takes_every_interrupt_when_one_that_looks_at_each_instruction_does(
-    timer0: list[str], timer1: list[str], serial: list[str], t2con: int, loop: list[str], levels: list[int]
-) -> None:
+    timer0, timer1, serial, t2con, loop, levels
+):
     parts = ["\n".join(part) for part in (timer0, timer1, serial)]
     code = assemble(PROGRAM.format(*parts, t2con, "\n".join(loop)))
     assert state_after(code, levels, anew=False) == state_after(code, levels, anew=True)

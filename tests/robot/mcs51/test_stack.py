@@ -1,7 +1,6 @@
 """SP leaves its stack: by each instruction that can write it, past data, round the top of RAM, below the start."""
 
 import shutil
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -152,7 +151,7 @@ void main(void) { P1 = eat(12); while (1) PCON |= 1; }
 
 
 @pytest.mark.skipif(shutil.which("sdcc") is None, reason="needs SDCC")
-def test_firmware_whose_local_variables_leave_ram_is_caught(tmp_path: Path):
+def test_firmware_whose_local_variables_leave_ram_is_caught(tmp_path):
     """No PUSH goes past FFh: SDCC's reentrant functions add to SP."""
     (tmp_path / "dying.c").write_text(DYING)
     children.run(

@@ -9,5 +9,5 @@ from tests.sim.world.rig import image
 
 @settings(max_examples=3, deadline=None)
 @given(st.integers(0, 20_000_000), st.integers(0, 1000))
-def test_going_on_from_a_saved_world_equals_not_stopping(first_tick: int, seed: int) -> None:
+def test_going_on_from_a_saved_world_equals_not_stopping(first_tick, seed):
     assert differing(first_tick, 40, seed, image()) == []

@@ -23,22 +23,20 @@ def read_back(path: Path) -> list[bytes]:
 
 
 @given(st.lists(st.binary(min_size=1, max_size=LONGEST_TOKEN)))
-def test_each_string_of_a_dictionary_is_written_once(
-    tmp_path_factory: pytest.TempPathFactory, tokens: list[bytes]
-) -> None:
+def test_each_string_of_a_dictionary_is_written_once(tmp_path_factory, tokens):
     path = tmp_path_factory.mktemp("dictionary") / "words"
     write_dictionary(path, {f'name "{number}"\n': token for number, token in enumerate(tokens)})
     assert sorted(read_back(path)) == sorted(set(tokens))
 
 
 @pytest.mark.parametrize("token", [b"", bytes(129)])
-def test_a_string_that_afl_would_refuse_is_refused(tmp_path: Path, token: bytes) -> None:
+def test_a_string_that_afl_would_refuse_is_refused(tmp_path, token):
     with pytest.raises(BadInput, match=f"words: long one: {len(token)} bytes; give 1 to 128"):
         write_dictionary(tmp_path / "words", {"long one": token})
 
 
 @pytest.mark.parametrize("robots", ROBOT_COUNTS)
-def test_the_strings_of_the_wire_hold_sync_preamble_and_whole_frames(robots: int) -> None:
+def test_the_strings_of_the_wire_hold_sync_preamble_and_whole_frames(robots):
     tokens = wire_tokens(robots)
     assert tokens["sync"] == SYNC
     assert tokens["preamble"] == downlink(robots).lead
@@ -50,12 +48,12 @@ def test_the_strings_of_the_wire_hold_sync_preamble_and_whole_frames(robots: int
 
 
 @pytest.mark.parametrize("robots", ROBOT_COUNTS)
-def test_all_our_strings_fit_a_dictionary(tmp_path: Path, robots: int) -> None:
+def test_all_our_strings_fit_a_dictionary(tmp_path, robots):
     write_dictionary(tmp_path / "words", wire_tokens(robots) | message_tokens(robots))
     assert len(read_back(tmp_path / "words")) > 20
 
 
-def test_seeds_are_written_once_each_without_empty_ones_and_cut(tmp_path: Path) -> None:
+def test_seeds_are_written_once_each_without_empty_ones_and_cut(tmp_path):
     long = bytes(range(256)) * 17
     inputs = {"first": b"x", "empty": b"", "../second": b"x", "../long": long}
     assert write_seeds(tmp_path / "seeds", inputs) == 2

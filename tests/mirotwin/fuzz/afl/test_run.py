@@ -5,7 +5,7 @@ import shutil
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ PATIENCE_S = 60.0
 
 
 @pytest.fixture(autouse=True)
-def _modules_for_the_target(monkeypatch: pytest.MonkeyPatch) -> None:
+def _modules_for_the_target(monkeypatch):
     """The target process imports the double from the tests' folder."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
 
@@ -51,13 +51,13 @@ def until(true: Callable[[], Any], what: str) -> Any:
 
 
 @pytest.fixture
-def found(tmp_path: Path) -> Iterator[tuple[AflRun, Path]]:
+def found(tmp_path):
     """A campaign that has found the word, and the input with it."""
     with campaign(tmp_path, watch=Double()) as run:
         yield run, until(run.new_crashes, "a crash")[0]
 
 
-def test_afl_finds_the_word_by_its_branches(found: tuple[AflRun, Path]) -> None:
+def test_afl_finds_the_word_by_its_branches(found):
     run, crash = found
     assert crash.read_bytes().startswith(WORD)
     assert "sig:34" in crash.name, "a find of kind 2"
@@ -73,7 +73,7 @@ def test_afl_finds_the_word_by_its_branches(found: tuple[AflRun, Path]) -> None:
     assert progress.characters > progress.executions
 
 
-def test_a_campaign_that_is_stopped_has_no_process_left_and_goes_on_later(tmp_path: Path) -> None:
+def test_a_campaign_that_is_stopped_has_no_process_left_and_goes_on_later(tmp_path):
     first = campaign(tmp_path)
     with first:
         until(first.new_crashes, "a crash")
@@ -89,7 +89,7 @@ def test_a_campaign_that_is_stopped_has_no_process_left_and_goes_on_later(tmp_pa
     again.stop()  # does nothing
 
 
-def test_two_jobs_share_what_they_find(tmp_path: Path) -> None:
+def test_two_jobs_share_what_they_find(tmp_path):
     with campaign(tmp_path, jobs=2) as run:
         until(
             lambda: all((tmp_path / "out" / name / "queue").is_dir() for name in ("main", "job1")), "queues"
@@ -99,7 +99,7 @@ def test_two_jobs_share_what_they_find(tmp_path: Path) -> None:
     assert run.progress().stability_percent == 100.0
 
 
-def test_it_ends_by_itself_after_its_time(tmp_path: Path) -> None:
+def test_it_ends_by_itself_after_its_time(tmp_path):
     with campaign(tmp_path, seconds=2) as run:
         until(lambda: not run.running, "the end")
     statistics = run.jobs[0].statistics()
@@ -108,7 +108,7 @@ def test_it_ends_by_itself_after_its_time(tmp_path: Path) -> None:
     assert statistics.edges == 4
 
 
-def test_a_target_that_hangs_can_be_stopped(tmp_path: Path) -> None:
+def test_a_target_that_hangs_can_be_stopped(tmp_path):
     with campaign(tmp_path, {"hangs": b"!"}, sleeps=True) as run:
         until(lambda: (tmp_path / "out" / "default.counts").exists(), "the target")
         time.sleep(1.0)  # until it has the first input: AFL++ says nothing of it
@@ -116,7 +116,7 @@ def test_a_target_that_hangs_can_be_stopped(tmp_path: Path) -> None:
     assert processes_of(tmp_path) == []
 
 
-def test_a_campaign_ends_with_its_process_however_that_ends(tmp_path: Path) -> None:
+def test_a_campaign_ends_with_its_process_however_that_ends(tmp_path):
     program = f"""
 import sys, time
 from pathlib import Path
@@ -139,7 +139,7 @@ time.sleep({PATIENCE_S})
     until(lambda: processes_of(tmp_path) == [], "the others to end")
 
 
-def test_a_robot_is_fuzzed_from_one_frame(tmp_path: Path) -> None:
+def test_a_robot_is_fuzzed_from_one_frame(tmp_path):
     specification = TargetSpec(input="bytes")
     frame = encode(TeamFrame(FrameType.TEAM, 1, ((200, 200),) * 3), 3)
     write_seeds(tmp_path / "seeds", {"frame": frame})
@@ -164,25 +164,25 @@ def error_of(run: AflRun) -> str:
     return f"{error.value}"
 
 
-def test_seeds_that_all_fail_are_told(tmp_path: Path) -> None:
+def test_seeds_that_all_fail_are_told(tmp_path):
     said = error_of(campaign(tmp_path, always=True))
     assert "default.log: afl-fuzz ended: We need at least one valid input seed that does not crash!; " in said
     assert "each seed fails by itself" in said
 
 
-def test_a_target_that_raises_is_quoted(tmp_path: Path) -> None:
+def test_a_target_that_raises_is_quoted(tmp_path):
     said = error_of(campaign(tmp_path, {"a": b"!"}, raises=True))
     assert "default.target:" in said
     assert "RuntimeError: the double raises" in said
 
 
-def test_a_target_that_cannot_be_made_is_quoted(tmp_path: Path) -> None:
+def test_a_target_that_cannot_be_made_is_quoted(tmp_path):
     write_seeds(tmp_path / "seeds", {"a": b"a"})
     said = error_of(AflRun(['{"board":"x"}'], tmp_path / "seeds", tmp_path / "out"))
     assert "target: Invalid enum value 'x' - at `$.board`" in said
 
 
-def test_a_folder_that_another_campaign_uses_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_another_campaign_uses_is_told(tmp_path):
     with campaign(tmp_path) as first:
         until(first.new_queue, "the first")
         said = error_of(campaign(tmp_path))
@@ -190,14 +190,14 @@ def test_a_folder_that_another_campaign_uses_is_told(tmp_path: Path) -> None:
         assert first.running
 
 
-def test_a_folder_with_a_file_in_the_place_of_a_job_is_told(tmp_path: Path) -> None:
+def test_a_folder_with_a_file_in_the_place_of_a_job_is_told(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "default").write_text("")
     assert "choose another folder" in error_of(campaign(tmp_path))
 
 
 @pytest.mark.parametrize("content", [None, b""])
-def test_a_folder_without_seeds_is_refused(tmp_path: Path, content: bytes | None) -> None:
+def test_a_folder_without_seeds_is_refused(tmp_path, content):
     (tmp_path / "seeds").mkdir()
     if content is not None:
         (tmp_path / "seeds" / "empty").write_bytes(content)
@@ -205,7 +205,7 @@ def test_a_folder_without_seeds_is_refused(tmp_path: Path, content: bytes | None
         AflRun([spec().text()], tmp_path / "seeds", tmp_path / "out")
 
 
-def test_a_folder_of_seeds_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_a_folder_of_seeds_that_is_none_is_refused(tmp_path):
     with pytest.raises(BadInput, match="seeds: is no folder; give"):
         AflRun([spec().text()], tmp_path / "seeds", tmp_path / "out")
 
@@ -224,19 +224,19 @@ def showmap(*options: str, data: bytes = b"") -> int:
     return done.returncode
 
 
-def test_afl_showmap_shows_the_edges_of_one_input(tmp_path: Path) -> None:
+def test_afl_showmap_shows_the_edges_of_one_input(tmp_path):
     assert showmap("-o", str(tmp_path / "map"), data=b"DUx") == 0
     assert (tmp_path / "map").read_text() == "000001:1\n000002:1\n000003:1\n"
 
 
-def test_afl_showmap_shows_the_edges_of_a_folder(tmp_path: Path) -> None:
+def test_afl_showmap_shows_the_edges_of_a_folder(tmp_path):
     write_seeds(tmp_path / "seeds", {"a": b"DUx", "b": b"x"})
     showmap("-i", str(tmp_path / "seeds"), "-o", str(tmp_path / "maps"))
     lines = [len(path.read_text().splitlines()) for path in sorted((tmp_path / "maps").iterdir())]
     assert lines == [3, 1]
 
 
-def test_afl_tmin_keeps_what_fails(tmp_path: Path) -> None:
+def test_afl_tmin_keeps_what_fails(tmp_path):
     (tmp_path / "in").write_bytes(WORD + b"and more of it")
     target = [sys.executable, "-m", "mirotwin.fuzz.afl.serve", spec().text()]
     command = ["afl-tmin", "-i", tmp_path / "in", "-o", tmp_path / "out", "-t", "60000", "--", *target]

@@ -26,7 +26,7 @@ def by_hand(specification: TargetSpec | str, data: bytes) -> tuple[int, str, str
     return done.returncode, done.stdout.decode(), done.stderr.decode()
 
 
-def test_the_first_word_says_options_size_of_the_map_and_shared_memory() -> None:
+def test_the_first_word_says_options_size_of_the_map_and_shared_memory():
     with FakeAfl(spec()) as afl:
         said = afl.hello()
         assert said & 0x8000_0001 == 0x8000_0001
@@ -37,7 +37,7 @@ def test_the_first_word_says_options_size_of_the_map_and_shared_memory() -> None
         assert afl.end() == 0
 
 
-def test_the_process_that_is_told_cannot_exist() -> None:
+def test_the_process_that_is_told_cannot_exist():
     with FakeAfl(spec()) as afl:
         afl.hello()
         process, _ = afl.run(b"hello")
@@ -45,7 +45,7 @@ def test_the_process_that_is_told_cannot_exist() -> None:
         afl.end()
 
 
-def test_edges_are_counted_in_the_memory_of_afl() -> None:
+def test_edges_are_counted_in_the_memory_of_afl():
     with FakeAfl(spec()) as afl:
         afl.hello()
         assert afl.run(b"DUC") == (afl.run(b"DUC")[0], 0)
@@ -56,7 +56,7 @@ def test_edges_are_counted_in_the_memory_of_afl() -> None:
 
 
 @pytest.mark.parametrize("kind", [1, 2, 8, 93])
-def test_the_signal_of_a_find_tells_its_kind(kind: int) -> None:
+def test_the_signal_of_a_find_tells_its_kind(kind):
     with FakeAfl(spec(kind=kind)) as afl:
         afl.hello()
         status = afl.run(WORD)[1]
@@ -67,13 +67,13 @@ def test_the_signal_of_a_find_tells_its_kind(kind: int) -> None:
 
 
 @given(st.integers(1, 255))
-def test_each_kind_of_finding_is_a_signal_that_kills(kind: int) -> None:
+def test_each_kind_of_finding_is_a_signal_that_kills(kind):
     status = wait_status(kind)
     assert os.WIFSIGNALED(status)
     assert os.WTERMSIG(status) > signal.SIGSYS, "none that a program dies of by itself"
 
 
-def test_one_process_answers_a_thousand_inputs_as_the_target_itself_does() -> None:
+def test_one_process_answers_a_thousand_inputs_as_the_target_itself_does():
     own = Double()
     with FakeAfl(spec()) as afl:
         afl.hello()
@@ -92,7 +92,7 @@ def test_one_process_answers_a_thousand_inputs_as_the_target_itself_does() -> No
         assert afl.end() == 0
 
 
-def test_a_length_beyond_the_segment_is_cut_to_it() -> None:
+def test_a_length_beyond_the_segment_is_cut_to_it():
     with FakeAfl(spec()) as afl:
         afl.hello()
         afl.cases.memory[:4] = (1 << 31).to_bytes(4, "little")
@@ -102,7 +102,7 @@ def test_a_length_beyond_the_segment_is_cut_to_it() -> None:
         afl.end()
 
 
-def test_what_the_machine_was_fed_is_kept_and_counted_on(tmp_path: Path) -> None:
+def test_what_the_machine_was_fed_is_kept_and_counted_on(tmp_path):
     beside = str(tmp_path / "main")
     for times in (1, 2):
         with FakeAfl(spec(), beside) as afl:
@@ -114,7 +114,7 @@ def test_what_the_machine_was_fed_is_kept_and_counted_on(tmp_path: Path) -> None
     assert not (tmp_path / "main.target").exists(), "there was nothing to complain of"
 
 
-def test_the_server_ends_when_afl_closes_its_pipes_before_the_answer() -> None:
+def test_the_server_ends_when_afl_closes_its_pipes_before_the_answer():
     with FakeAfl(spec()) as afl:
         afl.hello()
         os.close(afl.status)
@@ -124,12 +124,12 @@ def test_the_server_ends_when_afl_closes_its_pipes_before_the_answer() -> None:
         assert afl.server.stderr.read() == ""
 
 
-def test_the_server_ends_when_afl_does_not_answer_its_first_word() -> None:
+def test_the_server_ends_when_afl_does_not_answer_its_first_word():
     with FakeAfl(spec()) as afl:
         assert afl.end() == 0
 
 
-def test_a_target_that_raises_is_told_in_a_file(tmp_path: Path) -> None:
+def test_a_target_that_raises_is_told_in_a_file(tmp_path):
     with FakeAfl(spec(raises=True), str(tmp_path / "main")) as afl:
         afl.hello()
         afl.run(b"!")
@@ -140,7 +140,7 @@ def test_a_target_that_raises_is_told_in_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("variable", "remedy"), [(MAP_VARIABLE, "by afl-fuzz"), (CASES_VARIABLE, "4.00c or newer")]
 )
-def test_an_afl_without_shared_memory_is_refused(variable: str, remedy: str) -> None:
+def test_an_afl_without_shared_memory_is_refused(variable, remedy):
     with FakeAfl(spec(), without=variable) as afl:
         afl.hello()
         assert afl.end() == 2
@@ -150,12 +150,12 @@ def test_an_afl_without_shared_memory_is_refused(variable: str, remedy: str) -> 
         assert said.count("\n") == 1
 
 
-def test_shared_memory_that_is_not_there_is_an_error() -> None:
+def test_shared_memory_that_is_not_there_is_an_error():
     with pytest.raises(OSError, match="shared memory 2147483647: Invalid argument"):
         attach(0x7FFF_FFFF)
 
 
-def test_attached_memory_is_as_long_as_it_was_made() -> None:
+def test_attached_memory_is_as_long_as_it_was_made():
     with FakeAfl(spec()) as afl:
         assert len(afl.edges.memory) == 65536
         assert len(afl.cases.memory) == CASES_BYTES
@@ -164,7 +164,7 @@ def test_attached_memory_is_as_long_as_it_was_made() -> None:
 # ---- without AFL++ -----------------------------------------------------------------------------------------
 
 
-def test_without_afl_standard_input_is_run_once_and_told() -> None:
+def test_without_afl_standard_input_is_run_once_and_told():
     assert by_hand(spec(), WORD + b"Y") == (1, "word: found at 4 (tick 24, PC 0x0004)\n44 55 43 4b 59\n", "")
     assert by_hand(spec(), b"hello") == (0, "nothing found\n", "")
 
@@ -183,7 +183,7 @@ def test_without_afl_standard_input_is_run_once_and_told() -> None:
         ('{"maker": "os:nothing"}', "target: maker: os:nothing: module 'os' has no attribute 'nothing'; "),
     ],
 )
-def test_a_specification_that_cannot_be_used_is_one_line_and_exit_code_2(text: str, said: str) -> None:
+def test_a_specification_that_cannot_be_used_is_one_line_and_exit_code_2(text, said):
     code, out, err = by_hand(text, b"")
     assert (code, out) == (2, "")
     assert err.startswith(said)

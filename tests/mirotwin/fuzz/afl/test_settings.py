@@ -17,7 +17,7 @@ from mirotwin.fuzz.spec import TargetSpec, spec_of
 from tests.mirotwin.fuzz.afl.double import spec
 
 
-def test_one_job_is_not_distributed_and_several_are() -> None:
+def test_one_job_is_not_distributed_and_several_are():
     call = Call(("{}",), Path("seeds"), Path("out"), Path("words"), seconds=60, seed=7)
     alone, main, other = call.line(0, 1), call.line(0, 2), call.line(1, 2)
     assert not {"-M", "-S"} & set(alone)
@@ -30,24 +30,24 @@ def test_one_job_is_not_distributed_and_several_are() -> None:
     assert alone[alone.index("-V") + 1] == "60"
 
 
-def test_what_is_not_asked_for_is_not_on_the_command_line() -> None:
+def test_what_is_not_asked_for_is_not_on_the_command_line():
     line = Call(("{}",), Path("seeds"), Path("out")).line(0, 1)
     assert not {"-x", "-V", "-s"} & set(line)
 
 
 @given(image=st.text("@/x", max_size=8))
-def test_no_specification_holds_what_afl_replaces_by_the_name_of_a_file(image: str) -> None:
+def test_no_specification_holds_what_afl_replaces_by_the_name_of_a_file(image):
     one = TargetSpec(image=image)
     assert "@@" not in one.text()
     assert spec_of(one.text()) == one
 
 
-def test_a_folder_whose_name_afl_would_replace_is_refused() -> None:
+def test_a_folder_whose_name_afl_would_replace_is_refused():
     with pytest.raises(BadInput, match="out@@: afl-fuzz puts the name of a file for @@; choose another"):
         Call(("{}",), Path("seeds"), Path("out@@")).line(0, 1)
 
 
-def test_our_settings_win_and_others_are_passed_on() -> None:
+def test_our_settings_win_and_others_are_passed_on():
     found = environment({"AFL_MAP_SIZE": "65536", "AFL_SHUFFLE_QUEUE": "1", "HOME": "/h"}, 8192)
     assert found["AFL_MAP_SIZE"] == "8192"
     assert found["AFL_SHUFFLE_QUEUE"] == "1"
@@ -55,23 +55,23 @@ def test_our_settings_win_and_others_are_passed_on() -> None:
     assert all(found[name].isdecimal() for name in REASONS)
 
 
-def test_each_setting_has_a_reason() -> None:
+def test_each_setting_has_a_reason():
     assert all(reason.strip() for reason in REASONS.values())
 
 
-def test_the_first_of_several_jobs_is_the_main_one() -> None:
+def test_the_first_of_several_jobs_is_the_main_one():
     assert [job_name(job, 3) for job in range(3)] == ["main", "job1", "job2"]
     assert job_name(0, 1) == "default"
 
 
-def test_what_is_missing_says_how_to_get_it() -> None:
+def test_what_is_missing_says_how_to_get_it():
     said = missing(("afl-fuzz-of-tomorrow",))
     assert (
         said == "afl-fuzz-of-tomorrow is not on the PATH; install AFL++ (Debian, Ubuntu: `apt install afl++`)"
     )
 
 
-def test_a_campaign_without_afl_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_campaign_without_afl_is_refused(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(BadInput, match=r"^AFL\+\+: afl-fuzz is not on the PATH; install AFL\+\+"):
         AflRun([spec().text()], tmp_path, tmp_path / "out")
@@ -80,7 +80,7 @@ def test_a_campaign_without_afl_is_refused(tmp_path: Path, monkeypatch: pytest.M
 @pytest.mark.parametrize(
     ("jobs", "said"), [(0, r"^--jobs: 0: there is nothing to do; give 1 or more"), (-3, r"^--jobs: -3: ")]
 )
-def test_a_campaign_of_no_job_is_refused(tmp_path: Path, jobs: int, said: str) -> None:
+def test_a_campaign_of_no_job_is_refused(tmp_path, jobs, said):
     with pytest.raises(BadInput, match=said):
         AflRun([spec().text()], tmp_path, tmp_path / "out", jobs=jobs)
 
@@ -95,7 +95,7 @@ def process(proc: Path, number: int, allowed: str, kernel: bool = False) -> None
     (proc / str(number) / "status").write_text(f"Name:\tx\n{memory}Cpus_allowed_list:\t{allowed}\n")
 
 
-def test_the_core_to_which_the_fewest_are_bound_comes_first(tmp_path: Path) -> None:
+def test_the_core_to_which_the_fewest_are_bound_comes_first(tmp_path):
     free = sorted(os.sched_getaffinity(0))
     for number in range(3):
         process(tmp_path, 10 + number, str(free[0]))
@@ -107,7 +107,7 @@ def test_the_core_to_which_the_fewest_are_bound_comes_first(tmp_path: Path) -> N
     assert sorted(cores.cores_for(2 * len(free), tmp_path)) == sorted(2 * free)
 
 
-def test_more_jobs_than_cores_are_told() -> None:
+def test_more_jobs_than_cores_are_told():
     count = len(os.sched_getaffinity(0))
     assert cores.shared_cores(count) is None
     assert f"; --jobs {count} makes as many executions" in (cores.shared_cores(count + 1) or "")
@@ -135,18 +135,18 @@ def said(folder: Path, output: str, complaint: str = "") -> str:
     return f"{why_ended(folder / 'main.log', folder / 'main.target')}"
 
 
-def test_the_line_of_afl_is_quoted_with_a_remedy(tmp_path: Path) -> None:
+def test_the_line_of_afl_is_quoted_with_a_remedy(tmp_path):
     line = said(tmp_path, ABORT % "We need at least one valid input seed that does not crash!")
     what = "afl-fuzz ended: We need at least one valid input seed that does not crash!"
     assert line == f"{tmp_path}/main.log: {what}; {REMEDIES[0][1]}"
 
 
-def test_the_message_of_the_system_is_quoted_too(tmp_path: Path) -> None:
+def test_the_message_of_the_system_is_quoted_too(tmp_path):
     line = said(tmp_path, OS_ERROR)
     assert "Unable to create 'out' (Read-only file system); choose a folder that can be written to" in line
 
 
-def test_what_the_target_complained_of_is_the_cause(tmp_path: Path) -> None:
+def test_what_the_target_complained_of_is_the_cause(tmp_path):
     output = ABORT % "Fork server handshake failed"
     assert said(tmp_path, output, "x.ihx:3: no hex\n") == f"{tmp_path}/main.target:1: x.ihx:3: no hex"
     long = said(tmp_path, output, "Traceback\n  File x\nKeyError: 3\n")
@@ -154,5 +154,5 @@ def test_what_the_target_complained_of_is_the_cause(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("output", ["", "\n \n", "Segmentation fault\n"])
-def test_an_end_without_a_reason_shows_the_last_line(tmp_path: Path, output: str) -> None:
+def test_an_end_without_a_reason_shows_the_last_line(tmp_path, output):
     assert (output.strip() or "it said nothing") in said(tmp_path, output)

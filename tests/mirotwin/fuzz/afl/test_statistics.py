@@ -43,18 +43,16 @@ def plot(folder: Path, text: str) -> list[Statistics]:
     return read_plot(folder / "plot_data")
 
 
-def test_statistics_are_read(tmp_path: Path) -> None:
+def test_statistics_are_read(tmp_path):
     assert stats(tmp_path, STATS) == SAID
 
 
 @given(st.integers(0, len(STATS) - 1))
-def test_a_file_that_is_not_written_to_its_end_counts_as_none(
-    tmp_path_factory: pytest.TempPathFactory, end: int
-) -> None:
+def test_a_file_that_is_not_written_to_its_end_counts_as_none(tmp_path_factory, end):
     assert stats(tmp_path_factory.mktemp("stats"), STATS[:end]) is None
 
 
-def test_a_file_that_is_not_there_counts_as_none(tmp_path: Path) -> None:
+def test_a_file_that_is_not_there_counts_as_none(tmp_path):
     assert read_statistics(tmp_path / "fuzzer_stats") is None
     assert read_plot(tmp_path / "plot_data") == []
 
@@ -68,19 +66,19 @@ def test_a_file_that_is_not_there_counts_as_none(tmp_path: Path) -> None:
         ("run_time          : 10", "run_time 10", "fuzzer_stats:3: 'run_time 10' is no `key : value`; "),
     ],
 )
-def test_other_statistics_are_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_other_statistics_are_refused(tmp_path, old, new, said):
     with pytest.raises(BadInput) as error:
         stats(tmp_path, STATS.replace(old, new))
     assert said in f"{error.value}"
 
 
-def test_rows_of_the_plot_are_read_oldest_first(tmp_path: Path) -> None:
+def test_rows_of_the_plot_are_read_oldest_first(tmp_path):
     first, last = plot(tmp_path, PLOT)
     assert first == Statistics(550438, 45076.47, 4, 1, 4, 100.0, 60.0)
     assert last == Statistics(600000, 45000.0, 5, 2, 5, 100.0, 65.0)
 
 
-def test_columns_of_newer_versions_are_passed_over(tmp_path: Path) -> None:
+def test_columns_of_newer_versions_are_passed_over(tmp_path):
     newer = (
         PLOT.replace("edges_found", "edges_found, total_crashes")
         .replace("4\n", "4, 9\n")
@@ -89,7 +87,7 @@ def test_columns_of_newer_versions_are_passed_over(tmp_path: Path) -> None:
     assert plot(tmp_path, newer) == plot(tmp_path, PLOT)
 
 
-def test_a_row_that_is_not_written_to_its_end_is_left_out(tmp_path: Path) -> None:
+def test_a_row_that_is_not_written_to_its_end_is_left_out(tmp_path):
     end = PLOT.rindex("\n65")
     assert all(len(plot(tmp_path, PLOT[:cut])) == 1 for cut in range(end + 1, len(PLOT)))
 
@@ -102,16 +100,14 @@ def test_a_row_that_is_not_written_to_its_end_is_left_out(tmp_path: Path) -> Non
         ("600000", "x", "plot_data:3: invalid literal for int() with base 10: 'x'; "),
     ],
 )
-def test_another_plot_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_another_plot_is_refused(tmp_path, old, new, said):
     with pytest.raises(BadInput) as error:
         plot(tmp_path, PLOT.replace(old, new))
     assert said in f"{error.value}"
 
 
 @given(content=st.binary(max_size=30).filter(lambda content: len(content) != 24))
-def test_counters_that_are_not_whole_are_zeros(
-    tmp_path_factory: pytest.TempPathFactory, content: bytes
-) -> None:
+def test_counters_that_are_not_whole_are_zeros(tmp_path_factory, content):
     path = tmp_path_factory.mktemp("counts") / "main.counts"
     path.write_bytes(content)
     assert read_counts(path) == Fed()

@@ -40,20 +40,20 @@ from mirotwin.recording.capture.input import HEAD_BYTES
         (b" " + b"a" * (HEAD_BYTES - 1), "hex"),  # half a pair at the end of the part that is looked at
     ],
 )
-def test_the_beginning_tells_the_format(head: bytes, format: str) -> None:
+def test_the_beginning_tells_the_format(head, format):
     assert detect(head) == (format, "")
 
 
 @pytest.mark.parametrize(
     "text", [b"hello", b"55 5", b"# only a comment", b"12 | 55", b"   \n", b"\xef\xbb\xbfhello"]
 )
-def test_text_that_is_neither_hex_nor_a_stream_is_raw_and_said_to_be(text: bytes) -> None:
+def test_text_that_is_neither_hex_nor_a_stream_is_raw_and_said_to_be(text):
     format, note = detect(text)
     assert format == "raw"
     assert "neither pairs of hex digits nor a stream file; read as raw bytes" in note
 
 
-def test_a_packed_file_is_read_as_raw_bytes_and_said_to_be_packed() -> None:
+def test_a_packed_file_is_read_as_raw_bytes_and_said_to_be_packed():
     assert detect(gzip.compress(b"x")) == (
         "raw",
         "looks packed by gzip, unpack it first; read as raw bytes",
@@ -61,20 +61,20 @@ def test_a_packed_file_is_read_as_raw_bytes_and_said_to_be_packed() -> None:
 
 
 @given(st.binary(max_size=300))
-def test_any_bytes_have_a_format(head: bytes) -> None:
+def test_any_bytes_have_a_format(head):
     assert detect(head)[0] in FORMATS
 
 
 @given(
     st.lists(st.builds(Transmission, st.just(5), st.sampled_from("<>"), st.binary(min_size=1)), min_size=1)
 )
-def test_what_the_library_writes_as_a_stream_is_a_stream(sent: list[Transmission]) -> None:
+def test_what_the_library_writes_as_a_stream_is_a_stream(sent):
     text = stream.format_stream(sent)
     assert detect(text.encode())[0] == "stream"
     assert detect(text.partition("\n")[2].encode())[0] == "stream"
 
 
-def test_the_specification_names_the_formats_in_the_order_in_which_they_are_tried() -> None:
+def test_the_specification_names_the_formats_in_the_order_in_which_they_are_tried():
     page = (Path(__file__).parents[4] / "protocol/README.md").read_text(encoding="utf-8")
     table = page.partition("| it begins with | taken for |")[2].partition("\n\n")[0]
     named = [row.split("|")[-2].strip() for row in table.splitlines()[2:]]

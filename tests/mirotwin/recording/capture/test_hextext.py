@@ -71,7 +71,7 @@ def read(pieces: list[bytes]) -> tuple[bytes, tuple[int, int] | None]:
 
 
 @given(TEXTS, st.lists(st.integers(0, 60)))
-def test_any_text_in_any_pieces_is_read_as_character_by_character(text: str, cuts: list[int]) -> None:
+def test_any_text_in_any_pieces_is_read_as_character_by_character(text, cuts):
     data = text.encode()
     places = [0, *sorted(min(cut, len(data)) for cut in cuts), len(data)]
     assert read([data[start:end] for start, end in pairwise(places)]) == naive(text)
@@ -90,7 +90,7 @@ def test_any_text_in_any_pieces_is_read_as_character_by_character(text: str, cut
     ],
 )
 @pytest.mark.parametrize("before", ["", BOM, BOM + "# note\r\n"])
-def test_usual_ways_to_write_bytes_are_read(text: str, before: str) -> None:
+def test_usual_ways_to_write_bytes_are_read(text, before):
     assert read([(before + text).encode()]) == (b"\x55\xff\x2d", None)
 
 
@@ -104,7 +104,7 @@ def test_usual_ways_to_write_bytes_are_read(text: str, before: str) -> None:
         (BOM + "55\r\nff zz", r"a.hex:2:4: 'z' is no hex digit"),
     ],
 )
-def test_what_is_no_pair_is_named_with_line_and_column(text: str, message: str) -> None:
+def test_what_is_no_pair_is_named_with_line_and_column(text, message):
     reader = HexText("a.hex")
     reader.feed(text.encode())
     with pytest.raises(HexError, match=message):

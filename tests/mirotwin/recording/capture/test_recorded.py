@@ -68,7 +68,7 @@ def up(tick: int, data: bytes, network: int = 0, bad_stop: tuple[int, ...] = ())
     return Transmission(tick, "<", data, network, bad_stop)
 
 
-def test_runs_come_in_the_order_of_time_with_the_layout_of_their_network(tmp_path: Path) -> None:
+def test_runs_come_in_the_order_of_time_with_the_layout_of_their_network(tmp_path):
     path = tmp_path / "run.mcap"
     path.write_bytes(
         recording([(down(100), down(PERIOD + 50), up(90, b"a")), (down(PERIOD + 10, network=1),)])
@@ -85,7 +85,7 @@ def test_runs_come_in_the_order_of_time_with_the_layout_of_their_network(tmp_pat
 
 
 @pytest.mark.parametrize("cuts", [[], [1], [18], [5, 9], [1, 2, 3]])
-def test_an_answer_that_goes_on_over_the_end_of_periods_is_one_run(tmp_path: Path, cuts: list[int]) -> None:
+def test_an_answer_that_goes_on_over_the_end_of_periods_is_one_run(tmp_path, cuts):
     places = [0, *cuts, len(ANSWER)]
     wires = [(up(7 + start * UP, ANSWER[start:end]),) for start, end in pairwise(places)]
     path = tmp_path / "run.mcap"
@@ -93,7 +93,7 @@ def test_an_answer_that_goes_on_over_the_end_of_periods_is_one_run(tmp_path: Pat
     assert read(path)[0] == [up(7, ANSWER)]
 
 
-def test_bad_stop_bits_are_told_wherever_they_are(tmp_path: Path) -> None:
+def test_bad_stop_bits_are_told_wherever_they_are(tmp_path):
     path = tmp_path / "run.mcap"
     first = up(7, ANSWER[:8], bad_stop=(2, 7))
     second = up(7 + 8 * UP, ANSWER[8:], bad_stop=(0, 10))
@@ -101,14 +101,14 @@ def test_bad_stop_bits_are_told_wherever_they_are(tmp_path: Path) -> None:
     assert read(path)[0] == [up(7, ANSWER, bad_stop=(2, 7, 8, 18))]
 
 
-def test_what_comes_after_a_pause_is_another_transmission(tmp_path: Path) -> None:
+def test_what_comes_after_a_pause_is_another_transmission(tmp_path):
     path = tmp_path / "run.mcap"
     sent = [up(7, b"abc"), up(7 + 3 * UP + 1300, b"de"), up(7 + 9 * UP, b"f", 1), up(7 + 20 * UP, b"g")]
     path.write_bytes(recording([tuple(sent[:1]), tuple(sent[1:]), ()]))
     assert read(path)[0] == sent
 
 
-def test_periods_in_memory_give_the_same_as_their_recording(tmp_path: Path) -> None:
+def test_periods_in_memory_give_the_same_as_their_recording(tmp_path):
     first = (down(5), up(7, b"abc"), up(7 + 5 * UP, b"de"), up(7 + 9 * UP, ANSWER[:4], 1, (3,)))
     second = (down(PERIOD + 9), up(7 + 7 * UP, b"f"), up(7 + 13 * UP, ANSWER[4:], 1))
     path = tmp_path / "run.mcap"
@@ -119,7 +119,7 @@ def test_periods_in_memory_give_the_same_as_their_recording(tmp_path: Path) -> N
     assert [sent.data for sent in found] == [b"down", b"abc", b"def", ANSWER, b"down"]
 
 
-def test_every_recorded_character_of_a_run_is_there(tmp_path: Path) -> None:
+def test_every_recorded_character_of_a_run_is_there(tmp_path):
     path = tmp_path / "run.mcap"
     wires = [period.wire for period in periods(5)]
     path.write_bytes(recording(wires))
@@ -127,7 +127,7 @@ def test_every_recorded_character_of_a_run_is_there(tmp_path: Path) -> None:
     assert sorted(run.data for run in found) == sorted(run.data for wire in wires for run in wire)
 
 
-def test_a_recording_cut_short_anywhere_gives_what_came_before_and_the_offset(tmp_path: Path) -> None:
+def test_a_recording_cut_short_anywhere_gives_what_came_before_and_the_offset(tmp_path):
     whole = recording([(down(index * PERIOD),) for index in range(12)])
     path = tmp_path / "run.mcap"
     counts = []
@@ -151,7 +151,7 @@ WHOLE = recording([(down(index * PERIOD),) for index in range(3)])
 
 @settings(deadline=None, max_examples=100)
 @given(st.integers(0, len(WHOLE) - 1), st.integers(0, 7))
-def test_one_wrong_bit_anywhere_is_reported_after_what_could_be_read(at: int, bit: int) -> None:
+def test_one_wrong_bit_anywhere_is_reported_after_what_could_be_read(at, bit):
     data = bytearray(WHOLE)
     data[at] ^= 1 << bit
     with TemporaryDirectory() as folder:
@@ -173,14 +173,14 @@ def test_one_wrong_bit_anywhere_is_reported_after_what_could_be_read(at: int, bi
         (lambda data: foreign_mcap(), "not a recording of this program"),
     ],
 )
-def test_what_is_no_whole_recording_is_named_with_its_place(tmp_path: Path, change, message: str) -> None:  # type: ignore[no-untyped-def]
+def test_what_is_no_whole_recording_is_named_with_its_place(tmp_path, change, message):  # type: ignore[no-untyped-def]
     path = tmp_path / "run.mcap"
     path.write_bytes(change(recording([(down(5),)])))
     error = read(path)[2]
     assert message in str(error)
 
 
-def test_a_scenario_of_another_version_only_leaves_the_layout_open(tmp_path: Path) -> None:
+def test_a_scenario_of_another_version_only_leaves_the_layout_open(tmp_path):
     path = tmp_path / "run.mcap"
     path.write_bytes(recording([(down(5),)], text="[[tomorrow]]\n"))
     found, robots, error = read(path)

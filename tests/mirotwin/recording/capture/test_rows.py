@@ -40,7 +40,7 @@ def read(path: Path, format: str) -> tuple[list[Row], Exception | None]:
 
 @settings(deadline=None)
 @given(st.binary(max_size=400))
-def test_every_raw_byte_is_in_exactly_one_row(tmp_path_factory, data) -> None:  # type: ignore[no-untyped-def]
+def test_every_raw_byte_is_in_exactly_one_row(tmp_path_factory, data):  # type: ignore[no-untyped-def]
     path = tmp_path_factory.mktemp("raw") / "a"
     path.write_bytes(data)
     found, error = read(path, "raw")
@@ -60,7 +60,7 @@ def test_every_raw_byte_is_in_exactly_one_row(tmp_path_factory, data) -> None:  
 )
 def test_any_bytes_in_any_format_give_rows_and_at_most_the_formats_own_error(  # type: ignore[no-untyped-def]
     tmp_path_factory, data, magic, format
-) -> None:
+):
     path = tmp_path_factory.mktemp("any") / "a"
     path.write_bytes(magic + data)
     found, error = read(path, format)
@@ -68,13 +68,13 @@ def test_any_bytes_in_any_format_give_rows_and_at_most_the_formats_own_error(  #
     assert all(isinstance(row, Row) for row in found)
 
 
-def test_freshness_is_judged_as_the_robot_does() -> None:
+def test_freshness_is_judged_as_the_robot_does():
     sent = [Transmission(at * 800_800, ">", team(seq)) for at, seq in enumerate([0, 1, 1, 20, 2])]
     sent.append(Transmission(10 * 800_800, ">", team(30)))
     assert [row.fresh for row in decoded(sent)] == [True, True, False, False, True, True]
 
 
-def test_both_directions_and_networks_are_decoded_apart() -> None:
+def test_both_directions_and_networks_are_decoded_apart():
     answer = encode(TelemetryFrame(0, 1), 3)
     sent = []
     for at in range(0, 23, 5):  # five characters of each in turn
@@ -90,27 +90,27 @@ def test_both_directions_and_networks_are_decoded_apart() -> None:
     ]
 
 
-def test_a_pause_of_two_characters_gives_out_what_can_be_no_frame_any_more() -> None:
+def test_a_pause_of_two_characters_gives_out_what_can_be_no_frame_any_more():
     first, second = decoded([Transmission(0, ">", team(1)[:-1]), Transmission(24 * CHARACTER, ">", team(2))])
     assert first.event == Damaged(team(1)[:-1], Reason.CUT_SHORT, 0)
     assert isinstance(second.event, Received)
 
 
-def test_a_bad_stop_bit_spoils_the_frame_it_is_in() -> None:
+def test_a_bad_stop_bit_spoils_the_frame_it_is_in():
     wire = team(1)
     for place in range(6, len(wire)):
         (row,) = decoded([Transmission(0, ">", wire, 0, (place,))])
         assert row.event == Damaged(wire, Reason.BAD_STOP_BIT, 0)
 
 
-def test_a_frame_that_says_nothing_known_is_a_frame_all_the_same() -> None:
+def test_a_frame_that_says_nothing_known_is_a_frame_all_the_same():
     wire = encode(TelemetryFrame(3, 4), 5)  # slot 4 in a network of three
     (row,) = decoded([Transmission(0, "<", wire)])
     assert row.message is None
     assert "slot = 4" in row.unknown
 
 
-def test_memory_does_not_grow_with_the_input(tmp_path: Path) -> None:
+def test_memory_does_not_grow_with_the_input(tmp_path):
     path = tmp_path / "a"
     path.write_bytes(bytes(range(256)) * (1 << 14))  # 4 MiB
     with Input(str(path)) as given:

@@ -1,7 +1,6 @@
 """A recording lists an answer as valid exactly where the PC took it: stop bits are recorded."""
 
 import io
-from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -20,7 +19,7 @@ from mirotwin.recording.capture.rows import Row, rows
 from mirotwin.recording.reader import parse
 from mirotwin.recording.recorder import Recorder, Source
 from mirotwin.rerun import runner
-from tests.mirotwin.conftest import Result, mirotwin
+from tests.mirotwin.conftest import mirotwin
 from tests.sim.world.rig import image
 
 __all__ = ["mirotwin"]
@@ -52,7 +51,7 @@ def listed(path: Path) -> list[Row]:
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_answers_in_a_recording_are_those_that_the_pc_took(tmp_path: Path, seed: int) -> None:
+def test_the_answers_in_a_recording_are_those_that_the_pc_took(tmp_path, seed):
     path = tmp_path / "run.mcap"
     data, answers = recorded(seed)
     path.write_bytes(data)
@@ -68,9 +67,7 @@ def test_the_answers_in_a_recording_are_those_that_the_pc_took(tmp_path: Path, s
 
 
 @pytest.mark.parametrize("place", [5, 12, 18])
-def test_an_answer_refused_for_one_stop_bit_even_its_last_is_listed_as_refused(
-    mirotwin: Callable[..., Result], tmp_path: Path, place: int
-) -> None:
+def test_an_answer_refused_for_one_stop_bit_even_its_last_is_listed_as_refused(mirotwin, tmp_path, place):
     answer = encode(TelemetryFrame(3, 1), 3)
     source = Source(scenario_name="x", scenario_text="", seed=1, firmware=b"", firmware_sha256="")
     recording, exported = tmp_path / "run.mcap", tmp_path / "run.stream"

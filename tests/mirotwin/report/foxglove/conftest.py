@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import pytest
 
-from tests.mirotwin.conftest import Result, mirotwin
+from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.report.foxglove import rig
 
 __all__ = ["mirotwin"]
 
 
 @pytest.fixture(scope="session")
-def recording(mirotwin: Callable[..., Result], tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def recording(mirotwin, tmp_path_factory):
     """The two teams, 36 control periods, with frames."""
     return rig.teams(tmp_path_factory.mktemp("teams"), mirotwin)
 
 
 @pytest.fixture(scope="session")
-def shown(recording: bytes) -> list[rig.Read]:
+def shown(recording):
     """All messages of its export."""
     return rig.read(rig.exported(recording)[0])

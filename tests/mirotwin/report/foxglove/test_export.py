@@ -11,7 +11,6 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,7 +23,6 @@ from mirotwin.recording.channels import DeedMessage
 from mirotwin.recording.container import RecordingError
 from mirotwin.recording.recorder import Recorder
 from tests.mirotwin import synthetic
-from tests.mirotwin.conftest import Result
 from tests.mirotwin.report.foxglove import rig
 from tests.mirotwin.report.foxglove.rig import Read
 
@@ -44,13 +42,11 @@ def stamp_ns(time: dict[str, int]) -> int:
     return time["sec"] * 1_000_000_000 + time["nsec"]
 
 
-def test_the_same_recording_gives_the_same_bytes(recording: bytes) -> None:
+def test_the_same_recording_gives_the_same_bytes(recording):
     assert rig.exported(recording)[0] == rig.exported(recording)[0]
 
 
-def test_everything_that_was_recorded_stands_in_the_file_as_it_was_but_for_the_frames(
-    recording: bytes, shown: list[Read]
-) -> None:
+def test_everything_that_was_recorded_stands_in_the_file_as_it_was_but_for_the_frames(recording, shown):
     ours = [one for one in rig.read(recording) if one.name != "foxglove.CompressedImage"]
     assert [one for one in shown if not one.topic.startswith("/foxglove/")] == ours
     before, after = (reader.parse(data, "x") for data in (recording, rig.exported(recording)[0]))
@@ -62,7 +58,7 @@ def test_everything_that_was_recorded_stands_in_the_file_as_it_was_but_for_the_f
     assert names[0] == names[1] != []
 
 
-def test_the_frames_of_the_cameras_are_the_recorded_ones(recording: bytes, shown: list[Read]) -> None:
+def test_the_frames_of_the_cameras_are_the_recorded_ones(recording, shown):
     for network in (0, 1):
         before = of(rig.read(recording), f"/net{network}/camera/image")
         after = of(shown, f"/foxglove/net{network}/image")
@@ -75,7 +71,7 @@ def test_the_frames_of_the_cameras_are_the_recorded_ones(recording: bytes, shown
         assert [one.time_ns for one in after] == [one.time_ns for one in before]
 
 
-def test_every_message_has_the_time_of_what_it_tells(shown: list[Read]) -> None:
+def test_every_message_has_the_time_of_what_it_tells(shown):
     starts = {nanoseconds(index * CONTROL_PERIOD_TICKS) for index in range(36)}
     for one in shown:
         if one.name == "foxglove.FrameTransforms":
@@ -88,7 +84,7 @@ def test_every_message_has_the_time_of_what_it_tells(shown: list[Read]) -> None:
             assert one.time_ns in starts
 
 
-def test_the_frames_of_reference_are_one_tree(shown: list[Read]) -> None:
+def test_the_frames_of_reference_are_one_tree(shown):
     parents: dict[str, str] = {}
     for one in of(shown, "/foxglove/transforms"):
         for part in one.content["transforms"]:
@@ -111,7 +107,7 @@ def quaternions(content: Any) -> list[dict[str, float]]:
     return [found for part in content.values() for found in quaternions(part)]
 
 
-def test_every_quaternion_is_a_rotation_and_every_colour_is_one(shown: list[Read]) -> None:
+def test_every_quaternion_is_a_rotation_and_every_colour_is_one(shown):
     count = 0
     for one in shown:
         for q in quaternions(one.content) if one.topic.startswith("/foxglove/") else ():
@@ -120,7 +116,7 @@ def test_every_quaternion_is_a_rotation_and_every_colour_is_one(shown: list[Read
     assert count > 600
 
 
-def test_the_transforms_are_the_recorded_postures(shown: list[Read]) -> None:
+def test_the_transforms_are_the_recorded_postures(shown):
     frames = {
         "truth": "net0/robot2",
         "reference": "net0/robot2/reference",
@@ -146,7 +142,7 @@ def test_the_transforms_are_the_recorded_postures(shown: list[Read]) -> None:
             ) == pytest.approx(0.0)
 
 
-def test_the_same_entities_come_again_under_the_same_names(shown: list[Read]) -> None:
+def test_the_same_entities_come_again_under_the_same_names(shown):
     scenes = [[part["id"] for part in one.content["entities"]] for one in of(shown, "/foxglove/scene")]
     assert len(scenes) == 2
     assert scenes[0] == scenes[1]
@@ -158,7 +154,7 @@ def test_the_same_entities_come_again_under_the_same_names(shown: list[Read]) ->
     assert not set(trails[0]) & set(scenes[0])
 
 
-def test_a_trail_ends_where_the_robot_is_and_a_path_holds_the_reference(shown: list[Read]) -> None:
+def test_a_trail_ends_where_the_robot_is_and_a_path_holds_the_reference(shown):
     truth = of(shown, "/net0/robot0/truth")[-1].content
     trails = {part["id"]: part for part in of(shown, "/foxglove/trails")[-1].content["entities"]}
     points = trails["net0/robot0/trail/truth"]["lines"][0]["points"]
@@ -171,7 +167,7 @@ def test_a_trail_ends_where_the_robot_is_and_a_path_holds_the_reference(shown: l
         assert min(ways) < 0.011
 
 
-def test_errors_are_truth_against_reference(shown: list[Read]) -> None:
+def test_errors_are_truth_against_reference(shown):
     found = of(shown, "/foxglove/net0/robot0/error")
     pairs = zip(of(shown, "/net0/robot0/truth"), of(shown, "/net0/robot0/reference"), strict=True)
     assert [one.content["x_cm"] for one in found] == [
@@ -180,7 +176,7 @@ def test_errors_are_truth_against_reference(shown: list[Read]) -> None:
     assert len(found) == 36
 
 
-def test_the_log_tells_of_lost_robots_and_frames(shown: list[Read]) -> None:
+def test_the_log_tells_of_lost_robots_and_frames(shown):
     lines = [one.content for one in of(shown, "/foxglove/log")]
     words = Counter(line["message"].lstrip("0123456789 ") for line in lines)
     assert words["not measured: the robot or the frame was lost"] >= 3
@@ -214,7 +210,7 @@ class Fault:
         return "writes to a busy LM629 at main+3"
 
 
-def test_a_fault_of_the_firmware_is_an_error_at_its_tick() -> None:
+def test_a_fault_of_the_firmware_is_an_error_at_its_tick():
     shown = rig.read(rig.exported(recorded(3, lambda to: to.write_faults(0, 0, [Fault()])))[0])
     (line,) = of(shown, "/foxglove/log")
     assert line.time_ns == nanoseconds(Fault.tick)
@@ -222,7 +218,7 @@ def test_a_fault_of_the_firmware_is_an_error_at_its_tick() -> None:
     assert line.content["message"] == "firmware fault: writes to a busy LM629 at main+3"
 
 
-def test_what_was_done_to_a_robot_stands_in_the_log() -> None:
+def test_what_was_done_to_a_robot_stands_in_the_log():
     def add(recorder: Recorder) -> None:
         recorder._add("/net0/deeds", 800_800 * 3 + 5, DeedMessage(800_800 * 3 + 5, 0, "reset", 1))
         for period in list(synthetic.periods(4))[3:]:
@@ -233,7 +229,7 @@ def test_what_was_done_to_a_robot_stands_in_the_log() -> None:
     assert line.time_ns == nanoseconds(800_800 * 3 + 5)
 
 
-def test_a_recording_whose_scenario_cannot_be_read_is_shown_without_it_and_that_is_said() -> None:
+def test_a_recording_whose_scenario_cannot_be_read_is_shown_without_it_and_that_is_said():
     data, result = rig.exported(recorded(3, lambda recorder: None, "name = 'x'\nother = 1\n"))
     shown = rig.read(data)
     (note,) = result.notes
@@ -246,7 +242,7 @@ def test_a_recording_whose_scenario_cannot_be_read_is_shown_without_it_and_that_
     assert len(of(shown, "/foxglove/transforms")) == 3
 
 
-def test_a_part_is_shown_as_far_as_it_goes_and_stays_marked_as_one(recording: bytes) -> None:
+def test_a_part_is_shown_as_far_as_it_goes_and_stays_marked_as_one(recording):
     part = recording[: len(recording) * 2 // 3]
     data, result = rig.exported(part)
     assert 10 < result.periods < 36
@@ -258,12 +254,12 @@ def test_a_part_is_shown_as_far_as_it_goes_and_stays_marked_as_one(recording: by
     assert "broken off" in again.broken_off
 
 
-def test_a_file_that_has_the_topics_already_is_refused(recording: bytes) -> None:
+def test_a_file_that_has_the_topics_already_is_refused(recording):
     with pytest.raises(BadInput, match="holds Foxglove's topics already"):
         rig.exported(rig.exported(recording)[0])
 
 
-def test_a_damaged_frame_is_bad_input() -> None:
+def test_a_damaged_frame_is_bad_input():
     def add(recorder: Recorder) -> None:
         recorder.write_image(0, 5, b"png")
         recorder.flush()
@@ -273,9 +269,7 @@ def test_a_damaged_frame_is_bad_input() -> None:
         rig.exported(recorded(2, add))
 
 
-def test_the_command_writes_the_file_and_replaces_one_only_when_told(
-    mirotwin: Callable[..., Result], recording: bytes, tmp_path: Path
-) -> None:
+def test_the_command_writes_the_file_and_replaces_one_only_when_told(mirotwin, recording, tmp_path):
     given, out = tmp_path / "run.mcap", tmp_path / "fox.mcap"
     given.write_bytes(recording)
     told = f"{out}: 36 control periods and 72 camera frames for Foxglove\n"
@@ -308,12 +302,12 @@ def test_the_command_writes_the_file_and_replaces_one_only_when_told(
     ],
 )
 def test_what_is_no_recording_is_refused_in_one_line(
-    mirotwin: Callable[..., Result],
-    tmp_path: Path,
-    content: bytes,
-    options: tuple[str, ...],
-    expected: str,
-) -> None:
+    mirotwin,
+    tmp_path,
+    content,
+    options,
+    expected,
+):
     given, out = tmp_path / "given", tmp_path / "fox.mcap"
     given.write_bytes(content.replace(b"AA 55", b"\xff\xfe"))
     code, said, err = mirotwin("export", given, "--out", out, *options)

@@ -10,8 +10,6 @@ from typing import Any
 import msgspec
 import pytest
 
-from tests.mirotwin.report.foxglove.rig import Read
-
 layouts = pytest.importorskip("foxglove.layouts", reason="needs the extra develop")
 LAYOUT = msgspec.json.decode((Path(__file__).parents[4] / "examples" / "foxglove.json").read_bytes())
 PANELS: dict[str, dict[str, Any]] = LAYOUT["configById"]
@@ -46,7 +44,7 @@ def placed(node: Any) -> Iterator[str]:
             yield from placed(tab["layout"])
 
 
-def test_everything_that_is_shown_is_in_an_export(shown: list[Read]) -> None:
+def test_everything_that_is_shown_is_in_an_export(shown):
     found = sorted(set(topics(PANELS)))
     assert len(found) > 12
     for path in found:
@@ -60,12 +58,12 @@ def test_everything_that_is_shown_is_in_an_export(shown: list[Read]) -> None:
         assert isinstance(value, (int, float)) is bool(matched[2]), path
 
 
-def test_each_panel_stands_somewhere_once() -> None:
+def test_each_panel_stands_somewhere_once():
     assert sorted(placed(LAYOUT["layout"])) == sorted(PANELS)
 
 
 @pytest.mark.parametrize("panel", [name for name in PANELS if not name.startswith("Tab!")])
-def test_each_setting_of_a_panel_is_one_that_foxglove_has(panel: str) -> None:
+def test_each_setting_of_a_panel_is_one_that_foxglove_has(panel):
     config = dict(PANELS[panel])
     known = CONFIGS[panel.split("!")[0]]()._to_dict()
     assert set(config) <= set(known) | TITLE
@@ -80,7 +78,7 @@ def test_each_setting_of_a_panel_is_one_that_foxglove_has(panel: str) -> None:
         assert set(series) <= set(layouts.PlotSeries()._to_dict())
 
 
-def test_the_tree_is_shown_in_its_root_frame(shown: list[Read]) -> None:
+def test_the_tree_is_shown_in_its_root_frame(shown):
     parents = {
         part["parent_frame_id"]
         for one in shown

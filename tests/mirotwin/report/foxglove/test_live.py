@@ -9,8 +9,6 @@ import socket
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
@@ -20,13 +18,13 @@ from mirotwin.report.foxglove import derived
 from mirotwin.report.foxglove.messages import ALWAYS, INFO, Log
 from mirotwin.report.foxglove.server import Server
 from mirotwin.run import run_command as run_module  # noqa: F401  loaded before the SDK is hidden
-from tests.mirotwin.conftest import SHORT, Result
+from tests.mirotwin.conftest import SHORT
 from tests.mirotwin.report.foxglove import rig
 from tests.mirotwin.report.foxglove.client import Viewer, live
 
 
 @pytest.fixture(scope="module")
-def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def short(tmp_path_factory):
     """Six control periods."""
     path = tmp_path_factory.mktemp("short") / "short.toml"
     path.write_text(SHORT)
@@ -34,7 +32,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def unwatched(mirotwin: Callable[..., Result], short: Path) -> bytes:
+def unwatched(mirotwin, short):
     """What a run with seed 3 records, with frames, without --live."""
     out = short.parent / "out"
     done = mirotwin("run", short, "--seed", 3, "--out", out, "--record-frames", "--no-figure", "-q")
@@ -49,8 +47,8 @@ def contents(data: bytes) -> Counter[tuple[str, int, bytes]]:
 
 
 def test_a_viewer_gets_every_message_of_the_export_and_changes_no_byte_of_the_recording(
-    unwatched: bytes, short: Path, tmp_path: Path
-) -> None:
+    unwatched, short, tmp_path
+):
     out = tmp_path / "out"
     arguments = (short, "--seed", 3, "--out", out, "--record-frames", "--pace", 1, "--live-wait", "-q")
     with live(*arguments) as (process, url):
@@ -68,7 +66,7 @@ def test_a_viewer_gets_every_message_of_the_export_and_changes_no_byte_of_the_re
     assert schemas.items() <= told.items()
 
 
-def test_what_was_sent_last_has_time_to_get_to_a_viewer() -> None:
+def test_what_was_sent_last_has_time_to_get_to_a_viewer():
     with Server("127.0.0.1", 0, "short-3") as server:
         server.open([derived.log(0, Log(ALWAYS, INFO, "first", ""))])
         viewer = Viewer(server.url)
@@ -77,9 +75,7 @@ def test_what_was_sent_last_has_time_to_get_to_a_viewer() -> None:
     assert any(b"last" in message for _, _, message in viewer.done().messages)
 
 
-def test_viewers_that_come_late_and_go_early_change_no_byte_either(
-    unwatched: bytes, short: Path, tmp_path: Path
-) -> None:
+def test_viewers_that_come_late_and_go_early_change_no_byte_either(unwatched, short, tmp_path):
     out = tmp_path / "out"
     with live(short, "--seed", 3, "--out", out, "--record-frames", "--pace", 0.1, "-q") as (process, url):
         first, second = Viewer(url, stop_after=20), Viewer(url)
@@ -92,9 +88,7 @@ def test_viewers_that_come_late_and_go_early_change_no_byte_either(
     assert any(topic == "/foxglove/transforms" for topic, _, _ in late)
 
 
-def test_without_a_viewer_the_recording_is_the_same_too(
-    unwatched: bytes, short: Path, tmp_path: Path
-) -> None:
+def test_without_a_viewer_the_recording_is_the_same_too(unwatched, short, tmp_path):
     out = tmp_path / "out"
     with live(short, "--seed", 3, "--out", out, "--record-frames", "--pace", "max") as (process, _):
         assert process.stdout is not None
@@ -103,7 +97,7 @@ def test_without_a_viewer_the_recording_is_the_same_too(
     assert (out / "run.mcap").read_bytes() == unwatched
 
 
-def test_a_failed_check_is_an_error_in_the_log(short: Path, tmp_path: Path) -> None:
+def test_a_failed_check_is_an_error_in_the_log(short, tmp_path):
     out = tmp_path / "out"
     expected = ("--expect", "tracks_within_cm=0.001", "--pace", 1, "--live-wait", "-q")
     with live(short, "--out", out, *expected) as (process, url):
@@ -114,7 +108,7 @@ def test_a_failed_check_is_an_error_in_the_log(short: Path, tmp_path: Path) -> N
     assert any(b'"level":4' in line and b"tracks_within_cm: net0/robot" in line for line in lines)
 
 
-def test_a_run_keeps_the_pace_that_it_is_told(short: Path, tmp_path: Path) -> None:
+def test_a_run_keeps_the_pace_that_it_is_told(short, tmp_path):
     with live(short, "--out", tmp_path / "out", "--pace", 0.2, "-q") as (process, url):
         began_s = time.monotonic()
         Viewer(url).done()
@@ -122,7 +116,7 @@ def test_a_run_keeps_the_pace_that_it_is_told(short: Path, tmp_path: Path) -> No
     assert time.monotonic() - began_s > 0.7  # 0.2 s of virtual time take one second
 
 
-def test_ctrl_c_leaves_the_parts_of_the_run_and_closes_the_server(short: Path, tmp_path: Path) -> None:
+def test_ctrl_c_leaves_the_parts_of_the_run_and_closes_the_server(short, tmp_path):
     out = tmp_path / "out"
     with live(short, "--out", out, "--pace", 0.05) as (process, url):
         viewer = Viewer(url, stop_after=30)
@@ -136,9 +130,7 @@ def test_ctrl_c_leaves_the_parts_of_the_run_and_closes_the_server(short: Path, t
         Viewer(url)
 
 
-def test_a_port_that_is_taken_is_refused_before_anything_is_written(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path
-) -> None:
+def test_a_port_that_is_taken_is_refused_before_anything_is_written(mirotwin, short, tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         code, out, err = mirotwin("run", short, "--out", tmp_path / "out", "--live", port)
@@ -148,9 +140,7 @@ def test_a_port_that_is_taken_is_refused_before_anything_is_written(
     assert err.count("\n") == 1
 
 
-def test_without_the_library_one_line_says_what_to_install(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_the_library_one_line_says_what_to_install(mirotwin, short, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "websockets.asyncio.server", None)
     code, out, err = mirotwin("run", short, "--out", tmp_path / "out", "--live")
     assert (code, out, (tmp_path / "out").exists()) == (2, "", False)
@@ -172,9 +162,7 @@ def test_without_the_library_one_line_says_what_to_install(
         (("--live", "nowhere.invalid:0"), "--live: cannot listen at nowhere.invalid:0: "),
     ],
 )
-def test_options_that_cannot_be_meant_are_refused(
-    mirotwin: Callable[..., Result], short: Path, tmp_path: Path, options: tuple[str, ...], expected: str
-) -> None:
+def test_options_that_cannot_be_meant_are_refused(mirotwin, short, tmp_path, options, expected):
     code, _, err = mirotwin("run", short, "--out", tmp_path / "out", *options)
     assert (code, (tmp_path / "out").exists()) == (2, False)
     assert err.startswith(f"mirotwin: error: {expected}")

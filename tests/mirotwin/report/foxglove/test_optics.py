@@ -8,7 +8,6 @@ from miro_host.eye.camera_parameters import CameraParameters
 from miro_host.eye.lens import Lens
 from mirotwin.report.foxglove import camera
 from mirotwin.report.foxglove.messages import CameraCalibration, FrameTransform, time_of
-from tests.mirotwin.report.foxglove.rig import Read
 
 LENSES = (
     CameraParameters(),
@@ -53,16 +52,14 @@ def cross(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, flo
 
 @pytest.mark.parametrize("point", POINTS)
 @pytest.mark.parametrize("lens", LENSES)
-def test_a_point_is_drawn_half_a_pixel_from_where_our_lens_draws_it(
-    lens: CameraParameters, point: tuple[float, float, float]
-) -> None:
+def test_a_point_is_drawn_half_a_pixel_from_where_our_lens_draws_it(lens, point):
     at = time_of(0)
     u, v = drawn(camera.calibration(0, lens, at), camera.transform(0, lens, at), point)
     ours = Lens(lens).pixel(*point)  # counts from the edge of the first pixel, OpenCV from its middle
     assert (u + 0.5, v + 0.5) == pytest.approx(ours, abs=1e-9)
 
 
-def test_the_projection_is_that_of_the_picture_without_distortion(shown: list[Read]) -> None:
+def test_the_projection_is_that_of_the_picture_without_distortion(shown):
     (content, *_) = [one.content for one in shown if one.topic == "/foxglove/net1/calibration"]
     k, p = content["K"], content["P"]
     assert [p[0], p[1], p[2], p[4], p[5], p[6], p[8], p[9], p[10]] == k

@@ -56,7 +56,7 @@ class Frame:
 
 
 @pytest.fixture(scope="module")
-def frame(shown: list[Read]) -> Frame:
+def frame(shown):
     return Frame(shown, 20)
 
 
@@ -73,7 +73,7 @@ def places(line: dict[str, Any]) -> list[Point]:
     ]
 
 
-def test_the_lines_of_the_pitch_lie_on_the_bright_pixels(frame: Frame) -> None:
+def test_the_lines_of_the_pitch_lie_on_the_bright_pixels(frame):
     floor = frame.colour("pitch", (0.9, 0.1, 0.0))
     lines = frame.scene["pitch"]["lines"]
     bright = [sum(frame.colour("pitch", at)) > 1.5 * sum(floor) for line in lines for at in places(line)]
@@ -88,7 +88,7 @@ def test_the_lines_of_the_pitch_lie_on_the_bright_pixels(frame: Frame) -> None:
 
 
 @pytest.mark.parametrize("robot", ["net0/robot0", "net0/robot2", "net1/robot1"])
-def test_the_patches_of_a_robot_lie_on_pixels_of_their_colour(frame: Frame, robot: str) -> None:
+def test_the_patches_of_a_robot_lie_on_pixels_of_their_colour(frame, robot):
     patches = frame.scene[robot]["cubes"][2:]
     assert len(patches) == 2
     for patch in patches:

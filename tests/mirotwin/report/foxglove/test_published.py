@@ -13,7 +13,6 @@ import pytest
 from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto
 
 from mirotwin.report.foxglove import messages, published
-from tests.mirotwin.report.foxglove.rig import Read
 from tests.mirotwin.report.foxglove.validate import objections
 
 NAMES = ("FrameTransforms", "SceneUpdate", "CompressedImage", "CameraCalibration", "Log")
@@ -91,20 +90,20 @@ def back(message: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_schemas_that_are_written_have_the_fields_of_foxgloves_protobuf_messages(name: str) -> None:
+def test_the_schemas_that_are_written_have_the_fields_of_foxgloves_protobuf_messages(name):
     schema = msgspec.json.decode(published._published(name))
     assert schema["title"] == f"foxglove.{name}"
     assert schema_fields(schema, of_protobuf(name).DESCRIPTOR, name) == []
 
 
-def test_each_message_fits_its_schema(shown: list[Read]) -> None:
+def test_each_message_fits_its_schema(shown):
     found = [one for one in shown if one.topic.startswith("/foxglove/")]
     wrong = [line for one in found for line in objections(one.content, one.schema, one.topic)]
     assert wrong[:5] == []
     assert {one.name for one in found} == {*FOXGLOVE, "mirotwin.Error"}
 
 
-def test_each_message_goes_through_foxgloves_protobuf_classes_unchanged(shown: list[Read]) -> None:
+def test_each_message_goes_through_foxgloves_protobuf_classes_unchanged(shown):
     counts: Counter[str] = Counter()
     for one in shown:
         if one.name in FOXGLOVE and one.topic.startswith("/foxglove/"):
@@ -129,7 +128,7 @@ def test_each_message_goes_through_foxgloves_protobuf_classes_unchanged(shown: l
         lambda log: log["timestamp"].update(nsec=1_000_000_000),
     ],
 )
-def test_the_comparison_with_a_schema_notices_what_does_not_fit(damage: Any) -> None:
+def test_the_comparison_with_a_schema_notices_what_does_not_fit(damage):
     schema = msgspec.json.decode(published._published("Log"))
     line = messages.Log(messages.time_of(1), messages.INFO, "words", "net0")
     good = msgspec.to_builtins(line)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
 import pytest
 from click.testing import CliRunner
 
@@ -36,17 +33,17 @@ def called(*arguments: object) -> Called:
 
 
 @pytest.fixture(scope="session")
-def mirotwin() -> Callable[..., Called]:
+def mirotwin():
     return called
 
 
 @pytest.fixture(scope="session")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("pages")
 
 
 @pytest.fixture(scope="session")
-def fig6(folder: Path) -> Path:
+def fig6(folder):
     """The folder of a run of 1.5 s that does not settle in time."""
     out = folder / "fig6"
     options = ["--set", "duration_s=1.5", "--expect", "settles_within_s=0.4"]
@@ -56,14 +53,14 @@ def fig6(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def fig6_page(folder: Path, fig6: Path) -> Path:
+def fig6_page(folder, fig6):
     page = folder / "fig6.html"
     assert called("report", fig6, "-o", page, "-q") == (0, "")
     return page
 
 
 @pytest.fixture(scope="session")
-def two(folder: Path) -> Path:
+def two(folder):
     """The folder of a run of two robots, with the camera's frames."""
     scenario = folder / "two.toml"
     scenario.write_text(TWO)

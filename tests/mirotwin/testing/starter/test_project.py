@@ -3,7 +3,6 @@
 import os
 import shutil
 import sys
-from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 from miro_robot.firmware import image_path
 from mirotwin.testing.starter import project
 from tests import children
-from tests.mirotwin.conftest import Result, mirotwin
+from tests.mirotwin.conftest import mirotwin
 
 __all__ = ["mirotwin"]
 
@@ -21,9 +20,7 @@ def tree(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_new_folder_gets_the_firmware_its_tests_and_a_workflow(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_new_folder_gets_the_firmware_its_tests_and_a_workflow(mirotwin, tmp_path):
     code, out, err = mirotwin("init", tmp_path / "mine")
     assert (code, err) == (0, "")
     assert tree(tmp_path / "mine") == {name for name, _ in project.files()}
@@ -33,17 +30,13 @@ def test_a_new_folder_gets_the_firmware_its_tests_and_a_workflow(
     assert f"next: cd {tmp_path}/mine && make test" in out
 
 
-def test_an_empty_folder_will_do_and_other_files_stay(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_an_empty_folder_will_do_and_other_files_stay(mirotwin, tmp_path):
     (tmp_path / "LICENSE").write_text("mine")
     assert mirotwin("init", tmp_path)[0] == 0
     assert (tmp_path / "LICENSE").read_text() == "mine"
 
 
-def test_nothing_is_written_where_one_of_the_files_is_there_already(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_nothing_is_written_where_one_of_the_files_is_there_already(mirotwin, tmp_path):
     (tmp_path / "Makefile").write_text("all:\n")
     code, out, err = mirotwin("init", tmp_path)
     assert (code, out) == (2, "")
@@ -51,7 +44,7 @@ def test_nothing_is_written_where_one_of_the_files_is_there_already(
     assert tree(tmp_path) == {"Makefile"}
 
 
-def test_a_file_is_no_folder(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_file_is_no_folder(mirotwin, tmp_path):
     (tmp_path / "a").write_text("")
     assert mirotwin("init", tmp_path / "a")[0] == 2
     code, _, err = mirotwin("init", tmp_path / "a" / "b")
@@ -59,18 +52,14 @@ def test_a_file_is_no_folder(mirotwin: Callable[..., Result], tmp_path: Path) ->
     assert err.count("\n") == 1
 
 
-def test_an_installation_without_the_files_says_so(
-    mirotwin: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_installation_without_the_files_says_so(mirotwin, tmp_path, monkeypatch):
     monkeypatch.setattr(project, "source_folder", lambda: None)
     code, _, err = mirotwin("init", tmp_path / "a")
     assert code == 2
     assert "not part of this installation" in err
 
 
-def test_without_firmware_there_are_no_c_sources_and_no_test_that_names_one(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_without_firmware_there_are_no_c_sources_and_no_test_that_names_one(mirotwin, tmp_path):
     code, out, err = mirotwin("init", "--without-firmware", tmp_path / "mine")
     assert (code, err) == (0, "")
     assert tree(tmp_path / "mine") == {
@@ -82,9 +71,7 @@ def test_without_firmware_there_are_no_c_sources_and_no_test_that_names_one(
 
 
 @pytest.mark.parametrize("image", [(), (f"IMAGE={image_path()}",)], ids=["the robot's own", "an image"])
-def test_a_project_without_firmware_passes_its_tests_without_a_c_compiler(
-    mirotwin: Callable[..., Result], tmp_path: Path, image: tuple[str, ...]
-) -> None:
+def test_a_project_without_firmware_passes_its_tests_without_a_c_compiler(mirotwin, tmp_path, image):
     make = shutil.which("make")
     if make is None:
         pytest.skip("needs make")
@@ -106,15 +93,13 @@ def test_a_project_without_firmware_passes_its_tests_without_a_c_compiler(
     assert (tmp_path / "mine/build/pytest.xml").is_file()
 
 
-def test_what_a_project_requires_is_this_version_with_what_its_pages_need() -> None:
+def test_what_a_project_requires_is_this_version_with_what_its_pages_need():
     (requirements,) = (path for name, path in project.files() if name == "requirements.txt")
     minor = ".".join(metadata.version("mirotwin").split(".")[:2])
     assert f"mirotwin[report]~={minor}.0" in requirements.read_text("utf-8").splitlines()
 
 
-def test_writing_it_again_is_no_mistake_while_nothing_was_changed(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_writing_it_again_is_no_mistake_while_nothing_was_changed(mirotwin, tmp_path):
     mirotwin("init", tmp_path / "mine")
     assert mirotwin("init", tmp_path / "mine")[0] == 0
     (tmp_path / "mine/firmware/main.c").write_text("")

@@ -1,7 +1,6 @@
 """Cases: what is left of a failure gives it again, to the tick."""
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,7 +17,7 @@ from mirotwin.verify.cases.case import case_of_checks, case_text, tables_of, wri
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.cases.waits import expect_of_silence, expect_of_wait
 from tests import children
-from tests.mirotwin.conftest import Result, mirotwin
+from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.verify.checks.rig import MS, needs_sdcc, own_image, planted, silent_world, team
 from tests.mirotwin.verify.checks.test_planted import ALL
 
@@ -26,7 +25,7 @@ __all__ = ["mirotwin"]
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig9", "waypoints", "sine"])
-def test_a_scenario_comes_back_from_its_tables(name: str) -> None:
+def test_a_scenario_comes_back_from_its_tables(name):
     scenario = load(name, ["expect.inside_pitch=true"]).scenario
     assert of_table(tables_of(scenario), name) == without_expectations(scenario)
 
@@ -46,7 +45,7 @@ def failing(tmp_path: Path, expect: str = "failsafe_stop_ms = 100.0") -> Path:
 
 
 @pytest.mark.parametrize("engine", ["compiled", "python"])
-def test_a_case_gives_the_same_line_and_exit_code_on_any_engine(tmp_path: Path, engine: str) -> None:
+def test_a_case_gives_the_same_line_and_exit_code_on_any_engine(tmp_path, engine):
     path = failing(tmp_path)
     verdict = stream.read(path).header.verdict
     command = [
@@ -63,7 +62,7 @@ def test_a_case_gives_the_same_line_and_exit_code_on_any_engine(tmp_path: Path, 
     assert (found.returncode, found.stderr) == (1, f"mirotwin: fails as recorded: {verdict}\n")
 
 
-def test_settings_that_cure_it_are_told(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_settings_that_cure_it_are_told(mirotwin, tmp_path):
     path = failing(tmp_path)
     code, out, err = mirotwin("replay", path, "-q", "--expect", "failsafe_stop_ms=110.0")
     assert (code, err) == (0, "")
@@ -73,9 +72,7 @@ def test_settings_that_cure_it_are_told(mirotwin: Callable[..., Result], tmp_pat
     assert "still fails, but not as recorded: failsafe_stop_ms: net0/robot1: " in err
 
 
-def test_a_case_that_does_not_fail_again_is_a_difference(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_case_that_does_not_fail_again_is_a_difference(mirotwin, tmp_path):
     path = failing(tmp_path)
     path.write_text(path.read_text().replace("after_ms = 100.0", "after_ms = 110.0"))
     code, _, err = mirotwin("replay", path, "-q")
@@ -83,9 +80,7 @@ def test_a_case_that_does_not_fail_again_is_a_difference(
     assert "not reproduced: failsafe_stop_ms passes" in err
 
 
-def test_a_case_that_has_no_occasion_any_more_does_not_count_as_cured(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_case_that_has_no_occasion_any_more_does_not_count_as_cured(mirotwin, tmp_path):
     path = failing(tmp_path)
     text = "".join(line for line in path.read_text().splitlines(True) if " > " not in line)
     path.write_text(text)
@@ -95,9 +90,7 @@ def test_a_case_that_has_no_occasion_any_more_does_not_count_as_cured(
 
 
 @needs_sdcc
-def test_a_case_of_planted_firmware_is_cured_by_the_shipped_one(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_case_of_planted_firmware_is_cured_by_the_shipped_one(mirotwin, tmp_path):
     image = planted("stops 15 ms late")
     world, checks = silent_world("failsafe_stop_ms = true", image)
     trace = Trace(world)
@@ -116,7 +109,7 @@ def test_a_case_of_planted_firmware_is_cured_by_the_shipped_one(
     assert (code, out.startswith("cured: ")) == (0, True)
 
 
-def test_a_wait_that_was_in_vain_is_judged_again(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_wait_that_was_in_vain_is_judged_again(mirotwin, tmp_path):
     world, _ = silent_world("")
     trace = Trace(world)
     world.run_to(60 * MS)
@@ -132,7 +125,7 @@ def test_a_wait_that_was_in_vain_is_judged_again(mirotwin: Callable[..., Result]
     assert (code, err) == (1, f"mirotwin: fails as recorded: {line}\n")
 
 
-def test_an_event_that_must_not_come_is_judged_again(mirotwin: Callable[..., Result], tmp_path: Path) -> None:
+def test_an_event_that_must_not_come_is_judged_again(mirotwin, tmp_path):
     world, _ = silent_world("")
     trace = Trace(world)
     world.run_to(60 * MS)
@@ -149,13 +142,13 @@ def test_an_event_that_must_not_come_is_judged_again(mirotwin: Callable[..., Res
 @pytest.mark.parametrize(
     "condition", [conditions.When(predicate=bool), conditions.Edge(pin="rxd"), conditions.Reached(place=3)]
 )
-def test_waits_that_only_their_program_can_judge_make_no_check(condition: conditions.Condition) -> None:
+def test_waits_that_only_their_program_can_judge_make_no_check(condition):
     assert expect_of_silence(condition, 0, 1) is None
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.data())
-def test_a_trace_knows_what_happened_wherever_the_world_stands(data: st.DataObject) -> None:
+def test_a_trace_knows_what_happened_wherever_the_world_stands(data):
     world, _ = silent_world(ALL)
     trace = Trace(world)
     sent = []
@@ -168,16 +161,14 @@ def test_a_trace_knows_what_happened_wherever_the_world_stands(data: st.DataObje
     assert [one.tick for one in trace.happenings()] == sorted(sent)
 
 
-def test_a_world_that_has_moved_has_no_trace() -> None:
+def test_a_world_that_has_moved_has_no_trace():
     world, _ = silent_world("")
     world.run_to(1)
     with pytest.raises(ValueError, match="the world is at tick 1: what happened before is not known"):
         Trace(world)
 
 
-def test_a_verdict_of_a_check_that_nothing_expects_is_refused(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_verdict_of_a_check_that_nothing_expects_is_refused(mirotwin, tmp_path):
     path = failing(tmp_path)
     path.write_text(path.read_text().replace("[expect.failsafe_stop_ms]", "[expect.motors_off_ms]"))
     code, out, err = mirotwin("replay", path, "-q")
@@ -185,9 +176,7 @@ def test_a_verdict_of_a_check_that_nothing_expects_is_refused(
     assert "the verdict is of the check 'failsafe_stop_ms', which nothing expects" in err
 
 
-def test_a_case_ends_where_it_failed_whatever_the_duration_of_its_scenario(
-    mirotwin: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_case_ends_where_it_failed_whatever_the_duration_of_its_scenario(mirotwin, tmp_path):
     code, _, err = mirotwin("replay", failing(tmp_path), "-q", "--set", "duration_s=0.25")
     assert code == 1
     assert "fails as recorded: failsafe_stop_ms" in err

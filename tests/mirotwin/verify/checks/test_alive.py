@@ -29,24 +29,24 @@ def world(image: Image, *settings: str, name: str = "line", seed: int = 0) -> Wo
 @pytest.mark.parametrize(
     "name", ["fig6", "fig7", "fig8", "fig9", "fig10", "line", "curve", "sine", "waypoints"]
 )
-def test_a_processor_that_hangs_fails_each_built_in_scenario_that_drives(name: str) -> None:
+def test_a_processor_that_hangs_fails_each_built_in_scenario_that_drives(name):
     assert judged(world(image_of(HANGS), name=name))["acts_at_all"] == "failed"
     assert judged(world(own_image(), name=name))["acts_at_all"] == "passed"
 
 
 @pytest.mark.parametrize("code", [BABBLES, READS_BOTH], ids=["babbles", "reads both chips"])
-def test_programs_that_are_no_firmware_fail(code: bytes) -> None:
+def test_programs_that_are_no_firmware_fail(code):
     assert judged(world(image_of(code), "stop_on_fault=false"))["acts_at_all"] == "failed"
 
 
 @needs_sdcc
 @pytest.mark.parametrize("mistake", [DEAF, OTHER_BAUD, NO_FILTER], ids=["deaf", "other baud", "no filter"])
-def test_firmware_that_hears_nothing_or_drives_nothing_fails(mistake: tuple[str, str, str]) -> None:
+def test_firmware_that_hears_nothing_or_drives_nothing_fails(mistake):
     assert judged(world(built(*mistake)))["acts_at_all"] == "failed"
 
 
 @needs_sdcc
-def test_firmware_that_hangs_in_the_middle_of_a_run_fails() -> None:
+def test_firmware_that_hangs_in_the_middle_of_a_run_fails():
     hangs = "    while (last_left > 1200)\n        ;\n    state = STATE_DRIVING;"  # at about half its speed
     running = world(built("motion.c", "    state = STATE_DRIVING;", hangs))
     checks = Checks(running)
@@ -55,7 +55,7 @@ def test_firmware_that_hangs_in_the_middle_of_a_run_fails() -> None:
 
 
 @needs_sdcc
-def test_firmware_that_begins_again_by_itself_fails_and_one_that_is_reset_does_not() -> None:
+def test_firmware_that_begins_again_by_itself_fails_and_one_that_is_reset_does_not():
     again = "    if (last_left > 1200)\n        ((void (*)(void))0)();\n    state = STATE_DRIVING;"
     running = world(built("motion.c", "    state = STATE_DRIVING;", again))
     checks = Checks(running)
@@ -71,7 +71,7 @@ def test_firmware_that_begins_again_by_itself_fails_and_one_that_is_reset_does_n
     assert finish(healthy, checks)["acts_at_all"] == "passed"
 
 
-def test_the_failure_names_the_wheels_and_what_the_firmware_has_counted() -> None:
+def test_the_failure_names_the_wheels_and_what_the_firmware_has_counted():
     dead = world(image_of(HANGS))
     checks = Checks(dead)
     finish(dead, checks)
@@ -89,7 +89,7 @@ def test_the_failure_names_the_wheels_and_what_the_firmware_has_counted() -> Non
         "baud_offset_ppm = 40000",
     ],
 )
-def test_a_robot_that_no_frame_reaches_is_not_judged(radio: str) -> None:
+def test_a_robot_that_no_frame_reaches_is_not_judged(radio):
     assert judged(world(image_of(HANGS), f"network.radio={{{radio}}}"))["acts_at_all"] == "not judged"
 
 
@@ -97,13 +97,13 @@ def test_a_robot_that_no_frame_reaches_is_not_judged(radio: str) -> None:
     "radio",
     ["bit_error_rate = 0.002", "lost_frames = 0.3", "lost_character_rate = 0.02", 'profile = "fade15"'],
 )
-def test_under_a_bad_radio_a_dead_robot_fails_and_a_healthy_one_does_not(radio: str) -> None:
+def test_under_a_bad_radio_a_dead_robot_fails_and_a_healthy_one_does_not(radio):
     settings = (f"network.radio={{{radio}}}", "duration_s=4.0")
     assert judged(world(image_of(HANGS), *settings))["acts_at_all"] == "failed"
     assert judged(world(own_image(), *settings))["acts_at_all"] == "passed"
 
 
-def test_frames_with_bad_stop_bits_or_old_numbers_ask_for_nothing() -> None:
+def test_frames_with_bad_stop_bits_or_old_numbers_ask_for_nothing():
     running, checks = silent_world("")
     send(running, [team(1, 900, 700)] * 12)
     for _ in range(12):
@@ -112,13 +112,13 @@ def test_frames_with_bad_stop_bits_or_old_numbers_ask_for_nothing() -> None:
     assert finish(running, checks)["acts_at_all"] != "failed"
 
 
-def test_one_speed_again_and_again_is_told_once_and_passes() -> None:
+def test_one_speed_again_and_again_is_told_once_and_passes():
     running, checks = silent_world("")
     send(running, [team(seq % 64, 900, 700) for seq in range(20)])
     assert finish(running, checks)["acts_at_all"] == "passed"
 
 
-def test_a_robot_without_supply_or_in_reset_is_not_asked() -> None:
+def test_a_robot_without_supply_or_in_reset_is_not_asked():
     running, checks = silent_world("")
     running.robot(0, 1).board.set_reset(1)
     send(running, [team(seq % 64, 900 + seq, 700) for seq in range(20)])
@@ -142,7 +142,7 @@ reference = {kind = "line", start_y_cm = 60.0}
 """
 
 
-def test_one_dead_robot_among_others_is_named() -> None:
+def test_one_dead_robot_among_others_is_named():
     running = World(parse(TWO, "two"), 0, own_image())
     checks = Checks(running)
     running.robot(0, 2).board.load(image_of(HANGS))
@@ -150,7 +150,7 @@ def test_one_dead_robot_among_others_is_named() -> None:
     assert {(one.network, one.slot) for one in checks.failures} == {(0, 2)}
 
 
-def test_a_radio_that_loses_frames_needs_more_of_them() -> None:
+def test_a_radio_that_loses_frames_needs_more_of_them():
     assert frames_needed(RadioParams(), 23) == FRAMES
     assert frames_needed(RadioParams.of(lost_frames=0.1), 23) == 13
     assert frames_needed(RadioParams.of(lost_frames=1.0), 23) == 0

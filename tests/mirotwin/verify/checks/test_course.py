@@ -32,7 +32,7 @@ def errors(tracks: Tracks):
 
 
 @pytest.mark.parametrize("from_s", [0.0, 0.7, 1.5])
-def test_tracking_fails_at_the_first_period_outside_and_at_each_one_that_leaves_again(from_s: float) -> None:
+def test_tracking_fails_at_the_first_period_outside_and_at_each_one_that_leaves_again(from_s):
     limit_cm = 1.0
     settings = f"expect.tracks_within_cm={{limit_cm={limit_cm}, from_s={from_s}}}"
     failures, tracks, _ = judged(settings, STARTS_OFF)
@@ -45,7 +45,7 @@ def test_tracking_fails_at_the_first_period_outside_and_at_each_one_that_leaves_
     assert all(one.wanted == "at most 1 cm from the reference" for one in failures)
 
 
-def test_without_a_time_the_last_second_of_the_run_is_judged() -> None:
+def test_without_a_time_the_last_second_of_the_run_is_judged():
     failures, tracks, found = judged("expect.tracks_within_cm=0.001", STARTS_OFF)
     end_tick = PERIODS * CONTROL_PERIOD_TICKS
     first = next(one for one in errors(tracks) if one.tick >= end_tick - 24_000_000)
@@ -54,7 +54,7 @@ def test_without_a_time_the_last_second_of_the_run_is_judged() -> None:
     assert found["tracks_within_cm"] == "failed"
 
 
-def test_a_robot_settles_in_time_or_fails_when_the_time_is_over() -> None:
+def test_a_robot_settles_in_time_or_fails_when_the_time_is_over():
     failures, tracks, found = judged("expect.settles_within_s=1.5", STARTS_OFF)
     assert (failures, found["settles_within_s"]) == ([], "passed")
     unsettled = [one.tick for one in errors(tracks) if not one.settled]
@@ -67,7 +67,7 @@ def test_a_robot_settles_in_time_or_fails_when_the_time_is_over() -> None:
     )
 
 
-def test_a_robot_with_an_empty_battery_neither_settles_nor_tracks() -> None:
+def test_a_robot_with_an_empty_battery_neither_settles_nor_tracks():
     settings = ("expect.settles_within_s=1.5", "expect.tracks_within_cm=3.0")
     _, _, found = judged(*settings, WEAK)
     assert (found["settles_within_s"], found["tracks_within_cm"]) == ("failed", "failed")
@@ -75,7 +75,7 @@ def test_a_robot_with_an_empty_battery_neither_settles_nor_tracks() -> None:
     assert (found["settles_within_s"], found["tracks_within_cm"]) == ("passed", "passed")
 
 
-def test_a_robot_that_drives_over_the_edge_fails_once_for_each_time() -> None:
+def test_a_robot_that_drives_over_the_edge_fails_once_for_each_time():
     along_the_edge = ("network.robot.reference.start_y_cm=-6.2", "network.robot.reference.heading_deg=0.0")
     failures, tracks, found = judged("expect.inside_pitch=true", *along_the_edge)
     off = [one.off_pitch for one in errors(tracks)]
@@ -89,7 +89,7 @@ def test_a_robot_that_drives_over_the_edge_fails_once_for_each_time() -> None:
     assert judged("expect.inside_pitch=true")[2]["inside_pitch"] == "passed"
 
 
-def test_wheels_that_are_told_to_turn_too_fast_fail_at_the_command() -> None:
+def test_wheels_that_are_told_to_turn_too_fast_fail_at_the_command():
     failures, _, _ = judged("expect.wheels_within_m_s={limit_m_s=0.15, overshoot_m_s=10.0}")
     assert failures
     for one in failures:
@@ -99,7 +99,7 @@ def test_wheels_that_are_told_to_turn_too_fast_fail_at_the_command() -> None:
     assert judged("expect.wheels_within_m_s=1.46")[2]["wheels_within_m_s"] == "passed"
 
 
-def test_wheels_that_are_too_fast_without_being_told_fail_too() -> None:
+def test_wheels_that_are_too_fast_without_being_told_fail_too():
     text = """
 name = "pushed"
 duration_s = 0.5

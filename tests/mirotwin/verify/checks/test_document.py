@@ -15,13 +15,13 @@ ROW = re.compile(r"^\| `(\w+)` \| (\w+) \|(.*?)\| (.*) \|$", re.M)
 ROWS = {name: (kind, parameters, fails) for name, kind, parameters, fails in ROW.findall(PAGE)}
 
 
-def test_the_table_has_every_check_in_the_order_of_the_registry() -> None:
+def test_the_table_has_every_check_in_the_order_of_the_registry():
     assert list(ROWS) == list(CHECKS.own)
     assert [name for name, row in ROWS.items() if "always on" in row[2]] == list(ALWAYS_ON)
 
 
 @pytest.mark.parametrize("name", CHECKS.own)
-def test_a_row_says_kind_parameters_and_defaults(name: str) -> None:
+def test_a_row_says_kind_parameters_and_defaults(name):
     struct = struct_of(name)
     kind, parameters, _ = ROWS[name]
     assert kind == struct.KIND
@@ -37,13 +37,13 @@ def test_a_row_says_kind_parameters_and_defaults(name: str) -> None:
         assert float(said[struct.MAIN]) == getattr(struct(), struct.MAIN)
 
 
-def test_the_example_in_python_runs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_in_python_runs(capsys):
     (example,) = re.findall(r"```python\n(.*?)```", PAGE, re.S)
     exec(example, {})
     assert "('answers_within_ms', 'passed')" in capsys.readouterr().out
 
 
-def test_the_example_of_a_scenario_is_read() -> None:
+def test_the_example_of_a_scenario_is_read():
     example = re.findall(r"```toml\n(.*?)```", PAGE, re.S)[0]
     for_all, for_one = example.split("[network.robot.expect]")
     robot = '[[network]]\n[[network.robot]]\nreference.kind = "line"\n'

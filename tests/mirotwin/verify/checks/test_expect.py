@@ -36,17 +36,17 @@ def names(all_: str, one: str = "") -> dict[tuple[int, int], list[str]]:
     }
 
 
-def test_every_run_has_the_checks_that_are_always_on() -> None:
+def test_every_run_has_the_checks_that_are_always_on():
     assert names("") == {(0, 0): list(ALWAYS_ON), (0, 2): list(ALWAYS_ON)}
     assert not says_anything(load("line").scenario)
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig7", "fig8", "fig9", "fig10"])
-def test_the_scenarios_of_the_paper_expect_a_robot_that_accepts_frames_and_tracks(name: str) -> None:
+def test_the_scenarios_of_the_paper_expect_a_robot_that_accepts_frames_and_tracks(name):
     assert set(load(name).scenario.expect) == {"frames_accepted_min", "tracks_within_cm"}
 
 
-def test_a_robot_may_expect_otherwise_than_all() -> None:
+def test_a_robot_may_expect_otherwise_than_all():
     all_ = "[expect]\ninside_pitch = true\ntracks_within_cm = 3\n"
     one = (
         "[network.robot.expect]\ntracks_within_cm = { limit_cm = 2.0, from_s = 0.5 }\ninside_pitch = false\n"
@@ -62,7 +62,7 @@ def test_a_robot_may_expect_otherwise_than_all() -> None:
 
 
 @pytest.mark.parametrize("name", CHECKS.own)
-def test_each_check_says_its_name_and_kind(name: str) -> None:
+def test_each_check_says_its_name_and_kind(name):
     struct = struct_of(name)
     assert struct.__struct_config__.tag == name
     assert struct.KIND in ("safety", "liveness")
@@ -70,7 +70,7 @@ def test_each_check_says_its_name_and_kind(name: str) -> None:
     assert struct.__doc__
 
 
-def test_who_asks_for_a_check_that_is_none_is_told_how_one_is_made() -> None:
+def test_who_asks_for_a_check_that_is_none_is_told_how_one_is_made():
     both = "; `mirotwin scenarios checks` lists them, `mirotwin examples checks` writes one"
     with pytest.raises(ScenarioError, match=both):
         parse(TWO.format(all="[expect]\nfast = 1\n", one=""), "two", (), expectations_of)
@@ -127,14 +127,14 @@ def test_who_asks_for_a_check_that_is_none_is_told_how_one_is_made() -> None:
         ),
     ],
 )
-def test_what_cannot_be_expected_is_said_with_its_path(line: str, said: str) -> None:
+def test_what_cannot_be_expected_is_said_with_its_path(line, said):
     text = TWO.format(all=f"[expect]\n{line}\n", one="")
     with pytest.raises(ScenarioError, match=re.escape(f"two: {said}")):
         parse(text, "two", (), expectations_of)
 
 
 @pytest.mark.parametrize("value", ["true", "'v<0.05'", "3"])
-def test_a_check_that_takes_a_table_is_answered_with_one_that_can_be_used(value: str) -> None:
+def test_a_check_that_takes_a_table_is_answered_with_one_that_can_be_used(value):
     table = '{ what = "fault", until_tick = 24000000 }'
     said = f"two: expect.never_happens: never_happens takes a table; write never_happens = {table}; what: answer, "
     with pytest.raises(ScenarioError, match=re.escape(said)):
@@ -142,7 +142,7 @@ def test_a_check_that_takes_a_table_is_answered_with_one_that_can_be_used(value:
     assert names(f"[expect]\nnever_happens = {table}")[0, 0] == [*ALWAYS_ON, "never_happens"]
 
 
-def test_the_path_of_one_robots_expectation_is_its_own() -> None:
+def test_the_path_of_one_robots_expectation_is_its_own():
     text = TWO.format(all="", one="[network.robot.expect]\ninside_pitsch = true\n")
     with pytest.raises(
         ScenarioError, match=r"two: network\[0\]\.robot\[0\]\.expect\.inside_pitsch: there is no"
@@ -150,7 +150,7 @@ def test_the_path_of_one_robots_expectation_is_its_own() -> None:
         parse(text, "two", (), expectations_of)
 
 
-def test_a_setting_is_named_as_it_was_given() -> None:
+def test_a_setting_is_named_as_it_was_given():
     with pytest.raises(ScenarioError, match=r"fig6: --expect inside_pitch=3: expected true or false, got 3"):
         load("fig6", ["expect.inside_pitch=3"], expectations_of)
     with pytest.raises(
@@ -200,7 +200,7 @@ def own(tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("own")
-def test_a_check_of_another_distribution_is_found_by_its_entry_point() -> None:
+def test_a_check_of_another_distribution_is_found_by_its_entry_point():
     assert names("[expect]\nslow_below_m_s = 0.5")[0, 0] == [*ALWAYS_ON, "slow_below_m_s"]
     with pytest.raises(
         ScenarioError, match=r"expect\.slow_below_cm_s: .* use slow_below_m_s, in metres per second"
@@ -209,7 +209,7 @@ def test_a_check_of_another_distribution_is_found_by_its_entry_point() -> None:
 
 
 @pytest.mark.usefixtures("own")
-def test_a_check_that_cannot_check_its_parameters_is_named() -> None:
+def test_a_check_that_cannot_check_its_parameters_is_named():
     with pytest.raises(
         ScenarioError, match=r"expect\.loud: cannot check its parameters: RuntimeError: too loud"
     ):
@@ -229,7 +229,7 @@ VALUES = st.recursive(
 
 @settings(max_examples=150, deadline=None)
 @given(st.dictionaries(st.sampled_from([*CHECKS.own, "a b", ""]), VALUES, max_size=3))
-def test_any_table_is_checks_or_a_scenario_error(table) -> None:
+def test_any_table_is_checks_or_a_scenario_error(table):
     scenario = msgspec.structs.replace(load("fig6").scenario, expect=table)
     said = ""
     try:

@@ -59,7 +59,7 @@ def verdicts(image: Image | None) -> dict[str, str]:
     return finish(world, checks)
 
 
-def test_the_shipped_firmware_passes_all_checks_of_firmware() -> None:
+def test_the_shipped_firmware_passes_all_checks_of_firmware():
     found = verdicts(None)
     assert {name: verdict for name, verdict in found.items() if verdict != "passed"} == {}
     assert len(found) == 15
@@ -67,7 +67,7 @@ def test_the_shipped_firmware_passes_all_checks_of_firmware() -> None:
 
 @needs_sdcc
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_fails_the_checks_that_it_concerns(mistake: str) -> None:
+def test_a_mistake_fails_the_checks_that_it_concerns(mistake):
     found = verdicts(planted(mistake))
     assert {name for name, verdict in found.items() if verdict == "failed"} == MISTAKES[mistake]
 
@@ -75,7 +75,7 @@ def test_a_mistake_fails_the_checks_that_it_concerns(mistake: str) -> None:
 @needs_sdcc
 @pytest.mark.parametrize("mistake", ALWAYS)
 @pytest.mark.parametrize("stop", [False, True])
-def test_what_firmware_must_not_do_fails_a_check_that_no_scenario_asks_for(mistake: str, stop: bool) -> None:
+def test_what_firmware_must_not_do_fails_a_check_that_no_scenario_asks_for(mistake, stop):
     concerned = ALWAYS[mistake]
     world, checks = silent_world("", planted(mistake), stop=stop)
     send(world, [team(1, 2000, 2000), ServiceFrame(2, 1, 2, (9000,)), team(3, 2000, 2000)])

@@ -22,11 +22,11 @@ def verdicts(image: Image | None) -> dict[str, str]:
     return finish(world, checks)
 
 
-def test_a_question_while_the_robot_answers_need_not_be_answered() -> None:
+def test_a_question_while_the_robot_answers_need_not_be_answered():
     found = verdicts(None)
     assert (found["answers_within_ms"], found["answers_only_in_turn"]) == ("passed", "passed")
 
 
 @needs_sdcc
-def test_the_first_of_two_questions_must_be_answered() -> None:
+def test_the_first_of_two_questions_must_be_answered():
     assert verdicts(planted("never answers"))["answers_within_ms"] == "failed"

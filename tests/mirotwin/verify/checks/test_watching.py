@@ -45,7 +45,7 @@ def judged(seed: int, advance, text: str = TWO):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_run_with_all_checks_has_the_digest_of_one_without(seed: int) -> None:
+def test_a_run_with_all_checks_has_the_digest_of_one_without(seed):
     plain = World(parse(TWO, "two"), seed, own_image())
     while not plain.finished:
         plain.step()
@@ -56,7 +56,7 @@ def test_a_run_with_all_checks_has_the_digest_of_one_without(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_stops_and_waits_at_any_tick_change_no_verdict(seed: int) -> None:
+def test_stops_and_waits_at_any_tick_change_no_verdict(seed):
     draw = random.Random(seed)
 
     def wander(world: World) -> None:
@@ -69,7 +69,7 @@ def test_stops_and_waits_at_any_tick_change_no_verdict(seed: int) -> None:
     assert judged(seed, wander) == whole
 
 
-def test_a_saved_world_of_a_scenario_goes_on_under_other_expectations() -> None:
+def test_a_saved_world_of_a_scenario_goes_on_under_other_expectations():
     plain = World(load("fig6").scenario, 1, own_image())
     plain.run_to(100 * MS)
     other = World(load("fig6", ["expect.inside_pitch=true"]).scenario, 1, own_image())
@@ -77,7 +77,7 @@ def test_a_saved_world_of_a_scenario_goes_on_under_other_expectations() -> None:
     assert other.step().digest == plain.step().digest
 
 
-def test_failures_are_raised_for_tests_in_python() -> None:
+def test_failures_are_raised_for_tests_in_python():
     world, checks = silent_world("frames_accepted_min = 3")
     send(world, [team(1, 10, 10)])
     finish(world, checks)
@@ -88,14 +88,14 @@ def test_failures_are_raised_for_tests_in_python() -> None:
     ]
 
 
-def test_a_check_without_an_occasion_has_not_passed() -> None:
+def test_a_check_without_an_occasion_has_not_passed():
     world, checks = silent_world("failsafe_stop_ms = true\nanswers_within_ms = true")
     found = finish(world, checks)
     assert found["failsafe_stop_ms"] == found["answers_within_ms"] == "not judged"
     assert found["no_fault"] == "passed"
 
 
-def test_a_world_that_is_loaded_meanwhile_is_no_run_to_judge() -> None:
+def test_a_world_that_is_loaded_meanwhile_is_no_run_to_judge():
     world, checks = silent_world("")
     world.step()
     saved = world.save()
@@ -110,7 +110,7 @@ def test_a_world_that_is_loaded_meanwhile_is_no_run_to_judge() -> None:
     world.step()
 
 
-def test_events_that_the_log_no_longer_holds_leave_nothing_judged() -> None:
+def test_events_that_the_log_no_longer_holds_leave_nothing_judged():
     world, checks = silent_world("acts_within_ms = true\ninside_pitch = true")
     send(world, [team(1, 10, 10)])
     for _ in range(2049):
@@ -133,7 +133,7 @@ class RaisingJudge(Judge[Raising]):
         raise KeyError("speed")
 
 
-def test_what_a_check_raises_is_told_with_robot_and_name() -> None:
+def test_what_a_check_raises_is_told_with_robot_and_name():
     world, checks = silent_world("")
     checks.finish()
     Checks(world, {(0, 1): [Raising()]})
@@ -163,7 +163,7 @@ class ListingJudge(Judge[Listing]):
         self.heard.append(event)
 
 
-def test_a_judge_hears_every_event_once_in_the_order_of_ticks() -> None:
+def test_a_judge_hears_every_event_once_in_the_order_of_ticks():
     world, _ = silent_world("")
     checks = Checks(world, {(0, 1): [Listing()]})
     send(world, [team(seq, 100, -100, ask=True) for seq in range(1, 8)] + [team(7, 1, 1)])
@@ -177,7 +177,7 @@ def test_a_judge_hears_every_event_once_in_the_order_of_ticks() -> None:
     assert [event.value for event in judge.heard if event.what == "frame"] == [1] * 7 + [0]
 
 
-def test_a_robot_that_is_reset_owes_nothing_from_before() -> None:
+def test_a_robot_that_is_reset_owes_nothing_from_before():
     world, checks = silent_world(ALL)
     world.run_to(60 * MS)
     send(world, [team(1, 900, 900, ask=True)])
@@ -189,7 +189,7 @@ def test_a_robot_that_is_reset_owes_nothing_from_before() -> None:
     assert [failure for failure in checks.failures if failure.check != "frames_accepted_min"] == []
 
 
-def test_a_reset_pin_that_stays_down_excuses_no_other_robot() -> None:
+def test_a_reset_pin_that_stays_down_excuses_no_other_robot():
     scenario = parse(TWO, "two", ["expect.failsafe_stop_ms=true"], expectations_of)
     world = World(scenario, 1, own_image())
     checks = Checks(world)

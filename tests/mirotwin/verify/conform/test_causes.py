@@ -26,7 +26,7 @@ from tests.mutants.planted import PLANTED
 LINES = 3
 
 
-def test_presuppositions_are_rules_and_no_rule_presupposes_itself() -> None:
+def test_presuppositions_are_rules_and_no_rule_presupposes_itself():
     by_id = {rule.id: rule for rule in RULES}
 
     def walk(id: str, path: tuple[str, ...]) -> None:
@@ -38,25 +38,25 @@ def test_presuppositions_are_rules_and_no_rule_presupposes_itself() -> None:
         walk(id, ())
 
 
-def test_all_but_one_rule_presuppose_that_a_plain_frame_is_obeyed() -> None:
+def test_all_but_one_rule_presuppose_that_a_plain_frame_is_obeyed():
     assert [rule.id for rule in RULES if not rule.presupposes] == ["P24"]
     assert all(find("P24") in presupposed(rule) for rule in RULES if rule.id != "P24")
 
 
-def test_a_presupposition_comes_behind_those_that_it_has_itself() -> None:
+def test_a_presupposition_comes_behind_those_that_it_has_itself():
     for rule in RULES:
         found = [one.id for one in presupposed(rule)]
         assert all(set(find(id).presupposes) <= set(found[:place]) for place, id in enumerate(found))
 
 
-def test_rules_that_may_be_a_cause_say_what_firmware_does_that_breaks_them() -> None:
+def test_rules_that_may_be_a_cause_say_what_firmware_does_that_breaks_them():
     causes = {id for rule in RULES for id in rule.presupposes} | {rule.id for rule in RULES if rule.faults}
     assert {rule.id for rule in RULES if rule.broken} == causes
 
 
 def test_a_rule_whose_presupposition_failed_is_not_judged_and_its_trial_not_run(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch,
+):
     tried = []
     whole = run.try_rule
 
@@ -73,9 +73,7 @@ def test_a_rule_whose_presupposition_failed_is_not_judged_and_its_trial_not_run(
 
 
 @given(st.sets(st.sampled_from([rule.id for rule in RULES])), st.sets(st.sampled_from(RULES)))
-def test_no_rule_that_would_fail_passes_and_each_that_is_not_judged_has_a_cause_that_failed(
-    failing: set[str], chosen: set[Rule]
-) -> None:
+def test_no_rule_that_would_fail_passes_and_each_that_is_not_judged_has_a_cause_that_failed(failing, chosen):
     rules = [msgspec.structs.replace(rule, probe=None) for rule in RULES if rule in chosen]
 
     def tried(rule: Rule, *others: Any) -> Outcome:
@@ -95,21 +93,21 @@ def test_no_rule_that_would_fail_passes_and_each_that_is_not_judged_has_a_cause_
     assert ("failed" in verdicts.values()) == bool(failing & set(verdicts))
 
 
-def test_a_presupposition_that_is_not_tried_hides_nothing() -> None:
+def test_a_presupposition_that_is_not_tried_hides_nothing():
     (outcome,) = try_all([find("P44")], image_of(HANGS))
     assert (outcome.verdict, outcome.cause) == ("failed", "")
 
 
-def test_a_presupposition_counts_by_way_of_rules_that_are_not_tried() -> None:
+def test_a_presupposition_counts_by_way_of_rules_that_are_not_tried():
     found = list(try_all([find("P44"), find("P24")], image_of(HANGS)))
     assert [(one.rule, one.verdict) for one in found] == [("P24", "failed"), ("P44", "not judged")]
 
 
-def test_all_rules_are_tried_on_firmware_that_keeps_them() -> None:
+def test_all_rules_are_tried_on_firmware_that_keeps_them():
     assert {one.verdict for one in try_all(RULES, own_image())} == {"passed"}
 
 
-def test_a_rule_that_failed_after_a_firmware_fault_is_not_judged_and_the_fault_is_the_cause() -> None:
+def test_a_rule_that_failed_after_a_firmware_fault_is_not_judged_and_the_fault_is_the_cause():
     rules = [find(id) for id in ("P24", "P29", "P54")]
     outcomes = with_faults(list(try_all(rules, image_of(FAULTS))), rules)
     assert [(one.rule, one.verdict, one.cause) for one in outcomes] == [
@@ -119,9 +117,7 @@ def test_a_rule_that_failed_after_a_firmware_fault_is_not_judged_and_the_fault_i
     ]
 
 
-def test_the_table_begins_with_the_rule_that_hides_most_and_folds_those_that_it_hides(
-    mirotwin: Any, tmp_path: Path
-) -> None:
+def test_the_table_begins_with_the_rule_that_hides_most_and_folds_those_that_it_hides(mirotwin, tmp_path):
     image = tmp_path / "hangs.ihx"
     image.write_bytes(b":0200000080FE80\n:00000001FF\n")
     code, out, _ = mirotwin("conform", image)
@@ -154,7 +150,7 @@ def planted_image(name: str) -> Path:
 
 @needs_sdcc
 @pytest.mark.parametrize("name", FIRST_LINES)
-def test_a_usual_mistake_is_named_in_the_first_three_lines(name: str, mirotwin: Any) -> None:
+def test_a_usual_mistake_is_named_in_the_first_three_lines(name, mirotwin):
     code, out, _ = mirotwin("conform", planted_image(name), "-q")
     assert code in (1, 3)
     found = re.sub(r"\s+", " ", " ".join(out.splitlines()[:LINES]))
@@ -163,7 +159,7 @@ def test_a_usual_mistake_is_named_in_the_first_three_lines(name: str, mirotwin: 
 
 
 @needs_sdcc
-def test_a_timeline_tells_what_was_sent_received_commanded_and_answered(mirotwin: Any) -> None:
+def test_a_timeline_tells_what_was_sent_received_commanded_and_answered(mirotwin):
     code, out, err = mirotwin("conform", "--explain", "P44")
     assert (code, err) == (0, "")
     lines = out.splitlines()
@@ -181,7 +177,7 @@ def test_a_timeline_tells_what_was_sent_received_commanded_and_answered(mirotwin
 
 
 @needs_sdcc
-def test_a_timeline_shows_where_the_rule_failed_with_the_words_of_the_table(mirotwin: Any) -> None:
+def test_a_timeline_shows_where_the_rule_failed_with_the_words_of_the_table(mirotwin):
     image = planted_image("stops 15 ms late")
     code, out, _ = mirotwin("conform", image, "--explain", "p29")
     assert code == 1
@@ -192,7 +188,7 @@ def test_a_timeline_shows_where_the_rule_failed_with_the_words_of_the_table(miro
     assert first in re.sub(r"\s+", " ", table)
 
 
-def test_a_timeline_of_a_rule_that_is_not_there_is_refused(mirotwin: Any) -> None:
+def test_a_timeline_of_a_rule_that_is_not_there_is_refused(mirotwin):
     code, out, err = mirotwin("conform", "--explain", "P99")
     assert (code, out) == (2, "")
     assert "there is no rule 'P99'" in err
@@ -201,8 +197,8 @@ def test_a_timeline_of_a_rule_that_is_not_there_is_refused(mirotwin: Any) -> Non
 @needs_sdcc
 @pytest.mark.parametrize("instead", ["", "    halt_both(TRJ_MOTOR_OFF);\n"])
 def test_wheels_that_are_never_told_to_turn_break_the_rule_without_a_guess_at_the_reason(
-    instead: str,
-) -> None:
+    instead,
+):
     image = built("motion.c", "    start_both();\n    state = STATE_DRIVING;\n", instead)
     (outcome,) = try_all([find("P28")], image)
     assert outcome.verdict == "failed"
@@ -210,7 +206,7 @@ def test_wheels_that_are_never_told_to_turn_break_the_rule_without_a_guess_at_th
 
 
 @needs_sdcc
-def test_characters_that_are_no_answer_are_told_with_their_times() -> None:
+def test_characters_that_are_no_answer_are_told_with_their_times():
     image = built("telemetry.c", "tx_frame[TX_AT_SYNC] = SYNC_0;", "tx_frame[TX_AT_SYNC] = 0;")
     (outcome,) = try_all([find("P50")], image)
     assert re.search(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -36,7 +35,7 @@ def planted_file(folder: Path, name: str) -> Path:
     return folder / "out" / "miro.ihx"
 
 
-def test_rules_that_are_kept_are_a_table_and_exit_code_0(mirotwin: Any) -> None:
+def test_rules_that_are_kept_are_a_table_and_exit_code_0(mirotwin):
     code, out, err = mirotwin("conform", "--rule", "P29", "--rule", "p02", "--rule", "P29")
     assert (code, err) == (0, "")
     assert [line.split() for line in out.splitlines()] == [
@@ -48,7 +47,7 @@ def test_rules_that_are_kept_are_a_table_and_exit_code_0(mirotwin: Any) -> None:
 
 
 @needs_sdcc
-def test_a_failure_is_left_as_a_case_whose_replay_says_the_same(mirotwin: Any, tmp_path: Path) -> None:
+def test_a_failure_is_left_as_a_case_whose_replay_says_the_same(mirotwin, tmp_path):
     image = planted_file(tmp_path, "stops after 125 ms")
     (tmp_path / "out" / "miro.map").unlink()
     (tmp_path / "out" / "miro.cdb").unlink()
@@ -78,7 +77,7 @@ def test_a_failure_is_left_as_a_case_whose_replay_says_the_same(mirotwin: Any, t
 ROBOTS_OWN = Path(__file__).parents[4] / "robot_fw" / "miro_robot" / "firmware" / "miro.ihx"
 
 
-def test_a_firmware_fault_is_exit_code_3_and_a_case_of_its_own(mirotwin: Any, tmp_path: Path) -> None:
+def test_a_firmware_fault_is_exit_code_3_and_a_case_of_its_own(mirotwin, tmp_path):
     image = program(tmp_path, PUSHES)
     folder = tmp_path / "cases"
     code, out, err = mirotwin("conform", image, "--rule", "P03", "--rule", "P53", "--artifacts", folder)
@@ -95,9 +94,7 @@ def test_a_firmware_fault_is_exit_code_3_and_a_case_of_its_own(mirotwin: Any, tm
     ("code", "exit_code"),
     [(HANGS, 1), (BABBLES, 1), (FAULTS, 3), (RUNS_OUT, 3), (PUSHES, 3), (POKES, 3), (READS_BOTH, 3)],
 )
-def test_programs_that_are_no_firmware_end_with_a_verdict(
-    mirotwin: Any, tmp_path: Path, code: bytes, exit_code: int
-) -> None:
+def test_programs_that_are_no_firmware_end_with_a_verdict(mirotwin, tmp_path, code, exit_code):
     ids = [rule.id for rule in RULES] if exit_code == 3 else ["P01", "P41", "P43", "P51"]
     rules = [option for id in ids for option in ("--rule", id)]
     found, out, _ = mirotwin("conform", program(tmp_path, code), *rules)
@@ -105,13 +102,13 @@ def test_programs_that_are_no_firmware_end_with_a_verdict(
     assert out.splitlines()[-1].startswith(f"{len(ids)} rules: 0 passed, ")
 
 
-def test_a_program_that_babbles_breaks_the_rule_of_silence_first(mirotwin: Any, tmp_path: Path) -> None:
+def test_a_program_that_babbles_breaks_the_rule_of_silence_first(mirotwin, tmp_path):
     _, out, _ = mirotwin("conform", program(tmp_path, BABBLES), "--rule", "P43")
     assert "wanted silence: nobody asks, found 33 characters, 55 55 55 55" in out
     assert "55 .. (ticks 157239" in out
 
 
-def test_json_is_a_line_a_rule(mirotwin: Any, tmp_path: Path) -> None:
+def test_json_is_a_line_a_rule(mirotwin, tmp_path):
     image = program(tmp_path, HANGS)
     code, out, _ = mirotwin("conform", image, "--json", "--rule", "P03", "--rule", "P43")
     assert code == 1
@@ -123,7 +120,7 @@ def test_json_is_a_line_a_rule(mirotwin: Any, tmp_path: Path) -> None:
     assert lines[0]["first"]["wanted"] == "the wheels told as by team frame, seq 1 within 10 ms"
 
 
-def test_junit_has_a_case_a_rule_and_the_same_bytes_every_time(mirotwin: Any, tmp_path: Path) -> None:
+def test_junit_has_a_case_a_rule_and_the_same_bytes_every_time(mirotwin, tmp_path):
     image = program(tmp_path, HANGS)
     texts = []
     for _ in range(2):
@@ -147,7 +144,7 @@ def test_junit_has_a_case_a_rule_and_the_same_bytes_every_time(mirotwin: Any, tm
     assert names == ["firmware", "firmware_sha256", "seed"]
 
 
-def test_all_rules_are_listed_and_none_is_tried(mirotwin: Any) -> None:
+def test_all_rules_are_listed_and_none_is_tried(mirotwin):
     code, out, err = mirotwin("conform", "--list")
     assert (code, err) == (0, "")
     for rule in ALL:
@@ -170,9 +167,7 @@ def test_all_rules_are_listed_and_none_is_tried(mirotwin: Any) -> None:
         ),
     ],
 )
-def test_bad_input_is_one_line_and_exit_code_2(
-    mirotwin: Any, arguments: tuple[str, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bad_input_is_one_line_and_exit_code_2(mirotwin, arguments, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, err = mirotwin("conform", *arguments)
     if code == 2 and not err:  # a usage error, which the program says
@@ -182,7 +177,7 @@ def test_bad_input_is_one_line_and_exit_code_2(
     assert len(err.splitlines()) == 1
 
 
-def test_a_rule_that_a_scenario_names_and_is_not_there_is_refused(mirotwin: Any) -> None:
+def test_a_rule_that_a_scenario_names_and_is_not_there_is_refused(mirotwin):
     code, _, err = mirotwin("run", "fig6", "--expect", "conforms_to=P99")
     assert code == 2
     assert "conforms_to=P99" in err

@@ -26,20 +26,20 @@ IDS = [rule.id for rule in ALL]
 
 
 @pytest.mark.parametrize("id", IDS)
-def test_the_shipped_firmware_keeps_the_rule(id: str) -> None:
+def test_the_shipped_firmware_keeps_the_rule(id):
     outcome = try_rule(find(id), own_image())
     assert not outcome.failures
     assert outcome.fault_count == 0
 
 
 @pytest.mark.parametrize("id", IDS)
-def test_an_image_that_does_nothing_breaks_the_rule(id: str) -> None:
+def test_an_image_that_does_nothing_breaks_the_rule(id):
     assert not try_rule(find(id), image_of(HANGS)).passed
 
 
 @needs_sdcc
 @pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_in_the_firmware_breaks_the_rules_that_it_concerns(name: str) -> None:
+def test_a_mistake_in_the_firmware_breaks_the_rules_that_it_concerns(name):
     mistake = MISTAKES[name]
     image = built(mistake.file, mistake.right, mistake.wrong)
     kept = [id for id in mistake.fails.split() if not broken(id, image)]
@@ -53,11 +53,11 @@ def broken(id: str, image: object) -> bool:
     return bool(outcome.failures or forbidden)
 
 
-def test_each_rule_has_a_mistake_that_breaks_it() -> None:
+def test_each_rule_has_a_mistake_that_breaks_it():
     assert {id for mistake in MISTAKES.values() for id in mistake.fails.split()} == set(IDS)
 
 
-def test_rules_are_numbered_in_order_and_say_must_and_where_they_come_from() -> None:
+def test_rules_are_numbered_in_order_and_say_must_and_where_they_come_from():
     assert [f"P{number:02d}" for number in range(1, len(IDS) + 1)] == IDS
     for rule in ALL:
         assert "MUST" in rule.text
@@ -65,7 +65,7 @@ def test_rules_are_numbered_in_order_and_say_must_and_where_they_come_from() -> 
         assert f"# {section}\n" in (Path(__file__).parents[4] / page).read_text()
 
 
-def test_names_of_rules_differ() -> None:
+def test_names_of_rules_differ():
     assert len({rule.name for rule in ALL}) == len(ALL)
 
 
@@ -77,18 +77,18 @@ def bare_image(folder: Path) -> object:
 
 
 @pytest.mark.parametrize("id", ["P18", "P29", "P44", "P48", "P49"])
-def test_rules_need_no_symbols(id: str, tmp_path: Path) -> None:
+def test_rules_need_no_symbols(id, tmp_path):
     image = bare_image(tmp_path)
     assert not image.symbols.names  # type: ignore[attr-defined]
     assert try_rule(find(id), image).passed  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("seed", range(1, 7))
-def test_noise_of_any_seed_is_no_reason_to_fail(seed: int) -> None:
+def test_noise_of_any_seed_is_no_reason_to_fail(seed):
     assert try_rule(find("P15"), own_image(), seed).passed
 
 
-def test_a_trial_depends_on_its_rule_alone() -> None:
+def test_a_trial_depends_on_its_rule_alone():
     rule = find("P13")
     one = trial_of(rule)
     trial_of.cache_clear()
@@ -98,7 +98,7 @@ def test_a_trial_depends_on_its_rule_alone() -> None:
     assert one.scenario == other.scenario
 
 
-def test_a_run_that_is_no_trial_of_the_rule_is_not_judged() -> None:
+def test_a_run_that_is_no_trial_of_the_rule_is_not_judged():
     world, _ = silent_world("")
     checks = Checks(world, {(0, 1): [ConformsTo(rule="P02")]})
     world.inject(bytes(10))
@@ -108,7 +108,7 @@ def test_a_run_that_is_no_trial_of_the_rule_is_not_judged() -> None:
     assert [one.verdict for one in checks.verdicts()] == ["not judged"]
 
 
-def test_a_trial_of_which_a_network_says_less_is_not_judged_there() -> None:
+def test_a_trial_of_which_a_network_says_less_is_not_judged_there():
     trial = trial_of(find("P29"))
     said = [one for one in trial.script if one.network == 0 or not isinstance(one, Transmission)]
     world = World(trial.scenario, 0, own_image(), script=said)
@@ -120,6 +120,6 @@ def test_a_trial_of_which_a_network_says_less_is_not_judged_there() -> None:
     assert [one.verdict for one in checks.verdicts()] == ["not judged"]
 
 
-def test_a_rule_that_is_not_there_is_refused_with_the_nearest() -> None:
+def test_a_rule_that_is_not_there_is_refused_with_the_nearest():
     with pytest.raises(msgspec.ValidationError, match="there is no rule 'P99'; did you mean P"):
         msgspec.convert({"check": "conforms_to", "rule": "P99"}, ConformsTo)

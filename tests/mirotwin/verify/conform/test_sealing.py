@@ -23,14 +23,14 @@ def bodies(form: Format) -> st.SearchStrategy[bytes]:
 
 
 @given(st.data())
-def test_without_a_mistake_a_frame_is_sealed_as_the_protocol_seals_it(data: st.DataObject) -> None:
+def test_without_a_mistake_a_frame_is_sealed_as_the_protocol_seals_it(data):
     form = data.draw(st.sampled_from(FORMATS))
     body = data.draw(bodies(form))
     assert Sealing().seal(form, body) == seal(form, body)
 
 
 @given(st.data())
-def test_a_sealing_opens_what_it_sealed(data: st.DataObject) -> None:
+def test_a_sealing_opens_what_it_sealed(data):
     form = data.draw(st.sampled_from(FORMATS))
     body = data.draw(bodies(form))
     sealing = data.draw(st.sampled_from([one for one in MISTAKES.values() if one.sync == form.sync]))
@@ -39,8 +39,8 @@ def test_a_sealing_opens_what_it_sealed(data: st.DataObject) -> None:
 
 @pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 def test_no_two_mistakes_make_the_same_frame_and_only_the_right_layout_byte_makes_the_right_one(
-    form: Format,
-) -> None:
+    form,
+):
     body = bytes(range(1, form.body_size + 1))
     made = {what: sealing.seal(form, body) for what, sealing in MISTAKES.items()}
     assert len(set(made.values())) == len(made)
@@ -49,7 +49,7 @@ def test_no_two_mistakes_make_the_same_frame_and_only_the_right_layout_byte_make
 
 
 @given(st.data())
-def test_the_mistake_in_an_answer_is_found_by_its_characters_alone(data: st.DataObject) -> None:
+def test_the_mistake_in_an_answer_is_found_by_its_characters_alone(data):
     what = data.draw(st.sampled_from([one for one in MISTAKES if MISTAKES[one].sync == TELEMETRY.sync]))
     body = bytes([0x96]) + data.draw(bodies(TELEMETRY))[1:]
     characters = MISTAKES[what].seal(TELEMETRY, body)[len(TELEMETRY.lead) :]
@@ -70,11 +70,11 @@ def frame(*words: tuple[int, int]) -> Frame:
 
 
 @given(st.lists(PAIRS, min_size=3, max_size=3), st.integers(0, 2))
-def test_nothing_is_said_of_wheels_that_do_as_told(words: list[tuple[int, int]], slot: int) -> None:
+def test_nothing_is_said_of_wheels_that_do_as_told(words, slot):
     assert wheels_instead(told(words[slot]), frame(*words), slot) == ""
 
 
-def test_nothing_is_said_of_velocities_at_the_limit_where_one_mistake_looks_like_another() -> None:
+def test_nothing_is_said_of_velocities_at_the_limit_where_one_mistake_looks_like_another():
     assert wheels_instead(told((16632, -16633)), frame((16633, -16633)), 0) == ""
 
 
@@ -91,5 +91,5 @@ def test_nothing_is_said_of_velocities_at_the_limit_where_one_mistake_looks_like
         ((1, 2), ""),
     ],
 )
-def test_one_mistake_that_explains_both_wheels_is_named(found: tuple[int, int], said: str) -> None:
+def test_one_mistake_that_explains_both_wheels_is_named(found, said):
     assert wheels_instead(told(found), frame((-677, 682), (978, -983), (-1279, 1284)), 1) == said

@@ -16,7 +16,7 @@ ROWS = re.findall(r"^\| (`.*?) \| (.*) \|$", PAGE, re.M)
 EVERYWHERE = {"network", "slot", "note", "number"}
 
 
-def test_the_example_passes(tmp_path: Path) -> None:
+def test_the_example_passes(tmp_path):
     (example,) = re.findall(r"```toml\n(.*?)```", PAGE, re.S)
     path = tmp_path / "page.scenario.toml"
     path.write_text(example)
@@ -24,19 +24,19 @@ def test_the_example_passes(tmp_path: Path) -> None:
     assert (outcome.verdict, outcome.lines) == ("passed", ())
 
 
-def test_each_verb_has_a_row() -> None:
+def test_each_verb_has_a_row():
     said = {word for head, _ in ROWS for word in re.findall(r"`(\w+) = ", head)}
     assert set(VERBS) <= said
 
 
-def test_each_kind_of_event_has_a_row_with_its_keys() -> None:
+def test_each_kind_of_event_has_a_row_with_its_keys():
     for name, struct in HAPPENINGS.items():
         (row,) = [row for head, row in ROWS if re.search(rf"`{name}`", head)]
         keys = set(struct.__struct_encode_fields__) - EVERYWHERE
         assert keys <= set(re.findall(r"`(\w+)`", row)), name
 
 
-def test_each_kind_of_frame_is_said_with_its_keys() -> None:
+def test_each_kind_of_frame_is_said_with_its_keys():
     of_frames = set(SendFrame.__struct_encode_fields__)
     for name, struct in SENDS.items():
         (both,) = [f"{head} {row}" for head, row in ROWS if f'"{name}"' in head]

@@ -42,7 +42,7 @@ def run(path: Path, image: Image) -> Outcome:
 
 @needs_sdcc
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_steps_alone_find_it_at_the_step_that_it_concerns(mistake: str, tmp_path: Path) -> None:
+def test_steps_alone_find_it_at_the_step_that_it_concerns(mistake, tmp_path):
     file, right, wrong, place = MISTAKES[mistake]
     path = tmp_path / "alone.scenario.toml"
     path.write_text(STEPS_ALONE)
@@ -52,7 +52,7 @@ def test_steps_alone_find_it_at_the_step_that_it_concerns(mistake: str, tmp_path
 
 
 @needs_sdcc
-def test_a_failsafe_of_125_ms_fails_a_step_and_the_checks_of_the_example(tmp_path: Path) -> None:
+def test_a_failsafe_of_125_ms_fails_a_step_and_the_checks_of_the_example(tmp_path):
     image = built("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS + 15)")
     outcome = run(EXAMPLES / "failsafe.scenario.toml", image)
     step, check = outcome.lines[:2]
@@ -62,14 +62,14 @@ def test_a_failsafe_of_125_ms_fails_a_step_and_the_checks_of_the_example(tmp_pat
 
 
 @needs_sdcc
-def test_firmware_that_takes_damaged_frames_fails_the_other_example(tmp_path: Path) -> None:
+def test_firmware_that_takes_damaged_frames_fails_the_other_example(tmp_path):
     wrong = "take_body(rx_taken - frame_size + RX3_AT_HDR); if (0) {"
     image = built("decode.c", "if (!take_body(rx_taken - frame_size + RX3_AT_HDR)) {", wrong)
     outcome = run(EXAMPLES / "damage.scenario.toml", image)
     assert outcome.lines[0].startswith("step failed: step 3: never command: tick ")
 
 
-def test_the_shipped_firmware_passes_all_of_them(tmp_path: Path) -> None:
+def test_the_shipped_firmware_passes_all_of_them(tmp_path):
     path = tmp_path / "alone.scenario.toml"
     path.write_text(STEPS_ALONE)
     found = [run(one, own_image()) for one in (path, *sorted(EXAMPLES.glob("*.scenario.toml")))]

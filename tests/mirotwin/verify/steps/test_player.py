@@ -56,18 +56,18 @@ def frames_of(sent: list[Transmission]) -> list[Received]:
     return [event for event in found if isinstance(event, Received)]
 
 
-def test_deeds_take_no_time_and_a_pause_takes_its_time_to_the_tick() -> None:
+def test_deeds_take_no_time_and_a_pause_takes_its_time_to_the_tick():
     player = play(f"{DRIVE}, {{ pause_ms = 0.125 }}")
     assert (player.done, player.failure, player.world.tick) == (2, None, 3000)
 
 
-def test_a_wait_ends_at_the_tick_of_its_event() -> None:
+def test_a_wait_ends_at_the_tick_of_its_event():
     player = play(f'{DRIVE}, {{ wait_for = "frame" }}')
     assert player.world.tick // MS == 24  # key-up and 23 characters, the last one but its stop bit
     assert player.world.robot().board.log.end >= 23
 
 
-def test_what_happens_in_a_pause_is_there_for_the_next_waits_in_its_order() -> None:
+def test_what_happens_in_a_pause_is_there_for_the_next_waits_in_its_order():
     waits = ", ".join(
         f'{{ expect = "received", byte = {byte}, within_ms = 0 }}' for byte in (0x31, 0x32, 0x33)
     )
@@ -76,7 +76,7 @@ def test_what_happens_in_a_pause_is_there_for_the_next_waits_in_its_order() -> N
     assert late.world.tick == 305 * MS
 
 
-def test_a_pause_of_seconds_loses_nothing_of_its_begin() -> None:
+def test_a_pause_of_seconds_loses_nothing_of_its_begin():
     steps = (
         f'{DRIVE}, {{ stream = "on" }}, {{ pause_ms = 2500 }}, {{ expect = "frame", seq = 1, within_ms = 0 }}'
     )
@@ -86,7 +86,7 @@ def test_a_pause_of_seconds_loses_nothing_of_its_begin() -> None:
     assert board.log.first > 0  # its log no longer holds the begin
 
 
-def test_from_now_passes_over_what_has_happened() -> None:
+def test_from_now_passes_over_what_has_happened():
     steps = BOOTED + ', { send = "bytes", hex = "31 32" }, { pause_ms = 50 }, '
     assert play(steps + '{ wait_for = "received", within_ms = 5 }').failure is None
     failure = play(steps + '{ wait_for = "received", within_ms = 5, from_now = true }').failure
@@ -95,7 +95,7 @@ def test_from_now_passes_over_what_has_happened() -> None:
     assert failure.found == "nothing happened meanwhile"
 
 
-def test_wait_for_passes_over_what_does_not_fit_and_expect_fails_there() -> None:
+def test_wait_for_passes_over_what_does_not_fit_and_expect_fails_there():
     steps = BOOTED + ', { send = "bytes", hex = "31 32 33" }, '
     assert play(steps + '{ wait_for = "received", byte = 0x33, within_ms = 9 }').failure is None
     failure = play(steps + '{ expect = "received", byte = 0x33, within_ms = 9 }').failure
@@ -105,7 +105,7 @@ def test_wait_for_passes_over_what_does_not_fit_and_expect_fails_there() -> None
     assert failure.wanted == "received with byte = 51 within 9 ms"
 
 
-def test_a_step_that_is_not_reached_in_time_says_when_what_was_wanted_and_what_was_seen() -> None:
+def test_a_step_that_is_not_reached_in_time_says_when_what_was_wanted_and_what_was_seen():
     asked = '{ note = "never asked", wait_for = "answer", from_now = true, within_ms = 100 }'
     failure = play(f"{BOOTED}, {DRIVE}, {asked}").failure
     assert failure is not None
@@ -117,7 +117,7 @@ def test_a_step_that_is_not_reached_in_time_says_when_what_was_wanted_and_what_w
     assert failure.found.endswith("net0/robot0: command right STT")
 
 
-def test_never_looks_from_now_on_and_fails_at_the_event() -> None:
+def test_never_looks_from_now_on_and_fails_at_the_event():
     steps = f'{DRIVE}, {{ pause_ms = 50 }}, {{ never = "command", for_ms = 50 }}'
     assert play(steps).failure is None
     failure = play(f'{DRIVE}, {{ never = "command", name = "STT", for_ms = 50 }}').failure
@@ -127,14 +127,14 @@ def test_never_looks_from_now_on_and_fails_at_the_event() -> None:
     assert failure.found == "net0/robot0: command left STT"
 
 
-def test_silence_is_of_the_robots_of_a_network() -> None:
+def test_silence_is_of_the_robots_of_a_network():
     assert play(f"{DRIVE}, {{ silence_for_ms = 60 }}").failure is None
     failure = play('{ send = "poll" }, { silence_for_ms = 60 }').failure
     assert failure is not None
     assert failure.found == "net0/pc: heard 55h"
 
 
-def test_wheels_are_waited_for_and_hold_their_speed() -> None:
+def test_wheels_are_waited_for_and_hold_their_speed():
     steps = """
         { stream = "on", left_m_s = 0.3, right_m_s = -0.3 },
         { wait_for = "wheels", left_m_s = 0.3, right_m_s = -0.3, within_ms = 150 },
@@ -155,7 +155,7 @@ def test_wheels_are_waited_for_and_hold_their_speed() -> None:
     assert failure.found == "left_m_s = 0.0000, right_m_s = 0.0000; nothing happened meanwhile"
 
 
-def test_a_stream_sends_a_frame_a_period_until_it_is_told_to_stop_and_a_step_changes_it() -> None:
+def test_a_stream_sends_a_frame_a_period_until_it_is_told_to_stop_and_a_step_changes_it():
     steps = """
         { stream = "on", left_m_s = 0.1, right_m_s = 0.1, ask = false },
         { pause_ms = 100 },
@@ -176,7 +176,7 @@ def test_a_stream_sends_a_frame_a_period_until_it_is_told_to_stop_and_a_step_cha
     ]
 
 
-def test_numbers_are_fresh_and_a_poll_has_that_of_its_robot() -> None:
+def test_numbers_are_fresh_and_a_poll_has_that_of_its_robot():
     polls = ", ".join(f'{{ send = "poll", slot = {slot} }}, {{ pause_ms = 40 }}' for slot in (0, 1, 2, 2, 0))
     player = play(f'{{ send = "team", seq = 60 }}, {{ pause_ms = 40 }}, {polls}', finish=True)
     seqs = [frame.seq for frame in frames_of(sent_by(player))]
@@ -184,14 +184,14 @@ def test_numbers_are_fresh_and_a_poll_has_that_of_its_robot() -> None:
     assert player.world.robot().counter(0) == 6
 
 
-def test_a_poll_whose_turn_does_not_come_in_eight_numbers_is_told_so() -> None:
+def test_a_poll_whose_turn_does_not_come_in_eight_numbers_is_told_so():
     head = "duration_s = 1.0\nset = { network.robots = 5 }"
     what = "step 2: no number that is fresh after 59 asks robot 4: 64 is no multiple of 5; send a team frame before"
     with pytest.raises(ScenarioError, match=what):
         play('{ send = "team", seq = 59 }, { send = "poll", slot = 4 }', head)
 
 
-def test_a_robot_in_another_slot_is_told_and_asked_by_default_where_it_is_the_only_one() -> None:
+def test_a_robot_in_another_slot_is_told_and_asked_by_default_where_it_is_the_only_one():
     head = "duration_s = 1.0\nset = { network.robot.slot = 2 }"
     steps = f"""
         {DRIVE},
@@ -202,7 +202,7 @@ def test_a_robot_in_another_slot_is_told_and_asked_by_default_where_it_is_the_on
     assert play(steps, head).failure is None
 
 
-def test_two_robots_are_told_and_asked_apart() -> None:
+def test_two_robots_are_told_and_asked_apart():
     steps = """
         { send = "team", team_m_s = [[0.1, 0.1], [0, 0], [-0.1, -0.1]] },
         { send = "poll", slot = 2 },
@@ -218,7 +218,7 @@ def test_two_robots_are_told_and_asked_apart() -> None:
     assert "1 answer" in failure.found  # that of the other robot
 
 
-def test_damage_is_refused_by_the_robot_and_counted() -> None:
+def test_damage_is_refused_by_the_robot_and_counted():
     steps = """
         { send = "team", wrong_bits = [3, 9] },
         { pause_ms = 40 },
@@ -234,7 +234,7 @@ def test_damage_is_refused_by_the_robot_and_counted() -> None:
     assert [one.bad_stop for one in sent_by(player)] == [(), (22,), (1,), ()]
 
 
-def test_service_frames_reach_the_chips() -> None:
+def test_service_frames_reach_the_chips():
     steps = """
         { send = "filter", kp = 1, ki = 2, kd = 3, il = 4 },
         { wait_for = "command", name = "LFIL", side = "left", hex = "03 0f 00 01 00 02 00 03 00 04", within_ms = 40 },
@@ -247,7 +247,7 @@ def test_service_frames_reach_the_chips() -> None:
     assert player.failure is None
 
 
-def test_a_symbol_a_pin_and_an_lm629_command_are_waited_for() -> None:
+def test_a_symbol_a_pin_and_an_lm629_command_are_waited_for():
     steps = f"""
         {DRIVE},
         {{ wait_for = "reached", symbol = "motion_stop", within_ms = 200 }},
@@ -259,7 +259,7 @@ def test_a_symbol_a_pin_and_an_lm629_command_are_waited_for() -> None:
     assert 134 * MS < player.world.tick < 137 * MS  # 25 ms of frame, 110 of failsafe
 
 
-def test_a_check_of_a_step_judges_from_there_on() -> None:
+def test_a_check_of_a_step_judges_from_there_on():
     steps = f"""
         {{ check = {{ failsafe_stop_ms = 100.0 }}, note = "wrong on purpose" }},
         {DRIVE},
@@ -273,7 +273,7 @@ def test_a_check_of_a_step_judges_from_there_on() -> None:
     ]
 
 
-def test_what_a_step_saves_is_loaded_and_goes_on_to_the_same_digest() -> None:
+def test_what_a_step_saves_is_loaded_and_goes_on_to_the_same_digest():
     player = play(f'{DRIVE}, {{ pause_ms = 12.34 }}, {{ save = "driving.world" }}', finish=True)
     world = World(without_steps(player.world.scenario), 0, own_image())
     world.load(player.saved["driving.world"])
@@ -287,7 +287,7 @@ def ticks_of(time_ms: float) -> int:
     return round(time_ms * MS)
 
 
-def test_a_run_with_steps_is_the_run_in_which_the_same_is_sent_at_the_same_ticks() -> None:
+def test_a_run_with_steps_is_the_run_in_which_the_same_is_sent_at_the_same_ticks():
     steps = """
         { stream = "on", left_m_s = 0.3, right_m_s = 0.2 },
         { wait_for = "wheels", left_m_s = 0.3, within_ms = 150 },
@@ -305,7 +305,7 @@ def test_a_run_with_steps_is_the_run_in_which_the_same_is_sent_at_the_same_ticks
     assert world.digest == player.world.digest
 
 
-def test_a_firmware_fault_that_stops_the_run_fails_the_step_that_waits() -> None:
+def test_a_firmware_fault_that_stops_the_run_fails_the_step_that_waits():
     scenario = scenario_of('{ wait_for = "answer", within_ms = 500 }, { pause_ms = 1 }')
     image = msgspec.structs.replace(own_image(), code=bytes([0xA5]) + own_image().code[1:])
     world = World(scenario, 0, image)
@@ -317,7 +317,7 @@ def test_a_firmware_fault_that_stops_the_run_fails_the_step_that_waits() -> None
     assert "a firmware fault has stopped the run" in player.failure.found
 
 
-def test_a_radio_that_is_gone_a_reset_and_a_battery_taken_out_are_survived_in_order() -> None:
+def test_a_radio_that_is_gone_a_reset_and_a_battery_taken_out_are_survived_in_order():
     steps = """
         { pause_ms = 5 },
         { stream = "on", left_m_s = 0.2, right_m_s = 0.2, ask = false },

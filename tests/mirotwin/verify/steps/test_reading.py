@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 import pytest
 import tomli_w
@@ -73,7 +71,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("steps", WRONG)
-def test_what_is_wrong_is_one_line_with_its_place_and_a_remedy(steps: str) -> None:
+def test_what_is_wrong_is_one_line_with_its_place_and_a_remedy(steps):
     with pytest.raises(ScenarioError) as caught:
         read(steps)
     assert f"{caught.value}".startswith(f"{ORIGIN}: {WRONG[steps]}")
@@ -100,18 +98,18 @@ def test_what_is_wrong_is_one_line_with_its_place_and_a_remedy(steps: str) -> No
         ),
     ],
 )
-def test_a_step_that_no_run_can_get_to_is_refused(steps: str, what: str) -> None:
+def test_a_step_that_no_run_can_get_to_is_refused(steps, what):
     with pytest.raises(ScenarioError, match=what):
         read(steps)
 
 
-def test_a_step_may_last_to_the_very_end_of_the_run() -> None:
+def test_a_step_may_last_to_the_very_end_of_the_run():
     assert (
         len(read('{ pause_ms = 900 }, { expect = "answer", within_ms = 101 }, { silence_for_ms = 101 }')) == 3
     )
 
 
-def test_a_host_that_counts_its_own_frames_is_not_counted_for() -> None:
+def test_a_host_that_counts_its_own_frames_is_not_counted_for():
     head = 'duration_s = 1.0\nset = { network.host = "controller" }'
     with pytest.raises(
         ScenarioError, match=r"step 1\.seq: this network's host counts its frames itself; give seq"
@@ -126,7 +124,7 @@ def test_a_host_that_counts_its_own_frames_is_not_counted_for() -> None:
     )
 
 
-def test_a_symbol_that_the_image_does_not_have_is_refused() -> None:
+def test_a_symbol_that_the_image_does_not_have_is_refused():
     good = '{ expect = "reached", symbol = "motion_stop" }, { expect = "reached", address = 0x33 }'
     check_symbols(read(good), own_image(), ORIGIN)
     what = "step 1.symbol: 'motion_halt' is no symbol of .*miro.ihx; C names are those of functions that are not static"
@@ -136,7 +134,7 @@ def test_a_symbol_that_the_image_does_not_have_is_refused() -> None:
         check_symbols(read('{ expect = "reached", symbol = "frames_accepted" }'), own_image(), ORIGIN)
 
 
-def test_steps_know_their_number_and_note() -> None:
+def test_steps_know_their_number_and_note():
     first, second, third = read(
         '{ note = "off", send = "team", left_m_s = 1 }, { silence_for_ms = 3 }, { wait_for = "command", name = "STT" }'
     )
@@ -147,11 +145,11 @@ def test_steps_know_their_number_and_note() -> None:
     assert third == WaitStep(number=3, verb="wait_for", happening=Command(name_="STT"))
 
 
-def test_bytes_carry_their_stop_bits() -> None:
+def test_bytes_carry_their_stop_bits():
     assert SendBytes(hex="55 5a! ff!").characters() == (b"\x55\x5a\xff", (1, 2))
 
 
-def test_the_default_acceleration_is_that_of_the_contract() -> None:
+def test_the_default_acceleration_is_that_of_the_contract():
     assert acceleration_units(6.0) == 5973
 
 
@@ -185,7 +183,7 @@ TABLES = st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=5)
 
 @settings(max_examples=300, deadline=None)
 @given(st.lists(TABLES, max_size=3))
-def test_any_table_is_read_or_refused_with_its_place(tables: list[dict[str, Any]]) -> None:
+def test_any_table_is_read_or_refused_with_its_place(tables):
     scenario = msgspec.structs.replace(scenario_of(""), step=tuple(tables))
     refusal, steps = None, []
     try:
@@ -213,7 +211,7 @@ GOOD = st.one_of(
 
 
 @given(st.lists(GOOD, min_size=1, max_size=8))
-def test_steps_say_what_their_tables_say(tables: list[dict[str, Any]]) -> None:
+def test_steps_say_what_their_tables_say(tables):
     text = tomli_w.dumps({"scenario": "silent", "duration_s": 1.0, "step": tables})
     for step, table in zip(steps_of(parse(text, ORIGIN), ORIGIN), tables, strict=True):
         assert step.note == table.get("note", "")
