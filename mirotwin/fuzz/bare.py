@@ -19,7 +19,7 @@ from miro_protocol.stream_events import Deed
 from miro_protocol.transmission import Transmission
 from miro_robot.bare.machine import CRYSTAL_HZ
 from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
-from miro_robot.harness.heard_bus import LONGEST_ANSWER_TICKS, BareJudge
+from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareJudge
 from miro_robot.harness.program import INPUTS, Program
 from miro_robot.image import SPACE_BYTES, Image, load_hex
 from mirotwin.fuzz.bare_machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of

@@ -8,7 +8,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import NEVER_TICK
 from miro_robot.bare.machine import CRYSTAL_HZ, CRYSTAL_RANGE_HZ
 from miro_robot.faults import FaultKind, FirmwareFault
-from miro_robot.harness.heard_bus import HeardBus
+from miro_robot.harness.recording_bus import HeardBus
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import ASLEEP, Cpu
 from mirotwin.fuzz.exchange import Character, Exchange, Memory

@@ -9,7 +9,7 @@ from miro_exact.clock import NEVER_TICK
 from miro_protocol.stream_events import Deed, Reset
 from miro_protocol.transmission import Transmission
 from miro_robot.harness.harness import SETTLE_TICKS
-from miro_robot.harness.heard_bus import LONGEST_ANSWER_TICKS
+from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
 from miro_robot.image import Image
 from miro_robot.mcs51.uart import STOPPED_TICK
 from mirotwin.fuzz.bare_machine import BareLine, BareProcessor

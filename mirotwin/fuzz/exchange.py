@@ -28,7 +28,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_host.raised import at_place, defined_at, raised
 from miro_robot.faults import FirmwareFault
-from miro_robot.harness.heard_bus import HeardBus
+from miro_robot.harness.recording_bus import HeardBus
 from miro_robot.image import Image
 from miro_robot.image.c_types import value_of
 from miro_robot.image.variables import Variable, Variables, find_variable

@@ -14,7 +14,7 @@ from miro_protocol.transmission import Transmission
 from miro_robot.board import Board
 from miro_robot.harness.harness import AWAKE, Harness
 from miro_robot.harness.program import INPUTS, Program
-from miro_robot.harness.referee import NAMES, Referee
+from miro_robot.harness.fast_oracle import NAMES, Referee
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant

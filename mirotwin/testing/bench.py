@@ -31,7 +31,7 @@ from miro_robot.mcs51.line import Line
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
 from miro_sim.radio import Downlink, RadioParams, Uplink
-from mirotwin.testing.air import Air, Trouble
+from mirotwin.testing.noisy_wire import Air, Trouble
 
 MS = TICKS_PER_SECOND // 1000
 BOOT_TICKS = 4 * MS

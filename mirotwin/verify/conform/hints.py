@@ -15,7 +15,7 @@ from mirotwin.verify.conform.sealing import mistake_in
 
 if TYPE_CHECKING:
     from miro_sim.world.events import Event
-    from mirotwin.verify.conform.talk import Frame
+    from mirotwin.verify.conform.trial_script import Frame
 
 Pair = tuple[int, int]
 _SHIFTS = range(1, 17)

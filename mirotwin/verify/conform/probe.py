@@ -13,7 +13,7 @@ from mirotwin.verify.conform.hints import characters
 from mirotwin.verify.conform.listening import Listener, listen
 from mirotwin.verify.conform.rule import BOTH, Air, Rule
 from mirotwin.verify.conform.sealing import MISTAKES
-from mirotwin.verify.conform.talk import ACTING_TICKS, Frame, Talk, obeys
+from mirotwin.verify.conform.trial_script import ACTING_TICKS, Frame, Talk, obeys
 from mirotwin.verify.conform.trial import make_trial, trial_of
 
 _SETTLING_MS = 200.0

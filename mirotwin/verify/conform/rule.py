@@ -12,7 +12,7 @@ from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
-    from mirotwin.verify.conform.talk import Talk
+    from mirotwin.verify.conform.trial_script import Talk
 
 
 class Air(msgspec.Struct, frozen=True):

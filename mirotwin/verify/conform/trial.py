@@ -17,7 +17,7 @@ from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
 from mirotwin.verify.conform.rule import Air, Rule
-from mirotwin.verify.conform.talk import Expectation, Talk
+from mirotwin.verify.conform.trial_script import Expectation, Talk
 
 MOST_FAULTS = 1000
 LOOK_TICKS = 24_000

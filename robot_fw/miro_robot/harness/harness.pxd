@@ -1,7 +1,7 @@
 cimport cython
 
 from miro_robot.board cimport Board
-from miro_robot.harness.judge cimport Judge
+from miro_robot.harness.oracle cimport Judge
 from miro_robot.harness.program cimport Program
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.line cimport Line

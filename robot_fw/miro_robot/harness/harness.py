@@ -15,7 +15,7 @@ from typing import Any
 from miro_exact.clock import NEVER_TICK, TICKS_PER_SECOND
 from miro_exact.state import Flat
 from miro_robot.board import Board
-from miro_robot.harness.judge import Judge
+from miro_robot.harness.oracle import Judge
 from miro_robot.harness.program import RESET_TICKS, Program
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant

@@ -3,7 +3,7 @@
 import pytest
 
 from miro_protocol import stream
-from miro_robot.harness.referee import NAMES
+from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.image.debug_info import Sources
 from mirotwin.fuzz.confirm import NEVER_SLEEPS, Place, WorldCourt, expected_of, judge
 from mirotwin.fuzz.files import CampaignFolder

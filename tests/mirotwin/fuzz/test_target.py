@@ -11,7 +11,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_robot import event_log
 from miro_robot.firmware import image_path
-from miro_robot.harness.referee import NAMES
+from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.image import load_hex
 from miro_sim.world.world import World
 from mirotwin.fuzz.confirm import expected_of

@@ -9,7 +9,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import Symbol, Symbols, load_hex
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import RadioParams
-from mirotwin.testing.air import Air, Trouble
+from mirotwin.testing.noisy_wire import Air, Trouble
 from mirotwin.testing.bench import MS, Bench, LinkFailure
 from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.testing.noise import listen

@@ -7,7 +7,7 @@ import pytest
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.harness.harness import AWAKE, DONE, STOPPED, Harness
-from miro_robot.harness.judge import Judge
+from miro_robot.harness.oracle import Judge
 from miro_robot.harness.program import BYTES, SESSION, Program
 from miro_robot.image import SPACE_BYTES, Image, Symbols, load_hex
 from miro_robot.plant import Plant

@@ -24,7 +24,7 @@ from mirotwin.verify.conform.hints import characters, in_a_row, no_answer, numbe
 from mirotwin.verify.conform.rule import BOTH, THREE, Air, Chapter
 from mirotwin.verify.conform.rules import FRAME, FRESHNESS, RECEPTION, TURNS
 from mirotwin.verify.conform.seen import Answer, Seen
-from mirotwin.verify.conform.talk import Found, Frame, Talk, ms, over_by
+from mirotwin.verify.conform.trial_script import Found, Frame, Talk, ms, over_by
 
 CHAPTER = Chapter("Answers")
 BAUD = TICKS_PER_SECOND / ROBOT_BIT_TICKS

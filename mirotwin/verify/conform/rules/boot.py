@@ -11,7 +11,7 @@ from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import POWER_ON
 from mirotwin.verify.conform.seen import Seen
-from mirotwin.verify.conform.talk import BOOTED_MS, Found, Talk, ms
+from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, Talk, ms
 
 CHAPTER = Chapter("Power-on")
 _RESET, _RSTI = BY_NAME["RESET"].opcode, BY_NAME["RSTI"].opcode

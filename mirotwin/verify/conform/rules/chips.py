@@ -10,7 +10,7 @@ from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FRAME, PORT, POWER_ON
 from mirotwin.verify.conform.rules.sound import nothing_refused
 from mirotwin.verify.conform.seen import Answer, Seen
-from mirotwin.verify.conform.talk import Found, Talk
+from mirotwin.verify.conform.trial_script import Found, Talk
 
 CHAPTER = Chapter("Slow and broken LM629s")
 _BUSY = 0x01

@@ -13,7 +13,7 @@ from mirotwin.verify.conform.probe import why_deaf
 from mirotwin.verify.conform.rule import Air, Chapter
 from mirotwin.verify.conform.rules import FIRMWARE, FRAME, TURNS
 from mirotwin.verify.conform.seen import Seen
-from mirotwin.verify.conform.talk import ACTING_TICKS, Found, Frame, How, Talk, ms
+from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, How, Talk, ms
 
 CHAPTER = Chapter("Velocities")
 _LTRJ = BY_NAME["LTRJ"].opcode

@@ -18,7 +18,7 @@ from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FRESHNESS, WHEELS
 from mirotwin.verify.conform.seen import Seen
-from mirotwin.verify.conform.talk import ACTING_TICKS, Found, Frame, Talk, ms
+from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, Talk, ms
 
 CHAPTER = Chapter("Failsafe")
 TOLERANCE_TICKS = ms(0.5)

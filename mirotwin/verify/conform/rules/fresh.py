@@ -5,7 +5,7 @@ from __future__ import annotations
 from miro_protocol.table import FRESH_STEPS, SEQ_MODULUS
 from mirotwin.verify.conform.rule import Air, Chapter
 from mirotwin.verify.conform.rules import FRESHNESS
-from mirotwin.verify.conform.talk import How, Talk, ms
+from mirotwin.verify.conform.trial_script import How, Talk, ms
 
 CHAPTER = Chapter("Freshness")
 AGAIN_MS = 150.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from mirotwin.verify.conform.rule import THREE, Chapter
 from mirotwin.verify.conform.rules import FRESHNESS, TURNS
-from mirotwin.verify.conform.talk import Talk, ms
+from mirotwin.verify.conform.trial_script import Talk, ms
 
 CHAPTER = Chapter("Long trials")
 _FRAMES = 2000

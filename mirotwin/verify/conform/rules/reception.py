@@ -15,7 +15,7 @@ from miro_protocol.table import LAYOUT_TEAM, SEQ_MODULUS, SYNC, TELEMETRY, Frame
 from miro_protocol.whitening import whiten
 from mirotwin.verify.conform.rule import BOTH, Air, Chapter
 from mirotwin.verify.conform.rules import FRAME, RECEPTION, VERSIONS, WHY
-from mirotwin.verify.conform.talk import ACTING_TICKS, Frame, How, Talk
+from mirotwin.verify.conform.trial_script import ACTING_TICKS, Frame, How, Talk
 
 CHAPTER = Chapter("Reception")
 _CHANCE = Stream(0, "conform/reception")

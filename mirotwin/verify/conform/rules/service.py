@@ -10,7 +10,7 @@ from mirotwin.verify.conform.rules import FIRMWARE, FRAME, RECEPTION, VERSIONS
 from mirotwin.verify.conform.rules.failsafe import stops_behind
 from mirotwin.verify.conform.rules.sound import nothing_refused
 from mirotwin.verify.conform.seen import Seen, Words
-from mirotwin.verify.conform.talk import ACTING_TICKS, Found, Frame, Talk, ms
+from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, Talk, ms
 
 CHAPTER = Chapter("Service frames and unknown contents")
 

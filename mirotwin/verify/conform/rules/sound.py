@@ -9,7 +9,7 @@ from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FAULTS, POWER_ON
 from mirotwin.verify.conform.rules.boot import keeps_off
 from mirotwin.verify.conform.seen import Seen
-from mirotwin.verify.conform.talk import BOOTED_MS, Found, Talk, ms
+from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, Talk, ms
 
 CHAPTER = Chapter("Soundness")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mirotwin.verify.conform.rule import Air, Chapter
 from mirotwin.verify.conform.rules import TURNS
-from mirotwin.verify.conform.talk import Talk
+from mirotwin.verify.conform.trial_script import Talk
 
 CHAPTER = Chapter("Straps")
 

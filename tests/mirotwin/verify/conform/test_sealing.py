@@ -11,7 +11,7 @@ from miro_protocol.table import DOWNLINK, TELEMETRY, Format
 from mirotwin.verify.checks.orders import Order
 from mirotwin.verify.conform.hints import wheels_instead
 from mirotwin.verify.conform.sealing import MISTAKES, Sealing, mistake_in
-from mirotwin.verify.conform.talk import Frame
+from mirotwin.verify.conform.trial_script import Frame
 
 FORMATS = (*DOWNLINK.values(), TELEMETRY)
 ENDS = st.integers(-16633, 16633)

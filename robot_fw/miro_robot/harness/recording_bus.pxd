@@ -1,6 +1,6 @@
 cimport cython
 
-from miro_robot.harness.judge cimport Judge
+from miro_robot.harness.oracle cimport Judge
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.xram cimport XramBus
 

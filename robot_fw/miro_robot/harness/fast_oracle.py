@@ -34,7 +34,7 @@ from miro_protocol.table import (
 )
 from miro_robot import event_log
 from miro_robot.board import Board
-from miro_robot.harness.judge import Judge
+from miro_robot.harness.oracle import Judge
 from miro_robot.lm629.commands import BY_NAME
 from miro_robot.lm629.signals import COMMAND_ERROR
 

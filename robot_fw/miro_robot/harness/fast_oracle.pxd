@@ -3,7 +3,7 @@ cimport cython
 from miro_protocol.scan cimport Scanner
 from miro_robot.board cimport Board
 from miro_robot.event_log cimport EventLog
-from miro_robot.harness.judge cimport Judge
+from miro_robot.harness.oracle cimport Judge
 
 cdef int _NO_FAULT, _LM629, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS
 cdef long long _ACTING, _ANSWER, _TOLERANCE, _TESTING, _NEVER, _CHARACTER, _TO_RI, _TO_TI
