@@ -19,8 +19,8 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_robot.firmware import image_path
-from miro_robot.harness.program import OPERATIONS
 from miro_robot.harness.fast_oracle import NAMES
+from miro_robot.harness.program import OPERATIONS
 from miro_robot.image import Image, load_hex
 from miro_sim.world.world import World
 from mirotwin.fuzz.confirm import AFTER_TICKS, expected_of

@@ -19,8 +19,8 @@ from miro_protocol.stream_events import Deed
 from miro_protocol.transmission import Transmission
 from miro_robot.bare.machine import CRYSTAL_HZ
 from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
-from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareJudge
 from miro_robot.harness.program import INPUTS, Program
+from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareOracle
 from miro_robot.image import SPACE_BYTES, Image, load_hex
 from mirotwin.fuzz.bare_machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
 from mirotwin.fuzz.exchange import Exchange, NamedCheck, check_named
@@ -70,8 +70,8 @@ class BareTarget(HarnessTarget):
         self.processor.start_up(crystal_hz, boot_ms)
         bit_ticks = bit_ticks_of(self.processor, crystal_hz, baud, boot_ms)
         self.line = BareLine(crystal_hz, bit_ticks, self.processor.begin_tick)
-        self.judge = BareJudge(self.processor.bus, self.processor.cpu)
-        harness = Harness(self.processor, self.processor.cpu, self.judge, bit_ticks)
+        self.oracle = BareOracle(self.processor.bus, self.processor.cpu)
+        harness = Harness(self.processor, self.processor.cpu, self.oracle, bit_ticks)
         program = Program(INPUTS.index(input), repair=self._repaired, character_ticks=_BITS * bit_ticks)
         super().__init__(image, harness, program)
         self.code = 0
@@ -88,7 +88,7 @@ class BareTarget(HarnessTarget):
 
     def run(self, data: Any) -> int:
         ended = self.play(data)
-        self.code = NO_FAULT_CODE if self.judge.code else 0
+        self.code = NO_FAULT_CODE if self.oracle.code else 0
         if ended == AWAKE and not self.code:
             self.code = self._awake()
         if self.check is not None and not self.code:

@@ -8,7 +8,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import NEVER_TICK
 from miro_robot.bare.machine import CRYSTAL_HZ, CRYSTAL_RANGE_HZ
 from miro_robot.faults import FaultKind, FirmwareFault
-from miro_robot.harness.recording_bus import HeardBus
+from miro_robot.harness.recording_bus import RecordingBus
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import ASLEEP, Cpu
 from mirotwin.fuzz.exchange import Character, Exchange, Memory
@@ -44,12 +44,12 @@ class BareLine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class BareProcessor:
     """Powered on; `begin_tick` is when the first character could come."""
 
-    STATE = {"bus": HeardBus, "cpu": Cpu}
+    STATE = {"bus": RecordingBus, "cpu": Cpu}
     NOT_STATE = ("image", "memory", "begin_tick")
 
     def __init__(self, image: Image) -> None:
         self.image = image
-        self.bus = HeardBus()
+        self.bus = RecordingBus()
         self.cpu = Cpu(self.bus)
         self.bus.cpu = self.cpu
         self.cpu.load(image.code, image.used)
@@ -74,7 +74,7 @@ class BareProcessor:
             raise BadInput(self.image.path, "", what, "mend it, or see `mirotwin fw run`")
 
     def fault(self) -> FirmwareFault | None:
-        """The first one since `HeardBus.begin`."""
+        """The first one since `RecordingBus.begin`."""
         bus = self.bus
         if not bus.fault_kind:
             return None
@@ -82,7 +82,7 @@ class BareProcessor:
         return FirmwareFault(FaultKind(bus.fault_kind), bus.fault_tick, bus.fault_pc, symbol)
 
     def exchange(self) -> Exchange:
-        """What went in and out since `HeardBus.begin`, and the memories as they are now."""
+        """What went in and out since `RecordingBus.begin`, and the memories as they are now."""
         return Exchange(
             received=tuple(Character(value, tick, bool(stop)) for value, stop, tick in self.bus.heard()),
             sent=tuple(Character(value, tick) for value, tick in self.bus.said()),

@@ -92,7 +92,7 @@ SILENCES = ("failsafe_stop_ms", "motors_off_ms")
 
 
 def expected_of(check: str) -> dict[str, Any]:
-    """The check that tells whether a finding of that name is one; the failsafe's with the referee's tolerance."""
+    """The check that tells whether a finding of that name is one; the failsafe's with the fast oracle's tolerance."""
     if check == NEVER_SLEEPS:
         return {"acts_within_ms": True}
     if check in SILENCES:

@@ -28,7 +28,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_host.raised import at_place, defined_at, raised
 from miro_robot.faults import FirmwareFault
-from miro_robot.harness.recording_bus import HeardBus
+from miro_robot.harness.recording_bus import RecordingBus
 from miro_robot.image import Image
 from miro_robot.image.c_types import value_of
 from miro_robot.image.variables import Variable, Variables, find_variable
@@ -53,7 +53,7 @@ class Character(NamedTuple):
 class Memory:
     """The memories of the processor, as they are at the end of the run. Good until the next run."""
 
-    def __init__(self, cpu: Cpu, bus: HeardBus, image: Image) -> None:
+    def __init__(self, cpu: Cpu, bus: RecordingBus, image: Image) -> None:
         self._cpu = cpu
         self._bus = bus
         self._image = image

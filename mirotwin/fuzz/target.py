@@ -12,9 +12,9 @@ from miro_protocol.stream_events import Deed
 from miro_protocol.table import downlink
 from miro_protocol.transmission import Transmission
 from miro_robot.board import Board
+from miro_robot.harness.fast_oracle import NAMES, FastOracle
 from miro_robot.harness.harness import AWAKE, Harness
 from miro_robot.harness.program import INPUTS, Program
-from miro_robot.harness.fast_oracle import NAMES, Referee
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
@@ -63,7 +63,7 @@ class RobotTarget(HarnessTarget):
     """The MIRO's board with `image`, as robot `slot` of `robots`, motors unplugged, up and in silence.
 
     `run(data)` puts it back and plays an input of any length; returns 0, or the kind of `finding`, by the place of its
-    name in `referee.NAMES`. Edges are counted in the map of `use_map`, a writable buffer of `map_size` bytes.
+    name in `fast_oracle.NAMES`. Edges are counted in the map of `use_map`, a writable buffer of `map_size` bytes.
     `accepted`: fresh frames of the last run; `highest_sp`: how high its stack grew.
     """
 
@@ -72,19 +72,19 @@ class RobotTarget(HarnessTarget):
             raise BadInput("", "", f"input {input!r}", f"use {', '.join(INPUTS)}")
         self.robots = robots
         self.board = _booted(image, slot, robots)
-        self.referee = Referee(self.board, slot, robots)
+        self.oracle = FastOracle(self.board, slot, robots)
         cpu, bit_ticks = self.board.cpu, downlink(robots).bit_ticks
-        harness = Harness(self.board, cpu, self.referee, bit_ticks, self.board)
+        harness = Harness(self.board, cpu, self.oracle, bit_ticks, self.board)
         super().__init__(image, harness, Program(INPUTS.index(input), slot, robots), slot)
         self.code = 0
 
     @property
     def accepted(self) -> int:
-        return self.referee.accepted
+        return self.oracle.accepted
 
     def run(self, data: Any) -> int:
         ended = self.play(data)
-        self.code = self.referee.code
+        self.code = self.oracle.code
         if ended == AWAKE and not self.code:
             self.code = NEVER_SLEEPS_CODE
         return self.code
@@ -97,9 +97,9 @@ class RobotTarget(HarnessTarget):
         if self.code == NEVER_SLEEPS_CODE:
             what = "the firmware is awake 30 ms after the last character"
             return Finding(NEVER_SLEEPS, self.harness.now_tick, 0, what)
-        check, tick = NAMES[self.code], self.referee.tick
+        check, tick = NAMES[self.code], self.oracle.tick
         if self.board.faults:
-            return Finding(check, tick, self.referee.pc, str(self.board.faults[0]))
+            return Finding(check, tick, self.oracle.pc, str(self.board.faults[0]))
         return Finding(check, tick, 0, f"{check} at tick {tick}")
 
     def __repr__(self) -> str:

@@ -31,7 +31,7 @@ from miro_robot.mcs51.line import Line
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
 from miro_sim.radio import Downlink, RadioParams, Uplink
-from mirotwin.testing.noisy_wire import Air, Trouble
+from mirotwin.testing.noisy_wire import NoisyWire, Trouble
 
 MS = TICKS_PER_SECOND // 1000
 BOOT_TICKS = 4 * MS
@@ -74,7 +74,7 @@ class Bench:
         ),
         "board": Board,
         "downlink": Downlink,
-        "air": Air,
+        "wire": NoisyWire,
         "uplink": Uplink,
         "receiver": LineReceiver,
         "decoder": Decoder,
@@ -108,7 +108,7 @@ class Bench:
         self.downlink = Downlink(self.radio, seed, "down")
         heard = Line()
         self.downlink.listen(slot, heard)
-        self.air = Air(heard, self.board.cpu.rxd, seed, "air")
+        self.wire = NoisyWire(heard, self.board.cpu.rxd, seed, "air")
         self.uplink = Uplink(self.radio, seed, "up")
         self.uplink.listen(self.board.cpu.txd)
         self.now = 0
@@ -157,10 +157,10 @@ class Bench:
 
         Both are rounded up to whole bits.
         """
-        free = max([self.air.settled_tick, *(one.end_tick for one in self.air.troubles)])
+        free = max([self.wire.settled_tick, *(one.end_tick for one in self.wire.troubles)])
         start = _on_grid(max(free, self.now + after_ticks))
         length_ticks = _on_grid(length_ticks)
-        self.air.trouble(msgspec.convert((start, start + length_ticks, kind), Trouble))
+        self.wire.trouble(msgspec.convert((start, start + length_ticks, kind), Trouble))
 
     def wait(self, ticks: int) -> None:
         if ticks < 0:
@@ -183,7 +183,7 @@ class Bench:
         while self.now < tick:
             self.now = min(tick, self.now + STEP_TICKS)
             self.downlink.settle(self.now + AHEAD_TICKS)
-            self._hear(self.air.settle())
+            self._hear(self.wire.settle())
             while self.board.run(self.now) == WIRE_FULL:
                 self._take_answers(self.uplink.full_tick())
             if self.board.faults:

@@ -116,7 +116,7 @@ class LinkMachine(RuleBasedStateMachine):
 
         self._do(send)
 
-    @precondition(lambda self: not self.bench.air.troubles)
+    @precondition(lambda self: not self.bench.wire.troubles)
     @rule()
     def reset_the_robot(self) -> None:
         self._do(self.bench.reset)

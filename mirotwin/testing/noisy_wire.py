@@ -24,7 +24,7 @@ class Trouble(Struct, frozen=True, array_like=True):
     kind: Kind
 
 
-class Air:
+class NoisyWire:
     """Takes levels from `heard`, gives them to `rxd`, but for the troubles announced; seeds as in `rng.Stream`."""
 
     STATE = {

@@ -49,9 +49,9 @@ def _rules(ids: Sequence[str]) -> str:
 
 def _where(cause: Outcome) -> str:
     """The network size in which alone the rule fails, if it was tried in others too."""
-    airs = find(cause.rule).airs
-    failed = {airs[one.network].robots for one in cause.failures if not one.fault}
-    if len(failed) == 1 and len({air.robots for air in airs}) > 1:
+    topologies = find(cause.rule).topologies
+    failed = {topologies[one.network].robots for one in cause.failures if not one.fault}
+    if len(failed) == 1 and len({topology.robots for topology in topologies}) > 1:
         return f" where N = {failed.pop()}"
     return ""
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
-from mirotwin.verify.conform.rule import Air, Rule
+from mirotwin.verify.conform.rule import Rule, Topology
 from mirotwin.verify.conform.table import CHAPTERS
 
 
@@ -20,9 +20,9 @@ def _chapter(title: str, rules: list[Rule]) -> Iterator[str]:
     yield "| rule | name | a robot must | from | tried with | presupposes |"
     yield "|---|---|---|---|---|---|"
     for rule in rules:
-        airs = "; ".join(dict.fromkeys(map(_air, rule.airs))) + _chips(rule.lm629)
+        topologies = "; ".join(dict.fromkeys(map(_topology, rule.topologies))) + _chips(rule.lm629)
         text, before = rule.text.replace("|", chr(92) + "|"), ", ".join(rule.presupposes)
-        yield f"| {rule.id} | {rule.name} | {text} | {_source(rule.source)} | {airs} | {before} |"
+        yield f"| {rule.id} | {rule.name} | {text} | {_source(rule.source)} | {topologies} | {before} |"
     yield ""
 
 
@@ -41,14 +41,14 @@ def _chips(lm629: Lm629Options) -> str:
     return "".join(f", {one}" for one in changed)
 
 
-def _air(air: Air) -> str:
-    slots = ", ".join(map(str, air.slots))
-    more = ", keyed carrier with noise" if air.keyed else ""
-    if air.strap is not None:
-        more += f", its pins say {air.strap}"
-    if air.baud_offset_ppm:
-        more += f", host {air.baud_offset_ppm / 10_000:+g} %"
-    return f"N = {air.robots}, slot {slots}{more}"
+def _topology(topology: Topology) -> str:
+    slots = ", ".join(map(str, topology.slots))
+    more = ", keyed carrier with noise" if topology.keyed else ""
+    if topology.strap is not None:
+        more += f", its pins say {topology.strap}"
+    if topology.baud_offset_ppm:
+        more += f", host {topology.baud_offset_ppm / 10_000:+g} %"
+    return f"N = {topology.robots}, slot {slots}{more}"
 
 
 if __name__ == "__main__":

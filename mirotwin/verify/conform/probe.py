@@ -11,10 +11,10 @@ from miro_robot.lm629.commands import BY_NAME
 from miro_sim.world.events import Event
 from mirotwin.verify.conform.hints import characters
 from mirotwin.verify.conform.listening import Listener, listen
-from mirotwin.verify.conform.rule import BOTH, Air, Rule
+from mirotwin.verify.conform.rule import BOTH, Rule, Topology
 from mirotwin.verify.conform.sealing import MISTAKES
-from mirotwin.verify.conform.trial_script import ACTING_TICKS, Frame, Talk, obeys
 from mirotwin.verify.conform.trial import make_trial, trial_of
+from mirotwin.verify.conform.trial_script import ACTING_TICKS, Frame, TrialScript, obeys
 
 _SETTLING_MS = 200.0
 _STT = BY_NAME["STT"].opcode
@@ -25,24 +25,24 @@ _UNHEARD = 4
 
 def why_deaf(network: int, image: Image, seed: int) -> str:
     """What the robot in this one of `BOTH` does instead of obeying plain frames, or ""."""
-    air = BOTH[network]
+    topology = BOTH[network]
     said: list[tuple[str, Frame]] = []
 
-    def ways(talk: Talk) -> None:
-        talk.wait(_SETTLING_MS)
-        said.append(("", talk.team()))
+    def ways(script: TrialScript) -> None:
+        script.wait(_SETTLING_MS)
+        said.append(("", script.team()))
         for what, sealing in MISTAKES.items():
-            if sealing.seal(talk.form, bytes(talk.form.body_size)) != seal(
-                talk.form, bytes(talk.form.body_size)
+            if sealing.seal(script.form, bytes(script.form.body_size)) != seal(
+                script.form, bytes(script.form.body_size)
             ):
-                said.append((f"frames with {what}", talk.team(sealed=sealing.seal)))
-        other = _other_layout(talk)
+                said.append((f"frames with {what}", script.team(sealed=sealing.seal)))
+        other = _other_layout(script)
         said.append((f"frames for {other.n} robots: its strap for N is read the other way", other.team()))
-        talk.said += other.said
-        talk.wait_until(other.now)
-        talk.expect(talk.now, "", lambda seen: None)
+        script.said += other.said
+        script.wait_until(other.now)
+        script.expect(script.now, "", lambda seen: None)
 
-    rule = Rule("P24", "", "", ways, (air,))
+    rule = Rule("P24", "", "", ways, (topology,))
     (listener,) = listen(make_trial(rule), image, seed)
     right = said[0][1]
     return (
@@ -53,11 +53,11 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
     )
 
 
-def _other_layout(talk: Talk) -> Talk:
+def _other_layout(script: TrialScript) -> TrialScript:
     """The same host, which from now on speaks to a network of the other size."""
-    other = Talk(next(air for air in BOTH if air.robots != talk.n), talk.network)
-    other.air = Air(other.n, talk.air.slots)
-    other.now, other.seq = talk.now, talk.seq
+    other = TrialScript(next(topology for topology in BOTH if topology.robots != script.n), script.network)
+    other.topology = Topology(other.n, script.topology.slots)
+    other.now, other.seq = script.now, script.seq
     return other
 
 
@@ -86,7 +86,7 @@ def _serial_port(events: Sequence[Event], frame: Frame) -> str:
 def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
     """Whether a robot's serial port did not take all characters of the rule's trial, or its program did no more."""
     trial = trial_of(rule)
-    if rule.airs[network].keyed or len(trial.script) > len(trial.transmissions):
+    if rule.topologies[network].keyed or len(trial.script) > len(trial.transmissions):
         return ""  # noise, or a robot that was off
     sent = len(b"".join(one.data for one in trial.transmissions if one.network == network))
     for listener in listen(trial, image, seed):

@@ -12,10 +12,10 @@ from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 
 if TYPE_CHECKING:
     from miro_robot.image import Image
-    from mirotwin.verify.conform.trial_script import Talk
+    from mirotwin.verify.conform.trial_script import TrialScript
 
 
-class Air(msgspec.Struct, frozen=True):
+class Topology(msgspec.Struct, frozen=True):
     """A network of `robots` slots with a robot in each of `slots`, and a radio without errors.
 
     `keyed`: the carrier is on for frames only and the receiver hears noise in between; else it is on all the time.
@@ -30,27 +30,28 @@ class Air(msgspec.Struct, frozen=True):
     strap: int | None = None
 
 
-BOTH = (Air(3, (1,)), Air(5, (3,)))
+BOTH = (Topology(3, (1,)), Topology(5, (3,)))
 """A robot in either layout."""
-THREE = (Air(3, (1,)),)
+THREE = (Topology(3, (1,)),)
 """One robot, where the layout does not matter."""
 
 
 class Rule(msgspec.Struct, frozen=True):
     """`text` is a sentence with MUST, `source` the page and section that it comes from.
 
-    `script` says what the host of a network says and what its robots have to make of it; it is called for each of
-    `airs`. `faults`: kinds of firmware fault that break this rule, in its own trial and in those of others. `lm629`:
-    the chips of its robots. `presupposes`: ids of rules without which its trial says nothing about its own sentence;
-    where one of them failed, this one is not judged. `broken`: what firmware does that breaks it, for rules that others
-    presuppose. `probe` finds out more about such firmware, in the network that is given; it may find nothing, "".
+    `write` writes the trial: what the host of a network sends, and what its robots have to make of it. It is called
+    for each of `topologies`. `faults`: kinds of firmware fault that break this rule, in its own trial and in those of
+    others. `lm629`: the chips of its robots. `presupposes`: ids of rules without which its trial says nothing about
+    its own sentence; where one of them failed, this one is not judged. `broken`: what firmware does that breaks it,
+    for rules that others presuppose. `probe` finds out more about such firmware, in the network that is given; it may
+    find nothing, "".
     """
 
     id: str
     text: str
     source: str
-    script: Callable[[Talk], None]
-    airs: tuple[Air, ...] = BOTH
+    write: Callable[[TrialScript], None]
+    topologies: tuple[Topology, ...] = BOTH
     faults: tuple[FaultKind, ...] = ()
     lm629: Lm629Options = DEFAULT_OPTIONS
     presupposes: tuple[str, ...] = ()
@@ -60,11 +61,11 @@ class Rule(msgspec.Struct, frozen=True):
     @property
     def name(self) -> str:
         """A few words, for tables."""
-        return self.script.__name__.replace("_", " ")
+        return self.write.__name__.replace("_", " ")
 
 
 class Chapter:
-    """Collects the rules of a file: `@chapter.rule("P01", "The robot MUST ..", SOURCE)` before a script."""
+    """Collects the rules of a file: `@chapter.rule("P01", "The robot MUST ..", SOURCE)` before each function."""
 
     def __init__(self, title: str) -> None:
         self.title = title
@@ -75,15 +76,17 @@ class Chapter:
         id: str,
         text: str,
         source: str,
-        airs: tuple[Air, ...] = BOTH,
+        topologies: tuple[Topology, ...] = BOTH,
         faults: tuple[FaultKind, ...] = (),
         lm629: Lm629Options = DEFAULT_OPTIONS,
         presupposes: tuple[str, ...] = (),
         broken: str = "",
         probe: Callable[[int, Image, int], str] | None = None,
-    ) -> Callable[[Callable[[Talk], None]], Callable[[Talk], None]]:
-        def keep(script: Callable[[Talk], None]) -> Callable[[Talk], None]:
-            self.rules.append(Rule(id, text, source, script, airs, faults, lm629, presupposes, broken, probe))
-            return script
+    ) -> Callable[[Callable[[TrialScript], None]], Callable[[TrialScript], None]]:
+        def keep(write: Callable[[TrialScript], None]) -> Callable[[TrialScript], None]:
+            self.rules.append(
+                Rule(id, text, source, write, topologies, faults, lm629, presupposes, broken, probe)
+            )
+            return write
 
         return keep

@@ -16,8 +16,8 @@ from miro_protocol.transmission import Transmission
 from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
-from mirotwin.verify.conform.rule import Air, Rule
-from mirotwin.verify.conform.trial_script import Expectation, Talk
+from mirotwin.verify.conform.rule import Rule, Topology
+from mirotwin.verify.conform.trial_script import Expectation, TrialScript
 
 MOST_FAULTS = 1000
 LOOK_TICKS = 24_000
@@ -73,18 +73,18 @@ def trial_of(rule: Rule) -> Trial:
 
 
 def make_trial(rule: Rule) -> Trial:
-    talks = [Talk(air, index) for index, air in enumerate(rule.airs)]
-    for talk in talks:
-        rule.script(talk)
-    end_tick = max(one.tick for talk in talks for one in talk.expected)
-    script: list[Transmission | Deed] = []
-    for talk in talks:
-        script += [*talk.said, *talk.done]
-    script.sort(key=lambda one: one.tick)
+    scripts = [TrialScript(topology, index) for index, topology in enumerate(rule.topologies)]
+    for script in scripts:
+        rule.write(script)
+    end_tick = max(one.tick for script in scripts for one in script.expected)
+    events: list[Transmission | Deed] = []
+    for script in scripts:
+        events += [*script.said, *script.done]
+    events.sort(key=lambda one: one.tick)
     # everything before the end is told, so the last expectation needs a tick more
     periods = end_tick // CONTROL_PERIOD_TICKS + 1
     scenario = parse(_text(rule, seconds(periods * CONTROL_PERIOD_TICKS)), rule.id, ())
-    return Trial(rule, scenario, tuple(script), tuple(tuple(talk.expected) for talk in talks))
+    return Trial(rule, scenario, tuple(events), tuple(tuple(script.expected) for script in scripts))
 
 
 def _text(rule: Rule, duration_s: float) -> str:
@@ -96,15 +96,17 @@ def _text(rule: Rule, duration_s: float) -> str:
         lm629=rule.lm629,
         disarms="true" if rule.lm629.reset_disarms_breakpoint else "false",
     )
-    return text + "".join(_network(air, places) for air in rule.airs)
+    return text + "".join(_network(topology, places) for topology in rule.topologies)
 
 
-def _network(air: Air, places: Iterator[tuple[float, float]]) -> str:
-    carrier, squelch = ("keyed", "false") if air.keyed else ("on", "true")
-    text = _NETWORK.format(robots=air.robots, carrier=carrier, squelch=squelch, offset=air.baud_offset_ppm)
-    for slot in air.slots:
+def _network(topology: Topology, places: Iterator[tuple[float, float]]) -> str:
+    carrier, squelch = ("keyed", "false") if topology.keyed else ("on", "true")
+    text = _NETWORK.format(
+        robots=topology.robots, carrier=carrier, squelch=squelch, offset=topology.baud_offset_ppm
+    )
+    for slot in topology.slots:
         x_cm, y_cm = next(places)
-        strap = "" if air.strap is None else f"\nstrap = {air.strap}"
+        strap = "" if topology.strap is None else f"\nstrap = {topology.strap}"
         text += _ROBOT.format(slot=slot, strap=strap, x_cm=x_cm, y_cm=y_cm)
     return text
 

@@ -1,9 +1,9 @@
 """What the host of a network says in a trial, and what is expected of its robots: the words in which rules are written.
 
-    frame = talk.team()                 velocities that no frame before it had
-    talk.obeyed(frame)                  expected of each robot of the network
-    talk.wait(5.0)
-    talk.ignored(talk.team(wrong={3: 0x10}))
+    frame = script.team()                 velocities that no frame before it had
+    script.obeyed(frame)                  expected of each robot of the network
+    script.wait(5.0)
+    script.ignored(script.team(wrong={3: 0x10}))
 
 A trial is open: what is said does not depend on what the robots do. So everything is known in advance, and so is the
 tick at which each expectation is over.
@@ -43,7 +43,7 @@ from mirotwin.verify.conform.hints import (
     number,
     wheels_instead,
 )
-from mirotwin.verify.conform.rule import Air
+from mirotwin.verify.conform.rule import Topology
 from mirotwin.verify.conform.seen import Answer, Seen
 
 _LTRJ = BY_NAME["LTRJ"].opcode
@@ -91,7 +91,7 @@ class Expectation:
 
 
 class How(TypedDict, total=False):
-    """How a frame is said; see `Talk.say`."""
+    """How a frame is said; see `TrialScript.say`."""
 
     fresh: bool
     lead: bytes
@@ -103,18 +103,18 @@ class How(TypedDict, total=False):
     sealed: Callable[[Format, bytes], bytes]
 
 
-class Talk:
+class TrialScript:
     """The host of network `network`. `now`: when it can speak next; `seq`: of its last fresh frame.
 
     `said`, `done` and `expected` are what comes of it.
     """
 
-    def __init__(self, air: Air, network: int = 0) -> None:
-        self.air = air
-        self.n = air.robots
+    def __init__(self, topology: Topology, network: int = 0) -> None:
+        self.topology = topology
+        self.n = topology.robots
         self.network = network
-        self.form = downlink(air.robots)
-        self.character_ticks = -(-HOST_CHARACTER_TICKS * 1_000_000 // (1_000_000 + air.baud_offset_ppm))
+        self.form = downlink(topology.robots)
+        self.character_ticks = -(-HOST_CHARACTER_TICKS * 1_000_000 // (1_000_000 + topology.baud_offset_ppm))
         self.now = ms(BOOTED_MS)
         self.seq = 20 + network
         self.said: list[Transmission] = []
@@ -175,7 +175,7 @@ class Talk:
 
     def ping(self, **how: Unpack[How]) -> Frame:
         """A service frame that changes nothing."""
-        return self.service(self.air.slots[0], Opcode.PING, what="ping", **how)
+        return self.service(self.topology.slots[0], Opcode.PING, what="ping", **how)
 
     def of_type_2(self, **how: Unpack[How]) -> Frame:
         """A frame that only robots send, with a good CRC."""
@@ -183,7 +183,7 @@ class Talk:
 
     def ask_nobody(self, **how: Unpack[How]) -> Frame:
         """A question to a robot that is not there."""
-        absent = next(slot for slot in range(self.n) if slot not in self.air.slots)
+        absent = next(slot for slot in range(self.n) if slot not in self.topology.slots)
         return self.ask(absent, **how)
 
     def say(
@@ -245,7 +245,7 @@ class Talk:
         return self._do(Power, tick, for_ms, (0, 1))
 
     def _do(self, deed: type[Reset] | type[Power], tick: int, for_ms: float, levels: tuple[int, int]) -> int:
-        slot, end_tick = self.air.slots[0], tick + ms(for_ms)
+        slot, end_tick = self.topology.slots[0], tick + ms(for_ms)
         self.done += [
             deed(tick, self.network, slot, levels[0]),
             deed(end_tick, self.network, slot, levels[1]),

@@ -3,7 +3,7 @@ cimport cython
 from miro_protocol.scan cimport Scanner
 from miro_robot.board cimport Board
 from miro_robot.event_log cimport EventLog
-from miro_robot.harness.oracle cimport Judge
+from miro_robot.harness.oracle cimport LiveOracle
 
 cdef int _NO_FAULT, _LM629, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS
 cdef long long _ACTING, _ANSWER, _TOLERANCE, _TESTING, _NEVER, _CHARACTER, _TO_RI, _TO_TI
@@ -16,7 +16,7 @@ cdef int _WORD_OFF, _WORD_STOPS, _VELOCITY_MODE, _FORWARD, _HAS_ACCELERATION, _H
 cdef int _OFF_ORDER, _STOP_ORDER, _DRIVE_ORDER, _NO_WORD, _PAIRS
 
 
-cdef class Referee(Judge):
+cdef class FastOracle(LiveOracle):
     cdef Board board
     cdef EventLog log
     cdef int slot, robots, payload

@@ -34,7 +34,7 @@ from miro_protocol.table import (
 )
 from miro_robot import event_log
 from miro_robot.board import Board
-from miro_robot.harness.oracle import Judge
+from miro_robot.harness.oracle import LiveOracle
 from miro_robot.lm629.commands import BY_NAME
 from miro_robot.lm629.signals import COMMAND_ERROR
 
@@ -81,11 +81,11 @@ _NO_WORD = 1 << 30
 _PAIRS = 64
 
 
-class Referee(Judge):
+class FastOracle(LiveOracle):
     """Of robot `slot` of `robots`, whose board is `board`. `accepted`: fresh frames of the run; `pc`: of a fault."""
 
     NOT_STATE: tuple[str, ...] = (
-        *Judge.NOT_STATE,
+        *LiveOracle.NOT_STATE,
         *("board", "slot", "robots", "window", "telemetry", "freshness", "read", "pc", "accepted"),
         *(
             "decided",
@@ -102,7 +102,7 @@ class Referee(Judge):
     )
 
     def __init__(self, board: Board, slot: int, robots: int) -> None:
-        Judge.__init__(self)
+        LiveOracle.__init__(self)
         form = downlink(robots)
         self.board = board
         self.log = board.log

@@ -1,7 +1,7 @@
 cimport cython
 
 from miro_robot.board cimport Board
-from miro_robot.harness.oracle cimport Judge
+from miro_robot.harness.oracle cimport LiveOracle
 from miro_robot.harness.program cimport Program
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.line cimport Line
@@ -14,7 +14,7 @@ cdef class Harness:
     cdef readonly object machine
     cdef readonly Board board
     cdef readonly Cpu cpu
-    cdef readonly Judge judge
+    cdef readonly LiveOracle oracle
     cdef readonly long long bit_ticks, begin_tick, now_tick, end_tick
     cdef readonly int sleeps
     cdef object _flat

@@ -2,7 +2,7 @@
 
     saved moment --> machine <-- RXD: levels, as an ideal radio would give them <-- characters of a program
                         |
-                        +--> edges between branches, stack, event log --> judge
+                        +--> edges between branches, stack, event log --> oracle
 
 A character begins with the end of the one before it or after a pause, and a bad stop bit is space for three quarters of
 a bit, as on the air (`miro_sim.radio.sender`): the same characters at the same ticks in a world give the same levels.
@@ -15,7 +15,7 @@ from typing import Any
 from miro_exact.clock import NEVER_TICK, TICKS_PER_SECOND
 from miro_exact.state import Flat
 from miro_robot.board import Board
-from miro_robot.harness.oracle import Judge
+from miro_robot.harness.oracle import LiveOracle
 from miro_robot.harness.program import RESET_TICKS, Program
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import Plant
@@ -29,13 +29,13 @@ AWAKE_TICKS = 10 * TICKS_PER_SECOND // 1000
 AHEAD_TICKS = 240  # an instruction and what looks ahead may overrun a stop by so much
 
 DONE, STOPPED, AWAKE = range(3)
-"""How a run ended: as it should, by a fault or the judge, or without going to sleep."""
+"""How a run ended: as it should, by a fault or the oracle, or without going to sleep."""
 
 _LEAD, _SETTLE, _AWAKE_TICKS, _AHEAD = LEAD_TICKS, SETTLE_TICKS, AWAKE_TICKS, AHEAD_TICKS
 _DONE, _STOPPED, _AWAKE = DONE, STOPPED, AWAKE
 _RESET_TICKS = RESET_TICKS
 _LOOK = TICKS_PER_SECOND // 10_000  # how often it is looked at whether firmware sleeps
-_WAIT = TICKS_PER_SECOND // 1000  # ... and whether what the judge waits for came
+_WAIT = TICKS_PER_SECOND // 1000  # ... and whether what the oracle waits for came
 _BURST = 64  # characters on RXD that are not heard yet
 _BAD_STOP, _RESET = 1, 2
 
@@ -48,17 +48,17 @@ class Harness:
     """
 
     NOT_STATE = (
-        *("machine", "board", "cpu", "judge", "bit_ticks", "begin_tick", "sleeps", "now_tick", "end_tick"),
+        *("machine", "board", "cpu", "oracle", "bit_ticks", "begin_tick", "sleeps", "now_tick", "end_tick"),
         *("_flat", "_state"),
     )
 
     def __init__(
-        self, machine: Any, cpu: Cpu, judge: Judge, bit_ticks: int, board: Board | None = None
+        self, machine: Any, cpu: Cpu, oracle: LiveOracle, bit_ticks: int, board: Board | None = None
     ) -> None:
         self.machine = machine
         self.board = board
         self.cpu = cpu
-        self.judge = judge
+        self.oracle = oracle
         self.bit_ticks = bit_ticks
         cpu.rxd.settled_tick = NEVER_TICK
         cpu.txd.unread = True
@@ -82,7 +82,7 @@ class Harness:
         if self.board is not None:
             self._forget_records(self.board)
         self.now_tick = self.begin_tick
-        self.judge.begin(self.begin_tick)
+        self.oracle.begin(self.begin_tick)
 
     def _forget_records(self, board: Board) -> None:
         """What observers could have read: it would fill the memory."""
@@ -140,7 +140,7 @@ class Harness:
         self._set_reset(1)
         self._move(tick + _RESET_TICKS)
         self._set_reset(0)
-        self.judge.restarted(tick + _RESET_TICKS)
+        self.oracle.restarted(tick + _RESET_TICKS)
         return 0
 
     def _set_reset(self, level: int) -> None:
@@ -152,12 +152,12 @@ class Harness:
             self.cpu.reset()
 
     def _run(self, until: int) -> int:
-        """To a tick, and lets the judge look. 1: a fault, or the judge has seen enough."""
+        """To a tick, and lets the oracle look. 1: a fault, or the oracle has seen enough."""
         if until <= self.now_tick:
             return 0
         stopped = self._move(until)
-        self.judge.look(until)
-        return 1 if stopped or self.judge.code else 0
+        self.oracle.look(until)
+        return 1 if stopped or self.oracle.code else 0
 
     def _move(self, until: int) -> int:
         self.now_tick = until
@@ -166,13 +166,13 @@ class Harness:
         return self.cpu.run((until + 11) // 12)
 
     def _settle(self, tick: int) -> int:
-        """Until the firmware sleeps and the judge waits for nothing."""
+        """Until the firmware sleeps and the oracle waits for nothing."""
         if not self.sleeps:
             return _STOPPED if self._run(tick + _AWAKE_TICKS) else _DONE
         if not self._falls_asleep(tick + _SETTLE):
-            return _STOPPED if self.judge.code or self._faulted() else _AWAKE
+            return _STOPPED if self.oracle.code or self._faulted() else _AWAKE
         latest = self.now_tick + 2 * _SETTLE
-        while self.now_tick < latest and self.judge.waits():
+        while self.now_tick < latest and self.oracle.waits():
             if self._run(self.now_tick + _WAIT):
                 return _STOPPED
         return _DONE

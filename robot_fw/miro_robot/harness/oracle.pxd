@@ -1,4 +1,4 @@
-cdef class Judge:
+cdef class LiveOracle:
     cdef public int code
     cdef public long long tick
 

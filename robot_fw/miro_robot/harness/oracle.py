@@ -1,9 +1,9 @@
-"""Who judges a machine in a harness, while it runs."""
+"""What looks for mistakes of a machine in a harness while it runs."""
 
 from __future__ import annotations
 
 
-class Judge:
+class LiveOracle:
     """`code`: 0, or the kind of what it found first, by the names that it has for them; `tick`: of that."""
 
     NOT_STATE: tuple[str, ...] = ("code", "tick")

@@ -1,13 +1,13 @@
 cimport cython
 
-from miro_robot.harness.oracle cimport Judge
+from miro_robot.harness.oracle cimport LiveOracle
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.xram cimport XramBus
 
 cdef int _KEPT, _NO_FAULT
 cdef long long _NEVER, _STOPPED, _LONGEST
 
-cdef class HeardBus(XramBus):
+cdef class RecordingBus(XramBus):
     cdef public Cpu cpu
     cdef unsigned char received_values[4096]
     cdef unsigned char received_stops[4096]
@@ -26,8 +26,8 @@ cdef class HeardBus(XramBus):
     cpdef byte_sent(self, int value, long long tick)
     cpdef fault(self, int kind, int pc, long long tick)
 
-cdef class BareJudge(Judge):
-    cdef readonly HeardBus bus
+cdef class BareOracle(LiveOracle):
+    cdef readonly RecordingBus bus
     cdef readonly Cpu cpu
     cdef long long slept_tick
 

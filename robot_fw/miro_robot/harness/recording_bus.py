@@ -1,11 +1,11 @@
-"""A bus with 64 KB of RAM that keeps what the serial port received and sent, and the judge of such a machine."""
+"""A bus with 64 KB of RAM that keeps what the serial port received and sent, and the oracle of such a machine."""
 
 from __future__ import annotations
 
 from array import array
 
 from miro_exact.clock import NEVER_TICK
-from miro_robot.harness.oracle import Judge
+from miro_robot.harness.oracle import LiveOracle
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.uart import STOPPED_TICK
 from miro_robot.mcs51.xram import XramBus
@@ -13,14 +13,14 @@ from miro_robot.mcs51.xram import XramBus
 KEPT = 4096
 """Characters of each direction that are kept."""
 NO_FAULT = 1
-"""What a `BareJudge` finds."""
+"""What a `BareOracle` finds."""
 LONGEST_ANSWER_TICKS = 24_000_000
 """How long a run goes on, behind the moment at which the firmware sleeps, while it still sends."""
 _KEPT, _NO_FAULT, _LONGEST = KEPT, NO_FAULT, LONGEST_ANSWER_TICKS
 _NEVER, _STOPPED = NEVER_TICK, STOPPED_TICK
 
 
-class HeardBus(XramBus):
+class RecordingBus(XramBus):
     """Keeps the first 4096 characters of each direction since `begin`, and the first fault, which stops the CPU."""
 
     NOT_STATE = (
@@ -85,13 +85,13 @@ class HeardBus(XramBus):
         return [(self.sent_values[at], self.sent_ticks[at]) for at in range(self.sent_count)]
 
 
-class BareJudge(Judge):
+class BareOracle(LiveOracle):
     """Finds faults of the CPU on `bus`, and lets a run go on while the serial port sends."""
 
     NOT_STATE = ("bus", "cpu", "code", "tick", "slept_tick")
 
-    def __init__(self, bus: HeardBus, cpu: Cpu) -> None:
-        Judge.__init__(self)
+    def __init__(self, bus: RecordingBus, cpu: Cpu) -> None:
+        LiveOracle.__init__(self)
         self.bus = bus
         self.cpu = cpu
         self.slept_tick = _NEVER

@@ -106,7 +106,7 @@ def test_a_robot_in_a_world_receives_the_same_characters_at_the_same_ticks(shipp
 
 @settings(deadline=None, max_examples=60, derandomize=True)
 @given(SESSIONS)
-def test_the_shipped_firmware_passes_the_referee_and_the_checks(shipped, data):
+def test_the_shipped_firmware_passes_the_fast_oracle_and_the_checks(shipped, data):
     assert shipped.run(data) == 0, shipped.finding
     _, checks = world_of(shipped, data, JUDGED)
     assert not checks.failures
@@ -122,7 +122,7 @@ PLANTED = {
 
 @needs_sdcc
 @pytest.mark.parametrize("name", PLANTED)
-def test_the_referee_finds_what_the_check_of_that_name_finds(name):
+def test_the_fast_oracle_finds_what_the_check_of_that_name_finds(name):
     mistake = planted.PLANTED[name]
     data, check = PLANTED[name]
     firmware = build({mistake.file: mistake.applied(source_files()[mistake.file])})

@@ -9,8 +9,8 @@ from miro_robot.firmware import image_path
 from miro_robot.image import Symbol, Symbols, load_hex
 from miro_robot.mcs51.line import Line
 from miro_sim.radio import RadioParams
-from mirotwin.testing.noisy_wire import Air, Trouble
 from mirotwin.testing.bench import MS, Bench, LinkFailure
+from mirotwin.testing.noisy_wire import NoisyWire, Trouble
 from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.testing.noise import listen
 
@@ -76,12 +76,12 @@ def test_slicer_noise_alone_is_never_taken_for_a_frame_by_the_firmware(n):
 
 
 def test_trouble_that_comes_too_late_is_refused():
-    air = Air(Line(), Line(), 0, "x")
-    air.trouble(Trouble(5, 10, "mark"))
+    wire = NoisyWire(Line(), Line(), 0, "x")
+    wire.trouble(Trouble(5, 10, "mark"))
     with pytest.raises(
         ValueError, match="disturbance at tick 7 overlaps another one that lasts until tick 10"
     ):
-        air.trouble(Trouble(7, 20, "burst"))
+        wire.trouble(Trouble(7, 20, "burst"))
 
 
 def test_after_a_reset_the_robot_counts_from_nothing_and_hears_on():

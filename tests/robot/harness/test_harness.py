@@ -7,7 +7,7 @@ import pytest
 from miro_robot.board import Board
 from miro_robot.firmware import image_path
 from miro_robot.harness.harness import AWAKE, DONE, STOPPED, Harness
-from miro_robot.harness.oracle import Judge
+from miro_robot.harness.oracle import LiveOracle
 from miro_robot.harness.program import BYTES, SESSION, Program
 from miro_robot.image import SPACE_BYTES, Image, Symbols, load_hex
 from miro_robot.plant import Plant
@@ -26,7 +26,7 @@ def board_with(image, ticks=40 * MS):
 
 
 def harness_for(board):
-    return Harness(board, board.cpu, Judge(), BIT_TICKS, board)
+    return Harness(board, board.cpu, LiveOracle(), BIT_TICKS, board)
 
 
 def program(data, how=SESSION):

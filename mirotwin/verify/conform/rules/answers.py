@@ -21,10 +21,10 @@ from miro_protocol.table import (
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from mirotwin.verify.conform.hints import characters, in_a_row, no_answer, number
-from mirotwin.verify.conform.rule import BOTH, THREE, Air, Chapter
+from mirotwin.verify.conform.rule import BOTH, THREE, Chapter, Topology
 from mirotwin.verify.conform.rules import FRAME, FRESHNESS, RECEPTION, TURNS
 from mirotwin.verify.conform.seen import Answer, Seen
-from mirotwin.verify.conform.trial_script import Found, Frame, Talk, ms, over_by
+from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms, over_by
 
 CHAPTER = Chapter("Answers")
 BAUD = TICKS_PER_SECOND / ROBOT_BIT_TICKS
@@ -42,19 +42,19 @@ _AT_SPEED = 40
     "The robot in slot seq mod N MUST answer a fresh frame of type 3, with that frame's seq and its own slot, and the"
     " answer MUST be over before the next question can be: 33.37 ms after it.",
     TURNS,
-    airs=(*BOTH, Air(3, (0, 1, 2)), Air(5, (0, 1, 2, 3, 4))),
+    topologies=(*BOTH, Topology(3, (0, 1, 2)), Topology(5, (0, 1, 2, 3, 4))),
     presupposes=("P42",),
     broken="a question is not answered in turn",
 )
-def in_turn(talk: Talk) -> None:
-    talk.seq = 59
+def in_turn(script: TrialScript) -> None:
+    script.seq = 59
     for _ in range(10):  # over the wrap of seq, where some robot's turn comes early
-        question = talk.team(ask=True, what="question", gap_ms=36.0)
-        asked = question.seq % talk.n
-        if asked in talk.air.slots:
-            talk.answered(question, asked)
+        question = script.team(ask=True, what="question", gap_ms=36.0)
+        asked = question.seq % script.n
+        if asked in script.topology.slots:
+            script.answered(question, asked)
         else:
-            talk.silent(question.last_tick, over_by(question), f"{question.what} is for robot {asked}")
+            script.silent(question.last_tick, over_by(question), f"{question.what} is for robot {asked}")
 
 
 @CHAPTER.rule(
@@ -65,18 +65,18 @@ def in_turn(talk: Talk) -> None:
     presupposes=("P16",),
     broken="an answer is not well formed",
 )
-def form(talk: Talk) -> None:
-    for _ in range(3 * talk.n):  # whoever it takes itself for
-        _formed(talk, talk.team(ask=True, what="question", gap_ms=36.0))
-    end = talk.now
+def form(script: TrialScript) -> None:
+    for _ in range(3 * script.n):  # whoever it takes itself for
+        _formed(script, script.team(ask=True, what="question", gap_ms=36.0))
+    end = script.now
 
     def any_heard(seen: Seen) -> Found:
         return None if seen.heard else (end, "none")
 
-    talk.expect(end, f"an answer to some of {3 * talk.n} questions in a row", any_heard)
+    script.expect(end, f"an answer to some of {3 * script.n} questions in a row", any_heard)
 
 
-def _formed(talk: Talk, question: Frame, then_more: bool = False) -> None:
+def _formed(script: TrialScript, question: Frame, then_more: bool = False) -> None:
     """What is said then, if anything, is formed as an answer. `then_more`: another one may follow at once."""
     until = question.end_tick + ms(56.0)
 
@@ -87,7 +87,7 @@ def _formed(talk: Talk, question: Frame, then_more: bool = False) -> None:
         return (heard[-1].tick, f"{characters(heard)}: {what}") if what else None
 
     wanted = f"an answer of 19 characters without a pause, {_HEAD.hex(' ')} first, at 9615 baud"
-    talk.expect(until, wanted, test, (talk.air.slots[0],))
+    script.expect(until, wanted, test, (script.topology.slots[0],))
 
 
 def _badly_formed(heard: list[Event], question: Frame, seen: Seen) -> str:
@@ -114,26 +114,26 @@ def _badly_formed(heard: list[Event], question: Frame, seen: Seen) -> str:
     presupposes=("P07", "P09", "P20", "P41"),
     broken="a robot speaks unasked",
 )
-def unasked(talk: Talk) -> None:
-    slot = talk.air.slots[0]
-    talk.silent(0, talk.now, "nobody asks")
-    for _ in range(talk.n + 1):
-        talk.team()
-        talk.ping()
-    for other in range(talk.n):
+def unasked(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
+    script.silent(0, script.now, "nobody asks")
+    for _ in range(script.n + 1):
+        script.team()
+        script.ping()
+    for other in range(script.n):
         if other != slot:
-            talk.ask(other)
-    talk.ask(slot, fresh=False, wrong={talk.form.size - 1: 0x10})
-    talk.ask(slot, fresh=False, bad_stop=9)
-    talk.silent(ms(1.0), talk.now, "no question to this robot")
-    question = talk.ask(slot, gap_ms=36.0)
-    talk.answered(question, slot)
-    after = talk.now
+            script.ask(other)
+    script.ask(slot, fresh=False, wrong={script.form.size - 1: 0x10})
+    script.ask(slot, fresh=False, bad_stop=9)
+    script.silent(ms(1.0), script.now, "no question to this robot")
+    question = script.ask(slot, gap_ms=36.0)
+    script.answered(question, slot)
+    after = script.now
     for _ in range(3):
-        talk.team(ask=True, step=0, fresh=False)
-    talk.wait(200.0)
-    talk.silent(after, talk.now, "no fresh question")
-    talk.answered(talk.ask(slot, gap_ms=36.0), slot)
+        script.team(ask=True, step=0, fresh=False)
+    script.wait(200.0)
+    script.silent(after, script.now, "no fresh question")
+    script.answered(script.ask(slot, gap_ms=36.0), slot)
 
 
 @CHAPTER.rule(
@@ -142,16 +142,16 @@ def unasked(talk: Talk) -> None:
     TURNS,
     presupposes=("P04", "P41"),
 )
-def full_duplex(talk: Talk) -> None:
-    slot = talk.air.slots[0]
+def full_duplex(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
     for _ in range(3):
-        question = talk.ask(slot, gap_ms=0.0)
-        talk.answered(question, slot)
-        talk.obeyed(talk.team(lead=b"", gap_ms=12.0))
-    question = talk.ask(slot, gap_ms=0.0)
-    talk.answered(question, slot, "one whole answer to two questions in a row")
-    _formed(talk, question, then_more=True)
-    talk.obeyed(talk.ask(slot, lead=b"", gap_ms=40.0))
+        question = script.ask(slot, gap_ms=0.0)
+        script.answered(question, slot)
+        script.obeyed(script.team(lead=b"", gap_ms=12.0))
+    question = script.ask(slot, gap_ms=0.0)
+    script.answered(question, slot, "one whole answer to two questions in a row")
+    _formed(script, question, then_more=True)
+    script.obeyed(script.ask(slot, lead=b"", gap_ms=40.0))
 
 
 @CHAPTER.rule(
@@ -161,38 +161,42 @@ def full_duplex(talk: Talk) -> None:
     FRAME,
     presupposes=("P32", "P43"),
 )
-def flags(talk: Talk) -> None:
+def flags(script: TrialScript) -> None:
     both = Flags.STOPPED | Flags.MOTORS_OFF
-    _says(talk, f"flags {int(Flags.MOTORS_OFF):02X}h of power-on", partial(_flagged, Flags.MOTORS_OFF))
+    _says(script, f"flags {int(Flags.MOTORS_OFF):02X}h of power-on", partial(_flagged, Flags.MOTORS_OFF))
     for silence_ms, frames, wanted in (
         *((0.0, 0, 0), (0.0, 2, 0), (140.0, 0, Flags.STOPPED), (0.0, 0, 0), (520.0, 0, both), (0.0, 0, 0)),
         *((200.0, 3, Flags.STOPPED), (0.0, 3, 0), (600.0, 2, both), (0.0, 0, 0)),
     ):
-        talk.wait(silence_ms)
+        script.wait(silence_ms)
         for _ in range(frames):
-            talk.team()
-        _says(talk, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
-    talk.wait(140.0)
-    talk.ask_nobody()
+            script.team()
+        _says(script, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
+    script.wait(140.0)
+    script.ask_nobody()
     _says(
-        talk, f"flags {int(Flags.STOPPED):02X}h, which no answer has told,", partial(_flagged, Flags.STOPPED)
+        script,
+        f"flags {int(Flags.STOPPED):02X}h, which no answer has told,",
+        partial(_flagged, Flags.STOPPED),
     )
-    talk.wait(140.0)
-    question = talk.ask(talk.air.slots[0], gap_ms=0.0)
+    script.wait(140.0)
+    question = script.ask(script.topology.slots[0], gap_ms=0.0)
     first = f"flags {int(Flags.STOPPED):02X}h in the answer to {question.what}, the first of two in a row"
-    talk.answered(question, talk.air.slots[0], first, partial(_flagged, Flags.STOPPED))
-    talk.ask(talk.air.slots[0], lead=b"", gap_ms=40.0)
-    _says(talk, "flags 00h", partial(_flagged, 0))
+    script.answered(question, script.topology.slots[0], first, partial(_flagged, Flags.STOPPED))
+    script.ask(script.topology.slots[0], lead=b"", gap_ms=40.0)
+    _says(script, "flags 00h", partial(_flagged, 0))
     for silence_ms, wanted in ((140.0, Flags.STOPPED), (560.0, both)):
         for _ in range(2):  # what happened twice is told once
-            talk.team()
-            talk.wait(silence_ms)
-        _says(talk, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
+            script.team()
+            script.wait(silence_ms)
+        _says(script, f"flags {int(wanted):02X}h", partial(_flagged, wanted))
 
 
-def _says(talk: Talk, wanted: str, says: Callable[[Answer, Seen], str], gap_ms: float = 36.0) -> Frame:
-    question = talk.ask(talk.air.slots[0], gap_ms=gap_ms)
-    talk.answered(question, talk.air.slots[0], f"{wanted} in the answer to {question.what}", says)
+def _says(
+    script: TrialScript, wanted: str, says: Callable[[Answer, Seen], str], gap_ms: float = 36.0
+) -> Frame:
+    question = script.ask(script.topology.slots[0], gap_ms=gap_ms)
+    script.answered(question, script.topology.slots[0], f"{wanted} in the answer to {question.what}", says)
     return question
 
 
@@ -207,12 +211,12 @@ def _flagged(wanted: int, answer: Answer, seen: Seen) -> str:
     FRAME,
     presupposes=("P35", "P41"),
 )
-def status(talk: Talk) -> None:
-    talk.team()
-    _says(talk, "the chips' status", _status)
-    _run_away(talk)  # then they differ
-    _says(talk, "the chips' status", _status, gap_ms=70.0)
-    end = talk.now
+def status(script: TrialScript) -> None:
+    script.team()
+    _says(script, "the chips' status", _status)
+    _run_away(script)  # then they differ
+    _says(script, "the chips' status", _status, gap_ms=70.0)
+    end = script.now
 
     def differ(seen: Seen) -> Found:
         last = seen.periods[-1][1]
@@ -220,15 +224,15 @@ def status(talk: Talk) -> None:
             return end, f"{last.left.status:02X}h in both"
         return None
 
-    talk.expect(end, "an excessive error in the left LM629 alone", differ)
+    script.expect(end, "an excessive error in the left LM629 alone", differ)
 
 
-def _run_away(talk: Talk) -> None:
+def _run_away(script: TrialScript) -> None:
     """Gains of 0 and a fast left wheel: its desired position runs away from the real one."""
-    slot = talk.air.slots[0]
-    talk.service(slot, Opcode.FILTER, bytes(8))
+    slot = script.topology.slots[0]
+    script.service(slot, Opcode.FILTER, bytes(8))
     for _ in range(8):
-        talk.team(talk.same(slot, 16000, 50), gap_ms=30.0)
+        script.team(script.same(slot, 16000, 50), gap_ms=30.0)
 
 
 def _status(answer: Answer, seen: Seen) -> str:
@@ -261,43 +265,43 @@ def _around(answer: Answer, seen: Seen) -> tuple[RobotPeriod, RobotPeriod]:
     presupposes=("P35", "P41"),
     broken="positions in answers are wrong",
 )
-def positions(talk: Talk) -> None:
-    slot = talk.air.slots[0]
+def positions(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
     for _ in range(10):  # beyond 65536 counts, one wheel forward and one backward
-        talk.team(talk.same(slot, 13000, -12000), gap_ms=50.0)
-    _says(talk, "the real positions", _positions)
+        script.team(script.same(slot, 13000, -12000), gap_ms=50.0)
+    _says(script, "the real positions", _positions)
     for _ in range(_AT_SPEED):
-        question = talk.team(
-            talk.same(slot, 13000, -12000),
+        question = script.team(
+            script.same(slot, 13000, -12000),
             ask=True,
-            step=_step_to(talk, slot),
+            step=_step_to(script, slot),
             what="question at speed",
             gap_ms=36.0,
         )
-        talk.answered(
+        script.answered(
             question, slot, f"positions of one sample each in the answer to {question.what}", _read_at_once
         )
-    talk.team(talk.same(slot, 0, 0), gap_ms=60.0)
+    script.team(script.same(slot, 0, 0), gap_ms=60.0)
     for _ in range(6):
-        talk.team(talk.same(slot, 0, 0), gap_ms=60.0)
-    _stands(talk, slot)
-    _run_away(talk)
-    _stands(talk, slot)
+        script.team(script.same(slot, 0, 0), gap_ms=60.0)
+    _stands(script, slot)
+    _run_away(script)
+    _stands(script, slot)
 
 
-def _stands(talk: Talk, slot: int) -> None:
-    question = talk.team(
-        talk.same(slot, 0, 0),
+def _stands(script: TrialScript, slot: int) -> None:
+    question = script.team(
+        script.same(slot, 0, 0),
         ask=True,
-        step=_step_to(talk, slot),
+        step=_step_to(script, slot),
         what=f"question to robot {slot}",
         gap_ms=70.0,
     )
-    talk.answered(question, slot, f"the real positions in the answer to {question.what}", _positions)
+    script.answered(question, slot, f"the real positions in the answer to {question.what}", _positions)
 
 
-def _step_to(talk: Talk, slot: int) -> int:
-    return next(step for step in range(1, 9) if (talk.seq + step) % SEQ_MODULUS % talk.n == slot)
+def _step_to(script: TrialScript, slot: int) -> int:
+    return next(step for step in range(1, 9) if (script.seq + step) % SEQ_MODULUS % script.n == slot)
 
 
 def _positions(answer: Answer, seen: Seen) -> str:
@@ -343,24 +347,24 @@ def _within(position: int, ends: tuple[int, int]) -> bool:
     "`accepted` MUST count the fresh frames since power-on, the question itself included, and wrap at 256; no other"
     " frame counts.",
     FRAME,
-    airs=THREE,
+    topologies=THREE,
     presupposes=("P17", "P34", "P40", "P41"),
 )
-def accepted(talk: Talk) -> None:
+def accepted(script: TrialScript) -> None:
     count = 0
 
     def counted(wanted: int) -> None:
-        _says(talk, f"accepted {number(wanted % 256, 2)}", partial(_counts, "accepted", wanted))
+        _says(script, f"accepted {number(wanted % 256, 2)}", partial(_counts, "accepted", wanted))
 
     for rows, gap_ms in ((5, 12.0), (122, 0.0), (128, 0.0), (3, 12.0)):
         for _ in range(rows):
-            talk.team(lead=b"", gap_ms=gap_ms)
-        talk.wait(12.0)
-        talk.team(step=0, fresh=False, lead=b"")
-        talk.team(step=30, fresh=False, lead=b"")
-        talk.team(fresh=False, lead=b"", wrong={6: 2})
-        talk.ping(lead=b"")
-        talk.of_type_2(lead=b"")
+            script.team(lead=b"", gap_ms=gap_ms)
+        script.wait(12.0)
+        script.team(step=0, fresh=False, lead=b"")
+        script.team(step=30, fresh=False, lead=b"")
+        script.team(fresh=False, lead=b"", wrong={6: 2})
+        script.ping(lead=b"")
+        script.of_type_2(lead=b"")
         count += rows + 3
         counted(count)
 
@@ -376,33 +380,33 @@ def _counts(name: str, wanted: int, answer: Answer, seen: Seen) -> str:
     "`rejected` MUST count the windows whose sync, stop bits and spacings are good and whose CRC is bad, and wrap at"
     " 256; nothing else counts.",
     RECEPTION,
-    airs=BOTH,
+    topologies=BOTH,
     presupposes=("P06", "P13", "P41"),
 )
-def rejected(talk: Talk) -> None:
+def rejected(script: TrialScript) -> None:
     count = 0
-    size = talk.form.size
+    size = script.form.size
 
     def counted() -> None:
-        _says(talk, f"rejected {number(count % 256, 2)}", partial(_counts, "rejected", count))
+        _says(script, f"rejected {number(count % 256, 2)}", partial(_counts, "rejected", count))
 
     counted()
     for how in ({size - 1: 1}, {2: 0x80}, {size // 2: 0x18}):
-        talk.team(fresh=False, wrong=how)
+        script.team(fresh=False, wrong=how)
         count += 1
     counted()
-    talk.team(step=0, fresh=False)
-    talk.team(fresh=False, bad_stop=7, wrong={5: 1})
-    talk.team(fresh=False, pauses={9: 200.0}, wrong={5: 1})
-    talk.team(fresh=False, wrong={0: 1})
-    talk.team(fresh=False, wrong={1: 0x80})
-    talk.characters(bytes(40))
-    talk.wait(12.0)
+    script.team(step=0, fresh=False)
+    script.team(fresh=False, bad_stop=7, wrong={5: 1})
+    script.team(fresh=False, pauses={9: 200.0}, wrong={5: 1})
+    script.team(fresh=False, wrong={0: 1})
+    script.team(fresh=False, wrong={1: 0x80})
+    script.characters(bytes(40))
+    script.wait(12.0)
     counted()
     for syncs in (40, 90, 150):  # each sync with a whole window behind it is one
-        talk.characters(SYNC * syncs)
+        script.characters(SYNC * syncs)
         count += (2 * syncs - size) // 2 + 1
-        talk.wait(20.0)
+        script.wait(20.0)
         counted()
 
 
@@ -410,12 +414,12 @@ def rejected(talk: Talk) -> None:
     "P50",
     "A robot MUST answer the first question after a silence too: failsafe and motors off change nothing in it.",
     FRESHNESS,
-    airs=THREE,
+    topologies=THREE,
     presupposes=("P41",),
 )
-def after_silence(talk: Talk) -> None:
-    slot = talk.air.slots[0]
+def after_silence(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
     for silence_ms in (130.0, 700.0):
-        talk.answered(talk.ask(slot, gap_ms=36.0), slot)
-        talk.wait(silence_ms)
-    talk.answered(talk.ask(slot, gap_ms=36.0), slot)
+        script.answered(script.ask(slot, gap_ms=36.0), slot)
+        script.wait(silence_ms)
+    script.answered(script.ask(slot, gap_ms=36.0), slot)

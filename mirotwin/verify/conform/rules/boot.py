@@ -11,7 +11,7 @@ from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import POWER_ON
 from mirotwin.verify.conform.seen import Seen
-from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, Talk, ms
+from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
 
 CHAPTER = Chapter("Power-on")
 _RESET, _RSTI = BY_NAME["RESET"].opcode, BY_NAME["RSTI"].opcode
@@ -24,11 +24,11 @@ _RESET, _RSTI = BY_NAME["RESET"].opcode, BY_NAME["RSTI"].opcode
     presupposes=("P24",),
     broken="a motor is on before the first team frame",
 )
-def motors_off(talk: Talk) -> None:
-    talk.wait(600.0)
-    first = talk.team()
-    keeps_off(talk, 0, first.tick)
-    talk.obeyed(first)
+def motors_off(script: TrialScript) -> None:
+    script.wait(600.0)
+    first = script.team()
+    keeps_off(script, 0, first.tick)
+    script.obeyed(first)
 
 
 @CHAPTER.rule(
@@ -38,11 +38,11 @@ def motors_off(talk: Talk) -> None:
     POWER_ON,
     presupposes=("P03",),
 )
-def reset_together(talk: Talk) -> None:
-    talk.wait(60.0)
-    first = talk.team()
-    talk.obeyed(first)
-    end = talk.now
+def reset_together(script: TrialScript) -> None:
+    script.wait(60.0)
+    first = script.team()
+    script.obeyed(first)
+    end = script.now
 
     def shown(seen: Seen) -> Found:
         for tick, side, chip in seen.chips(ms(BOOTED_MS), first.tick):
@@ -71,10 +71,10 @@ def reset_together(talk: Talk) -> None:
                 return tick, f"{(left - right) % SAMPLE_TICKS} ticks from one to the other"
         return None
 
-    talk.expect(first.tick, f"status 80h or C0h {BOOTED_MS:g} ms after power-on", shown)
-    talk.expect(first.tick, "RSTI 0000h", other_mask)
-    talk.expect(end, "RESET sent to both LM629 or none", alone)
-    talk.expect(end, f"both LM629 with the same samples {BOOTED_MS:g} ms after power-on", apart)
+    script.expect(first.tick, f"status 80h or C0h {BOOTED_MS:g} ms after power-on", shown)
+    script.expect(first.tick, "RSTI 0000h", other_mask)
+    script.expect(end, "RESET sent to both LM629 or none", alone)
+    script.expect(end, f"both LM629 with the same samples {BOOTED_MS:g} ms after power-on", apart)
 
 
 @CHAPTER.rule(
@@ -84,12 +84,12 @@ def reset_together(talk: Talk) -> None:
     presupposes=("P24",),
     broken="it is not ready 40 ms after power-on",
 )
-def ready(talk: Talk) -> None:
-    talk.seq = 0  # P19 has other numbers
-    talk.obeyed(talk.team())
+def ready(script: TrialScript) -> None:
+    script.seq = 0  # P19 has other numbers
+    script.obeyed(script.team())
 
 
-def keeps_off(talk: Talk, after_tick: int, until_tick: int) -> None:
+def keeps_off(script: TrialScript, after_tick: int, until_tick: int) -> None:
     """Expects both motors off in between; the chips have `BOOTED_MS` for their reset."""
 
     def ordered(seen: Seen) -> Found:
@@ -106,5 +106,5 @@ def keeps_off(talk: Talk, after_tick: int, until_tick: int) -> None:
                 return tick, f"status {chip.status:02X}h of the {side} LM629"
         return None
 
-    talk.expect(until_tick, "both motors off", ordered)
-    talk.expect(until_tick, "both motors off", driven)
+    script.expect(until_tick, "both motors off", ordered)
+    script.expect(until_tick, "both motors off", driven)

@@ -10,7 +10,7 @@ from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FRAME, PORT, POWER_ON
 from mirotwin.verify.conform.rules.sound import nothing_refused
 from mirotwin.verify.conform.seen import Answer, Seen
-from mirotwin.verify.conform.trial_script import Found, Talk
+from mirotwin.verify.conform.trial_script import Found, TrialScript
 
 CHAPTER = Chapter("Slow and broken LM629s")
 _BUSY = 0x01
@@ -27,14 +27,14 @@ _NEVER_UP = Lm629Options(reset_clocks=1 << 24)  # 2.8 s: the trial is over befor
     lm629=_SLOW,
     presupposes=("P47",),
 )
-def slow(talk: Talk) -> None:
-    slot = talk.air.slots[0]
+def slow(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
     for _ in range(3):
-        talk.obeyed(talk.team())
-        talk.answered(
-            talk.ask(slot, gap_ms=36.0), slot, "no flag 20h, and status of LM629s that are free", _free
+        script.obeyed(script.team())
+        script.answered(
+            script.ask(slot, gap_ms=36.0), slot, "no flag 20h, and status of LM629s that are free", _free
         )
-    nothing_refused(talk)
+    nothing_refused(script)
 
 
 @CHAPTER.rule(
@@ -46,8 +46,8 @@ def slow(talk: Talk) -> None:
     presupposes=("P41",),
     broken="a broken LM629 is not told of",
 )
-def broken(talk: Talk) -> None:
-    _tells_of_them(talk)
+def broken(script: TrialScript) -> None:
+    _tells_of_them(script)
 
 
 @CHAPTER.rule(
@@ -57,19 +57,21 @@ def broken(talk: Talk) -> None:
     lm629=_NEVER_FREE,
     presupposes=("P58",),
 )
-def busy(talk: Talk) -> None:
-    _tells_of_them(talk)
+def busy(script: TrialScript) -> None:
+    _tells_of_them(script)
 
 
-def _tells_of_them(talk: Talk) -> None:
-    slot = talk.air.slots[0]
-    talk.team(lead=b"")
-    talk.answered(talk.ask(slot, gap_ms=36.0), slot, "flag 20h", _says(Flags.INIT_FAILED, Flags.INIT_FAILED))
+def _tells_of_them(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
+    script.team(lead=b"")
+    script.answered(
+        script.ask(slot, gap_ms=36.0), slot, "flag 20h", _says(Flags.INIT_FAILED, Flags.INIT_FAILED)
+    )
     both = Flags.INIT_FAILED | Flags.MOTORS_OFF
     for _ in range(2):
-        talk.wait(520.0)
-        talk.answered(talk.ask(slot, gap_ms=36.0), slot, f"flags {int(both):02X}h", _says(both, both))
-    end = talk.now
+        script.wait(520.0)
+        script.answered(script.ask(slot, gap_ms=36.0), slot, f"flags {int(both):02X}h", _says(both, both))
+    end = script.now
 
     def driven(seen: Seen) -> Found:
         for tick, side, chip in seen.chips(0, end):
@@ -77,7 +79,7 @@ def _tells_of_them(talk: Talk) -> None:
                 return tick, f"the {side} one driven"
         return None
 
-    talk.expect(end, "both motors off", driven)
+    script.expect(end, "both motors off", driven)
 
 
 def _free(answer: Answer, seen: Seen) -> str:

@@ -10,10 +10,10 @@ from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.commands import BY_NAME
 from mirotwin.verify.checks.failsafe import ACTING_MS
 from mirotwin.verify.conform.probe import why_deaf
-from mirotwin.verify.conform.rule import Air, Chapter
+from mirotwin.verify.conform.rule import Chapter, Topology
 from mirotwin.verify.conform.rules import FIRMWARE, FRAME, TURNS
 from mirotwin.verify.conform.seen import Seen
-from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, How, Talk, ms
+from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, How, TrialScript, ms
 
 CHAPTER = Chapter("Velocities")
 _LTRJ = BY_NAME["LTRJ"].opcode
@@ -27,24 +27,24 @@ _ANY_BOOT_MS = 260.0
     "P22",
     "In a network of 3, each robot MUST take the velocities of its own slot.",
     FRAME,
-    airs=(Air(3, (0, 1, 2)),),
+    topologies=(Topology(3, (0, 1, 2)),),
     presupposes=("P19",),
 )
-def own_slot_of_three(talk: Talk) -> None:
+def own_slot_of_three(script: TrialScript) -> None:
     for _ in range(4):
-        talk.obeyed(talk.team())
+        script.obeyed(script.team())
 
 
 @CHAPTER.rule(
     "P23",
     "In a network of 5, each robot MUST take the velocities of its own slot.",
     FRAME,
-    airs=(Air(5, (0, 1, 2, 3, 4)),),
+    topologies=(Topology(5, (0, 1, 2, 3, 4)),),
     presupposes=("P19",),
 )
-def own_slot_of_five(talk: Talk) -> None:
+def own_slot_of_five(script: TrialScript) -> None:
     for _ in range(4):
-        talk.obeyed(talk.team())
+        script.obeyed(script.team())
 
 
 @CHAPTER.rule(
@@ -54,12 +54,12 @@ def own_slot_of_five(talk: Talk) -> None:
     broken="a plain team frame is not obeyed",
     probe=why_deaf,
 )
-def both_types(talk: Talk) -> None:
-    talk.wait(_ANY_BOOT_MS)
+def both_types(script: TrialScript) -> None:
+    script.wait(_ANY_BOOT_MS)
     after = ""
     for ask in (False, True, True, False):
         what = "question" if ask else "team frame"
-        talk.obeyed(talk.team(ask=ask, what=what + after))
+        script.obeyed(script.team(ask=ask, what=what + after))
         after = f" after a {what}"
 
 
@@ -70,7 +70,7 @@ def both_types(talk: Talk) -> None:
     FRAME,
     presupposes=("P19",),
 )
-def words(talk: Talk) -> None:
+def words(script: TrialScript) -> None:
     pairs = [
         (1, -1),
         (-1, 1),
@@ -83,7 +83,7 @@ def words(talk: Talk) -> None:
     ]
     pairs += [(0x55AA >> 2, -0x2AD5), (0, 300), (-300, 0), (4097, 16), (-16633, 16632)]
     for left, right in pairs:
-        talk.obeyed(_only(talk, left, right))
+        script.obeyed(_only(script, left, right))
 
 
 @CHAPTER.rule(
@@ -92,7 +92,7 @@ def words(talk: Talk) -> None:
     FRAME,
     presupposes=("P19",),
 )
-def saturation(talk: Talk) -> None:
+def saturation(script: TrialScript) -> None:
     limit = VELOCITY_SATURATION
     for left, right in (
         (limit, -limit),
@@ -104,15 +104,15 @@ def saturation(talk: Talk) -> None:
         (20000, 100),
         (-100, -20000),
     ):
-        talk.obeyed(_only(talk, left, right))
+        script.obeyed(_only(script, left, right))
 
 
-def _only(talk: Talk, left: int, right: int, **how: Unpack[How]) -> Frame:
+def _only(script: TrialScript, left: int, right: int, **how: Unpack[How]) -> Frame:
     """A frame with these velocities for the robots that are there."""
-    pairs = list(talk.words())
-    for slot in talk.air.slots:
+    pairs = list(script.words())
+    for slot in script.topology.slots:
         pairs[slot] = (left, right)
-    return talk.team(tuple(pairs), what=f"team frame with {left}, {right}", **how)
+    return script.team(tuple(pairs), what=f"team frame with {left}, {right}", **how)
 
 
 @CHAPTER.rule(
@@ -121,18 +121,18 @@ def _only(talk: Talk, left: int, right: int, **how: Unpack[How]) -> Frame:
     FIRMWARE,
     presupposes=("P32",),
 )
-def one_sample(talk: Talk) -> None:
-    frames = [talk.team(gap_ms=12.0 + 0.11 * count) for count in range(12)]
-    talk.wait(620.0)
+def one_sample(script: TrialScript) -> None:
+    frames = [script.team(gap_ms=12.0 + 0.11 * count) for count in range(12)]
+    script.wait(620.0)
     for frame in frames:
-        talk.obeyed(frame)
-        _together(talk, frame.tick, frame.end_tick + ACTING_TICKS, frame.what)
+        script.obeyed(frame)
+        _together(script, frame.tick, frame.end_tick + ACTING_TICKS, frame.what)
     end = frames[-1].end_tick
-    _together(talk, end + ms(50.0), end + ms(120.0), "the failsafe's stop")
-    _together(talk, end + ms(450.0), end + ms(510.0), "motors off")
+    _together(script, end + ms(50.0), end + ms(120.0), "the failsafe's stop")
+    _together(script, end + ms(450.0), end + ms(510.0), "motors off")
 
 
-def _together(talk: Talk, after_tick: int, until_tick: int, what: str) -> None:
+def _together(script: TrialScript, after_tick: int, until_tick: int, what: str) -> None:
     def test(seen: Seen) -> Found:
         left, right = seen.both_told(until_tick)
         if min(left.tick, right.tick) <= after_tick:
@@ -142,7 +142,7 @@ def _together(talk: Talk, after_tick: int, until_tick: int, what: str) -> None:
             return max(left.tick, right.tick), f"{abs(left.tick - right.tick)} ticks from one to the other"
         return None
 
-    talk.expect(until_tick, f"{what}: STT of both wheels in one sample", test)
+    script.expect(until_tick, f"{what}: STT of both wheels in one sample", test)
 
 
 @CHAPTER.rule(
@@ -152,12 +152,12 @@ def _together(talk: Talk, after_tick: int, until_tick: int, what: str) -> None:
     presupposes=("P19",),
     broken="velocities are not kept between frames",
 )
-def kept(talk: Talk) -> None:
+def kept(script: TrialScript) -> None:
     for sign in (1, -1, 1):
-        frame = _only(talk, 300 * sign, -311 * sign, gap_ms=65.0)
-        talk.obeyed(frame)
-        talk.unchanged(frame.end_tick + ACTING_TICKS, talk.now, f"velocities kept behind {frame.what}")
-        _reached(talk, frame)
+        frame = _only(script, 300 * sign, -311 * sign, gap_ms=65.0)
+        script.obeyed(frame)
+        script.unchanged(frame.end_tick + ACTING_TICKS, script.now, f"velocities kept behind {frame.what}")
+        _reached(script, frame)
 
 
 def _why_not_reached(seen: Seen, tick: int) -> str:
@@ -173,9 +173,9 @@ def _why_not_reached(seen: Seen, tick: int) -> str:
     return ""
 
 
-def _reached(talk: Talk, frame: Frame) -> None:
+def _reached(script: TrialScript, frame: Frame) -> None:
     """Both chips run at the frame's velocities 20 ms after it."""
-    after_tick, until_tick = frame.end_tick + ms(20.0), talk.now
+    after_tick, until_tick = frame.end_tick + ms(20.0), script.now
 
     def test(seen: Seen) -> Found:
         wanted = frame.for_robot(seen.slot)
@@ -186,4 +186,4 @@ def _reached(talk: Talk, frame: Frame) -> None:
         return None
 
     assert until_tick - after_tick > CONTROL_PERIOD_TICKS
-    talk.expect(until_tick, f"both LM629 at the velocities of {frame.what}", test)
+    script.expect(until_tick, f"both LM629 at the velocities of {frame.what}", test)

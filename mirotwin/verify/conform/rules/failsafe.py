@@ -18,7 +18,7 @@ from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FRESHNESS, WHEELS
 from mirotwin.verify.conform.seen import Seen
-from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, Talk, ms
+from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, TrialScript, ms
 
 CHAPTER = Chapter("Failsafe")
 TOLERANCE_TICKS = ms(0.5)
@@ -36,12 +36,12 @@ _COUNTED = (
     presupposes=("P28",),
     broken="the wheels are not told to stop 110 ms after the last frame",
 )
-def stop(talk: Talk) -> None:
-    for make in (talk.team, talk.team, talk.ask_nobody):
-        talk.obeyed(talk.team())
-        talk.wait(3.3)
-        stops_behind(talk, make())
-        talk.wait(130.0)
+def stop(script: TrialScript) -> None:
+    for make in (script.team, script.team, script.ask_nobody):
+        script.obeyed(script.team())
+        script.wait(3.3)
+        stops_behind(script, make())
+        script.wait(130.0)
 
 
 @CHAPTER.rule(
@@ -51,40 +51,40 @@ def stop(talk: Talk) -> None:
     presupposes=("P06", "P13", "P20", "P32", "P37"),
     broken="the failsafe is put off",
 )
-def not_put_off(talk: Talk) -> None:
-    last = talk.team()
-    talk.obeyed(last)
+def not_put_off(script: TrialScript) -> None:
+    last = script.team()
+    script.obeyed(last)
     for count in range(16):
-        talk.team(step=0, fresh=False, lead=b"", gap_ms=0.0)
-        talk.team(fresh=False, lead=b"", gap_ms=0.0, wrong={4: 1})
+        script.team(step=0, fresh=False, lead=b"", gap_ms=0.0)
+        script.team(fresh=False, lead=b"", gap_ms=0.0, wrong={4: 1})
         if count == 0:  # 150 ms later it would be fresh
-            talk.team(step=40, fresh=False, lead=b"", gap_ms=0.0)
-    stops_behind(talk, last)
-    off_behind(talk, last)
-    talk.wait_until(max(talk.now, last.end_tick + ms(530.0)))
-    talk.obeyed(talk.team())
-    talk.wait(3.3)
-    last = talk.team(gap_ms=0.0)
-    talk.characters(bytes(8))  # no robot has looked at the frame when the first of these ends
-    stops_behind(talk, last)
-    talk.wait(130.0)
-    _stop_of_a_busy_robot(talk)
+            script.team(step=40, fresh=False, lead=b"", gap_ms=0.0)
+    stops_behind(script, last)
+    off_behind(script, last)
+    script.wait_until(max(script.now, last.end_tick + ms(530.0)))
+    script.obeyed(script.team())
+    script.wait(3.3)
+    last = script.team(gap_ms=0.0)
+    script.characters(bytes(8))  # no robot has looked at the frame when the first of these ends
+    stops_behind(script, last)
+    script.wait(130.0)
+    _stop_of_a_busy_robot(script)
 
 
-def _stop_of_a_busy_robot(talk: Talk) -> None:
+def _stop_of_a_busy_robot(script: TrialScript) -> None:
     """While one wheel still comes to a stop and an acceleration waits for that, syncs in a row before a frame."""
-    slot = talk.air.slots[0]
+    slot = script.topology.slots[0]
     for syncs in (16, 24):
         for _ in range(8):
-            talk.team(talk.same(slot, 0, 12000))
-        talk.team(talk.same(slot, 0, 12000), gap_ms=2.0)
-        talk.service(slot, Opcode.ACCELERATION, DEFAULT_ACCELERATION.to_bytes(4, "little"), gap_ms=0.0)
-        talk.wait(112.0)
-        talk.characters(SYNC * syncs)
-        last = talk.team(what=f"team frame behind {syncs} syncs", lead=b"")
-        talk.obeyed(last)
-        stops_behind(talk, last)
-        talk.wait(130.0)
+            script.team(script.same(slot, 0, 12000))
+        script.team(script.same(slot, 0, 12000), gap_ms=2.0)
+        script.service(slot, Opcode.ACCELERATION, DEFAULT_ACCELERATION.to_bytes(4, "little"), gap_ms=0.0)
+        script.wait(112.0)
+        script.characters(SYNC * syncs)
+        last = script.team(what=f"team frame behind {syncs} syncs", lead=b"")
+        script.obeyed(last)
+        stops_behind(script, last)
+        script.wait(130.0)
 
 
 @CHAPTER.rule(
@@ -95,24 +95,24 @@ def _stop_of_a_busy_robot(talk: Talk) -> None:
     presupposes=("P29", "P36"),
     broken="the failsafe's stop is not as it has to be",
 )
-def smooth(talk: Talk) -> None:
+def smooth(script: TrialScript) -> None:
     for acceleration in (DEFAULT_ACCELERATION, 3000):
         if acceleration != DEFAULT_ACCELERATION:
-            talk.service(talk.air.slots[0], Opcode.ACCELERATION, acceleration.to_bytes(4, "little"))
-        fast = tuple((12000, -12000) for _ in range(talk.n))
-        until = talk.now + ms(12000 * 256 / acceleration * SAMPLE_TICKS / TICKS_PER_MS + 60.0)
-        while talk.now < until:
-            last = talk.team(fast, gap_ms=60.0)
-        talk.obeyed(last)
+            script.service(script.topology.slots[0], Opcode.ACCELERATION, acceleration.to_bytes(4, "little"))
+        fast = tuple((12000, -12000) for _ in range(script.n))
+        until = script.now + ms(12000 * 256 / acceleration * SAMPLE_TICKS / TICKS_PER_MS + 60.0)
+        while script.now < until:
+            last = script.team(fast, gap_ms=60.0)
+        script.obeyed(last)
         stop_tick = last.end_tick + FAILSAFE_STOP_TICKS
-        talk.wait_until(
+        script.wait_until(
             last.end_tick + ms(490.0) if acceleration != DEFAULT_ACCELERATION else stop_tick + ms(320.0)
         )
-        _slows_down(talk, stop_tick + TOLERANCE_TICKS, talk.now, acceleration)
-        _stays_closed(talk, last, talk.now)
+        _slows_down(script, stop_tick + TOLERANCE_TICKS, script.now, acceleration)
+        _stays_closed(script, last, script.now)
 
 
-def _slows_down(talk: Talk, after_tick: int, until_tick: int, acceleration: int) -> None:
+def _slows_down(script: TrialScript, after_tick: int, until_tick: int, acceleration: int) -> None:
     """From one control period to the next the velocities fall by what the acceleration makes in 97 or 98 samples."""
     samples = CONTROL_PERIOD_TICKS // SAMPLE_TICKS
 
@@ -133,10 +133,10 @@ def _slows_down(talk: Talk, after_tick: int, until_tick: int, acceleration: int)
             return until_tick, "a wheel that still turns"
         return None
 
-    talk.expect(until_tick, f"wheels slowed down by {acceleration} / 65536 count per sample^2", test)
+    script.expect(until_tick, f"wheels slowed down by {acceleration} / 65536 count per sample^2", test)
 
 
-def _stays_closed(talk: Talk, last: Frame, until_tick: int) -> None:
+def _stays_closed(script: TrialScript, last: Frame, until_tick: int) -> None:
     """No abrupt stop, and the motors stay on."""
 
     def test(seen: Seen) -> Found:
@@ -145,7 +145,7 @@ def _stays_closed(talk: Talk, last: Frame, until_tick: int) -> None:
                 return order.tick, f"the {order.side} wheel told {in_words(order)}"
         return None
 
-    talk.expect(until_tick, "a smooth stop", test)
+    script.expect(until_tick, "a smooth stop", test)
 
 
 @CHAPTER.rule(
@@ -155,20 +155,20 @@ def _stays_closed(talk: Talk, last: Frame, until_tick: int) -> None:
     presupposes=("P31", "P34"),
     broken="the motors are not off 500 ms after the last frame",
 )
-def off(talk: Talk) -> None:
-    talk.obeyed(talk.team())
-    last = talk.ping()
-    off_behind(talk, last)
-    talk.wait_until(last.end_tick + ms(700.0))
+def off(script: TrialScript) -> None:
+    script.obeyed(script.team())
+    last = script.ping()
+    off_behind(script, last)
+    script.wait_until(last.end_tick + ms(700.0))
 
     def driven(seen: Seen) -> Found:
-        for tick, side, chip in seen.chips(last.end_tick + ms(501.0), talk_end):
+        for tick, side, chip in seen.chips(last.end_tick + ms(501.0), script_end):
             if chip.pwm_magnitude or not chip.status & MOTOR_OFF:
                 return tick, f"the {side} one on"
         return None
 
-    talk_end = talk.now
-    talk.expect(talk_end, "both motors off", driven)
+    script_end = script.now
+    script.expect(script_end, "both motors off", driven)
 
 
 @CHAPTER.rule(
@@ -177,16 +177,16 @@ def off(talk: Talk) -> None:
     WHEELS,
     presupposes=("P28",),
 )
-def back(talk: Talk) -> None:
+def back(script: TrialScript) -> None:
     for silence_ms in (150.0, 600.0, 900.0, 120.0):
-        frame = talk.team()
-        talk.obeyed(frame)
-        _turning(talk, talk.team(frame.words, gap_ms=60.0))
-        talk.wait(silence_ms - 60.0)
-    talk.obeyed(talk.team())
+        frame = script.team()
+        script.obeyed(frame)
+        _turning(script, script.team(frame.words, gap_ms=60.0))
+        script.wait(silence_ms - 60.0)
+    script.obeyed(script.team())
 
 
-def _turning(talk: Talk, frame: Frame) -> None:
+def _turning(script: TrialScript, frame: Frame) -> None:
     """Both wheels turn as told, as seen from the encoders, when they had time for it."""
     until = frame.end_tick + ms(60.0)
 
@@ -204,20 +204,20 @@ def _turning(talk: Talk, frame: Frame) -> None:
                 )
         return None
 
-    talk.expect(until, f"wheels that turn as by {frame.what}", test)
+    script.expect(until, f"wheels that turn as by {frame.what}", test)
 
 
-def stops_behind(talk: Talk, last: Frame) -> None:
+def stops_behind(script: TrialScript, last: Frame) -> None:
     """Expects the stop in time, and neither earlier nor later."""
-    _in_time(talk, last, FAILSAFE_STOP_TICKS, "stop", "both wheels told to stop")
+    _in_time(script, last, FAILSAFE_STOP_TICKS, "stop", "both wheels told to stop")
 
 
-def off_behind(talk: Talk, last: Frame) -> None:
+def off_behind(script: TrialScript, last: Frame) -> None:
     """Expects motors off in time."""
-    _in_time(talk, last, FAILSAFE_OFF_TICKS, "off", "both motors off")
+    _in_time(script, last, FAILSAFE_OFF_TICKS, "off", "both motors off")
 
 
-def _in_time(talk: Talk, last: Frame, after_ticks: int, what: str, wanted: str) -> None:
+def _in_time(script: TrialScript, last: Frame, after_ticks: int, what: str, wanted: str) -> None:
     earliest = last.last_tick + after_ticks - TOLERANCE_TICKS
     latest = last.end_tick + after_ticks + TOLERANCE_TICKS
 
@@ -247,7 +247,7 @@ def _in_time(talk: Talk, last: Frame, after_ticks: int, what: str, wanted: str) 
         return f"{side} at {in_ms(tick - last.end_tick)}"
 
     window = f"{in_ms(earliest - last.end_tick)} to {in_ms(latest - last.end_tick)}"
-    talk.expect(latest, f"{wanted} {window} after the end of {last.what}", test)
+    script.expect(latest, f"{wanted} {window} after the end of {last.what}", test)
 
 
 def in_ms(ticks: int) -> str:

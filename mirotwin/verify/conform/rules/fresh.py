@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from miro_protocol.table import FRESH_STEPS, SEQ_MODULUS
-from mirotwin.verify.conform.rule import Air, Chapter
+from mirotwin.verify.conform.rule import Chapter, Topology
 from mirotwin.verify.conform.rules import FRESHNESS
-from mirotwin.verify.conform.trial_script import How, Talk, ms
+from mirotwin.verify.conform.trial_script import How, TrialScript, ms
 
 CHAPTER = Chapter("Freshness")
 AGAIN_MS = 150.0
@@ -20,11 +20,11 @@ NEAR_MS = 0.3
     presupposes=("P28",),
     broken="a frame 1 to 8 steps on is not obeyed",
 )
-def steps(talk: Talk) -> None:
-    talk.seq = 30 + 20 * talk.network
-    talk.obeyed(talk.team())
+def steps(script: TrialScript) -> None:
+    script.seq = 30 + 20 * script.network
+    script.obeyed(script.team())
     for step in range(1, FRESH_STEPS + 1):
-        talk.obeyed(talk.team(step=step, what=f"team frame {step} steps on"))
+        script.obeyed(script.team(step=step, what=f"team frame {step} steps on"))
 
 
 @CHAPTER.rule(
@@ -35,14 +35,14 @@ def steps(talk: Talk) -> None:
     presupposes=("P04", "P16"),
     broken="a frame that is not fresh is acted on",
 )
-def stale(talk: Talk) -> None:
-    every = range(FRESH_STEPS + 1, SEQ_MODULUS) if talk.n == 3 else (9, 10, 16, 24, 32, 40, 48, 56, 62, 63)
+def stale(script: TrialScript) -> None:
+    every = range(FRESH_STEPS + 1, SEQ_MODULUS) if script.n == 3 else (9, 10, 16, 24, 32, 40, 48, 56, 62, 63)
     for count, step in enumerate((0, *every)):
         if count % 2 == 0:
-            talk.obeyed(talk.team(lead=b"\xff"))
-        frame = talk.team(step=step, what=f"team frame {step} steps on", lead=b"", fresh=False)
-        talk.ignored(frame)
-    talk.obeyed(talk.team())
+            script.obeyed(script.team(lead=b"\xff"))
+        frame = script.team(step=step, what=f"team frame {step} steps on", lead=b"", fresh=False)
+        script.ignored(frame)
+    script.obeyed(script.team())
 
 
 @CHAPTER.rule(
@@ -53,36 +53,36 @@ def stale(talk: Talk) -> None:
     FRESHNESS,
     presupposes=("P30",),
 )
-def again(talk: Talk) -> None:
+def again(script: TrialScript) -> None:
     for step in (20, 63, 9):
         for after_ms, fresh in ((AGAIN_MS - NEAR_MS, False), (AGAIN_MS + NEAR_MS, True), (400.0, True)):
-            last = talk.team()
-            talk.obeyed(last)
-            start = last.last_tick + ms(after_ms) - (talk.form.wire_size - 1) * talk.character_ticks
+            last = script.team()
+            script.obeyed(last)
+            start = last.last_tick + ms(after_ms) - (script.form.wire_size - 1) * script.character_ticks
             if after_ms < 200.0:  # a frame that is not fresh must not count here
-                talk.team(step=0, lead=b"", fresh=False)
-            talk.wait_until(start)
-            frame = talk.team(
+                script.team(step=0, lead=b"", fresh=False)
+            script.wait_until(start)
+            frame = script.team(
                 step=step, what=f"team frame {step} steps on after {after_ms:g} ms", fresh=fresh
             )
             if fresh:
-                talk.obeyed(frame)
+                script.obeyed(frame)
             else:
-                talk.ignored(frame)
+                script.ignored(frame)
 
 
 @CHAPTER.rule(
     "P19",
     "The first valid frame after power-on MUST be fresh, whatever its seq.",
     FRESHNESS,
-    airs=(Air(3, (1,)), Air(5, (3,)), Air(3, (2,)), Air(3, (0,))),
+    topologies=(Topology(3, (1,)), Topology(5, (3,)), Topology(3, (2,)), Topology(3, (0,))),
     presupposes=("P03",),
     broken="the first frame is not obeyed, whatever its seq",
 )
-def first(talk: Talk) -> None:
-    talk.seq = (0, 40, 63, 1)[talk.network]
-    talk.obeyed(talk.team(step=0, what="first team frame"))
-    talk.obeyed(talk.team())
+def first(script: TrialScript) -> None:
+    script.seq = (0, 40, 63, 1)[script.network]
+    script.obeyed(script.team(step=0, what="first team frame"))
+    script.obeyed(script.team())
 
 
 @CHAPTER.rule(
@@ -92,12 +92,12 @@ def first(talk: Talk) -> None:
     presupposes=("P17", "P29"),
     broken="a repeated frame is acted on",
 )
-def repeated(talk: Talk) -> None:
-    talk.obeyed(talk.team())
+def repeated(script: TrialScript) -> None:
+    script.obeyed(script.team())
     for _ in range(3):
-        talk.wait(105.0)
-        talk.ignored(talk.team(step=0, what="team frame with the same seq", fresh=False))
-    talk.obeyed(talk.team())
+        script.wait(105.0)
+        script.ignored(script.team(step=0, what="team frame with the same seq", fresh=False))
+    script.obeyed(script.team())
 
 
 @CHAPTER.rule(
@@ -108,12 +108,12 @@ def repeated(talk: Talk) -> None:
     presupposes=("P17", "P34"),
     broken="not one counter serves all types",
 )
-def one_counter(talk: Talk) -> None:
-    talk.obeyed(talk.team())
+def one_counter(script: TrialScript) -> None:
+    script.obeyed(script.team())
     how = How(fresh=False, lead=b"", gap_ms=12.0)
-    for make in (talk.ping, talk.of_type_2, talk.ask_nobody):
+    for make in (script.ping, script.of_type_2, script.ask_nobody):
         make()
-        talk.ignored(talk.team(step=0, what="team frame with the seq of another type", **how))
-        talk.obeyed(talk.team())
-    talk.ignored(talk.team(ask=True, step=0, what="question with the seq of a team frame", **how))
-    talk.obeyed(talk.team())
+        script.ignored(script.team(step=0, what="team frame with the seq of another type", **how))
+        script.obeyed(script.team())
+    script.ignored(script.team(ask=True, step=0, what="question with the seq of a team frame", **how))
+    script.obeyed(script.team())

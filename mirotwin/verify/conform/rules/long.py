@@ -5,7 +5,7 @@ from __future__ import annotations
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from mirotwin.verify.conform.rule import THREE, Chapter
 from mirotwin.verify.conform.rules import FRESHNESS, TURNS
-from mirotwin.verify.conform.trial_script import Talk, ms
+from mirotwin.verify.conform.trial_script import TrialScript, ms
 
 CHAPTER = Chapter("Long trials")
 _FRAMES = 2000
@@ -19,37 +19,37 @@ _WRAPS_MS = (2560.0, (1 << 23) / 1000, 8542.5, (1 << 24) / 1000, 32768.0, (1 << 
     "P61",
     "However many frames came, the next one MUST be obeyed and the next question answered.",
     TURNS,
-    airs=THREE,
+    topologies=THREE,
     presupposes=("P34", "P41"),
 )
-def many(talk: Talk) -> None:
-    slot = talk.air.slots[0]
+def many(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
     for number in range(1, _FRAMES + 1):
-        begun = talk.now
-        frame = talk.ask(slot, gap_ms=0.0) if number % 3 == 0 else talk.team(gap_ms=0.0)
+        begun = script.now
+        frame = script.ask(slot, gap_ms=0.0) if number % 3 == 0 else script.team(gap_ms=0.0)
         if number % _EACH < 3 or number > _FRAMES - 6:
-            talk.obeyed(frame)
+            script.obeyed(frame)
             if number % 3 == 0:
-                talk.answered(frame, slot)
-        talk.wait_until(begun + CONTROL_PERIOD_TICKS)
-    talk.wait(40.0)
+                script.answered(frame, slot)
+        script.wait_until(begun + CONTROL_PERIOD_TICKS)
+    script.wait(40.0)
 
 
 @CHAPTER.rule(
     "P62",
     "After any silence motors MUST stay off, the last frame again MUST NOT be fresh, and one with another seq MUST be.",
     FRESHNESS,
-    airs=THREE,
+    topologies=THREE,
     presupposes=("P20", "P32"),
 )
-def ages(talk: Talk) -> None:
+def ages(script: TrialScript) -> None:
     for silence_ms in _WRAPS_MS:
-        last = talk.team()
+        last = script.team()
         until = last.end_tick + ms(silence_ms + 40.0)
-        talk.unchanged(
+        script.unchanged(
             last.end_tick + ms(_OFF_MS), until, f"motors off {silence_ms / 1000:.1f} s after the last frame"
         )
-        talk.wait_until(until)
-        talk.ignored(talk.team(step=0, fresh=False))
-        talk.wait(20.0)
-        talk.obeyed(talk.team(step=20, what=f"team frame 20 steps on after {silence_ms / 1000:.1f} s"))
+        script.wait_until(until)
+        script.ignored(script.team(step=0, fresh=False))
+        script.wait(20.0)
+        script.obeyed(script.team(step=20, what=f"team frame 20 steps on after {silence_ms / 1000:.1f} s"))

@@ -13,9 +13,9 @@ from miro_protocol.crc import POLYNOMIAL_REFLECTED
 from miro_protocol.frames import seal
 from miro_protocol.table import LAYOUT_TEAM, SEQ_MODULUS, SYNC, TELEMETRY, FrameType
 from miro_protocol.whitening import whiten
-from mirotwin.verify.conform.rule import BOTH, Air, Chapter
+from mirotwin.verify.conform.rule import BOTH, Chapter, Topology
 from mirotwin.verify.conform.rules import FRAME, RECEPTION, VERSIONS, WHY
-from mirotwin.verify.conform.trial_script import ACTING_TICKS, Frame, How, Talk
+from mirotwin.verify.conform.trial_script import ACTING_TICKS, Frame, How, TrialScript
 
 CHAPTER = Chapter("Reception")
 _CHANCE = Stream(0, "conform/reception")
@@ -23,23 +23,23 @@ LONGEST_US, SHORTEST_US = 80.0, 20.0
 """Two receivers may differ about a pause in between (protocol/README.md)."""
 
 
-def refused(talk: Talk, ways: Iterable[tuple[str, How]], in_a_row: int = 0) -> None:
+def refused(script: TrialScript, ways: Iterable[tuple[str, How]], in_a_row: int = 0) -> None:
     """Frames, each damaged in one of these ways: no robot acts on any of them, and all on the good ones in between.
 
     Some follow each other without a pause, as many as are over before the failsafe comes.
     """
-    in_a_row = in_a_row or (3 if talk.n == 3 else 2)
+    in_a_row = in_a_row or (3 if script.n == 3 else 2)
     before = ""
     for count, (what, how) in enumerate(ways):
         if count % in_a_row == 0:
             if count:
-                talk.wait(ACTING_TICKS / 24_000 + 2.0)
-            talk.obeyed(talk.team(lead=b"\xff", what=f"team frame{before}"))
+                script.wait(ACTING_TICKS / 24_000 + 2.0)
+            script.obeyed(script.team(lead=b"\xff", what=f"team frame{before}"))
         before = f" after a {what}"
         damaged: How = {"lead": b"", "fresh": False, "gap_ms": 0.0, **how}
-        talk.ignored(talk.team(what=what, **damaged))
-    talk.wait(ACTING_TICKS / 24_000 + 2.0)
-    talk.obeyed(talk.team(lead=b"\xff", what=f"team frame{before}"))
+        script.ignored(script.team(what=what, **damaged))
+    script.wait(ACTING_TICKS / 24_000 + 2.0)
+    script.obeyed(script.team(lead=b"\xff", what=f"team frame{before}"))
 
 
 @CHAPTER.rule(
@@ -50,7 +50,7 @@ def refused(talk: Talk, ways: Iterable[tuple[str, How]], in_a_row: int = 0) -> N
     presupposes=("P28",),
     broken="a frame is not found by its sync alone",
 )
-def preamble(talk: Talk) -> None:
+def preamble(script: TrialScript) -> None:
     ways: tuple[tuple[str, How], ...] = (
         ("without preamble", How(lead=b"")),
         ("behind FFh alone", How(lead=b"\xff")),
@@ -62,7 +62,7 @@ def preamble(talk: Talk) -> None:
         ("with a pause in its preamble", How(pauses={-2: 5000.0})),
     )
     for what, how in ways:
-        talk.obeyed(talk.team(what=f"team frame {what}", **how))
+        script.obeyed(script.team(what=f"team frame {what}", **how))
 
 
 @CHAPTER.rule(
@@ -71,9 +71,9 @@ def preamble(talk: Talk) -> None:
     RECEPTION,
     presupposes=("P04",),
 )
-def sync(talk: Talk) -> None:
+def sync(script: TrialScript) -> None:
     refused(
-        talk,
+        script,
         (
             (f"frame with bit {bit} of sync byte {at} wrong", How(wrong={at: 1 << bit}))
             for at in (0, 1)
@@ -89,9 +89,9 @@ def sync(talk: Talk) -> None:
     presupposes=("P07",),
     broken="a frame of another layout is taken",
 )
-def layout(talk: Talk) -> None:
-    others = (LAYOUT_TEAM | (8 - talk.n), TELEMETRY.layout, 0x20 | talk.n, LAYOUT_TEAM, 0x00, 0xFF)
-    refused(talk, ((f"frame of layout {byte:02X}h", How(layout=byte)) for byte in others))
+def layout(script: TrialScript) -> None:
+    others = (LAYOUT_TEAM | (8 - script.n), TELEMETRY.layout, 0x20 | script.n, LAYOUT_TEAM, 0x00, 0xFF)
+    refused(script, ((f"frame of layout {byte:02X}h", How(layout=byte)) for byte in others))
 
 
 @CHAPTER.rule(
@@ -101,10 +101,10 @@ def layout(talk: Talk) -> None:
     presupposes=("P04",),
     broken="a wrong CRC is not handled as it has to be",
 )
-def crc(talk: Talk) -> None:
-    low = talk.form.size - 2
+def crc(script: TrialScript) -> None:
+    low = script.form.size - 2
     refused(
-        talk,
+        script,
         (
             (f"frame whose CRC leaves bit {bit} wrong", How(wrong={low: d & 0xFF, low + 1: d >> 8}))
             for bit, d in enumerate(map(leaving, (1 << bit for bit in range(16))))
@@ -126,13 +126,13 @@ def leaving(register: int) -> int:
     WHY,
     presupposes=("P07",),
 )
-def wrong_bits(talk: Talk) -> None:
-    refused(talk, _wrong_bits(talk))
+def wrong_bits(script: TrialScript) -> None:
+    refused(script, _wrong_bits(script))
 
 
-def _wrong_bits(talk: Talk) -> Iterator[tuple[str, How]]:
+def _wrong_bits(script: TrialScript) -> Iterator[tuple[str, How]]:
     """One wrong bit in each character, then samples of two to four."""
-    characters = range(2, talk.form.size)
+    characters = range(2, script.form.size)
     for at in characters:
         yield f"frame with a wrong bit in character {at}", How(wrong={at: 1 << at * 3 % 8})
     draw = 0
@@ -160,10 +160,13 @@ def _wrong_bits(talk: Talk) -> Iterator[tuple[str, How]]:
     presupposes=("P04",),
     broken="a bad stop bit is not handled as it has to be",
 )
-def stop_bits(talk: Talk) -> None:
+def stop_bits(script: TrialScript) -> None:
     refused(
-        talk,
-        ((f"frame with a bad stop bit in character {at}", How(bad_stop=at)) for at in range(talk.form.size)),
+        script,
+        (
+            (f"frame with a bad stop bit in character {at}", How(bad_stop=at))
+            for at in range(script.form.size)
+        ),
     )
 
 
@@ -174,13 +177,13 @@ def stop_bits(talk: Talk) -> None:
     presupposes=("P04",),
     broken="a pause within a frame is not handled as it has to be",
 )
-def long_pauses(talk: Talk) -> None:
-    short = [(at, LONGEST_US) for at in range(1, talk.form.size)]
+def long_pauses(script: TrialScript) -> None:
+    short = [(at, LONGEST_US) for at in range(1, script.form.size)]
     # counters of 8 and 16 bits that count machine cycles come round after the first two and the last
-    long = [(talk.form.size // 2, pause_us) for pause_us in (128.0, 256.0, 1040.0, 10_000.0, 32_766.3)]
+    long = [(script.form.size // 2, pause_us) for pause_us in (128.0, 256.0, 1040.0, 10_000.0, 32_766.3)]
     for ways, in_a_row in ((short, 0), (long, 1)):
         damaged = ((f"frame with {us:g} us before character {at}", How(pauses={at: us})) for at, us in ways)
-        refused(talk, damaged, in_a_row)
+        refused(script, damaged, in_a_row)
 
 
 @CHAPTER.rule(
@@ -188,22 +191,22 @@ def long_pauses(talk: Talk) -> None:
     f"A frame with pauses of up to {SHORTEST_US:g} us between its characters MUST be taken, and one of a host whose"
     " serial port is 2.5 % too fast or 1.5 % too slow: the spacings are within 1040 +- 50 us.",
     RECEPTION,
-    airs=(*BOTH, Air(3, (0,), baud_offset_ppm=25_000), Air(5, (4,), baud_offset_ppm=-15_000)),
+    topologies=(*BOTH, Topology(3, (0,), baud_offset_ppm=25_000), Topology(5, (4,), baud_offset_ppm=-15_000)),
     presupposes=("P04",),
 )
-def short_pauses(talk: Talk) -> None:
-    offset = talk.air.baud_offset_ppm
+def short_pauses(script: TrialScript) -> None:
+    offset = script.topology.baud_offset_ppm
     for _ in range(3):
-        talk.obeyed(talk.team(what=f"team frame of a host {offset / 10_000:+g} %" if offset else ""))
+        script.obeyed(script.team(what=f"team frame of a host {offset / 10_000:+g} %" if offset else ""))
     if not offset:
-        places = range(1, talk.form.size)
+        places = range(1, script.form.size)
         everywhere = dict.fromkeys(places, SHORTEST_US)
-        talk.obeyed(
-            talk.team(what=f"team frame with {SHORTEST_US:g} us before each character", pauses=everywhere)
+        script.obeyed(
+            script.team(what=f"team frame with {SHORTEST_US:g} us before each character", pauses=everywhere)
         )
         for at in places:
             what = f"team frame with {SHORTEST_US:g} us before character {at}"
-            talk.obeyed(talk.team(what=what, lead=b"", pauses={at: SHORTEST_US}))
+            script.obeyed(script.team(what=what, lead=b"", pauses={at: SHORTEST_US}))
 
 
 @CHAPTER.rule(
@@ -212,28 +215,28 @@ def short_pauses(talk: Talk) -> None:
     RECEPTION,
     presupposes=("P14", "P16"),
 )
-def emptied(talk: Talk) -> None:
+def emptied(script: TrialScript) -> None:
     for spoilt in (False, True):
-        talk.obeyed(talk.team())
-        outer, inner = _nested(talk, spoilt)
+        script.obeyed(script.team())
+        outer, inner = _nested(script, spoilt)
         if spoilt:  # then the window was not emptied
-            talk.obeyed(inner)
+            script.obeyed(inner)
         else:
-            talk.obeyed(outer)
-            talk.unchanged(
+            script.obeyed(outer)
+            script.unchanged(
                 outer.end_tick + ACTING_TICKS, inner.end_tick + ACTING_TICKS, f"{inner.what} not acted on"
             )
-        talk.obeyed(talk.team())
+        script.obeyed(script.team())
 
 
-def _nested(talk: Talk, spoilt: bool) -> tuple[Frame, Frame]:
+def _nested(script: TrialScript, spoilt: bool) -> tuple[Frame, Frame]:
     """A frame whose last six characters begin another one; with a wrong bit in the outer one, if `spoilt`.
 
     The first three characters of the inner payload are the outer frame's last; they are velocities of robot 0.
     """
-    form = replace(talk.form, lead=b"")
-    outer_words, inner_words = talk.words(), talk.words()
-    outer_seq, inner_seq = ((talk.seq + step) % SEQ_MODULUS for step in (1, 2))
+    form = replace(script.form, lead=b"")
+    outer_words, inner_words = script.words(), script.words()
+    outer_seq, inner_seq = ((script.seq + step) % SEQ_MODULUS for step in (1, 2))
     inner_payload = bytearray(_payload(inner_words))
     inner_start = SYNC + whiten(bytes([FrameType.TEAM * SEQ_MODULUS + inner_seq]) + bytes(inner_payload[:1]))
     # what the outer payload must be in clear so that its last four characters are these on the air
@@ -248,14 +251,16 @@ def _nested(talk: Talk, spoilt: bool) -> tuple[Frame, Frame]:
     wire = bytearray(outer_wire + inner_wire[len(inner_start) + 2 :])
     if spoilt:
         wire[2] ^= 0x02
-    begun = talk.now
-    talk.characters(bytes(wire))
-    outer_end = begun + form.size * talk.character_ticks
-    outer = Frame(begun, outer_end - talk.character_ticks, outer_end, outer_seq, outer_words, "outer frame")
-    end = talk.now
-    inner = Frame(outer.tick, end - talk.character_ticks, end, inner_seq, inner_words, "frame within a frame")
-    talk.seq = inner_seq if spoilt else outer_seq
-    talk.wait(12.0)
+    begun = script.now
+    script.characters(bytes(wire))
+    outer_end = begun + form.size * script.character_ticks
+    outer = Frame(begun, outer_end - script.character_ticks, outer_end, outer_seq, outer_words, "outer frame")
+    end = script.now
+    inner = Frame(
+        outer.tick, end - script.character_ticks, end, inner_seq, inner_words, "frame within a frame"
+    )
+    script.seq = inner_seq if spoilt else outer_seq
+    script.wait(12.0)
     return outer, inner
 
 
@@ -270,14 +275,14 @@ def _payload(words: Iterable[tuple[int, int]]) -> bytes:
     presupposes=("P09", "P10", "P14"),
     broken="a frame right behind garbage is lost",
 )
-def garbage(talk: Talk) -> None:
+def garbage(script: TrialScript) -> None:
     noise = bytes(int(_CHANCE.uniform(9000 + at) * 256) for at in range(300))
-    frame = seal(talk.form, bytes(talk.form.body_size))
+    frame = seal(script.form, bytes(script.form.body_size))
     kinds = (
         ("one character", b"\x2d"),
         ("random characters", noise[:40]),
         ("nothing but syncs", SYNC * 20),
-        ("half a frame", frame[: -talk.form.size // 2]),
+        ("half a frame", frame[: -script.form.size // 2]),
         ("all of a frame but its last character", frame[:-1]),
         ("a frame with a wrong CRC", frame[:-1] + bytes([frame[-1] ^ 1])),
         ("00h", bytes(30)),
@@ -286,8 +291,8 @@ def garbage(talk: Talk) -> None:
         ("300 random characters", noise),
     )
     for what, characters in kinds:
-        talk.characters(characters)
-        talk.obeyed(talk.team(what=f"team frame right behind {what}", lead=b""))
+        script.characters(characters)
+        script.obeyed(script.team(what=f"team frame right behind {what}", lead=b""))
     frames = (
         ("a bad stop bit", How(bad_stop=5)),
         ("a pause", How(pauses={7: 400.0})),
@@ -295,11 +300,11 @@ def garbage(talk: Talk) -> None:
     )
     for what, how in frames:
         damaged: How = {"fresh": False, "gap_ms": 0.0, **how}
-        talk.team(**damaged)
-        talk.obeyed(talk.team(what=f"team frame right behind one with {what}", lead=b""))
+        script.team(**damaged)
+        script.obeyed(script.team(what=f"team frame right behind one with {what}", lead=b""))
     for _ in range(3):  # none of three is lost, without a pause between them
-        talk.obeyed(talk.team(what="team frame right behind another", lead=b"", gap_ms=0.0))
-    talk.wait(12.0)
+        script.obeyed(script.team(what="team frame right behind another", lead=b"", gap_ms=0.0))
+    script.wait(12.0)
 
 
 @CHAPTER.rule(
@@ -309,19 +314,19 @@ def garbage(talk: Talk) -> None:
     presupposes=("P07",),
     broken="a frame behind a false sync is lost",
 )
-def false_syncs(talk: Talk) -> None:
-    for length in range(2, talk.form.size, 3):
+def false_syncs(script: TrialScript) -> None:
+    for length in range(2, script.form.size, 3):
         lead = SYNC + bytes(range(0x60, 0x60 + length - 2))
-        talk.obeyed(talk.team(what=f"team frame {length} characters behind a sync", lead=lead))
+        script.obeyed(script.team(what=f"team frame {length} characters behind a sync", lead=lead))
 
 
 @CHAPTER.rule(
     "P15",
     "Between keyed frames, RXD shows slicer noise: the first frame with its preamble MUST be taken all the same.",
     FRAME,
-    airs=(Air(3, (1,), keyed=True), Air(5, (3,), keyed=True)),
+    topologies=(Topology(3, (1,), keyed=True), Topology(5, (3,), keyed=True)),
     presupposes=("P13",),
 )
-def slicer_noise(talk: Talk) -> None:
+def slicer_noise(script: TrialScript) -> None:
     for count in range(8):
-        talk.obeyed(talk.team(what="team frame behind noise", gap_ms=14.0 + 3.7 * count))
+        script.obeyed(script.team(what="team frame behind noise", gap_ms=14.0 + 3.7 * count))

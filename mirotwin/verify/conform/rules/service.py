@@ -5,12 +5,12 @@ from __future__ import annotations
 from miro_protocol.table import DEFAULT_ACCELERATION, Opcode
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import number
-from mirotwin.verify.conform.rule import Air, Chapter
+from mirotwin.verify.conform.rule import Chapter, Topology
 from mirotwin.verify.conform.rules import FIRMWARE, FRAME, RECEPTION, VERSIONS
 from mirotwin.verify.conform.rules.failsafe import stops_behind
 from mirotwin.verify.conform.rules.sound import nothing_refused
 from mirotwin.verify.conform.seen import Seen, Words
-from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, Talk, ms
+from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, TrialScript, ms
 
 CHAPTER = Chapter("Service frames and unknown contents")
 
@@ -30,15 +30,15 @@ def _acceleration(value: int) -> bytes:
     presupposes=("P29",),
     broken="a ping does not do what it has to",
 )
-def ping(talk: Talk) -> None:
-    frame = talk.team()
-    talk.obeyed(frame)
+def ping(script: TrialScript) -> None:
+    frame = script.team()
+    script.obeyed(frame)
     for _ in range(5):
-        last = talk.ping(gap_ms=60.0)
-        talk.untouched(last, since=frame)
-    talk.unchanged(frame.end_tick + ACTING_TICKS, talk.now, "velocities kept while service frames come")
-    stops_behind(talk, last)
-    talk.wait(70.0)
+        last = script.ping(gap_ms=60.0)
+        script.untouched(last, since=frame)
+    script.unchanged(frame.end_tick + ACTING_TICKS, script.now, "velocities kept while service frames come")
+    stops_behind(script, last)
+    script.wait(70.0)
 
 
 @CHAPTER.rule(
@@ -48,19 +48,19 @@ def ping(talk: Talk) -> None:
     presupposes=("P21",),
     broken="filter words are not loaded as they have to be",
 )
-def filter_words(talk: Talk) -> None:
-    slot = talk.air.slots[0]
+def filter_words(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
     for words in ((0x0102, 0x0304, 0x0506, 0x0708), (0x7FFF, 0, 1, 0x55AA), (400, 40, 3000, 2000)):
-        _filter_taken(talk, talk.service(slot, Opcode.FILTER, _filter(words), "filter frame"), words)
-    talk.obeyed(talk.team())
+        _filter_taken(script, script.service(slot, Opcode.FILTER, _filter(words), "filter frame"), words)
+    script.obeyed(script.team())
     words = (401, 41, 2900, 1999)
-    frame = talk.service(slot, Opcode.FILTER, _filter(words), "filter frame in motion")
-    _filter_taken(talk, frame, words)
-    talk.unchanged(frame.tick, frame.end_tick + ACTING_TICKS, "velocities kept")
-    talk.obeyed(talk.team())
+    frame = script.service(slot, Opcode.FILTER, _filter(words), "filter frame in motion")
+    _filter_taken(script, frame, words)
+    script.unchanged(frame.tick, frame.end_tick + ACTING_TICKS, "velocities kept")
+    script.obeyed(script.team())
 
 
-def _filter_taken(talk: Talk, frame: Frame, words: Words) -> None:
+def _filter_taken(script: TrialScript, frame: Frame, words: Words) -> None:
     deadline = frame.end_tick + ACTING_TICKS
 
     def test(seen: Seen) -> Found:
@@ -70,7 +70,7 @@ def _filter_taken(talk: Talk, frame: Frame, words: Words) -> None:
                 return deadline, f"{_listed(found)} in the {side} one"
         return None
 
-    talk.expect(deadline, f"kp, ki, kd, il = {_listed(words)} in force after {frame.what}", test)
+    script.expect(deadline, f"kp, ki, kd, il = {_listed(words)} in force after {frame.what}", test)
 
 
 def _listed(words: Words | None) -> str:
@@ -85,12 +85,14 @@ def _listed(words: Words | None) -> str:
     presupposes=("P21",),
     broken="an acceleration is not set as it has to be",
 )
-def acceleration(talk: Talk) -> None:
+def acceleration(script: TrialScript) -> None:
     for value in (0x0102_0304, 0x3FFF_FFFF, 0x0001_2345, 4000):
-        talk.service(talk.air.slots[0], Opcode.ACCELERATION, _acceleration(value), "acceleration frame")
-        _driven_with(talk, talk.team(), value)
-        talk.obeyed(talk.team(_standing(talk)))
-        talk.wait(520.0)  # motors off: at rest in any case
+        script.service(
+            script.topology.slots[0], Opcode.ACCELERATION, _acceleration(value), "acceleration frame"
+        )
+        _driven_with(script, script.team(), value)
+        script.obeyed(script.team(_standing(script)))
+        script.wait(520.0)  # motors off: at rest in any case
 
 
 @CHAPTER.rule(
@@ -100,40 +102,40 @@ def acceleration(talk: Talk) -> None:
     presupposes=("P31", "P41"),
     broken="an acceleration in motion does not wait",
 )
-def acceleration_waits(talk: Talk) -> None:
-    slot = talk.air.slots[0]
-    talk.obeyed(talk.team())
-    _sent_in_motion(talk, 9000)
-    for words in (talk.words(), ((0, 700),) * talk.n, ((-700, 0),) * talk.n):
-        _driven_with(talk, talk.team(words), DEFAULT_ACCELERATION)
+def acceleration_waits(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
+    script.obeyed(script.team())
+    _sent_in_motion(script, 9000)
+    for words in (script.words(), ((0, 700),) * script.n, ((-700, 0),) * script.n):
+        _driven_with(script, script.team(words), DEFAULT_ACCELERATION)
     for _ in range(8):  # told to stand by frames
-        talk.obeyed(talk.team(_standing(talk), gap_ms=20.0))
+        script.obeyed(script.team(_standing(script), gap_ms=20.0))
     for _ in range(4):
-        fast = talk.team(((300, 14000),) * talk.n, gap_ms=60.0)
-    _driven_with(talk, fast, 9000)
-    _sent_in_motion(talk, 7000)
-    talk.obeyed(talk.team(_standing(talk), gap_ms=15.0))
-    _driven_with(talk, talk.team(what="team frame while one wheel slows down"), 9000)
-    talk.wait(300.0)  # told to stand by the failsafe
-    _driven_with(talk, talk.team(), 7000)
-    talk.answered(talk.ask(slot, gap_ms=40.0), slot)
-    nothing_refused(talk)
+        fast = script.team(((300, 14000),) * script.n, gap_ms=60.0)
+    _driven_with(script, fast, 9000)
+    _sent_in_motion(script, 7000)
+    script.obeyed(script.team(_standing(script), gap_ms=15.0))
+    _driven_with(script, script.team(what="team frame while one wheel slows down"), 9000)
+    script.wait(300.0)  # told to stand by the failsafe
+    _driven_with(script, script.team(), 7000)
+    script.answered(script.ask(slot, gap_ms=40.0), slot)
+    nothing_refused(script)
 
 
-def _sent_in_motion(talk: Talk, value: int) -> None:
-    frame = talk.service(
-        talk.air.slots[0], Opcode.ACCELERATION, _acceleration(value), "acceleration in motion"
+def _sent_in_motion(script: TrialScript, value: int) -> None:
+    frame = script.service(
+        script.topology.slots[0], Opcode.ACCELERATION, _acceleration(value), "acceleration in motion"
     )
-    talk.unchanged(frame.tick, frame.end_tick + ACTING_TICKS, "velocities kept")
+    script.unchanged(frame.tick, frame.end_tick + ACTING_TICKS, "velocities kept")
 
 
-def _standing(talk: Talk) -> tuple[tuple[int, int], ...]:
-    return ((0, 0),) * talk.n
+def _standing(script: TrialScript) -> tuple[tuple[int, int], ...]:
+    return ((0, 0),) * script.n
 
 
-def _driven_with(talk: Talk, frame: Frame, value: int) -> None:
+def _driven_with(script: TrialScript, frame: Frame, value: int) -> None:
     """The frame is obeyed, and this acceleration is in force."""
-    talk.obeyed(frame)
+    script.obeyed(frame)
     deadline = frame.end_tick + ACTING_TICKS
 
     def test(seen: Seen) -> Found:
@@ -142,32 +144,32 @@ def _driven_with(talk: Talk, frame: Frame, value: int) -> None:
                 return deadline, f"{number(order.acceleration, 8)} in the {order.side} one"
         return None
 
-    talk.expect(deadline, f"acceleration {number(value, 8)} in force with {frame.what}", test)
+    script.expect(deadline, f"acceleration {number(value, 8)} in force with {frame.what}", test)
 
 
 @CHAPTER.rule(
     "P38",
     "A setting MUST be made by the addressed robot alone.",
     FRAME,
-    airs=(Air(3, (0, 1, 2)), Air(5, (0, 4))),
+    topologies=(Topology(3, (0, 1, 2)), Topology(5, (0, 4))),
     presupposes=("P35", "P36"),
 )
-def addressed(talk: Talk) -> None:
+def addressed(script: TrialScript) -> None:
     words = (300, 30, 2500, 1500)
-    for slot in talk.air.slots:
-        others = tuple(other for other in talk.air.slots if other != slot)
+    for slot in script.topology.slots:
+        others = tuple(other for other in script.topology.slots if other != slot)
         for opcode, data in ((Opcode.FILTER, _filter(words)), (Opcode.ACCELERATION, _acceleration(8000))):
-            frame = talk.service(slot, opcode, data, f"service frame to robot {slot}, opcode {opcode}")
-            talk.untouched(frame, others)
+            frame = script.service(slot, opcode, data, f"service frame to robot {slot}, opcode {opcode}")
+            script.untouched(frame, others)
             if opcode == Opcode.FILTER:
-                _only_of(talk, frame, slot, words)
-    talk.obeyed(talk.team())
-    absent = talk.n - 2
-    if absent not in talk.air.slots:
-        talk.untouched(talk.service(absent, Opcode.FILTER, _filter(words), "service frame to nobody"))
+                _only_of(script, frame, slot, words)
+    script.obeyed(script.team())
+    absent = script.n - 2
+    if absent not in script.topology.slots:
+        script.untouched(script.service(absent, Opcode.FILTER, _filter(words), "service frame to nobody"))
 
 
-def _only_of(talk: Talk, frame: Frame, slot: int, words: Words) -> None:
+def _only_of(script: TrialScript, frame: Frame, slot: int, words: Words) -> None:
     deadline = frame.end_tick + ACTING_TICKS
 
     def test(seen: Seen) -> Found:
@@ -177,7 +179,7 @@ def _only_of(talk: Talk, frame: Frame, slot: int, words: Words) -> None:
                 return deadline, f"{_listed(found)} in the {side} one"
         return None
 
-    talk.expect(deadline, f"{_listed(words)} in force after {frame.what}", test, (slot,))
+    script.expect(deadline, f"{_listed(words)} in force after {frame.what}", test, (slot,))
 
 
 @CHAPTER.rule(
@@ -186,21 +188,23 @@ def _only_of(talk: Talk, frame: Frame, slot: int, words: Words) -> None:
     VERSIONS,
     presupposes=("P31",),
 )
-def unknown_opcode(talk: Talk) -> None:
-    slot = talk.air.slots[0]
+def unknown_opcode(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
     for opcode in (3, 0xFE):
-        talk.untouched(
-            talk.service(slot, opcode, bytes(range(1, 9)), f"service frame at rest, opcode {opcode}")
+        script.untouched(
+            script.service(slot, opcode, bytes(range(1, 9)), f"service frame at rest, opcode {opcode}")
         )
-    frame = talk.team()
-    talk.obeyed(frame)
+    frame = script.team()
+    script.obeyed(frame)
     for opcode in (3, 4, 0x7F, 0x81, 0xFF):
-        last = talk.service(slot, opcode, bytes(range(1, 9)), f"service frame, opcode {opcode}", gap_ms=50.0)
-        talk.untouched(last, since=frame)
-    talk.unchanged(frame.end_tick + ACTING_TICKS, talk.now, "velocities kept")
-    stops_behind(talk, last)
-    talk.wait(150.0)
-    _driven_with(talk, talk.team(), DEFAULT_ACCELERATION)
+        last = script.service(
+            slot, opcode, bytes(range(1, 9)), f"service frame, opcode {opcode}", gap_ms=50.0
+        )
+        script.untouched(last, since=frame)
+    script.unchanged(frame.end_tick + ACTING_TICKS, script.now, "velocities kept")
+    stops_behind(script, last)
+    script.wait(150.0)
+    _driven_with(script, script.team(), DEFAULT_ACCELERATION)
 
 
 @CHAPTER.rule(
@@ -210,12 +214,12 @@ def unknown_opcode(talk: Talk) -> None:
     presupposes=("P29",),
     broken="a frame of type 2 is not handled as it has to be",
 )
-def type_2(talk: Talk) -> None:
-    frame = talk.team()
-    talk.obeyed(frame)
-    for _ in range(3 * talk.n):  # each number asks another robot
-        last = talk.of_type_2(gap_ms=40.0)
-        talk.untouched(last, since=frame)
-    talk.silent(frame.end_tick + ms(25.0), talk.now, "frames of type 2 ask nobody")
-    stops_behind(talk, last)
-    talk.wait(80.0)
+def type_2(script: TrialScript) -> None:
+    frame = script.team()
+    script.obeyed(frame)
+    for _ in range(3 * script.n):  # each number asks another robot
+        last = script.of_type_2(gap_ms=40.0)
+        script.untouched(last, since=frame)
+    script.silent(frame.end_tick + ms(25.0), script.now, "frames of type 2 ask nobody")
+    stops_behind(script, last)
+    script.wait(80.0)

@@ -9,14 +9,14 @@ from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FAULTS, POWER_ON
 from mirotwin.verify.conform.rules.boot import keeps_off
 from mirotwin.verify.conform.seen import Seen
-from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, Talk, ms
+from mirotwin.verify.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
 
 CHAPTER = Chapter("Soundness")
 
 
-def nothing_refused(talk: Talk) -> None:
+def nothing_refused(script: TrialScript) -> None:
     """Expects that no LM629 refused a command up to now."""
-    end = talk.now
+    end = script.now
 
     def refused(seen: Seen) -> Found:
         for tick, side, chip in seen.chips(0, end):
@@ -24,7 +24,7 @@ def nothing_refused(talk: Talk) -> None:
                 return tick, f"command error of the {side} one"
         return None
 
-    talk.expect(end, "no command that an LM629 refuses", refused)
+    script.expect(end, "no command that an LM629 refuses", refused)
 
 
 @CHAPTER.rule(
@@ -36,9 +36,9 @@ def nothing_refused(talk: Talk) -> None:
     presupposes=("P52",),
     broken="LM629s are not used as their data sheet says",
 )
-def lm629(talk: Talk) -> None:
-    load(talk)
-    nothing_refused(talk)
+def lm629(script: TrialScript) -> None:
+    load(script)
+    nothing_refused(script)
 
 
 @CHAPTER.rule(
@@ -49,8 +49,8 @@ def lm629(talk: Talk) -> None:
     presupposes=("P13", "P16", "P36"),
     broken="interrupts leave the main loop no time, or frames are lost under load",
 )
-def main_loop(talk: Talk) -> None:
-    load(talk)
+def main_loop(script: TrialScript) -> None:
+    load(script)
 
 
 @CHAPTER.rule(
@@ -61,8 +61,8 @@ def main_loop(talk: Talk) -> None:
     presupposes=("P52",),
     broken="the stack runs into data, or leaves internal RAM",
 )
-def stack(talk: Talk) -> None:
-    load(talk)
+def stack(script: TrialScript) -> None:
+    load(script)
 
 
 @CHAPTER.rule(
@@ -73,8 +73,8 @@ def stack(talk: Talk) -> None:
     presupposes=("P52",),
     broken="it executes what is no code of its own",
 )
-def own_code(talk: Talk) -> None:
-    load(talk)
+def own_code(script: TrialScript) -> None:
+    load(script)
 
 
 @CHAPTER.rule(
@@ -85,23 +85,23 @@ def own_code(talk: Talk) -> None:
     presupposes=("P01", "P41"),
     broken="a reset of the processor does harm",
 )
-def reset_pin(talk: Talk) -> None:
-    slot = talk.air.slots[0]
+def reset_pin(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
     for when, for_ms in (("in motion", 3.0), ("within a frame", 0.05), ("while it answers", 7.0)):
-        talk.obeyed(talk.team(step=1))
+        script.obeyed(script.team(step=1))
         if when == "within a frame":
-            begun = talk.now
-            talk.team()
-            end = talk.reset(begun + 15 * talk.character_ticks, for_ms)
+            begun = script.now
+            script.team()
+            end = script.reset(begun + 15 * script.character_ticks, for_ms)
         else:
-            question = talk.ask(slot)
-            end = talk.reset(question.end_tick + ms(9.0 if when == "while it answers" else 40.0), for_ms)
-        talk.wait_until(end + ms(BOOTED_MS))
-        talk.wait(45.0)
-        keeps_off(talk, end, talk.now)
-        talk.seq += 30  # any number is fresh again
-        talk.obeyed(talk.team(what=f"team frame after a reset {when}"))
-        talk.answered(talk.ask(slot, gap_ms=36.0), slot)
+            question = script.ask(slot)
+            end = script.reset(question.end_tick + ms(9.0 if when == "while it answers" else 40.0), for_ms)
+        script.wait_until(end + ms(BOOTED_MS))
+        script.wait(45.0)
+        keeps_off(script, end, script.now)
+        script.seq += 30  # any number is fresh again
+        script.obeyed(script.team(what=f"team frame after a reset {when}"))
+        script.answered(script.ask(slot, gap_ms=36.0), slot)
 
 
 @CHAPTER.rule(
@@ -110,30 +110,30 @@ def reset_pin(talk: Talk) -> None:
     POWER_ON,
     presupposes=("P55",),
 )
-def supply(talk: Talk) -> None:
-    slot = talk.air.slots[0]
+def supply(script: TrialScript) -> None:
+    slot = script.topology.slots[0]
     for off_ms in (2.0, 60.0):
-        talk.obeyed(talk.team())
-        question = talk.ask(slot)
-        end = talk.switch_off(question.end_tick + ms(9.0), off_ms)
-        talk.wait_until(end + ms(BOOTED_MS))
-        talk.wait(45.0)
-        keeps_off(talk, end, talk.now)
-        talk.seq += 20
-        talk.obeyed(talk.team(what="team frame after the supply was off"))
-        talk.answered(talk.ask(slot, gap_ms=36.0), slot)
+        script.obeyed(script.team())
+        question = script.ask(slot)
+        end = script.switch_off(question.end_tick + ms(9.0), off_ms)
+        script.wait_until(end + ms(BOOTED_MS))
+        script.wait(45.0)
+        keeps_off(script, end, script.now)
+        script.seq += 20
+        script.obeyed(script.team(what="team frame after the supply was off"))
+        script.answered(script.ask(slot, gap_ms=36.0), slot)
 
 
-def load(talk: Talk) -> None:
+def load(script: TrialScript) -> None:
     """Everything at once: questions without a pause, settings, garbage full of syncs; then a frame that is obeyed."""
-    slot = talk.air.slots[0]
+    slot = script.topology.slots[0]
     for count in range(3):
         for _ in range(4):
-            talk.team(ask=True, lead=b"", gap_ms=0.0)
-        talk.service(slot, Opcode.FILTER, bytes((0x90, 1, 40, 0, 0xB8, 11, 0xD0, 7)), gap_ms=0.0)
-        talk.service(slot, Opcode.ACCELERATION, (5973 + count).to_bytes(4, "little"), gap_ms=0.0)
-        talk.characters(SYNC * 25)
-        talk.characters(bytes(range(1, 250, 7)))
-        talk.obeyed(talk.ask(slot, lead=b"", what="question under load"))
-    talk.wait(540.0)
-    talk.obeyed(talk.team(what="team frame after the load"))
+            script.team(ask=True, lead=b"", gap_ms=0.0)
+        script.service(slot, Opcode.FILTER, bytes((0x90, 1, 40, 0, 0xB8, 11, 0xD0, 7)), gap_ms=0.0)
+        script.service(slot, Opcode.ACCELERATION, (5973 + count).to_bytes(4, "little"), gap_ms=0.0)
+        script.characters(SYNC * 25)
+        script.characters(bytes(range(1, 250, 7)))
+        script.obeyed(script.ask(slot, lead=b"", what="question under load"))
+    script.wait(540.0)
+    script.obeyed(script.team(what="team frame after the load"))

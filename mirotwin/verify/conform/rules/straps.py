@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from mirotwin.verify.conform.rule import Air, Chapter
+from mirotwin.verify.conform.rule import Chapter, Topology
 from mirotwin.verify.conform.rules import TURNS
-from mirotwin.verify.conform.trial_script import Talk
+from mirotwin.verify.conform.trial_script import TrialScript
 
 CHAPTER = Chapter("Straps")
 
@@ -13,23 +13,23 @@ CHAPTER = Chapter("Straps")
     "P60",
     "A robot whose slot pins say N or more MUST never move and never answer.",
     TURNS,
-    airs=(
-        Air(3, (1,)),
-        Air(3, (1,), strap=3),
-        Air(3, (1,), strap=4),
-        Air(3, (1,), strap=7),
-        Air(5, (3,), strap=5),
+    topologies=(
+        Topology(3, (1,)),
+        Topology(3, (1,), strap=3),
+        Topology(3, (1,), strap=4),
+        Topology(3, (1,), strap=7),
+        Topology(5, (3,), strap=5),
     ),
     presupposes=("P41",),
 )
-def no_slot(talk: Talk) -> None:
+def no_slot(script: TrialScript) -> None:
     for _ in range(2):
-        for slot in range(talk.n):
-            talk.team()
-            question = talk.ask(slot, gap_ms=36.0)
-            if talk.air.strap is None:  # a robot that is there, beside them
-                talk.obeyed(question)
-    if talk.air.strap is None:
+        for slot in range(script.n):
+            script.team()
+            question = script.ask(slot, gap_ms=36.0)
+            if script.topology.strap is None:  # a robot that is there, beside them
+                script.obeyed(question)
+    if script.topology.strap is None:
         return
-    talk.unchanged(0, talk.now, "the wheels of no robot of this network told anything")
-    talk.silent(0, talk.now, "no robot of this network is asked")
+    script.unchanged(0, script.now, "the wheels of no robot of this network told anything")
+    script.silent(0, script.now, "no robot of this network is asked")
