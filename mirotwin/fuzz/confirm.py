@@ -15,10 +15,10 @@ import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_protocol.frames import TeamFrame, encode
+from miro_protocol.robot_rules import TOLERANCE_TICKS
 from miro_protocol.stream_events import Deed
 from miro_protocol.table import FRESH_AGAIN_TICKS, FrameType
 from miro_protocol.transmission import DOWN, Transmission
-from miro_robot.harness.fast_oracle import TOLERANCE_TICKS
 from miro_robot.image import Image
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World

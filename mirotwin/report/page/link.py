@@ -18,13 +18,13 @@ from miro_exact.clock import CHARACTER_BITS, HOST_CHARACTER_TICKS, ROBOT_BIT_TIC
 from miro_protocol.decoder import Damaged, Decoder, Received
 from miro_protocol.frames import ContentError, describe
 from miro_protocol.freshness import Freshness
+from miro_protocol.robot_rules import TO_RI_TICKS
 from miro_protocol.table import TELEMETRY
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.event_log import EventLog
 from miro_sim.periods import Period
 from miro_sim.world.events import Event, of_board
 from miro_sim.world.world import World
-from mirotwin.verify.checks.hearing import TO_RI_TICKS
 
 OF_PC = ("answer", "reset", "power", "radio")
 RESTARTS = ("reset", "power")

@@ -1,9 +1,7 @@
 """Checks of the failsafe: without a fresh frame the wheels are told to stop in time, and the motors go off in time.
 
-Times count from the end of the last fresh frame's last character, when a robot can know of it (protocol/README.md,
-"Freshness and failsafe"). Too early is as wrong as too late. An order within `ACTING_MS` of a fresh frame is what that
-frame says and no failsafe. A robot that receives characters when the time comes may be testing a frame, which may be
-the fresh one: it has `TESTING_MS` more.
+Too early is as wrong as too late. The rule is `miro_protocol.robot_rules.SilenceRule` (protocol/README.md, "Freshness
+and failsafe").
 """
 
 from __future__ import annotations
@@ -12,16 +10,14 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from miro_exact.clock import HOST_CHARACTER_TICKS
+from miro_protocol.robot_rules import ACTING_TICKS, SilenceRule
+from miro_protocol.table import TICKS_PER_MS
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject, in_ms, ms_ticks
 from mirotwin.verify.checks.orders import Order, Orders
 
-ACTING_MS = 10.0
-"""Firmware has dealt with a frame so long after its last character; a fair third of a camera frame."""
-
-TESTING_MS = 2.0
-"""How long the test of a frame may put the failsafe off; the shipped firmware takes up to 1.5 ms for five robots."""
+ACTING_MS = ACTING_TICKS / TICKS_PER_MS
+"""Firmware has dealt with a frame so long after it."""
 
 TimeMs = Annotated[float, Meta(gt=ACTING_MS, le=60_000.0)]
 ToleranceMs = Annotated[float, Meta(ge=0.0, le=1000.0)]
@@ -66,8 +62,8 @@ class MotorsOff(SilenceCheck, frozen=True, kw_only=True, tag="motors_off_ms"):
 
 
 class SilenceJudge(Judge[SilenceCheck]):
-    """`fresh_tick`: end of the last fresh frame, None before the first and once its silence has been judged.
-    `in_time`: a wheel was told in time. A wheel that needed no order, because it stood, is no occasion to judge.
+    """`in_time`: a wheel was told in time. A wheel that needed no order, because it stood, is no occasion to judge.
+
     `late`: (end of the last fresh frame, tick of the failure) of wheels that have not been told yet.
     """
 
@@ -76,14 +72,8 @@ class SilenceJudge(Judge[SilenceCheck]):
     def __init__(self, check: SilenceCheck, subject: Subject) -> None:
         super().__init__(check, subject)
         self.orders = Orders()
-        self.fresh_tick: int | None = None
+        self.rule = SilenceRule(ms_ticks(check.after_ms), ms_ticks(check.tolerance_ms))
         self.in_time = False
-        self.acting_ticks = ms_ticks(ACTING_MS)
-        self.earliest_ticks = ms_ticks(max(check.after_ms - check.tolerance_ms, 0.0))
-        self.after_ticks = ms_ticks(check.after_ms)
-        self.latest_ticks = ms_ticks(check.after_ms + check.tolerance_ms)
-        self.testing_ticks = ms_ticks(TESTING_MS)
-        self.heard_tick: int | None = None
         self.late: tuple[int, int] | None = None
         self.wanted = (
             f"{check.WANTED} {check.after_ms:g} +- {check.tolerance_ms:g} ms after the last fresh frame"
@@ -92,12 +82,11 @@ class SilenceJudge(Judge[SilenceCheck]):
     def event(self, event: Event) -> None:
         self.until(event.tick)
         if event.what == "received":
-            if self.fresh_tick is None or event.tick <= self.fresh_tick + self.latest_ticks:
-                self.heard_tick = event.tick  # what comes when the time is over puts nothing off
+            self.rule.received(event.tick)
         elif event.what == "frame":
             if event.value and event.frame is not None:
                 self._fail_late(event.tick)
-                self.fresh_tick = event.frame.last_tick + HOST_CHARACTER_TICKS
+                self.rule.begin(event.frame.last_tick)
                 self.in_time = False
         else:
             self._command(event)
@@ -107,41 +96,33 @@ class SilenceJudge(Judge[SilenceCheck]):
         order = self.orders.take(event)
         if not self._unfulfilled():
             self._fail_late(event.tick)
-        if order is None or self.fresh_tick is None or not self.check.fulfilled(order):
+        if order is None or not self.check.fulfilled(order) or order.side not in unfulfilled:
             return
-        silence = event.tick - self.fresh_tick
-        if order.side not in unfulfilled or silence <= self.acting_ticks:
-            return
-        if silence >= self.earliest_ticks:
+        if self.rule.is_early(event.tick):
+            self.judged += 1
+            after = in_ms(event.tick - self.rule.end_tick())
+            self.fail(event.tick, self.wanted, f"the {order.side} one after {after}")
+            self.rule.begin(-1)
+        elif self.rule.is_judged(event.tick):
             self.in_time = True
-            return
-        self.judged += 1
-        self.fail(event.tick, self.wanted, f"the {order.side} one after {in_ms(silence)}")
-        self.fresh_tick = None
 
     def restarted(self, tick: int) -> None:
         self.until(tick)
         self._fail_late(tick)
-        self.fresh_tick = None
+        self.rule.begin(-1)
         self.orders = Orders()
 
     def end(self, tick: int) -> None:
         self._fail_late(tick)
 
     def until(self, tick: int) -> None:
-        if self.fresh_tick is None or tick <= self.fresh_tick + self.latest_ticks:
-            return
-        latest_tick = self.fresh_tick + self.latest_ticks
-        testing_tick = self.fresh_tick + self.after_ticks - self.testing_ticks
-        if self.heard_tick is not None and testing_tick <= self.heard_tick <= latest_tick:
-            latest_tick += self.testing_ticks
-        if tick <= latest_tick:
+        if not self.rule.is_over(tick):
             return
         unfulfilled = self._unfulfilled()
         self.judged += bool(unfulfilled or self.in_time)
         if unfulfilled:
-            self.late = (self.fresh_tick, latest_tick)
-        self.fresh_tick = None
+            self.late = (self.rule.end_tick(), self.rule.deadline())
+        self.rule.begin(-1)
 
     def _fail_late(self, tick: int) -> None:
         """Notes the failure of wheels that are late, when it is known how late: at `tick` they are told, or it is given

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from miro_exact.clock import ROBOT_BIT_TICKS
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.freshness import Freshness
+from miro_protocol.robot_rules import TO_RI_TICKS
 from miro_sim.world.events import Event
-
-TO_RI_TICKS = 9 * ROBOT_BIT_TICKS + ROBOT_BIT_TICKS * 10 // 16 + ROBOT_BIT_TICKS // 32
-"""From a character's start bit to RI: 9 10/16 bits, and half of the sixteenth by which the port may see it late."""
 
 
 class Hearing:

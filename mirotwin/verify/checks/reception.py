@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Annotated, ClassVar
 
 from msgspec import Meta
@@ -10,6 +9,7 @@ from msgspec import Meta
 from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ContentError, TeamFrame
+from miro_protocol.robot_rules import NO_WORD, DrivingRule, OriginRule
 from miro_protocol.table import VELOCITY_SATURATION
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
@@ -38,27 +38,28 @@ class MovesJudge(Judge[MovesOnlyWhenFresh]):
     def __init__(self, check: MovesOnlyWhenFresh, subject: Subject) -> None:
         super().__init__(check, subject)
         self.orders = Orders()
-        self.fresh_tick: int | None = None
-        self.within_ticks = ms_ticks(check.within_ms)
+        self.rule = DrivingRule(ms_ticks(check.within_ms))
 
     def restarted(self, tick: int) -> None:
-        self.fresh_tick = None
+        self.rule.begin()
         self.orders = Orders()
 
     def event(self, event: Event) -> None:
         if event.what == "frame":
             if event.value and event.frame is not None:
-                self.fresh_tick = event.frame.last_tick
+                self.rule.fresh(event.frame.last_tick)
             return
         order = self.orders.take(event)
         if order is None or not order.moves:
             return
         self.judged += 1
-        wanted = f"wheels told to turn only within {self.check.within_ms:g} ms of a fresh frame"
-        if self.fresh_tick is None:
-            self.fail(event.tick, wanted, f"the {order.side} one, before any fresh frame")
-        elif event.tick - self.fresh_tick > self.within_ticks:
-            self.fail(event.tick, wanted, f"the {order.side} one after {in_ms(event.tick - self.fresh_tick)}")
+        if not self.rule.may_move(event.tick):
+            fresh_tick = self.rule.fresh_tick
+            when = (
+                f" after {in_ms(event.tick - fresh_tick)}" if fresh_tick >= 0 else ", before any fresh frame"
+            )
+            wanted = f"wheels told to turn only within {self.check.within_ms:g} ms of a fresh frame"
+            self.fail(event.tick, wanted, f"the {order.side} one{when}")
 
 
 class AcceptsOnlySent(Check, frozen=True, kw_only=True, tag="accepts_only_sent"):
@@ -75,9 +76,7 @@ class AcceptsOnlySent(Check, frozen=True, kw_only=True, tag="accepts_only_sent")
 
 
 class SentJudge(Judge[AcceptsOnlySent]):
-    """`sent`: (tick, velocities of this robot) of team frames. `ordered_tick`: of orders that are not judged yet,
-    because one to the other wheel may come on the same tick.
-    """
+    """`ordered_tick`: of orders that are not judged yet, because one to the other wheel may come on the same tick."""
 
     HEARS = ("sent", "command")
 
@@ -85,8 +84,7 @@ class SentJudge(Judge[AcceptsOnlySent]):
         super().__init__(check, subject)
         self.orders = Orders()
         self.decoder = Decoder(subject.robots)
-        self.sent: deque[tuple[int, Words]] = deque()
-        self.within_ticks = ms_ticks(check.within_ms)
+        self.rule = OriginRule(ms_ticks(check.within_ms))
         self.ordered_tick: int | None = None
 
     def event(self, event: Event) -> None:
@@ -109,20 +107,18 @@ class SentJudge(Judge[AcceptsOnlySent]):
         for found in self.decoder.feed_symbols(symbols):
             words = words_of(found, self.subject) if isinstance(found, Received) else None
             if words is not None:
-                self.sent.append((found.start_tick, words))
+                self.rule.team(found.start_tick, *words)
 
     def until(self, tick: int) -> None:
         if self.ordered_tick is None or tick <= self.ordered_tick:
             return
         at, self.ordered_tick = self.ordered_tick, None
-        while self.sent and self.sent[0][0] < at - self.within_ticks:
-            self.sent.popleft()
         self.judged += 1
-        left, right = self.orders.last["left"], self.orders.last["right"]
-        told = tuple(order.word if order.what == "drive" else 0 for order in (left, right))
-        if not any(words == told for sent_tick, words in self.sent if sent_tick <= at):
+        words = self.orders.words()
+        if not self.rule.allows(at, *words):
             wanted = f"velocities that the host sent in the last {self.check.within_ms:g} ms"
-            self.fail(at, wanted, f"{told[0]}, {told[1]} (left, right)")
+            left, right = (None if word == NO_WORD else word for word in words)
+            self.fail(at, wanted, f"{left}, {right} (left, right)")
 
     def end(self, tick: int) -> None:
         self.until(tick + 1)
@@ -152,7 +148,7 @@ class BackInSync(ActsCheck, frozen=True, kw_only=True, tag="back_in_sync_within_
 
 
 class ActsJudge(Judge[ActsCheck]):
-    """`waiting`: (deadline, velocities) of frames that no order has followed yet."""
+    """`damaged`: characters that are no frame came since the last frame."""
 
     HEARS = ("frame", "damaged", "command")
 
@@ -160,8 +156,7 @@ class ActsJudge(Judge[ActsCheck]):
         super().__init__(check, subject)
         self.orders = Orders()
         self.damaged = False
-        self.waiting: deque[tuple[int, Words]] = deque()
-        self.within_ticks = ms_ticks(check.within_ms)
+        self.rule = DrivingRule(ms_ticks(check.within_ms))
 
     def event(self, event: Event) -> None:
         self.until(event.tick)
@@ -170,14 +165,11 @@ class ActsJudge(Judge[ActsCheck]):
         elif event.what == "frame":
             self._frame(event)
         elif self.orders.take(event) is not None:
-            left, right = self.orders.last["left"], self.orders.last["right"]
-            told = tuple(order.word if order.what == "drive" else 0 for order in (left, right))
-            while any(words == told for _, words in self.waiting):
-                self.waiting.popleft()
+            self.rule.told(*self.orders.words())
 
     def restarted(self, tick: int) -> None:
         self.until(tick)
-        self.waiting.clear()
+        self.rule.begin()
         self.damaged = False
         self.orders = Orders()
 
@@ -190,15 +182,15 @@ class ActsJudge(Judge[ActsCheck]):
         if words is not None:
             self.judged += 1
             if words != (0, 0) or not self._stopping():
-                self.waiting.append((frame.last_tick + self.within_ticks, words))
+                self.rule.team(frame.last_tick, *words)
 
     def _stopping(self) -> bool:
         """Whether both wheels are told to stop, with their loops closed: velocity 0 says nothing new to them."""
         return all(order.what != "off" and not order.moves for order in self.orders.last.values())
 
     def until(self, tick: int) -> None:
-        while self.waiting and tick > self.waiting[0][0]:
-            deadline, words = self.waiting.popleft()
+        while (missed := self.rule.missed(tick)) is not None:
+            deadline, *words = missed
             after = " after damage" if self.check.AFTER_DAMAGE else ""
             wanted = (
                 f"wheels told {words[0]}, {words[1]} within {self.check.within_ms:g} ms of a frame{after}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from miro_protocol.frames import seal
+from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import TICKS_PER_MS
 from miro_robot.image import Image
 from miro_robot.lm629.commands import BY_NAME
@@ -14,7 +15,7 @@ from mirotwin.verify.conform.listening import Listener, listen
 from mirotwin.verify.conform.rule import BOTH, Rule, Topology
 from mirotwin.verify.conform.sealing import MISTAKES
 from mirotwin.verify.conform.trial import make_trial, trial_of
-from mirotwin.verify.conform.trial_script import ACTING_TICKS, Frame, TrialScript, obeys
+from mirotwin.verify.conform.trial_script import Frame, TrialScript, obeys
 
 _SETTLING_MS = 200.0
 _STT = BY_NAME["STT"].opcode

@@ -20,6 +20,7 @@ from typing import TypedDict, Unpack
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
 from miro_protocol.frames import seal
+from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.stream_events import Deed, Power, Reset
 from miro_protocol.table import (
     FAILSAFE_STOP_TICKS,
@@ -32,7 +33,6 @@ from miro_protocol.table import (
 )
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.lm629.commands import BY_NAME
-from mirotwin.verify.checks.failsafe import ACTING_MS
 from mirotwin.verify.checks.orders import Order
 from mirotwin.verify.conform.hints import (
     characters,
@@ -51,7 +51,7 @@ _VELOCITY = 0x08
 """In the low byte of LTRJ's control word: a velocity follows."""
 BOOTED_MS = 40.0
 """A robot is ready for its first frame so long after power-on (a camera frame and a little more). Chosen."""
-ACTING_TICKS = int(ACTING_MS * TICKS_PER_MS)
+ACTING_MS = ACTING_TICKS / TICKS_PER_MS
 GAP_MS = ACTING_MS + 2.0
 """From the end of a frame to the begin of the next, unless a rule says otherwise: time to act."""
 Pairs = tuple[tuple[int, int], ...]

@@ -1,29 +1,33 @@
 """What a MIRO must do with what its serial port received, judged from the event log while it runs.
 
-A find counts once the check of the same name fails for it in a world (`mirotwin.verify.checks`, which this follows in
-a shorter form: one frame and one question wait at a time).
+A find counts once the check of the same name fails for it in a world (`mirotwin.verify.checks`). Both judge by the same
+rules, `miro_protocol.robot_rules`; this oracle takes the frames that the robot received for those that the host sent.
 
     RECEIVED --> window of the decoder --> fresh? --> what the wheels have to be told, and until when
     COMMAND of an LM629 --> order to a wheel -----> compared with it
     SENT --> window of telemetry --> an answer that was asked for
     FAULT --> a fault
-
-Times are those of the checks, from the start bit of a frame's last character, of the failsafe from its end.
-
-Long because all rules look at one stream of events and share what was heard and told; a compiled class is one file.
 """
 
 from __future__ import annotations
 
-from miro_exact.clock import HOST_CHARACTER_TICKS, NEVER_TICK
+from miro_exact.clock import NEVER_TICK, TICKS_PER_SECOND
 from miro_protocol.freshness import Freshness
+from miro_protocol.robot_rules import (
+    ACTING_TICKS,
+    TO_RI_TICKS,
+    TO_TI_TICKS,
+    AnswerRule,
+    DrivingRule,
+    OriginRule,
+    SilenceRule,
+)
 from miro_protocol.scan import Scanner
 from miro_protocol.table import (
     FAILSAFE_OFF_TICKS,
     FAILSAFE_STOP_TICKS,
     FRESH_AGAIN_TICKS,
     FRESH_STEPS,
-    ROBOT_BIT_TICKS,
     SEQ_MODULUS,
     SLOT_MASK,
     TELEMETRY,
@@ -35,7 +39,7 @@ from miro_protocol.table import (
 from miro_robot import event_log
 from miro_robot.board import Board
 from miro_robot.harness.oracle import LiveOracle
-from miro_robot.lm629.commands import BY_NAME
+from miro_robot.lm629.orders import OFF, WheelOrders
 from miro_robot.lm629.signals import COMMAND_ERROR
 
 NAMES = (
@@ -51,34 +55,20 @@ NAMES = (
     "answers_within_ms",
 )
 """The checks, by `code`."""
-ACTING_TICKS = 10 * TICKS_PER_MS
-ANSWER_TICKS = 30 * TICKS_PER_MS
-TOLERANCE_TICKS = TICKS_PER_MS // 2
-"""Of the failsafe's times, as in the checks of a run."""
-TESTING_TICKS = 2 * TICKS_PER_MS
 EDGE_TICKS = TICKS_PER_MS // 5
+"""Firmware tells 150 ms to within 0.1 ms: what it makes of a frame so near to that, nobody can say."""
 
 _NO_FAULT, _LM629, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS = range(1, 10)
-_ACTING, _ANSWER, _TOLERANCE, _TESTING = ACTING_TICKS, ANSWER_TICKS, TOLERANCE_TICKS, TESTING_TICKS
-_EDGE, _FRESH_AGAIN, _FRESH_STEPS = EDGE_TICKS, FRESH_AGAIN_TICKS, FRESH_STEPS
-_SILENCES = (FAILSAFE_STOP_TICKS, FAILSAFE_OFF_TICKS)
+_ACTING, _EDGE, _FRESH_AGAIN, _FRESH_STEPS = ACTING_TICKS, EDGE_TICKS, FRESH_AGAIN_TICKS, FRESH_STEPS
 _NEVER = NEVER_TICK
-_CHARACTER = HOST_CHARACTER_TICKS
-_TO_RI = 9 * ROBOT_BIT_TICKS + ROBOT_BIT_TICKS * 10 // 16 + ROBOT_BIT_TICKS // 32
-_TO_TI = 9 * ROBOT_BIT_TICKS
+_TO_RI, _TO_TI = TO_RI_TICKS, TO_TI_TICKS
 _SATURATION = VELOCITY_SATURATION
 _TEAM, _ASK = FrameType.TEAM, FrameType.TEAM_ASK
 _SEQS = SEQ_MODULUS
 _SLOT_MASK = SLOT_MASK
-_ANSWER_SIZE = TELEMETRY.wire_size
 _RECEIVED, _SENT, _COMMAND, _FAULT = event_log.RECEIVED, event_log.SENT, event_log.COMMAND, event_log.FAULT
-_RESET, _STT, _LTRJ = (BY_NAME[name].opcode for name in ("RESET", "STT", "LTRJ"))
 _COMMAND_ERROR = COMMAND_ERROR
-_WORD_OFF, _WORD_STOPS, _VELOCITY_MODE, _FORWARD = 0x0100, 0x0600, 0x0800, 0x1000  # of LTRJ's control word
-_HAS_ACCELERATION, _HAS_VELOCITY, _RELATIVE = 0x20, 0x08, 0x04
-_OFF_ORDER, _STOP_ORDER, _DRIVE_ORDER = range(3)
-_NO_WORD = 1 << 30
-_PAIRS = 64
+_OFF_ORDER = OFF
 
 
 class FastOracle(LiveOracle):
@@ -86,19 +76,9 @@ class FastOracle(LiveOracle):
 
     NOT_STATE: tuple[str, ...] = (
         *LiveOracle.NOT_STATE,
-        *("board", "slot", "robots", "window", "telemetry", "freshness", "read", "pc", "accepted"),
-        *(
-            "decided",
-            "up_tick",
-            "fresh_tick",
-            "fresh_seq",
-            "heard_tick",
-            "told_tick",
-            "wanted_tick",
-            "wanted",
-        ),
-        *("control", "velocity", "order", "speed", "pairs", "pair_end", "silence_tick", "silences"),
-        *("asked_tick", "asked_seq", "allowed", "before_seq", "payload", "log"),
+        *("board", "log", "slot", "robots", "payload", "window", "telemetry", "freshness", "read", "pc"),
+        *("accepted", "decided", "up_tick", "fresh_tick", "fresh_seq", "told_tick", "left", "right"),
+        *("orders", "driving", "origin", "answers", "stop", "off"),
     )
 
     def __init__(self, board: Board, slot: int, robots: int) -> None:
@@ -112,30 +92,22 @@ class FastOracle(LiveOracle):
         self.window = Scanner(form)
         self.telemetry = Scanner(TELEMETRY)
         self.freshness = Freshness()
-        self.silences = list(_SILENCES)
+        self.orders = WheelOrders()
+        self.driving = DrivingRule()
+        self.origin = OriginRule(TICKS_PER_SECOND)
+        self.answers = AnswerRule()
+        self.stop = SilenceRule(FAILSAFE_STOP_TICKS)
+        self.off = SilenceRule(FAILSAFE_OFF_TICKS)
         self.read = 0  # serial number of the next event
         self.decided = 1  # 0: it cannot be said any more what the robot must do
         self.up_tick = -1  # until when firmware that was reset may take to come up
+        self.fresh_tick = -1  # of the last fresh frame
         self.fresh_seq = 0
         self.pc = 0
         self.accepted = 0
-        # Per side: what LTRJ loaded, and the order in force.
-        self.control = [0] * 2
-        self.velocity = [0] * 2
-        self.order = [0] * 2
-        self.speed = [0] * 2
-        self.fresh_tick = -1  # of the last fresh frame
-        self.heard_tick = -1  # of the last character
         self.told_tick = -1  # of an order to move whose pair is not judged yet
-        self.wanted_tick = _NEVER  # until when the wheels have to be told `wanted`
-        self.wanted = [0] * 2
-        self.pairs = [0] * 128  # the velocities of the last valid team frames
-        self.pair_end = 0
-        self.silence_tick = [0] * 2  # from when stop and off are due; -1: they are not
-        self.asked_tick = _NEVER
-        self.asked_seq = -1
-        self.before_seq = -1
-        self.allowed = 0
+        self.left = 0  # the velocities of the last valid team frame
+        self.right = 0
 
     def begin(self, tick: int) -> None:
         self.code = 0
@@ -147,27 +119,20 @@ class FastOracle(LiveOracle):
         self.decided = 1
         self.up_tick = -1
         self._forget()
-        self.pair_end = 0
+        self.origin.begin()
 
     def _forget(self) -> None:
-        """The processor begins anew: nothing was heard or told."""
+        """The processor begins again: nothing was received or told."""
         self.window.begin()
         self.telemetry.begin()
         self.freshness.last_seq = None
         self.fresh_tick = -1
-        self.heard_tick = -1
         self.told_tick = -1
-        self.wanted_tick = _NEVER
-        self.asked_tick = _NEVER
-        self.asked_seq = -1
-        self.before_seq = -1
-        self.allowed = 0
-        for side in range(2):
-            self.order[side] = _OFF_ORDER
-            self.control[side] = 0
-            self.velocity[side] = 0
-            self.speed[side] = 0
-            self.silence_tick[side] = -1
+        self.orders.begin()
+        self.driving.begin()
+        self.answers.begin()
+        self.stop.begin(-1)
+        self.off.begin(-1)
 
     def restarted(self, tick: int) -> None:
         """Pins that all went high at once may have told an LM629 nonsense, until firmware has reset it."""
@@ -177,7 +142,7 @@ class FastOracle(LiveOracle):
         self.decided = 1
 
     def waits(self) -> bool:
-        return self.decided != 0 and (self.asked_tick != _NEVER or self.wanted_tick != _NEVER)
+        return self.decided != 0 and (self.answers.asked_tick != _NEVER or self.driving.deadline != _NEVER)
 
     def look(self, tick: int) -> None:
         """Judges what has happened before `tick`."""
@@ -214,47 +179,37 @@ class FastOracle(LiveOracle):
         self.pc = pc
         self._found(_NO_FAULT, tick)
 
-    # ---- time ----------------------------------------------------------------------------------------------
-
     def _pass(self, tick: int) -> None:
         """What had to have happened before `tick`."""
         if self.told_tick >= 0 and tick > self.told_tick:
-            self._judge_pair()
-        if tick > self.wanted_tick:
-            self._found(_ACTS, self.wanted_tick)
-        if tick > self.asked_tick + _TO_TI:
-            self._found(_ANSWERS, self.asked_tick)
-        for what in range(2):
-            if self.silence_tick[what] >= 0:
-                self._pass_silence(what, tick)
+            if not self.origin.allows(self.told_tick, self.orders.word(0), self.orders.word(1)):
+                self._found(_ACCEPTS, self.told_tick)
+            self.told_tick = -1
+        if tick > self.driving.deadline:
+            self._found(_ACTS, self.driving.deadline)
+        missed = self.answers.missed(tick)
+        if missed >= 0:
+            self._found(_ANSWERS, missed)
+        self._pass_silence(_STOPS, self.stop, tick)
+        self._pass_silence(_OFF, self.off, tick)
 
-    def _pass_silence(self, what: int, tick: int) -> None:
-        """A robot that receives characters then may be testing a frame."""
-        due = self.silence_tick[what] + self.silences[what]
-        latest = due + _TOLERANCE
-        if due - _TESTING <= self.heard_tick <= latest:
-            latest += _TESTING
-        if tick > latest:
-            if not (self._fulfilled(what, 0) and self._fulfilled(what, 1)):
-                self._found(_STOPS + what, latest)
-            self.silence_tick[what] = -1
+    def _pass_silence(self, code: int, silence: SilenceRule, tick: int) -> None:
+        if silence.is_over(tick):
+            if not (self._is_over(code, 0) and self._is_over(code, 1)):
+                self._found(code, silence.deadline())
+            silence.begin(-1)
 
-    def _is_over(self, what: int, tick: int) -> bool:
-        """Whether a silence's time is over, though it is not judged: characters then put nothing off."""
-        since = self.silence_tick[what]
-        return since >= 0 and tick > since + self.silences[what] + _TOLERANCE
+    def _is_over(self, code: int, side: int) -> bool:
+        """Whether a wheel is as it has to be in silence: stopped or off."""
+        if code == _OFF:
+            return self.orders.what(side) == _OFF_ORDER
+        return not self.orders.moves(side)
 
-    def _fulfilled(self, what: int, side: int) -> bool:
-        """Whether a wheel is as it has to be in silence: told to stop (0), off (1)."""
-        if what:
-            return self.order[side] == _OFF_ORDER
-        return self.order[side] != _DRIVE_ORDER or self.speed[side] == 0
-
-    # ---- what is heard -------------------------------------------------------------------------------------
+    # ---- what is received ----------------------------------------------------------------------------------
 
     def _received(self, tick: int, good_stop: int, value: int) -> None:
-        if not (self._is_over(0, tick) or self._is_over(1, tick)):
-            self.heard_tick = tick
+        self.stop.received(tick)
+        self.off.received(tick)
         if self.window.take(value, good_stop == 0, tick - _TO_RI):
             self._frame(tick - _TO_RI)
 
@@ -265,24 +220,22 @@ class FastOracle(LiveOracle):
         seq = hdr % _SEQS
         self._ask_whether_decided(seq, tick)
         fresh = self.freshness.judge(seq, tick)
-        team = kind in (_TEAM, _ASK) and self._read_pair(fresh)
+        team = kind in (_TEAM, _ASK) and self._read_pair()
+        if team:
+            self.origin.team(tick, self.left, self.right)
         if fresh:
             self.accepted += 1
             self.fresh_tick = tick
             self.fresh_seq = seq
-            self.silence_tick[0] = tick + _CHARACTER
-            self.silence_tick[1] = tick + _CHARACTER
-            if team:
-                self.wanted_tick = _NEVER if self._stops_already() else tick + _ACTING
+            self.driving.fresh(tick)
+            self.stop.begin(tick)
+            self.off.begin(tick)
+            if team and not self._stops_already():
+                self.driving.team(tick, self.left, self.right)
             if kind == _ASK and seq % self.robots == self.slot:
-                if self.asked_tick == _NEVER:
-                    self.asked_tick = tick + _ANSWER
-                self.before_seq = self.asked_seq
-                self.asked_seq = seq
-                self.allowed = _ANSWER_SIZE
+                self.answers.question(tick, seq)
 
     def _ask_whether_decided(self, seq: int, tick: int) -> None:
-        """Firmware tells 150 ms to within 0.1 ms: what it makes of a frame right at that edge, nobody can say."""
         since = tick - self.fresh_tick - _FRESH_AGAIN
         if self.fresh_tick >= 0 and -_EDGE <= since <= _EDGE:
             step = (seq - self.fresh_seq) % _SEQS
@@ -292,131 +245,58 @@ class FastOracle(LiveOracle):
     def _stops_already(self) -> bool:
         """Whether velocity 0 is wanted, and both wheels are told so with their loops closed."""
         for side in range(2):
-            if self.wanted[side] != 0 or self.order[side] == _OFF_ORDER or not self._fulfilled(0, side):
+            if self.orders.what(side) == _OFF_ORDER or self.orders.moves(side):
                 return False
-        return True
+        return self.left == 0 and self.right == 0
 
-    def _read_pair(self, fresh: bool) -> bool:
+    def _read_pair(self) -> bool:
         """What the team frame has for this robot; False if it is not to be acted on."""
         if self.slot >= self.robots:
             return False
         for place in range(1, self.payload, 2):
             if self.window.body_at(place) == 0 and self.window.body_at(place + 1) == 0x80:
                 return False
-        for side in range(2):
-            place = 1 + 4 * self.slot + 2 * side
-            word = self.window.body_at(place) | self.window.body_at(place + 1) << 8
-            if word >= 0x8000:
-                word -= 0x10000
-            if word > _SATURATION:
-                word = _SATURATION
-            if word < -_SATURATION:
-                word = -_SATURATION
-            if fresh:
-                self.wanted[side] = word
-            self.pairs[2 * (self.pair_end % _PAIRS) + side] = word
-        self.pair_end += 1
+        self.left = self._word(1 + 4 * self.slot)
+        self.right = self._word(3 + 4 * self.slot)
         return True
 
-    # ---- what the wheels are told --------------------------------------------------------------------------
+    def _word(self, place: int) -> int:
+        word = self.window.body_at(place) | self.window.body_at(place + 1) << 8
+        if word >= 0x8000:
+            word -= 0x10000
+        return max(-_SATURATION, min(_SATURATION, word))
+
+    # ---- what the wheels are told, and what is sent --------------------------------------------------------
 
     def _command(self, tick: int, code: int, size: int, high: int, low: int) -> None:
         side = code >> 8 & 1
-        opcode = code & 0xFF
-        if opcode == _LTRJ:
-            self._load(side, size, high, low)
-        elif opcode == _RESET:
-            self.control[side] = 0
-            self.velocity[side] = 0
-            self._order(tick, side, _OFF_ORDER, 0)
-        elif opcode == _STT:
-            control = self.control[side]
-            if control & _WORD_OFF:
-                self._order(tick, side, _OFF_ORDER, 0)
-            elif control & _WORD_STOPS:
-                self._order(tick, side, _STOP_ORDER, 0)
-            else:
-                backward = control & _VELOCITY_MODE and not control & _FORWARD
-                self._order(
-                    tick, side, _DRIVE_ORDER, -self.velocity[side] if backward else self.velocity[side]
-                )
+        moved = self.orders.moves(side)
+        driven = self.orders.what(side) != _OFF_ORDER
+        if self.orders.take(side, code & 0xFF, size, high, low):
+            self._order(tick, side, moved, driven)
 
-    def _load(self, side: int, size: int, high: int, low: int) -> None:
-        """LTRJ: control word, then acceleration, velocity, position as it announces."""
-        control = self._data(size, high, low, 0) << 8 | self._data(size, high, low, 1)
-        self.control[side] = control
-        at = 6 if control & _HAS_ACCELERATION else 2
-        if control & _HAS_VELOCITY and at + 4 <= size:
-            value = 0
-            for place in range(4):
-                value = value << 8 | self._data(size, high, low, at + place)
-            if value >= 0x80000000:
-                value -= 0x100000000
-            self.velocity[side] = self.velocity[side] + value if control & _RELATIVE else value
-
-    def _data(self, size: int, high: int, low: int, place: int) -> int:
-        """Byte `place` of `size` ones, the last seven of which are in `low`."""
-        behind = size - 1 - place
-        if behind < 7:
-            return low >> (8 * behind) & 0xFF
-        return high >> (8 * (behind - 7)) & 0xFF
-
-    def _order(self, tick: int, side: int, what: int, speed: int) -> None:
-        stopping = self._fulfilled(0, side)
-        off = self._fulfilled(1, side)
-        self.order[side] = what
-        self.speed[side] = speed
-        if what == _DRIVE_ORDER and speed != 0:
+    def _order(self, tick: int, side: int, moved: bool, driven: bool) -> None:
+        """A wheel is told something. `moved`, `driven`: whether it was told to turn, or to keep its loop closed."""
+        if self.orders.moves(side):
             self.told_tick = tick
-            if self.fresh_tick < 0 or tick - self.fresh_tick > _ACTING:
+            if not self.driving.may_move(tick):
                 self._found(_MOVES, tick)
-        if self.wanted_tick != _NEVER:
-            if self._told(0) == self.wanted[0] and self._told(1) == self.wanted[1]:
-                self.wanted_tick = _NEVER
-        for silence in range(2):
-            since = self.silence_tick[silence]
-            was = off if silence else stopping
-            if since >= 0 and not was and self._fulfilled(silence, side):
-                if _ACTING < tick - since < self.silences[silence] - _TOLERANCE:
-                    self._found(_STOPS + silence, tick)
-
-    def _told(self, side: int) -> int:
-        """In the unit of the radio; a number that no frame holds where it is none of these."""
-        if self.order[side] != _DRIVE_ORDER:
-            return 0
-        return _NO_WORD if self.speed[side] & 0xFF else self.speed[side] >> 8
-
-    def _judge_pair(self) -> None:
-        """Both wheels got the velocities of one frame."""
-        tick = self.told_tick
-        self.told_tick = -1
-        left = self._told(0)
-        right = self._told(1)
-        place = self.pair_end - _PAIRS if self.pair_end > _PAIRS else 0
-        while place < self.pair_end:
-            if self.pairs[2 * (place % _PAIRS)] == left and self.pairs[2 * (place % _PAIRS) + 1] == right:
-                break
-            place += 1
-        if place == self.pair_end:
-            self._found(_ACCEPTS, tick)
-
-    # ---- answers -------------------------------------------------------------------------------------------
+        elif moved and self.stop.is_early(tick):
+            self._found(_STOPS, tick)
+        if driven and self.orders.what(side) == _OFF_ORDER and self.off.is_early(tick):
+            self._found(_OFF, tick)
+        self.driving.told(self.orders.word(0), self.orders.word(1))
 
     def _sent(self, tick: int, value: int) -> None:
-        if self.allowed == 0:
+        if not self.answers.character():
             self._found(_IN_TURN, tick)
-        else:
-            self.allowed -= 1
-            if self.telemetry.take(value, False, tick - _TO_TI):
-                self._answer(tick - _TO_TI)
+        elif self.telemetry.take(value, False, tick - _TO_TI):
+            self._answer(tick - _TO_TI)
 
     def _answer(self, tick: int) -> None:
         seq = self.telemetry.body_at(0) % _SEQS
         slot = self.telemetry.body_at(1) & _SLOT_MASK
-        if slot != self.slot or (seq != self.asked_seq and seq != self.before_seq):
+        if not self.answers.in_turn(seq) or slot != self.slot:
             self._found(_IN_TURN, tick)
-        if seq == self.asked_seq:
-            self.allowed = 0
-        if tick > self.asked_tick:
+        if self.answers.late(tick, seq):
             self._found(_ANSWERS, tick)
-        self.asked_tick = _NEVER

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Unpack
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import VELOCITY_SATURATION
 from miro_robot.lm629.chip import SAMPLE_TICKS
 from miro_robot.lm629.commands import BY_NAME
-from mirotwin.verify.checks.failsafe import ACTING_MS
 from mirotwin.verify.conform.probe import why_deaf
 from mirotwin.verify.conform.rule import Chapter, Topology
 from mirotwin.verify.conform.rules import FIRMWARE, FRAME, TURNS
 from mirotwin.verify.conform.seen import Seen
-from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, How, TrialScript, ms
+from mirotwin.verify.conform.trial_script import ACTING_MS, Found, Frame, How, TrialScript, ms
 
 CHAPTER = Chapter("Velocities")
 _LTRJ = BY_NAME["LTRJ"].opcode

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.robot_rules import ACTING_TICKS, TOLERANCE_TICKS, SilenceRule
 from miro_protocol.table import (
     DEFAULT_ACCELERATION,
     FAILSAFE_OFF_TICKS,
@@ -18,11 +19,9 @@ from mirotwin.verify.conform.hints import in_words
 from mirotwin.verify.conform.rule import Chapter
 from mirotwin.verify.conform.rules import FRESHNESS, WHEELS
 from mirotwin.verify.conform.seen import Seen
-from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, TrialScript, ms
+from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms
 
 CHAPTER = Chapter("Failsafe")
-TOLERANCE_TICKS = ms(0.5)
-"""One and a half LM629 samples."""
 _COUNTED = (
     "A robot may count from the start or from the end of that frame's last character (1.04 ms apart), and may be 0.5 ms"
     " off"
@@ -218,8 +217,9 @@ def off_behind(script: TrialScript, last: Frame) -> None:
 
 
 def _in_time(script: TrialScript, last: Frame, after_ticks: int, what: str, wanted: str) -> None:
-    earliest = last.last_tick + after_ticks - TOLERANCE_TICKS
-    latest = last.end_tick + after_ticks + TOLERANCE_TICKS
+    rule = SilenceRule(after_ticks)
+    rule.begin(last.last_tick)
+    earliest, latest = rule.earliest_tick(), rule.latest_tick()
 
     def done(seen: Seen, side: str, tick: int) -> bool:
         order = seen.told(side, tick)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from miro_protocol.table import FRESH_STEPS, SEQ_MODULUS
+from miro_protocol.table import FRESH_AGAIN_TICKS, FRESH_STEPS, SEQ_MODULUS, TICKS_PER_MS
 from mirotwin.verify.conform.rule import Chapter, Topology
 from mirotwin.verify.conform.rules import FRESHNESS
 from mirotwin.verify.conform.trial_script import How, TrialScript, ms
 
 CHAPTER = Chapter("Freshness")
-AGAIN_MS = 150.0
+AGAIN_MS = FRESH_AGAIN_TICKS / TICKS_PER_MS
 NEAR_MS = 0.3
 """So near to 150 ms a robot may judge either way: three times the error of the shipped firmware. Chosen."""
 

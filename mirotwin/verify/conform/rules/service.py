@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import DEFAULT_ACCELERATION, Opcode
 from miro_sim.world.events import SIDES
 from mirotwin.verify.conform.hints import number
@@ -10,7 +11,7 @@ from mirotwin.verify.conform.rules import FIRMWARE, FRAME, RECEPTION, VERSIONS
 from mirotwin.verify.conform.rules.failsafe import stops_behind
 from mirotwin.verify.conform.rules.sound import nothing_refused
 from mirotwin.verify.conform.seen import Seen, Words
-from mirotwin.verify.conform.trial_script import ACTING_TICKS, Found, Frame, TrialScript, ms
+from mirotwin.verify.conform.trial_script import Found, Frame, TrialScript, ms
 
 CHAPTER = Chapter("Service frames and unknown contents")
 

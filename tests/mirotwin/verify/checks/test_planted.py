@@ -4,7 +4,7 @@ import pytest
 
 from miro_protocol.frames import ServiceFrame, encode
 from miro_robot.image import Image
-from tests.mirotwin.verify.checks.rig import finish, needs_sdcc, planted, send, silent_world, team
+from tests.mirotwin.verify.checks.rig import built, finish, needs_sdcc, planted, send, silent_world, team
 
 ALL = """
 failsafe_stop_ms = true
@@ -82,3 +82,9 @@ def test_what_firmware_must_not_do_fails_a_check_that_no_scenario_asks_for(mista
     found = finish(world, checks)
     assert {name for name, verdict in found.items() if verdict == "failed"} == concerned
     assert all(failure.fault for failure in checks.failures) == (concerned != {"lm629_protocol"})
+
+
+@needs_sdcc
+def test_a_robot_may_count_the_silence_from_the_start_of_a_character():
+    image = built("failsafe.c", "age == FAILSAFE_STOP_MS)", "age == FAILSAFE_STOP_MS - 1)")
+    assert verdicts(image)["failsafe_stop_ms"] == "passed"

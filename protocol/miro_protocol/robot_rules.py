@@ -1,0 +1,230 @@
+"""What a robot owes its host: each rule once, as arithmetic over the ticks of what happened.
+
+The checks of a run, the fuzzer's oracle and the trials of `mirotwin conform` judge by these; what they look at and how
+they tell of it is theirs. `tests/naive/robot_rules.py` says the same slowly, over a whole history.
+
+Ticks of a frame are those of the start bit of its last character, `last_tick`; it ends a character later. A wheel's
+velocity is a word of the radio (1/256 count per sample).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from miro_exact.clock import HOST_CHARACTER_TICKS, NEVER_TICK
+from miro_protocol.table import ROBOT_BIT_TICKS, TELEMETRY, TICKS_PER_MS
+
+ACTING_TICKS = 10 * TICKS_PER_MS
+"""Firmware has dealt with a frame so long after it; a fair third of a camera frame."""
+ANSWER_TICKS = 30 * TICKS_PER_MS
+"""From a question's last character to that of its answer, which alone takes 18.7 ms."""
+TOLERANCE_TICKS = TICKS_PER_MS // 2
+"""Of the failsafe's times: one and a half LM629 samples."""
+TESTING_TICKS = 2 * TICKS_PER_MS
+"""How long the test of a frame may put the failsafe off; the shipped firmware takes up to 1.5 ms for five robots."""
+TO_RI_TICKS = 9 * ROBOT_BIT_TICKS + ROBOT_BIT_TICKS * 10 // 16 + ROBOT_BIT_TICKS // 32
+"""From a character's start bit to RI: 9 10/16 bits, and half of the sixteenth by which the port may see it late."""
+TO_TI_TICKS = 9 * ROBOT_BIT_TICKS
+"""From a character's start bit to TI, which is set when its stop bit begins."""
+NO_WORD = 1 << 30
+"""A velocity that no frame can hold."""
+
+_ACTING, _TESTING, _TO_TI = ACTING_TICKS, TESTING_TICKS, TO_TI_TICKS
+_CHARACTER, _NEVER, _ANSWER_SIZE = HOST_CHARACTER_TICKS, NEVER_TICK, TELEMETRY.wire_size
+
+
+class SilenceRule:
+    """So long after the last fresh frame both wheels are stopped, or off, within a tolerance.
+
+    A robot may count from the start or from the end of the frame's last character. One that receives characters when
+    the time comes may be testing a frame, which may be the fresh one: it has `TESTING_TICKS` more. `last_tick`: of the
+    last fresh frame, -1 before the first and once its silence is judged; `received_tick`: of the last character.
+    """
+
+    NOT_STATE = ("after_ticks", "tolerance_ticks", "last_tick", "received_tick")
+
+    def __init__(self, after_ticks: int, tolerance_ticks: int = TOLERANCE_TICKS) -> None:
+        self.after_ticks = after_ticks
+        self.tolerance_ticks = tolerance_ticks
+        self.last_tick = -1
+        self.received_tick = -1
+
+    def begin(self, last_tick: int) -> None:
+        """The last fresh frame is that at `last_tick`; -1: there is none, or it is judged."""
+        self.last_tick = last_tick
+
+    def end_tick(self) -> int:
+        """The end of the last fresh frame."""
+        return self.last_tick + _CHARACTER
+
+    def earliest_tick(self) -> int:
+        """Wheels that go over before this do so too early."""
+        return self.last_tick + max(self.after_ticks - self.tolerance_ticks, 0)
+
+    def latest_tick(self) -> int:
+        """When the time of a robot that tests no frame is over."""
+        return self.last_tick + _CHARACTER + self.after_ticks + self.tolerance_ticks
+
+    def received(self, tick: int) -> None:
+        """A character came. Once the time is over it puts nothing off."""
+        if self.last_tick < 0 or tick <= self.latest_tick():
+            self.received_tick = tick
+
+    def deadline(self) -> int:
+        """When the time is over, with the test of a frame that may be under way."""
+        latest = self.latest_tick()
+        begun = latest - self.tolerance_ticks - _TESTING
+        return latest + _TESTING if begun <= self.received_tick <= latest else latest
+
+    def is_over(self, tick: int) -> bool:
+        """Whether at `tick` both wheels had to have gone over."""
+        return self.last_tick >= 0 and tick > self.latest_tick() and tick > self.deadline()
+
+    def is_judged(self, tick: int) -> bool:
+        """Whether a wheel that goes over at `tick` does so in silence: right after a frame it does what that says."""
+        return self.last_tick >= 0 and tick - self.end_tick() > _ACTING
+
+    def is_early(self, tick: int) -> bool:
+        """Whether a wheel that goes over at `tick` does so too early."""
+        return self.is_judged(tick) and tick < self.earliest_tick()
+
+
+class DrivingRule:
+    """Wheels are told to turn only within `within_ticks` of a fresh frame, and what a fresh team frame says in time.
+
+    `fresh_tick`: of the last fresh frame, -1 before the first; `deadline`: of the first team frame that waits.
+    """
+
+    NOT_STATE = ("within_ticks", "fresh_tick", "deadline", "waiting")
+
+    def __init__(self, within_ticks: int = ACTING_TICKS) -> None:
+        self.within_ticks = within_ticks
+        self.fresh_tick = -1
+        self.deadline = NEVER_TICK
+        self.waiting: list[tuple[int, int, int]] = []
+
+    def begin(self) -> None:
+        """No frame has come yet."""
+        self.fresh_tick = -1
+        self.deadline = _NEVER
+        self.waiting.clear()
+
+    def fresh(self, tick: int) -> None:
+        """A fresh frame of any type."""
+        self.fresh_tick = tick
+
+    def may_move(self, tick: int) -> bool:
+        """Whether a wheel may be told to turn at `tick`."""
+        return self.fresh_tick >= 0 and tick - self.fresh_tick <= self.within_ticks
+
+    def team(self, tick: int, left: int, right: int) -> None:
+        """Wheels have to be told this, of a fresh team frame."""
+        self.waiting.append((tick + self.within_ticks, left, right))
+        self.deadline = self.waiting[0][0]
+
+    def told(self, left: int, right: int) -> None:
+        """The wheels are told this now: that frame is obeyed, and those before it are past."""
+        for place in range(len(self.waiting) - 1, -1, -1):
+            if self.waiting[place][1:] == (left, right):
+                del self.waiting[: place + 1]
+                break
+        self.deadline = self.waiting[0][0] if self.waiting else _NEVER
+
+    def missed(self, tick: int) -> tuple[int, int, int] | None:
+        """(deadline, left, right) of a frame that was not obeyed before `tick`; it waits no longer."""
+        if tick <= self.deadline:
+            return None
+        found = self.waiting.pop(0)
+        self.deadline = self.waiting[0][0] if self.waiting else _NEVER
+        return found
+
+
+class OriginRule:
+    """Velocities are those of one team frame of the last `within_ticks`; 0 for both is always allowed to stop."""
+
+    NOT_STATE = ("within_ticks", "frames")
+
+    def __init__(self, within_ticks: int) -> None:
+        self.within_ticks = within_ticks
+        self.frames: deque[tuple[int, int, int]] = deque()
+
+    def begin(self) -> None:
+        """No frame has come yet."""
+        self.frames.clear()
+
+    def team(self, tick: int, left: int, right: int) -> None:
+        """A team frame, in the order of time."""
+        self.frames.append((tick, left, right))
+
+    def allows(self, tick: int, left: int, right: int) -> bool:
+        """Whether the wheels may be told this at `tick`, which does not go back."""
+        while self.frames and self.frames[0][0] < tick - self.within_ticks:
+            self.frames.popleft()
+        found = False
+        for begun, one, other in self.frames:
+            found = found or (begun <= tick and one == left and other == right)
+        return found
+
+
+class AnswerRule:
+    """One answer a question, with its number and in time; without a question silence.
+
+    `asked_tick`, `asked_seq`: the question that waits, the tick NEVER_TICK without one. A question that comes while
+    one waits need not be answered. `last_seq`, `before_seq`: the last two questions, -1 for none; `allowed`: characters
+    that may still be sent.
+    """
+
+    NOT_STATE = ("within_ticks", "asked_tick", "asked_seq", "last_seq", "before_seq", "allowed")
+
+    def __init__(self, within_ticks: int = ANSWER_TICKS) -> None:
+        self.within_ticks = within_ticks
+        self.begin()
+
+    def begin(self) -> None:
+        """Nothing was asked yet."""
+        self.asked_tick = _NEVER
+        self.asked_seq = -1
+        self.last_seq = -1
+        self.before_seq = -1
+        self.allowed = 0
+
+    def question(self, tick: int, seq: int) -> None:
+        """A fresh question to this robot."""
+        if self.asked_tick == _NEVER:
+            self.asked_tick = tick
+            self.asked_seq = seq
+        self.before_seq = self.last_seq
+        self.last_seq = seq
+        self.allowed = _ANSWER_SIZE
+
+    def character(self) -> bool:
+        """The robot sends a character: whether it may."""
+        if self.allowed == 0:
+            return False
+        self.allowed -= 1
+        return True
+
+    def in_turn(self, seq: int) -> bool:
+        """An answer with this number was sent: whether it answers a question. That to the last one is the last."""
+        if seq == self.last_seq:
+            self.allowed = 0
+        return seq in (self.last_seq, self.before_seq)
+
+    def late(self, tick: int, seq: int) -> int:
+        """By how much the question that waited was answered too late, 0 if it was not by this answer or in time."""
+        if self.asked_tick == _NEVER or seq != self.asked_seq:
+            return 0
+        late = tick - self.asked_tick - self.within_ticks
+        self.asked_tick = _NEVER
+        return late if late > 0 else 0
+
+    def missed(self, tick: int) -> int:
+        """When the question that waits had to be answered, if that was before `tick`: it waits no longer. Else -1.
+
+        An answer is known only when TI is set for its last character.
+        """
+        if self.asked_tick == _NEVER or tick <= self.asked_tick + self.within_ticks + _TO_TI:
+            return -1
+        deadline = self.asked_tick + self.within_ticks
+        self.asked_tick = _NEVER
+        return deadline

@@ -1,0 +1,95 @@
+"""The rules by which robots are judged, beside their slow twins, on histories of chance."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from miro_protocol.robot_rules import TO_TI_TICKS, AnswerRule, DrivingRule, OriginRule, SilenceRule
+from tests.naive import robot_rules as naive
+
+MS = 24_000
+TICKS = st.integers(0, 40).map(lambda half: half * MS // 2)
+NEAR = st.integers(-5, 5)
+
+
+@given(
+    st.integers(0, 200).map(lambda ms: ms * MS),
+    st.integers(11, 60).map(lambda ms: ms * MS),
+    st.integers(0, 70).map(lambda half: half * MS // 2),
+    st.lists(st.tuples(st.integers(-8, 8), NEAR).map(lambda one: one[0] * MS // 2 + one[1])),
+)
+def test_silence_is_over_at_its_deadline_and_early_before_its_window(last_tick, after, tolerance, around):
+    rule = SilenceRule(after, tolerance)
+    assert not rule.is_over(last_tick + 1000 * MS)
+    rule.begin(last_tick)
+    due = rule.end_tick() + after
+    received = sorted(due + offset for offset in around)
+    for tick in received:
+        rule.received(tick)
+    deadline = naive.silence_deadline(last_tick, after, tolerance, received)
+    assert rule.deadline() == deadline
+    assert [rule.is_over(deadline + more) for more in (-1, 0, 1)] == [False, False, True]
+    for tick in (*received, rule.earliest_tick() - 1, rule.earliest_tick()):
+        assert rule.is_early(tick) == naive.silence_is_early(last_tick, after, tolerance, tick)
+    rule.begin(-1)
+    assert not rule.is_over(deadline + 1)
+
+
+EVENTS = st.lists(st.tuples(st.booleans(), st.integers(1, 30), st.sampled_from([(0, 0), (1, 2), (2, 1)])))
+
+
+@given(EVENTS, st.integers(1, 50))
+def test_frames_that_are_not_obeyed_in_time_are_missed(events, within):
+    rule = DrivingRule(within)
+    frames, orders, missed = [], [], []
+    now = 0
+    for is_frame, step, words in events:
+        now += step
+        while (found := rule.missed(now)) is not None:
+            missed.append(naive.Said(found[0] - within, found[1:]))
+        (frames if is_frame else orders).append(naive.Said(now, words))
+        if is_frame:
+            rule.fresh(now)
+            rule.team(now, *words)
+        else:
+            rule.told(*words)
+        assert rule.may_move(now) == any(now - frame.tick <= within for frame in frames)
+    while (found := rule.missed(now + 1)) is not None:
+        missed.append(naive.Said(found[0] - within, found[1:]))
+    assert missed == naive.missed(frames, orders, within, now + 1)
+
+
+@given(EVENTS, st.integers(1, 60))
+def test_velocities_come_from_a_frame_of_late(events, within):
+    rule = OriginRule(within)
+    frames, now = [], 0
+    for is_frame, step, words in events:
+        now += step
+        if is_frame:
+            frames.append(naive.Said(now, words))
+            rule.team(now, *words)
+        else:
+            assert rule.allows(now, *words) == naive.is_sent(frames, now, words, within)
+
+
+KINDS = st.sampled_from(["asked", "answer", "character", "character", "look"])
+
+
+@given(st.lists(st.tuples(KINDS, st.integers(1, 30 * MS), st.integers(0, 3)), max_size=60))
+def test_answers_are_in_turn_and_in_time(drawn):
+    rule, within = AnswerRule(), 30 * MS
+    events, found, now = [], [], 0
+    for kind, step, seq in drawn:
+        now += step
+        events.append((kind, now, seq))
+        if kind == "character" and not rule.character():
+            found.append(("unasked", now))
+        if kind == "answer" and not rule.in_turn(seq):
+            found.append(("wrong", now))
+        deadline = rule.missed(now)
+        if deadline >= 0:
+            found.append(("missing", deadline))
+        if kind == "answer" and rule.late(now, seq):
+            found.append(("late", now))
+        if kind == "asked":
+            rule.question(now, seq)
+    assert found == naive.answer_fails(events, within, TO_TI_TICKS)
