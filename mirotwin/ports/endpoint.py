@@ -12,7 +12,7 @@ from selectors import BaseSelector
 
 import msgspec
 
-from mirotwin.ports.bounded import Bounded
+from mirotwin.ports.byte_fifo import Bounded
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.report.live import Plug
 

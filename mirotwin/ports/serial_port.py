@@ -36,10 +36,10 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import HOST_CHARACTER_TICKS, NEVER_TICK, seconds, ticks
 from miro_robot.faults import FirmwareFault
 from miro_sim.world.world import World
-from mirotwin.ports.bounded import Bounded
-from mirotwin.ports.opened import Opened, opened
-from mirotwin.ports.passing import ByWallClock, InCalls, Passing
+from mirotwin.ports.byte_fifo import Bounded
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
+from mirotwin.ports.recorded_world import Opened, opened
+from mirotwin.ports.time_policy import ByWallClock, InCalls, Passing
 from mirotwin.ports.url import parse_url
 from mirotwin.rerun.pacing import Pace, Turns
 

@@ -7,7 +7,7 @@ import pytest
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
 from miro_sim.periods import Period
 from miro_sim.world.world import World
-from mirotwin.ports.bounded import Bounded
+from mirotwin.ports.byte_fifo import Bounded
 from mirotwin.ports.endpoint import Endpoint, Place
 from mirotwin.ports.live import live_scenario
 from mirotwin.ports.radio_port import RadioPort
