@@ -6,7 +6,7 @@ BUFFER_BYTES = 65_536
 """68 s of a robot that sends all the time."""
 
 
-class Bounded:
+class ByteFifo:
     """At most `limit` bytes. `dropped`: how many found it full."""
 
     def __init__(self, limit: int = BUFFER_BYTES) -> None:

@@ -12,7 +12,7 @@ from selectors import BaseSelector
 
 import msgspec
 
-from mirotwin.ports.byte_fifo import Bounded
+from mirotwin.ports.byte_fifo import ByteFifo
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.report.live import Plug
 
@@ -21,8 +21,8 @@ Tell = Callable[[str], object]
 """Takes a line for the user."""
 
 
-class Place(msgspec.Struct, frozen=True):
-    """What all endpoints are made with: the port behind, the selector that wakes the session, who is told."""
+class PortContext(msgspec.Struct, frozen=True):
+    """What all endpoints are made with: their radio, the selector that wakes the session, who is told."""
 
     port: RadioPort
     selector: BaseSelector
@@ -34,14 +34,14 @@ class Endpoint:
 
     kind = ""
 
-    def __init__(self, place: Place, where: str) -> None:
-        self.port = place.port
-        self.selector = place.selector
-        self.tell = place.tell
+    def __init__(self, context: PortContext, where: str) -> None:
+        self.port = context.port
+        self.selector = context.selector
+        self.tell = context.tell
         self.where = where
         self.name = f"{self.kind} {where}"
         self.client = ""
-        self.out = Bounded()
+        self.out = ByteFifo()
         self.clients = self.refused = 0
         self.bytes_in = self.bytes_out = self.dropped = 0
         self._client_bytes = (0, 0)
@@ -104,4 +104,4 @@ class Endpoint:
         self.tell(f"{self.name}: {self.client} {why}; {text}")
         self.dropped += self.out.dropped + lost
         self.client = ""
-        self.out = Bounded()
+        self.out = ByteFifo()

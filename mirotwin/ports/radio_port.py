@@ -1,7 +1,7 @@
 """The serial port of the PC's radio on one network of a world, in virtual time.
 
-    bytes to send ──► transmit buffer, 4096 characters ──► air ──► robots
-    bytes heard   ◄──────────── the PC's receiver ◄─────── air ◄── robots
+    bytes to send  ──► transmit buffer, 4096 characters ──► air ──► robots
+    bytes received ◄─────────── the PC's receiver ◄─────── air ◄── robots
 
 A character with a bad stop bit is delivered like any other, as serial ports do unless they are told to check; the
 recording knows which had one. Slicer noise is heard by robots only: the PC's receiver has a squelch.
@@ -47,7 +47,7 @@ class RadioPort:
         """Puts at least one character into the transmit buffer; returns the tick of the first start bit.
 
         The carrier comes up at the next tick that is settled on no wire: 120 ticks from now. `World.inject` would take
-        the radio's latency off, which is before now for the PC; what it puts on the air before the begin of the control
+        the radio's latency off, which is before now for the PC; what it puts on the air before the start of the control
         period would, replayed, belong to the period before, and the digests would differ.
         """
         outbox = self._parts.outbox
@@ -59,8 +59,8 @@ class RadioPort:
         outbox = self._parts.outbox
         outbox.waiting = [one for one in outbox.waiting if one.origin != INJECTED]
 
-    def heard(self) -> bytes:
-        """What the PC has heard since the last call; to be called before 4096 events at the PC have passed."""
+    def received(self) -> bytes:
+        """What the PC has received since the last call; to be called before 4096 events at the PC have passed."""
         log = self._parts.log
         found = bytes(event.value for _, event in log.since(self._read) if event.what == "heard")
         self._read = log.end

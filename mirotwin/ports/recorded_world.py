@@ -18,7 +18,7 @@ from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from miro_sim.world.world import World
 from mirotwin.ports.live import live_scenario
-from mirotwin.ports.url import Target
+from mirotwin.ports.url import UrlOptions
 from mirotwin.recording.recorder import Recorder
 from mirotwin.recording.source import source_of
 from mirotwin.rerun import runner
@@ -28,7 +28,7 @@ from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder
 FLUSH_S = 0.2
 
 
-class Opened:
+class RecordedWorld:
     """A world at tick 0 and, with `folder`, its recording until `close`."""
 
     def __init__(self, world: World, text: ScenarioText, seed: int, folder: OutputFolder | None) -> None:
@@ -47,9 +47,9 @@ class Opened:
             stream = files.enter_context(folder.part(RECORDING).open("wb", buffering=0))
             self._recorder = files.enter_context(Recorder(stream, source))
             self._files = files.pop_all()
-        self.world.observers.append(self._keep)
+        self.world.observers.append(self._write)
 
-    def _keep(self, period: Period) -> None:
+    def _write(self, period: Period) -> None:
         assert self._recorder is not None
         try:
             self._recorder.write(period)
@@ -61,7 +61,7 @@ class Opened:
     def _break_off(self, error: OSError) -> NoReturn:
         """What was recorded stays, as a part."""
         self._recorder = None
-        self.world.observers.remove(self._keep)
+        self.world.observers.remove(self._write)
         try:
             self._files.__exit__(type(error), error, error.__traceback__)
         except (BadInput, OSError) as told:
@@ -97,17 +97,17 @@ def _image(path: str) -> Image:
     return load_hex(Path(path))
 
 
-def opened(target: Target, at_exit: Callable[[], object]) -> Opened:
-    """The world that `target` asks for. A program that records and ends without closing calls `at_exit`.
+def open_world(options: UrlOptions, at_exit: Callable[[], object]) -> RecordedWorld:
+    """The world that `options` ask for. A program that records and ends without closing calls `at_exit`.
 
     Raises BadInput, or ValueError for a network that the scenario does not have.
     """
-    text = live_scenario(target.scenario, target.settings)
-    image = _image(target.firmware)
-    world = World(text.scenario, target.seed, image)
-    world.earliest_tick(target.network)  # refuses a network that is not there
-    if not target.out:
-        return Opened(world, text, target.seed, None)
-    found = Opened(world, text, target.seed, OutputFolder(Path(target.out)))
+    text = live_scenario(options.scenario, options.settings)
+    image = _image(options.firmware)
+    world = World(text.scenario, options.seed, image)
+    world.earliest_tick(options.network)  # refuses a network that is not there
+    if not options.out:
+        return RecordedWorld(world, text, options.seed, None)
+    recorded = RecordedWorld(world, text, options.seed, OutputFolder(Path(options.out)))
     atexit.register(at_exit)
-    return found
+    return recorded

@@ -13,7 +13,7 @@ from typing import Any
 from serial import rfc2217
 from serial.serialutil import EIGHTBITS, PARITY_NONE, STOPBITS_ONE
 
-from mirotwin.ports.endpoint import Place
+from mirotwin.ports.endpoint import PortContext
 from mirotwin.ports.sockets import TcpEndpoint
 
 BAUD = 9600
@@ -27,14 +27,14 @@ class Rfc2217Endpoint(TcpEndpoint):
 
     kind, scheme = "rfc2217", "rfc2217"
 
-    def __init__(self, place: Place, host: str, number: int) -> None:
-        super().__init__(place, host, number)
+    def __init__(self, context: PortContext, host: str, number: int) -> None:
+        super().__init__(context, host, number)
         self.ignored = 0
         self._manager: Any = None
 
     def greet(self) -> None:
         self._told = False
-        self._manager = rfc2217.PortManager(_Line(self), self)
+        self._manager = rfc2217.PortManager(_FixedSettings(self), self)
 
     def heard_from(self, data: bytes) -> bytes:
         manager = self._manager
@@ -61,7 +61,7 @@ class Rfc2217Endpoint(TcpEndpoint):
         return b"".join(self._manager.escape(data))
 
 
-class _Line:
+class _FixedSettings:
     """The port as `PortManager` sees it: settings that can be read, of which none can be changed."""
 
     cts = dsr = cd = True
@@ -73,10 +73,10 @@ class _Line:
 
     @staticmethod
     def _fixed(value: object) -> property:
-        def get(line: _Line) -> object:
+        def get(line: _FixedSettings) -> object:
             return value
 
-        def put(line: _Line, wanted: object) -> None:
+        def put(line: _FixedSettings, wanted: object) -> None:
             if wanted != value:
                 raise ValueError(f"this radio's port has {value}")
 

@@ -3,7 +3,7 @@
 Each `open` is a robot that is switched on: virtual time begins at 0 and nothing is kept of the port's last use.
 
     read(n)          time passes until n bytes are there, up to `timeout` (None: for ever), or up to
-                     `inter_byte_timeout` behind a byte; it stands at the tick at which the last of them was known
+                     `inter_byte_timeout` after a byte; it stands at the tick at which the last of them was known
     read, timeout 0  what is there; no time passes
     in_waiting       what is there; no time passes
     write(data)      none passes while the transmit buffer (4096 characters) has room; else until it has, up to
@@ -12,12 +12,11 @@ Each `open` is a robot that is switched on: virtual time begins at 0 and nothing
     sleep, others    none passes
 
 With `realtime=1` it passes by the wall clock instead, also between calls, and calls wait for it.
-
-Long because pyserial wants one class with all of it.
 """
 
 from __future__ import annotations
 
+import threading
 import warnings
 from typing import Any
 
@@ -36,12 +35,12 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import HOST_CHARACTER_TICKS, NEVER_TICK, seconds, ticks
 from miro_robot.faults import FirmwareFault
 from miro_sim.world.world import World
-from mirotwin.ports.byte_fifo import Bounded
+from mirotwin.ports.byte_fifo import ByteFifo
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
-from mirotwin.ports.recorded_world import Opened, opened
-from mirotwin.ports.time_policy import ByWallClock, InCalls, Passing
+from mirotwin.ports.recorded_world import RecordedWorld, open_world
+from mirotwin.ports.time_policy import RealTime, TimePolicy, VirtualTime
 from mirotwin.ports.url import parse_url
-from mirotwin.rerun.pacing import Pace, Turns
+from mirotwin.rerun.pacing import Pace
 
 BAUD = 9600
 POLLS = 1000
@@ -49,21 +48,21 @@ POLLS = 1000
 
 
 class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
-    """A port of pyserial; see the head of this file. `world`: the world behind it while it is open."""
+    """A port of pyserial; see the head of this file. `world`: its world while it is open."""
 
     BAUDRATES = (BAUD,)
     is_open: bool
 
     def __init__(self, *args: Any, **named: Any) -> None:
-        self._turn = Turns()
-        self._opened: Opened | None = None
+        self._lock = threading.RLock()  # a terminal reads in one thread and writes in another
+        self._recorded: RecordedWorld | None = None
         self._cancel_read = self._cancel_write = False
         self._polls = 0
         super().__init__(*args, **named)
 
     @property
     def world(self) -> World:
-        """The world behind the open port. Raises PortNotOpenError."""
+        """The world of the open port. Raises PortNotOpenError."""
         return self._there().world
 
     # ---- opening -----------------------------------------------------------------------------------------
@@ -76,20 +75,20 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
             raise SerialException("Port is already open.")
         self._reconfigure_port()
         try:
-            target = parse_url(self._port)
-            self._opened = opened(target, self.close)
+            options = parse_url(self._port)
+            self._recorded = open_world(options, self.close)
         except (BadInput, OSError, ValueError) as error:
             raise SerialException(str(error)) from None
-        world = self._opened.world
-        port = self._radio = RadioPort(world, target.network)
-        self._inbox = Bounded()
-        self._limit_tick = ticks(target.limit_s)
-        self._passing: Passing
-        if target.realtime:
-            self._passing = ByWallClock(port, self._inbox, Pace(target.realtime))
+        world = self._recorded.world
+        port = self._radio = RadioPort(world, options.network)
+        self._inbox = ByteFifo()
+        self._limit_tick = ticks(options.limit_s)
+        self._time: TimePolicy
+        if options.realtime:
+            self._time = RealTime(port, self._inbox, Pace(options.realtime))
         else:
-            self._passing = InCalls(port, self._inbox)
-        self._polling = not target.realtime
+            self._time = VirtualTime(port, self._inbox)
+        self._polling = not options.realtime
         self.is_open = True
 
     def close(self) -> None:
@@ -104,8 +103,8 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
             pass
         finally:
             self.is_open = False
-            with self._turn:
-                self._opened = None
+            with self._lock:
+                self._recorded = None
                 there.close()
 
     def _reconfigure_port(self) -> None:
@@ -122,9 +121,9 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
     @property
     def in_waiting(self) -> int:
         """Bytes that are there."""
-        with self._turn:
+        with self._lock:
             self._there()
-            self._passing.catch_up()
+            self._time.catch_up()
             self._note_poll(len(self._inbox))
             return len(self._inbox)
 
@@ -140,9 +139,9 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         deadline = gap_end = NEVER_TICK
         first, there = True, 0
         while True:
-            with self._turn:
+            with self._lock:
                 self._there()
-                self._passing.catch_up()
+                self._time.catch_up()
                 if first and self._timeout is not None:
                     deadline = world.tick + ticks(self._timeout)
                 if self._inter_byte_timeout is not None and len(self._inbox) > there:
@@ -151,8 +150,8 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
                 if self._read_ends(size, min(deadline, gap_end)):
                     return self._inbox.take(size)
                 tick = min(deadline, gap_end, self._limit_tick)
-                self._passing.advance(tick, for_byte=True)
-            self._passing.rest(tick)
+                self._time.advance(tick, for_byte=True)
+            self._time.rest(tick)
             first = False
 
     def _read_ends(self, size: int, deadline: int) -> bool:
@@ -176,9 +175,9 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._cancel_read = True
 
     def reset_input_buffer(self) -> None:
-        with self._turn:
+        with self._lock:
             self._there()
-            self._passing.catch_up()
+            self._time.catch_up()
             self._inbox.clear()
 
     # ---- writing -----------------------------------------------------------------------------------------
@@ -190,9 +189,9 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         deadline = NEVER_TICK
         sent, first = 0, True
         while True:
-            with self._turn:
+            with self._lock:
                 self._there()
-                self._passing.catch_up()
+                self._time.catch_up()
                 if first and self._write_timeout is not None:
                     deadline = world.tick + ticks(self._write_timeout)
                 if why := self._why_over():
@@ -211,8 +210,8 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
                 wanted = min(len(data) - sent, TRANSMIT_CHARACTERS)
                 room_tick = self._radio.free_tick - (TRANSMIT_CHARACTERS - wanted) * HOST_CHARACTER_TICKS
                 tick = min(deadline, max(room_tick, world.tick + 1), self._limit_tick)
-                self._passing.advance(tick, for_byte=False)
-            self._passing.rest(tick)
+                self._time.advance(tick, for_byte=False)
+            self._time.rest(tick)
             first = False
 
     def cancel_write(self) -> None:
@@ -227,9 +226,9 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
     def _drain(self, timeout_s: float | None) -> None:
         deadline = NEVER_TICK
         while True:
-            with self._turn:
+            with self._lock:
                 world = self._there().world
-                self._passing.catch_up()
+                self._time.catch_up()
                 if deadline == NEVER_TICK and timeout_s is not None:
                     deadline = world.tick + ticks(timeout_s)
                 if not self._radio.waiting:
@@ -239,22 +238,22 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
                 if world.tick >= deadline:
                     raise SerialTimeoutException("Write timeout")
                 tick = min(self._radio.free_tick, deadline, self._limit_tick)
-                self._passing.advance(tick, for_byte=False)
-            self._passing.rest(tick)
+                self._time.advance(tick, for_byte=False)
+            self._time.rest(tick)
 
     @property
     def out_waiting(self) -> int:
         """Characters that are not sent yet."""
-        with self._turn:
+        with self._lock:
             self._there()
-            self._passing.catch_up()
+            self._time.catch_up()
             return self._radio.waiting
 
     def reset_output_buffer(self) -> None:
         """Takes back what has not begun to be sent."""
-        with self._turn:
+        with self._lock:
             self._there()
-            self._passing.catch_up()
+            self._time.catch_up()
             self._radio.purge()
 
     # ---- lines that a radio does not have ----------------------------------------------------------------
@@ -283,10 +282,10 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     # ---- within ------------------------------------------------------------------------------------------
 
-    def _there(self) -> Opened:
-        if self._opened is None:
+    def _there(self) -> RecordedWorld:
+        if self._recorded is None:
             raise PortNotOpenError()
-        return self._opened
+        return self._recorded
 
     def _why_over(self) -> str:
         """Why no more time passes, if so."""

@@ -12,7 +12,7 @@ from miro_exact.seed import MAX_SEED
 from miro_sim.world.world import World
 from mirotwin.firmware.held_signals import held_signals
 from mirotwin.ports.live import LONGEST_S, live_scenario
-from mirotwin.ports.serve_ports import Wanted, open_ports, ports_option
+from mirotwin.ports.serve_ports import PortOptions, open_ports, ports_option
 from mirotwin.ports.session import Session
 from mirotwin.recording.source import source_of
 from mirotwin.report.live import Live
@@ -115,7 +115,7 @@ def serve(
         world = World(text.scenario, seed, image)
     source = source_of(text, world)
     trace, checks = Trace(world), Checks(world, expectations_of(text.scenario, text.origin))
-    wanted = Wanted(pty, tcp, rfc2217, host, force)
+    options = PortOptions(pty, tcp, rfc2217, host, force)
 
     def tell(line: str) -> None:
         if not quiet:
@@ -126,7 +126,7 @@ def serve(
         held_signals() as hold,
         folder,
         DefaultSelector() as selector,
-        open_ports(wanted, world, selector, tell) as ports,
+        open_ports(options, world, selector, tell) as ports,
     ):
         for port in ports:
             show_line(f"{port.kind} {port.where}")

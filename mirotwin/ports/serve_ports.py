@@ -26,7 +26,7 @@ LONGEST_NUMBER = 5
 HERE = "127.0.0.1"
 
 
-class PortNumber(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+class PortNumberType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     """NUMBER, or NUMBER@NETWORK; 0 stands for a free port."""
 
     name = "port"
@@ -42,7 +42,7 @@ class PortNumber(click.ParamType):  # type: ignore[type-arg, unused-ignore]
         return int(number), int(network or 0)
 
 
-class Link(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+class LinkType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     """A path, or PATH@NETWORK; "" or @NETWORK for none."""
 
     name = "link"
@@ -54,7 +54,7 @@ class Link(click.ParamType):  # type: ignore[type-arg, unused-ignore]
         return (path, int(network)) if at and _is_number(network) else (str(value), 0)
 
 
-class Host(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+class AddressType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     """An address to listen on. The empty one would be all of the machine's."""
 
     name = "address"
@@ -71,8 +71,8 @@ def _is_number(text: str) -> bool:
     return text.isascii() and text.isdecimal() and len(text) <= LONGEST_NUMBER
 
 
-class Wanted(msgspec.Struct, frozen=True):
-    """What was asked for: links and port numbers, each with its network."""
+class PortOptions(msgspec.Struct, frozen=True):
+    """The ports to open: links and port numbers, each with its network."""
 
     pty: Sequence[tuple[str, int]]
     tcp: Sequence[tuple[int, int]]
@@ -86,28 +86,28 @@ def ports_option(command: Command) -> Command:
     for option in (
         click.option(
             "--host",
-            type=Host(),
+            type=AddressType(),
             default=HERE,
             show_default=True,
             help="Address on which TCP ports are opened.",
         ),
         click.option(
             "--rfc2217",
-            type=PortNumber(),
+            type=PortNumberType(),
             multiple=True,
             metavar="PORT",
             help="TCP with telnet negotiation, `rfc2217://` of pyserial. 0: any free port.",
         ),
         click.option(
             "--tcp",
-            type=PortNumber(),
+            type=PortNumberType(),
             multiple=True,
             metavar="PORT",
             help="TCP with the bytes as they are, `socket://` of pyserial. 0: any free port.",
         ),
         click.option(
             "--pty",
-            type=Link(),
+            type=LinkType(),
             multiple=True,
             is_flag=False,
             flag_value="",
@@ -120,28 +120,30 @@ def ports_option(command: Command) -> Command:
 
 
 @contextmanager
-def open_ports(wanted: Wanted, world: World, selector: BaseSelector, tell: Tell) -> Iterator[list[Endpoint]]:
+def open_ports(
+    options: PortOptions, world: World, selector: BaseSelector, tell: Tell
+) -> Iterator[list[Endpoint]]:
     """All of them, or none. Raises BadInput for one that cannot be had."""
     radios = [RadioPort(world, network) for network in range(len(world.networks))]
 
-    def place(option: str, network: int) -> endpoint.Place:
+    def context(option: str, network: int) -> endpoint.PortContext:
         if network >= len(radios):
             what = f"there is no network {network}; there are {len(radios)}, from 0 on"
             raise BadInput(option, "", what)
-        return endpoint.Place(radios[network], selector, tell)
+        return endpoint.PortContext(radios[network], selector, tell)
 
-    pty = wanted.pty if wanted.pty or wanted.tcp or wanted.rfc2217 else [("", 0)]
+    pty = options.pty if options.pty or options.tcp or options.rfc2217 else [("", 0)]
     with ExitStack() as closing:
         found: list[Endpoint] = []
 
-        def opened(one: Endpoint) -> None:
+        def add(one: Endpoint) -> None:
             closing.callback(one.close)
             found.append(one)
 
         for link, network in pty:
-            opened(PtyEndpoint(place("--pty", network), Path(link) if link else None, wanted.force))
-        for number, network in wanted.tcp:
-            opened(TcpEndpoint(place("--tcp", network), wanted.host, number))
-        for number, network in wanted.rfc2217:
-            opened(Rfc2217Endpoint(place("--rfc2217", network), wanted.host, number))
+            add(PtyEndpoint(context("--pty", network), Path(link) if link else None, options.force))
+        for number, network in options.tcp:
+            add(TcpEndpoint(context("--tcp", network), options.host, number))
+        for number, network in options.rfc2217:
+            add(Rfc2217Endpoint(context("--rfc2217", network), options.host, number))
         yield found

@@ -45,7 +45,7 @@ class Session:
         self.once = once
         self.periods = min(world.periods, -(-end_tick // CONTROL_PERIOD_TICKS))
         self._slice_ticks = max(1, min(ticks(SLICE_S * pace.factor), LONGEST_SLICE_TICKS))
-        self._told_ticks = 0
+        self._reported_ticks = 0
 
     # ---- what `runner.run` steps -------------------------------------------------------------------------
 
@@ -93,16 +93,16 @@ class Session:
         if tick <= before:
             return
         self.world.run_to(tick)
-        if self.pace.note(before, tick, due_tick) and due_tick - tick >= 2 * self._told_ticks:
-            self._told_ticks = due_tick - tick
+        if self.pace.note(before, tick, due_tick) and due_tick - tick >= 2 * self._reported_ticks:
+            self._reported_ticks = due_tick - tick
             behind_ms = 1000.0 * seconds(due_tick - tick)
             self.tell(f"{seconds(tick):.3f} s: {behind_ms:.0f} ms behind the wall clock")
-        heard: dict[int, bytes] = {}
+        received: dict[int, bytes] = {}
         for endpoint in self.endpoints:
             port = endpoint.port
-            if port.network not in heard:
-                heard[port.network] = port.heard()
-            endpoint.deliver(heard[port.network])
+            if port.network not in received:
+                received[port.network] = port.received()
+            endpoint.deliver(received[port.network])
             endpoint.push()
 
     def _all_gone(self) -> bool:

@@ -13,7 +13,7 @@ from selectors import EVENT_READ, EVENT_WRITE
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import ticks
-from mirotwin.ports.endpoint import CHUNK_BYTES, Endpoint, Place
+from mirotwin.ports.endpoint import CHUNK_BYTES, Endpoint, PortContext
 
 LINGER_TICKS = ticks(0.5)
 MOST_WIRE_BYTES = 65_536
@@ -25,7 +25,7 @@ class TcpEndpoint(Endpoint):
 
     kind, scheme = "tcp", "socket"
 
-    def __init__(self, place: Place, host: str, number: int) -> None:
+    def __init__(self, context: PortContext, host: str, number: int) -> None:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:
             self._listener = socket.create_server((host, number), family=family, backlog=8)
@@ -35,7 +35,7 @@ class TcpEndpoint(Endpoint):
             raise BadInput(f"--{self.kind} {number}", "", f"{host}: {reason}", remedy) from None
         self._listener.setblocking(False)
         shown = f"[{host}]" if ":" in host else host
-        super().__init__(place, f"{self.scheme}://{shown}:{self._listener.getsockname()[1]}")
+        super().__init__(context, f"{self.scheme}://{shown}:{self._listener.getsockname()[1]}")
         self._socket: socket.socket | None = None
         self._wire = bytearray()
         self._input_over_tick = -1

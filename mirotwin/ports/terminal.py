@@ -16,7 +16,7 @@ from selectors import EVENT_READ, EVENT_WRITE
 from typing import Any
 
 from miro_exact.bad_input import BadInput
-from mirotwin.ports.endpoint import CHUNK_BYTES, Endpoint, Place
+from mirotwin.ports.endpoint import CHUNK_BYTES, Endpoint, PortContext
 
 SOMEBODY = "a program"
 
@@ -31,7 +31,7 @@ class PtyEndpoint(Endpoint):
 
     kind = "pty"
 
-    def __init__(self, place: Place, link: Path | None, force: bool = False) -> None:
+    def __init__(self, context: PortContext, link: Path | None, force: bool = False) -> None:
         try:
             import termios
             import tty
@@ -48,7 +48,7 @@ class PtyEndpoint(Endpoint):
         self._lock: int | None = None
         if link is not None:
             self._make_link(link, force)
-        super().__init__(place, self.path if link is None else f"{link}")
+        super().__init__(context, self.path if link is None else f"{link}")
         self._poll = select.poll()
         self._poll.register(self._master, select.POLLIN)
         self._watched = 0

@@ -1,4 +1,4 @@
-"""The two ways in which time passes for a program that holds a world: in its calls, or by the wall clock."""
+"""How time passes for a program that holds a world: in its calls only, or by the wall clock."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Protocol
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, TICKS_PER_SECOND, seconds
 from miro_sim.world.conditions import Heard
 from miro_sim.world.waits import WaitExpired
-from mirotwin.ports.byte_fifo import Bounded
+from mirotwin.ports.byte_fifo import ByteFifo
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.rerun.pacing import Pace
 
@@ -19,8 +19,8 @@ CATCH_UP_S = 0.25
 _log = logging.getLogger("mirotwin.ports")
 
 
-class Passing(Protocol):
-    """How time passes. `inbox` gets what the PC hears."""
+class TimePolicy(Protocol):
+    """How time passes. `inbox` gets what the PC receives."""
 
     def catch_up(self) -> None:
         """Before a call looks at anything: to where the world should be now."""
@@ -29,18 +29,18 @@ class Passing(Protocol):
         """Towards `tick`; with `for_byte` not beyond the next byte heard. The caller asks again until it is content."""
 
     def rest(self, tick: int) -> None:
-        """Between two of these, without the world: other threads take their turns."""
+        """Between two of these, without the world: other threads may have it."""
 
 
-class InCalls:
+class VirtualTime:
     """Virtual time: nothing passes between calls, and a call takes no longer than computing takes."""
 
-    def __init__(self, port: RadioPort, inbox: Bounded) -> None:
+    def __init__(self, port: RadioPort, inbox: ByteFifo) -> None:
         self.port = port
         self.inbox = inbox
 
     def catch_up(self) -> None:
-        self.inbox.add(self.port.heard())
+        self.inbox.add(self.port.received())
 
     def advance(self, tick: int, for_byte: bool) -> None:
         world = self.port.world
@@ -56,14 +56,14 @@ class InCalls:
         """No time to pass."""
 
 
-class ByWallClock:
+class RealTime:
     """Real time: the world stands where the wall clock says, as often as a call comes, and a wait is one."""
 
-    def __init__(self, port: RadioPort, inbox: Bounded, pace: Pace) -> None:
+    def __init__(self, port: RadioPort, inbox: ByteFifo, pace: Pace) -> None:
         self.port = port
         self.inbox = inbox
         self.pace = pace
-        self._told_ticks = 0
+        self._reported_ticks = 0
 
     def catch_up(self) -> None:
         world = self.port.world
@@ -71,10 +71,10 @@ class ByWallClock:
         latest = due + int(CATCH_UP_S * self.pace.factor * TICKS_PER_SECOND)
         while world.tick < due and not world.stopped and self.pace.tick() < latest:
             world.run_to(min(due, world.tick + CONTROL_PERIOD_TICKS))
-            self.inbox.add(self.port.heard())
+            self.inbox.add(self.port.received())
         now = self.pace.tick()
-        if self.pace.note(world.tick, world.tick, now) and now - world.tick >= 2 * self._told_ticks:
-            self._told_ticks = now - world.tick
+        if self.pace.note(world.tick, world.tick, now) and now - world.tick >= 2 * self._reported_ticks:
+            self._reported_ticks = now - world.tick
             _log.warning(
                 "tick %d: %.0f ms behind the wall clock", world.tick, 1000.0 * seconds(now - world.tick)
             )

@@ -23,7 +23,7 @@ from mirotwin.rerun.pacing import FASTEST
 SCHEME = "miro://"
 
 
-class Target(msgspec.Struct, frozen=True):
+class UrlOptions(msgspec.Struct, frozen=True):
     """What a URL asks for. `realtime`: virtual seconds in a second; 0: time passes in calls. `out` "": no files."""
 
     scenario: str
@@ -36,7 +36,7 @@ class Target(msgspec.Struct, frozen=True):
     out: str = ""
 
 
-def parse_url(url: str) -> Target:
+def parse_url(url: str) -> UrlOptions:
     """Raises BadInput for a scheme, an option or a value that it does not know, and for an option that stands twice."""
     if not url.lower().startswith(SCHEME):
         raise BadInput(url, "", "is no miro:// URL", f"begin with {SCHEME}SCENARIO")
@@ -60,7 +60,7 @@ def parse_url(url: str) -> Target:
             found[key] = _READERS[key](value)
         except ValueError as error:
             raise BadInput(url, key, f"{value!r} {error}") from None
-    return Target(scenario, settings=tuple(settings), **found)
+    return UrlOptions(scenario, settings=tuple(settings), **found)
 
 
 def _whole(most: int) -> Callable[[str], int]:

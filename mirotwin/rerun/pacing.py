@@ -1,11 +1,10 @@
-"""The wall clock beside virtual time, and threads that take turns at one world.
+"""The wall clock beside virtual time.
 
 A world that is paced is moved on to `Pace.tick()` and never beyond; it may be behind, which is counted.
 """
 
 from __future__ import annotations
 
-import threading
 import time
 
 from miro_exact.clock import TICKS_PER_SECOND, seconds, ticks
@@ -14,9 +13,6 @@ FASTEST = 1000.0
 """Virtual seconds in one, at most."""
 LATE_TICKS = ticks(0.020)
 """What counts as late: a little more than the 16 ms for which an adapter of USB may keep a character."""
-
-Turns = threading.RLock
-"""A lock for one world: a terminal reads in one thread and writes in another."""
 
 
 class Pace:

@@ -29,19 +29,19 @@ class _Radio:
         """Nothing waits."""
 
 
-def _place(radio: _Radio, told: list[str]) -> Any:
+def _context(radio: _Radio, told: list[str]) -> Any:
     from selectors import DefaultSelector
 
-    from mirotwin.ports.endpoint import Place
+    from mirotwin.ports.endpoint import PortContext
 
-    return Place(radio, DefaultSelector(), told.append)  # type: ignore[arg-type]
+    return PortContext(radio, DefaultSelector(), told.append)  # type: ignore[arg-type]
 
 
 def _negotiation() -> Run:
     from mirotwin.ports.rfc2217 import LONGEST_SUBOPTION, Rfc2217Endpoint
 
     told: list[str] = []
-    whole, parts, other = (Rfc2217Endpoint(_place(_Radio(), told), "127.0.0.1", 0) for _ in range(3))
+    whole, parts, other = (Rfc2217Endpoint(_context(_Radio(), told), "127.0.0.1", 0) for _ in range(3))
 
     def run(data: bytes) -> str:
         cut, data = 1 + (data[0] if data else 0), data[1:]
@@ -170,21 +170,21 @@ def _sockets(kind: str) -> Run:
 
     def run(data: bytes) -> str:
         radio, told = _Radio(), []
-        place = _place(radio, told)
+        context = _context(radio, told)
         port: Any
         if kind == "pty":
-            port = PtyEndpoint(place, None)
+            port = PtyEndpoint(context, None)
             connect: Any = lambda: _TerminalClient(port.path)  # noqa: E731
         else:
-            port = (Rfc2217Endpoint if kind == "rfc2217" else TcpEndpoint)(place, "127.0.0.1", 0)
+            port = (Rfc2217Endpoint if kind == "rfc2217" else TcpEndpoint)(context, "127.0.0.1", 0)
             number = int(port.where.rpartition(":")[2])
             connect = lambda: _TcpClient(number)  # noqa: E731
         try:
             return _client(Draws(data), radio, port, connect, told)
         finally:
             port.close()
-            assert not place.selector.get_map(), "something is still watched"
-            place.selector.close()
+            assert not context.selector.get_map(), "something is still watched"
+            context.selector.close()
 
     return run
 

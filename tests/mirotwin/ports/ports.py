@@ -7,7 +7,7 @@ from selectors import DefaultSelector
 from typing import TypeVar
 
 from miro_sim.world.world import World
-from mirotwin.ports.endpoint import Endpoint, Place
+from mirotwin.ports.endpoint import Endpoint, PortContext
 from mirotwin.ports.live import live_scenario
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.ports.sockets import TcpEndpoint
@@ -23,7 +23,7 @@ class Rig:
         self.world = World(live_scenario("fig6").scenario, 1, own_image())
         self.selector = DefaultSelector()
         self.told: list[str] = []
-        self.place = Place(RadioPort(self.world), self.selector, self.told.append)
+        self.context = PortContext(RadioPort(self.world), self.selector, self.told.append)
         self.open: list[Endpoint] = []
 
     def opened(self, port: Port) -> Port:

@@ -63,9 +63,9 @@ def test_what_the_pc_hears_is_given_once():
     port = RadioPort(world)
     port.send(question(0))
     world.run_to(ticks(0.1))
-    answer = port.heard()
+    answer = port.received()
     assert (len(answer), answer[:4]) == (19, b"\x55" * 4)
-    assert port.heard() == b""
+    assert port.received() == b""
 
 
 @pytest.mark.parametrize(

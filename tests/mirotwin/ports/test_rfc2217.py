@@ -20,7 +20,7 @@ def sent_to(port: Rfc2217Endpoint, data: bytes) -> bytes:
 
 
 def test_bytes_pass_with_ff_doubled(rig):
-    port = rig.opened(Rfc2217Endpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(Rfc2217Endpoint(rig.context, "127.0.0.1", 0))
     client = connected(port)
     everything = bytes(range(256))
     assert sent_to(port, everything.replace(IAC, IAC + IAC)) == everything
@@ -29,7 +29,7 @@ def test_bytes_pass_with_ff_doubled(rig):
 
 
 def test_the_rate_is_answered_with_the_one_there_is(rig):
-    port = rig.opened(Rfc2217Endpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(Rfc2217Endpoint(rig.context, "127.0.0.1", 0))
     client = connected(port)
     client.recv(100)
     for rate in (9600, 115_200, 0):
@@ -41,7 +41,7 @@ def test_the_rate_is_answered_with_the_one_there_is(rig):
 
 
 def test_purging_empties_the_buffers(rig):
-    port = rig.opened(Rfc2217Endpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(Rfc2217Endpoint(rig.context, "127.0.0.1", 0))
     client = connected(port)
     port.port.send(b"a" * 100)
     port.deliver(b"b" * 100)
@@ -61,7 +61,7 @@ def test_purging_empties_the_buffers(rig):
     ],
 )
 def test_nonsense_is_ignored_and_what_follows_passes(rig, nonsense):
-    port = rig.opened(Rfc2217Endpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(Rfc2217Endpoint(rig.context, "127.0.0.1", 0))
     client = connected(port)
     assert sent_to(port, nonsense + b"through").endswith(b"through")
     assert port.ignored >= 1
@@ -88,7 +88,7 @@ def fuzzed():
 @given(st.lists(_pieces, max_size=40))
 def test_no_negotiation_raises_or_grows_without_bound(fuzzed, pieces):
     if not fuzzed.open:
-        fuzzed.opened(Rfc2217Endpoint(fuzzed.place, "127.0.0.1", 0))
+        fuzzed.opened(Rfc2217Endpoint(fuzzed.context, "127.0.0.1", 0))
         fuzzed.client = connected(fuzzed.open[0])  # type: ignore[attr-defined, arg-type]
     port = fuzzed.open[0]
     assert isinstance(port, Rfc2217Endpoint)
@@ -102,7 +102,7 @@ def test_no_negotiation_raises_or_grows_without_bound(fuzzed, pieces):
 
 
 def test_a_client_that_asks_without_reading_answers_is_put_out(rig):
-    port = rig.opened(Rfc2217Endpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(Rfc2217Endpoint(rig.context, "127.0.0.1", 0))
     client = connected(port)
     client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     assert port._socket is not None

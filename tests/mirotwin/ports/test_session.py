@@ -7,8 +7,8 @@ import pytest
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
 from miro_sim.periods import Period
 from miro_sim.world.world import World
-from mirotwin.ports.byte_fifo import Bounded
-from mirotwin.ports.endpoint import Endpoint, Place
+from mirotwin.ports.byte_fifo import ByteFifo
+from mirotwin.ports.endpoint import Endpoint, PortContext
 from mirotwin.ports.live import live_scenario
 from mirotwin.ports.radio_port import RadioPort
 from mirotwin.ports.session import Session
@@ -22,8 +22,8 @@ class Scripted(Endpoint):
 
     kind = "scripted"
 
-    def __init__(self, place: Place, sends: list[tuple[int, bytes]]) -> None:
-        super().__init__(place, "here")
+    def __init__(self, context: PortContext, sends: list[tuple[int, bytes]]) -> None:
+        super().__init__(context, "here")
         self.sends = sends
         self.got = b""
         self.has_come("a test")
@@ -43,8 +43,8 @@ def session_of(
     scenario = live_scenario("fig6", ("network.radio.bit_error_rate=0",)).scenario
     world = World(scenario, 1, own_image())
     told: list[str] = []
-    place = Place(RadioPort(world), NO_SELECTOR, told.append)  # type: ignore[arg-type]
-    found = [Scripted(place, list(sends) if index == 0 else []) for index in range(ports)]
+    context = PortContext(RadioPort(world), NO_SELECTOR, told.append)  # type: ignore[arg-type]
+    found = [Scripted(context, list(sends) if index == 0 else []) for index in range(ports)]
     pace = fake_pace()
     session = Session(world, pace, NO_SELECTOR, found, told.append, **{"end_tick": ticks(0.5), **more})  # type: ignore[arg-type]
     return session, found, told
@@ -111,7 +111,7 @@ def test_once_ends_it_when_the_last_client_has_gone():
 
 
 def test_a_full_buffer_drops_what_comes_in_and_counts_it():
-    buffer = Bounded(10)
+    buffer = ByteFifo(10)
     buffer.add(b"abcdefgh")
     buffer.add(b"ijkl")
     assert (bytes(buffer.data), buffer.dropped) == (b"abcdefghij", 2)
@@ -123,7 +123,7 @@ def test_a_full_buffer_drops_what_comes_in_and_counts_it():
 @pytest.mark.parametrize("reads", [True, False])
 def test_a_client_that_does_not_read_loses_what_comes_when_its_buffer_is_full(reads):
     _, (client,), told = session_of()
-    client.out = Bounded(16)
+    client.out = ByteFifo(16)
     for _ in range(4):
         client.deliver(b"12345678")
         if reads:

@@ -14,7 +14,7 @@ from tests.mirotwin.ports.rig import question
 
 
 def test_bytes_pass_as_they_are_both_ways(rig):
-    port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(TcpEndpoint(rig.context, "127.0.0.1", 0))
     client = connected(port)
     everything = bytes(range(256))
     client.sendall(everything)
@@ -31,7 +31,7 @@ def test_bytes_pass_as_they_are_both_ways(rig):
 
 
 def test_a_second_client_is_refused_and_the_first_one_stays(rig):
-    port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(TcpEndpoint(rig.context, "127.0.0.1", 0))
     first = connected(port)
     with socket.create_connection(first.getpeername(), timeout=5) as second:
         soon(port, lambda: port.refused)
@@ -45,7 +45,7 @@ def test_a_second_client_is_refused_and_the_first_one_stays(rig):
 
 
 def test_a_client_that_breaks_the_connection_is_gone_and_the_next_one_is_welcome(rig):
-    port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(TcpEndpoint(rig.context, "127.0.0.1", 0))
     for _ in range(2):
         client = connected(port)
         client.sendall(question(0)[:10])  # in the middle of a frame
@@ -56,7 +56,7 @@ def test_a_client_that_breaks_the_connection_is_gone_and_the_next_one_is_welcome
 
 
 def test_a_client_whose_input_is_over_gets_answers_for_half_a_second(rig):
-    port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(TcpEndpoint(rig.context, "127.0.0.1", 0))
     client = connected(port)
     client.sendall(b"?")
     client.shutdown(socket.SHUT_WR)
@@ -73,7 +73,7 @@ def test_a_client_whose_input_is_over_gets_answers_for_half_a_second(rig):
 
 
 def test_bytes_wait_in_the_kernel_while_the_transmit_buffer_is_full(rig):
-    port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(TcpEndpoint(rig.context, "127.0.0.1", 0))
     client = connected(port)
     client.sendall(bytes(6000))
     until_s = time.monotonic() + 5
@@ -93,7 +93,7 @@ def test_bytes_wait_in_the_kernel_while_the_transmit_buffer_is_full(rig):
 
 
 def test_a_slow_reader_is_dropped_bytes_and_not_waited_for(rig):
-    port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(TcpEndpoint(rig.context, "127.0.0.1", 0))
     client = connected(port)
     for _ in range(2000):
         port.deliver(bytes(8192))
@@ -107,20 +107,20 @@ def test_a_slow_reader_is_dropped_bytes_and_not_waited_for(rig):
 
 
 def test_a_port_that_is_taken_is_bad_input(rig):
-    port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(TcpEndpoint(rig.context, "127.0.0.1", 0))
     number = int(port.where.rpartition(":")[2])
     with pytest.raises(
         BadInput, match=rf"--tcp {number}: 127.0.0.1: Address already in use; choose another port"
     ):
-        TcpEndpoint(rig.place, "127.0.0.1", number)
+        TcpEndpoint(rig.context, "127.0.0.1", number)
     with pytest.raises(BadInput, match=r"--rfc2217 0: 203\.0\.113\.9: "):
-        Rfc2217Endpoint(rig.place, "203.0.113.9", 0)
+        Rfc2217Endpoint(rig.context, "203.0.113.9", 0)
 
 
 def test_the_kernel_gives_up_a_client_that_has_vanished_whether_answers_are_on_their_way_or_not(
     rig,
 ):
-    port = rig.opened(TcpEndpoint(rig.place, "127.0.0.1", 0))
+    port = rig.opened(TcpEndpoint(rig.context, "127.0.0.1", 0))
     with connected(port):
         assert port._socket is not None
         assert port._socket.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)

@@ -12,7 +12,7 @@ from tests.mirotwin.ports.ports import soon
 
 
 def test_a_terminal_passes_all_bytes_unchanged_and_without_echo(rig, tmp_path):
-    port = rig.opened(PtyEndpoint(rig.place, tmp_path / "radio"))
+    port = rig.opened(PtyEndpoint(rig.context, tmp_path / "radio"))
     client = os.open(tmp_path / "radio", os.O_RDWR | os.O_NOCTTY)
     soon(port, lambda: port.client)
     everything = bytes(range(256))
@@ -29,7 +29,7 @@ def test_a_terminal_passes_all_bytes_unchanged_and_without_echo(rig, tmp_path):
 
 
 def test_what_a_program_has_not_read_is_gone_when_the_next_one_opens_the_terminal(rig):
-    port = rig.opened(PtyEndpoint(rig.place, None))
+    port = rig.opened(PtyEndpoint(rig.context, None))
     client = os.open(port.path, os.O_RDWR | os.O_NOCTTY)
     soon(port, lambda: port.client)
     port.deliver(b"stale")
@@ -44,7 +44,7 @@ def test_what_a_program_has_not_read_is_gone_when_the_next_one_opens_the_termina
 
 
 def test_a_program_that_writes_and_closes_at_once_is_heard(rig):
-    port = rig.opened(PtyEndpoint(rig.place, None))
+    port = rig.opened(PtyEndpoint(rig.context, None))
     client = os.open(port.path, os.O_WRONLY | os.O_NOCTTY)
     os.write(client, b"short visit")
     os.close(client)
@@ -52,7 +52,7 @@ def test_a_program_that_writes_and_closes_at_once_is_heard(rig):
 
 
 def test_a_full_terminal_holds_nothing_up_and_what_is_dropped_is_counted(rig):
-    port = rig.opened(PtyEndpoint(rig.place, None))
+    port = rig.opened(PtyEndpoint(rig.context, None))
     client = os.open(port.path, os.O_RDWR | os.O_NOCTTY)
     soon(port, lambda: port.client)
     for _ in range(100):
@@ -67,7 +67,7 @@ def test_a_full_terminal_holds_nothing_up_and_what_is_dropped_is_counted(rig):
 
 def test_another_baud_rate_is_told_once(rig):
     termios = pytest.importorskip("termios")
-    port = rig.opened(PtyEndpoint(rig.place, None))
+    port = rig.opened(PtyEndpoint(rig.context, None))
     client = os.open(port.path, os.O_RDWR | os.O_NOCTTY)
     soon(port, lambda: port.client)
     modes = termios.tcgetattr(client)
@@ -85,26 +85,26 @@ def test_another_baud_rate_is_told_once(rig):
 def test_a_link_is_made_and_removed_and_replaces_only_one_that_leads_nowhere(rig, tmp_path):
     link = tmp_path / "radio"
     link.symlink_to(tmp_path / "gone")
-    port = PtyEndpoint(rig.place, link)
+    port = PtyEndpoint(rig.context, link)
     assert os.readlink(link) == port.path
     for force in (False, True):
         with pytest.raises(
             BadInput, match="radio: another session serves it; end that one, or choose another link"
         ):
-            PtyEndpoint(rig.place, link, force)
+            PtyEndpoint(rig.context, link, force)
     assert os.readlink(link) == port.path
     port.close()
     assert list(tmp_path.iterdir()) == []
     link.symlink_to(os.ttyname(os.openpty()[1]))  # as a session that was killed leaves it
     with pytest.raises(BadInput, match="radio: is there already; choose another link with --pty"):
-        PtyEndpoint(rig.place, link)
-    other = PtyEndpoint(rig.place, link, force=True)
+        PtyEndpoint(rig.context, link)
+    other = PtyEndpoint(rig.context, link, force=True)
     assert os.readlink(link) == other.path
     other.close()
     assert list(tmp_path.iterdir()) == []
     link.write_text("years of work")
     with pytest.raises(BadInput, match="is there already"):
-        PtyEndpoint(rig.place, link, force=True)
+        PtyEndpoint(rig.context, link, force=True)
     assert link.read_text() == "years of work"
 
 

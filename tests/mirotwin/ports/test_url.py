@@ -5,20 +5,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
-from mirotwin.ports.url import Target, parse_url
+from mirotwin.ports.url import UrlOptions, parse_url
 
 
 @pytest.mark.parametrize(
     ("url", "target"),
     [
-        ("miro://fig6", Target("fig6")),
-        ("miro://fig6/", Target("fig6")),
-        ("MIRO://fig6?seed=7", Target("fig6", seed=7)),
-        ("miro://my/own.toml?network=1", Target("my/own.toml", network=1)),
-        ("miro:///tmp/a%20b.toml", Target("/tmp/a b.toml")),
-        ("miro://fig6?set=a.b=1&set=c=%22x+y%22", Target("fig6", settings=("a.b=1", 'c="x+y"'))),
-        ("miro://fig6?firmware=C:%5Cx.ihx&realtime=0.5", Target("fig6", firmware="C:\\x.ihx", realtime=0.5)),
-        ("miro://fig6?limit_s=10&out=runs/x", Target("fig6", limit_s=10.0, out="runs/x")),
+        ("miro://fig6", UrlOptions("fig6")),
+        ("miro://fig6/", UrlOptions("fig6")),
+        ("MIRO://fig6?seed=7", UrlOptions("fig6", seed=7)),
+        ("miro://my/own.toml?network=1", UrlOptions("my/own.toml", network=1)),
+        ("miro:///tmp/a%20b.toml", UrlOptions("/tmp/a b.toml")),
+        ("miro://fig6?set=a.b=1&set=c=%22x+y%22", UrlOptions("fig6", settings=("a.b=1", 'c="x+y"'))),
+        (
+            "miro://fig6?firmware=C:%5Cx.ihx&realtime=0.5",
+            UrlOptions("fig6", firmware="C:\\x.ihx", realtime=0.5),
+        ),
+        ("miro://fig6?limit_s=10&out=runs/x", UrlOptions("fig6", limit_s=10.0, out="runs/x")),
     ],
 )
 def test_a_url_says_what_to_open(url, target):
