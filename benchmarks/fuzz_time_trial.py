@@ -156,7 +156,7 @@ class _Looked:
         """Whether one of these is confirmed."""
         for data in inputs:
             if not self.checks and self.target.run(data):
-                self.checks = confirmed(self.target.image, self.target.happenings(data))
+                self.checks = confirmed(self.target.image, self.target.script(data))
                 self.unconfirmed += not self.checks
         return bool(self.checks)
 

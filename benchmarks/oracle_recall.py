@@ -116,7 +116,7 @@ def failed(image: Image, target: RobotTarget, data: bytes) -> tuple[str, ...]:
         )
     )
     scenario = msgspec.structs.replace(scenario, expect=_EXPECT)
-    world = World(scenario, 0, image, target.happenings(data))
+    world = World(scenario, 0, image, target.script(data))
     checks = Checks(world)
     world.run_to(end_tick)
     checks.finish()

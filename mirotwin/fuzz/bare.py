@@ -14,8 +14,8 @@ from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
 from miro_host.raised import at_place, defined_at, raised_at
 from miro_host.raised import described as described_error
+from miro_protocol.actions import ScriptItem
 from miro_protocol.protocol import Damage, Frame, Protocol
-from miro_protocol.stream_events import Deed
 from miro_protocol.transmission import Transmission
 from miro_robot.bare.machine import CRYSTAL_HZ
 from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
@@ -140,9 +140,9 @@ class BareTarget(HarnessTarget):
         return None
 
     def describe(self, data: bytes) -> str:
-        return "\n".join(self._line(one) for one in self.happenings(data))
+        return "\n".join(self._line(one) for one in self.script(data))
 
-    def _line(self, one: Transmission | Deed) -> str:
+    def _line(self, one: ScriptItem) -> str:
         protocol = self.protocol
         if protocol is None or not isinstance(one, Transmission):
             return described(one)

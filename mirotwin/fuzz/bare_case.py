@@ -29,7 +29,7 @@ import tomli_w
 
 from miro_exact.bad_input import BadInput, one_line
 from miro_protocol import stream, stream_header
-from miro_protocol.stream_events import Deed
+from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image
 from mirotwin.fuzz.bare import NO_FAULT
@@ -87,7 +87,7 @@ def failure_of(run: BareRun, name: str, check: NamedCheck | None) -> BareFailure
 def case_text(
     image: Image,
     line: BareLine,
-    heard: Sequence[Transmission | Deed],
+    heard: Sequence[ScriptItem],
     end_tick: int,
     failure: BareFailure | None = None,
 ) -> str:
@@ -179,9 +179,9 @@ def _check(case: stream.Stream, name: str, given: str | None) -> NamedCheck:
         raise BadInput(case.source, "header: expect", what, remedy) from error
 
 
-def _heard(case: stream.Stream) -> list[Transmission | Deed]:
+def _heard(case: stream.Stream) -> list[ScriptItem]:
     return [
         one
-        for one in case.happenings()
+        for one in case.script()
         if not isinstance(one, Transmission) or (one.direction == DOWN and one.network == 0)
     ]

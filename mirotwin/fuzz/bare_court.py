@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from miro_protocol.stream_events import Deed
-from miro_protocol.transmission import Transmission
+from miro_protocol.actions import ScriptItem
 from mirotwin.fuzz.bare import NO_FAULT, BareTarget
 from mirotwin.fuzz.bare_case import case_text, failure_of
 from mirotwin.fuzz.bare_run import AHEAD_TICKS, BareRun
@@ -24,7 +23,7 @@ class BareCourt:
     def confirm(self, target: Target, data: bytes, finding: Finding) -> Judgement:
         """Whether the finding comes again. Raises BadInput where the check fails itself."""
         assert isinstance(target, BareTarget)
-        heard = target.happenings(data)
+        heard = target.script(data)
         check = self.check if finding.check not in (NO_FAULT, NEVER_SLEEPS) else None
         behind = AHEAD_TICKS if finding.check == NO_FAULT else 0  # the instruction itself
         return _judged(target, heard, finding.check, check, finding.tick + behind)
@@ -33,18 +32,18 @@ class BareCourt:
         """What the check of this court says of an input, and whether there is a fault."""
         assert isinstance(target, BareTarget)
         target.run(data)
-        heard, end_tick = target.happenings(data), target.end_tick()
+        heard, end_tick = target.script(data), target.end_tick()
         name = NO_FAULT if self.check is None else self.check.name
         return _judged(target, heard, name, self.check, end_tick)
 
     def stream(self, target: Target, data: bytes) -> str:
         assert isinstance(target, BareTarget)
         target.run(data)
-        return case_text(target.image, target.line, target.happenings(data), target.end_tick())
+        return case_text(target.image, target.line, target.script(data), target.end_tick())
 
 
 def _judged(
-    target: BareTarget, heard: Sequence[Transmission | Deed], name: str, check: NamedCheck | None, tick: int
+    target: BareTarget, heard: Sequence[ScriptItem], name: str, check: NamedCheck | None, tick: int
 ) -> Judgement:
     failure = failure_of(BareRun(target.image, target.line, heard, tick), name, check)
     if failure is None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import NEVER_TICK
-from miro_protocol.stream_events import Deed, Reset
+from miro_protocol.actions import Reset, ScriptItem
 from miro_protocol.transmission import Transmission
 from miro_robot.harness.harness import SETTLE_TICKS
 from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
@@ -30,7 +30,7 @@ class BareRun:
         self,
         image: Image,
         line: BareLine,
-        heard: Sequence[Transmission | Deed],
+        heard: Sequence[ScriptItem],
         end_tick: int,
         source: str = "",
     ) -> None:
@@ -89,12 +89,12 @@ class BareRun:
             tick += _BITS * bit
         self._end_of_last = tick
 
-    def _reset(self, deed: Reset) -> None:
-        if deed.level:
+    def _reset(self, action: Reset) -> None:
+        if action.level:
             self.processor.cpu.hold()
         else:
             self.processor.cpu.reset()
-            self.processor.bus.reset_tick = deed.tick
+            self.processor.bus.reset_tick = action.tick
 
     def _end(self, end_tick: int) -> None:
         cpu = self.processor.cpu

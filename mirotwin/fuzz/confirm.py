@@ -1,6 +1,6 @@
 """A find played in a World, whose checks have the last word.
 
-input ──► Target.happenings ──► World: ideal radio, carrier on, the robot of the target alone
+input ──► Target.script ──► World: ideal radio, carrier on, the robot of the target alone
                                   │ checks: the one that the find names, and those that are always on
                                   ▼
                          failed: a case            passed: kept apart, as not confirmed
@@ -14,9 +14,9 @@ from typing import Any, Protocol
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
+from miro_protocol.actions import ScriptItem
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.robot_rules import TOLERANCE_TICKS
-from miro_protocol.stream_events import Deed
 from miro_protocol.table import FRESH_AGAIN_TICKS, FrameType
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image
@@ -76,16 +76,16 @@ class WorldCourt:
         self.place = place
 
     def confirm(self, target: Target, data: bytes, finding: Finding) -> Judgement:
-        heard = target.happenings(data)
+        heard = target.script(data)
         if finding.check == NEVER_SLEEPS:
             heard = [*heard, *_questions(heard, finding.tick, self.place.robots)]
         return judge(self.place, heard, expected_of(finding.check), finding.tick)
 
     def judged(self, target: Target, data: bytes, expected: Expected) -> Judgement:
-        return judge(self.place, target.happenings(data), expected)
+        return judge(self.place, target.script(data), expected)
 
     def stream(self, target: Target, data: bytes) -> str:
-        return stream_of(self.place, target.happenings(data))
+        return stream_of(self.place, target.script(data))
 
 
 SILENCES = ("failsafe_stop_ms", "motors_off_ms")
@@ -100,9 +100,7 @@ def expected_of(check: str) -> dict[str, Any]:
     return {check: True} if check in CHECKS.names() else {}
 
 
-def judge(
-    place: Place, heard: Sequence[Transmission | Deed], expected: Expected, last_tick: int = 0
-) -> Judgement:
+def judge(place: Place, heard: Sequence[ScriptItem], expected: Expected, last_tick: int = 0) -> Judgement:
     """What the checks say of a robot that hears this from power-on. `last_tick`: the run goes on beyond it at least.
 
     Raises PartError where a check raises.
@@ -113,14 +111,14 @@ def judge(
     return Judgement(checks.failures[0], case_of_checks(world, trace, checks))
 
 
-def stream_of(place: Place, heard: Sequence[Transmission | Deed]) -> str:
+def stream_of(place: Place, heard: Sequence[ScriptItem]) -> str:
     """The same as a stream file that nothing is expected of, for `mirotwin replay` and `mirotwin fw`."""
     world, trace, _ = _played(place, heard, {}, 0)
     return case_text(world, trace, {}, "")
 
 
 def _played(
-    place: Place, heard: Sequence[Transmission | Deed], expected: Expected, last_tick: int
+    place: Place, heard: Sequence[ScriptItem], expected: Expected, last_tick: int
 ) -> tuple[World, Trace, Checks]:
     script = sorted(heard, key=lambda one: one.tick)
     ends = [one.end_tick if isinstance(one, Transmission) else one.tick for one in script]
@@ -146,7 +144,7 @@ def _scenario(place: Place, end_tick: int) -> Scenario:
     )
 
 
-def _questions(heard: Sequence[Transmission | Deed], found_tick: int, robots: int) -> list[Transmission]:
+def _questions(heard: Sequence[ScriptItem], found_tick: int, robots: int) -> list[Transmission]:
     """Two team frames behind the input, so late that one of them at least is fresh: a robot that lives acts on it."""
     ends = [one.end_tick if isinstance(one, Transmission) else one.tick for one in heard]
     tick = max([found_tick, *ends]) + FRESH_AGAIN_TICKS + _SETTLED_TICKS

@@ -15,7 +15,8 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import TEXT_BYTES
 from miro_protocol import stream
-from mirotwin.fuzz.inputs import Heard, inputs_of
+from miro_protocol.actions import ScriptItem
+from mirotwin.fuzz.inputs import inputs_of
 from mirotwin.recording.capture.detect import TIMED, detect
 from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.source import READ_ERRORS, open_source
@@ -103,7 +104,7 @@ def _inputs_in(path: Path, kind: str, robots: int) -> list[bytes]:
     with Input(str(path)) as given:
         format, _ = detect(given.peek())
         if format in TIMED:
-            by_network: dict[int, list[Heard]] = {}
+            by_network: dict[int, list[ScriptItem]] = {}
             for one in _heard(given, format):
                 by_network.setdefault(one.network, []).append(one)
             return [data for sent in by_network.values() for data in inputs_of(kind, sent, robots)]
@@ -112,7 +113,7 @@ def _inputs_in(path: Path, kind: str, robots: int) -> list[bytes]:
     return [path.read_bytes()]
 
 
-def _heard(given: Input, format: str) -> Iterator[Heard]:
+def _heard(given: Input, format: str) -> Iterator[ScriptItem]:
     if format == "stream":  # may say what is done to robots, too
-        return iter(stream.decode(given.read(TEXT_BYTES), given.label).happenings())
+        return iter(stream.decode(given.read(TEXT_BYTES), given.label).script())
     return iter(open_source(given, format, lambda text: None).sent)

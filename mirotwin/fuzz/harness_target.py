@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from miro_protocol.stream_events import Deed, Reset
+from miro_protocol.actions import Action, Reset, ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.harness.harness import AHEAD_TICKS, LEAD_TICKS, Harness
 from miro_robot.harness.program import INPUTS, RESET_TICKS, Program
@@ -57,11 +57,11 @@ class HarnessTarget:
         """How far the last run went."""
         return self.harness.now_tick
 
-    def happenings(self, data: bytes) -> list[Transmission | Deed]:
+    def script(self, data: bytes) -> list[ScriptItem]:
         """What the processor hears of an input, and its resets, at ticks since power-on."""
         program = self.program
         program.read(data)
-        found: list[Transmission | Deed] = []
+        found: list[ScriptItem] = []
         tick = self.harness.begin_tick + LEAD_TICKS
         first = tick
         values = bytearray()
@@ -86,16 +86,16 @@ class HarnessTarget:
             found += self._reset(tick)
         return found
 
-    def _reset(self, tick: int) -> list[Deed]:
+    def _reset(self, tick: int) -> list[Action]:
         at = tick + AHEAD_TICKS
         return [Reset(at, 0, self.slot, 1), Reset(at + RESET_TICKS, 0, self.slot, 0)]
 
     def describe(self, data: bytes) -> str:
         """An input as lines, one for each piece of what the processor hears."""
-        return "\n".join(described(one) for one in self.happenings(data))
+        return "\n".join(described(one) for one in self.script(data))
 
 
-def described(one: Transmission | Deed) -> str:
+def described(one: ScriptItem) -> str:
     """One line for people."""
     if isinstance(one, Transmission):
         bad = f", bad stop bits at {', '.join(map(str, one.bad_stop))}" if one.bad_stop else ""

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from miro_protocol.actions import Reset, ScriptItem
 from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
-from miro_protocol.stream_events import Deed, Reset
 from miro_protocol.table import SEQ_MODULUS, FrameType
 from miro_protocol.transmission import DOWN, Transmission
 
@@ -24,12 +24,11 @@ _RAW_CHARACTERS = 32
 TOGETHER = 12
 """Transmissions that make one input: a long recording becomes many short inputs, which fuzzers like better."""
 
-Heard = Transmission | Deed
 Frame = tuple[int, bytes]
 """HDR and payload."""
 
 
-def inputs_of(kind: str, happened: Iterable[Heard], robots: int) -> list[bytes]:
+def inputs_of(kind: str, happened: Iterable[ScriptItem], robots: int) -> list[bytes]:
     """The inputs of that kind that this becomes, at most so many transmissions each, no two the same."""
     heard = [
         one for one in happened if not isinstance(one, Transmission) or (one.direction == DOWN and one.data)
@@ -38,7 +37,7 @@ def inputs_of(kind: str, happened: Iterable[Heard], robots: int) -> list[bytes]:
     return list(dict.fromkeys(filter(None, (input_of(kind, piece, robots) for piece in pieces))))
 
 
-def input_of(kind: str, heard: Sequence[Heard], robots: int) -> bytes:
+def input_of(kind: str, heard: Sequence[ScriptItem], robots: int) -> bytes:
     """One input of that kind; empty where there is nothing that it could say."""
     if kind == "bytes":
         return b"".join(one.data for one in heard if isinstance(one, Transmission))

@@ -8,9 +8,8 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.stream_events import Deed
+from miro_protocol.actions import ScriptItem
 from miro_protocol.table import downlink
-from miro_protocol.transmission import Transmission
 from miro_robot.board import Board
 from miro_robot.harness.fast_oracle import NAMES, FastOracle
 from miro_robot.harness.harness import AWAKE, Harness
@@ -55,7 +54,7 @@ class Target(Protocol):
     def finding(self) -> Finding | None: ...
     def use_map(self, edges: Any) -> None: ...
     def run(self, data: Any) -> int: ...
-    def happenings(self, data: bytes) -> list[Transmission | Deed]: ...
+    def script(self, data: bytes) -> list[ScriptItem]: ...
     def describe(self, data: bytes) -> str: ...
 
 

@@ -10,7 +10,7 @@ recording knows which had one. Slicer noise is heard by robots only: the PC's re
 from __future__ import annotations
 
 from miro_exact.clock import HOST_CHARACTER_TICKS
-from miro_sim.world.deeds import SETTLE_TICKS
+from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.outbox import INJECTED
 from miro_sim.world.world import World
 

@@ -15,8 +15,8 @@ from msgspec import Meta
 
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
+from miro_protocol.actions import Action, Power, RadioState, Reset
 from miro_protocol.stream import MAX_TICK
-from miro_protocol.stream_events import Deed, Power, RadioState, Reset
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
 from mirotwin.recording import images, topics
@@ -160,8 +160,8 @@ class WireMessage(msgspec.Struct, frozen=True):
     bad_stop: tuple[int, ...]
 
 
-class DeedMessage(msgspec.Struct, frozen=True):
-    """`deeds`: what was done to a robot, or (`slot` -1) to the radio of the network.
+class ActionMessage(msgspec.Struct, frozen=True):
+    """`actions`: what was done to a robot, or (`slot` -1) to the radio of the network.
 
     `what` is "reset" or "power" with `value` 0 or 1, or the radio "up", "down" or "noise" from then on.
     """
@@ -197,7 +197,7 @@ ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
 OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {
     topics.PERIOD: PeriodMessage,
     topics.WIRE: WireMessage,
-    topics.DEEDS: DeedMessage,
+    topics.ACTIONS: ActionMessage,
     topics.IMAGE: images.ImageMessage,
 }
 
@@ -217,21 +217,21 @@ def messages(period: Period) -> Iterator[tuple[str, int, msgspec.Struct]]:
     for sent in period.wire:
         message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
         yield topics.wire_topic(sent.network), sent.tick, message
-    for deed in period.deeds:
-        yield topics.deeds_topic(deed.network), deed.tick, _deed_message(deed)
+    for action in period.actions:
+        yield topics.actions_topic(action.network), action.tick, _action_message(action)
     yield topics.PERIOD, tick, PeriodMessage(tick, period.index, period.digest)
 
 
-def _deed_message(deed: Deed) -> DeedMessage:
-    if isinstance(deed, RadioState):
-        return DeedMessage(deed.tick, -1, deed.state)
-    if isinstance(deed, Reset):
-        return DeedMessage(deed.tick, deed.slot, "reset", deed.level)
-    return DeedMessage(deed.tick, deed.slot, "power", deed.on)
+def _action_message(action: Action) -> ActionMessage:
+    if isinstance(action, RadioState):
+        return ActionMessage(action.tick, -1, action.state)
+    if isinstance(action, Reset):
+        return ActionMessage(action.tick, action.slot, "reset", action.level)
+    return ActionMessage(action.tick, action.slot, "power", action.on)
 
 
-def deed(network: int, message: DeedMessage) -> Deed:
-    """What a message about a deed says. Raises ValueError when it cannot be."""
+def action(network: int, message: ActionMessage) -> Action:
+    """What a message about an action says. Raises ValueError when it cannot be."""
     if not 0 <= message.tick <= MAX_TICK or message.slot < -1:
         raise ValueError(f"{message.what} of robot {message.slot} at tick {message.tick}")
     if message.what == "reset":

@@ -19,7 +19,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, NEVER_T
 from miro_sim.periods import Period, RobotPeriod
 from mirotwin.recording import fields, sequences
 from mirotwin.recording.difference import DIGEST, Difference
-from mirotwin.recording.sequences import Happening
+from mirotwin.recording.sequences import LogEntry
 
 Kind = Literal["bits", "bytes", "commands", "wheels"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -143,13 +143,13 @@ def _air(one: Sequence[Period], other: Sequence[Period], rule: Rule) -> Iterator
             there = sequences.transmissions(other, network, sent)
             yield from _unlike(here, there, 0, NEVER_TICK, (network, -1, name))
         if rule.host:
-            done, there = sequences.deeds(one, network), sequences.deeds(other, network)
-            yield from _unlike(done, there, 0, NEVER_TICK, (network, -1, "deeds"))
+            done, there = sequences.actions(one, network), sequences.actions(other, network)
+            yield from _unlike(done, there, 0, NEVER_TICK, (network, -1, "actions"))
 
 
 def _unlike(
-    one: Sequence[Happening],
-    other: Sequence[Happening],
+    one: Sequence[LogEntry],
+    other: Sequence[LogEntry],
     within_ticks: int,
     known_tick: int,
     place: tuple[int, int, str],

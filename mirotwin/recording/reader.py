@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.inputs import RECORDING_BYTES, read_input
-from miro_protocol.stream_events import Deed
+from miro_protocol.actions import Action
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
 from mirotwin.recording import channels
@@ -88,7 +88,7 @@ class _Collector:
         self.first = 0
         self.robots: dict[tuple[int, int], dict[str, Any]] = {}
         self.wire: list[Transmission] = []
-        self.deeds: list[Deed] = []
+        self.actions: list[Action] = []
         self.periods: list[Period] = []
 
     def take(self, place: Place, message: Any) -> None:
@@ -97,8 +97,8 @@ class _Collector:
             self._close(message)
         elif isinstance(message, channels.WireMessage):
             self.wire.append(channels.transmission(place.network, message))
-        elif isinstance(message, channels.DeedMessage):
-            self.deeds.append(channels.deed(place.network, message))
+        elif isinstance(message, channels.ActionMessage):
+            self.actions.append(channels.action(place.network, message))
         elif place.channel not in ("samples", "fault"):
             self.robots.setdefault((place.network, place.slot), {})[place.channel] = message
 
@@ -111,12 +111,12 @@ class _Collector:
             channels.robot_period(network, slot, found) for (network, slot), found in self.robots.items()
         )
         period = Period(
-            message.index, message.tick, robots, tuple(self.wire), message.digest, tuple(self.deeds)
+            message.index, message.tick, robots, tuple(self.wire), message.digest, tuple(self.actions)
         )
         self.periods.append(period)
         self.robots = {}
         self.wire = []
-        self.deeds = []
+        self.actions = []
 
 
 def _source(messages: Messages) -> Source:

@@ -20,7 +20,7 @@ from mirotwin.recording.images import image_message
 from mirotwin.recording.writer import McapWriter, Writable
 
 METADATA = "mirotwin"
-FORMAT = "3"
+FORMAT = "4"
 """Raised whenever a recording of before would be read as something else: 3 has stop bits on the wire channels."""
 SCENARIO_ATTACHMENT = "scenario.toml"
 FIRMWARE_ATTACHMENT = "firmware.ihx"

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.stream_events import Deed, RadioState, Reset
+from miro_protocol.actions import Action, RadioState, Reset
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.lm629.commands import BY_OPCODE
 from miro_sim.periods import Period
@@ -15,7 +15,7 @@ SAME_TICKS = CONTROL_PERIOD_TICKS // 2
 """Two alike that are no farther apart are one that came at another time; others came once each."""
 
 
-class Happening(NamedTuple):
+class LogEntry(NamedTuple):
     """Something with a tick; `text` says all of it but when."""
 
     tick: int
@@ -25,29 +25,29 @@ class Happening(NamedTuple):
         return f"{self.text} at tick {self.tick}"
 
 
-Pair = tuple[Happening | None, Happening | None]
+Pair = tuple[LogEntry | None, LogEntry | None]
 
 
-def commands(periods: Sequence[Period], index: int, side: str, answers: bool) -> list[Happening]:
+def commands(periods: Sequence[Period], index: int, side: str, answers: bool) -> list[LogEntry]:
     """Complete commands to one LM629 of the robot in place `index`; with `answers` also what it gave back.
 
     What a chip answers, a position say, depends on when it was asked.
     """
     found = (command for period in periods for command in getattr(period.robots[index], side).commands)
-    return [Happening(tick, _command(opcode, data, answers)) for tick, opcode, data in found]
+    return [LogEntry(tick, _command(opcode, data, answers)) for tick, opcode, data in found]
 
 
-def transmissions(periods: Sequence[Period], network: int, sent: bool) -> list[Happening]:
+def transmissions(periods: Sequence[Period], network: int, sent: bool) -> list[LogEntry]:
     """What was said on a network's air: by its host as `sent`, or else by its robots as the PC heard them."""
-    return [Happening(one.tick, _text(one)) for one in _on_air(periods, network, sent)]
+    return [LogEntry(one.tick, _text(one)) for one in _on_air(periods, network, sent)]
 
 
-def characters(periods: Sequence[Period], network: int) -> list[Happening]:
+def characters(periods: Sequence[Period], network: int) -> list[LogEntry]:
     """The same of its robots, character by character: where they are parted by pauses is no matter."""
     found = []
     for one in _on_air(periods, network, False):
         for value, stop_good, tick in one.symbols():
-            found.append(Happening(tick, f"{value:02x}{'' if stop_good else ' with a bad stop bit'}"))
+            found.append(LogEntry(tick, f"{value:02x}{'' if stop_good else ' with a bad stop bit'}"))
     return found
 
 
@@ -59,17 +59,17 @@ def _command(opcode: int, data: str, answers: bool) -> str:
     return f"{known.name} {opcode:02X}h {shown}".rstrip()
 
 
-def deeds(periods: Sequence[Period], network: int) -> list[Happening]:
+def actions(periods: Sequence[Period], network: int) -> list[LogEntry]:
     """What was done to a network's robots and its radio."""
-    found = (deed for period in periods for deed in period.deeds if deed.network == network)
-    return [Happening(deed.tick, _deed(deed)) for deed in found]
+    found = (action for period in periods for action in period.actions if action.network == network)
+    return [LogEntry(action.tick, _action(action)) for action in found]
 
 
-def _deed(deed: Deed) -> str:
-    if isinstance(deed, RadioState):
-        return f"radio {deed.state}"
-    what, level = ("reset", deed.level) if isinstance(deed, Reset) else ("power", deed.on)
-    return f"robot {deed.slot} {what} {level}"
+def _action(action: Action) -> str:
+    if isinstance(action, RadioState):
+        return f"radio {action.state}"
+    what, level = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)
+    return f"robot {action.slot} {what} {level}"
 
 
 def _on_air(periods: Sequence[Period], network: int, sent: bool) -> Iterator[Transmission]:
@@ -84,7 +84,7 @@ def _text(one: Transmission) -> str:
     return f"{one.data.hex(' ')}{bad}"
 
 
-def unlike(one: Sequence[Happening], other: Sequence[Happening], within_ticks: int) -> Iterator[Pair]:
+def unlike(one: Sequence[LogEntry], other: Sequence[LogEntry], within_ticks: int) -> Iterator[Pair]:
     """The pairs that differ, in the order of time; None stands where one side has nothing.
 
     Two that say the same are alike if they are at most `within_ticks` apart. After a pair that is not alike the
@@ -112,7 +112,7 @@ def unlike(one: Sequence[Happening], other: Sequence[Happening], within_ticks: i
     yield from ((None, there) for there in other[second:])
 
 
-def _follows(found: Sequence[Happening], index: int, wanted: Happening, within_ticks: int) -> bool:
+def _follows(found: Sequence[LogEntry], index: int, wanted: LogEntry, within_ticks: int) -> bool:
     """Whether one behind `index` says what `wanted` says, at its time."""
     for place in range(index + 1, len(found)):
         if found[place].tick > wanted.tick + within_ticks:

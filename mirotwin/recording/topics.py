@@ -2,7 +2,7 @@
 
 /period                  a control period of the whole world
 /net0/wire               the characters on the air of network 0
-/net0/deeds              what was done to its robots and its radio
+/net0/actions            what was done to its robots and its radio
 /net0/camera/image       the frames of its camera
 /net0/robot2/lm629       a channel of the robot in slot 2 of network 0
 """
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 PERIOD = "/period"
 WIRE = "wire"
-DEEDS = "deeds"
+ACTIONS = "actions"
 IMAGE = "camera/image"
 _TOPIC = re.compile(rf"/net([0-9]{{1,9}})(?:/robot([0-9]{{1,9}}))?/([a-z0-9_]+|{IMAGE})")
 
@@ -33,8 +33,8 @@ def wire_topic(network: int) -> str:
     return f"/net{network}/{WIRE}"
 
 
-def deeds_topic(network: int) -> str:
-    return f"/net{network}/{DEEDS}"
+def actions_topic(network: int) -> str:
+    return f"/net{network}/{ACTIONS}"
 
 
 def image_topic(network: int) -> str:

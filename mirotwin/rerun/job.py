@@ -11,6 +11,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_protocol import stream
+from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
 from miro_sim.periods import Period
@@ -24,8 +25,7 @@ from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
 from mirotwin.rerun.rerun import image_if_any, image_of
 from mirotwin.rerun.script import (
-    Doing,
-    check_deeds,
+    check_actions,
     check_script,
     scenario_of_stream,
     script_of,
@@ -61,7 +61,7 @@ class Job(msgspec.Struct, frozen=True):
 
     scenario: Scenario
     seed: int
-    script: list[Doing]
+    script: list[ScriptItem]
     recorded: Sequence[Period]
     image: Image | None = None
     state: str = ""
@@ -164,7 +164,7 @@ def _job_of_recording(
     scenario = parse_scenario(source.scenario_text, f"{path}: scenario.toml", settings, expectations_of)
     script = script_of(recording.periods)
     check_script(script, path, len(scenario.networks))
-    check_deeds(script, path, scenario)
+    check_actions(script, path, scenario)
     as_it_was = image is not None and not settings and seed in (None, source.seed)
     silent = all(network.host == "silent" for network in scenario.networks)
     state = source.state if as_it_was and silent else ""
@@ -173,12 +173,12 @@ def _job_of_recording(
 
 
 def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str], seed: int | None) -> Job:
-    sent = given.happenings()
+    sent = given.script()
     header = [*in_text(given.header.set or {}), *in_text({"expect": given.header.expect or {}})]
     scenario = changed(
         scenario_of_stream(sent, path, given.header), path, [*header, *settings], expectations_of
     )
-    check_deeds(sent, path, scenario)
+    check_actions(sent, path, scenario)
     own = given.header.seed or 0
     return Job(scenario, own if seed is None else seed, script_of_stream(sent), ())
 

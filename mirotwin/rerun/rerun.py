@@ -49,8 +49,8 @@ def world_of(recording: Recording, path: str, image: Image | None = None, script
     script = script_of(recording.periods) if scripted else None
     world = World(scenario, source.seed, image or image_of(recording, path), script=script)
     if not scripted:
-        for deed in (deed for period in recording.periods for deed in period.deeds):
-            world.do(deed)
+        for action in (action for period in recording.periods for action in period.actions):
+            world.do(action)
     return world
 
 

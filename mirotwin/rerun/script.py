@@ -9,8 +9,8 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds, ticks
+from miro_protocol.actions import Power, Reset, ScriptItem
 from miro_protocol.events import Received
-from miro_protocol.stream_events import Deed, Power, Reset
 from miro_protocol.stream_header import Header
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DOWN, Transmission
@@ -25,29 +25,25 @@ AFTERMATH_TICKS = TICKS_PER_SECOND
 LONGEST_TICKS = 86_400 * TICKS_PER_SECOND
 
 
-Doing = Transmission | Deed
-"""What a script consists of."""
-
-
-def script_of(periods: Iterable[Period]) -> list[Doing]:
+def script_of(periods: Iterable[Period]) -> list[ScriptItem]:
     """Everything the hosts of a recording sent, and what was done to robots and radios."""
-    found: list[Doing] = []
+    found: list[ScriptItem] = []
     for period in periods:
-        found += [*period.wire, *period.deeds]
+        found += [*period.wire, *period.actions]
     return script_of_stream(sorted(found, key=lambda one: one.tick))
 
 
-def script_of_stream(lines: Iterable[Doing]) -> list[Doing]:
+def script_of_stream(lines: Iterable[ScriptItem]) -> list[ScriptItem]:
     """Everything that is sent or done to robots."""
     return [one for one in lines if not isinstance(one, Transmission) or one.direction == DOWN]
 
 
-def sent_in(script: Iterable[Doing]) -> list[Transmission]:
+def sent_in(script: Iterable[ScriptItem]) -> list[Transmission]:
     """Only what hosts send."""
     return [one for one in script if isinstance(one, Transmission) and one.direction == DOWN]
 
 
-def check_script(script: Sequence[Doing], path: str, networks: int) -> None:
+def check_script(script: Sequence[ScriptItem], path: str, networks: int) -> None:
     """Raises BadInput for transmissions of a network that overlap, or that is not there."""
     before: dict[int, Transmission] = {}
     for one in script:
@@ -63,7 +59,7 @@ def check_script(script: Sequence[Doing], path: str, networks: int) -> None:
         before[one.network] = one
 
 
-def check_deeds(script: Sequence[Doing], path: str, scenario: Scenario) -> None:
+def check_actions(script: Sequence[ScriptItem], path: str, scenario: Scenario) -> None:
     """Raises BadInput for what is done to a robot that is not there."""
     for one in script:
         if isinstance(one, Reset | Power):
@@ -73,7 +69,7 @@ def check_deeds(script: Sequence[Doing], path: str, scenario: Scenario) -> None:
                 raise BadInput(path, f"tick {one.tick}", f"no robot in slot {one.slot}; {there}")
 
 
-def robots_of_stream(sent: Iterable[Doing]) -> int:
+def robots_of_stream(sent: Iterable[ScriptItem]) -> int:
     """3 or 5: the layout in which more of the frames from hosts can be read."""
     script = sent_in(sent)
     counts = {robots: _frames(script, robots) for robots in ROBOT_COUNTS}
@@ -87,7 +83,7 @@ def _frames(script: Iterable[Transmission], robots: int) -> int:
     return len([event for one in script for event in decoder.hear(one) if isinstance(event, Received)])
 
 
-def scenario_of_stream(sent: Sequence[Doing], path: str, header: Header | None = None) -> Scenario:
+def scenario_of_stream(sent: Sequence[ScriptItem], path: str, header: Header | None = None) -> Scenario:
     """The scenario that the header names or holds; without one the default scenario with an ideal link.
 
     Raises BadInput for a stream with nothing to send, for transmissions that overlap, that take more than a
@@ -104,7 +100,7 @@ def scenario_of_stream(sent: Sequence[Doing], path: str, header: Header | None =
         return _default_scenario(script, path)
     scenario = _scenario_of_header(header.scenario, f"{path}: header: scenario")
     check_script(script, path, len(scenario.networks))
-    check_deeds(script, path, scenario)
+    check_actions(script, path, scenario)
     end_tick = -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS
     for one in script:
         # What was recorded may still be on the air when its run ends.
@@ -124,7 +120,7 @@ def _scenario_of_header(scenario: str | dict[str, object], place: str) -> Scenar
     return load(scenario, ["expect={}"]).scenario  # which its own controller is to fulfil
 
 
-def _default_scenario(script: Sequence[Doing], path: str) -> Scenario:
+def _default_scenario(script: Sequence[ScriptItem], path: str) -> Scenario:
     """The default one with ideal links, and its robot in every slot of each network's layout, all at one start.
 
     Runs for a second longer than the stream, so that the failsafe is seen.

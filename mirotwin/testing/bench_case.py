@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
-from miro_protocol.stream_events import Deed, Reset
+from miro_protocol.actions import Reset, ScriptItem
 from miro_protocol.transmission import Transmission
 from miro_sim.world.world import World
 from mirotwin.testing.bench import LOOKING_TICKS, Bench
@@ -34,7 +34,7 @@ def case_of_bench(bench: Bench) -> str | None:
     )
     scenario = msgspec.structs.replace(silent_scenario(settings), expect=_expected(bench))
     heard = [entry.what for entry in bench.heard_stream()]
-    script: list[Transmission | Deed] = [sent for sent in heard if isinstance(sent, Transmission)]
+    script: list[ScriptItem] = [sent for sent in heard if isinstance(sent, Transmission)]
     for tick in bench.resets:
         script += [Reset(tick, 0, bench.slot, 1), Reset(tick + _RESET_TICKS, 0, bench.slot, 0)]
     world = World(scenario, 0, bench.image, sorted(script, key=lambda one: one.tick))

@@ -72,7 +72,7 @@ def case_of(rig: Rig, failures: Sequence[Failure], caught: BaseException | None)
 def _judged_again(rig: Rig, expect: Mapping[str, Any]) -> Failure | None:
     """What the check says when all that went into the world goes into a new one."""
     scenario = msgspec.structs.replace(rig.wanted.scenario, expect=dict(expect))
-    world = World(scenario, rig.wanted.seed, rig.wanted.image, rig.trace.happenings())
+    world = World(scenario, rig.wanted.seed, rig.wanted.image, rig.trace.script())
     try:
         checks = Checks(world)
     except BadInput:  # a wait for no time at all is no check

@@ -45,7 +45,7 @@ def _material(rig: Rig, name: str, caught: BaseException | None, text: str, agai
         for place, checks in expectations_of(waited, scenario.name).items():
             known = [check.name for check in expected.get(place, ())]
             expected[place] = [*expected.get(place, ()), *(one for one in checks if one.name not in known)]
-    world = World(scenario, wanted.seed, wanted.image, rig.trace.happenings())
+    world = World(scenario, wanted.seed, wanted.image, rig.trace.script())
     done = run_again(world, rig.tick, expected)
     return Material(
         about=About(

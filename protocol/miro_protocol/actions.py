@@ -1,10 +1,12 @@
-"""What a stream file may say besides characters: resets, radios switched off, levels on pins."""
+"""What is done to robots, radios and pins at a tick; a script has transmissions and these."""
 
 from __future__ import annotations
 
 from typing import Literal
 
 import msgspec
+
+from miro_protocol.transmission import Transmission
 
 
 class Reset(msgspec.Struct, frozen=True):
@@ -41,9 +43,10 @@ class PinLevel(msgspec.Struct, frozen=True):
     level: int
 
 
-Deed = Reset | Power | RadioState
+Action = Reset | Power | RadioState
 """What somebody does to a robot or a radio in a world."""
-StreamEvent = Deed | PinLevel
+ScriptItem = Transmission | Action
+"""What goes into a world from outside."""
 
 WHO_CAN = {
     Reset: "`mirotwin replay` resets robots",
@@ -51,4 +54,4 @@ WHO_CAN = {
     RadioState: "`mirotwin replay` switches radios off and on",
     PinLevel: "`mirotwin fw run --pins FILE` puts levels on the pins of a bare processor",
 }
-"""For a reader that cannot act on an event: who can."""
+"""For a reader that cannot do an action: who can."""

@@ -1,4 +1,4 @@
-"""Recorded command streams: text, one transmission or event a line, made to be compared by `diff` and kept in git.
+"""Recorded command streams: text, one transmission or action a line, made to be compared by `diff` and kept in git.
 
     # mirotwin stream 2
     #: scenario = "fig6"
@@ -10,7 +10,7 @@ which follow each other without a pause, then a comment for people. Ticks do not
 line; two lines may have the same one. What belongs here: whole files. What does not: the grammar of a line
 (`stream_line.py`) and of the header (`stream_header.py`), and judging the bytes; any bytes may be recorded.
 
-A file is written as version 1 if that has words for everything in it: no header, no event, one network and no bad stop
+A file is written as version 1 if that has words for everything in it: no header, no action, one network and no bad stop
 bit. What is written is read back as the same.
 """
 
@@ -23,15 +23,15 @@ import msgspec
 
 from miro_exact.inputs import read_input
 from miro_protocol import files, stream_header
+from miro_protocol.actions import WHO_CAN, Action, ScriptItem
 from miro_protocol.stream_error import StreamError as StreamError
-from miro_protocol.stream_events import WHO_CAN, Deed
 from miro_protocol.stream_header import PREFIX, Header
 from miro_protocol.stream_line import (
     FIRST_LINE,
     MAX_TICK,
     Entry,
-    Happening,
     Line,
+    StreamItem,
     format_line,
     needs_version_2,
 )
@@ -61,22 +61,22 @@ class Stream(msgspec.Struct, frozen=True):
     source: str = "<stream>"
 
     def transmissions(self) -> list[Transmission]:
-        """All transmissions. Raises StreamError for an event: for readers that cannot act on any."""
+        """All transmissions. Raises StreamError for an action: for readers that cannot act on any."""
         return [characters(entry, self.source) for entry in self.entries]
 
-    def happenings(self) -> list[Transmission | Deed]:
-        """All transmissions and deeds. Raises StreamError for a level on a pin, which no board leaves open."""
+    def script(self) -> list[ScriptItem]:
+        """All transmissions and actions. Raises StreamError for a level on a pin, which no board leaves open."""
         return [
-            entry.what if isinstance(entry.what, Deed) else characters(entry, self.source)
+            entry.what if isinstance(entry.what, Action) else characters(entry, self.source)
             for entry in self.entries
         ]
 
 
 def characters(entry: Entry, source: str) -> Transmission:
-    """The transmission in a line. Raises StreamError for an event, which says who can act on it."""
+    """The transmission in a line. Raises StreamError for an action, which says who can act on it."""
     if isinstance(entry.what, Transmission):
         return entry.what
-    what = "an event, which this command does not support"
+    what = "an action, which this command does not support"
     raise StreamError(source, entry.line, 1, what, WHO_CAN[type(entry.what)])
 
 
@@ -149,7 +149,7 @@ def decode(data: bytes, source: str = "<stream>") -> Stream:
     return parse(text, source)
 
 
-def format_stream(lines: Iterable[Entry | Happening], header: Header | None = None) -> str:
+def format_stream(lines: Iterable[Entry | StreamItem], header: Header | None = None) -> str:
     """The whole file. ValueError for what could not be read back, and when ticks go backwards."""
     written, last = [], 0
     version = 1 if header is None or not header.text else 2
@@ -167,7 +167,7 @@ def format_stream(lines: Iterable[Entry | Happening], header: Header | None = No
 
 
 def write(
-    path: str | os.PathLike[str], lines: Iterable[Entry | Happening], header: Header | None = None
+    path: str | os.PathLike[str], lines: Iterable[Entry | StreamItem], header: Header | None = None
 ) -> None:
     """Writes a stream file whole or not at all: a reader finds the old content or the new."""
     files.replace(path, format_stream(lines, header).encode())

@@ -2,7 +2,7 @@
 
     792000 > 55 55 ff 2d d4        characters from the host of network 0
     792000 <@1 55 55! ff           ... from a robot of network 1; the second one has a bad stop bit
-    800000 *@1/2 reset 1           events, see `stream_events.py`
+    800000 *@1/2 reset 1           actions, see `actions.py`
     800000 *@1/2 power 0
     800000 *@1 radio down
     800000 * P1.0 0
@@ -16,8 +16,8 @@ import re
 from dataclasses import dataclass, field
 from reprlib import repr as brief
 
+from miro_protocol.actions import Action, PinLevel, Power, RadioState, Reset, ScriptItem
 from miro_protocol.stream_error import StreamError
-from miro_protocol.stream_events import PinLevel, Power, RadioState, Reset, StreamEvent
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DIRECTIONS, DOWN, UP, Transmission, check_bad_stop
 
@@ -35,32 +35,32 @@ _TICK = re.compile(r"[0-9]{1,19}")
 _CHARACTER = re.compile(r"([0-9a-fA-F]{2})(!?)")
 _PLACE = re.compile(r"([<>*])(?:@([0-9]{1,5})(?:/([0-9]{1,5}))?)?")
 _PIN = re.compile(r"P[0-3]\.[0-7]")
-_EVENTS = "write `*@N/SLOT reset 0|1`, `*@N/SLOT power 0|1`, `*@N radio up|down|noise` or `* P1.0 0|1`"
+_ACTIONS = "write `*@N/SLOT reset 0|1`, `*@N/SLOT power 0|1`, `*@N radio up|down|noise` or `* P1.0 0|1`"
 
-Happening = Transmission | StreamEvent
+StreamItem = ScriptItem | PinLevel
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
     """What one line says, the comment behind it, and the number of the line (0: of no file)."""
 
-    what: Happening
+    what: StreamItem
     comment: str = ""
     line: int = field(default=0, compare=False)
 
 
-def needs_version_2(what: Happening) -> bool:
+def needs_version_2(what: StreamItem) -> bool:
     """Whether version 1 has no words for it."""
     return not isinstance(what, Transmission) or bool(what.network or what.bad_stop)
 
 
-def format_line(what: Happening, comment: str = "") -> str:
+def format_line(what: StreamItem, comment: str = "") -> str:
     """The line without its newline. ValueError when it could not be read back as the same."""
     if not 0 <= what.tick <= MAX_TICK:
         raise ValueError(f"tick = {what.tick}: must be 0..{MAX_TICK}")
     if comment != comment.strip() or "\n" in comment:
         raise ValueError(f"comment = {comment!r}: must be one line without blanks around it")
-    said = _characters(what) if isinstance(what, Transmission) else _event(what)
+    said = _characters(what) if isinstance(what, Transmission) else _action(what)
     line = f"{what.tick} {said}"
     return f"{line}  # {comment}" if comment else line
 
@@ -79,21 +79,21 @@ def _characters(sent: Transmission) -> str:
     return f"{place} " + " ".join(f"{byte:02x}{'!' * (at in bad)}" for at, byte in enumerate(sent.data))
 
 
-def _event(event: StreamEvent) -> str:
-    if isinstance(event, PinLevel):
-        if not _PIN.fullmatch(event.pin):
-            raise ValueError(f"pin = {event.pin!r}: must be P0.0..P3.7")
-        _check("level", event.level, 1)
-        return f"{HAND} {event.pin} {event.level}"
-    _check("network", event.network, MAX_NETWORK)
-    if isinstance(event, Reset | Power):
-        word, value = ("reset", event.level) if isinstance(event, Reset) else ("power", event.on)
-        _check("slot", event.slot, MAX_SLOT)
+def _action(action: Action | PinLevel) -> str:
+    if isinstance(action, PinLevel):
+        if not _PIN.fullmatch(action.pin):
+            raise ValueError(f"pin = {action.pin!r}: must be P0.0..P3.7")
+        _check("level", action.level, 1)
+        return f"{HAND} {action.pin} {action.level}"
+    _check("network", action.network, MAX_NETWORK)
+    if isinstance(action, Reset | Power):
+        word, value = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)
+        _check("slot", action.slot, MAX_SLOT)
         _check("level", value, 1)
-        return f"{HAND}@{event.network}/{event.slot} {word} {value}"
-    if event.state not in RADIO_STATES:
-        raise ValueError(f"state = {event.state!r}: must be {', '.join(RADIO_STATES)}")
-    return f"{HAND}@{event.network} radio {event.state}"
+        return f"{HAND}@{action.network}/{action.slot} {word} {value}"
+    if action.state not in RADIO_STATES:
+        raise ValueError(f"state = {action.state!r}: must be {', '.join(RADIO_STATES)}")
+    return f"{HAND}@{action.network} radio {action.state}"
 
 
 def _check(name: str, value: int, high: int) -> None:
@@ -137,7 +137,7 @@ class Line:
         tick = self._tick(tokens[0])
         kind, network, slot = self._place(tokens, end, version)
         if kind == HAND:
-            what: Happening = self._read_event(tick, network, slot, tokens, end)
+            what: StreamItem = self._read_action(tick, network, slot, tokens, end)
         else:
             what = self._read_characters(tick, kind, network or 0, tokens, end, version)
         return Entry(what, comment.strip(), self.number)
@@ -195,11 +195,11 @@ class Line:
             data.append(int(found[1], 16))
         return Transmission(tick, direction, bytes(data), network, tuple(bad_stop))
 
-    def _read_event(
+    def _read_action(
         self, tick: int, network: int | None, slot: int | None, tokens: list[re.Match[str]], end: int
-    ) -> StreamEvent:
+    ) -> Action | PinLevel:
         if len(tokens) != 4:
-            raise self.error(end, "not an event", _EVENTS)
+            raise self.error(end, "not an action", _ACTIONS)
         word, value = tokens[2][0], tokens[3][0]
         if word == "reset" and slot is not None and network is not None and value in ("0", "1"):
             return Reset(tick, network, slot, int(value))
@@ -210,5 +210,7 @@ class Line:
         if _PIN.fullmatch(word) and network is None and value in ("0", "1"):
             return PinLevel(tick, word, int(value))
         raise self.error(
-            tokens[1].start() + 1, f"{brief(self.text[tokens[1].start() : end - 1])} is no event", _EVENTS
+            tokens[1].start() + 1,
+            f"{brief(self.text[tokens[1].start() : end - 1])} is not an action",
+            _ACTIONS,
         )

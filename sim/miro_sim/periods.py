@@ -9,7 +9,7 @@ it.
 import msgspec
 
 from miro_host.posture import Posture
-from miro_protocol.stream_events import Deed
+from miro_protocol.actions import Action
 from miro_protocol.transmission import Transmission
 
 CommandRecord = tuple[int, int, str]
@@ -75,7 +75,7 @@ class RobotPeriod(msgspec.Struct, frozen=True):
 class Period(msgspec.Struct, frozen=True):
     """Control period `index`, which begins at `tick`; `digest` (hex) chains the states up to its end.
 
-    `deeds`: what was done to robots and radios meanwhile, as a script or a caller wanted it.
+    `actions`: what was done to robots and radios meanwhile, as a script or a caller wanted it.
     """
 
     index: int
@@ -83,4 +83,4 @@ class Period(msgspec.Struct, frozen=True):
     robots: tuple[RobotPeriod, ...]
     wire: tuple[Transmission, ...]
     digest: str
-    deeds: tuple[Deed, ...] = ()
+    actions: tuple[Action, ...] = ()

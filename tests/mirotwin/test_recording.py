@@ -18,7 +18,7 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from miro_protocol.stream_events import Power, RadioState, Reset
+from miro_protocol.actions import Power, RadioState, Reset
 from miro_sim.periods import Control
 from mirotwin.recording import channels, topics
 from mirotwin.recording import recorder as recorder_module
@@ -57,14 +57,14 @@ def test_what_goes_in_comes_out_to_the_last_bit():
 
 
 def test_what_was_done_to_robots_and_radios_comes_out_again():
-    deeds = (Reset(5, 0, 2, 1), Power(6, 1, 0, 0), RadioState(7, 1, "noise"), RadioState(8, 1, "up"))
-    period = msgspec.structs.replace(next(periods(1)), deeds=deeds)
+    actions = (Reset(5, 0, 2, 1), Power(6, 1, 0, 0), RadioState(7, 1, "noise"), RadioState(8, 1, "up"))
+    period = msgspec.structs.replace(next(periods(1)), actions=actions)
     stream = io.BytesIO()
     with Recorder(stream, SOURCE) as recorder:
         recorder.write(period)
-    assert sorted(parse(stream.getvalue(), "run.mcap").periods[0].deeds, key=lambda deed: deed.tick) == [
-        *deeds
-    ]
+    assert sorted(
+        parse(stream.getvalue(), "run.mcap").periods[0].actions, key=lambda action: action.tick
+    ) == [*actions]
 
 
 def test_two_recordings_of_one_run_are_the_same_bytes_whenever_they_are_made(
@@ -166,7 +166,7 @@ def test_bad_stop_bits_of_no_characters_are_refused(change):
 def test_a_recording_of_the_format_before_is_refused_with_the_reason(monkeypatch):
     monkeypatch.setattr(recorder_module, "FORMAT", "2")
     with pytest.raises(
-        RecordingError, match="recording format '2'; this program reads format 3; use the version"
+        RecordingError, match="recording format '2'; this program reads format 4; use the version"
     ):
         parse(recorded(), "run.mcap")
 

@@ -7,8 +7,8 @@ from functools import cache
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, ROBOT_BIT_TICKS, seconds
 from miro_protocol import crc
+from miro_protocol.actions import Reset, ScriptItem
 from miro_protocol.frames import seal
-from miro_protocol.stream_events import Deed, Reset
 from miro_protocol.table import TICKS_PER_MS, downlink
 from miro_protocol.transmission import DOWN, Transmission
 from miro_protocol.whitening import whiten
@@ -45,7 +45,7 @@ robots = 3
 radio = {{ bit_error_rate = 0.0, carrier = "on" }}
 robot = [{{ slot = 0, reference = {{ kind = "line" }} }}]
 """
-Input = Sequence[Transmission | Deed]
+Input = Sequence[ScriptItem]
 
 
 class Host:
@@ -53,7 +53,7 @@ class Host:
 
     def __init__(self) -> None:
         self.tick = READY_TICK
-        self.heard: list[Transmission | Deed] = []
+        self.heard: list[ScriptItem] = []
 
     def bytes(self, data: bytes) -> None:
         self.heard.append(Transmission(self.tick, DOWN, bytes(data)))

@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_protocol import stream, stream_header, stream_line
+from miro_protocol.actions import PinLevel, Power, RadioState, Reset
 from miro_protocol.stream import Entry, StreamError
-from miro_protocol.stream_events import PinLevel, Power, RadioState, Reset
 from miro_protocol.transmission import DIRECTIONS, Transmission
 
 comments = st.text(st.characters(blacklist_categories=("Cc", "Cs", "Zl", "Zp")), max_size=20).map(str.strip)
@@ -126,14 +126,14 @@ REFUSED = [
     (V2 + "5 >@65536 55", 2, 3, "network 65536", "networks 0..65535"),
     (V2 + "5 >@0/1 55", 2, 3, "'>@0/1' is not a direction", ""),
     (V2 + "5 *@0/5 reset 1", 2, 3, "slot 5", "slots 0..4"),
-    (V2 + "5 *@0 reset 1", 2, 3, "'*@0 reset 1' is no event", "*@N/SLOT reset 0|1"),
-    (V2 + "5 *@0/1 reset 2", 2, 3, "is no event", ""),
-    (V2 + "5 *@0/1 radio up", 2, 3, "is no event", ""),
-    (V2 + "5 *@0 radio off", 2, 3, "is no event", ""),
-    (V2 + "5 *@0 P1.0 1", 2, 3, "is no event", ""),
-    (V2 + "5 * P1.8 1", 2, 3, "is no event", ""),
-    (V2 + "5 * P1.0 1 1", 2, 13, "not an event", ""),
-    (V2 + "5 *  # P1.0", 2, 4, "not an event", ""),
+    (V2 + "5 *@0 reset 1", 2, 3, "'*@0 reset 1' is not an action", "*@N/SLOT reset 0|1"),
+    (V2 + "5 *@0/1 reset 2", 2, 3, "is not an action", ""),
+    (V2 + "5 *@0/1 radio up", 2, 3, "is not an action", ""),
+    (V2 + "5 *@0 radio off", 2, 3, "is not an action", ""),
+    (V2 + "5 *@0 P1.0 1", 2, 3, "is not an action", ""),
+    (V2 + "5 * P1.8 1", 2, 3, "is not an action", ""),
+    (V2 + "5 * P1.0 1 1", 2, 13, "not an action", ""),
+    (V2 + "5 *  # P1.0", 2, 4, "not an action", ""),
     (V2 + "9 > 55\n8 * P1.0 0", 3, 1, "tick 8 goes backwards", ""),
     (V2 + "5 > 55\n#: seed = 1", 3, 1, "a line of the header behind the first tick", "above all ticks"),
     (
@@ -256,7 +256,7 @@ def test_transmissions_out_of_order_are_not_written():
 def test_who_cannot_act_on_an_event_refuses_it_and_says_who_can(event, who):
     found = stream.parse(f"{V2}1 > 55\n5 {event}\n", "a.stream")
     with pytest.raises(
-        StreamError, match=r"a\.stream:3:1: an event, which this command does not support; "
+        StreamError, match=r"a\.stream:3:1: an action, which this command does not support; "
     ) as caught:
         found.transmissions()
     assert who in caught.value.remedy

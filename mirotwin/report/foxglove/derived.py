@@ -89,8 +89,8 @@ class Derived:
             yield Said(topics.error_topic(*place), tick, _error(robot, tick))
             for line in self._notes.setdefault(place, notes.RobotNotes()).add(robot, tick):
                 yield Said(topics.LOG, tick, line)
-        for deed in period.deeds:
-            yield Said(topics.LOG, deed.tick, notes.of_deed(deed))
+        for action in period.actions:
+            yield Said(topics.LOG, action.tick, notes.of_action(action))
 
     def _trail(self, robot: RobotPeriod, index: int, at: Time) -> Iterator[SceneEntity]:
         place = robot.network, robot.slot

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Protocol
 
-from miro_protocol.stream_events import Deed, RadioState, Reset
+from miro_protocol.actions import Action, RadioState, Reset
 from miro_sim.periods import RobotPeriod
 from mirotwin.report.foxglove.frames import robot_frame
 from mirotwin.report.foxglove.messages import ERROR, INFO, WARNING, Log, time_of
@@ -81,11 +81,11 @@ def of_failure(failure: Failed) -> Log:
     return Log(time_of(failure.tick), ERROR, f"{failure}", robot_frame(failure.network, failure.slot))
 
 
-def of_deed(deed: Deed) -> Log:
+def of_action(action: Action) -> Log:
     """What was done to a robot, or to the radio of a network."""
-    at = time_of(deed.tick)
-    if isinstance(deed, RadioState):
-        return Log(at, INFO, f"radio: {deed.state}", f"net{deed.network}")
-    if isinstance(deed, Reset):
-        return Log(at, INFO, f"reset: {deed.level}", robot_frame(deed.network, deed.slot))
-    return Log(at, INFO, f"power: {deed.on}", robot_frame(deed.network, deed.slot))
+    at = time_of(action.tick)
+    if isinstance(action, RadioState):
+        return Log(at, INFO, f"radio: {action.state}", f"net{action.network}")
+    if isinstance(action, Reset):
+        return Log(at, INFO, f"reset: {action.level}", robot_frame(action.network, action.slot))
+    return Log(at, INFO, f"power: {action.on}", robot_frame(action.network, action.slot))

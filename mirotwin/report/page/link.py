@@ -143,7 +143,7 @@ class LinkLog:
                 lane = f"net{index}/robot{robot.slot} hears"
                 found += _fates(lane, sent, named, ear.heard, delay, self.world.tick)
             found += _answers(heard, self._at_pc[index], index)
-            found += [_deed(event) for event in self._at_pc[index] if event.what != "answer"]
+            found += [_action(event) for event in self._at_pc[index] if event.what != "answer"]
         return found
 
 
@@ -248,9 +248,9 @@ def _answer(event: Event) -> str:
     return _said(event.frame, 3) if event.frame is not None else ""
 
 
-def _deed(event: Event) -> Mark:
+def _action(event: Event) -> Mark:
     lane = f"net{event.network} done to it"
-    return Mark(lane, "deed", event.tick, event.tick + HOST_CHARACTER_TICKS, f"{event}".partition(": ")[2])
+    return Mark(lane, "action", event.tick, event.tick + HOST_CHARACTER_TICKS, f"{event}".partition(": ")[2])
 
 
 def _characters(count: int) -> str:

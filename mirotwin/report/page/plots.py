@@ -29,7 +29,7 @@ KIND_COLOURS = {
     "fresh": "good",
     "repeated": "repeated",
     "answer": "truth",
-    "deed": "measured",
+    "action": "measured",
     "damaged": "bad",
     "lost": "lost",
 }

@@ -28,8 +28,7 @@ import tomli_w
 
 from miro_exact.bad_input import one_line
 from miro_protocol import files, stream, stream_header
-from miro_protocol.stream_events import Deed
-from miro_protocol.transmission import Transmission
+from miro_protocol.actions import ScriptItem
 from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world.world import World
 from mirotwin.verify.cases.trace import Trace
@@ -50,11 +49,11 @@ def case_text(world: World, trace: Trace, expect: Mapping[str, Any], verdict: st
     header["expect"] = dict(expect)
     header["scenario"] = tables_of(world.scenario)
     return stream.format_stream(
-        _in_order(trace.happenings()), stream_header.of_text(tomli_w.dumps(header).rstrip("\n"))
+        _in_order(trace.script()), stream_header.of_text(tomli_w.dumps(header).rstrip("\n"))
     )
 
 
-def _in_order(happened: Sequence[Transmission | Deed]) -> Sequence[stream.Entry]:
+def _in_order(happened: Sequence[ScriptItem]) -> Sequence[stream.Entry]:
     return [stream.Entry(one) for one in happened]
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from miro_protocol.stream_events import Deed
-from miro_protocol.transmission import DOWN, Transmission
+from miro_protocol.actions import ScriptItem
+from miro_protocol.transmission import DOWN
 from miro_sim.periods import Period
 from miro_sim.world.world import World
 
@@ -14,23 +14,23 @@ class Trace:
     A world that loads a saved one needs a trace that knows what happened before: give it as `before`.
     """
 
-    def __init__(self, world: World, before: tuple[Transmission | Deed, ...] = ()) -> None:
+    def __init__(self, world: World, before: tuple[ScriptItem, ...] = ()) -> None:
         if world.tick and not before:
             raise ValueError(f"the world is at tick {world.tick}: what happened before is not known")
         self.world = world
-        self._happened: list[Transmission | Deed] = list(before)
+        self._happened: list[ScriptItem] = list(before)
         world.observers.append(self._look)
 
     def _look(self, period: Period) -> None:
         self._happened += [sent for sent in period.wire if sent.direction == DOWN]
-        self._happened += period.deeds
+        self._happened += period.actions
 
-    def happenings(self) -> tuple[Transmission | Deed, ...]:
-        """Transmissions of hosts that have been put on the air, and deeds that were done, in the order of time."""
+    def script(self) -> tuple[ScriptItem, ...]:
+        """Transmissions of hosts that have been put on the air, and actions that were done, in the order of time."""
         found = list(self._happened)
         if self.world.in_period:
             for network in self.world.networks:
-                found += [*network.sent, *network.deeds.done]
+                found += [*network.sent, *network.actions.done]
         return tuple(sorted(found, key=lambda one: one.tick))
 
     def close(self) -> None:
@@ -38,4 +38,4 @@ class Trace:
         self.world.observers.remove(self._look)
 
     def __repr__(self) -> str:
-        return f"Trace({len(self._happened)} happenings up to tick {self.world.tick})"
+        return f"Trace({len(self._happened)} actions and transmissions up to tick {self.world.tick})"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
-from miro_protocol.stream_events import Deed
+from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import Transmission
 from miro_sim.scenario.file import parse
 from miro_sim.scenario.keys import Scenario
@@ -58,7 +58,7 @@ class Trial:
 
     rule: Rule
     scenario: Scenario
-    script: tuple[Transmission | Deed, ...]
+    script: tuple[ScriptItem, ...]
     expected: tuple[tuple[Expectation, ...], ...]
 
     @property
@@ -77,14 +77,14 @@ def make_trial(rule: Rule) -> Trial:
     for script in scripts:
         rule.write(script)
     end_tick = max(one.tick for script in scripts for one in script.expected)
-    events: list[Transmission | Deed] = []
+    items: list[ScriptItem] = []
     for script in scripts:
-        events += [*script.said, *script.done]
-    events.sort(key=lambda one: one.tick)
+        items += [*script.said, *script.done]
+    items.sort(key=lambda one: one.tick)
     # everything before the end is told, so the last expectation needs a tick more
     periods = end_tick // CONTROL_PERIOD_TICKS + 1
     scenario = parse(_text(rule, seconds(periods * CONTROL_PERIOD_TICKS)), rule.id, ())
-    return Trial(rule, scenario, tuple(events), tuple(tuple(script.expected) for script in scripts))
+    return Trial(rule, scenario, tuple(items), tuple(tuple(script.expected) for script in scripts))
 
 
 def _text(rule: Rule, duration_s: float) -> str:

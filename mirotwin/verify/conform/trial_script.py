@@ -19,9 +19,9 @@ from itertools import pairwise
 from typing import TypedDict, Unpack
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
+from miro_protocol.actions import Action, Power, Reset
 from miro_protocol.frames import seal
 from miro_protocol.robot_rules import ACTING_TICKS
-from miro_protocol.stream_events import Deed, Power, Reset
 from miro_protocol.table import (
     FAILSAFE_STOP_TICKS,
     SEQ_MODULUS,
@@ -118,7 +118,7 @@ class TrialScript:
         self.now = ms(BOOTED_MS)
         self.seq = 20 + network
         self.said: list[Transmission] = []
-        self.done: list[Deed] = []
+        self.done: list[Action] = []
         self.expected: list[Expectation] = []
         self._words = 0
         self._before: Pairs = ()
@@ -244,11 +244,11 @@ class TrialScript:
         """Takes the supply of the network's first robot away; returns when it is back."""
         return self._do(Power, tick, for_ms, (0, 1))
 
-    def _do(self, deed: type[Reset] | type[Power], tick: int, for_ms: float, levels: tuple[int, int]) -> int:
+    def _do(self, kind: type[Reset] | type[Power], tick: int, for_ms: float, levels: tuple[int, int]) -> int:
         slot, end_tick = self.topology.slots[0], tick + ms(for_ms)
         self.done += [
-            deed(tick, self.network, slot, levels[0]),
-            deed(end_tick, self.network, slot, levels[1]),
+            kind(tick, self.network, slot, levels[0]),
+            kind(end_tick, self.network, slot, levels[1]),
         ]
         return end_tick
 

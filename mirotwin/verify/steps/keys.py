@@ -1,4 +1,4 @@
-"""The steps that a scenario may have: one frozen struct a kind, each a deed or a wait.
+"""The steps that a scenario may have: one frozen struct a kind, each an action or a wait.
 
 A table of a step has one key that says what it is, its verb: `VERBS`. The others are the verb's own.
 """

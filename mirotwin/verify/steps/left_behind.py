@@ -48,7 +48,7 @@ def case_of_step(player: Player, trace: Trace) -> str | None:
 def _judged_again(world: World, trace: Trace, expect: Mapping[str, Any]) -> Failure | None:
     """What the check says when all that went into the world goes into a new one."""
     scenario = msgspec.structs.replace(world.scenario, expect=dict(expect))
-    again = World(scenario, world.seed, world.image, trace.happenings())
+    again = World(scenario, world.seed, world.image, trace.script())
     checks = Checks(again)
     again.run_to(world.tick)
     checks.finish()

@@ -5,8 +5,8 @@
     player.finish()                        and on to the end of the run
     player.failure                         None, or what was wanted and what was found
 
-A deed takes no time; what it does begins some microseconds later. A wait ends at the tick of its event and leaves what
-happens later, also on the same tick, to the next one. So does a pause; what happens in `never`, `hold` and
+An action takes no time; what it does begins some microseconds later. A wait ends at the tick of its event and leaves
+what happens later, also on the same tick, to the next one. So does a pause; what happens in `never`, `hold` and
 `silence_for_ms` is past when they end. Once a control period, and before each frame of a stream, the world stops on the
 way, which changes nothing of the run.
 """

@@ -69,7 +69,7 @@ class _Table:
             self.refuse("", "does nothing", meant[0] if meant else known)
         if len(verbs) > 1:
             self.refuse(
-                "", f"has both {verbs[0]} and {verbs[1]}", "one deed or one wait a step: make two of it"
+                "", f"has both {verbs[0]} and {verbs[1]}", "one action or one wait a step: make two of it"
             )
         step = self._step(verbs[0])
         what, _, remedy = plan.objection(step, self.scenario).partition("; ")

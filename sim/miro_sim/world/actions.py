@@ -1,8 +1,8 @@
 """What somebody does to the robots and the radio of a network at a tick: reset pins, supplies, radio on and off.
 
-A deed takes effect before anything else happens at its tick. The radio is settled a little ahead of the robots, so its
-band down changes `SETTLE_TICKS` earlier than the rest, for the same tick: RADIO_DOWN and RADIO_UP are two entries. What
-waits is saved, but no part of the digest: a run does not depend on when a deed was announced.
+An action takes effect before anything else happens at its tick. The radio is settled a little ahead of the robots, so
+its band down changes `SETTLE_TICKS` earlier than the rest, for the same tick: RADIO_DOWN and RADIO_UP are two entries.
+What waits is saved, but no part of the digest: a run does not depend on when an action was announced.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
-from miro_protocol.stream_events import Deed, Power, RadioState, Reset
+from miro_protocol.actions import Action, Power, RadioState, Reset
 from miro_sim.radio.condition import CONDITIONS
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _MOST_WAITING = 1 << 16
 
 
 class Waiting(NamedTuple):
-    """A deed that waits for `tick`. `slot`: 0 for the radio's; `value`: a level, or the number of a condition."""
+    """An action that waits for `tick`. `slot`: 0 for the radio's; `value`: a level, or the number of a condition."""
 
     tick: int
     what: int
@@ -33,8 +33,8 @@ class Waiting(NamedTuple):
     value: int
 
 
-class Deeds:
-    """Those of one network. `done`: the deeds of the control period that is under way, a record."""
+class Actions:
+    """Those of one network. `done`: the actions of the control period that is under way, a record."""
 
     STATE = {
         "waiting": Rows(
@@ -55,7 +55,7 @@ class Deeds:
     def __init__(self, network: int) -> None:
         self.network = network
         self.waiting: list[Waiting] = []
-        self.done: list[Deed] = []
+        self.done: list[Action] = []
 
     @property
     def next_tick(self) -> int:
@@ -69,32 +69,32 @@ class Deeds:
                 return one.tick
         return NEVER_TICK
 
-    def announce(self, deed: Deed) -> None:
-        """Behind the deeds of the same tick that were announced before."""
+    def announce(self, action: Action) -> None:
+        """Behind the actions of the same tick that were announced before."""
         if len(self.waiting) + 2 > _MOST_WAITING:
-            raise ValueError(f"net{self.network}: {len(self.waiting)} deeds wait; at most {_MOST_WAITING}")
-        if isinstance(deed, RadioState):
-            value = CONDITIONS.index(deed.state)
-            self.waiting.append(Waiting(deed.tick - SETTLE_TICKS, RADIO_DOWN, 0, value))
-            self.waiting.append(Waiting(deed.tick, RADIO_UP, 0, value))
-        elif isinstance(deed, Reset):
-            self.waiting.append(Waiting(deed.tick, RESET, deed.slot, deed.level))
+            raise ValueError(f"net{self.network}: {len(self.waiting)} actions wait; at most {_MOST_WAITING}")
+        if isinstance(action, RadioState):
+            value = CONDITIONS.index(action.state)
+            self.waiting.append(Waiting(action.tick - SETTLE_TICKS, RADIO_DOWN, 0, value))
+            self.waiting.append(Waiting(action.tick, RADIO_UP, 0, value))
+        elif isinstance(action, Reset):
+            self.waiting.append(Waiting(action.tick, RESET, action.slot, action.level))
         else:
-            self.waiting.append(Waiting(deed.tick, POWER, deed.slot, deed.on))
+            self.waiting.append(Waiting(action.tick, POWER, action.slot, action.on))
         self.waiting.sort(key=lambda one: one.tick)
 
-    def do_due(self, network: Network, tick: int) -> list[Deed]:
-        """Does what is due at `tick`; returns the deeds of it that robots and PC can notice."""
-        found: list[Deed] = []
+    def do_due(self, network: Network, tick: int) -> list[Action]:
+        """Does what is due at `tick`; returns the actions of it that robots and PC can notice."""
+        found: list[Action] = []
         while self.waiting and self.waiting[0].tick <= tick:
             one = self.waiting.pop(0)
-            deed = self._do(network, one)
-            if deed is not None:
-                found.append(deed)
+            action = self._do(network, one)
+            if action is not None:
+                found.append(action)
         self.done += found
         return found
 
-    def _do(self, network: Network, one: Waiting) -> Deed | None:
+    def _do(self, network: Network, one: Waiting) -> Action | None:
         if one.what == RADIO_DOWN:
             for listener in network.downlink.listeners.values():
                 listener.condition = one.value
@@ -114,13 +114,13 @@ class Deeds:
         for one in self.waiting:
             if one.what in (RESET, POWER) and (one.slot not in slots or one.value > 1):
                 raise ValueError(
-                    f"a deed waits for slot {one.slot} with level {one.value}, at tick {one.tick}"
+                    f"an action waits for slot {one.slot} with level {one.value}, at tick {one.tick}"
                 )
 
-    def take(self) -> tuple[Deed, ...]:
-        """The deeds of the period that is over."""
+    def take(self) -> tuple[Action, ...]:
+        """The actions of the period that is over."""
         found, self.done = tuple(self.done), []
         return found
 
     def __repr__(self) -> str:
-        return f"Deeds(net{self.network}, {self.waiting})"
+        return f"Actions(net{self.network}, {self.waiting})"

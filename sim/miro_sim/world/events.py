@@ -25,8 +25,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import msgspec
 
+from miro_protocol.actions import Action, RadioState, Reset
 from miro_protocol.events import Received
-from miro_protocol.stream_events import Deed, RadioState, Reset
 from miro_robot import event_log
 from miro_robot.event_log import EventLog
 from miro_robot.lm629.commands import BY_OPCODE
@@ -127,13 +127,13 @@ class HostLog:
             self.end -= 1
 
 
-def of_deed(deed: Deed) -> Event:
-    """The event that a deed is, at its tick."""
-    if isinstance(deed, RadioState):
-        value = CONDITIONS.index(deed.state)
-        return Event(tick=deed.tick, what="radio", network=deed.network, value=value)
-    what, value = ("reset", deed.level) if isinstance(deed, Reset) else ("power", deed.on)
-    return Event(tick=deed.tick, what=what, network=deed.network, slot=deed.slot, value=value)
+def of_action(action: Action) -> Event:
+    """The event that an action is, at its tick."""
+    if isinstance(action, RadioState):
+        value = CONDITIONS.index(action.state)
+        return Event(tick=action.tick, what="radio", network=action.network, value=value)
+    what, value = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)
+    return Event(tick=action.tick, what=what, network=action.network, slot=action.slot, value=value)
 
 
 def of_board(log: EventLog, serial: int, network: int, slot: int) -> Iterator[tuple[int, Event]]:

@@ -19,9 +19,9 @@ from miro_sim.periods import RobotPeriod
 from miro_sim.radio import Downlink, Uplink
 from miro_sim.scenario import keys as sc
 from miro_sim.scenario.build import radio_for
+from miro_sim.world.actions import SETTLE_TICKS, Actions
 from miro_sim.world.control_noise import NoisyCommands
-from miro_sim.world.deeds import SETTLE_TICKS, Deeds
-from miro_sim.world.events import Event, HostLog, of_deed
+from miro_sim.world.events import Event, HostLog, of_action
 from miro_sim.world.outbox import LATEST_TICK, LONGEST_BYTES, Outbox
 from miro_sim.world.robot import Robot
 from miro_sim.world.sight import PixelSight, Sight, sight_of
@@ -45,12 +45,12 @@ class Network:
         "ear": Ear,
         "frames_sent": TICK,
         "outbox": Outbox,
-        "deeds": Deeds,
+        "actions": Actions,
         "heard": Rows(1 << 20, "B", "?", TICK),
     }
     NOT_HASHED = (
         "outbox",
-        "deeds",
+        "actions",
         "heard",
     )  # they depend on when input was announced and where the world stopped
     NOT_STATE = (
@@ -91,7 +91,7 @@ class Network:
             self.uplink.listen(robot.board.cpu.txd, robot.spec.slot)
         self.ear = Ear(spec.robots)
         self.host: Host = "script" if script is not None else spec.host
-        self.deeds = Deeds(index)
+        self.actions = Actions(index)
         self.outbox = Outbox(0 if radio.carrier == "on" else radio.keyup_ticks, index)
         for sent in script or ():
             check_bad_stop(sent.bad_stop, len(sent.data))
@@ -136,9 +136,9 @@ class Network:
         raise ValueError(f"net{self.index} has no robot in slot {slot}; there is {there}")
 
     def do_due(self, tick: int) -> None:
-        """The deeds that are due, each with an event in the log."""
-        for deed in self.deeds.do_due(self, tick):
-            self.log.note(of_deed(deed))
+        """The actions that are due, each with an event in the log."""
+        for action in self.actions.do_due(self, tick):
+            self.log.note(of_action(action))
 
     def send_due(self, rendezvous_tick: int) -> None:
         """Puts on the air what may come up before the tick up to which it is settled next, and nothing else: what may
@@ -246,7 +246,7 @@ class Network:
         boards = [robot.board for robot in self.robots]
         return [
             list(self.sent),
-            list(self.deeds.done),
+            list(self.actions.done),
             self.log.end,
             [(list(b.left.commands), list(b.right.commands), list(b.faults), b.log.end) for b in boards],
         ]
@@ -255,7 +255,7 @@ class Network:
         """Takes back what `records` gave; nothing but more of the same may have happened since."""
         sent, done, log_end, boards = records
         self.sent = list(sent)
-        self.deeds.done = list(done)
+        self.actions.done = list(done)
         self.log.cut(log_end)
         for robot, (left, right, faults, end) in zip(self.robots, boards, strict=True):
             robot.board.left.commands[:] = left
@@ -275,9 +275,9 @@ class Network:
             raise ValueError(f"the PC has heard everything up to tick {self.uplink.now}, at tick {tick}")
         if max(self.downlink.free_tick, self.downlink.busy_tick) > tick + LONGEST_TRANSMISSION_TICKS:
             raise ValueError(f"the transmitter is busy until tick {self.downlink.free_tick}, at tick {tick}")
-        if self.deeds.next_tick < tick - SETTLE_TICKS:
-            raise ValueError(f"a deed waits for tick {self.deeds.next_tick}, at tick {tick}")
-        self.deeds.check([robot.slot for robot in self.robots])
+        if self.actions.next_tick < tick - SETTLE_TICKS:
+            raise ValueError(f"an action waits for tick {self.actions.next_tick}, at tick {tick}")
+        self.actions.check([robot.slot for robot in self.robots])
         if self.outbox.waiting and self.outbox.waiting[0].sent.tick < self.downlink.free_tick:
             raise ValueError(
                 f"characters wait, but the transmitter is busy until tick {self.downlink.free_tick}"

@@ -23,7 +23,7 @@ import msgspec
 from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, ticks
 from miro_exact.seed import MAX_SEED
 from miro_exact.state import TICK, Flat, Octets
-from miro_protocol.stream_events import Deed, Power, RadioState, Reset
+from miro_protocol.actions import Action, Power, RadioState, Reset, ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
@@ -31,8 +31,8 @@ from miro_sim.periods import Period
 from miro_sim.radio.condition import CONDITIONS, Condition
 from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world import conditions as waiting
+from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.bodies import Bodies, Pair
-from miro_sim.world.deeds import SETTLE_TICKS
 from miro_sim.world.events import Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
@@ -56,7 +56,7 @@ class World:
     """A deterministic machine: same scenario, same firmware, same seed, same bits.
 
     `script` replaces the stations' frames (replay): transmissions of the hosts, which must not overlap on one network,
-    and deeds (`do`). Raises ValueError for those that do, that are of no host, or of a network or robot that the
+    and actions (`do`). Raises ValueError for those that do, that are of no host, or of a network or robot that the
     scenario does not have.
     `observers` are called at the end of each control period, with what it left behind; they change nothing.
     """
@@ -88,7 +88,7 @@ class World:
         scenario: Scenario,
         seed: int,
         image: Image,
-        script: Sequence[Transmission | Deed] | None = None,
+        script: Sequence[ScriptItem] | None = None,
     ) -> None:
         if not 0 <= seed <= MAX_SEED:
             raise ValueError(f"seed {seed} is out of range: 0 to {MAX_SEED}")
@@ -130,9 +130,9 @@ class World:
         self._state: Flat | None = None
         self._own: Identity | None = None
         self._opened: tuple[bytes, bytes] | None = None  # a saved world that is whole, and its state
-        for deed in script or ():
-            if not isinstance(deed, Transmission):
-                self._announce(deed, 0)
+        for item in script or ():
+            if not isinstance(item, Transmission):
+                self._announce(item, 0)
 
     @property
     def digest(self) -> str:
@@ -219,17 +219,17 @@ class World:
         """The robot in `slot` of `network`. Raises ValueError where there is none."""
         return self._network(network).robot(slot)
 
-    def do(self, deed: Deed) -> None:
+    def do(self, action: Action) -> None:
         """Announces what is done to a robot or a radio at a tick: `Reset`, `Power`, `RadioState`.
 
-        Before anything else that happens at that tick. Raises ValueError for a tick before `earliest_deed_tick`, a
+        Before anything else that happens at that tick. Raises ValueError for a tick before `earliest_action_tick`, a
         network or a robot that is not there, and for levels that are none.
         """
-        self._announce(deed, self.earliest_deed_tick)
+        self._announce(action, self.earliest_action_tick)
 
     @property
-    def earliest_deed_tick(self) -> int:
-        """The earliest tick for a deed that is announced now: the radio is settled up to there."""
+    def earliest_action_tick(self) -> int:
+        """The earliest tick for an action that is announced now: the radio is settled up to there."""
         return self.tick + SETTLE_TICKS
 
     def set_reset(self, level: int, network: int = 0, slot: int | None = None) -> int:
@@ -237,39 +237,41 @@ class World:
 
         `slot`: default, the first robot of the network.
         """
-        return self._do_now(Reset(self.earliest_deed_tick, network, self._slot(network, slot), level))
+        return self._do_now(Reset(self.earliest_action_tick, network, self._slot(network, slot), level))
 
     def set_power(self, on: int, network: int = 0, slot: int | None = None) -> int:
         """Switches a robot's supply on (1) or off (0) as soon as possible; returns the tick. `slot` as above."""
-        return self._do_now(Power(self.earliest_deed_tick, network, self._slot(network, slot), on))
+        return self._do_now(Power(self.earliest_action_tick, network, self._slot(network, slot), on))
 
     def set_radio(self, state: Condition, network: int = 0) -> int:
         """Lets a radio work ("up"), be off ("down") or give "noise", as soon as possible; returns the tick."""
-        return self._do_now(RadioState(self.earliest_deed_tick, network, state))
+        return self._do_now(RadioState(self.earliest_action_tick, network, state))
 
     def _slot(self, network: int, slot: int | None) -> int:
         return self._network(network).robots[0].slot if slot is None else slot
 
-    def _do_now(self, deed: Deed) -> int:
-        self.do(deed)
-        return deed.tick
+    def _do_now(self, action: Action) -> int:
+        self.do(action)
+        return action.tick
 
-    def _announce(self, deed: Deed, earliest_tick: int) -> None:
-        network = self._network(deed.network)
-        _whole(deed.tick)
-        if not earliest_tick <= deed.tick < NEVER_TICK:
+    def _announce(self, action: Action, earliest_tick: int) -> None:
+        network = self._network(action.network)
+        _whole(action.tick)
+        if not earliest_tick <= action.tick < NEVER_TICK:
             raise ValueError(
-                f"net{deed.network}: tick {deed.tick} of a deed; the earliest is {earliest_tick}"
+                f"net{action.network}: tick {action.tick} of an action; the earliest is {earliest_tick}"
             )
-        if isinstance(deed, RadioState):
-            if deed.state not in CONDITIONS:
-                raise ValueError(f"net{deed.network}: a radio {deed.state!r}; give {', '.join(CONDITIONS)}")
+        if isinstance(action, RadioState):
+            if action.state not in CONDITIONS:
+                raise ValueError(
+                    f"net{action.network}: a radio {action.state!r}; give {', '.join(CONDITIONS)}"
+                )
         else:
-            network.robot(deed.slot)
-            level = deed.level if isinstance(deed, Reset) else deed.on
+            network.robot(action.slot)
+            level = action.level if isinstance(action, Reset) else action.on
             if level not in (0, 1):
-                raise ValueError(f"net{deed.network}/robot{deed.slot}: level {level!r}; give 0 or 1")
-        network.deeds.announce(deed)
+                raise ValueError(f"net{action.network}/robot{action.slot}: level {level!r}; give 0 or 1")
+        network.actions.announce(action)
 
     # Pieces of a control period, for `run_to` and `waits`
 
@@ -287,10 +289,10 @@ class World:
 
     def rendezvous(self, tick: int) -> int:
         """Where everything meets next, going to `tick`."""
-        deed_tick = NEVER_TICK
+        action_tick = NEVER_TICK
         for network in self.networks:
-            deed_tick = min(deed_tick, network.deeds.next_after(self.tick))
-        return min(tick, self.period_end, self.bodies.next_tick(self.tick), deed_tick)
+            action_tick = min(action_tick, network.actions.next_after(self.tick))
+        return min(tick, self.period_end, self.bodies.next_tick(self.tick), action_tick)
 
     def run_piece(self, tick: int) -> None:
         """Everything on to `tick`, which is no later than the end of the period."""
@@ -316,8 +318,10 @@ class World:
         self.in_period = False
         self.index += 1
         self.chain = hashlib.sha256(self.state.hashed()).digest()
-        deeds = tuple(deed for network in self.networks for deed in network.deeds.take())
-        self.last = Period(index=index, tick=begun, robots=robots, wire=wire, digest=self.digest, deeds=deeds)
+        actions = tuple(action for network in self.networks for action in network.actions.take())
+        self.last = Period(
+            index=index, tick=begun, robots=robots, wire=wire, digest=self.digest, actions=actions
+        )
         for observer in self.observers:
             observer(self.last)
 

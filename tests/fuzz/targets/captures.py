@@ -22,7 +22,7 @@ def _stream() -> Run:
             return refused(error)
         outcome = "taken"
         try:
-            found.happenings()
+            found.script()
         except BadInput as error:
             outcome = refused(error)
         again = stream.decode(stream.format_stream(found.entries, found.header).encode(), _SOURCE)

@@ -216,7 +216,7 @@ TARGETS = {
             b"/net0/robot0/",
             b"/period",
             b"/wire",
-            b"/deed",
+            b"/action",
             b'"tick":',
             b'"index":',
             b'"digest":',

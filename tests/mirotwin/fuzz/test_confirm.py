@@ -139,4 +139,4 @@ def test_seeds_do_no_harm_in_target_and_world(kind):
     for data in seeds(kind, 3, 0):
         assert (target.run(data), target.finding) == (0, None)
         expected = {name: True for name in NAMES if name}
-        assert judge(Place(image), target.happenings(data), expected).failure is None
+        assert judge(Place(image), target.script(data), expected).failure is None

@@ -4,8 +4,8 @@ import pytest
 
 from miro_exact.bad_input import BadInput
 from miro_protocol import stream
+from miro_protocol.actions import Reset
 from miro_protocol.frames import TeamFrame, encode
-from miro_protocol.stream_events import Reset
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.harness.program import SESSION, Program
 from mirotwin.fuzz.corpus import read_corpus

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_protocol.actions import Reset
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
-from miro_protocol.stream_events import Reset
 from miro_protocol.transmission import DOWN, UP, Transmission
 from miro_robot.harness.program import BYTES, FRAMES, INPUTS, SESSION, Program
 from mirotwin.fuzz.inputs import PAUSE_TICKS, SILENCE_TICKS, TOGETHER, input_of, inputs_of

@@ -65,7 +65,7 @@ def world_of(target, data, names=()):
     scenario = silent_scenario(settings)
     expect = {key: value for name in names for key, value in expected_of(name).items()}
     scenario = msgspec.structs.replace(scenario, expect=expect)
-    world = World(scenario, 0, target.image, target.happenings(data))
+    world = World(scenario, 0, target.image, target.script(data))
     checks = Checks(world)
     world.run_to(end_tick)
     checks.finish()

@@ -174,7 +174,7 @@ def test_a_digest_is_compared_where_the_host_was_silent(mirotwin, tmp_path):
         assert mirotwin("replay", path, "-q", "--compare", "bytes")[0] == 0
 
 
-def test_a_live_session_with_deeds_replays_to_the_same_digests(mirotwin, tmp_path):
+def test_a_live_session_with_actions_replays_to_the_same_digests(mirotwin, tmp_path):
     path = tmp_path / "live.toml"
     path.write_text(SHORT.replace("[[network]]", '[[network]]\nhost = "silent"', 1))
     text = load(str(path))
@@ -222,7 +222,7 @@ def test_a_recording_of_another_format_is_refused_with_the_reason(
     for command in (("replay", path), ("diff", path, finished / "run.mcap"), ("diff", path, path)):
         code, out, err = mirotwin(*command)
         assert (code, out) == (2, "")
-        assert f"recording format '{format}'; this program reads format 3" in err
+        assert f"recording format '{format}'; this program reads format 4" in err
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.stream_events import Power, RadioState, Reset
+from miro_protocol.actions import Power, RadioState, Reset
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
 from mirotwin.recording.compare import Difference, Rule, differences
 from mirotwin.recording.difference import first_per_channel
-from mirotwin.recording.sequences import SAME_TICKS, Happening, unlike
+from mirotwin.recording.sequences import SAME_TICKS, LogEntry, unlike
 from tests.mirotwin.synthetic import periods
 
 RUN = list(periods(6, [(0, 0), (0, 2)]))
@@ -150,18 +150,18 @@ def test_only_differences_in_the_window_are_told():
     assert [one.period for one in differences(RUN, moved, window)] == [2, 3]
 
 
-def test_the_hosts_values_and_deeds_are_compared_on_request():
-    deeds = (Reset(5, 0, 2, 0), Power(6, 0, 2, 1), RadioState(7, 0, "noise"))
+def test_the_hosts_values_and_actions_are_compared_on_request():
+    actions = (Reset(5, 0, 2, 0), Power(6, 0, 2, 1), RadioState(7, 0, "noise"))
     robots = (msgspec.structs.replace(RUN[2].robots[0], control=None), RUN[2].robots[1])
-    changed = [*RUN[:2], msgspec.structs.replace(RUN[2], robots=robots, deeds=deeds), *RUN[3:]]
+    changed = [*RUN[:2], msgspec.structs.replace(RUN[2], robots=robots, actions=actions), *RUN[3:]]
     assert differences(RUN, changed) == []
     found = differences(RUN, changed, Rule(host=True))
     named = {one.channel for one in found}
-    assert {"control v_m_s", "control inner.u1", "deeds"} <= named
-    assert [one.replayed for one in found if one.channel == "deeds"] == [
+    assert {"control v_m_s", "control inner.u1", "actions"} <= named
+    assert [one.replayed for one in found if one.channel == "actions"] == [
         *("robot 2 reset 0 at tick 5", "robot 2 power 1 at tick 6", "radio noise at tick 7"),
     ]
-    assert found[0].channel == "deeds"
+    assert found[0].channel == "actions"
 
 
 def test_a_digest_alone_is_a_difference_at_the_end_of_its_period():
@@ -183,13 +183,13 @@ def test_the_first_of_each_channel_is_told_with_how_many_there_are():
     assert (first, count) == (found[0], 6)
 
 
-happenings = st.lists(
+entries = st.lists(
     st.tuples(st.integers(1, 400_000), st.sampled_from("ab")), max_size=8, unique_by=lambda one: one[0]
-).map(lambda found: [Happening(tick, text) for tick, text in sorted(found)])
+).map(lambda found: [LogEntry(tick, text) for tick, text in sorted(found)])
 
 
-@given(happenings, happenings, st.integers(0, 30_000))
-def test_every_happening_is_alike_or_told_once_and_in_order(one, other, within):
+@given(entries, entries, st.integers(0, 30_000))
+def test_every_entry_is_alike_or_told_once_and_in_order(one, other, within):
     found = list(unlike(one, other, within))
     for side, whole in ((0, one), (1, other)):
         told = [pair[side] for pair in found if pair[side] is not None]
@@ -201,13 +201,13 @@ def test_every_happening_is_alike_or_told_once_and_in_order(one, other, within):
     assert all(abs(a.tick - b.tick) <= within for a, b in zip(left, right, strict=True))
 
 
-@given(happenings, st.integers(-20_000, 20_000))
+@given(entries, st.integers(-20_000, 20_000))
 def test_a_run_that_is_shifted_as_a_whole_is_alike_within_the_shift(one, shift):
     apart = one[:1]
     for each in one[1:]:  # so far from each other that none can be taken for its neighbour
         if each.tick - apart[-1].tick > SAME_TICKS:
             apart.append(each)
-    other = [Happening(each.tick + shift, each.text) for each in apart]
+    other = [LogEntry(each.tick + shift, each.text) for each in apart]
     assert list(unlike(apart, other, abs(shift))) == []
     if shift:
         assert len(list(unlike(apart, other, abs(shift) - 1))) == len(apart)

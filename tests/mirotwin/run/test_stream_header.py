@@ -127,7 +127,7 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(mirotwin, t
             "tick 4900000: ends at tick 4900000, but the scenario ends at",
         ),
         (in_header(SHORT), "2000000 *@1 radio up", "tick 2000000: network 1, but the scenario has 1"),
-        ("", "2000000 * P1.0 1", ":6:1: an event, which this command does not support; `mirotwin fw run"),
+        ("", "2000000 * P1.0 1", ":6:1: an action, which this command does not support; `mirotwin fw run"),
         ("", "1701700 >@31 55\n1800000 >@32 55", "tick 1800000: network 32, but the scenario has 32"),
         (
             "",
@@ -165,7 +165,7 @@ def test_decoding_and_exporting_refuse_an_event_after_what_came_before(mirotwin,
     path.write_text(f"{V2}5 > 55\n9 *@0 radio down\n99999 > 55\n")
     code, _, err = mirotwin(*command, path)
     assert code == 2
-    assert f"{path}:3:1: an event, which this command does not support" in err
+    assert f"{path}:3:1: an action, which this command does not support" in err
 
 
 def test_a_robot_that_is_reset_counts_anew_and_a_radio_that_is_off_lets_nothing_through(mirotwin, tmp_path):
@@ -179,7 +179,7 @@ def test_a_robot_that_is_reset_counts_anew_and_a_radio_that_is_off_lets_nothing_
     assert [row[1] for row in counters(out)] == ["2", "1", "0"]
 
 
-def test_a_deed_at_a_network_beyond_the_colours_of_teams_is_done(mirotwin, tmp_path):
+def test_an_action_at_a_network_beyond_the_colours_of_teams_is_done(mirotwin, tmp_path):
     (tmp_path / "a.stream").write_text(V2 + "960000 *@5 radio up\n970000 *@5/0 reset 1\n")
     code, _, err = mirotwin("replay", tmp_path / "a.stream")
     assert (code, err) == (0, "")

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from miro_exact import engine
 from miro_exact.clock import ticks
+from miro_protocol.actions import Power, RadioState, Reset
 from miro_protocol.frames import TeamFrame, encode
-from miro_protocol.stream_events import Power, RadioState, Reset
 from miro_protocol.table import DOWNLINK
 from miro_sim.scenario.file import load
 from miro_sim.world import conditions as wait
-from miro_sim.world.deeds import POWER, RESET, Waiting
+from miro_sim.world.actions import POWER, RESET, Waiting
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 from tests import children
@@ -96,8 +96,8 @@ def test_without_supply_the_motors_coast_and_with_it_everything_begins_anew():
 
 def test_a_reset_pin_that_is_down_while_the_supply_comes_back_holds_the_processor():
     world = driving()
-    for deed in (world.set_power, world.set_reset, world.set_power):
-        world.run_to(deed(1 if deed == world.set_reset or not world.robot().board.powered else 0) + 1)
+    for action in (world.set_power, world.set_reset, world.set_power):
+        world.run_to(action(1 if action == world.set_reset or not world.robot().board.powered else 0) + 1)
     before = world.robot().board.cpu.instructions
     world.run_to(world.tick + PERIOD)
     assert world.robot().board.cpu.instructions == before
@@ -159,12 +159,12 @@ def scripted():
 
 @settings(max_examples=8, deadline=None)
 @given(st.data())
-def test_when_a_deed_is_announced_and_where_the_world_stops_change_no_bit(data):
+def test_when_an_action_is_announced_and_where_the_world_stops_change_no_bit(data):
     world = two_networks(script=[])
-    for deed in SCRIPT:
-        latest = deed.tick - 120
+    for action in SCRIPT:
+        latest = action.tick - 120
         world.run_to(data.draw(st.integers(min(world.tick, latest), latest)))
-        world.do(deed)
+        world.do(action)
         if data.draw(st.booleans()):
             other = two_networks(script=[])
             other.load(world.save())
@@ -173,23 +173,23 @@ def test_when_a_deed_is_announced_and_where_the_world_stops_change_no_bit(data):
     assert world.digest == scripted().digest
 
 
-def test_a_wait_among_deeds_changes_no_bit():
+def test_a_wait_among_actions_changes_no_bit():
     world = two_networks(script=SCRIPT)
     with pytest.raises(WaitExpired):
         world.run_until(wait.When(predicate=lambda robot: False, at="sample"), within=PERIODS * PERIOD)
     assert world.digest == scripted().digest
 
 
-def test_a_period_names_its_deeds():
+def test_a_period_names_its_actions():
     world = two_networks(script=SCRIPT)
     periods = [world.step() for _ in range(PERIODS)]
-    assert sorted((deed for period in periods for deed in period.deeds), key=lambda one: one.tick) == [
+    assert sorted((action for period in periods for action in period.actions), key=lambda one: one.tick) == [
         *SCRIPT
     ]
-    assert periods[2].deeds == SCRIPT[2:4]
+    assert periods[2].actions == SCRIPT[2:4]
 
 
-def test_deeds_are_events_that_say_what_was_done():
+def test_actions_are_events_that_say_what_was_done():
     world = two_networks(script=SCRIPT)
     world.run_to(PERIODS * PERIOD)
     told = [
@@ -201,7 +201,7 @@ def test_deeds_are_events_that_say_what_was_done():
 
 
 @pytest.mark.parametrize(
-    ("deed", "what"),
+    ("action", "what"),
     [
         (Reset(119, 0, 0, 1), "the earliest is 120"),
         (Reset(120, 1, 0, 1), "there is no network 1"),
@@ -211,15 +211,15 @@ def test_deeds_are_events_that_say_what_was_done():
         (RadioState(1 << 62, 0, "up"), "the earliest is"),
     ],
 )
-def test_what_cannot_be_done_is_refused(deed, what):
+def test_what_cannot_be_done_is_refused(action, what):
     world = fig6()
     before = world.save()
     with pytest.raises(ValueError, match=what):
-        world.do(deed)
+        world.do(action)
     assert world.save() == before
 
 
-def test_a_deed_is_saved_with_the_world():
+def test_an_action_is_saved_with_the_world():
     world = silent()
     world.do(Reset(BOOTED_TICK, 0, 0, HELD))
     other = silent()
@@ -247,10 +247,10 @@ def test_a_time_that_is_no_whole_number_of_ticks_is_refused(move):
 
 
 @pytest.mark.parametrize("waiting", [Waiting(50_000, RESET, 3, 1), Waiting(50_000, POWER, 0, 2)])
-def test_a_saved_deed_that_cannot_be_done_is_refused(waiting):
+def test_a_saved_action_that_cannot_be_done_is_refused(waiting):
     world, other = silent(), silent()
-    world.networks[0].deeds.waiting = [waiting]
-    with pytest.raises(ValueError, match="a deed waits for slot"):
+    world.networks[0].actions.waiting = [waiting]
+    with pytest.raises(ValueError, match="an action waits for slot"):
         other.load(world.save())
 
 
@@ -258,24 +258,24 @@ ENGINES = """
 import sys
 from miro_exact import engine
 engine.select(sys.argv[1])
-from miro_protocol.stream_events import Power, RadioState, Reset
+from miro_protocol.actions import Power, RadioState, Reset
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 
-deeds = [RadioState(400_000, 0, "noise"), RadioState(700_003, 0, "up")]
-deeds += [Reset(900_001, 0, 0, 1), Reset(900_400, 0, 0, 0)]
-deeds += [Power(1_200_000, 0, 0, 0), RadioState(1_300_000, 0, "down"), Power(1_500_123, 0, 0, 1)]
+actions = [RadioState(400_000, 0, "noise"), RadioState(700_003, 0, "up")]
+actions += [Reset(900_001, 0, 0, 1), Reset(900_400, 0, 0, 0)]
+actions += [Power(1_200_000, 0, 0, 0), RadioState(1_300_000, 0, "down"), Power(1_500_123, 0, 0, 1)]
 settings = ["network.host=silent", "network.radio.profile=fade15", "camera={kind = 'gaussian'}"]
-world = World(load("fig6", settings).scenario, 7, load_hex(image_path()), script=deeds)
+world = World(load("fig6", settings).scenario, 7, load_hex(image_path()), script=actions)
 world.run_to(3 * 800_800)
 print(engine.active(), world.digest)
 """
 
 
 @pytest.mark.skipif(engine.active() != "compiled", reason="no compiled modules here")
-def test_deeds_give_the_same_bits_compiled_and_uncompiled():
+def test_actions_give_the_same_bits_compiled_and_uncompiled():
     found = [
         children.run(
             [sys.executable, "-c", ENGINES, name], capture_output=True, text=True, check=True

@@ -64,7 +64,7 @@ class Double:
     def _count(self, edge: int) -> None:
         self.edges[edge] = (self.edges[edge] + 1) & 0xFF
 
-    def happenings(self, data: bytes) -> list[Any]:
+    def script(self, data: bytes) -> list[Any]:
         return []
 
     def describe(self, data: bytes) -> str:

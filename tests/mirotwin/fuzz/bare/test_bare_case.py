@@ -3,7 +3,7 @@
 import pytest
 
 from miro_exact.bad_input import BadInput
-from miro_protocol.stream_events import Reset
+from miro_protocol.actions import Reset
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.bare.machine import BareMachine
 from miro_robot.bare.pins import PinEvent
@@ -29,7 +29,7 @@ def case(tmp_path, data, firmware=SLEEPS, check=None):
     target = BareTarget(image(firmware), "bytes", check=check)
     assert target.run(data)
     found = target.finding
-    heard = target.happenings(data)
+    heard = target.script(data)
     end_tick = found.tick + (AHEAD_TICKS if found.check == "no_fault" else 0)
     failure = failure_of(BareRun(target.image, target.line, heard, end_tick), found.check, check)
     path = tmp_path / "find.stream"
@@ -159,7 +159,7 @@ def test_the_bare_machine_of_fw_run_has_the_same_fault_from_the_levels_on_its_pi
     data = b"\x09\x01ab" + b"\x0a\x05" + b"\x0e\x00\x07\x01c!" + b"\x09\x00!"
     assert target.run(data)
     events = []
-    for one in target.happenings(data):
+    for one in target.script(data):
         tick = one.tick
         for at, value in enumerate(one.data):
             levels = [0, *(value >> place & 1 for place in range(8)), 0 if at in one.bad_stop else 1]

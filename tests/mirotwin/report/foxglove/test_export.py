@@ -19,7 +19,7 @@ from mcap.reader import make_reader
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, nanoseconds
 from mirotwin.recording import reader
-from mirotwin.recording.channels import DeedMessage
+from mirotwin.recording.channels import ActionMessage
 from mirotwin.recording.container import RecordingError
 from mirotwin.recording.recorder import Recorder
 from tests.mirotwin import synthetic
@@ -220,7 +220,7 @@ def test_a_fault_of_the_firmware_is_an_error_at_its_tick():
 
 def test_what_was_done_to_a_robot_stands_in_the_log():
     def add(recorder: Recorder) -> None:
-        recorder._add("/net0/deeds", 800_800 * 3 + 5, DeedMessage(800_800 * 3 + 5, 0, "reset", 1))
+        recorder._add("/net0/actions", 800_800 * 3 + 5, ActionMessage(800_800 * 3 + 5, 0, "reset", 1))
         for period in list(synthetic.periods(4))[3:]:
             recorder.write(period)
 

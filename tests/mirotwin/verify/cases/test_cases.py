@@ -158,7 +158,7 @@ def test_a_trace_knows_what_happened_wherever_the_world_stands(data):
         if data.draw(st.booleans()):
             sent.append(world.set_reset(0, slot=1))
     world.run_to(max(sent) + 40 * MS)
-    assert [one.tick for one in trace.happenings()] == sorted(sent)
+    assert [one.tick for one in trace.script()] == sorted(sent)
 
 
 def test_a_world_that_has_moved_has_no_trace():

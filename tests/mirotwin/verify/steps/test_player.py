@@ -1,4 +1,4 @@
-"""Steps are done in virtual time: deeds take none, waits end at their event and lose nothing.
+"""Steps are done in virtual time: actions take none, waits end at their event and lose nothing.
 
 Long because each test has the steps of its own scenario.
 """
@@ -11,8 +11,8 @@ import msgspec
 import pytest
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_protocol.actions import Action
 from miro_protocol.decoder import Decoder, Received
-from miro_protocol.stream_events import Deed
 from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.periods import Period
 from miro_sim.scenario.errors import ScenarioError
@@ -56,7 +56,7 @@ def frames_of(sent: list[Transmission]) -> list[Received]:
     return [event for event in found if isinstance(event, Received)]
 
 
-def test_deeds_take_no_time_and_a_pause_takes_its_time_to_the_tick():
+def test_actions_take_no_time_and_a_pause_takes_its_time_to_the_tick():
     player = play(f"{DRIVE}, {{ pause_ms = 0.125 }}")
     assert (player.done, player.failure, player.world.tick) == (2, None, 3000)
 
@@ -347,18 +347,18 @@ def test_a_radio_that_is_gone_a_reset_and_a_battery_taken_out_are_survived_in_or
     """
     player = play(steps + rest, "duration_s = 1.5", finish=True)
     assert player.failure is None
-    trace = [*sent_by(player), *deeds_of(player)]
+    trace = [*sent_by(player), *actions_of(player)]
     world = World(without_steps(player.world.scenario), 0, own_image(), trace)
     while not world.finished:
         world.step()
     assert world.digest == player.world.digest
 
 
-def deeds_of(player: Player) -> list[Deed]:
+def actions_of(player: Player) -> list[Action]:
     """What was done in the run, which is made again."""
     world = World(player.world.scenario, player.world.seed, player.world.image)
     trace = Trace(world)
     again = Player(world, steps_of(world.scenario, ""), "")
     again.play()
     again.finish()
-    return [one for one in trace.happenings() if not isinstance(one, Transmission)]
+    return [one for one in trace.script() if not isinstance(one, Transmission)]

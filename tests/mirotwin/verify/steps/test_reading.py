@@ -21,7 +21,7 @@ WRONG = {
     "{}": "step 1: does nothing; give it one of send, stream, wait_for, expect, never, silence_for_ms",
     '{ snd = "team" }': "step 1: does nothing; did you mean send?",
     "{ pause_s = 1 }": "step 1: does nothing; use pause_ms, in milliseconds",
-    '{ send = "team", pause_ms = 3 }': "step 1: has both send and pause_ms; one deed or one wait a step",
+    '{ send = "team", pause_ms = 3 }': "step 1: has both send and pause_ms; one action or one wait a step",
     '{ send = "tem" }': "step 1.send: 'tem' is not one of the choices; use team, poll, ping, filter, acc",
     '{ send = "team", left_cm_s = 20 }': "step 1.left_cm_s: unknown key; use left_m_s, in metres per second",
     '{ send = "team", left_m_s = 3 }': "step 1.left_m_s: 3 is out of range; must be <= 2.876 in metres per sec",
