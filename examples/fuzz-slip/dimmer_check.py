@@ -2,7 +2,7 @@
 
 from slip_protocol import Damage, Slip
 
-from mirotwin.fuzz.exchange import Exchange
+from mirotwin.verify.bare.exchange import Exchange
 
 BRIGHT = 100
 P1 = 0x90

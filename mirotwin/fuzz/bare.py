@@ -22,16 +22,16 @@ from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
 from miro_robot.harness.program import INPUTS, Program
 from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareOracle
 from miro_robot.image import SPACE_BYTES, Image, load_hex
-from mirotwin.fuzz.bare_machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
-from mirotwin.fuzz.exchange import Exchange, NamedCheck, check_named
 from mirotwin.fuzz.harness_target import HarnessTarget, described
 from mirotwin.fuzz.protocols import protocol_named
-from mirotwin.fuzz.target import NEVER_SLEEPS, Finding
+from mirotwin.fuzz.target import Finding
+from mirotwin.verify.bare.case import NEVER_SLEEPS, NO_FAULT
+from mirotwin.verify.bare.exchange import Exchange, NamedCheck, check_named
+from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.spec import TargetSpec
 
-NO_FAULT = "no_fault"
 NO_FAULT_CODE, NEVER_SLEEPS_CODE, CHECK_CODE = 1, 2, 3
 MOST_OF_A_BODY = 32
 """Bytes of a body in a seed; the harness's program has a form for longer ones, which a fuzzer finds."""

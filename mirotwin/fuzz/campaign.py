@@ -22,7 +22,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.engine import Engine, NoProgress, Progress
 from mirotwin.fuzz.files import CampaignFolder
-from mirotwin.fuzz.finds import Find, Finds
+from mirotwin.fuzz.triage import Find, Finds
 
 LOOK_S = 0.2
 """Wall time between two looks at the engine."""

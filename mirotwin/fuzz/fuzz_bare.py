@@ -18,7 +18,7 @@ from mirotwin.shell.options import Whole, load_image
 from mirotwin.shell.program import DIVERGENCE, complain
 
 if TYPE_CHECKING:
-    from mirotwin.fuzz.bare_court import BareCourt
+    from mirotwin.fuzz.bare_oracle import BareCourt
 
 Command = Callable[..., Any]
 _ROBOTS_OWN = ("robots", "slot")
@@ -105,8 +105,8 @@ def bare_seeds(spec: TargetSpec) -> list[bytes]:
 
 def bare_court(checks: tuple[str, ...]) -> tuple[BareCourt, dict[str, Any]]:
     """Who confirms finds, and what new inputs are judged by. Raises BadInput for a check that there is not."""
-    from mirotwin.fuzz.bare_court import BareCourt
-    from mirotwin.fuzz.exchange import check_named
+    from mirotwin.fuzz.bare_oracle import BareCourt
+    from mirotwin.verify.bare.exchange import check_named
 
     if not checks:
         return BareCourt(), {}
@@ -119,7 +119,7 @@ def replay_bare_case(path: str, firmware: str | None, checks: tuple[str, ...]) -
 
     `checks`: those of --expect, at most one, for a case that names one that is in a file.
     """
-    from mirotwin.fuzz.bare_case import replay_bare
+    from mirotwin.verify.bare.case import replay_bare
 
     if firmware is None:
         remedy = "give --firmware IMAGE.ihx"
@@ -136,7 +136,7 @@ def replay_bare_case(path: str, firmware: str | None, checks: tuple[str, ...]) -
 
 def check_given(path: Path, checks: tuple[str, ...]) -> str | None:
     """The one of --expect that a case names, if any."""
-    from mirotwin.fuzz.bare_case import check_of_case
+    from mirotwin.verify.bare.case import check_of_case
 
     named = check_of_case(path)
     return next((text for text in checks if text.rpartition(":")[2] == named), None)
@@ -144,7 +144,7 @@ def check_given(path: Path, checks: tuple[str, ...]) -> str | None:
 
 def problem_of_bare_case(path: Path, image: Image, check: str | None) -> str:
     """Why a case fails on `image`, or the empty string. `check`: as of --expect, for a case that names it."""
-    from mirotwin.fuzz.bare_case import replay_bare
+    from mirotwin.verify.bare.case import replay_bare
 
     verdict = replay_bare(path, image, check)
     return verdict.line if verdict.failed else ""

@@ -22,12 +22,9 @@ from miro_robot.image import Image
 from miro_sim.scenario.file import changed
 from mirotwin.firmware.sources_option import sources_of, sources_option
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
-from mirotwin.fuzz.confirm import Court, WorldCourt
-from mirotwin.fuzz.confirm import Place as RobotPlace
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
-from mirotwin.fuzz.finds import MINIMISE_S, Find, Finds
 from mirotwin.fuzz.fuzz_bare import (
     BareAsked,
     bare_court,
@@ -40,10 +37,13 @@ from mirotwin.fuzz.fuzz_bare import (
 from mirotwin.fuzz.fuzz_progress import FuzzProgress
 from mirotwin.fuzz.fuzz_regress import refuse_others, regress
 from mirotwin.fuzz.fuzz_summary import Ended, report
+from mirotwin.fuzz.oracle import Court, WorldCourt
+from mirotwin.fuzz.oracle import Place as RobotPlace
 from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
+from mirotwin.fuzz.triage import MINIMISE_S, Find, Finds
 from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, load_image
 from mirotwin.shell.program import Terminated, complain
 from mirotwin.shell.times import WallTime

@@ -13,8 +13,8 @@ from miro_robot.inspect.coverage import branch_share, line_share
 from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import table
 from mirotwin.fuzz.campaign import Campaign
-from mirotwin.fuzz.finds import Find
 from mirotwin.fuzz.fuzz_progress import clock, counted
+from mirotwin.fuzz.triage import Find
 from mirotwin.shell import command_line
 from mirotwin.shell.console import show
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line

@@ -20,9 +20,8 @@ from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
 from mirotwin.fuzz.harness_target import MAP_SIZE as MAP_SIZE
 from mirotwin.fuzz.harness_target import HarnessTarget
+from mirotwin.verify.bare.case import NEVER_SLEEPS
 
-NEVER_SLEEPS = "never_sleeps"
-"""The finding that the firmware did not go back to sleep. No check has that name: what follows from it is judged."""
 NEVER_SLEEPS_CODE = len(NAMES)
 BOOT_PERIODS = 8
 """Control periods, of 33.4 ms, that firmware may take to turn its serial receiver on."""

@@ -17,11 +17,11 @@ from mirotwin.recording.difference import Difference
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
 from mirotwin.replay.compare_options import Asked, compare_options
-from mirotwin.replay.diff_again import Again, run_again
+from mirotwin.replay.diff_reproduction import Again, run_again
 from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
 from mirotwin.replay.replay_firmware import lines_from_option, load_images, program_of
 from mirotwin.replay.sources import Made, SourceDifference, source_differences
-from mirotwin.rerun.rerun import image_if_any
+from mirotwin.rerun.recorded import image_if_any
 from mirotwin.shell.console import show
 from mirotwin.shell.options import Place, choose_engine, engine_option
 from mirotwin.shell.outputs import file_in

@@ -15,9 +15,9 @@ from miro_robot.image import Image
 from miro_sim.radio.downlink import TransmissionError
 from mirotwin.firmware.coverage_files import source_folders
 from mirotwin.recording.compare import Rule, differences
-from mirotwin.report.page.again import Again, run_again
 from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.frames import Extras, extras_of
+from mirotwin.report.page.reproduction import Again, run_again
 from mirotwin.report.page.run_page import About, Material, Replayed, run_page
 from mirotwin.report.summary import Summary
 from mirotwin.rerun.job import Job, load_job

@@ -23,7 +23,7 @@ from mirotwin.recording.capture.detect import detect
 from mirotwin.recording.capture.input import HEAD_BYTES
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
-from mirotwin.rerun.rerun import image_if_any, image_of
+from mirotwin.rerun.recorded import image_if_any, image_of
 from mirotwin.rerun.script import (
     check_actions,
     check_script,

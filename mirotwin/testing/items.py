@@ -12,8 +12,8 @@ import pytest
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_sim.world.waits import WaitExpired
-from mirotwin.testing.left_behind import SUMMARY, case_of, folder_of, leave_test, story, test_line
-from mirotwin.testing.page_left import page_of
+from mirotwin.testing.artifacts import SUMMARY, case_of, folder_of, leave_test, story, test_line
+from mirotwin.testing.report_page import page_of
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.cases.artifacts import PAGE, clear, replay_line, report_line

@@ -46,7 +46,7 @@ def slip():
 
 def target(image, kind="frames", check=False):
     from mirotwin.fuzz.bare import BareTarget
-    from mirotwin.fuzz.exchange import check_named
+    from mirotwin.verify.bare.exchange import check_named
 
     judge = check_named(CHECK) if check else None
     return BareTarget(image, kind, slip(), judge, crystal_hz=CRYSTAL_HZ)
@@ -99,7 +99,7 @@ def test_its_mistake_is_found_among_the_escapes_and_the_mended_one_stands(images
 @needs_sdcc
 @pytest.mark.parametrize("path", FINDS, ids=lambda path: path.stem)
 def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
-    from mirotwin.fuzz.bare_case import replay_bare
+    from mirotwin.verify.bare.case import replay_bare
 
     again = replay_bare(path, images["dimmer"], CHECK)
     assert again.failed

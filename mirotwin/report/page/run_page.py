@@ -15,13 +15,13 @@ from miro_robot.image.debug_info import Sources
 from miro_sim.periods import Period
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.difference import Difference, first_per_channel
-from mirotwin.report.page.again import Again
 from mirotwin.report.page.course import Column, Course, Postures, RobotCourse, add_samples, course_of
 from mirotwin.report.page.document import render
 from mirotwin.report.page.firmware import SHOWN, coverage_rows, function_rows
 from mirotwin.report.page.frames import CameraFrame, Extras
 from mirotwin.report.page.link import Mark, lanes_of
 from mirotwin.report.page.pitch import pitch_of
+from mirotwin.report.page.reproduction import Again
 from mirotwin.report.summary import Steps, rms_name, settling_text, tracking_of
 
 FIRST = 200

@@ -14,7 +14,7 @@ from miro_robot.firmware import image_path
 from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.image import load_hex
 from miro_sim.world.world import World
-from mirotwin.fuzz.confirm import expected_of
+from mirotwin.fuzz.oracle import expected_of
 from mirotwin.fuzz.target import target_for
 from mirotwin.verify.checks.watching import Checks
 from mirotwin.verify.wanted import silent_scenario

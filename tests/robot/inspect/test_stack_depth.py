@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_robot.inspect.stack_depth import StackReader
-from tests.mirotwin.fuzz.bare.firmwares import image
+from tests.mirotwin.verify.bare.firmwares import image
 from tests.robot.mcs51.rig import cpu_with
 
 

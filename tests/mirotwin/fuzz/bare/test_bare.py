@@ -8,9 +8,9 @@ from miro_exact.bad_input import BadInput
 from miro_protocol.miro_wire import Miro
 from miro_protocol.protocol import Protocol
 from mirotwin.fuzz.bare import CHECK_CODE, NEVER_SLEEPS_CODE, NO_FAULT_CODE, BareTarget, frame_input
-from mirotwin.fuzz.bare_run import BareRun
-from mirotwin.fuzz.exchange import NamedCheck
-from tests.mirotwin.fuzz.bare.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
+from mirotwin.verify.bare.exchange import NamedCheck
+from mirotwin.verify.bare.run import BareRun
+from tests.mirotwin.verify.bare.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
 
 INPUTS = st.sampled_from(["bytes", "frames", "session"])
 

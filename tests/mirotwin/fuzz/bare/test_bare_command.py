@@ -6,8 +6,8 @@ import pytest
 from intelhex import IntelHex
 
 from tests.mirotwin.conftest import mirotwin as mirotwin
-from tests.mirotwin.fuzz.bare.firmwares import FAULTY, POLLS, SLEEPS, image
 from tests.mirotwin.fuzz.conftest import engines as engines
+from tests.mirotwin.verify.bare.firmwares import FAULTY, POLLS, SLEEPS, image
 
 CHECK = """
 def never_q(run):

@@ -9,7 +9,7 @@ import random
 from miro_exact import engine
 
 engine.select({engine!r})
-from tests.mirotwin.fuzz.bare.firmwares import SLEEPS, image
+from tests.mirotwin.verify.bare.firmwares import SLEEPS, image
 from mirotwin.fuzz.bare import BareTarget
 from miro_protocol.miro_wire import Miro
 

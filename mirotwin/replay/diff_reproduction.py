@@ -17,7 +17,7 @@ from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS, StateDifference, first_difference
 from mirotwin.replay.program import Program
 from mirotwin.replay.sources import Made
-from mirotwin.rerun.rerun import repeating, world_of
+from mirotwin.rerun.recorded import repeating, world_of
 from mirotwin.shell.options import plain_parameters
 
 Both = tuple[Recording, Recording]

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.exchange import check_named
+from mirotwin.verify.bare.exchange import check_named
 from tests.host import distribution
 
 SOURCE = """

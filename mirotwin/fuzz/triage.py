@@ -20,9 +20,9 @@ from miro_robot.inspect.coverage import Counts
 from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import collect, write
 from mirotwin.fuzz.budget import Budget
-from mirotwin.fuzz.confirm import Court, Expected, Judgement
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.minimise import minimise
+from mirotwin.fuzz.oracle import Court, Expected, Judgement
 from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.target import Finding, Target
 from mirotwin.verify.checks.interface import Failure

@@ -5,12 +5,12 @@ import pytest
 from miro_protocol import stream
 from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.image.debug_info import Sources
-from mirotwin.fuzz.confirm import NEVER_SLEEPS, Place, WorldCourt, expected_of, judge
 from mirotwin.fuzz.files import CampaignFolder
-from mirotwin.fuzz.finds import Finds
+from mirotwin.fuzz.oracle import NEVER_SLEEPS, Place, WorldCourt, expected_of, judge
 from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import Finding, target_for
+from mirotwin.fuzz.triage import Finds
 from mirotwin.verify.checks.registry import CHECKS
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image, planted
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from miro_robot.image import load_hex
-from mirotwin.fuzz.confirm import Place, WorldCourt
+from mirotwin.fuzz.oracle import Place, WorldCourt
 from mirotwin.fuzz.target import target_for
 from tests import children
 from tests.mutants.build import build

@@ -11,7 +11,7 @@ from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.harness.recording_bus import RecordingBus
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import ASLEEP, Cpu
-from mirotwin.fuzz.exchange import Character, Exchange, Memory
+from mirotwin.verify.bare.exchange import Character, Exchange, Memory
 
 BOOT_MS = 200
 _SLICE = 20_000  # cycles

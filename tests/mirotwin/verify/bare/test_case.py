@@ -8,10 +8,10 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.bare.machine import BareMachine
 from miro_robot.bare.pins import PinEvent
 from mirotwin.fuzz.bare import BareTarget
-from mirotwin.fuzz.bare_case import case_text, failure_of, replay_bare
-from mirotwin.fuzz.bare_run import AHEAD_TICKS, BareRun
-from mirotwin.fuzz.exchange import NamedCheck
-from tests.mirotwin.fuzz.bare.firmwares import POLLS, SLEEPS, image
+from mirotwin.verify.bare.case import case_text, failure_of, replay_bare
+from mirotwin.verify.bare.exchange import NamedCheck
+from mirotwin.verify.bare.run import AHEAD_TICKS, BareRun
+from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
 
 MENDED = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
 WRONG = 'def short(run):\n    return f"{len(run.sent)} are too many" if len(run.sent) > 2 else None\n'

@@ -12,8 +12,8 @@ from miro_robot.harness.harness import SETTLE_TICKS
 from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
 from miro_robot.image import Image
 from miro_robot.mcs51.uart import STOPPED_TICK
-from mirotwin.fuzz.bare_machine import BareLine, BareProcessor
-from mirotwin.fuzz.exchange import NamedCheck
+from mirotwin.verify.bare.exchange import NamedCheck
+from mirotwin.verify.bare.machine import BareLine, BareProcessor
 
 AHEAD_TICKS = 240  # the CPU may look so far beyond the end of a run
 _BITS = 10

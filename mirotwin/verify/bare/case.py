@@ -32,13 +32,14 @@ from miro_protocol import stream, stream_header
 from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image
-from mirotwin.fuzz.bare import NO_FAULT
-from mirotwin.fuzz.bare_machine import BareLine
-from mirotwin.fuzz.bare_run import BareRun
-from mirotwin.fuzz.exchange import OPTION, NamedCheck, check_named, installed_check
-from mirotwin.fuzz.target import NEVER_SLEEPS
+from mirotwin.verify.bare.exchange import OPTION, NamedCheck, check_named, installed_check
+from mirotwin.verify.bare.machine import BareLine
+from mirotwin.verify.bare.run import BareRun
 from mirotwin.verify.checks.interface import Failure
 
+NO_FAULT = "no_fault"
+NEVER_SLEEPS = "never_sleeps"
+"""That the firmware did not go back to sleep. No check of a world has that name: what follows from it is judged."""
 FAULT_CODE, FAILED_CODE, DIVERGED_CODE = 3, 1, 4
 """Exit codes, as everywhere: a firmware fault, an expectation that failed, a case that does not fail again."""
 

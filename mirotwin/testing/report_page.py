@@ -13,9 +13,9 @@ import tomli_w
 
 from miro_sim.world.world import World
 from mirotwin.firmware.coverage_files import source_folders
-from mirotwin.report.page.again import run_again
 from mirotwin.report.page.bokeh_page import has_bokeh
 from mirotwin.report.page.document import MOST_BYTES
+from mirotwin.report.page.reproduction import run_again
 from mirotwin.report.page.run_page import About, Material, run_page
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from miro_protocol.actions import ScriptItem
-from mirotwin.fuzz.bare import NO_FAULT, BareTarget
-from mirotwin.fuzz.bare_case import case_text, failure_of
-from mirotwin.fuzz.bare_run import AHEAD_TICKS, BareRun
-from mirotwin.fuzz.confirm import Judgement
-from mirotwin.fuzz.exchange import NamedCheck
-from mirotwin.fuzz.target import NEVER_SLEEPS, Finding, Target
+from mirotwin.fuzz.bare import BareTarget
+from mirotwin.fuzz.oracle import Judgement
+from mirotwin.fuzz.target import Finding, Target
+from mirotwin.verify.bare.case import NEVER_SLEEPS, NO_FAULT, case_text, failure_of
+from mirotwin.verify.bare.exchange import NamedCheck
+from mirotwin.verify.bare.run import AHEAD_TICKS, BareRun
 
 
 class BareCourt:

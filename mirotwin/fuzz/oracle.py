@@ -22,7 +22,8 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
-from mirotwin.fuzz.target import NEVER_SLEEPS, Finding, Target
+from mirotwin.fuzz.target import Finding, Target
+from mirotwin.verify.bare.case import NEVER_SLEEPS
 from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.interface import Failure
