@@ -14,7 +14,6 @@ import msgspec
 
 from miro_exact.domain import DomainError
 from miro_exact.state import Items
-from miro_host.ear import Heard
 from miro_host.estimators.interface import DEAD_S, Estimate, Estimator, EstimatorInput
 from miro_host.estimators.none import NoEstimator
 from miro_host.integrator import Integrator
@@ -23,6 +22,7 @@ from miro_host.parts import PartError
 from miro_host.posture import Posture
 from miro_host.raised import at_place, defined_at, described, raised_at
 from miro_host.references.interface import Trajectory
+from miro_host.telemetry_receiver import LastTelemetry
 from miro_host.wheels import Wheels
 
 PERIOD_S = 1001.0 / 30000.0  # one NTSC frame, 800 800 ticks
@@ -97,15 +97,15 @@ class Pilot:
     def __repr__(self) -> str:
         return f"Pilot({self.reference!r}, {self.law!r}, command={self.command!r})"
 
-    def update(self, measured: Posture | None, t_s: float, heard: Heard | None = None) -> Command:
-        """One control period at `t_s` after the reference's start; `measured` and `heard` may be missing (None).
+    def update(self, measured: Posture | None, t_s: float, telemetry: LastTelemetry | None = None) -> Command:
+        """One control period at `t_s` after the reference's start; `measured` and `telemetry` may be missing (None).
 
         Raises PartError, and leaves integrator and command alone, when the law fails or answers what is no number.
         """
         z, units = self.integrator, self.wheels.units_per_m_s
         sent = self.command.left / units, self.command.right / units
         estimate = self._estimate(
-            EstimatorInput(t_s, z.period_s, measured, z.v_m_s, z.w_rad_s, *sent, heard, self.dead_s)
+            EstimatorInput(t_s, z.period_s, measured, z.v_m_s, z.w_rad_s, *sent, telemetry, self.dead_s)
         )
         if estimate is None:
             return self.command
@@ -120,7 +120,7 @@ class Pilot:
                 posture=estimate.posture,
                 v_m_s=z.v_m_s,
                 w_rad_s=z.w_rad_s,
-                heard=heard,
+                telemetry=telemetry,
             )
         )
         inner = {name: answer.inner[name] for name in self.law.INNER}

@@ -19,10 +19,10 @@ HALF_TURN = 1 << 15
 TURN = 1 << 16
 
 _COUNT = ("q", -NEVER_TICK, NEVER_TICK)
-_NOTHING_HEARD = (-1, 0, 0, 0, 0, 0, 0, 0, 0)
+_NO_TELEMETRY = (-1, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
-class Heard(NamedTuple):
+class LastTelemetry(NamedTuple):
     """One robot's last answer.
 
     `tick` is the start bit of the frame's first character at the PC; `flags` are those of `miro_protocol.table.Flags`;
@@ -41,15 +41,15 @@ class Heard(NamedTuple):
     rejected: int
 
 
-class Ear:
-    """Receiver of one network's answers. `heard` holds the last one of each slot, None before the first."""
+class TelemetryReceiver:
+    """Receiver of one network's answers. `last` holds the last one of each slot, None before the first."""
 
     STATE = {
         "decoder": TelemetryDecoder,
-        "heard": Rows(
+        "last": Rows(
             *(8, ("q", -1, NEVER_TICK), "B", "B", "B", "B", _COUNT, _COUNT, "B", "B"),
-            split=lambda heard: heard or _NOTHING_HEARD,
-            make=lambda cells: None if cells[0] < 0 else Heard(*cells),
+            split=lambda last: last or _NO_TELEMETRY,
+            make=lambda cells: None if cells[0] < 0 else LastTelemetry(*cells),
         ),
     }
     NOT_STATE = ("robots",)
@@ -57,15 +57,15 @@ class Ear:
     def __init__(self, robots: int) -> None:
         self.robots = robots
         self.decoder = TelemetryDecoder()
-        self.heard: list[Heard | None] = [None] * robots
+        self.last: list[LastTelemetry | None] = [None] * robots
 
     def __repr__(self) -> str:
-        return f"Ear({self.decoder!r}, heard={self.heard!r})"
+        return f"TelemetryReceiver({self.decoder!r}, last={self.last!r})"
 
-    def hear(self, symbols: Sequence[Symbol]) -> list[Event]:
-        """Takes received characters in the order of time; returns what the decoder found in them.
+    def receive(self, symbols: Sequence[Symbol]) -> list[Event]:
+        """Takes characters in the order of time; returns what the decoder found in them.
 
-        What is no answer of a robot here changes nothing in `heard`.
+        What is no answer of a robot here changes nothing in `last`.
         """
         found = self.decoder.feed_symbols(symbols)
         for event in found:
@@ -75,13 +75,13 @@ class Ear:
 
     def _take(self, event: Received) -> None:
         try:
-            message = event.message(len(self.heard))
+            message = event.message(len(self.last))
         except ContentError:  # the CRC is good: a firmware that sets bits which the format keeps at 0
             return
-        if not isinstance(message, TelemetryFrame) or message.slot >= len(self.heard):
+        if not isinstance(message, TelemetryFrame) or message.slot >= len(self.last):
             return
-        before = self.heard[message.slot]
-        self.heard[message.slot] = Heard(
+        before = self.last[message.slot]
+        self.last[message.slot] = LastTelemetry(
             tick=event.start_tick,
             seq=message.seq,
             flags=message.flags,
@@ -95,8 +95,8 @@ class Ear:
 
     def after_load(self) -> None:
         """Raises ValueError unless there is an answer, or none, of each robot."""
-        if len(self.heard) != self.robots:
-            raise ValueError(f"answers of {len(self.heard)} robots where {self.robots} belong")
+        if len(self.last) != self.robots:
+            raise ValueError(f"answers of {len(self.last)} robots where {self.robots} belong")
 
 
 def unwrapped(low: int, before: int) -> int:

@@ -5,12 +5,12 @@ import hashlib
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.rng import Stream
 from miro_exact.state import snapshot
-from miro_host.ear import Heard
 from miro_host.estimators.ekf import EkfParameters
 from miro_host.estimators.ekf_telemetry import EkfTelemetryParameters
 from miro_host.estimators.interface import EstimatorInput
 from miro_host.eye.track import Sighting
 from miro_host.pilot import PERIOD_S
+from miro_host.telemetry_receiver import LastTelemetry
 
 
 def bits(periods=300):
@@ -30,7 +30,7 @@ def bits(periods=300):
             estimate = one.step(
                 EstimatorInput(
                     *(index * PERIOD_S, PERIOD_S, None if index % 7 == 0 else seen, 0.0, 0.0, *rims),
-                    heard=Heard(
+                    telemetry=LastTelemetry(
                         *((index // 3 * 3 - 2) * CONTROL_PERIOD_TICKS + 720_000, 0, 0, 0, 0),
                         *(40 * index, -31 * index, 0, 0),
                     ),

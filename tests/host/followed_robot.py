@@ -3,13 +3,13 @@
 import math
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
-from miro_host.ear import Heard
 from miro_host.estimators.ekf import EkfParameters
 from miro_host.estimators.ekf_telemetry import METRES_PER_COUNT, EkfTelemetryParameters
 from miro_host.estimators.interface import DEAD_S, EstimatorInput
 from miro_host.eye.track import Sighting
 from miro_host.pilot import PERIOD_S
 from miro_host.posture import Posture
+from miro_host.telemetry_receiver import LastTelemetry
 from miro_host.wheels import Wheels
 
 TRACK_M = Wheels().track_m
@@ -84,9 +84,9 @@ class Loop:
         self.index = 0
         self.seen = None
         self.before = (0.0, 0.0)
-        self.heard = self.coming = None  # an answer arrives a period after it was begun
+        self.telemetry = self.coming = None  # an answer arrives a period after it was begun
         self.path = []  # true postures at the exposures
-        self.tell = lambda heard: heard  # what becomes of an answer on its way
+        self.tell = lambda telemetry: telemetry  # what becomes of an answer on its way
 
     @property
     def filter(self):
@@ -97,9 +97,9 @@ class Loop:
         """One period; what the filter says and where the robot really is at that time."""
         now_s = self.index * PERIOD_S
         seen = self.change(self.index, self.seen)
-        heard = self.heard if self.heard is None else self.tell(self.heard)
-        given_ = EstimatorInput(now_s, PERIOD_S, seen, *self.before, *rims(*self.before), heard)
-        self.heard = self.coming
+        telemetry = self.telemetry if self.telemetry is None else self.tell(self.telemetry)
+        given_ = EstimatorInput(now_s, PERIOD_S, seen, *self.before, *rims(*self.before), telemetry)
+        self.telemetry = self.coming
         estimate = self.estimator.step(given_)
         self.exposed = self.path[-1] if self.path else self.robot.posture
         self.path.append(self.robot.posture)
@@ -112,7 +112,7 @@ class Loop:
         if self.answers and self.index % 3 == 0:
             self.robot.run(now_s + READ_S)
             counts = [round(way / METRES_PER_COUNT) for way in self.robot.rims_m]
-            self.coming = Heard(
+            self.coming = LastTelemetry(
                 round((now_s + READ_S + SAMPLED_S) * TICKS_PER_SECOND), 0, 0, 0, 0, *counts, 0, 0
             )
         self.robot.run(self.index * PERIOD_S)

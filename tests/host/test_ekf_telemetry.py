@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import restore, snapshot
-from miro_host.ear import TURN, Heard
 from miro_host.estimators.ekf import EkfParameters
 from miro_host.estimators.ekf_telemetry import EkfTelemetryParameters
 from miro_host.eye.track import Sighting
+from miro_host.telemetry_receiver import TURN, LastTelemetry
 from tests.host.followed_robot import Loop, Robot, truths
 
 P = EkfTelemetryParameters()
@@ -85,36 +85,36 @@ def told_before(change, at=60):
 def test_a_repeated_answer_and_an_older_one_change_nothing():
     old = Loop(P.estimator(), Robot(), answers=True)
     old.run(10)
-    loop, same = told_before(lambda heard: None)
-    last = Heard(loop.estimator.heard_tick, *loop.heard[1:])
-    for heard in (last, old.heard):
-        loop.tell = lambda _, told=heard: told
+    loop, same = told_before(lambda telemetry: None)
+    last = LastTelemetry(loop.estimator.telemetry_tick, *loop.telemetry[1:])
+    for telemetry in (last, old.telemetry):
+        loop.tell = lambda _, told=telemetry: told
         same.tell = lambda _: None
         assert loop.period() == same.period()
 
 
 def test_an_answer_from_the_future_changes_nothing():
-    loop, same = told_before(lambda heard: heard._replace(tick=NEVER_TICK))
+    loop, same = told_before(lambda telemetry: telemetry._replace(tick=NEVER_TICK))
     same.tell = lambda _: None
     assert loop.run(5) == same.run(5)
 
 
 @pytest.mark.parametrize("turns", [-2, 1, 7])
 def test_counts_that_are_off_by_whole_turns_of_the_counter_tell_the_same(turns):
-    def change(heard):
-        left, right = heard.position_left + turns * TURN, heard.position_right - turns * TURN
-        return heard._replace(position_left=left, position_right=right)
+    def change(telemetry):
+        left, right = telemetry.position_left + turns * TURN, telemetry.position_right - turns * TURN
+        return telemetry._replace(position_left=left, position_right=right)
 
     loop, same = told_before(change)
     assert loop.run(20) == same.run(20)
 
 
 def test_a_robot_that_was_reset_is_not_moved_and_counted_on_from_there():
-    loop, same = told_before(lambda heard: heard)
-    first = loop.heard
-    loop.tell = lambda heard: heard._replace(
-        position_left=heard.position_left - first.position_left + 20000,
-        position_right=heard.position_right - first.position_right - 20000,
+    loop, same = told_before(lambda telemetry: telemetry)
+    first = loop.telemetry
+    loop.tell = lambda telemetry: telemetry._replace(
+        position_left=telemetry.position_left - first.position_left + 20000,
+        position_right=telemetry.position_right - first.position_right - 20000,
     )
     for estimate, whole in zip(loop.run(30), same.run(30), strict=True):
         assert (
@@ -174,7 +174,7 @@ def test_a_camera_whose_displacement_changes_along_the_path_is_told_from_large_w
 COUNT = st.integers(-NEVER_TICK, NEVER_TICK) | st.integers(-70000, 70000)
 BYTE = st.integers(0, 255)
 ANSWERS = st.builds(
-    Heard,
+    LastTelemetry,
     st.integers(-1, 10**8) | st.integers(0, NEVER_TICK),
     BYTE,
     BYTE,
@@ -191,7 +191,7 @@ ANSWERS = st.builds(
 @given(st.lists(st.none() | ANSWERS, min_size=40, max_size=40))
 def test_whatever_an_answer_says_the_filter_goes_on(answers):
     loop = Loop(EkfTelemetryParameters(warp_m=0.005).estimator(), Robot(), blurred, answers=True)
-    loop.tell = lambda heard: answers[loop.index % 40] or heard
+    loop.tell = lambda telemetry: answers[loop.index % 40] or telemetry
     for _ in range(60):
         loop.period()
         loop.estimator.check_memory()

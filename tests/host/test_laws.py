@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot, values
-from miro_host.ear import Heard
 from miro_host.integrator import Integrator, Limits
 from miro_host.laws.interface import Law, LawParameters, Velocities
 from miro_host.laws.yang_kim import Gains
@@ -16,11 +15,12 @@ from miro_host.parts import PartError
 from miro_host.pilot import PERIOD_S, Pilot
 from miro_host.posture import Posture
 from miro_host.references.line import Line
+from miro_host.telemetry_receiver import LastTelemetry
 from tests.host.own_laws import Leaky, LeakyParameters, Wrong, WrongParameters
 
 HERE = Posture(0.07, 0.02, -0.38)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
-HEARD = Heard(1, 2, 0, 0, 0, 100, -100, 7, 0)
+HEARD = LastTelemetry(1, 2, 0, 0, 0, 100, -100, 7, 0)
 
 
 class Listening(Law[LawParameters]):
@@ -47,7 +47,7 @@ def test_a_law_is_given_the_measurement_the_reference_and_the_last_answer_of_its
     one = pilot(law, reference_lead_s=0.5)
     one.update(HERE, 1.0, HEARD)
     command = one.update(HERE, 1.0 + PERIOD_S, HEARD)
-    assert (law.given.posture, law.given.heard) == (HERE, HEARD)
+    assert (law.given.posture, law.given.telemetry) == (HERE, HEARD)
     assert law.given.t_s == 1.0 + PERIOD_S + 0.5
     assert law.given.reference == law.given.path.at(law.given.t_s)
     assert law.given.period_s == PERIOD_S

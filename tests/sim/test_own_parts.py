@@ -34,7 +34,7 @@ class Listener(Law[LawParameters]):
     INNER = ("position_left",)
 
     def step(self, given: LawInput) -> Velocities:
-        count = 0.0 if given.heard is None else float(given.heard.position_left)
+        count = 0.0 if given.telemetry is None else float(given.telemetry.position_left)
         return Velocities(0.1 + count * 1e-5, 0.0, {"position_left": count})
 
 
@@ -69,9 +69,9 @@ def test_what_was_heard_is_saved_and_hashed():
     first, second = world(ByEar()), world(ByEar())
     first.run_to(10 * CONTROL_PERIOD_TICKS)
     second.load(first.save())
-    assert second.networks[0].ear.heard == first.networks[0].ear.heard != [None, None, None]
+    assert second.networks[0].telemetry.last == first.networks[0].telemetry.last != [None, None, None]
     assert second.state.hashed() == first.state.hashed()
-    second.networks[0].ear.heard[0] = None
+    second.networks[0].telemetry.last[0] = None
     assert second.state.hashed() != first.state.hashed()
 
 
@@ -100,7 +100,7 @@ def test_the_ear_follows_the_wheel_counts_beyond_sixteen_bits():
     counts = []
     while one.index < 120:
         counts.append(one.step().robots[0].left.real_position)
-    heard = one.networks[0].ear.heard[0]
+    heard = one.networks[0].telemetry.last[0]
     assert heard.position_left > 1 << 16
     period = heard.tick // CONTROL_PERIOD_TICKS
     assert counts[period - 1] <= heard.position_left <= counts[period] + 2000
@@ -164,9 +164,13 @@ ROBOT = "networks[0].robots[0]"
     [
         (f"{ROBOT}.pilot.law.error_m", struct.pack("<d", math.nan), "error_m is NaN"),
         (f"{ROBOT}.pilot.law.error_m", struct.pack("<d", math.inf), "'error_m' is inf"),
-        ("networks[0].ear.heard", struct.pack("<I", 2) + 2 * NOTHING_HEARD, "of 2 robots where 3 belong"),
         (
-            "networks[0].ear.heard",
+            "networks[0].telemetry.last",
+            struct.pack("<I", 2) + 2 * NOTHING_HEARD,
+            "of 2 robots where 3 belong",
+        ),
+        (
+            "networks[0].telemetry.last",
             struct.pack("<I", 3) + struct.pack("<q", 1 << 40) + NOTHING_HEARD[8:] + 2 * NOTHING_HEARD,
             "last answer came after tick 4000000",
         ),

@@ -28,7 +28,7 @@ CPU = "networks[0].robots[0].board.cpu"
         (f"{CPU}.peripherals.shift.number", struct.pack("<i", 9)),
         (f"{CPU}.peripherals.ports.pending", struct.pack("<IqBB", 1, 1 << 30, 4, 0)),
         (f"{CPU}.peripherals.uart.rxd.ticks", struct.pack("<I", 1 << 23) + bytes(8)),
-        ("networks[0].ear.decoder._data", struct.pack("<I", 4161) + bytes(4161)),
+        ("networks[0].telemetry.decoder._data", struct.pack("<I", 4161) + bytes(4161)),
     ],
 )
 def test_what_compiled_code_takes_for_an_index_or_a_divisor_is_checked_by_name(saved, path, data):

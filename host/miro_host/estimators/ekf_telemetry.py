@@ -32,11 +32,11 @@ from msgspec import Meta
 
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.dmath import sincos
-from miro_host.ear import HALF_TURN, TURN, Heard
 from miro_host.estimators.ekf import WHEELS, Ekf, EkfParameters
 from miro_host.estimators.filter import Filter
 from miro_host.estimators.interface import EstimatorInput
 from miro_host.posture import Posture
+from miro_host.telemetry_receiver import HALF_TURN, TURN, LastTelemetry
 from miro_host.wheels import COUNTS_PER_WHEEL_TURN, PI, nearest
 
 METRES_PER_COUNT = 2.0 * PI * WHEELS.radius_m / COUNTS_PER_WHEEL_TURN
@@ -94,7 +94,7 @@ class EkfTelemetry(Ekf):
 
     STATE: ClassVar[Mapping[str, Any]] = {
         "counting": "?",
-        "heard_tick": "q",
+        "telemetry_tick": "q",
         "left_count": "q",
         "right_count": "q",
         "seen_s": "d",
@@ -109,7 +109,7 @@ class EkfTelemetry(Ekf):
     def __init__(self, parameters: EkfTelemetryParameters) -> None:
         super().__init__(parameters)
         self.counting = False
-        self.heard_tick = -1
+        self.telemetry_tick = -1
         self.left_count = 0
         self.right_count = 0
         self.seen_s = 0.0
@@ -126,29 +126,29 @@ class EkfTelemetry(Ekf):
 
     def _measure(self, given: EstimatorInput) -> None:
         """The camera's measurement and a new answer, in the order of the instants that they tell of."""
-        heard = given.heard
-        if heard is None or heard.tick <= self.heard_tick:
+        telemetry = given.telemetry
+        if telemetry is None or telemetry.tick <= self.telemetry_tick:
             super()._measure(given)
             return
-        read_s = heard.tick / TICKS_PER_SECOND - self.parameters.sampled_s
+        read_s = telemetry.tick / TICKS_PER_SECOND - self.parameters.sampled_s
         first = given.measured is not None and self._exposed_s(given.measured, given.t_s) < read_s
         if first:
             super()._measure(given)
         if read_s <= given.t_s:
-            self.heard_tick = heard.tick
-            self._count(heard, read_s)
+            self.telemetry_tick = telemetry.tick
+            self._count(telemetry, read_s)
         if not first:
             super()._measure(given)
 
-    def _count(self, heard: Heard, read_s: float) -> None:
+    def _count(self, telemetry: LastTelemetry, read_s: float) -> None:
         """Prediction to the instant of the counts, then correction by them, or the beginning of counting."""
         one = self.filter
         if not one.known or read_s <= one.at_s:
             return
         one.predict(read_s)
-        left_m = self._beyond_m(heard.position_left - self.left_count, one.left_m)
-        right_m = self._beyond_m(heard.position_right - self.right_count, one.right_m)
-        self.left_count, self.right_count = heard.position_left, heard.position_right
+        left_m = self._beyond_m(telemetry.position_left - self.left_count, one.left_m)
+        right_m = self._beyond_m(telemetry.position_right - self.right_count, one.right_m)
+        self.left_count, self.right_count = telemetry.position_left, telemetry.position_right
         gate = self.parameters.count_gate if self.counting else 0.0
         noise_m2 = self.parameters.count_noise_m * self.parameters.count_noise_m
         one.count(5, left_m, noise_m2, gate)

@@ -10,10 +10,10 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
-from miro_host.ear import Heard
 from miro_host.estimators.registry import AnyEstimator
 from miro_host.memory import Remembering
 from miro_host.posture import Posture
+from miro_host.telemetry_receiver import LastTelemetry
 
 NOTHING: Mapping[str, float] = {}
 DEAD_S = 0.028
@@ -25,8 +25,8 @@ class EstimatorInput(msgspec.Struct, frozen=True):
 
     `measured` is what the camera's tracker hands over now, None in a frame in which the robot was not found. `v_m_s`,
     `w_rad_s` are the velocities that were commanded one period ago, `left_m_s`, `right_m_s` the speeds of the rims that
-    were sent for them, for wheels of the nominal radius. `heard` is the robot's last answer by radio. `dead_s` is how
-    long after t_s the last bit of the next command leaves the transmitter.
+    were sent for them, for wheels of the nominal radius. `telemetry` is the robot's last answer by radio. `dead_s` is
+    how long after t_s the last bit of the next command leaves the transmitter.
     """
 
     t_s: float
@@ -36,7 +36,7 @@ class EstimatorInput(msgspec.Struct, frozen=True):
     w_rad_s: float
     left_m_s: float
     right_m_s: float
-    heard: Heard | None = None
+    telemetry: LastTelemetry | None = None
     dead_s: float = DEAD_S
 
 

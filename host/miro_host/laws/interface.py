@@ -19,12 +19,12 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
-from miro_host.ear import Heard
 from miro_host.integrator import Limits
 from miro_host.laws.registry import Controller
 from miro_host.memory import Remembering
 from miro_host.posture import Posture
 from miro_host.references.interface import Reference, Trajectory
+from miro_host.telemetry_receiver import LastTelemetry
 
 NOTHING: Mapping[str, float] = {}
 
@@ -34,8 +34,8 @@ class LawInput(msgspec.Struct, frozen=True):
 
     `t_s` is the time since the start of the reference at which `reference` was evaluated; `path` gives the reference at
     any other time. `posture` is what the estimator made of the camera's measurements. `v_m_s`, `w_rad_s` are the
-    commanded velocities that the last period ended with. `heard` is the robot's last answer by radio, None before the
-    first.
+    commanded velocities that the last period ended with. `telemetry` is the robot's last answer by radio, None before
+    the first.
     """
 
     t_s: float
@@ -45,7 +45,7 @@ class LawInput(msgspec.Struct, frozen=True):
     posture: Posture
     v_m_s: float
     w_rad_s: float
-    heard: Heard | None = None
+    telemetry: LastTelemetry | None = None
 
 
 class Accelerations(msgspec.Struct, frozen=True):

@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, ticks
 from miro_exact.state import TICK, Rows
-from miro_host.ear import Ear
 from miro_host.pilot import Command
 from miro_host.station import Station
+from miro_host.telemetry_receiver import TelemetryReceiver
 from miro_protocol.decoder import Received, Symbol
 from miro_protocol.frames import ContentError, Message, TelemetryFrame
 from miro_protocol.transmission import DOWN, UP, Transmission, check_bad_stop, of_symbols
@@ -42,7 +42,7 @@ class Network:
         "station": Station,
         "downlink": Downlink,
         "uplink": Uplink,
-        "ear": Ear,
+        "telemetry": TelemetryReceiver,
         "frames_sent": TICK,
         "outbox": Outbox,
         "actions": Actions,
@@ -89,7 +89,7 @@ class Network:
         for robot in self.robots:
             self.downlink.listen(robot.spec.slot, robot.board.cpu.rxd)
             self.uplink.listen(robot.board.cpu.txd, robot.spec.slot)
-        self.ear = Ear(spec.robots)
+        self.telemetry = TelemetryReceiver(spec.robots)
         self.host: Host = "script" if script is not None else spec.host
         self.actions = Actions(index)
         self.outbox = Outbox(0 if radio.carrier == "on" else radio.keyup_ticks, index)
@@ -109,7 +109,7 @@ class Network:
         commands: list[Command | None] = [None] * len(self.robots)
         if self.host == "controller":
             commands = [
-                robot.steer(posture, self.ear.heard[robot.spec.slot], tick)
+                robot.steer(posture, self.telemetry.last[robot.spec.slot], tick)
                 for robot, posture in zip(self.robots, measured, strict=True)
             ]
             self._transmit(tick + self.compute_ticks + self.keyup_ticks, commands)
@@ -206,7 +206,7 @@ class Network:
         """The PC's receiver hears what the robots sent up to `tick`."""
         heard = self.uplink.receive(tick)
         self.log.note_heard(heard)
-        for found in self.ear.hear(heard):
+        for found in self.telemetry.receive(heard):
             if isinstance(found, Received):
                 self._note_answer(self.uplink.known_tick(found.last_tick), found)
         self.heard += heard
@@ -282,7 +282,7 @@ class Network:
             raise ValueError(
                 f"characters wait, but the transmitter is busy until tick {self.downlink.free_tick}"
             )
-        if any(answer is not None and answer.tick > tick for answer in self.ear.heard):
+        if any(answer is not None and answer.tick > tick for answer in self.telemetry.last):
             raise ValueError(f"a robot's last answer came after tick {tick}")
         for robot in self.robots:
             cpu = robot.board.cpu

@@ -11,10 +11,10 @@ from collections.abc import Callable
 from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_exact.domain import DomainError
 from miro_exact.rng import Stream
-from miro_host.ear import Heard
 from miro_host.parts import PartError
 from miro_host.pilot import Command, Pilot
 from miro_host.posture import Posture
+from miro_host.telemetry_receiver import LastTelemetry
 from miro_robot.board import Board
 from miro_robot.event_log import TRUE
 from miro_robot.image import Image
@@ -99,10 +99,10 @@ class Robot:
                     board.log.note(TRUE, reached, 0, 0)
         return stopped
 
-    def steer(self, measured: Posture | None, heard: Heard | None, tick: int) -> Command:
-        """The PC computes this robot's wheel commands from what it measured and heard. Raises PartError."""
+    def steer(self, measured: Posture | None, telemetry: LastTelemetry | None, tick: int) -> Command:
+        """Wheel commands from what the PC measured and the robot's last telemetry. Raises PartError."""
         try:
-            return self.pilot.update(measured, seconds(tick), heard)
+            return self.pilot.update(measured, seconds(tick), telemetry)
         except PartError as error:
             raise self._named(error, tick) from error
 

@@ -1,4 +1,4 @@
-"""The wire: the window decoder by each way of feeding it, frames, the host's ear."""
+"""The wire: the window decoder by each way of feeding it, frames, the PC's receiver of telemetry."""
 
 from __future__ import annotations
 
@@ -180,9 +180,9 @@ def _frames() -> Run:
     return run
 
 
-def _ear() -> Run:
+def _telemetry() -> Run:
     from miro_exact.state import snapshot
-    from miro_host.ear import Ear
+    from miro_host.telemetry_receiver import TelemetryReceiver
     from miro_protocol.frames import seal
     from miro_protocol.table import TELEMETRY
 
@@ -197,14 +197,14 @@ def _ear() -> Run:
             tick += draw.below(1 << 16) * 24
             symbols += [(byte, True, tick + at * TELEMETRY.character_ticks) for at, byte in enumerate(chunk)]
             tick += len(chunk) * TELEMETRY.character_ticks
-        whole, parts = Ear(robots), Ear(robots)
-        events = whole.hear(symbols)
-        found = [event for at in range(0, len(symbols), cut) for event in parts.hear(symbols[at : at + cut])]
+        whole, parts = TelemetryReceiver(robots), TelemetryReceiver(robots)
+        events = whole.receive(symbols)
+        found = [
+            event for at in range(0, len(symbols), cut) for event in parts.receive(symbols[at : at + cut])
+        ]
         assert events == found, "cut elsewhere, the events differ"
         assert snapshot(whole) == snapshot(parts), "cut elsewhere, the states differ"
-        return (
-            f"{sum(one is not None for one in whole.heard)} of {robots} heard, {min(len(events), 4)} events"
-        )
+        return f"{sum(one is not None for one in whole.last)} of {robots} heard, {min(len(events), 4)} events"
 
     return run
 
@@ -255,7 +255,7 @@ def _column_seeds() -> list[bytes]:
     ]
 
 
-def _ear_seeds() -> list[bytes]:
+def _telemetry_seeds() -> list[bytes]:
     body = _frame_seeds()[5][2:]
     return [
         b"\x00\x05" + b"".join(bytes([kind]) + body + b"\x10\x20" for kind in (0, 3, 1)),
@@ -283,5 +283,7 @@ TARGETS = {
     "frames": Target(
         "bodies of frames, sealed: what they say, and back", _frames, _frame_seeds, _SEEN, most_bytes=32
     ),
-    "ear": Target("telemetry: the host's ear, cut anywhere", _ear, _ear_seeds, _SEEN, most_bytes=256),
+    "telemetry": Target(
+        "the PC's receiver, cut anywhere", _telemetry, _telemetry_seeds, _SEEN, most_bytes=256
+    ),
 }
