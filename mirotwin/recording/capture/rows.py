@@ -9,12 +9,12 @@ import msgspec
 
 from miro_protocol.events import Event, Received
 from miro_protocol.frames import ContentError, Message
-from miro_protocol.freshness import Freshness
 from miro_protocol.transmission import DOWN, Transmission, character_ticks
 from mirotwin.recording.capture.source import READ_ERRORS
 
 if TYPE_CHECKING:
     from miro_protocol.decoder import WindowDecoder
+    from miro_protocol.robot_receiver import Reception
 
 
 class Row(msgspec.Struct, frozen=True):
@@ -33,34 +33,35 @@ class Row(msgspec.Struct, frozen=True):
     unknown: str = ""
 
 
-class _Ear:
-    """Hears one direction of one network."""
+class _Decoding:
+    """Decodes one direction of one network."""
 
     def __init__(self, direction: str, network: int, layout: int) -> None:
-        from miro_protocol.decoder import Decoder, TelemetryDecoder
+        from miro_protocol.decoder import TelemetryDecoder
+        from miro_protocol.robot_receiver import RobotReceiver
 
         self.direction = direction
         self.network = network
         self.layout = layout
         self.step = character_ticks(direction)
-        self.decoder: WindowDecoder = Decoder(layout) if direction == DOWN else TelemetryDecoder()
-        self.freshness = Freshness()
+        self.robot = RobotReceiver(layout) if direction == DOWN else None
+        self.decoder: WindowDecoder = TelemetryDecoder() if self.robot is None else self.robot.decoder
         self.offset = 0
         self.end_tick = 0
 
     def hear(self, sent: Transmission) -> Iterator[Row]:
         self.end_tick = sent.end_tick
-        return self.rows(self.decoder.hear(sent))
+        return self.rows(self.robot.hear(sent) if self.robot else _answers(self.decoder.hear(sent)))
 
     def flush(self) -> Iterator[Row]:
-        return self.rows(self.decoder.flush())
+        return self.rows(self.robot.flush() if self.robot else _answers(self.decoder.flush()))
 
-    def rows(self, events: Iterable[Event]) -> Iterator[Row]:
-        for event in events:
-            yield self.row(event)
+    def rows(self, found: Iterable[Reception]) -> Iterator[Row]:
+        for event, fresh in found:
+            yield self.row(event, fresh)
             self.offset += len(event.data)
 
-    def row(self, event: Event) -> Row:
+    def row(self, event: Event, fresh: bool | None) -> Row:
         if not isinstance(event, Received):
             return Row(self.offset, self.direction, self.network, event)
         message, unknown = None, ""
@@ -68,8 +69,12 @@ class _Ear:
             message = event.message(self.layout)
         except ContentError as error:
             unknown = str(error)
-        fresh = self.freshness.judge(event.seq, event.last_tick) if self.direction == DOWN else None
         return Row(self.offset, self.direction, self.network, event, message, fresh, unknown)
+
+
+def _answers(events: Iterable[Event]) -> Iterator[Reception]:
+    """Freshness is of what robots receive."""
+    return ((event, None) for event in events)
 
 
 def rows(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator[Row]:
@@ -77,20 +82,20 @@ def rows(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator
 
     After a pause of two characters or more what came before it cannot become a frame any more: it is given out.
     """
-    ears: dict[tuple[int, str], _Ear] = {}
+    decodings: dict[tuple[int, str], _Decoding] = {}
     failure: Exception | None = None
     try:
         for one in sent:
             key = (one.network, one.direction)
-            if key not in ears:
-                ears[key] = _Ear(one.direction, one.network, layout(one.network))
-            for ear in ears.values():
-                if ear.decoder.pending and one.tick >= ear.end_tick + 2 * ear.step:
-                    yield from ear.flush()
-            yield from ears[key].hear(one)
+            if key not in decodings:
+                decodings[key] = _Decoding(one.direction, one.network, layout(one.network))
+            for other in decodings.values():
+                if other.decoder.pending and one.tick >= other.end_tick + 2 * other.step:
+                    yield from other.flush()
+            yield from decodings[key].hear(one)
     except READ_ERRORS as error:  # what is pending comes first
         failure = error
-    for ear in ears.values():
-        yield from ear.flush()
+    for decoding in decodings.values():
+        yield from decoding.flush()
     if failure is not None:
         raise failure

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import msgspec
 
 from miro_exact.clock import CHARACTER_BITS, HOST_CHARACTER_TICKS, ROBOT_BIT_TICKS, ticks
-from miro_protocol.decoder import Damaged, Decoder, Received
+from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ContentError, describe
-from miro_protocol.freshness import Freshness
+from miro_protocol.robot_receiver import Reception, RobotReceiver
 from miro_protocol.robot_rules import TO_RI_TICKS
 from miro_protocol.table import TELEMETRY
 from miro_protocol.transmission import DOWN, Transmission
@@ -46,46 +47,40 @@ class Mark(msgspec.Struct, frozen=True):
     text: str
 
 
-class Heard(msgspec.Struct, frozen=True):
+class Arrival(NamedTuple):
     """Characters at a robot, by their ticks: a valid frame (`fresh` or not), or none (`fresh` None)."""
 
     ticks: tuple[int, ...]
     fresh: bool | None
 
 
-class Ear:
-    """Decodes what a robot's serial port delivers, and keeps when each character came."""
+class Arrivals:
+    """What a robot's serial port delivers, and when each character came."""
 
     def __init__(self, robots: int) -> None:
-        self.heard: list[Heard] = []
+        self.all: list[Arrival] = []
         self._robots = robots
         self._ticks: list[int] = []
-        self.restart()
+        self._receiver = RobotReceiver(robots)
 
     def restart(self) -> None:
-        """The robot begins anew, and knows nothing of before."""
+        """The robot begins again, and knows nothing of before."""
         self.flush()
-        self._decoder, self._freshness = Decoder(self._robots), Freshness()
+        self._receiver = RobotReceiver(self._robots)
 
     def take(self, received: Event) -> None:
-        tick = received.tick - TO_RI_TICKS
-        self._ticks.append(tick)
-        self._note(self._decoder.feed_symbols([(received.value, received.good_stop, tick)]))
+        self._ticks.append(received.tick - TO_RI_TICKS)
+        self._note(self._receiver.character(received.value, received.good_stop, received.tick))
 
     def flush(self) -> None:
         """Nothing more comes."""
-        if self._ticks:
-            self._note(self._decoder.flush())
+        self._note(self._receiver.flush())
 
-    def _note(self, found: Sequence[Received | Damaged]) -> None:
+    def _note(self, found: Sequence[Reception]) -> None:
         """Every character belongs to one event, in the order in which they came."""
-        for one in found:
-            fresh = None
-            if isinstance(one, Received):
-                fresh = self._freshness.judge(one.seq, one.last_tick)
-            ticks_of = tuple(self._ticks[: len(one.data)])
+        for one, fresh in found:
+            self.all.append(Arrival(tuple(self._ticks[: len(one.data)]), fresh))
             del self._ticks[: len(one.data)]
-            self.heard.append(Heard(ticks_of, fresh))
 
 
 class LinkLog:
@@ -97,12 +92,12 @@ class LinkLog:
         self._at_pc: dict[int, list[Event]] = {network.index: [] for network in world.networks}
         self._pc_read = {network.index: network.log.end for network in world.networks}
         self._board_read: dict[tuple[int, int], int] = {}
-        self._ears: dict[tuple[int, int], Ear] = {}
+        self._arrivals: dict[tuple[int, int], Arrivals] = {}
         for network in world.networks:
             for robot in network.robots:
                 place = (network.index, robot.slot)
                 self._board_read[place] = robot.board.log.end
-                self._ears[place] = Ear(network.spec.robots)
+                self._arrivals[place] = Arrivals(network.spec.robots)
         world.observers.append(self.look)
 
     def look(self, period: Period) -> None:
@@ -123,9 +118,9 @@ class LinkLog:
         received = [event for event in events if event.what == "received"]
         for event in sorted([*received, *restarts], key=lambda event: event.tick):
             if event.what in RESTARTS:
-                self._ears[place].restart()
+                self._arrivals[place].restart()
             else:
-                self._ears[place].take(event)
+                self._arrivals[place].take(event)
 
     def marks(self) -> list[Mark]:
         """All marks, lane by lane, in the order of time."""
@@ -138,10 +133,10 @@ class LinkLog:
             delay = ticks(network.spec.radio.latency_s)
             found += [_sent(one, name) for one, name in zip(sent, named, strict=True)]
             for robot in network.robots:
-                ear = self._ears[index, robot.slot]
-                ear.flush()
+                arrivals = self._arrivals[index, robot.slot]
+                arrivals.flush()
                 lane = f"net{index}/robot{robot.slot} hears"
-                found += _fates(lane, sent, named, ear.heard, delay, self.world.tick)
+                found += _fates(lane, sent, named, arrivals.all, delay, self.world.tick)
             found += _answers(heard, self._at_pc[index], index)
             found += [_action(event) for event in self._at_pc[index] if event.what != "answer"]
         return found
@@ -176,7 +171,7 @@ def _fates(
     lane: str,
     sent: Sequence[Transmission],
     named: Sequence[str],
-    heard: Sequence[Heard],
+    arrivals: Sequence[Arrival],
     delay: int,
     over_tick: int,
 ) -> list[Mark]:
@@ -186,7 +181,7 @@ def _fates(
     damaged: dict[int, int] = {}  # transmission -> characters of it in no frame
     frames: dict[int, bool] = {}  # ... -> whether the frame was fresh
     marks = []
-    for one in heard:
+    for one in arrivals:
         if one.fresh is not None:
             frames[bisect_right(begins, one.ticks[-1]) - 1] = one.fresh
             continue

@@ -1,40 +1,27 @@
-"""What a robot's receiver heard: its characters as valid frames, fresh or not, and as damage.
+"""What a robot received as events: valid frames, fresh or not, and damage.
 
-Characters are those that the robot's own serial port delivered, so radio noise is in them already. The port sets RI in
-the stop bit; the rules count from the start bit.
+Characters are those that the robot's own serial port delivered, so radio noise is in them already.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from miro_protocol.decoder import Decoder, Received
-from miro_protocol.freshness import Freshness
-from miro_protocol.robot_rules import TO_RI_TICKS
+from miro_protocol.events import Received
+from miro_protocol.robot_receiver import RobotReceiver
 from miro_sim.world.events import Event
 
 
-class Hearing:
-    """The frames that robot `slot` of `network` hears, in a network of `robots`."""
-
-    def __init__(self, network: int, slot: int, robots: int) -> None:
-        self.network = network
-        self.slot = slot
-        self.decoder = Decoder(robots)
-        self.freshness = Freshness()
-
-    def take(self, received: Event) -> Iterator[Event]:
-        """The `frame` and `damaged` events that a `received` one completes, at its tick."""
-        symbol = (received.value, received.good_stop, received.tick - TO_RI_TICKS)
-        for found in self.decoder.feed_symbols([symbol]):
-            frame = found if isinstance(found, Received) else None
-            fresh = frame is not None and self.freshness.judge(frame.seq, frame.last_tick)
-            yield Event(
-                tick=received.tick,
-                what="damaged" if frame is None else "frame",
-                network=self.network,
-                slot=self.slot,
-                value=int(fresh),
-                data=found.data,
-                frame=frame,
-            )
+def receptions(receiver: RobotReceiver, received: Event) -> Iterator[Event]:
+    """The `frame` and `damaged` events that a `received` one completes, at its tick."""
+    for found, fresh in receiver.character(received.value, received.good_stop, received.tick):
+        frame = found if isinstance(found, Received) else None
+        yield Event(
+            tick=received.tick,
+            what="damaged" if frame is None else "frame",
+            network=received.network,
+            slot=received.slot,
+            value=int(bool(fresh)),
+            data=found.data,
+            frame=frame,
+        )

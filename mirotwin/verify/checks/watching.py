@@ -22,13 +22,14 @@ from typing import Any, TypeVar
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.parts import PartError
 from miro_host.raised import raised
+from miro_protocol.robot_receiver import RobotReceiver
 from miro_sim.periods import Period
 from miro_sim.world.events import Event, of_board
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
 from mirotwin.verify.checks.expect import Place, expectations_of
-from mirotwin.verify.checks.hearing import Hearing
+from mirotwin.verify.checks.hearing import receptions
 from mirotwin.verify.checks.interface import Check, Expectation, Failure, FirstFailure, Judge, Subject
 from mirotwin.verify.checks.judges import checked_judge
 
@@ -134,9 +135,9 @@ class _Watched:
         for judge in self.judges:
             for what in judge.HEARS:
                 self.of_events.setdefault(what, []).append(judge)
-        self.hearing: Hearing | None = None
+        self.receiver: RobotReceiver | None = None
         if any(what in self.of_events for what in _FROM_RECEIVED):
-            self.hearing = Hearing(network.index, robot.slot, network.spec.robots)
+            self.receiver = RobotReceiver(network.spec.robots)
         self.hears_board = any(what not in _FROM_PC for what in self.of_events)
         self.hears_pc = bool(self.of_events)
         self.hears_characters = "heard" in self.of_events
@@ -196,16 +197,16 @@ class _Watched:
             if event.what in _RESTARTS:
                 self._restart(event.tick)
             self._tell_one(event)
-            if event.what == "received" and self.hearing is not None:
-                for heard in self.hearing.take(event):
+            if event.what == "received" and self.receiver is not None:
+                for heard in receptions(self.receiver, event):
                     self._tell_one(heard)
         del self.waiting[:told]
         for judge in self.of_times:
             self._guarded(judge.check, partial(judge.until, tick))
 
     def _restart(self, tick: int) -> None:
-        if self.hearing is not None:
-            self.hearing = Hearing(self.network.index, self.robot.slot, self.network.spec.robots)
+        if self.receiver is not None:
+            self.receiver = RobotReceiver(self.network.spec.robots)
         for judge in self.judges:
             self._guarded(judge.check, partial(judge.restarted, tick))
 
