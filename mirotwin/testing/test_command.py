@@ -10,7 +10,7 @@ import click
 
 from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
-from mirotwin.report.junit import TestCase, junit_xml
+from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import (
     Place,
     Whole,

@@ -13,6 +13,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.seed import MAX_SEED
 from miro_robot.image import Image
 from mirotwin.shell.console import show
+from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, load_image, stack_option
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, complain, show_line
@@ -21,10 +22,9 @@ from mirotwin.verify.cases.artifacts import FIRMWARE, IMAGE_FILES, leave_image, 
 from mirotwin.verify.cases.case import write_case
 from mirotwin.verify.conform.causes import begin_with, causes_first, folded
 from mirotwin.verify.conform.explain import explain
-from mirotwin.verify.conform.junit import junit as as_junit
 from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.run import Outcome, case_names, failure_text, try_all, with_faults
-from mirotwin.verify.conform.table import ALL, LONG, RULES, find
+from mirotwin.verify.conform.table import ALL, LONG, RULES, chapter_of, find
 
 LINES = 5
 """Firmware faults that are listed."""
@@ -114,7 +114,7 @@ def conform(
     if junit is not None:
         properties = {"firmware": firmware.path.name, "firmware_sha256": firmware.sha256, "seed": f"{seed}"}
         with whole_file(junit, "--junit") as part:
-            part.write_bytes(as_junit(outcomes, rules, properties))
+            part.write_bytes(junit_xml("mirotwin conform", _test_cases(outcomes, rules), properties))
     if as_json:
         _print_json(outcomes)
     else:
@@ -159,6 +159,23 @@ def _list(rules: Sequence[Rule], as_json: bool) -> None:
     for rule in rules:
         table.add_row(rule.id, rule.name, rule.text)
     show(table)
+
+
+def _test_cases(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[TestCase]:
+    """One a rule, without times: the same image gives the same bytes."""
+    by_id = {rule.id: rule for rule in rules}
+    cases = []
+    for outcome in outcomes:
+        rule = by_id[outcome.rule]
+        case = TestCase(f"{rule.id} {rule.name}", f"conform.{chapter_of(rule).title}")
+        if outcome.cause:
+            because = f"not judged: {outcome.cause} failed, {find(outcome.cause).broken}"
+            case = msgspec.structs.replace(case, verdict="skipped", lines=(because,))
+        elif outcome.failures:
+            lines = (*map(failure_text, outcome.failures), rule.text, f"({rule.source})")
+            case = msgspec.structs.replace(case, verdict="failure", lines=lines)
+        cases.append(case)
+    return cases
 
 
 def _print_json(outcomes: Sequence[Outcome]) -> None:

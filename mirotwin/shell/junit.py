@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
 from xml.etree import ElementTree
 
 import msgspec
@@ -12,24 +13,24 @@ from miro_exact.bad_input import one_line
 
 
 class TestCase(msgspec.Struct, frozen=True):
-    """One test. `failure`: what was wanted is not so; `error`: it could not be judged. `lines`: all there is to say."""
+    """One test. `failure`: what was wanted is not so; `error`: it could not be judged. `lines`: all there is to say;
+    the first one is the message. `time_s` None: nothing about times, so the same verdicts give the same bytes.
+    """
 
     __test__ = False
 
     name: str
     classname: str
-    time_s: float
+    time_s: float | None = None
     verdict: Literal["passed", "failure", "error", "skipped"] = "passed"
     lines: Sequence[str] = ()
     properties: Mapping[str, str] = {}
 
 
-def junit_xml(suite: str, cases: Sequence[TestCase]) -> bytes:
-    """The file's content."""
+def junit_xml(suite: str, cases: Sequence[TestCase], properties: Mapping[str, str] = {}) -> bytes:
+    """The file's content. `properties`: of the whole suite."""
     verdicts = [case.verdict for case in cases]
-    time_s = 0.0
-    for case in cases:
-        time_s += case.time_s
+    times_s = [case.time_s for case in cases if case.time_s is not None]
     top = ElementTree.Element("testsuites")
     within = ElementTree.SubElement(
         top,
@@ -39,20 +40,18 @@ def junit_xml(suite: str, cases: Sequence[TestCase]) -> bytes:
         failures=str(verdicts.count("failure")),
         errors=str(verdicts.count("error")),
         skipped=str(verdicts.count("skipped")),
-        time=f"{time_s:.3f}",
+        **_time(math.fsum(times_s) if times_s else None),
     )
+    _properties(within, properties)
     for case in cases:
         one = ElementTree.SubElement(
             within,
             "testcase",
             classname=_clean(case.classname),
             name=_clean(case.name),
-            time=f"{case.time_s:.3f}",
+            **_time(case.time_s),
         )
-        if case.properties:
-            listed = ElementTree.SubElement(one, "properties")
-            for name, value in case.properties.items():
-                ElementTree.SubElement(listed, "property", name=name, value=_clean(value))
+        _properties(one, case.properties)
         if case.verdict != "passed":
             message = _clean(case.lines[0]) if case.lines else case.verdict
             said = ElementTree.SubElement(one, case.verdict, message=message)
@@ -62,6 +61,17 @@ def junit_xml(suite: str, cases: Sequence[TestCase]) -> bytes:
     ElementTree.indent(top)
     content: bytes = ElementTree.tostring(top, encoding="utf-8", xml_declaration=True)
     return content + b"\n"
+
+
+def _time(time_s: float | None) -> dict[str, Any]:
+    return {} if time_s is None else {"time": f"{time_s:.3f}"}
+
+
+def _properties(within: ElementTree.Element, properties: Mapping[str, str]) -> None:
+    if properties:
+        listed = ElementTree.SubElement(within, "properties")
+        for name, value in properties.items():
+            ElementTree.SubElement(listed, "property", name=name, value=_clean(value))
 
 
 def _clean(text: str) -> str:
