@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import argparse
 import os
+import resource
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -26,6 +28,11 @@ WORKER = Path(__file__).with_name("against_worker.py")
 SLOW_PAIRS = 11
 """Pairs of whole commands, which take a second each."""
 MEMORY_PAIRS = 3
+INSTALL_PAIRS = 1
+"""Compiling takes minutes, so it is done once, cold."""
+NOT_COPIED = shutil.ignore_patterns(
+    ".git", ".venv", "build", "runs", "*.so", "*.pyd", "__pycache__", "*.egg-info"
+)
 
 COMMAND = """
 import sys
@@ -34,6 +41,7 @@ sys.argv[0] = "mirotwin"
 from mirotwin.entry import main
 sys.exit(main())
 """
+GROUPS = ("loop", "teams", "harness", "world", "state", "shell", "install", "memory")
 SLOW_SPEED = "speed_m_s = 0.005"  # stays on the pitch for three minutes
 
 
@@ -61,7 +69,7 @@ class Side:
         """Processor seconds of `task` in the worker, and its result."""
         if self._worker is None:
             self._worker = subprocess.Popen(
-                [sys.executable, "-P", str(WORKER)],
+                [sys.executable, "-P", str(WORKER), str(self.tree.folder)],
                 env=self.tree.environment(),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
@@ -100,6 +108,21 @@ class Side:
         """`mirotwin run fig6` from shell to prompt."""
         return self.processor_s("run", "fig6", "--out", str(self.folder / "run"), "--force", "-q", *options)
 
+    def report(self) -> tuple[float, str]:
+        """`mirotwin report` of the run that was made last."""
+        return self.processor_s("report", str(self.folder / "run"))
+
+    def compile(self) -> tuple[float, str]:
+        """Processor seconds of compiling everything, in a copy of the tree that has nothing compiled."""
+        copy = Path(tempfile.mkdtemp(dir=self.folder))
+        shutil.copytree(self.tree.folder, copy, ignore=NOT_COPIED, dirs_exist_ok=True)
+        line = [sys.executable, "setup.py", "-q", "build_ext", "--inplace"]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(line, cwd=copy, capture_output=True, check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        shutil.rmtree(copy)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, ""
+
     def peak_bytes(self, duration_s: int) -> tuple[float, str]:
         """Most memory that a slow run of `duration_s` occupies."""
         scenario = self.folder / f"slow{duration_s}.toml"
@@ -128,10 +151,15 @@ class Side:
 def tasks(pairs: int) -> list[Task]:
     """The lines of the table."""
     slow, ms, us = min(pairs, SLOW_PAIRS), ("ms", 1e3), ("us", 1e6)
-    few, mb = min(pairs, MEMORY_PAIRS), ("MB", 1e-6)
+    few, mb, once = min(pairs, MEMORY_PAIRS), ("MB", 1e-6), min(pairs, INSTALL_PAIRS)
     return [
-        Task("loop", "fig6, loop, recorded", ms, pairs, lambda side: side.ask("recorded")),
-        Task("loop", "fig6, loop, not recorded", ms, pairs, lambda side: side.ask("unrecorded")),
+        Task("loop", "fig6 pixels, recorded", ms, pairs, lambda side: side.ask("recorded_pixels")),
+        Task("loop", "fig6 pixels, not recorded", ms, pairs, lambda side: side.ask("unrecorded_pixels")),
+        Task("loop", "fig6 gaussian, recorded", ms, pairs, lambda side: side.ask("recorded")),
+        Task("loop", "fig6 gaussian, not recorded", ms, pairs, lambda side: side.ask("unrecorded")),
+        Task("teams", "two_teams pixels, a period", ms, slow, lambda side: side.ask("two_teams")),
+        Task("harness", "harness, 8 random bytes", us, pairs, lambda side: side.ask("harness_bytes")),
+        Task("harness", "harness, one accepted frame", us, pairs, lambda side: side.ask("harness_frame")),
         Task("world", "World()", ms, pairs, lambda side: side.ask("construction")),
         Task("world", "load_hex of a known image", ms, pairs, lambda side: side.ask("known_image")),
         Task("state", "World.save", us, pairs, lambda side: side.ask("save")),
@@ -143,6 +171,9 @@ def tasks(pairs: int) -> list[Task]:
         Task("shell", "mirotwin --help", ms, slow, lambda side: side.processor_s("--help")),
         Task("shell", "mirotwin run fig6", ms, slow, lambda side: side.run()),
         Task("shell", "  with --no-figure, if it has it", ms, slow, lambda side: side.run(*side.no_figure)),
+        Task("shell", "mirotwin conform", ms, slow, lambda side: side.processor_s("conform")),
+        Task("shell", "mirotwin report of that run", ms, slow, lambda side: side.report()),
+        Task("install", "compiling everything", ("s", 1.0), once, lambda side: side.compile()),
         Task("memory", "peak memory of a 6 s run", mb, few, lambda side: side.peak_bytes(6)),
         Task("memory", "peak memory of a 180 s run", mb, few, lambda side: side.peak_bytes(180)),
     ]
@@ -151,7 +182,7 @@ def tasks(pairs: int) -> list[Task]:
 def in_pairs(task: Task, other: Side, own: Side) -> tuple[list[tuple[float, float]], bool]:
     """(other, own) of each pair, begun by each side in turn, and whether all results were equal."""
     found, results = [], {}
-    for side in (other, own):  # once for nothing: caches, first imports
+    for side in (other, own) if task.pairs > 1 else ():  # once for nothing: caches, first imports
         results[task.measure(side)[1]] = True
     for pair in range(task.pairs):
         first, second = (other, own) if pair % 2 == 0 else (own, other)
@@ -178,7 +209,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("commit", help="what this tree is compared with")
     parser.add_argument("--pairs", type=int, default=41, help="measurements of each side (default 41)")
-    parser.add_argument("--only", default="", help="groups, by commas: loop, world, state, shell, memory")
+    parser.add_argument("--only", default="", help=f"groups, by commas: {', '.join(GROUPS)}")
     arguments = parser.parse_args()
     groups = {name for name in arguments.only.split(",") if name}
     chosen = [task for task in tasks(arguments.pairs) if not groups or task.group in groups]

@@ -14,9 +14,15 @@ from copy import copy
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import cycle
+from pathlib import Path
 from typing import Any
 
 SCENARIO = "fig6"
+GAUSSIAN = 'camera={kind="gaussian"}'
+TEAMS_PERIODS = 60
+"""Control periods of two teams: two simulated seconds."""
+FRAME = bytes([0, 0x64, 0, 0x9C, 0xFF]) + bytes(8)
+"""A team frame as the fuzzer's target `frames` reads it; the firmware accepts it."""
 MANY = 200
 """Executions of a task that takes microseconds."""
 WARM_PERIODS = 30
@@ -26,8 +32,9 @@ NEW = {
     "recording": "mirotwin.recording.recorder",
     "scenario": "miro_sim.scenario.file",
     "world": "miro_sim.world.world",
+    "fuzz": "mirotwin.fuzz.target",
 }
-OLD = {**NEW, "runner": "mirotwin.rerun.runner"}
+OLD = {**NEW, "runner": "mirotwin.runner"}
 """Before `mirotwin` became a top folder."""
 
 
@@ -41,35 +48,60 @@ def without_editable_installs() -> None:
 class Tasks:
     """What is measured. Each method returns (processor seconds of one execution, result to compare)."""
 
-    def __init__(self) -> None:
+    def __init__(self, folder: Path) -> None:
         layout = NEW if find_spec("mirotwin.rerun") else OLD
         self.parts: dict[str, Any] = {name: import_module(module) for name, module in layout.items()}
         self.load_hex = import_module("miro_robot.image").load_hex
         self.image_path = import_module("miro_robot.firmware").image_path
         load = self.parts["scenario"].load
-        self.text = load(SCENARIO)
-        if 'kind = "pixels"' in self.text.text:  # the same run as in trees that had no pictures yet
-            self.text = load(SCENARIO, ('camera={kind="gaussian"}',))
+        self.pixels, self.gaussian = load(SCENARIO), load(SCENARIO, (GAUSSIAN,))
+        self.teams = load(str(folder / "examples" / "two_teams.toml"))
         self.image = self.load_hex(self.image_path())
         self.warm: Any = self.new_world()
         for _ in range(WARM_PERIODS):
             self.warm.step()
+        target_for = self.parts["fuzz"].target_for
+        draws = import_module("miro_exact.rng").Stream(1997, "benchmarks.fuzz")
+        self.random = [bytes(draws.u32(8 * one + place) & 0xFF for place in range(8)) for one in range(64)]
+        self.bytes, self.frames = target_for(self.image, "bytes"), target_for(self.image, "frames")
 
-    def new_world(self) -> Any:
-        return self.parts["world"].World(self.text.scenario, 0, self.image)
+    def new_world(self, text: Any = None) -> Any:
+        return self.parts["world"].World((text or self.gaussian).scenario, 0, self.image)
 
     def recorded(self) -> tuple[float, str]:
         """The loop over control periods with the default recording into memory."""
-        recording, world = self.parts["recording"], self.new_world()
-        source = recording.Source(
-            SCENARIO, self.text.text, 0, self.image.path.read_bytes(), self.image.sha256
-        )
+        return self._recorded(self.gaussian)
+
+    def recorded_pixels(self) -> tuple[float, str]:
+        return self._recorded(self.pixels)
+
+    def _recorded(self, text: Any) -> tuple[float, str]:
+        recording, world = self.parts["recording"], self.new_world(text)
+        source = recording.Source(SCENARIO, text.text, 0, self.image.path.read_bytes(), self.image.sha256)
         with recording.Recorder(io.BytesIO(), source) as recorder:
             return _timed(lambda: self.parts["runner"].run(world, recorder)), _ended(world)
 
     def unrecorded(self) -> tuple[float, str]:
         world = self.new_world()
         return _timed(lambda: self.parts["runner"].run(world)), _ended(world)
+
+    def unrecorded_pixels(self) -> tuple[float, str]:
+        world = self.new_world(self.pixels)
+        return _timed(lambda: self.parts["runner"].run(world)), _ended(world)
+
+    def two_teams(self) -> tuple[float, str]:
+        """A control period of six robots before two cameras."""
+        world = self.new_world(self.teams)
+        return _timed(world.step, TEAMS_PERIODS), _ended(world)
+
+    def harness_bytes(self) -> tuple[float, str]:
+        """The fuzzer's target with 8 random bytes."""
+        inputs = cycle(self.random)
+        return _timed(lambda: self.bytes.run(next(inputs)), MANY), ""
+
+    def harness_frame(self) -> tuple[float, str]:
+        """The fuzzer's target with a frame that the firmware accepts."""
+        return _timed(lambda: self.frames.run(FRAME), MANY), str(self.frames.accepted)
 
     def construction(self) -> tuple[float, str]:
         return _timed(self.new_world), ""
@@ -134,7 +166,7 @@ def _timed(work: Callable[[], object], times: int = 1) -> float:
 
 def main() -> None:
     without_editable_installs()
-    tasks = Tasks()
+    tasks = Tasks(Path(sys.argv[1]))
     print("ready", flush=True)
     for line in sys.stdin:
         elapsed_s, result = getattr(tasks, line.strip())()
