@@ -1,4 +1,4 @@
-"""The memory of a part, such as a law: declared in a table of attributes, checked after every step.
+"""The memory of a plug-in, such as a law: declared in a table of attributes, checked after every step.
 
     d    a finite float
     q    an int of 64 bits with sign
@@ -16,12 +16,12 @@ from typing import Any, ClassVar
 LARGEST = (1 << 63) - 1
 TYPES = {"d": "a finite float", "q": "an int of 64 bits", "?": "True or False"}
 LONGEST = 65536
-"""Items of one list. A part with more would make each period's digest slow."""
+"""Items of one list. A plug-in with more would make each period's digest slow."""
 
 
 class Remembering:
-    """A part with parameters and a memory. `STATE` declares the memory, attribute to type; `NOT_STATE` names what stays
-    as it was made.
+    """A plug-in with parameters and a memory. `STATE` declares the memory, attribute to type; `NOT_STATE` names what
+    stays as it was made.
     """
 
     STATE: ClassVar[Mapping[str, Any]] = {}

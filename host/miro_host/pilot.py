@@ -18,7 +18,7 @@ from miro_host.estimators.interface import DEAD_S, Estimate, Estimator, Estimato
 from miro_host.estimators.none import NoEstimator
 from miro_host.integrator import Integrator
 from miro_host.laws.interface import NOTHING, Accelerations, Answer, Law, LawInput, Velocities
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.raised import at_place, defined_at, described, raised_at
 from miro_host.references.interface import Trajectory
@@ -100,7 +100,7 @@ class Pilot:
     def update(self, measured: Posture | None, t_s: float, telemetry: LastTelemetry | None = None) -> Command:
         """One control period at `t_s` after the reference's start; `measured` and `telemetry` may be missing (None).
 
-        Raises PartError, and leaves integrator and command alone, when the law fails or answers what is no number.
+        Raises PluginError, and leaves integrator and command alone, when the law fails or answers what is no number.
         """
         z, units = self.integrator, self.wheels.units_per_m_s
         sent = self.command.left / units, self.command.right / units
@@ -141,7 +141,7 @@ class Pilot:
             if estimate is not None:
                 check_estimate(estimate, self.estimator.INNER)
             self.estimator.check_memory()
-        except PartError:  # of the reference, which the part may have asked
+        except PluginError:  # of the reference, which the plug-in may have asked
             raise
         except (Exception, SystemExit) as error:
             raise _failure("estimator", self.estimator, error) from error
@@ -153,7 +153,7 @@ class Pilot:
             answer = self.law.step(given)
             check_answer(answer, self.law.INNER)
             self.law.check_memory()
-        except PartError:  # of the reference, which the part may have asked
+        except PluginError:  # of the reference, which the plug-in may have asked
             raise
         except (Exception, SystemExit) as error:
             raise _failure("law", self.law, error) from error
@@ -182,15 +182,15 @@ class Pilot:
         )
 
 
-def _failure(word: str, part: Law[Any] | Estimator[Any], error: BaseException) -> PartError:
-    """What to raise for what a part raised: its name and the reason in one line."""
+def _failure(word: str, plugin: Law[Any] | Estimator[Any], error: BaseException) -> PluginError:
+    """What to raise for what a plug-in raised: its name and the reason in one line."""
     known = type(error) in (ValueError, DomainError)
     reason = str(error) if known else described(error)
-    place = raised_at(error) or defined_at(part.step)
-    what = f"{word} {part.parameters.name()!r} failed: {at_place(reason, place)}"
+    place = raised_at(error) or defined_at(plugin.step)
+    what = f"{word} {plugin.parameters.name()!r} failed: {at_place(reason, place)}"
     if isinstance(error, DomainError):
-        return PartError(what, "the parameters are far outside those of a real robot")
-    return PartError(what, f"mend the {word} or its parameters")
+        return PluginError(what, "the parameters are far outside those of a real robot")
+    return PluginError(what, f"mend the {word} or its parameters")
 
 
 def check_answer(answer: object, inner: tuple[str, ...]) -> None:

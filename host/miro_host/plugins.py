@@ -1,7 +1,7 @@
-"""Parts that a scenario names: the table of our own, and those that other distributions add by entry points.
+"""Plug-ins that a scenario names: the table of our own, and those that other distributions add by entry points.
 
-A part is chosen by a frozen `msgspec` struct of its parameters whose tag is the part's name. A distribution adds one in
-its `pyproject.toml`:
+A plug-in is chosen by a frozen `msgspec` struct of its parameters whose tag is the plug-in's name. A distribution adds
+one in its `pyproject.toml`:
 
     [project.entry-points."mirotwin.laws"]
     samson = "samson_law:Parameters"
@@ -18,22 +18,22 @@ from typing import Any, Generic, TypeVar
 from miro_exact.bad_input import BadInput
 from miro_host.raised import raised
 
-Part = TypeVar("Part")
+Plugin = TypeVar("Plugin")
 
 
-class PartError(BadInput):
-    """A part that cannot be found, loaded or used: `what` and `remedy`."""
+class PluginError(BadInput):
+    """A plug-in that cannot be found, loaded or used: `what` and `remedy`."""
 
     def __init__(self, what: str, remedy: str = "") -> None:
         super().__init__("", "", what, remedy)
 
 
-class Registry(Generic[Part]):
-    """Parts of one kind.
+class Registry(Generic[Plugin]):
+    """Plug-ins of one kind.
 
-    `group` is the name of the entry points, `word` what a message calls a part, `key` the scenario key that names it,
-    `base` the struct that all structs of parameters derive from (`module:class`), `own` our table: name to
-    `module:class`. `default` is the part of a table that does not say its name, if there is one.
+    `group` is the name of the entry points, `word` what a message calls a plug-in, `key` the scenario key that names
+    it, `base` the struct that all structs of parameters derive from (`module:class`), `own` our table: name to
+    `module:class`. `default` is the plug-in of a table that does not say its name, if there is one.
     """
 
     def __init__(
@@ -63,24 +63,26 @@ class Registry(Generic[Part]):
         found = {entry.name for entry in entry_points(group=self.group)}
         return [*self.own, *sorted(found.difference(self.own))]
 
-    def find(self, name: str) -> type[Part]:
-        """The struct of parameters of the part `name`. Raises PartError with the reason in one line."""
+    def find(self, name: str) -> type[Plugin]:
+        """The struct of parameters of the plug-in `name`. Raises PluginError with the reason in one line."""
         if name in self.own:
             return self._checked(_loaded(self.own[name]), name, self.own[name])
         from importlib.metadata import entry_points
 
         entries = list(entry_points(group=self.group, name=name))
         if not entries:
-            raise PartError(f"{name!r} is not one of the choices", self._choices(name))
+            raise PluginError(f"{name!r} is not one of the choices", self._choices(name))
         sources = [_source(entry) for entry in entries]
         if len(entries) > 1:
-            raise PartError(f"{self.word} {name!r} is in {' and in '.join(sources)}", "uninstall one of them")
+            raise PluginError(
+                f"{self.word} {name!r} is in {' and in '.join(sources)}", "uninstall one of them"
+            )
         place = f"{entries[0].value}, from {sources[0]}"
         try:
             found = entries[0].load()
         except (Exception, SystemExit) as error:
             what = f"{self.word} {name!r} ({place}) cannot be imported: {raised(error)}"
-            raise PartError(what, f"repair or uninstall {sources[0]}") from error
+            raise PluginError(what, f"repair or uninstall {sources[0]}") from error
         return self._checked(found, name, place)
 
     def _choices(self, name: str) -> str:
@@ -90,17 +92,17 @@ class Registry(Generic[Part]):
         choices = f"use {', '.join(others)} or {last}" if others else f"use {last}"
         return f"did you mean {close[0]}? {choices}" if close else choices
 
-    def _checked(self, found: Any, name: str, place: str) -> type[Part]:
-        """`found` if it is a struct of parameters as this kind of part needs it."""
-        part = f"{self.word} {name!r} ({place})"
+    def _checked(self, found: Any, name: str, place: str) -> type[Plugin]:
+        """`found` if it is a struct of parameters as this kind of plug-in needs it."""
+        found_as = f"{self.word} {name!r} ({place})"
         if not (isinstance(found, type) and issubclass(found, _loaded(self.base))):
-            raise PartError(f"{part} is not a struct of parameters", f"derive it from {self.base}")
+            raise PluginError(f"{found_as} is not a struct of parameters", f"derive it from {self.base}")
         struct: Any = found
         config = struct.__struct_config__
         if config.tag != name or config.tag_field != self.key:
-            raise PartError(f"{part} has the tag {config.tag!r}", f"give the class tag={name!r}")
+            raise PluginError(f"{found_as} has the tag {config.tag!r}", f"give the class tag={name!r}")
         if not (config.frozen and config.forbid_unknown_fields):
-            raise PartError(f"{part} can change, or takes unknown keys", "give the class frozen=True")
+            raise PluginError(f"{found_as} can change, or takes unknown keys", "give the class frozen=True")
         return found
 
 

@@ -202,7 +202,7 @@ class Campaign:
             self.reached_by = self.finds.leave("covering", self.covering.name, data, stream, counts)
 
     def _judge(self, data: bytes) -> None:
-        """What the checks in Python say of it. Raises PartError where one raises."""
+        """What the checks in Python say of it. Raises PluginError where one raises."""
         began_s = time.monotonic()
         try:
             self.judged += 1

@@ -16,7 +16,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.seed import MAX_SEED
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import Image
 from miro_sim.scenario.file import changed
@@ -265,12 +265,12 @@ def _run(campaign: Campaign, image: Image, asked: Asked) -> int:
             left = campaign.finish(
                 progress.show, INTERRUPTED_S if isinstance(error, KeyboardInterrupt) else 1.0
             )
-        except PartError as error:
+        except PluginError as error:
             stopped = BadInput("", "--expect", f"{error.what}; the campaign has ended", error.remedy)
             stopped.__cause__ = error
         except BadInput as error:  # of the engine: what was found until then is told first
             stopped = error
-            with suppress(BadInput, PartError):
+            with suppress(BadInput, PluginError):
                 left = campaign.finish(progress.show, INTERRUPTED_S)
     ended = Ended(left=left, complete=stopped is None, checks=asked.checks)
     code = report(campaign, image, asked.out, asked.covering, ended, asked.quiet)

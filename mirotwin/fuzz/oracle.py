@@ -62,7 +62,7 @@ class Court(Protocol):
         ...
 
     def judged(self, target: Target, data: bytes, expected: Expected) -> Judgement:
-        """Judges an input by these checks, and by those that are always on. Raises PartError where one raises."""
+        """Judges an input by these checks, and by those that are always on. Raises PluginError where one raises."""
         ...
 
     def stream(self, target: Target, data: bytes) -> str:
@@ -104,7 +104,7 @@ def expected_of(check: str) -> dict[str, Any]:
 def judge(place: Place, heard: Sequence[ScriptItem], expected: Expected, last_tick: int = 0) -> Judgement:
     """What the checks say of a robot that hears this from power-on. `last_tick`: the run goes on beyond it at least.
 
-    Raises PartError where a check raises.
+    Raises PluginError where a check raises.
     """
     world, trace, checks = _played(place, heard, expected, last_tick)
     if not checks.failures:

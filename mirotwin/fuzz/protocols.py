@@ -7,7 +7,7 @@ import tomllib
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_host.parts import PartError, Registry
+from miro_host.plugins import PluginError, Registry
 from miro_host.raised import raised
 from miro_protocol.protocol import Protocol
 
@@ -26,7 +26,7 @@ def protocol_named(text: str) -> Protocol:
     name, _, parameters = text.partition(":")
     try:
         found = PROTOCOLS.find(name)
-    except PartError as error:
+    except PluginError as error:
         raise BadInput("", OPTION, error.what, error.remedy) from error
     try:
         given = tomllib.loads(f"given = {{{parameters}}}")["given"]

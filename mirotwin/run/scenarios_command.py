@@ -7,7 +7,7 @@ import click
 from rich.table import Table
 
 from miro_exact.bad_input import shortened
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as radio_profiles
 from miro_sim.scenario import variants as scenario_variants
@@ -109,7 +109,7 @@ def checks() -> None:
     for name in CHECKS.names():
         try:
             struct = struct_of(name)
-        except PartError as error:
+        except PluginError as error:
             table.add_row(name, error.what, "")
             continue
         keys = [f"{key}*" if key == struct.MAIN else key for key in struct.__struct_encode_fields__]

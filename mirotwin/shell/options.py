@@ -17,7 +17,7 @@ from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput, shortened
 from miro_exact.domain import DomainError
 from miro_exact.inputs import TEXT_BYTES, check_regular
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from miro_robot.image.symbols import STACK
@@ -156,5 +156,5 @@ def plain_parameters(label: str, done: str = "run") -> Iterator[None]:
     except DomainError as error:
         what = f"cannot be {done}: {error}; the parameters are far outside those of a real robot"
         raise BadInput(label, "", what) from None
-    except PartError as error:
+    except PluginError as error:
         raise BadInput(label, "", f"cannot be {done}: {error.what}", error.remedy) from error

@@ -14,8 +14,8 @@ from miro_host.estimators.predict import PredictParameters, moved
 from miro_host.estimators.registry import ESTIMATORS
 from miro_host.laws.kanayama import KanayamaParameters
 from miro_host.laws.yang_kim import Gains
-from miro_host.parts import PartError
 from miro_host.pilot import PERIOD_S, Pilot
+from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.references.line import Line
 from miro_host.wheels import Wheels
@@ -121,7 +121,7 @@ class Answering(Estimator[Odd]):
 def test_an_estimator_that_fails_is_named(answer, reason):
     one = Pilot(Line(), Gains().law(), estimator=Odd(answer).estimator())
     with pytest.raises(
-        PartError,
+        PluginError,
         match=rf"estimator 'odd' failed: .*{reason} \(.*:\d+ in Answering.step\); mend the estimator",
     ):
         one.update(HERE, 0.0)
@@ -176,5 +176,5 @@ def test_values_that_an_estimator_names_go_with_the_command_and_are_saved():
 
 @pytest.mark.parametrize("wrong", [{"left": 0.0}, {"right": 2.5}, {"left": math.nan}, {"named": "b"}])
 def test_an_estimator_with_odd_wheels_or_other_names_is_named(wrong):
-    with pytest.raises(PartError, match="estimator 'knowing' failed: "):
+    with pytest.raises(PluginError, match="estimator 'knowing' failed: "):
         steered(**wrong)

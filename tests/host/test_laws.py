@@ -11,8 +11,8 @@ from miro_exact.state import restore, snapshot, values
 from miro_host.integrator import Integrator, Limits
 from miro_host.laws.interface import Law, LawParameters, Velocities
 from miro_host.laws.yang_kim import Gains
-from miro_host.parts import PartError
 from miro_host.pilot import PERIOD_S, Pilot
+from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.references.line import Line
 from miro_host.telemetry_receiver import LastTelemetry
@@ -119,7 +119,7 @@ def test_a_law_that_fails_is_named_and_leaves_the_command_as_it_was(how, reason)
     one = pilot(Wrong(WrongParameters(how=how)))
     before = one.update(HERE, 0.0)
     with pytest.raises(
-        PartError, match=rf"law 'wrong' failed: {reason} \(.*own_laws.py:\d+ in Wrong.step\); mend the law"
+        PluginError, match=rf"law 'wrong' failed: {reason} \(.*own_laws.py:\d+ in Wrong.step\); mend the law"
     ):
         one.update(HERE, PERIOD_S)
     assert one.command == before
@@ -154,7 +154,7 @@ def test_a_saved_command_that_no_pilot_gave_is_refused(command, reason):
 
 def test_numbers_far_from_any_robots_are_not_called_a_mistake_of_the_law():
     one = pilot(Gains().law())
-    with pytest.raises(PartError, match=r"law 'yang_kim' failed: angle .*; the parameters are far outside"):
+    with pytest.raises(PluginError, match=r"law 'yang_kim' failed: angle .*; the parameters are far outside"):
         one.update(Posture(0.0, 0.0, 1e300), 1.0)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from miro_host.laws.registry import LAWS
 from miro_host.laws.yang_kim import Gains
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from tests import children
 from tests.host.distribution import install
 
@@ -38,7 +38,7 @@ def site(tmp_path, monkeypatch):
 
 
 def reason(name):
-    with pytest.raises(PartError) as caught:
+    with pytest.raises(PluginError) as caught:
         LAWS.find(name)
     assert "\n" not in str(caught.value)
     return str(caught.value)

@@ -11,7 +11,7 @@ from miro_exact.state import snapshot
 from miro_host.estimators.predict import PredictParameters
 from miro_host.laws.interface import Law, LawInput, LawParameters, Velocities
 from miro_host.laws.yang_kim import Gains
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import load, parse
@@ -150,7 +150,7 @@ def test_a_saved_world_of_another_law_is_refused():
 def test_a_law_that_fails_names_robot_and_tick_and_leaves_no_nan_in_the_state():
     one = world(WrongParameters(how="nan"))
     with pytest.raises(
-        PartError, match=r"net0/robot0: tick 1601600 \(0.066733 s\): law .wrong. failed: .* = nan"
+        PluginError, match=r"net0/robot0: tick 1601600 \(0.066733 s\): law .wrong. failed: .* = nan"
     ):
         finish(one)
     assert snapshot(one)

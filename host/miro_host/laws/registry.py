@@ -3,7 +3,7 @@
 No law is imported before a scenario names it.
 """
 
-from miro_host.parts import Registry
+from miro_host.plugins import Registry
 
 
 class Controller:

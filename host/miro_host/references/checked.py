@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import msgspec
 
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_host.raised import at_place, defined_at, described, raised_at
 from miro_host.references.interface import Reference, Trajectory
 
@@ -24,7 +24,7 @@ class CheckedReference:
         return f"CheckedReference({self.trajectory!r})"
 
     def at(self, t_s: float) -> Reference:
-        """The reference at `t_s`. Raises PartError."""
+        """The reference at `t_s`. Raises PluginError."""
         try:
             found = self.trajectory.at(t_s)
             if not isinstance(found, Reference):
@@ -36,7 +36,7 @@ class CheckedReference:
             reason = str(error) if type(error) is ValueError else described(error)
             place = raised_at(error) or defined_at(getattr(self.trajectory, "at", None))
             what = f"reference {self.name!r} failed at {t_s:.6f} s: {at_place(reason, place)}"
-            raise PartError(what, "mend the reference or its parameters") from error
+            raise PluginError(what, "mend the reference or its parameters") from error
         return found
 
 

@@ -1,6 +1,6 @@
 """The names of the references."""
 
-from miro_host.parts import Registry
+from miro_host.plugins import Registry
 
 
 class AnyReference:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_host.references.interface import Paced, Trajectory
 from miro_sim.periods import RobotPeriod
 from miro_sim.scenario.build import reference_for
@@ -53,7 +53,7 @@ def reference_points(robot: Robot, duration_s: float) -> tuple[Point, ...]:
     try:
         trajectory = reference_for(robot, duration_s)
         found = [trajectory.at(at_s).posture for at_s in _instants(trajectory, duration_s)]
-    except PartError:
+    except PluginError:
         return ()
     return tuple((at.x_m, at.y_m) for at in found)
 

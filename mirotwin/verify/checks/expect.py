@@ -17,7 +17,7 @@ from typing import Any, cast
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_host.raised import raised
 from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
@@ -35,7 +35,7 @@ Place = tuple[int, int]
 
 
 def struct_of(name: str) -> type[Check]:
-    """The parameters of the check `name`. Raises PartError."""
+    """The parameters of the check `name`. Raises PluginError."""
     return cast(type[Check], CHECKS.find(name))
 
 
@@ -67,7 +67,7 @@ def checks_of_table(
         place = f"{path}.{name}"
         try:
             struct = struct_of(name)
-        except PartError as error:
+        except PluginError as error:
             raise _no_check(origin, place, name, error) from error.__cause__
         if problem := problem_of_class(struct):
             raise ScenarioError(origin, place, problem, "repair the check")
@@ -87,7 +87,7 @@ def _objection(check: Check, origin: str, place: str, end_tick: int) -> str:
         ) from error
 
 
-def _no_check(origin: str, place: str, name: str, error: PartError) -> ScenarioError:
+def _no_check(origin: str, place: str, name: str, error: PluginError) -> ScenarioError:
     if "is not one of the choices" in error.what:
         near = remedy_for_key(name, CHECKS.names())
         remedy = f"{near}{'' if near.endswith('?') else ';'} {WHERE_CHECKS_ARE}"

@@ -5,21 +5,21 @@ from __future__ import annotations
 from difflib import get_close_matches
 from typing import Any, get_args
 
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_host.raised import at_place, defined_at
 from mirotwin.verify.checks.interface import EVENTS, Check, Judge, Kind, Subject
 
 
 def checked_judge(check: Check, subject: Subject) -> Judge[Any]:
-    """The judge of one robot. Raises PartError for what is not one."""
+    """The judge of one robot. Raises PluginError for what is not one."""
     judge: Any = check.judge(subject)
     place = defined_at(check.judge)
     if not isinstance(judge, Judge):
         what = at_place(f"`judge` returned {judge!r:.40}", place)
-        raise PartError(what, "return an object of a class that derives from Judge")
+        raise PluginError(what, "return an object of a class that derives from Judge")
     if not hasattr(judge, "failures"):
         what = f"the constructor of {type(judge).__name__} does not call that of Judge"
-        raise PartError(
+        raise PluginError(
             at_place(what, defined_at(type(judge).__init__)), "call super().__init__(check, subject)"
         )
     _check_hears(judge, place)
@@ -40,10 +40,10 @@ def _check_hears(judge: Judge[Any], place: str) -> None:
     hears: Any = judge.HEARS
     name = f"HEARS of {type(judge).__name__}"
     if not isinstance(hears, tuple | list | set | frozenset):
-        raise PartError(at_place(f"{name} is {hears!r:.40}", place), f"write ({hears!r:.40},)")
+        raise PluginError(at_place(f"{name} is {hears!r:.40}", place), f"write ({hears!r:.40},)")
     for what in hears:
         if what not in EVENTS:
             close = get_close_matches(str(what), EVENTS, n=1)
             mean = f"did you mean {close[0]}? " if close else ""
             said = at_place(f"{name} names {what!r:.40}, which is no event", place)
-            raise PartError(said, f"{mean}there are {', '.join(EVENTS)}")
+            raise PluginError(said, f"{mean}there are {', '.join(EVENTS)}")

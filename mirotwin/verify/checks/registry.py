@@ -3,7 +3,7 @@
 No check is imported before it is named.
 """
 
-from miro_host.parts import Registry
+from miro_host.plugins import Registry
 
 ALWAYS_ON = ("no_fault", "lm629_protocol", "main_loop_alive", "stack_clear", "acts_at_all")
 

@@ -20,7 +20,7 @@ from operator import attrgetter
 from typing import Any, TypeVar
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_host.raised import raised
 from miro_protocol.robot_receiver import RobotReceiver
 from miro_sim.periods import Period
@@ -119,7 +119,7 @@ class Checks:
 class _Watched:
     """One robot and its judges. `lost`: events that the log no longer held when they were asked for.
 
-    A judge may be a user's own: whatever it raises becomes a PartError with its name.
+    A judge may be a user's own: whatever it raises becomes a PluginError with its name.
     """
 
     def __init__(
@@ -224,10 +224,10 @@ class _Watched:
     def _guarded(self, check: Check, call: Callable[[], T]) -> T:
         try:
             return call()
-        except PartError as error:
-            raise PartError(f"{self._named(check)}: {error.what}", error.remedy) from error
+        except PluginError as error:
+            raise PluginError(f"{self._named(check)}: {error.what}", error.remedy) from error
         except (Exception, SystemExit) as error:
-            raise PartError(f"{self._named(check)}: {raised(error)}", "repair the check") from error
+            raise PluginError(f"{self._named(check)}: {raised(error)}", "repair the check") from error
 
     def _named(self, check: Check) -> str:
         return f"net{self.network.index}/robot{self.robot.slot}: check {check.name!r} cannot judge"

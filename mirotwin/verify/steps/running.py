@@ -11,7 +11,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.domain import DomainError
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_robot.image import Image
 from miro_sim.scenario.file import ScenarioText, load
 from miro_sim.scenario.keys import Scenario
@@ -94,7 +94,7 @@ def run_test(
         if folder is not None:
             clear(folder, SCENARIO)
         return _run(path, image, seed, settings, folder, again)
-    except (DomainError, PartError) as error:
+    except (DomainError, PluginError) as error:
         show_traceback(error)
         what = f"cannot be run: {error}"
         return Outcome(path, "error", (f"{BadInput(path, '', what)}",), seed=seed)

@@ -16,8 +16,8 @@ from miro_host.eye import calibration_kinds as kinds
 from miro_host.eye.calibration import Calibration
 from miro_host.integrator import integrator_of
 from miro_host.laws.interface import LawParameters
-from miro_host.parts import PartError
 from miro_host.pilot import Pilot
+from miro_host.plugins import PluginError
 from miro_host.raised import at_place, defined_at, raised
 from miro_host.references.checked import CheckedReference
 from miro_host.references.interface import ReferenceParameters, Trajectory
@@ -34,12 +34,12 @@ DEGREE = 0.017453292519943295
 
 
 def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
-    """The reference trajectory in the paper's axes, which start at its own start. Raises PartError."""
+    """The reference trajectory in the paper's axes, which start at its own start. Raises PluginError."""
     parameters = robot.reference
     assert isinstance(parameters, ReferenceParameters)
     name = parameters.name()
     trajectory = _made(
-        "reference", name, lambda: _a_part(parameters.trajectory(duration_s), "at", parameters.trajectory)
+        "reference", name, lambda: _a_plugin(parameters.trajectory(duration_s), "at", parameters.trajectory)
     )
     return trajectory if name in REFERENCES.own else CheckedReference(trajectory, name)
 
@@ -52,7 +52,7 @@ def dead_s(scenario: sc.Scenario, network: sc.Network) -> float:
 
 
 def pilot_for(robot: sc.Robot, reference: Trajectory, host: sc.Host, dead_s: float) -> Pilot:
-    """Estimator and law, integrator and wheel split. Raises PartError when one of the first two cannot be made."""
+    """Estimator and law, integrator and wheel split. Raises PluginError when one of the first two cannot be made."""
     chosen, controller = robot.estimator, robot.controller
     assert isinstance(chosen, EstimatorParameters)
     assert isinstance(controller, LawParameters)
@@ -70,29 +70,29 @@ def pilot_for(robot: sc.Robot, reference: Trajectory, host: sc.Host, dead_s: flo
     )
 
 
-def _remembering(part: Any, maker: Any) -> Any:
-    """The part itself, once its memory was found to be as declared."""
-    _a_part(part, "check_memory", maker).check_memory()
-    return part
+def _remembering(plugin: Any, maker: Any) -> Any:
+    """The plug-in itself, once its memory was found to be as declared."""
+    _a_plugin(plugin, "check_memory", maker).check_memory()
+    return plugin
 
 
-def _a_part(part: Any, method: str, maker: Any) -> Any:
-    """What `maker` returned, which has to have this method. Raises PartError."""
-    if not hasattr(part, method):
-        what = f"`{maker.__name__}` returned {part!r:.40}"
-        raise PartError(at_place(what, defined_at(maker)), f"return an object with the method `{method}`")
-    return part
+def _a_plugin(plugin: Any, method: str, maker: Any) -> Any:
+    """What `maker` returned, which has to have this method. Raises PluginError."""
+    if not hasattr(plugin, method):
+        what = f"`{maker.__name__}` returned {plugin!r:.40}"
+        raise PluginError(at_place(what, defined_at(maker)), f"return an object with the method `{method}`")
+    return plugin
 
 
 def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
-    """A new part; whatever goes wrong with it is a PartError that names it."""
+    """A new plug-in; whatever goes wrong with it is a PluginError that names it."""
     try:
         return make()
-    except PartError as error:
-        raise PartError(f"{word} {name!r} cannot be made: {error.what}", error.remedy) from error
+    except PluginError as error:
+        raise PluginError(f"{word} {name!r} cannot be made: {error.what}", error.remedy) from error
     except (Exception, SystemExit) as error:
         what = f"{word} {name!r} cannot be made: {raised(error)}"
-        raise PartError(what, f"mend the {word} or its parameters") from error
+        raise PluginError(what, f"mend the {word} or its parameters") from error
 
 
 @lru_cache(maxsize=16)

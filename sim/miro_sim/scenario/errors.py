@@ -7,9 +7,9 @@ from typing import Any
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_sim.scenario.keys import Scenario
-from miro_sim.scenario.parts import REGISTRIES, struct_of
+from miro_sim.scenario.plugins import REGISTRIES, struct_of
 
 UNITS = {
     "s": "seconds",
@@ -82,7 +82,7 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
     if unknown:
         known = _keys_at(raw, path)
         place = f"{path}.{unknown[1]}" if path else unknown[1]
-        remedy = _other_part(raw, path, unknown[1]) or ("" if path else _of_a_file(unknown[1]))
+        remedy = _other_plugin(raw, path, unknown[1]) or ("" if path else _of_a_file(unknown[1]))
         remedy = remedy or remedy_for_key(unknown[1], known if path else [*known, *FILE_KEYS])
         if not path and remedy.startswith("keys here"):
             remedy += "; `mirotwin scenarios show fig6` has those of their tables, too"
@@ -209,7 +209,7 @@ def _type_at(raw: Any, path: str) -> msgspec.inspect.Type | None:
 
 
 def _chosen(found: msgspec.inspect.Type, table: Any) -> msgspec.inspect.Type:
-    """The type itself; where it is any part's table, or of several kinds, that which the table names."""
+    """The type itself; where it is any plug-in's table, or of several kinds, that which the table names."""
     if isinstance(found, msgspec.inspect.UnionType) and isinstance(table, dict):
         structs = [option for option in found.types if isinstance(option, msgspec.inspect.StructType)]
         named = [
@@ -220,7 +220,7 @@ def _chosen(found: msgspec.inspect.Type, table: Any) -> msgspec.inspect.Type:
         return found
     try:
         return msgspec.inspect.type_info(struct_of(REGISTRIES[found.cls], table))
-    except (ValueError, TypeError, AttributeError):  # no part is named, or none can be used
+    except (ValueError, TypeError, AttributeError):  # no plug-in is named, or none can be used
         return found
 
 
@@ -246,8 +246,8 @@ def _keys_at(raw: Any, path: str) -> list[str]:
     return []
 
 
-def _other_part(raw: Any, path: str, key: str) -> str:
-    """The remedy for a key that belongs to another part than the one which the table at `path` names."""
+def _other_plugin(raw: Any, path: str, key: str) -> str:
+    """The remedy for a key that belongs to another plug-in than the one which the table at `path` names."""
     table = _type_at(raw, path)
     if not isinstance(table, msgspec.inspect.CustomType):
         return ""
@@ -255,7 +255,7 @@ def _other_part(raw: Any, path: str, key: str) -> str:
     for name in registry.names():
         try:
             keys = registry.find(name).__struct_encode_fields__
-        except PartError:
+        except PluginError:
             continue
         if key in keys:
             return f'it belongs to the {registry.word} {name!r}, which {registry.key} = "{name}" chooses'

@@ -17,8 +17,8 @@ from miro_protocol.toml_text import TEXT_KIB, not_finite, without_none
 from miro_sim.scenario.base import with_base
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario
-from miro_sim.scenario.parts import cause_of, full_message, part_of
 from miro_sim.scenario.places import check_places
+from miro_sim.scenario.plugins import cause_of, full_message, plugin_of
 from miro_sim.scenario.profiles import ProfileError, with_profiles
 from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
 from miro_sim.scenario.text import check_integers, check_size, written
@@ -207,7 +207,7 @@ def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
     check_integers(raw, origin)
     complete = _with_profiles(_with_variant(raw, origin), origin)
     try:
-        scenario = msgspec.convert(complete, Scenario, dec_hook=part_of)
+        scenario = msgspec.convert(complete, Scenario, dec_hook=plugin_of)
     except msgspec.ValidationError as error:
         raise value_error(origin, complete, full_message(error)) from cause_of(error)
     check_places(scenario, origin)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_exact.domain import DomainError
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_sim.pitch import ground as pitch
 from miro_sim.scenario.errors import ScenarioError
@@ -40,7 +40,7 @@ def check_places(scenario: Scenario, origin: str) -> None:
             place = f"network[{number}].robot[{index}]"
             try:
                 _check(robot, scenario, origin, place)
-            except PartError as error:
+            except PluginError as error:
                 raise ScenarioError(origin, f"{place}.reference", error.what, error.remedy) from error
             except DomainError as error:  # a heading of a million radians
                 raise ScenarioError(origin, f"{place}.reference", f"leaves the pitch: {error}") from error

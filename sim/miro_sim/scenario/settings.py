@@ -15,7 +15,7 @@ import msgspec
 from miro_host.laws.registry import LAWS
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.keys import Network, Robot
-from miro_sim.scenario.parts import REGISTRIES
+from miro_sim.scenario.plugins import REGISTRIES
 from miro_sim.scenario.profiles import ERROR_KEYS
 from miro_sim.scenario.text import check_size
 from miro_sim.scenario.variants import VariantError, impose

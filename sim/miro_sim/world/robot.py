@@ -11,8 +11,8 @@ from collections.abc import Callable
 from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_exact.domain import DomainError
 from miro_exact.rng import Stream
-from miro_host.parts import PartError
 from miro_host.pilot import Command, Pilot
+from miro_host.plugins import PluginError
 from miro_host.posture import Posture
 from miro_host.telemetry_receiver import LastTelemetry
 from miro_robot.board import Board
@@ -55,7 +55,7 @@ class Robot:
             start = self.reference.at(0.0).posture
             delay_s = dead_s(scenario, scenario.networks[network])
             self.pilot: Pilot = pilot_for(spec, self.reference, scenario.host, delay_s)
-        except PartError as error:
+        except PluginError as error:
             raise self._named(error, 0) from error
         wheels = Stream(seed, f"{name}/wheels")
         try:
@@ -100,16 +100,16 @@ class Robot:
         return stopped
 
     def steer(self, measured: Posture | None, telemetry: LastTelemetry | None, tick: int) -> Command:
-        """Wheel commands from what the PC measured and the robot's last telemetry. Raises PartError."""
+        """Wheel commands from what the PC measured and the robot's last telemetry. Raises PluginError."""
         try:
             return self.pilot.update(measured, seconds(tick), telemetry)
-        except PartError as error:
+        except PluginError as error:
             raise self._named(error, tick) from error
 
-    def _named(self, error: PartError, tick: int) -> PartError:
+    def _named(self, error: PluginError, tick: int) -> PluginError:
         """The same with the robot it is of, and when."""
         place = f"net{self.network}/robot{self.spec.slot}: tick {tick} ({seconds(tick):.6f} s)"
-        return PartError(f"{place}: {error.what}", error.remedy)
+        return PluginError(f"{place}: {error.what}", error.remedy)
 
     def counter(self, index: int) -> int | None:
         """A frame counter of the firmware (16 bit), or None when the image exports no such symbol."""
@@ -125,7 +125,7 @@ class Robot:
         v_m_s, w_rad_s = self.drive.velocity_at(tick)
         try:
             reference = self.reference.at(seconds(tick)).posture
-        except PartError as error:
+        except PluginError as error:
             raise self._named(error, tick) from error
         return RobotPeriod(
             network=self.network,

@@ -6,7 +6,7 @@ import sys
 import msgspec
 import pytest
 
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_host.references.arc import Arc, ArcRef
 from miro_host.references.checked import CheckedReference
 from miro_host.references.line import Line, LineRef
@@ -83,7 +83,7 @@ GOOD = Line().at(1.0)
 )
 def test_a_reference_that_fails_is_named(answer, reason):
     with pytest.raises(
-        PartError, match=rf"reference 'odd' failed at 1.500000 s: {reason}.* \(.*test_keys.py:\d+ in "
+        PluginError, match=rf"reference 'odd' failed at 1.500000 s: {reason}.* \(.*test_keys.py:\d+ in "
     ):
         CheckedReference(Broken(answer), "odd").at(1.5)
 

@@ -30,7 +30,7 @@ CHECKS_TOLD = {
     "absent": "module 'plugged_checks' has no attribute 'Absent'; repair or uninstall plugged-checks 1.0",
     "syntax": "SyntaxError: invalid syntax (plugged_syntax.py, line 1) (site/plugged_syntax.py:1)",
 }
-PARTS_TOLD = {
+PLUGINS_TOLD = {
     "controller={law='law_raises'}": (
         f"KeyError: 'speed' (site/plugged_laws.py:{line_of(LAWS, 'speed')} in RaisesLaw.step)"
     ),
@@ -77,10 +77,10 @@ def test_a_check_that_is_wrong_is_told_with_its_file_by_run(mirotwin, name):
     assert len([line for line in said.splitlines() if "error: " in line]) == 1
 
 
-@pytest.mark.parametrize("setting", PARTS_TOLD)
+@pytest.mark.parametrize("setting", PLUGINS_TOLD)
 def test_a_part_that_is_wrong_is_told_with_its_file_by_run(mirotwin, setting):
     said = told(mirotwin("run", "fig6", *SHORT, "-q", "--no-figure", "--set", f"network.robot.{setting}"))
-    assert PARTS_TOLD[setting] in said
+    assert PLUGINS_TOLD[setting] in said
 
 
 def test_a_wrong_event_in_hears_is_told_the_nearest_one_and_the_list(mirotwin):
@@ -106,7 +106,7 @@ def test_the_other_commands_tell_the_same(mirotwin, here):
     assert f"error: runs 0, 1, 2: net0/robot0: {RAISED}" in said
     for command in (("camera", "look", "fig6", "--at", "0.1s"), ("run", "fig6", *SHORT, "-q")):
         said = told(mirotwin(*command, "--set", "network.robot.controller={law='law_raises'}"))
-        assert PARTS_TOLD["controller={law='law_raises'}"] in said, command
+        assert PLUGINS_TOLD["controller={law='law_raises'}"] in said, command
 
 
 def test_a_check_that_breaks_after_the_recording_is_told_by_replay_and_report(mirotwin, monkeypatch):

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from miro_host.parts import PartError
+from miro_host.plugins import PluginError
 from miro_robot.event_log import RECEIVED
 from miro_sim.scenario.file import load, parse
 from miro_sim.world import conditions
@@ -139,7 +139,7 @@ def test_what_a_check_raises_is_told_with_robot_and_name():
     Checks(world, {(0, 1): [Raising()]})
     send(world, [team(1, 10, 10)])
     with pytest.raises(
-        PartError,
+        PluginError,
         match=r"^net0/robot1: check 'raising' cannot judge: KeyError: 'speed' \(.*:\d+ in RaisingJudge.event\)",
     ):
         world.run_to(10_000_000)
