@@ -74,7 +74,7 @@ class NoKind(Check, frozen=True, kw_only=True, tag="no_kind"):
 class Objects(Check, frozen=True, kw_only=True, tag="objects"):
     KIND = "safety"
 
-    def objection(self, end_tick):
+    def problem(self, end_tick):
         return 1 // 0
 
     def judge(self, subject):

@@ -115,7 +115,7 @@ def share(found: Iterable[Fate], known: dict[str, Survivor]) -> tuple[int, int]:
     return killed, killed + len([one for one in alive if not (one.id in known and known[one.id].conforms)])
 
 
-def objections(score: Score, known: dict[str, Survivor]) -> list[str]:
+def problems(score: Score, known: dict[str, Survivor]) -> list[str]:
     """What is not as it has to be."""
     found = []
     killed, could = share(score.fates, known)
@@ -194,7 +194,7 @@ def _score(jobs: list[Job], asked: argparse.Namespace, whole: bool) -> int:
     print(
         f"killed {len([one for one in planted if one.what == 'killed'])} of {len(planted)} planted mistakes"
     )
-    against = objections(score, survivors()) if whole else []
+    against = problems(score, survivors()) if whole else []
     for line in against:
         print(line)
     return 1 if against else 0

@@ -5,7 +5,7 @@ import pytest
 from tests.mutants.document import BEGIN, END, PAGE, render, replaced
 from tests.mutants.draw import COUNT, SEED, drawn, mutants_of, source_files
 from tests.mutants.planted import PLANTED
-from tests.mutants.score import Fate, Score, fates, jobs_of, merged, objections, share
+from tests.mutants.score import Fate, Score, fates, jobs_of, merged, problems, share
 from tests.mutants.sdcc import needs_sdcc
 from tests.mutants.survivors import Survivor, survivors
 
@@ -26,7 +26,7 @@ OTHERS = [of_draw(90, "does not compile"), of_draw(91, "same bytes"), planted("k
 
 
 def objected(*fates: Fate, known: dict[str, Survivor]) -> list[str]:
-    return objections(Score(0, ("P01", "P02"), 2.0, (*KILLED, *OTHERS, *fates)), known)
+    return problems(Score(0, ("P01", "P02"), 2.0, (*KILLED, *OTHERS, *fates)), known)
 
 
 def test_what_no_right_rule_can_kill_is_not_counted():
@@ -42,7 +42,7 @@ def test_a_score_of_95_percent_with_all_survivors_explained_is_as_it_has_to_be()
 
 
 @pytest.mark.parametrize(
-    ("fates", "known", "objection"),
+    ("fates", "known", "problem"),
     [
         ((of_draw(50, "alive"), of_draw(51, "alive")), (50, 51), "killed 19 of 21, wanted 95 %"),
         (
@@ -58,14 +58,14 @@ def test_a_score_of_95_percent_with_all_survivors_explained_is_as_it_has_to_be()
         ((planted("alive"),), (), "planted mistake 'never stops': alive"),
     ],
 )
-def test_what_is_not_as_it_has_to_be_is_said(fates, known, objection):
+def test_what_is_not_as_it_has_to_be_is_said(fates, known, problem):
     table = {of_draw(number, "alive").id: MISSING for number in known}
-    assert objected(*fates, known=table) == [objection]
+    assert objected(*fates, known=table) == [problem]
 
 
 def test_a_rule_that_kills_nobody_is_named():
     score = Score(0, ("P01", "P02", "P03"), 2.0, (*KILLED, *OTHERS))
-    assert objections(score, {}) == ["rule P03 kills nobody"]
+    assert problems(score, {}) == ["rule P03 kills nobody"]
 
 
 def test_every_survivor_of_the_table_is_a_mutant_of_the_draw_and_its_reason_a_sentence():

@@ -23,7 +23,7 @@ ENGINE_LINE = {"compiled": "compiled (", "python": "python (0 of"}
 """How `mirotwin info` begins what it says of the engine."""
 
 
-def objections(engine: str, folder: Path) -> Iterator[str]:
+def problems(engine: str, folder: Path) -> Iterator[str]:
     """What is wrong, a line each."""
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     said = _mirotwin(folder, "--version")
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--engine", choices=sorted(ENGINE_LINE), required=True, help="the one it has to have")
     engine = parser.parse_args(arguments).engine
     with tempfile.TemporaryDirectory(prefix="mirotwin-installed-") as name:
-        found = [*objections(engine, Path(name))]
+        found = [*problems(engine, Path(name))]
     for what in found:
         print(what, file=sys.stderr)
     if not found:

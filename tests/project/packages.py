@@ -54,7 +54,7 @@ def left_out(archive: Path) -> list[str]:
     ]
 
 
-def objections(clean: Clean, tree: Path, engine: str) -> Iterator[str]:
+def problems(clean: Clean, tree: Path, engine: str) -> Iterator[str]:
     """What the installed program does wrong, by the test that the archive has; `tree`: the archive, unpacked."""
     code, out = clean.run("python", tree / INSTALLED, "--engine", engine)
     if code:
@@ -73,19 +73,19 @@ def tried(folder: Path, tree: Path, python: Path, archive: Path, pure: Path, new
     (wheel,) = (compiled.folder / "wheel").iterdir()
     print(f"{wheel.name}: built in {time.perf_counter() - begun:.0f} s", flush=True)
     compiled.must("pip", "install", "-q", wheel)
-    yield from objections(compiled, tree, "compiled")
+    yield from problems(compiled, tree, "compiled")
     compiled.must("mirotwin", "run", "fig6")
     slow = Clean(folder / "pure")
     slow.folder.mkdir()
     slow.make(python)
     print(pure.name, flush=True)
     slow.must("pip", "install", "-q", pure)
-    yield from objections(slow, tree, "python")
+    yield from problems(slow, tree, "python")
     if newest:
         print(f"{archive.name}, CC=false", flush=True)
         slow.must("pip", "uninstall", "-q", "-y", "mirotwin")
         slow.must("pip", "install", "-q", archive, more={"CC": "false"})
-        yield from objections(slow, tree, "python")
+        yield from problems(slow, tree, "python")
 
 
 def smoke(folder: Path, tree: Path, pure: Path) -> Iterator[str]:
@@ -94,9 +94,9 @@ def smoke(folder: Path, tree: Path, pure: Path) -> Iterator[str]:
     clean.make()
     print(pure.name, flush=True)
     clean.must("pip", "install", "-q", pure)
-    yield from objections(clean, tree, "python")
+    yield from problems(clean, tree, "python")
     clean.copy_engines()
-    yield from objections(clean, tree, "compiled")
+    yield from problems(clean, tree, "compiled")
 
 
 def found(folder: Path, chosen: Sequence[Path]) -> Iterator[str]:

@@ -28,7 +28,7 @@ class TracksWithin(Check, frozen=True, kw_only=True, tag="tracks_within_cm"):
     limit_cm: LimitCm
     from_s: Annotated[float, Meta(ge=0.0, le=LONGEST_S)] | None = None
 
-    def objection(self, end_tick: int) -> str:
+    def problem(self, end_tick: int) -> str:
         if self.from_s is not None and ticks(self.from_s) >= end_tick:
             return f"from_s: {self.from_s:g} s is not before the end of the run, {seconds(end_tick):g} s"
         return ""
@@ -49,7 +49,7 @@ class SettlesWithin(Check, frozen=True, kw_only=True, tag="settles_within_s"):
     position_cm: LimitCm = SETTLED_CM
     heading_rad: Annotated[float, Meta(gt=0.0, le=3.141592653589793)] = SETTLED_RAD
 
-    def objection(self, end_tick: int) -> str:
+    def problem(self, end_tick: int) -> str:
         if ticks(self.within_s) >= end_tick:
             return f"{self.within_s:g} s is not before the end of the run, {seconds(end_tick):g} s"
         return ""

@@ -72,19 +72,17 @@ def checks_of_table(
         if problem := problem_of_class(struct):
             raise ScenarioError(origin, place, problem, "repair the check")
         found[name] = check = _check(scenario, origin, place, struct, name, value)
-        objection = "" if check is None else _objection(check, origin, place, end_tick)
-        if objection:
-            raise ScenarioError(origin, place, objection, "give an earlier time, or a longer duration_s")
+        problem = "" if check is None else _problem(check, origin, place, end_tick)
+        if problem:
+            raise ScenarioError(origin, place, problem, "give an earlier time, or a longer duration_s")
     return found
 
 
-def _objection(check: Check, origin: str, place: str, end_tick: int) -> str:
+def _problem(check: Check, origin: str, place: str, end_tick: int) -> str:
     try:
-        return check.objection(end_tick)
+        return check.problem(end_tick)
     except (Exception, SystemExit) as error:
-        raise ScenarioError(
-            origin, place, f"`objection` raised {raised(error)}", "repair the check"
-        ) from error
+        raise ScenarioError(origin, place, f"`problem` raised {raised(error)}", "repair the check") from error
 
 
 def _no_check(origin: str, place: str, name: str, error: PluginError) -> ScenarioError:

@@ -68,7 +68,7 @@ class EventCheck(Check, frozen=True, kw_only=True):
             fields["value"] = self.value
         return kind(**fields)
 
-    def objection(self, end_tick: int) -> str:
+    def problem(self, end_tick: int) -> str:
         if self.until_tick > end_tick:
             return f"until_tick {self.until_tick} is behind the end of the run, tick {end_tick}"
         return ""

@@ -95,7 +95,7 @@ class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     def name(self) -> str:
         return str(self.__struct_config__.tag)
 
-    def objection(self, end_tick: int) -> str:
+    def problem(self, end_tick: int) -> str:
         """Why a run that ends at `end_tick` cannot be judged, or the empty string."""
         return ""
 

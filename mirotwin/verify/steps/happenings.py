@@ -51,7 +51,7 @@ class Happening(
     def name(self) -> str:
         return str(self.__struct_config__.tag)
 
-    def objection(self) -> str:
+    def problem(self) -> str:
         """What is wrong with its keys beside their types: `what; remedy`, or the empty string."""
         return ""
 
@@ -208,7 +208,7 @@ class Command(AtRobot, frozen=True, kw_only=True, tag="command"):
     name_: str | None = msgspec.field(default=None, name="name")
     hex: str | None = None
 
-    def objection(self) -> str:
+    def problem(self) -> str:
         if self.name_ is not None and self.name_ not in BY_NAME:
             return f"name: {self.name_!r} is no LM629 command; there are {', '.join(BY_NAME)}"
         try:
@@ -236,7 +236,7 @@ class Edge(AtRobot, frozen=True, kw_only=True, tag="edge"):
     pin: str
     level: Literal[0, 1] | None = None
 
-    def objection(self) -> str:
+    def problem(self) -> str:
         if self.pin in PINS:
             return ""
         shown = ", ".join(pin for pin in PINS if not pin.startswith("P"))
@@ -258,7 +258,7 @@ class Reached(AtRobot, frozen=True, kw_only=True, tag="reached"):
     symbol: str | None = None
     address: Word | None = None
 
-    def objection(self) -> str:
+    def problem(self) -> str:
         both = (self.symbol is None) == (self.address is None)
         return "reached: takes a symbol or an address; give one of the two" if both else ""
 
@@ -294,7 +294,7 @@ class WheelsAt(AtRobot, frozen=True, kw_only=True, tag="wheels"):
     right_m_s: SpeedMS | None = None
     tolerance_m_s: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.02
 
-    def objection(self) -> str:
+    def problem(self) -> str:
         none = self.left_m_s is None and self.right_m_s is None
         return "wheels: no speed is given; give left_m_s, right_m_s or both" if none else ""
 

@@ -34,7 +34,7 @@ def end_tick(scenario: Scenario) -> int:
     return max(1, -(-ticks(scenario.duration_s) // CONTROL_PERIOD_TICKS)) * CONTROL_PERIOD_TICKS
 
 
-def objection(step: Step, scenario: Scenario) -> str:
+def problem(step: Step, scenario: Scenario) -> str:
     """Why this step cannot be done in this scenario, as `key: what; remedy`, or the empty string."""
     networks = scenario.networks
     if step.network >= len(networks):
@@ -55,7 +55,7 @@ def objection(step: Step, scenario: Scenario) -> str:
     happening = happening_of(step)
     if happening is not None:
         slot = getattr(happening, "slot", None)
-        return happening.objection() or ("" if slot is None else _absent(slot, network))
+        return happening.problem() or ("" if slot is None else _absent(slot, network))
     if isinstance(step, CheckStep):
         if not step.check:
             return "check: there is no check; give it keys as [expect] has them"
@@ -76,7 +76,7 @@ def _of_send(step: SendStep, network: Network) -> str:
     what = step.what
     if isinstance(what, SendFrame) and what.seq is None and network.host != "silent":
         return 'seq: this network\'s host counts its frames itself; give seq, or write host = "silent"'
-    return what.objection(network.robots)
+    return what.problem(network.robots)
 
 
 def _absent(slot: int, network: Network) -> str:

@@ -72,7 +72,7 @@ class _Table:
                 "", f"has both {verbs[0]} and {verbs[1]}", "one action or one wait a step: make two of it"
             )
         step = self._step(verbs[0])
-        what, _, remedy = plan.objection(step, self.scenario).partition("; ")
+        what, _, remedy = plan.problem(step, self.scenario).partition("; ")
         if what:
             key, _, rest = what.partition(": ")
             self.refuse(key if rest else "", rest or what, remedy)

@@ -35,7 +35,7 @@ class Send(
     def name(self) -> str:
         return str(self.__struct_config__.tag)
 
-    def objection(self, robots: int) -> str:
+    def problem(self, robots: int) -> str:
         """What is wrong with its keys on a network of `robots` slots: `what; remedy`, or the empty string."""
         slot = getattr(self, "slot", None)
         if slot is not None and slot >= robots:
@@ -53,7 +53,7 @@ class SendFrame(Send, frozen=True, kw_only=True):
     wrong_bits: tuple[int, ...] = ()
     bad_stop: tuple[int, ...] = ()
 
-    def objection(self, robots: int) -> str:
+    def problem(self, robots: int) -> str:
         form = DOWNLINK[robots]
         first = len(form.lead) + len(form.sync)
         bits = 8 * (form.wire_size - first)
@@ -66,7 +66,7 @@ class SendFrame(Send, frozen=True, kw_only=True):
                 what = f"bad_stop: {list(self.bad_stop)} are not characters of the frame in their order"
                 return f"{what}; use 0 to {form.wire_size - 1}"
             before = place
-        return super().objection(robots)
+        return super().problem(robots)
 
     def damaged(self, data: bytes, robots: int) -> bytes:
         """The frame's characters with the wrong bits in them."""
@@ -90,7 +90,7 @@ class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
     team_m_s: tuple[Pair, ...] | None = None
     ask: bool = False
 
-    def objection(self, robots: int) -> str:
+    def problem(self, robots: int) -> str:
         if self.team_m_s is not None and len(self.team_m_s) != robots:
             return (
                 f"team_m_s: {len(self.team_m_s)} pairs for {robots} slots; give one pair [left, right] a slot"
@@ -98,7 +98,7 @@ class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
         one = (self.slot, self.left_m_s, self.right_m_s)
         if self.team_m_s is not None and one != (None, None, None):
             return "team_m_s: tells all slots; leave out slot, left_m_s and right_m_s"
-        return super().objection(robots)
+        return super().problem(robots)
 
 
 class SendPoll(SendFrame, frozen=True, kw_only=True, tag="poll"):
@@ -106,10 +106,10 @@ class SendPoll(SendFrame, frozen=True, kw_only=True, tag="poll"):
 
     slot: Slot | None = None
 
-    def objection(self, robots: int) -> str:
+    def problem(self, robots: int) -> str:
         if None not in (self.seq, self.slot) and self.seq % robots != self.slot:  # type: ignore[operator]
             return f"seq: {self.seq} does not ask robot {self.slot}; leave it out"
-        return super().objection(robots)
+        return super().problem(robots)
 
 
 class SendService(SendFrame, frozen=True, kw_only=True):
@@ -161,7 +161,7 @@ class SendBytes(Send, frozen=True, kw_only=True, tag="bytes"):
 
     hex: str
 
-    def objection(self, robots: int) -> str:
+    def problem(self, robots: int) -> str:
         words = self.hex.split()
         for word in words:
             if not CHARACTER.fullmatch(word):

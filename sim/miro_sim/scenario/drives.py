@@ -16,7 +16,7 @@ from miro_host.wheels import Wheels
 if TYPE_CHECKING:
     from miro_host.references.interface import Reference
 
-Objection = tuple[str, str]
+Problem = tuple[str, str]
 """What is wrong with a reference, and the remedy."""
 Places = Iterable[tuple[float, "Reference"]]
 """A reference at several times in s, in their order."""
@@ -27,7 +27,7 @@ ORIGIN_M = 1e-6
 """A path that starts this near to the origin starts in it."""
 
 
-def limits_objection(frames: Places, law: LawParameters) -> Objection | None:
+def limits_problem(frames: Places, law: LawParameters) -> Problem | None:
     """What is wrong with the speeds of a reference at the camera frames `frames`."""
     period_s = seconds(CONTROL_PERIOD_TICKS)
     wheels = Wheels()
@@ -48,7 +48,7 @@ def limits_objection(frames: Places, law: LawParameters) -> Objection | None:
     return None
 
 
-def _beyond(t_s: float, at: Reference, name: str, value: str, limit: str) -> Objection:
+def _beyond(t_s: float, at: Reference, name: str, value: str, limit: str) -> Problem:
     where = f"after {t_s:.2f} s, at {_place(at)},"
     if not name:
         return f"{where} a wheel needs {value}; it reaches {limit} m/s", "drive it more slowly, or turn less"
@@ -58,7 +58,7 @@ def _beyond(t_s: float, at: Reference, name: str, value: str, limit: str) -> Obj
     )
 
 
-def origin_objection(places: Places, law: LawParameters) -> Objection | None:
+def origin_problem(places: Places, law: LawParameters) -> Problem | None:
     """What is wrong if a path comes too near to the origin (equation 11 of the paper).
 
     A path that starts in the origin may only go away from it until it has reached the law's clearance.

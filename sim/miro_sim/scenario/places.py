@@ -49,7 +49,7 @@ def check_places(scenario: Scenario, origin: str) -> None:
 def _check(robot: Robot, scenario: Scenario, origin: str, place: str) -> None:
     from miro_host.laws.interface import LawParameters  # needs hot modules: not before the engine was chosen
     from miro_sim.scenario.build import reference_for
-    from miro_sim.scenario.drives import limits_objection, origin_objection
+    from miro_sim.scenario.drives import limits_problem, origin_problem
 
     duration_s = scenario.duration_s
     reference = reference_for(robot, duration_s)
@@ -79,11 +79,11 @@ def _check(robot: Robot, scenario: Scenario, origin: str, place: str) -> None:
         on_s = t_s
     law = robot.controller
     assert isinstance(law, LawParameters)
-    objection = origin_objection(
+    problem = origin_problem(
         ((t_s, reference.at(t_s)) for t_s in _instants(reference, duration_s)), law
-    ) or limits_objection(((t_s, reference.at(t_s)) for t_s in _frames(reference, duration_s)), law)
-    if objection is not None:
-        raise ScenarioError(origin, f"{place}.reference", *objection)
+    ) or limits_problem(((t_s, reference.at(t_s)) for t_s in _frames(reference, duration_s)), law)
+    if problem is not None:
+        raise ScenarioError(origin, f"{place}.reference", *problem)
 
 
 def _instants(reference: Trajectory, duration_s: float) -> Iterator[float]:

@@ -23,8 +23,8 @@ CHECKS_TOLD = {
     "hears_text": "HEARS of HearsTextJudge is 'command' (site/plugged_checks.py:",
     "no_super": "the constructor of NoSuperJudge does not call that of Judge (site/plugged_checks.py:",
     "no_kind": "plugged_checks.NoKind has no KIND",
-    "objects": f"`objection` raised ZeroDivisionError: integer division or modulo by zero (site/plugged_checks.py:"
-    f"{line_of(CHECKS, '1 // 0')} in Objects.objection)",
+    "objects": f"`problem` raised ZeroDivisionError: integer division or modulo by zero (site/plugged_checks.py:"
+    f"{line_of(CHECKS, '1 // 0')} in Objects.problem)",
     "leaves": f"SystemExit: 0 (site/plugged_checks.py:{line_of(CHECKS, 'SystemExit')} in Leaves.__post_init__)",
     "float_tick": f"(site/plugged_checks.py:{line_of(CHECKS, 'tick / 2')} in FloatTickJudge.period)",
     "absent": "module 'plugged_checks' has no attribute 'Absent'; repair or uninstall plugged-checks 1.0",

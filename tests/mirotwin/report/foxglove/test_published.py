@@ -13,7 +13,7 @@ import pytest
 from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto
 
 from mirotwin.report.foxglove import messages, published
-from tests.mirotwin.report.foxglove.validate import objections
+from tests.mirotwin.report.foxglove.validate import problems
 
 NAMES = ("FrameTransforms", "SceneUpdate", "CompressedImage", "CameraCalibration", "Log")
 FOXGLOVE = [f"foxglove.{name}" for name in NAMES]
@@ -98,7 +98,7 @@ def test_the_schemas_that_are_written_have_the_fields_of_foxgloves_protobuf_mess
 
 def test_each_message_fits_its_schema(shown):
     found = [one for one in shown if one.topic.startswith("/foxglove/")]
-    wrong = [line for one in found for line in objections(one.content, one.schema, one.topic)]
+    wrong = [line for one in found for line in problems(one.content, one.schema, one.topic)]
     assert wrong[:5] == []
     assert {one.name for one in found} == {*FOXGLOVE, "mirotwin.Error"}
 
@@ -132,7 +132,7 @@ def test_the_comparison_with_a_schema_notices_what_does_not_fit(damage):
     schema = msgspec.json.decode(published._published("Log"))
     line = messages.Log(messages.time_of(1), messages.INFO, "words", "net0")
     good = msgspec.to_builtins(line)
-    assert list(objections(good, schema)) == []
+    assert list(problems(good, schema)) == []
     bad = copy.deepcopy(good)
     damage(bad)
-    assert len(list(objections(bad, schema))) == 1
+    assert len(list(problems(bad, schema))) == 1

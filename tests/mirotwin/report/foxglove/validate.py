@@ -13,7 +13,7 @@ ABOUT = {"title", "description", "$comment"}
 TYPES = {"string": str, "boolean": bool, "array": list, "object": dict}
 
 
-def objections(value: Any, schema: dict[str, Any], place: str = "") -> Iterator[str]:
+def problems(value: Any, schema: dict[str, Any], place: str = "") -> Iterator[str]:
     """What is wrong with `value`, a line each."""
     words = set(schema) - ABOUT
     if "oneOf" in schema:
@@ -36,13 +36,13 @@ def objections(value: Any, schema: dict[str, Any], place: str = "") -> Iterator[
         if set(value) != set(schema["properties"]):
             yield f"{place}: fields {sorted(set(value) ^ set(schema['properties']))}"
         for name in value.keys() & schema["properties"].keys():
-            yield from objections(value[name], schema["properties"][name], f"{place}.{name}")
+            yield from problems(value[name], schema["properties"][name], f"{place}.{name}")
     elif kind == "array":
         assert words <= {"type", "items", "minItems", "maxItems"}, (place, words)
         if not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value)):
             yield f"{place}: {len(value)} items"
         for index, part in enumerate(value):
-            yield from objections(part, schema["items"], f"{place}[{index}]")
+            yield from problems(part, schema["items"], f"{place}[{index}]")
     elif kind == "string":
         assert words <= {"type", "contentEncoding"}, (place, words)
         if schema.get("contentEncoding") == "base64":
