@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import click
 
@@ -12,7 +12,8 @@ from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
 from miro_robot.image.debug_info import Sources
 from mirotwin.firmware.coverage_files import source_folders
-from mirotwin.shell.options import Place
+from mirotwin.shell.command import Option
+from mirotwin.shell.options import IMAGE, NAME, Place
 
 
 def sources_option(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -23,6 +24,16 @@ def sources_option(command: Callable[..., Any]) -> Callable[..., Any]:
         type=Place(),
         help="Folder of the C files; may be repeated. Default: the image's folder.",
     )(command)
+
+
+SOURCES = Option(
+    "--sources",
+    metavar="FOLDER",
+    type=NAME,
+    help="Folder of the C files; may be repeated. Default: the image's folder.",
+    heading=IMAGE,
+)
+SourceFolders = Annotated[tuple[str, ...], SOURCES]
 
 
 def sources_of(image: Image, given: Sequence[str]) -> Sources:

@@ -15,9 +15,9 @@ from mirotwin.firmware.coverage_files import table
 from mirotwin.fuzz.campaign import Campaign
 from mirotwin.fuzz.fuzz_progress import clock, counted
 from mirotwin.fuzz.triage import Find
-from mirotwin.shell import command_line
 from mirotwin.shell.console import show
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
+from mirotwin.verify.cases import replay_line as line
 from mirotwin.verify.expectations import is_in_file
 
 COVERAGE = "coverage.info"
@@ -102,7 +102,7 @@ def _print_find(find: Find, more: int, out: Path, image: Image, checks: Sequence
 def replay_line(stream: Path, image: Image, in_file: str = "") -> str:
     """The command that plays it again. `in_file`: the check of a case that is in a file, which no case names."""
     own = image.path.resolve() == image_path().resolve()
-    return command_line.replay_line(stream, None if own else image.path, in_file)
+    return line.replay_line(stream, None if own else image.path, in_file)
 
 
 def _print_covering(campaign: Campaign, symbol: str, image: Image) -> bool:

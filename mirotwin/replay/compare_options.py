@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
+from typing import Annotated, Any
 
 import click
-import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
@@ -20,11 +17,12 @@ from mirotwin.recording.compare import (
     Kind,
     Rule,
 )
-from mirotwin.shell.options import Number, Whole
-from mirotwin.shell.times import Time, TimeType
+from mirotwin.shell.command import Option, Options
+from mirotwin.shell.options import FROM, JSON, TO, FiniteNumber, Whole
+from mirotwin.shell.times import Time
 
-_MS = TICKS_PER_SECOND // 1000
-APPLIES = {
+_TICKS_PER_MS = TICKS_PER_SECOND // 1000
+_APPLIES = {
     "within_ms": ("bytes", "commands"),
     "within_counts": ("wheels",),
     "within_counts_per_sample": ("wheels",),
@@ -32,19 +30,79 @@ APPLIES = {
 """A tolerance, and the comparisons that have it."""
 
 
-class Asked(msgspec.Struct, frozen=True):
-    """How to compare and what to tell; names as the options'. `given`: some of it was asked for by an option."""
+class CompareOptions(Options, frozen=True, kw_only=True):
+    """How to compare and what to tell."""
 
-    rule: Rule
-    everything: bool
-    as_json: bool
-    given: str
+    kind: Annotated[
+        Kind,
+        Option(
+            "--compare",
+            type=click.Choice(KINDS),
+            help="bits: all that robots did. bytes: the characters the PC heard. commands: the commands of each LM629."
+            " wheels: positions and desired velocities. The last three have tolerances.",
+        ),
+    ] = "bits"
+    within_ms: Annotated[
+        float | None,
+        Option(
+            type=FiniteNumber(0, 1000),
+            metavar="MS",
+            help=f"bytes, commands: how far apart in time. Default {WITHIN_TICKS / _TICKS_PER_MS:g}.",
+        ),
+    ] = None
+    within_counts: Annotated[
+        int | None,
+        Option(
+            type=Whole(0, 1 << 30),
+            metavar="COUNTS",
+            help=f"wheels: how far apart in position. Default {WITHIN_COUNTS}.",
+        ),
+    ] = None
+    within_counts_per_sample: Annotated[
+        float | None,
+        Option(
+            type=FiniteNumber(0, 1 << 14),
+            metavar="COUNTS",
+            help=f"wheels: how far apart in desired velocity. Default {WITHIN_COUNTS_PER_SAMPLE:g}.",
+        ),
+    ] = None
+    from_time: Annotated[Time | None, FROM.saying("Compare from there on, such as 1.5s, 20ms or 48000t.")] = (
+        None
+    )
+    to_time: Annotated[Time | None, TO.saying("Stop there. Default: the end of the recording.")] = None
+    as_json: Annotated[bool, JSON] = False
+
+    def refuse(self) -> None:
+        """Raises BadInput for options that do not go together."""
+        for name, kinds in _APPLIES.items():
+            for option in self.given(name):
+                if self.kind not in kinds:
+                    whose = " or ".join(f"--compare {each}" for each in kinds)
+                    what = f"does not apply to --compare {self.kind}"
+                    raise BadInput("", option, what, f"give {whose} with it")
+        rule = self.rule
+        if rule.to_tick is not None and rule.to_tick <= rule.from_tick:
+            place = f"--from {rule.from_tick}t --to {rule.to_tick}t"
+            raise BadInput("", place, "the window is empty", "--to must be later")
+
+    @property
+    def rule(self) -> Rule:
+        """The comparison that was asked for."""
+        ms, counts, per_sample = self.within_ms, self.within_counts, self.within_counts_per_sample
+        return Rule(
+            kind=self.kind,
+            within_ticks=WITHIN_TICKS if ms is None else int(Fraction(ms) * _TICKS_PER_MS),
+            within_counts=WITHIN_COUNTS if counts is None else counts,
+            within_counts_per_sample=WITHIN_COUNTS_PER_SAMPLE if per_sample is None else per_sample,
+            from_tick=0 if self.from_time is None else self.from_time.ticks(),
+            to_tick=None if self.to_time is None else self.to_time.ticks(),
+        )
 
     def described(self) -> str:
         """The comparison in words."""
         rule = self.rule
-        if rule.kind in APPLIES["within_ms"]:
-            return f"{rule.kind}, within {rule.within_ticks / _MS:g} ms"
+        if rule.kind in _APPLIES["within_ms"]:
+            return f"{rule.kind}, within {rule.within_ticks / _TICKS_PER_MS:g} ms"
         if rule.kind == "wheels":
             return f"wheels, within {rule.within_counts} counts and {rule.within_counts_per_sample:g} counts per sample"
         return rule.kind
@@ -52,77 +110,9 @@ class Asked(msgspec.Struct, frozen=True):
     def rule_as_json(self) -> dict[str, Any]:
         rule = self.rule
         tolerances = {
-            "within_ms": rule.within_ticks / _MS,
+            "within_ms": rule.within_ticks / _TICKS_PER_MS,
             "within_counts": rule.within_counts,
             "within_counts_per_sample": rule.within_counts_per_sample,
         }
-        own = {name: value for name, value in tolerances.items() if rule.kind in APPLIES[name]}
+        own = {name: value for name, value in tolerances.items() if rule.kind in _APPLIES[name]}
         return {"compare": rule.kind, **own, "from_tick": rule.from_tick, "to_tick": rule.to_tick}
-
-
-_OPTIONS: tuple[Callable[[Any], Any], ...] = (
-    click.option("--compare", "kind", type=click.Choice(KINDS), default="bits", show_default=True,
-                 help="bits: all that robots did. bytes: the characters the PC heard. commands: the commands of each"
-                 " LM629. wheels: positions and desired velocities. The last three have tolerances."),
-    click.option("--within-ms", type=Number(0, 1000), metavar="MS",
-                 help=f"bytes, commands: how far apart in time. Default {WITHIN_TICKS / _MS:g}."),
-    click.option("--within-counts", type=Whole(0, 1 << 30), metavar="COUNTS",
-                 help=f"wheels: how far apart in position. Default {WITHIN_COUNTS}."),
-    click.option("--within-counts-per-sample", type=Number(0, 1 << 14), metavar="COUNTS",
-                 help=f"wheels: how far apart in desired velocity. Default {WITHIN_COUNTS_PER_SAMPLE:g}."),
-    click.option("--from", "from_time", type=TimeType(), help="Compare from there on, such as 1.5s, 20ms or 48000t."),
-    click.option("--to", "to_time", type=TimeType(), help="Stop there. Default: the end of the recording."),
-    click.option("--all-differences", "all_differences", is_flag=True,
-                 help="List every difference, not only the first of each channel."),
-    click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of tables."),
-)  # fmt: skip
-
-
-def compare_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Gives a command these options, as one `asked`."""
-
-    @functools.wraps(command)
-    def gathered(**given: Any) -> Any:
-        return command(asked=_taken(given), **given)
-
-    with_options: Callable[..., Any] = gathered
-    for option in reversed(_OPTIONS):
-        with_options = option(with_options)
-    return with_options
-
-
-def _taken(given: dict[str, Any]) -> Asked:
-    """Takes these options out of a command's arguments. Raises BadInput for those that do not go together."""
-    kind: Kind = given.pop("kind")
-    tolerances = {name: given.pop(name) for name in APPLIES}
-    start, end = _ticks(given.pop("from_time")), _ticks(given.pop("to_time"))
-    everything, as_json = given.pop("all_differences"), given.pop("as_json")
-    used = [name for name, value in tolerances.items() if value is not None]
-    for name in used:
-        if kind not in APPLIES[name]:
-            whose = " or ".join(f"--compare {each}" for each in APPLIES[name])
-            raise BadInput("", _option(name), f"does not apply to --compare {kind}", f"give {whose} with it")
-    if end is not None and end <= (start or 0):
-        raise BadInput("", f"--from {start or 0}t --to {end}t", "the window is empty", "--to must be later")
-    within_ms = tolerances["within_ms"]
-    counts, per_sample = tolerances["within_counts"], tolerances["within_counts_per_sample"]
-    rule = Rule(
-        kind=kind,
-        within_ticks=WITHIN_TICKS if within_ms is None else int(Fraction(within_ms) * _MS),
-        within_counts=WITHIN_COUNTS if counts is None else counts,
-        within_counts_per_sample=WITHIN_COUNTS_PER_SAMPLE if per_sample is None else per_sample,
-        from_tick=start or 0,
-        to_tick=end,
-    )
-    first = (
-        _option(used[0]) if used else "--compare" if kind != "bits" else "--from" if start is not None else ""
-    )
-    return Asked(rule, everything, as_json, first or ("--all-differences" if everything else ""))
-
-
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
-
-
-def _ticks(time: Time | None) -> int | None:
-    return None if time is None else time.ticks(TICKS_PER_SECOND)

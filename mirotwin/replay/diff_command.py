@@ -3,50 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
-import click
 import msgspec
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_sim.scenario.file import parse as parse_scenario
-from mirotwin.firmware.sources_option import checked_sources, sources_option
+from mirotwin.firmware.sources_option import SourceFolders, checked_sources
 from mirotwin.recording.compare import differences
 from mirotwin.recording.difference import Difference
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
-from mirotwin.replay.compare_options import Asked, compare_options
+from mirotwin.replay.compare_options import CompareOptions
 from mirotwin.replay.diff_reproduction import Again, run_again
 from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
-from mirotwin.replay.replay_firmware import lines_from_option, load_images, program_of
+from mirotwin.replay.replay_firmware import LinesFrom, load_images, program_of
 from mirotwin.replay.sources import Made, SourceDifference, source_differences
 from mirotwin.rerun.recorded import image_if_any
+from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.console import show
-from mirotwin.shell.options import Place, choose_engine, engine_option
+from mirotwin.shell.options import ALL, NAME, QUIET, Engine, choose_engine
 from mirotwin.shell.outputs import file_in
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
 
 WORDS = ("A", "B")
 
 
-@click.command(short_help="Compares two recordings.")
-@click.argument("a", type=Place())
-@click.argument("b", type=Place())
-@compare_options
-@lines_from_option
-@sources_option
-@engine_option
-@click.option("-q", "--quiet", is_flag=True, help="No tables.")
-def diff(
-    a: str,
-    b: str,
-    asked: Asked,
-    lines_from: tuple[str, ...],
-    sources: tuple[str, ...],
-    engine: str | None,
-    quiet: bool,
-) -> int:
+class DiffOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "diff"
+    a: Annotated[str, Argument("A", NAME)]
+    b: Annotated[str, Argument("B", NAME)]
+    compare: CompareOptions = CompareOptions()
+    lines_from: LinesFrom = ()
+    sources: SourceFolders = ()
+    engine: Engine = None
+    everything: Annotated[bool, ALL.saying("List every difference, not only the first of each channel.")] = (
+        False
+    )
+    quiet: Annotated[bool, QUIET.saying("No tables.")] = False
+
+
+@command_of(DiffOptions)
+def diff(options: DiffOptions) -> int:
     """Compares the recordings A and B (run.mcap, or a run's folder): what they were made from, then all they hold.
 
     `bits` compares what the PCs did as well, and the digests of the states. Where both can be run again, the first
@@ -55,37 +55,37 @@ def diff(
 
     Exit code 4 when the recordings differ, 0 when they hold the same, whatever they were made from.
     """
-    choose_engine(engine)
-    checked_sources(sources)
-    a, b = file_in(a), file_in(b)
+    choose_engine(options.engine)
+    compare, sources = options.compare, checked_sources(options.sources)
+    a, b = file_in(options.a), file_in(options.b)
     recordings = _read(a), _read(b)
     made = _made(recordings[0], a), _made(recordings[1], b)
     origins = list(source_differences(*made))
     notes: list[str] = []
     one, other = _same_robots(recordings, notes)
-    digests = _digests(asked, recordings, notes)
-    rule = msgspec.structs.replace(asked.rule, host=asked.rule.kind == "bits", digests=digests)
+    digests = _digests(compare, recordings, notes)
+    rule = msgspec.structs.replace(compare.rule, host=compare.rule.kind == "bits", digests=digests)
     found = differences(one.periods, other.periods, rule)
     lengths = len(one.periods), len(other.periods)
-    images = load_images(lines_from, *(one.image for one in made))
+    images = load_images(options.lines_from, *(one.image for one in made))
     again = Again()
     if found:
         programs = [program_of(one.image, images, sources) for one in made if one.image is not None]
         again = run_again((a, b), recordings, made, programs, found, notes)
 
-    if not quiet and not asked.as_json:
+    if not options.quiet and not compare.as_json:
         _print_sources(origins)
         if found:
-            print_differences(found, asked.everything, WORDS)
-    code = _verdict(asked, origins, found, lengths, again, notes)
-    if asked.as_json:
+            print_differences(found, options.everything, WORDS)
+    code = _verdict(compare, origins, found, lengths, again, notes)
+    if compare.as_json:
         document = {
             "a": a,
             "b": b,
             "sources": [one.as_json() for one in origins],
             "periods": {"a": lengths[0], "b": lengths[1]},
-            **asked.rule_as_json(),
-            **differences_as_json(found, asked.everything, ("a", "b")),
+            **compare.rule_as_json(),
+            **differences_as_json(found, options.everything, ("a", "b")),
             **again.as_json(),
             "notes": notes,
             "exit_code": code,
@@ -141,9 +141,9 @@ def _only(recording: Recording, robots: Sequence[tuple[int, int]]) -> Recording:
     return msgspec.structs.replace(recording, periods=tuple(periods))
 
 
-def _digests(asked: Asked, recordings: tuple[Recording, Recording], notes: list[str]) -> bool:
+def _digests(compare: CompareOptions, recordings: tuple[Recording, Recording], notes: list[str]) -> bool:
     """Whether the digests say anything: they are of states of one form."""
-    if asked.rule.kind != "bits":
+    if compare.rule.kind != "bits":
         return False
     one, other = (recording.source.state for recording in recordings)
     if one != other:
@@ -165,7 +165,7 @@ def _print_sources(sources: Sequence[SourceDifference]) -> None:
 
 
 def _verdict(
-    asked: Asked,
+    compare: CompareOptions,
     sources: Sequence[SourceDifference],
     found: Sequence[Difference],
     lengths: tuple[int, int],
@@ -180,13 +180,13 @@ def _verdict(
             complain(f"their states differ from {again.state} on")
         if again.firmwares is not None:
             print_firmwares(again.firmwares, WORDS)
-    if lengths[0] != lengths[1] and asked.rule.to_tick is None:
+    if lengths[0] != lengths[1] and compare.rule.to_tick is None:
         code = DIVERGENCE
         complain(f"A has {lengths[0]} control periods, B has {lengths[1]}")
     for note in notes:
         complain(note)
-    if code == DONE and not asked.as_json:
-        how = "" if asked.rule.kind == "bits" else f" ({asked.described()})"
+    if code == DONE and not compare.as_json:
+        how = "" if compare.rule.kind == "bits" else f" ({compare.described()})"
         whence = "; they were not made from the same" if sources else ""
         show(f"the recordings hold the same in all {min(lengths)} control periods{how}{whence}")
     return code

@@ -39,7 +39,7 @@ def print_differences(found: Sequence[Difference], everything: bool, words: tupl
     show(table)
     if len(rows) < len(found):
         channels = "channel" if len(rows) == 1 else "channels"
-        show(f"{len(found)} differences in {len(rows)} {channels}; --all-differences lists them")
+        show(f"{len(found)} differences in {len(rows)} {channels}; --all lists them")
 
 
 def print_firmwares(found: FirmwareDifference, words: tuple[str, str] = WORDS) -> None:

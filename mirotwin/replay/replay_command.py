@@ -3,83 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import click
 import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_exact.seed import MAX_SEED
 from miro_sim.periods import Period
 from miro_sim.radio.downlink import TransmissionError
 from miro_sim.world.world import World
-from mirotwin.firmware.sources_option import checked_sources, sources_option
+from mirotwin.firmware.sources_option import SourceFolders, checked_sources
 from mirotwin.fuzz.fuzz_bare import replay_bare_case
-from mirotwin.recording.compare import differences
+from mirotwin.recording.compare import Rule, differences
 from mirotwin.recording.difference import Difference
-from mirotwin.replay.compare_options import Asked, compare_options
+from mirotwin.replay.compare_options import CompareOptions
 from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
 from mirotwin.replay.firmwares import FirmwareDifference
 from mirotwin.replay.replay_case import replay_case
-from mirotwin.replay.replay_firmware import firmwares_apart, lines_from_option, load_images, program_of
+from mirotwin.replay.replay_firmware import LinesFrom, firmwares_apart, load_images, program_of
 from mirotwin.replay.replay_tables import SHOWN, print_frames, print_response
 from mirotwin.rerun import runner
 from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.job import Job, load_job
+from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import (
-    Place,
-    Whole,
+    ALL,
+    QUIET,
+    SEED,
+    SET,
+    Engine,
+    StackFrom,
     choose_engine,
-    engine_option,
-    firmware_option,
     plain_parameters,
-    set_option,
-    stack_option,
 )
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import is_bare_case
+from mirotwin.verify.cases.replay_line import CaseOptions
 from mirotwin.verify.checks.expect import expectations_of, says_anything
 from mirotwin.verify.checks.watching import Checks
-from mirotwin.verify.expectations import (
-    as_setting,
-    expectations_text,
-    plain_expect_option,
-    refuse_files,
-    report_failures,
-)
+from mirotwin.verify.expectations import as_settings, expectations_text, report_failures
+
+_OF_A_RECORDING = ("kind", "within_ms", "within_counts", "within_counts_per_sample", "from_time")
+_OF_THE_WORLD = (*_OF_A_RECORDING, "seed", "settings")
 
 
-@click.command(short_help="Sends recorded bytes again and compares.")
-@click.argument("file", type=Place())
-@firmware_option("Image to run instead of the recorded one (of the robot's own, for a text stream).")
-@stack_option
-@lines_from_option
-@sources_option
-@click.option("--seed", type=Whole(0, MAX_SEED), help="Master seed instead of the recorded one.")
-@set_option("A key to set in the recorded scenario (or the default one, for a text stream), as for `run`.")
-@compare_options
-@plain_expect_option
-@engine_option
-@click.option("--all", "everything", is_flag=True, help=f"List all frames, not only the first {SHOWN}.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no lists of frames or differences.")
-def replay(
-    file: str,
-    firmware: str | None,
-    stack_from: int | None,
-    lines_from: tuple[str, ...],
-    sources: tuple[str, ...],
-    seed: int | None,
-    settings: tuple[str, ...],
-    asked: Asked,
-    expected: tuple[str, ...],
-    engine: str | None,
-    everything: bool,
-    quiet: bool,
-) -> int:
+class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
+    stack_from: StackFrom = None
+    lines_from: LinesFrom = ()
+    sources: SourceFolders = ()
+    seed: Annotated[int | None, SEED.saying("Master seed instead of the recorded one.")] = None
+    settings: Annotated[
+        tuple[str, ...],
+        SET.saying(
+            "A key to set in the recorded scenario (or the default one, for a text stream), as for `run`."
+        ),
+    ] = ()
+    compare: CompareOptions = CompareOptions()
+    engine: Engine = None
+    everything: Annotated[
+        bool,
+        ALL.saying(
+            f"List all frames, not only the first {SHOWN}, and all differences, not only the first of each channel."
+        ),
+    ] = False
+    quiet: Annotated[bool, QUIET.saying("No progress bar and no lists of frames or differences.")] = False
+
+
+@command_of(ReplayOptions)
+def replay(options: ReplayOptions) -> int:
     """Sends the bytes of FILE again and compares what the robot does.
 
     FILE is a run.mcap, a text stream, or the folder of a run or of a failed test.
@@ -102,60 +98,59 @@ def replay(
 
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
-    file = file_in(file, (*RECORDINGS, *CASES))
+    file, compare = file_in(options.file, (*RECORDINGS, *CASES)), options.compare
     if is_bare_case(file):
-        _check_bare(file, asked, settings, seed)
-        choose_engine(engine)
-        return replay_bare_case(file, firmware, expected)
-    refuse_files(expected)
-    settings = (*settings, *map(as_setting, expected))
-    if stack_from is not None and firmware is None:
+        _refuse(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD))
+        choose_engine(options.engine)
+        return replay_bare_case(file, options.firmware, options.expected)
+    settings = (*options.settings, *as_settings(options.expected))
+    if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
-    job, image = load_job(file, firmware, engine, settings, seed, stack_from)
-    if asked.given and not job.recorded:
-        raise BadInput(file, asked.given, "a text stream holds nothing to compare with", "leave it out")
-    images = load_images(lines_from, job.image)
-    checked_sources(sources)
+    job, image = load_job(file, options.firmware, options.engine, settings, options.seed, options.stack_from)
+    if not job.recorded:
+        _refuse(file, "a text stream holds nothing to compare with", options.given(*_OF_A_RECORDING))
+    images = load_images(options.lines_from, job.image)
+    checked_sources(options.sources)
     if job.case.verdict:
-        _check_case(file, asked)
-        return replay_case(job, image, file, quiet)
+        _refuse(file, "is not for a case, which ends where it failed", options.given("to_time", "as_json"))
+        return replay_case(job, image, file, options.quiet)
     judged = says_anything(job.scenario)
     with plain_parameters(file, "replayed"):
         world = job.world(image)
     checks = Checks(world, expectations_of(job.scenario, file))
-    periods = _periods(file, job, asked)
-    replayed = _run(file, world, periods, quiet or asked.as_json)
-    rule = msgspec.structs.replace(asked.rule, digests=job.state == world.state.tables())
+    periods = _periods(file, job, compare.rule)
+    replayed = _run(file, world, periods, options.quiet or compare.as_json)
+    rule = msgspec.structs.replace(compare.rule, digests=job.state == world.state.tables())
     found = differences(job.recorded, replayed, rule)
     apart = None
     if found and job.image is not None and job.image.code != image.code:
-        programs = program_of(job.image, images, ()), program_of(image, (), sources)
+        programs = program_of(job.image, images, ()), program_of(image, (), options.sources)
         apart = firmwares_apart(file, job, programs, found)
     checks.finish()
 
-    if not quiet and not asked.as_json:
-        print_frames(job, replayed, everything)
+    if not options.quiet and not compare.as_json:
+        print_frames(job, replayed, options.everything)
         if job.recorded and found:
-            print_differences(found, asked.everything)
-    if not job.recorded and not asked.as_json:
+            print_differences(found, options.everything)
+    if not job.recorded and not compare.as_json:
         print_response(replayed)
     failed = report_failures(checks)
-    if judged and not quiet and not asked.as_json:
+    if judged and not options.quiet and not compare.as_json:
         show(expectations_text(checks.verdicts()))
     faults = report_faults(world)
-    differs = _verdict(job, asked, periods, replayed, found, apart)
+    differs = _verdict(job, compare, periods, replayed, found, apart)
     decides = any(".expect." in f".{one}" for one in settings)
     code = (faults or failed) if decides else (differs or faults or failed)
-    if asked.as_json:
+    if compare.as_json:
         compared = {
             "periods": {"recorded": len(job.recorded), "replayed": len(replayed)},
-            **asked.rule_as_json(),
+            **compare.rule_as_json(),
         }
         firmwares = {"recorded": job.image.sha256 if job.image else None, "replayed": image.sha256}
         instruction = None if apart is None else apart.as_json()
         document = {"file": file, "seed": job.seed, "firmware": firmwares, **compared}
         result = {
-            **differences_as_json(found, asked.everything),
+            **differences_as_json(found, options.everything),
             "instruction": instruction,
             "exit_code": code,
         }
@@ -163,33 +158,25 @@ def replay(
     return code
 
 
-def _check_case(file: str, asked: Asked) -> None:
-    """Raises BadInput for what a case has no use for: its verdict is a line and an exit code."""
-    for option, given in (("--to", asked.rule.to_tick is not None), ("--json", asked.as_json)):
-        if given:
-            raise BadInput(file, option, "is not for a case, which ends where it failed", "leave it out")
-
-
-def _check_bare(file: str, asked: Asked, settings: tuple[str, ...], seed: int | None) -> None:
-    """Raises BadInput for options that need the robot's world."""
-    given = asked.given or ("--seed" if seed is not None else "--set" if settings else "")
+def _refuse(file: str, what: str, given: Sequence[str]) -> None:
+    """Raises BadInput for the first of the options that were given and mean nothing here."""
     if given:
-        raise BadInput(file, given, "is not for a case of a bare processor", "leave it out")
+        raise BadInput(file, given[0], what, "leave it out")
 
 
-def _periods(file: str, job: Job, asked: Asked) -> int | None:
+def _periods(file: str, job: Job, rule: Rule) -> int | None:
     """How many control periods are replayed; None: to the end of the scenario."""
     if not job.recorded:
-        ends = [tick for tick in (asked.rule.to_tick, job.case.end_tick) if tick]
+        ends = [tick for tick in (rule.to_tick, job.case.end_tick) if tick]
         return -(-min(ends) // CONTROL_PERIOD_TICKS) if ends else None
     first = job.recorded[0].index
     there = first + len(job.recorded)
-    if asked.rule.from_tick >= there * CONTROL_PERIOD_TICKS:
+    if rule.from_tick >= there * CONTROL_PERIOD_TICKS:
         what = f"the recording ends at tick {there * CONTROL_PERIOD_TICKS}"
-        raise BadInput(file, f"--from {asked.rule.from_tick}t", what, "look earlier")
-    if asked.rule.to_tick is None:
+        raise BadInput(file, f"--from {rule.from_tick}t", what, "look earlier")
+    if rule.to_tick is None:
         return there - first
-    return min(there, -(-asked.rule.to_tick // CONTROL_PERIOD_TICKS)) - first
+    return min(there, -(-rule.to_tick // CONTROL_PERIOD_TICKS)) - first
 
 
 def _run(file: str, world: World, periods: int | None, quiet: bool) -> list[Period]:
@@ -211,7 +198,7 @@ def _run(file: str, world: World, periods: int | None, quiet: bool) -> list[Peri
 
 def _verdict(
     job: Job,
-    asked: Asked,
+    compare: CompareOptions,
     periods: int | None,
     replayed: Sequence[Period],
     found: Sequence[Difference],
@@ -227,7 +214,7 @@ def _verdict(
     if periods is not None and len(replayed) < periods:
         complain(f"the replay ended after {len(replayed)} of {periods} recorded control periods")
         return DIVERGENCE
-    if not asked.as_json:
-        how = "" if asked.rule.kind == "bits" else f" ({asked.described()})"
+    if not compare.as_json:
+        how = "" if compare.rule.kind == "bits" else f" ({compare.described()})"
         show(f"the robots' response equals the recorded one in all {len(replayed)} control periods{how}")
     return DONE

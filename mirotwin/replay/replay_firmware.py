@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
-
-import click
+from typing import Annotated
 
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path, source_folder
@@ -18,18 +16,19 @@ from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS
 from mirotwin.replay.program import Program
 from mirotwin.rerun.job import Job
-from mirotwin.shell.options import Place, load_image, plain_parameters
+from mirotwin.shell.command import Option
+from mirotwin.shell.options import IMAGE, NAME, load_image, plain_parameters
 
-
-def lines_from_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    return click.option(
-        "--lines-from",
-        multiple=True,
+LinesFrom = Annotated[
+    tuple[str, ...],
+    Option(
         metavar="IMAGE.ihx",
-        type=Place(),
+        type=NAME,
         help="A recorded image as a file, beside which its debug files lie: for its C lines; may be repeated. The"
         " robot's own image needs none.",
-    )(command)
+        heading=IMAGE,
+    ),
+]
 
 
 def load_images(paths: Sequence[str], *recorded: Image | None) -> list[Image]:

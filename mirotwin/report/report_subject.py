@@ -21,12 +21,12 @@ from mirotwin.report.page.reproduction import Again, run_again
 from mirotwin.report.page.run_page import About, Material, Replayed, run_page
 from mirotwin.report.summary import Summary
 from mirotwin.rerun.job import Job, load_job
-from mirotwin.shell.command_line import replay_line
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.artifacts import CASES, REPORT
 from mirotwin.verify.cases.case import is_bare_case, tables_of
+from mirotwin.verify.cases.replay_line import replay_line
 from mirotwin.verify.checks.expect import expectations_of
 
 SUMMARIES = ("summary.json", "summary.part.json")

@@ -15,14 +15,3 @@ def operand(path: str | PathLike[str]) -> str:
 def command_line(*words: str) -> str:
     """`mirotwin` with these words, quoted for a shell."""
     return shlex.join(["mirotwin", *words])
-
-
-def replay_line(
-    stream: str | PathLike[str], firmware: str | PathLike[str] | None = None, check: str = ""
-) -> str:
-    """The command that plays a stream or a case again, on that image (None: the robot's own).
-
-    `check`: FILE.py:FUNCTION, which a case cannot name.
-    """
-    image = [] if firmware is None else ["--firmware", operand(firmware)]
-    return command_line("replay", operand(stream), *image, *(["--expect", check] if check else []))

@@ -1,4 +1,4 @@
-"""Options that several commands share, and what is loaded because of them."""
+"""Options that several commands share, each declared once, and what is loaded because of them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import click
 import msgspec
@@ -17,17 +17,20 @@ from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput, shortened
 from miro_exact.domain import DomainError
 from miro_exact.inputs import TEXT_BYTES, check_regular
+from miro_exact.seed import MAX_SEED
 from miro_host.plugins import PluginError
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from miro_robot.image.symbols import STACK
 from miro_sim.scenario.keys import Scenario
-
-Command = TypeVar("Command", bound=Callable[..., Any])
+from mirotwin.shell.command import Option
+from mirotwin.shell.times import TimeType
 
 
 class Whole(click.IntRange):
     """A whole number, refused in plain words."""
+
+    name = "N"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
@@ -37,7 +40,7 @@ class Whole(click.IntRange):
         return super().convert(value, param, ctx)
 
 
-class Number(click.FloatRange):
+class FiniteNumber(click.FloatRange):
     """A number in a range: neither "nan" nor "inf" is one."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -50,7 +53,7 @@ class Number(click.FloatRange):
         return super().convert(value, param, ctx)
 
 
-class Place(click.Path):
+class PathType(click.Path):
     """A path. The empty string is none, and an option that comes where a path is missing is none either."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -61,18 +64,6 @@ class Place(click.Path):
         ):
             self.fail(f"the path is missing before {value}; a file of this name is ./{value}.", param, ctx)
         return super().convert(value, param, ctx)
-
-
-def engine_option(command: Command) -> Command:
-    return click.option(
-        "--engine",
-        type=click.Choice(engines.ENGINES),
-        help="How the hot modules run; both give the same bits. Default: compiled if they were built.",
-    )(command)
-
-
-def firmware_option(text: str) -> Callable[[Command], Command]:
-    return click.option("--firmware", "firmware", metavar="IMAGE.ihx", type=Place(), help=text)
 
 
 class IramAddress(click.ParamType):  # type: ignore[type-arg, unused-ignore]
@@ -89,9 +80,70 @@ class IramAddress(click.ParamType):  # type: ignore[type-arg, unused-ignore]
             )
         return int(value, 16)
 
+    def written(self, value: int) -> str:
+        return f"{value:#04x}"
 
+
+NAME = PathType()
+"""A path as text."""
+PATH = PathType(path_type=Path)
+IMAGE = "Firmware image"
+"""The heading of options that say which image runs and how it is read."""
+
+
+SEED = Option("--seed", type=Whole(0, MAX_SEED), help="Master seed of all noise.")
+SET = Option("--set", metavar="KEY=VALUE", help="A key of the scenario, as for `run`; may be repeated.")
+FIRMWARE = Option(
+    "--firmware",
+    metavar="IMAGE.ihx",
+    type=NAME,
+    help="Image to run instead of the robot's own.",
+    heading=IMAGE,
+)
+OUT = Option("-o", "--out", type=PATH, help="File to write.")
+FORCE = Option("--force", help="Replace the file at --out.")
+QUIET = Option("-q", "--quiet", help="No progress bar, no last line.")
+JSON = Option("--json", help="Print one JSON document instead of tables.")
+ALL = Option("--all", help="List everything, not only what comes first.")
+FROM = Option("--from", type=TimeType(), help="Begin there, such as 1.5s, 20ms or 48000t.")
+TO = Option("--to", type=TimeType(), help="End there.")
+
+Seed = Annotated[int, SEED]
+Settings = Annotated[tuple[str, ...], SET]
+Firmware = Annotated[str | None, FIRMWARE]
+StackFrom = Annotated[
+    int | None,
+    Option(
+        type=IramAddress(),
+        help="Where the stack begins (0x..; it ends at 0xff), for an image without a .map.",
+        heading=IMAGE,
+    ),
+]
+Engine = Annotated[
+    str | None,
+    Option(
+        type=click.Choice(engines.ENGINES),
+        help="How the hot modules run; both give the same bits. Default: compiled if they were built.",
+    ),
+]
+
+# Until every command takes a record:
+Command = TypeVar("Command", bound=Callable[..., Any])
+Place, Number = PathType, FiniteNumber
 STACK_FROM: dict[str, Any] = {"metavar": "ADDRESS", "type": IramAddress()}
 STACK_FROM_HELP = "Where the stack begins (0x..; it ends at 0xff), for an image without a .map."
+
+
+def engine_option(command: Command) -> Command:
+    return click.option(
+        "--engine",
+        type=click.Choice(engines.ENGINES),
+        help="How the hot modules run; both give the same bits. Default: compiled if they were built.",
+    )(command)
+
+
+def firmware_option(text: str) -> Callable[[Command], Command]:
+    return click.option("--firmware", "firmware", metavar="IMAGE.ihx", type=Place(), help=text)
 
 
 def stack_option(command: Command) -> Command:

@@ -140,6 +140,7 @@ class LazyGroup(click.Group):
             return super().get_command(ctx, cmd_name)
         command = getattr(import_module(self.lazy[cmd_name].module), cmd_name)
         assert isinstance(command, click.Command)
+        command.short_help = self.lazy[cmd_name].about
         return command
 
     def resolve_command(

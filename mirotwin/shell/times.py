@@ -32,6 +32,9 @@ class Time(msgspec.Struct, frozen=True):
     value: Fraction
     in_ticks: bool
 
+    def __str__(self) -> str:
+        return self.text
+
     def ticks(self, crystal_hz: int = TICKS_PER_SECOND) -> int:
         return int(self.value if self.in_ticks else self.value * crystal_hz)
 

@@ -22,12 +22,12 @@ from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_DATA, VELOCIT
 from miro_robot.firmware import image_path
 from miro_robot.image import Image
 from miro_sim.radio import RadioParams
-from mirotwin.shell.command_line import replay_line
 from mirotwin.testing import shrinking
 from mirotwin.testing.bench import MS, Bench, LinkFailure
 from mirotwin.testing.bench_case import case_of_bench
 from mirotwin.testing.profiles import link_profiles, seeds
 from mirotwin.verify.cases.case import write_case
+from mirotwin.verify.cases.replay_line import replay_line
 
 STEPS = st.sampled_from([1, 1, 1, 2, 8, 9, 0, 63])
 """How far the sequence number moves: mostly as a host's does, but also as one that is stuck or restarted."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import click
 
-from miro_sim.scenario.settings import EXPECT
+from miro_sim.scenario.settings import EXPECT as EXPECT_KEY
+from mirotwin.shell.command import Option
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain
 from mirotwin.verify.checks.interface import Expectation
 from mirotwin.verify.checks.registry import ALWAYS_ON
@@ -41,7 +42,7 @@ def refuse_files(given: Sequence[str]) -> None:
 
 def as_setting(text: str) -> str:
     """`--expect KEY=VALUE` as the setting that it stands for; a KEY alone is a check with its defaults."""
-    return f"{EXPECT}{text}" if "=" in text else f"{EXPECT}{text}=true"
+    return f"{EXPECT_KEY}{text}" if "=" in text else f"{EXPECT_KEY}{text}=true"
 
 
 def _as_settings(ctx: click.Context, param: click.Parameter, given: Sequence[str]) -> tuple[str, ...]:
@@ -71,6 +72,21 @@ def _option(command: Command, callback: Callable[..., Any] | None, more: str = "
         help="A check of the run: a key of the scenario's [expect], such as tracks_within_cm=3; may be repeated. Exit"
         " code 1 when one fails." + more,
     )(command)
+
+
+EXPECT = Option(
+    "--expect",
+    metavar="KEY[=VALUE]",
+    help="A check of the run: a key of the scenario's [expect], such as tracks_within_cm=3; may be repeated. Exit"
+    " code 1 when one fails.",
+)
+Expected = Annotated[tuple[str, ...], EXPECT]
+
+
+def as_settings(expected: Sequence[str]) -> tuple[str, ...]:
+    """What --expect was given, as settings of the scenario. Raises UsageError for a check in a file."""
+    refuse_files(expected)
+    return tuple(map(as_setting, expected))
 
 
 def report_failures(checks: Checks) -> int:

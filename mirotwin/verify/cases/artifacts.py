@@ -15,7 +15,8 @@ from pathlib import Path
 
 from miro_robot.firmware import image_path
 from miro_robot.image import Image
-from mirotwin.shell import command_line
+from mirotwin.shell.command_line import command_line, operand
+from mirotwin.verify.cases import replay_line as line
 from mirotwin.verify.cases.case import write_case
 
 REPORT, CASE, SENT = "report.txt", "case.stream", "sent.stream"
@@ -79,9 +80,9 @@ MOST_BYTES = 1 << 20
 
 def replay_line(folder: str, own: bool, name: str = CASE) -> str:
     """The command that gives the verdict of the case in `folder` again; `own`: with the robot's own firmware."""
-    return command_line.replay_line(f"{folder}/{name}", None if own else f"{folder}/{FIRMWARE}")
+    return line.replay_line(f"{folder}/{name}", None if own else f"{folder}/{FIRMWARE}")
 
 
 def report_line(folder: str) -> str:
     """The command that makes the page of what happened, as a line of a report."""
-    return "page: " + command_line.command_line("report", command_line.operand(folder))
+    return "page: " + command_line("report", operand(folder))

@@ -43,7 +43,7 @@ def test_every_option_on_the_page_is_one_of_the_commands(name):
     }
     assert set(re.findall(r"--[a-z][a-z-]+", PAGE)) <= there
     own = {option for parameter in main.get_command(context, name).params for option in parameter.opts}
-    assert {"--compare", "--json", "--from", "--to", "--all-differences", "--lines-from", "--sources"} <= own
+    assert {"--compare", "--json", "--from", "--to", "--all", "--lines-from", "--sources"} <= own
 
 
 def run(*arguments: object) -> str:
@@ -57,6 +57,6 @@ def test_every_key_of_the_json_is_on_the_page(tmp_path):
     first, second = (tmp_path / f"{seed}" / "run.mcap" for seed in (1, 2))
     said = set(re.findall(r"`(\w+)`", PAGE.partition("## The JSON document")[2]))
     for arguments in (("replay", first, "--seed", 2), ("diff", first, second)):
-        document = json.loads(run(*arguments, "--json", "--all-differences"))
+        document = json.loads(run(*arguments, "--json", "--all"))
         assert set(document) <= said
         assert set(document["first"]) <= said

@@ -82,7 +82,7 @@ def test_firmware_with_another_constant_is_told_by_instruction_and_c_line(mirotw
     assert "they go on at different places after tick " in err
     assert "CJNE A,_age," in err
     assert "/net0/robot0/lm629 right command" in out
-    assert "--all-differences lists them" in out
+    assert "--all lists them" in out
 
 
 @needs_sdcc
@@ -103,7 +103,7 @@ def test_json_holds_the_same_and_nothing_else_is_on_stdout(mirotwin, silent, lat
     changed = document["instruction"]["changed"]
     assert [place["text"] for place in changed["places"]] == ["MOV A,#6Eh", "MOV A,#7Dh"]
     assert changed["values"] == [{"name": "ACC", "values": [110, 125]}]
-    every = json.loads(mirotwin(*command, "--all-differences")[1])
+    every = json.loads(mirotwin(*command, "--all")[1])
     assert len(every["differences"]) == every["count"] == document["count"]
 
 
@@ -121,8 +121,8 @@ def test_the_first_of_each_channel_is_listed_and_all_on_request(mirotwin, finish
     assert code == 4
     rows = [line.split() for line in out.splitlines() if "/net0/robot2/lm629" in line]
     assert [(row[0], row[-1]) for row in rows] == [("0", "6"), ("0", "6")]
-    assert "12 differences in 2 channels; --all-differences lists them" in out
-    code, out, _ = mirotwin("replay", path, "--all-differences")
+    assert "12 differences in 2 channels; --all lists them" in out
+    code, out, _ = mirotwin("replay", path, "--all")
     assert code == 4
     assert len([line for line in out.splitlines() if "/net0/robot2/lm629" in line]) == 12
 
@@ -272,9 +272,7 @@ def test_lines_come_from_a_recorded_image_alone(mirotwin, finished, tmp_path):
         assert "--lines-from: is not a recorded image; give one that is, or leave it out" in err
 
 
-@pytest.mark.parametrize(
-    "options", [("--compare", "bytes"), ("--from", "1t"), ("--all-differences",), ("--lines-from", "IMAGE")]
-)
+@pytest.mark.parametrize("options", [("--compare", "bytes"), ("--from", "1t"), ("--lines-from", "IMAGE")])
 def test_a_text_stream_has_nothing_to_compare_with(mirotwin, tmp_path, options):
     path = tmp_path / "a.stream"
     path.write_text("792000 > 55 55\n")

@@ -1,0 +1,243 @@
+"""A command whose options are one record: the parser, the defaults and the line that gives the command again come from
+its fields.
+
+    class LookOptions(Options, frozen=True, kw_only=True):
+        COMMAND = "camera look"
+        scenario: Annotated[str, Argument("SCENARIO")]
+        network: Annotated[int, Option(type=Whole(0), help="Whose camera.")] = 0
+        compare: CompareOptions = CompareOptions()
+
+    @command_of(LookOptions)
+    def look(options: LookOptions) -> int: ...
+
+A field that is itself such a record stands for all of its options. A flag is a field that is False, an option that may
+be repeated one that is ().
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from copy import copy
+from functools import cache
+from inspect import cleandoc
+from typing import Any, ClassVar, NamedTuple, TypeVar, get_args
+
+import click
+import msgspec
+
+from mirotwin.shell.command_line import command_line, operand
+
+
+class Argument(NamedTuple):
+    """What an argument is on the command line; its field is called as the function wants it."""
+
+    metavar: str
+    type: Any = None
+
+
+class Option:
+    """What an option is on the command line. Without names it is called as its field.
+
+    `heading`: the group of the help in which it stands. `needs`, `apart`: the field without which, or together with
+    which, it is refused. `alone`: the value of an option that is given without one. An option that several commands
+    have is declared once, and may say something else of itself in each (`saying`).
+    """
+
+    def __init__(
+        self,
+        *names: str,
+        help: str,
+        type: Any = None,
+        metavar: str | None = None,
+        heading: str = "",
+        needs: str = "",
+        apart: str = "",
+        alone: str | None = None,
+    ) -> None:
+        self.names = names
+        self.help = help
+        self.type = type
+        self.metavar = metavar
+        self.heading = heading
+        self.needs = needs
+        self.apart = apart
+        self.alone = alone
+        self.origin = self
+
+    def saying(self, help: str, **others: Any) -> Option:
+        """The same option with this help, and perhaps other attributes."""
+        other = copy(self)
+        vars(other).update(help=help, **others)
+        return other
+
+
+class Options(msgspec.Struct, frozen=True, kw_only=True):
+    """The options of a command."""
+
+    COMMAND: ClassVar[str] = ""
+    """Its words after `mirotwin`."""
+
+    def command_line(self) -> str:
+        """The command with what differs from its defaults, quoted for a shell."""
+        return command_line(*self.COMMAND.split(), *self._words())
+
+    def _words(self) -> Iterator[str]:
+        for field in _fields(type(self)):
+            value = getattr(self, field.name)
+            if field.record is not None:
+                yield from value._words()
+            elif value != field.default:
+                values = value if field.default == () else (value,)
+                for one in values:
+                    yield from field.words(one)
+
+    def given(self, *names: str) -> list[str]:
+        """The options among the fields of these names (without names: among all) that differ from their defaults."""
+        found = []
+        for field in _fields(type(self)):
+            value = getattr(self, field.name)
+            if field.record is not None:
+                found += value.given(*names)
+            elif (not names or field.name in names) and value != field.default:
+                found.append(field.label)
+        return found
+
+    def refuse(self) -> None:
+        """Raises UsageError for options that do not go together."""
+        fields = {field.name: field for field in _fields(type(self))}
+        for field in fields.values():
+            value = getattr(self, field.name)
+            if field.record is not None:
+                value.refuse()
+            elif isinstance(field.declared, Option) and value != field.default:
+                needs, apart = field.declared.needs, field.declared.apart
+                if needs and getattr(self, needs) == fields[needs].default:
+                    raise click.UsageError(f"{field.label} needs {fields[needs].label}.")
+                if apart and getattr(self, apart) != fields[apart].default:
+                    raise click.UsageError(f"{field.label} does not go with {fields[apart].label}.")
+
+
+class _Field(NamedTuple):
+    """A field of a record: what was declared, or the record that it is."""
+
+    name: str
+    declared: Argument | Option | None
+    record: type[Options] | None
+    default: Any
+    required: bool
+
+    @property
+    def label(self) -> str:
+        """How a message calls it."""
+        if isinstance(self.declared, Argument):
+            return self.declared.metavar
+        assert self.declared is not None
+        names = self.declared.names or (f"--{self.name.replace('_', '-')}",)
+        return max(names, key=len)
+
+    def words(self, value: Any) -> list[str]:
+        """The value as words of the command line."""
+        assert self.declared is not None
+        text = getattr(self.declared.type, "written", str)(value)
+        if isinstance(self.declared, Argument):
+            return [operand(text)]
+        if self.default is False:
+            return [self.label]
+        if self.declared.alone is not None:
+            return [f"{self.label}={text}"]
+        return [self.label, operand(text) if isinstance(self.declared.type, click.Path) else text]
+
+    def parameter(self) -> click.Parameter:
+        declared = self.declared
+        given: dict[str, Any] = {"required": self.required}
+        if self.default not in (None, (), False):
+            given["default"] = self.default
+        assert declared is not None
+        if isinstance(declared, Argument):
+            nargs = -1 if self.default == () else 1
+            return click.Argument(
+                [self.name], metavar=declared.metavar, type=declared.type, nargs=nargs, **given
+            )
+        if declared.alone is not None:
+            given |= {"is_flag": False, "flag_value": declared.alone}
+        return _HeadedOption(
+            [self.name, *(declared.names or (self.label,))],
+            heading=declared.heading,
+            help=declared.help,
+            type=declared.type,
+            metavar=declared.metavar,
+            multiple=self.default == (),
+            show_default="default" in given,
+            **({"is_flag": True} if self.default is False else {}),
+            **given,
+        )
+
+
+@cache
+def _fields(record: type[Options]) -> tuple[_Field, ...]:
+    found = []
+    for field in msgspec.structs.fields(record):
+        declared = next((one for one in get_args(field.type) if isinstance(one, Argument | Option)), None)
+        nested = field.type if declared is None else None
+        found.append(_Field(field.name, declared, nested, field.default, field.required))
+    return tuple(found)
+
+
+def _parameters(record: type[Options]) -> Iterator[click.Parameter]:
+    for field in _fields(record):
+        if field.record is not None:
+            yield from _parameters(field.record)
+        else:
+            yield field.parameter()
+
+
+Record = TypeVar("Record", bound=Options)
+
+
+def _read(record: type[Record], given: dict[str, Any]) -> Record:
+    """The record with what the command line gave."""
+    return record(
+        **{
+            field.name: given[field.name] if field.record is None else _read(field.record, given)
+            for field in _fields(record)
+        }
+    )
+
+
+class _HeadedOption(click.Option):
+    def __init__(self, *args: Any, heading: str, **named: Any) -> None:
+        super().__init__(*args, **named)
+        self.heading = heading
+
+
+class _Command(click.Command):
+    """A command whose help shows options that have a heading below that."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        groups: dict[str, list[tuple[str, str]]] = {"": []}
+        for param in self.get_params(ctx):
+            line = param.get_help_record(ctx)
+            if line is not None and isinstance(param, click.Option):
+                groups.setdefault(getattr(param, "heading", ""), []).append(line)
+        for heading, lines in groups.items():
+            with formatter.section(heading or "Options"):
+                formatter.write_dl(lines)
+
+
+def command_of(record: type[Record]) -> Callable[[Callable[[Record], int | None]], click.Command]:
+    """Makes a command of a function that takes the record; the command is called as the function."""
+
+    def made(function: Callable[[Record], int | None]) -> click.Command:
+        def called(**given: Any) -> int | None:
+            options = _read(record, given)
+            options.refuse()
+            return function(options)
+
+        return _Command(
+            function.__name__,
+            callback=called,
+            params=list(_parameters(record)),
+            help=cleandoc(function.__doc__ or ""),
+        )
+
+    return made
