@@ -70,7 +70,7 @@ def main() -> None:
         if any(target.run(data) for data in inputs) or (
             inputs[0] in (FRAME, SESSION) and not target.accepted
         ):
-            sys.exit(f"{name}: {target.finding}, {target.accepted} frames accepted")
+            sys.exit(f"{name}: {target.failure}, {target.accepted} frames accepted")
         tasks[name] = partial(execution_s, target, inputs)
     times: dict[str, list[float]] = {name: [] for name in tasks}
     for _ in range(rounds):

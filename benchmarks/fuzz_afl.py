@@ -64,7 +64,7 @@ def main() -> None:
     if engine.active() != "compiled":
         sys.exit("the compiled modules are missing: " + engine.REMEDY)
     times = f"{'per wall s':>12}{'per core s':>16}{'afl us':>12}{'target us':>12}"
-    print(f"{'':22}{times}{'stability':>13}{'edges':>7}{'finds':>9}")
+    print(f"{'':22}{times}{'stability':>13}{'edges':>7}{'crashes':>9}")
     for name, (target, inputs) in classes(load_hex(image_path())).items():
         with TemporaryDirectory() as folder:
             row = measured(Path(folder), TargetSpec(input=target.input), inputs, wall_s)

@@ -1,8 +1,8 @@
-"""One trial: an engine fuzzes an image until a find of it is confirmed, or the time is over.
+"""One trial: an engine fuzzes an image until a crash of it is confirmed, or the time is over.
 
-What counts is processor time of the engine's processes, from their start to the find, because it depends little on what
-else the machine does. A trial ends after `limit_s` of it, or after three times as long on the wall clock. A find is
-confirmed when checks fail for it in a world with the mistaken firmware that do not fail there with the shipped one.
+What counts is processor time of the engine's processes, from their start to the crash, because it depends little on
+what else the machine does. A trial ends after `limit_s` of it, or after three times as long on the wall clock. A crash
+is confirmed when checks fail for it in a world with the mistaken firmware that do not fail there with the shipped one.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def _goes_on(wanted: Wanted, begun_s: float, spent_s: float) -> bool:
 
 
 class _Looked:
-    """At finds. `checks`: those that fail by the first one that is confirmed."""
+    """At crashes. `checks`: those that fail by the first one that is confirmed."""
 
     def __init__(self, target: Target) -> None:
         self.target = target

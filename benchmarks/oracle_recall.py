@@ -136,8 +136,8 @@ def judged(mistake: str, image: Image, given: Sequence[bytes]) -> Row:
         by_oracle = bool(target.run(data))
         checks = failed(image, target, data)
         counts[by_oracle, bool(checks)] += 1
-        finding = target.finding
-        renamed += bool(checks and finding and finding.check not in checks)
+        failure = target.failure
+        renamed += bool(checks and failure and failure.check not in checks)
         if checks and not by_oracle:
             missed.update(set(checks))
     return Row(mistake, counts[True, True], counts[False, True], counts[True, False], dict(missed), renamed)

@@ -24,7 +24,7 @@ from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareOracle
 from miro_robot.image import SPACE_BYTES, Image, load_hex
 from mirotwin.fuzz.harness_target import HarnessTarget, described
 from mirotwin.fuzz.protocols import protocol_named
-from mirotwin.fuzz.target import Finding
+from mirotwin.fuzz.target import TargetFailure
 from mirotwin.verify.bare.case import NEVER_SLEEPS, NO_FAULT
 from mirotwin.verify.bare.exchange import Exchange, NamedCheck, check_named
 from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 NO_FAULT_CODE, NEVER_SLEEPS_CODE, CHECK_CODE = 1, 2, 3
 MOST_OF_A_BODY = 32
-"""Bytes of a body in a seed; the harness's program has a form for longer ones, which a fuzzer finds."""
+"""Bytes of a body in a seed; the harness's program has a form for longer ones, which a fuzzer triage."""
 _BITS = 10
 
 T = TypeVar("T")
@@ -44,7 +44,7 @@ class BareTarget(HarnessTarget):
     """`image` on a bare processor, up and in silence.
 
     `protocol` makes frames of bodies; without it they are sent as they are. `check` judges each run, `baud` 0 takes the
-    rate of the receiver. `run(data)` returns 0 or what `finding` is: a fault, no sleep, what the check says.
+    rate of the receiver. `run(data)` returns 0 or what `failure` is: a fault, no sleep, what the check says.
     Raises BadInput where the firmware does not come up.
     """
 
@@ -96,7 +96,7 @@ class BareTarget(HarnessTarget):
         return self.code
 
     def _judge(self, check: NamedCheck) -> None:
-        """What the check says. That it fails itself is a finding too: it is told when the find is confirmed."""
+        """What the check says. That it fails itself is a failure too: it is told when the crash is confirmed."""
         try:
             self._wrong = check.judge(self.exchange()) or ""
         except BadInput as error:
@@ -126,17 +126,17 @@ class BareTarget(HarnessTarget):
         return 12 * self.cpu.cycles
 
     @property
-    def finding(self) -> Finding | None:
+    def failure(self) -> TargetFailure | None:
         """Of the last run."""
         fault = self.processor.fault()
         if self.code == NO_FAULT_CODE and fault is not None:
-            return Finding(NO_FAULT, fault.tick, fault.pc, str(fault))
+            return TargetFailure(NO_FAULT, fault.tick, fault.pc, str(fault))
         if self.code == NEVER_SLEEPS_CODE:
             where = self.image.symbols.name_at(self.cpu.pc)
             what = f"awake long after the last character{f', in {where}' if where else ''}"
-            return Finding(NEVER_SLEEPS, self.end_tick(), 0, what)
+            return TargetFailure(NEVER_SLEEPS, self.end_tick(), 0, what)
         if self.code == CHECK_CODE and self.check is not None:
-            return Finding(self.check.name, self.end_tick(), 0, self._wrong)
+            return TargetFailure(self.check.name, self.end_tick(), 0, self._wrong)
         return None
 
     def describe(self, data: bytes) -> str:

@@ -2,7 +2,7 @@
 
 This is one of the few places that know the wall clock.
 
-    engine ──crashes──► finds: minimised, told apart, confirmed
+    engine ──crashes──► triage: minimised, told apart, confirmed
        └────queue────► coverage, --covering, checks in Python (a share of the time, the rest waits)
 
 The engine works in processes of its own, so it goes on while one of its inputs is looked at.
@@ -22,14 +22,14 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.engine import Engine, NoProgress, Progress
 from mirotwin.fuzz.files import CampaignFolder
-from mirotwin.fuzz.triage import Find, Finds
+from mirotwin.fuzz.triage import Crash, Triage
 
 LOOK_S = 0.2
 """Wall time between two looks at the engine."""
 SLICE_S = 0.5
 """How long inputs of the queue are looked at in one go."""
 LOOKED = 8
-"""Inputs of the queue that are looked at between two finds, which take longer."""
+"""Inputs of the queue that are looked at between two crashes, which take longer."""
 AFTER_S = 20.0
 """How long inputs are still looked at once the time is over."""
 
@@ -48,13 +48,13 @@ class Status(msgspec.Struct, frozen=True):
     executions: int
     executions_per_s: float
     edges: int | None
-    finds: int
+    crashes: int
     unconfirmed: int
     waiting: int
 
 
 class Campaign:
-    """One campaign. `expected`: checks in Python that look at each input of the queue; `tell` gets each find at once.
+    """One campaign. `expected`: checks in Python that look at each input of the queue; `tell` gets each crash at once.
 
     `judged`: inputs that those have looked at; `reached_by`: the stream that reached what was to be reached.
     """
@@ -62,15 +62,15 @@ class Campaign:
     def __init__(
         self,
         engine: Engine,
-        finds: Finds,
+        triage: Triage,
         folder: CampaignFolder,
         expected: Mapping[str, Any],
         covering: Covering | None = None,
-        tell: Callable[[Find], None] = lambda find: None,
+        tell: Callable[[Crash], None] = lambda crash: None,
     ) -> None:
         self.engine = engine
         self._progress: Progress = NoProgress()
-        self.finds = finds
+        self.triage = triage
         self.folder = folder
         self.expected = expected
         self.covering = covering
@@ -89,7 +89,7 @@ class Campaign:
         self._shown_s = 0.0
 
     def begin_with(self, failing: Iterable[bytes], passing: Iterable[bytes]) -> None:
-        """Inputs to look at before those of the engine: seeds that fail are finds, of the others coverage is taken."""
+        """Inputs to look at before those of the engine: seeds that fail are crashes, others give coverage."""
         for inputs, data_of in ((self._crashes, failing), (self._queue, passing)):
             for data in data_of:
                 self._seen.add(data)
@@ -101,7 +101,7 @@ class Campaign:
     def run(self, time_s: float | None, show: Callable[[Status], None]) -> None:
         """Until the time is over (None: never), or what was to be reached is. The engine is stopped however it ends."""
         self._began_s = time.monotonic()
-        self.finds.tell = lambda: self._show_sometimes(show)
+        self.triage.tell = lambda: self._show_sometimes(show)
         try:
             self.engine.start()
             while self.reached_by is None and (time_s is None or self.run_s < time_s):
@@ -118,7 +118,7 @@ class Campaign:
     def finish(self, show: Callable[[Status], None], limit_s: float = AFTER_S) -> int:
         """Looks at what is left, so long at most; returns how many inputs were left out."""
         end_s = time.monotonic() + limit_s
-        self.finds.tell = lambda: self._show_sometimes(show)
+        self.triage.tell = lambda: self._show_sometimes(show)
         while (self._crashes or self._queue or self._to_judge) and time.monotonic() < end_s:
             self._work(end_s, None, at_ease=True)
         return len(self._crashes) + len(self._queue) + len(self._to_judge)
@@ -138,8 +138,8 @@ class Campaign:
             progress.executions,
             progress.executions_per_s,
             progress.edges,
-            len(self.finds.confirmed),
-            len(self.finds.unconfirmed),
+            len(self.triage.confirmed),
+            len(self.triage.unconfirmed),
             len(self._crashes) + len(self._queue) + len(self._to_judge),
         )
 
@@ -167,14 +167,14 @@ class Campaign:
             inputs.append(data)
 
     def _work(self, end_s: float, time_s: float | None, at_ease: bool = False) -> None:
-        """Finds, and coverage between two of them; then checks in Python, a third of the time while the engine runs."""
+        """Crashes, and coverage between two of them; then checks in Python, a third of the time."""
         while self.reached_by is None or at_ease:
             if time.monotonic() >= end_s or (time_s is not None and self.run_s >= time_s):
                 return
             if self._crashes and (not self._queue or self._looked >= LOOKED):
                 done = self._crashes
                 self._looked = 0
-                self._keep(self.finds.take(done[0]))
+                self._keep(self.triage.take(done[0]))
             elif self._queue:
                 done = self._queue
                 self._looked += 1
@@ -186,28 +186,28 @@ class Campaign:
                 return
             done.popleft()  # now: what is interrupted is looked at again
 
-    def _keep(self, find: Find | None) -> None:
-        if find is not None:
-            self.tell(find)
+    def _keep(self, crash: Crash | None) -> None:
+        if crash is not None:
+            self.tell(crash)
 
     def _look(self, data: bytes) -> None:
         """An input that found something new: what it executes."""
         self.inputs += 1
         self.folder.write("corpus", f"input-{self.inputs:05d}", data)
-        counts = self.finds.reached.run(data)
+        counts = self.triage.reached.run(data)
         if self.expected:
             self._to_judge.append(data)
         if self.covering is not None and self.reached_by is None and self.covering.address in counts:
-            stream = self.finds.court.stream(self.finds.target, data)
-            self.reached_by = self.finds.leave("covering", self.covering.name, data, stream, counts)
+            stream = self.triage.oracle.stream(self.triage.target, data)
+            self.reached_by = self.triage.leave("covering", self.covering.name, data, stream, counts)
 
     def _judge(self, data: bytes) -> None:
         """What the checks in Python say of it. Raises PluginError where one raises."""
         began_s = time.monotonic()
         try:
             self.judged += 1
-            failure = self.finds.judged(data, self.expected).failure
+            failure = self.triage.judged(data, self.expected).failure
             if failure is not None:
-                self._keep(self.finds.take_judged(data, failure, self.expected))
+                self._keep(self.triage.take_judged(data, failure, self.expected))
         finally:
             self._judging_s += time.monotonic() - began_s

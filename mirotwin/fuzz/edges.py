@@ -31,7 +31,7 @@ class EdgeUnion:
         return self._seen.bit_count()
 
     def add(self, data: bytes) -> int:
-        """Runs an input; how many edges no input before has executed. Those of a run with a finding do not count."""
+        """Runs an input; how many edges no input before has executed. Those of a run with a failure do not count."""
         self._edges[:] = self._none
         self._target.use_map(self._edges)
         if self._target.run(data):

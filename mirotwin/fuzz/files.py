@@ -1,10 +1,10 @@
 """The folder of a campaign: what stands where.
 
 OUT/
-  finds/NAME.stream        a case: `mirotwin replay` gives the verdict again
-  finds/NAME.input         the minimised input, for --corpus
-  finds/NAME.txt           the same as readable lines
-  finds/NAME.info          what it executed, as an lcov tracefile
+  crashes/NAME.stream      a case: `mirotwin replay` gives the verdict again
+  crashes/NAME.input       the minimised input, for --corpus
+  crashes/NAME.txt         the same as readable lines
+  crashes/NAME.info        what it executed, as an lcov tracefile
   unconfirmed/NAME.*       what a world did not find wrong: the same files, and a stream that nothing is expected of
   covering/SYMBOL.*        the input that reached a function (--covering)
   corpus/                  inputs that found something new
@@ -27,7 +27,7 @@ from miro_exact.bad_input import BadInput
 from miro_protocol import files
 from mirotwin.shell.outputs import OutputError, told_when_full
 
-FOLDERS = ("finds", "unconfirmed", "covering", "corpus", "seeds", "engine")
+FOLDERS = ("crashes", "unconfirmed", "covering", "corpus", "seeds", "engine")
 FILES = ("coverage.info", "coverage.info.lst", "summary.json", "dictionary")
 SCRATCH = ("corpus", "seeds", "engine")
 """Folders of these that are taken away where a campaign breaks off with an error."""
@@ -88,7 +88,7 @@ class CampaignFolder:
 
     @contextmanager
     def filled(self) -> Iterator[None]:
-        """While the campaign writes there. A full disk is an OutputError, and leaves finds only, or no folder."""
+        """While the campaign writes there. A full disk is an OutputError, and leaves crashes only, or no folder."""
         try:
             with told_when_full(self.path, OPTION):
                 yield
@@ -98,12 +98,12 @@ class CampaignFolder:
             for name in FILES:
                 (self.path / name).unlink(missing_ok=True)
             for path in (*self.path.rglob("*"), self.path):
-                with suppress(OSError):  # a folder with finds in it, or a find
+                with suppress(OSError):  # a folder with crashes in it, or a crash
                     path.rmdir()
             raise
 
     def remove(self, folder: str, name: str) -> None:
-        """Takes away the files of a find."""
+        """Takes away the files of a crash."""
         for path in self.folder(folder).glob(f"{glob.escape(name)}.*"):
             path.unlink()
 

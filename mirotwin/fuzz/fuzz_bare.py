@@ -18,7 +18,7 @@ from mirotwin.shell.options import Whole, load_image
 from mirotwin.shell.program import DIVERGENCE, complain
 
 if TYPE_CHECKING:
-    from mirotwin.fuzz.bare_oracle import BareCourt
+    from mirotwin.fuzz.bare_oracle import BareProcessorOracle
 
 Command = Callable[..., Any]
 _ROBOTS_OWN = ("robots", "slot")
@@ -103,15 +103,15 @@ def bare_seeds(spec: TargetSpec) -> list[bytes]:
     return bare_target(spec).seeds()
 
 
-def bare_court(checks: tuple[str, ...]) -> tuple[BareCourt, dict[str, Any]]:
-    """Who confirms finds, and what new inputs are judged by. Raises BadInput for a check that there is not."""
-    from mirotwin.fuzz.bare_oracle import BareCourt
+def bare_oracle(checks: tuple[str, ...]) -> tuple[BareProcessorOracle, dict[str, Any]]:
+    """Who confirms crashes, and what new inputs are judged by. Raises BadInput for a check that there is not."""
+    from mirotwin.fuzz.bare_oracle import BareProcessorOracle
     from mirotwin.verify.bare.exchange import check_named
 
     if not checks:
-        return BareCourt(), {}
+        return BareProcessorOracle(), {}
     check = check_named(checks[0])
-    return BareCourt(check), {check.name: True}
+    return BareProcessorOracle(check), {check.name: True}
 
 
 def replay_bare_case(path: str, firmware: str | None, checks: tuple[str, ...]) -> int:

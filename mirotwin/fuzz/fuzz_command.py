@@ -27,8 +27,8 @@ from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
 from mirotwin.fuzz.fuzz_bare import (
     BareAsked,
-    bare_court,
     bare_fuzz_options,
+    bare_oracle,
     bare_seeds,
     bare_spec,
     load_bare_firmware,
@@ -37,13 +37,13 @@ from mirotwin.fuzz.fuzz_bare import (
 from mirotwin.fuzz.fuzz_progress import FuzzProgress
 from mirotwin.fuzz.fuzz_regress import refuse_others, regress
 from mirotwin.fuzz.fuzz_summary import Ended, report
-from mirotwin.fuzz.oracle import Court, WorldCourt
+from mirotwin.fuzz.oracle import Oracle, WorldOracle
 from mirotwin.fuzz.oracle import Place as RobotPlace
 from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
-from mirotwin.fuzz.triage import MINIMISE_S, Find, Finds
+from mirotwin.fuzz.triage import MINIMISE_S, Crash, Triage
 from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, load_image
 from mirotwin.shell.program import Terminated, complain
 from mirotwin.shell.times import WallTime
@@ -127,7 +127,7 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
     type=WallTime(LONGEST_S),
     default=f"{MINIMISE_S:.0f}s",
     show_default=True,
-    help="Longest time for making a find small.",
+    help="Longest time for making a crash small.",
 )
 @click.option(
     "--regress", "cases", type=Place(path_type=Path), metavar="DIR", help="Run the saved cases of a folder."
@@ -149,7 +149,7 @@ def fuzz(
     """Looks for inputs that make IMAGE.ihx (default: the robot's own firmware) fail, on the robot's board.
 
     Each input is played from the moment at which the firmware is up. Faults and the promises of the protocol are judged
-    in each; what fails is made small, played again in a World, and left in --out as finds/NAME.stream, a case for
+    in each; what fails is made small, played again in a World, and left in --out as crashes/NAME.stream, a case for
     `mirotwin replay`. Afterwards it says which functions and lines no input has reached.
 
     With --bare it is any 8051 firmware with a serial port, on a processor to which nothing of the robot is connected.
@@ -174,20 +174,25 @@ def fuzz(
         return _bare_campaign(image or "", kind, active, firmware, asked, bare)
     spec = TargetSpec(image=image or "", input=kind, robots=int(robots), slot=slot, engine=active)
     expected = _expected(asked.checks)
-    court = WorldCourt(RobotPlace(firmware, spec.robots, spec.slot))
-    return _campaign(spec, firmware, asked, court, expected, seeds(spec.input, spec.robots, spec.slot))
+    oracle = WorldOracle(RobotPlace(firmware, spec.robots, spec.slot))
+    return _campaign(spec, firmware, asked, oracle, expected, seeds(spec.input, spec.robots, spec.slot))
 
 
 def _bare_campaign(
     path: str, kind: str, engine: Literal["compiled", "python"], image: Image, asked: Asked, bare: BareAsked
 ) -> int:
-    court, expected = bare_court(asked.checks)
+    oracle, expected = bare_oracle(asked.checks)
     spec = bare_spec(path, kind, engine, bare, asked.checks)
-    return _campaign(spec, image, asked, court, expected, bare_seeds(spec))
+    return _campaign(spec, image, asked, oracle, expected, bare_seeds(spec))
 
 
 def _campaign(
-    spec: TargetSpec, image: Image, asked: Asked, court: Court, expected: dict[str, Any], inputs: list[bytes]
+    spec: TargetSpec,
+    image: Image,
+    asked: Asked,
+    oracle: Oracle,
+    expected: dict[str, Any],
+    inputs: list[bytes],
 ) -> int:
     folder = CampaignFolder(asked.out, asked.force)
     check_outside(asked.out, asked.corpus)
@@ -204,16 +209,16 @@ def _campaign(
         what = f"{covering.name} runs while the firmware starts, before any input"
         raise BadInput("", "--covering", what, "name a function that an input has to reach")
     folder.make()
-    finds = Finds(target, reached, court, folder, sources_of(image, asked.sources), asked.minimise_s)
+    triage = Triage(target, reached, oracle, folder, sources_of(image, asked.sources), asked.minimise_s)
     with folder.filled():
-        campaign, asked = _begun(spec, asked, finds, folder, expected, covering, _sorted_out(target, inputs))
+        campaign, asked = _begun(spec, asked, triage, folder, expected, covering, _sorted_out(target, inputs))
         return _run(campaign, image, asked)
 
 
 def _begun(
     spec: TargetSpec,
     asked: Asked,
-    finds: Finds,
+    triage: Triage,
     folder: CampaignFolder,
     expected: dict[str, Any],
     covering: Covering | None,
@@ -229,7 +234,7 @@ def _begun(
     else:
         complain("every input fails or executes no branch: there is nothing to go on from")
         asked = msgspec.structs.replace(asked, time_s=0.0)
-    campaign = Campaign(engine, finds, folder, expected, covering, _teller(asked.quiet))
+    campaign = Campaign(engine, triage, folder, expected, covering, _teller(asked.quiet))
     campaign.begin_with(failing, (*passing, *silent))
     return campaign, asked
 
@@ -280,11 +285,11 @@ def _run(campaign: Campaign, image: Image, asked: Asked) -> int:
 
 
 def _teller(quiet: bool) -> Any:
-    def tell(find: Find) -> None:
-        kind = "found" if find.confirmed else "found, but not confirmed in a World"
-        complain(f"{kind}: {find.name}: {find.verdict}")
+    def tell(crash: Crash) -> None:
+        kind = "found" if crash.confirmed else "found, but not confirmed in a World"
+        complain(f"{kind}: {crash.name}: {crash.verdict}")
 
-    return (lambda find: None) if quiet else tell
+    return (lambda crash: None) if quiet else tell
 
 
 def _expected(checks: tuple[str, ...]) -> dict[str, Any]:
@@ -317,14 +322,14 @@ def _covering(symbol: str | None, image: Image) -> Covering | None:
 def _check_at_rest(target: Target, image: Image) -> None:
     """Raises BadInput for firmware in which something is wrong before it has heard anything."""
     target.run(b"")
-    finding = target.finding
+    failure = target.failure
     harness = getattr(target, "harness", None)
     if harness is not None and not harness.sleeps:
         complain(
             f"{image.path}: never sleeps (IDL); each run goes on for {AWAKE_MS} ms behind its last character"
         )
-    if finding is not None:
-        what = f"fails before it has heard anything: {finding.check}: {finding.what}"
+    if failure is not None:
+        what = f"fails before it has heard anything: {failure.check}: {failure.what}"
         raise BadInput(image.path, "", what, "mend that first: each input would find it")
 
 

@@ -62,15 +62,15 @@ def said(status: Status) -> str:
     parts = [f"{status.executions_per_s:.0f}/s"]
     if status.edges is not None:  # else the engine has not said yet
         parts.append(f"{status.edges} edges")
-    parts.append(counted(status.finds, "find"))
+    parts.append(counted(status.crashes, "crash", "crashes"))
     if status.unconfirmed:
         parts.append(f"{status.unconfirmed} unconfirmed")
     return ", ".join(parts)
 
 
-def counted(number: int, word: str) -> str:
-    """`no finds`, `1 find`, `2 finds`."""
-    return f"{number or 'no'} {word}{'' if number == 1 else 's'}"
+def counted(number: int, word: str, plural: str = "") -> str:
+    """`no inputs`, `1 input`, `2 crashes`."""
+    return f"{number or 'no'} {word if number == 1 else plural or f'{word}s'}"
 
 
 def clock(time_s: float) -> str:

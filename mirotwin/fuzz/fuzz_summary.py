@@ -1,4 +1,4 @@
-"""What `mirotwin fuzz` says at the end: counts, coverage, finds with the line that repeats each, and summary.json."""
+"""What `mirotwin fuzz` says at the end: counts, coverage, crashes with the line that repeats each, and summary.json."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import table
 from mirotwin.fuzz.campaign import Campaign
 from mirotwin.fuzz.fuzz_progress import clock, counted
-from mirotwin.fuzz.triage import Find
+from mirotwin.fuzz.triage import Crash
 from mirotwin.shell.console import show
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
 from mirotwin.verify.cases import replay_line as line
@@ -39,8 +39,8 @@ def report(
     campaign: Campaign, image: Image, out: Path, covering: str | None, ended: Ended, quiet: bool
 ) -> int:
     """Writes the files of the campaign and says what came of it; the exit code."""
-    finds = campaign.finds
-    tracefile = finds.write_coverage(out / COVERAGE, finds.reached.total)
+    triage = campaign.triage
+    tracefile = triage.write_coverage(out / COVERAGE, triage.reached.total)
     never = never_reached(tracefile)
     _write_summary(campaign, out, tracefile, never, ended)
     status = campaign.status()
@@ -58,13 +58,13 @@ def report(
         complain(f"{counted(ended.left, 'input')} of the engine were not looked at; a longer --time does")
     if campaign.expected and not quiet:
         show_line(f"{', '.join(campaign.expected)}: judged {counted(campaign.judged, 'input')}")
-    if finds.unrepeated:
-        complain(f"{counted(finds.unrepeated, 'input')} that the engine saw failing did not fail again")
-    _print_finds(campaign, out, image, ended.checks)
+    if triage.unrepeated:
+        complain(f"{counted(triage.unrepeated, 'input')} that the engine saw failing did not fail again")
+    _print_crashes(campaign, out, image, ended.checks)
     if not quiet:
         show_line(f"written to {out}")
     missed = covering is not None and _print_covering(campaign, covering, image)
-    return EXPECTATION_FAILED if finds.confirmed or missed else DONE
+    return EXPECTATION_FAILED if triage.confirmed or missed else DONE
 
 
 def never_reached(tracefile: Tracefile) -> list[str]:
@@ -74,29 +74,29 @@ def never_reached(tracefile: Tracefile) -> list[str]:
     )
 
 
-def _print_finds(campaign: Campaign, out: Path, image: Image, checks: Sequence[str]) -> None:
-    finds = campaign.finds
-    show_line(counted(len(finds.confirmed), "find"))
-    for find in finds.confirmed:
-        _print_find(find, finds.more[find.name], out, image, checks)
-    if finds.unconfirmed:
+def _print_crashes(campaign: Campaign, out: Path, image: Image, checks: Sequence[str]) -> None:
+    triage = campaign.triage
+    show_line(counted(len(triage.confirmed), "crash", "crashes"))
+    for crash in triage.confirmed:
+        _print_crash(crash, triage.more[crash.name], out, image, checks)
+    if triage.unconfirmed:
         show_line(
-            f"{len(finds.unconfirmed)} not confirmed: wrong on the target, right in a World; kept in"
+            f"{len(triage.unconfirmed)} not confirmed: wrong on the target, right in a World; kept in"
             f" {out / 'unconfirmed'}"
         )
-        for find in finds.unconfirmed:
-            _print_find(find, finds.more[find.name], out, image, checks)
+        for crash in triage.unconfirmed:
+            _print_crash(crash, triage.more[crash.name], out, image, checks)
 
 
-def _print_find(find: Find, more: int, out: Path, image: Image, checks: Sequence[str]) -> None:
-    where = f" in {find.function}" if find.function else ""
+def _print_crash(crash: Crash, more: int, out: Path, image: Image, checks: Sequence[str]) -> None:
+    where = f" in {crash.function}" if crash.function else ""
     again = f"; {counted(more, 'more input')}" if more else ""
-    before, after = find.sizes
-    show_line(f"  {find.name}{where}: {find.verdict} ({after} bytes, found with {before}{again})")
+    before, after = crash.sizes
+    show_line(f"  {crash.name}{where}: {crash.verdict} ({after} bytes, found with {before}{again})")
     in_file = next(
-        (text for text in checks if is_in_file(text) and text.rpartition(":")[2] == find.check), ""
+        (text for text in checks if is_in_file(text) and text.rpartition(":")[2] == crash.check), ""
     )
-    show_line(f"    {replay_line(out / find.folder / f'{find.name}.stream', image, in_file)}")
+    show_line(f"    {replay_line(out / crash.folder / f'{crash.name}.stream', image, in_file)}")
 
 
 def replay_line(stream: Path, image: Image, in_file: str = "") -> str:
@@ -122,7 +122,7 @@ def _write_summary(
     status = campaign.status()
     lines, branches = line_share(tracefile), branch_share(tracefile)
     document = {
-        "firmware_sha256": campaign.finds.target.image.sha256,
+        "firmware_sha256": campaign.triage.target.image.sha256,
         "complete": ended.complete,
         "run_s": status.run_s,
         "executions": status.executions,
@@ -130,15 +130,19 @@ def _write_summary(
         "inputs": campaign.inputs,
         "inputs_left": ended.left,
         "inputs_judged": campaign.judged,
-        "unrepeated": campaign.finds.unrepeated,
+        "unrepeated": campaign.triage.unrepeated,
         "lines": msgspec.to_builtins(lines),
         "branches": msgspec.to_builtins(branches),
         "functions_never_reached": never,
         "reached_by": None if campaign.reached_by is None else str(campaign.reached_by),
-        "finds": [_as_json(find, campaign) for find in campaign.finds.found],
+        "crashes": [_as_json(crash, campaign) for crash in campaign.triage.found],
     }
     campaign.folder.write("", SUMMARY, msgspec.json.format(msgspec.json.encode(document)) + b"\n")
 
 
-def _as_json(find: Find, campaign: Campaign) -> dict[str, object]:
-    return {**msgspec.to_builtins(find), "confirmed": find.confirmed, "more": campaign.finds.more[find.name]}
+def _as_json(crash: Crash, campaign: Campaign) -> dict[str, object]:
+    return {
+        **msgspec.to_builtins(crash),
+        "confirmed": crash.confirmed,
+        "more": campaign.triage.more[crash.name],
+    }

@@ -2,7 +2,7 @@
 
 HypothesisRun ── starts ──► python -m mirotwin.fuzz.hypothesis_process SPECIFICATION SEEDS JOB SEED
                                │ JOB/queue/id:..     inputs that executed something new
-                               │ JOB/crashes/id:..   inputs with a finding
+                               │ JOB/crashes/id:..   inputs with a failure
      reads ◄───────────────────┘ JOB/progress        counters
 """
 
@@ -114,7 +114,7 @@ class HypothesisRun:
         )
 
     def new_crashes(self) -> list[Path]:
-        """Inputs with a finding that were not given before."""
+        """Inputs with a failure that were not given before."""
         return self._new("crashes")
 
     def new_queue(self) -> list[Path]:

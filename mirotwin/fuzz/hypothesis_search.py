@@ -1,8 +1,8 @@
 """What Hypothesis draws for a target, and which inputs are worth keeping.
 
 Hypothesis draws inputs and climbs towards those that execute many edges (`hypothesis.target`); there is no other
-evolution. It remembers all that it has drawn, so it works in rounds, each with a seed of its own. A finding is no
-failure for it: it goes on, and finds are made smaller elsewhere.
+evolution. It remembers all that it has drawn, so it works in rounds, each with a seed of its own. A crash does not
+end its search; crashes are made smaller elsewhere.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ROUND_EXAMPLES = 500
 
 
 class Explorer:
-    """Runs inputs and tells `keep(kind, data)` which to keep: "queue" for new edges, "crashes" for a new finding.
+    """Runs inputs and tells `keep(kind, data)` which to keep: "queue" for new edges, "crashes" for a new failure.
 
     How often an edge was executed counts by AFL++'s classes: 1, 2, 3, 4 to 7, 8 to 15, .. times. Findings are new by
     check and place.
@@ -32,7 +32,7 @@ class Explorer:
         self.target = target
         self.keep = keep
         self.seen = 0
-        self.findings: dict[tuple[str, int], None] = {}
+        self.failures: dict[tuple[str, int], None] = {}
         self._edges = bytearray(target.map_size)
         self._none = bytes(target.map_size)
         target.use_map(self._edges)
@@ -42,10 +42,10 @@ class Explorer:
         self._edges[:] = self._none
         found = self.target.run(data)
         classes = int.from_bytes(self._edges.translate(_CLASSES), "little")
-        finding = self.target.finding if found else None
-        if finding is not None:
-            if (finding.check, finding.pc) not in self.findings:
-                self.findings[finding.check, finding.pc] = None
+        failure = self.target.failure if found else None
+        if failure is not None:
+            if (failure.check, failure.pc) not in self.failures:
+                self.failures[failure.check, failure.pc] = None
                 self.keep("crashes", data)
         elif classes & ~self.seen:
             self.seen |= classes
@@ -54,7 +54,7 @@ class Explorer:
 
     @property
     def edges(self) -> int:
-        """Seen, in runs without a finding."""
+        """Seen, in runs without a failure."""
         seen = self.seen.to_bytes(len(self._edges), "little")
         return len(seen) - seen.count(0)
 

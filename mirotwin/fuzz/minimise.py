@@ -27,7 +27,7 @@ def minimise(data: bytes, still: Question, budget: Budget) -> bytes:
 
 
 def _without_chunks(data: bytes, still: Question, budget: Budget) -> bytes:
-    """Chunks are taken away from the end on: what comes after the find goes first."""
+    """Chunks are taken away from the end on: what comes after the crash goes first."""
     size = max(1, len(data) // 2)
     while data:
         end = len(data)

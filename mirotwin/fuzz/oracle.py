@@ -1,7 +1,7 @@
-"""A find played in a World, whose checks have the last word.
+"""A crash played in a World, whose checks have the last word.
 
 input ──► Target.script ──► World: ideal radio, carrier on, the robot of the target alone
-                                  │ checks: the one that the find names, and those that are always on
+                                  │ checks: the one that the crash names, and those that are always on
                                   ▼
                          failed: a case            passed: kept apart, as not confirmed
 """
@@ -22,7 +22,7 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.world import World
-from mirotwin.fuzz.target import Finding, Target
+from mirotwin.fuzz.target import Target, TargetFailure
 from mirotwin.verify.bare.case import NEVER_SLEEPS
 from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.trace import Trace
@@ -32,7 +32,7 @@ from mirotwin.verify.checks.watching import Checks
 from mirotwin.verify.wanted import silent_scenario
 
 AFTER_TICKS = TICKS_PER_SECOND // 20
-"""How long a world goes on behind the input and the find: an answer may take 30 ms, a frame 10 ms."""
+"""How long a world goes on behind the input and the crash: an answer may take 30 ms, a frame 10 ms."""
 _SETTLED_TICKS = TICKS_PER_SECOND // 100
 
 Expected = Mapping[str, Any]
@@ -47,21 +47,21 @@ class Place(msgspec.Struct, frozen=True):
     slot: int = 0
 
 
-class Judgement(msgspec.Struct, frozen=True):
+class OracleVerdict(msgspec.Struct, frozen=True):
     """What a world made of an input. `failure`: the first check that failed, None if none did; `case`: its text."""
 
     failure: Failure | None
     case: str = ""
 
 
-class Court(Protocol):
+class Oracle(Protocol):
     """Who has the last word on an input."""
 
-    def confirm(self, target: Target, data: bytes, finding: Finding) -> Judgement:
+    def confirm(self, target: Target, data: bytes, failure: TargetFailure) -> OracleVerdict:
         """Judges an input in which a target found that."""
         ...
 
-    def judged(self, target: Target, data: bytes, expected: Expected) -> Judgement:
+    def judged(self, target: Target, data: bytes, expected: Expected) -> OracleVerdict:
         """Judges an input by these checks, and by those that are always on. Raises PluginError where one raises."""
         ...
 
@@ -70,19 +70,19 @@ class Court(Protocol):
         ...
 
 
-class WorldCourt:
+class WorldOracle:
     """A World with the robot of `place`."""
 
     def __init__(self, place: Place) -> None:
         self.place = place
 
-    def confirm(self, target: Target, data: bytes, finding: Finding) -> Judgement:
+    def confirm(self, target: Target, data: bytes, failure: TargetFailure) -> OracleVerdict:
         heard = target.script(data)
-        if finding.check == NEVER_SLEEPS:
-            heard = [*heard, *_questions(heard, finding.tick, self.place.robots)]
-        return judge(self.place, heard, expected_of(finding.check), finding.tick)
+        if failure.check == NEVER_SLEEPS:
+            heard = [*heard, *_questions(heard, failure.tick, self.place.robots)]
+        return judge(self.place, heard, expected_of(failure.check), failure.tick)
 
-    def judged(self, target: Target, data: bytes, expected: Expected) -> Judgement:
+    def judged(self, target: Target, data: bytes, expected: Expected) -> OracleVerdict:
         return judge(self.place, target.script(data), expected)
 
     def stream(self, target: Target, data: bytes) -> str:
@@ -93,7 +93,7 @@ SILENCES = ("failsafe_stop_ms", "motors_off_ms")
 
 
 def expected_of(check: str) -> dict[str, Any]:
-    """The check that tells whether a finding of that name is one; the failsafe's with the fast oracle's tolerance."""
+    """The check that tells whether a failure of that name is one; the failsafe's with the fast oracle's tolerance."""
     if check == NEVER_SLEEPS:
         return {"acts_within_ms": True}
     if check in SILENCES:
@@ -101,15 +101,15 @@ def expected_of(check: str) -> dict[str, Any]:
     return {check: True} if check in CHECKS.names() else {}
 
 
-def judge(place: Place, heard: Sequence[ScriptItem], expected: Expected, last_tick: int = 0) -> Judgement:
+def judge(place: Place, heard: Sequence[ScriptItem], expected: Expected, last_tick: int = 0) -> OracleVerdict:
     """What the checks say of a robot that hears this from power-on. `last_tick`: the run goes on beyond it at least.
 
     Raises PluginError where a check raises.
     """
     world, trace, checks = _played(place, heard, expected, last_tick)
     if not checks.failures:
-        return Judgement(None)
-    return Judgement(checks.failures[0], case_of_checks(world, trace, checks))
+        return OracleVerdict(None)
+    return OracleVerdict(checks.failures[0], case_of_checks(world, trace, checks))
 
 
 def stream_of(place: Place, heard: Sequence[ScriptItem]) -> str:

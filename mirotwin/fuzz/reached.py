@@ -1,4 +1,4 @@
-"""What inputs reach: coverage of a campaign and of single inputs, and the path that tells finds apart.
+"""What inputs reach: coverage of a campaign and of single inputs, and the path that tells crashes apart.
 
 The campaign's own target counts edges at full speed. Here is a second one of the same image that counts instructions,
 some fifty times slower, so it sees only inputs that found something new.

@@ -28,7 +28,7 @@ BOOT_PERIODS = 8
 _SCON, _REN = 0x98, 0x10
 
 
-class Finding(msgspec.Struct, frozen=True):
+class TargetFailure(msgspec.Struct, frozen=True):
     """What was wrong in a run. `pc`: address of the instruction that did it, 0 where none is known."""
 
     check: str
@@ -50,7 +50,7 @@ class Target(Protocol):
     @property
     def cpu(self) -> Cpu: ...
     @property
-    def finding(self) -> Finding | None: ...
+    def failure(self) -> TargetFailure | None: ...
     def use_map(self, edges: Any) -> None: ...
     def run(self, data: Any) -> int: ...
     def script(self, data: bytes) -> list[ScriptItem]: ...
@@ -60,7 +60,7 @@ class Target(Protocol):
 class RobotTarget(HarnessTarget):
     """The MIRO's board with `image`, as robot `slot` of `robots`, motors unplugged, up and in silence.
 
-    `run(data)` puts it back and plays an input of any length; returns 0, or the kind of `finding`, by the place of its
+    `run(data)` puts it back and plays an input of any length; returns 0, or the kind of `failure`, by the place of its
     name in `fast_oracle.NAMES`. Edges are counted in the map of `use_map`, a writable buffer of `map_size` bytes.
     `accepted`: fresh frames of the last run; `highest_sp`: how high its stack grew.
     """
@@ -88,17 +88,17 @@ class RobotTarget(HarnessTarget):
         return self.code
 
     @property
-    def finding(self) -> Finding | None:
+    def failure(self) -> TargetFailure | None:
         """Of the last run."""
         if not self.code:
             return None
         if self.code == NEVER_SLEEPS_CODE:
             what = "the firmware is awake 30 ms after the last character"
-            return Finding(NEVER_SLEEPS, self.harness.now_tick, 0, what)
+            return TargetFailure(NEVER_SLEEPS, self.harness.now_tick, 0, what)
         check, tick = NAMES[self.code], self.oracle.tick
         if self.board.faults:
-            return Finding(check, tick, self.oracle.pc, str(self.board.faults[0]))
-        return Finding(check, tick, 0, f"{check} at tick {tick}")
+            return TargetFailure(check, tick, self.oracle.pc, str(self.board.faults[0]))
+        return TargetFailure(check, tick, 0, f"{check} at tick {tick}")
 
     def __repr__(self) -> str:
         return f"RobotTarget({self.image.path}, input={self.input!r}, robot {self.slot} of {self.robots})"

@@ -1,6 +1,6 @@
 """What becomes of an input that failed: minimised, told apart from the others, confirmed in a World, left as files.
 
-Two finds are the same where check, PC and path are. The PC is that of the instruction that did it, a fault; where no
+Two crashes are the same where check, PC and path are. The PC is that of the instruction that did it, a fault; where no
 instruction did it (nothing came in time, say) there is none. The path is that of the minimised input (`reached`).
 
 Of inputs with the same check and PC only the first few are minimised, unless a new path comes of them: an easy mistake
@@ -22,9 +22,9 @@ from mirotwin.firmware.coverage_files import collect, write
 from mirotwin.fuzz.budget import Budget
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.minimise import minimise
-from mirotwin.fuzz.oracle import Court, Expected, Judgement
+from mirotwin.fuzz.oracle import Expected, Oracle, OracleVerdict
 from mirotwin.fuzz.reached import Reached
-from mirotwin.fuzz.target import Finding, Target
+from mirotwin.fuzz.target import Target, TargetFailure
 from mirotwin.verify.checks.interface import Failure
 
 MINIMISE_S = 10.0
@@ -32,13 +32,13 @@ TRIES = 50_000
 TRIES_IN_A_WORLD = 400
 SAME_TRIED = 6
 """Inputs of one check and PC in a row that are minimised although nothing new comes of them."""
-CONFIRMED, UNCONFIRMED = "finds", "unconfirmed"
+CONFIRMED, UNCONFIRMED = "crashes", "unconfirmed"
 
 
-class Find(msgspec.Struct, frozen=True, kw_only=True):
+class Crash(msgspec.Struct, frozen=True, kw_only=True):
     """A mistake that an input shows. `verdict`: of the World, or of the target where that is not confirmed.
 
-    `pc` None: no instruction did it. `folder`: `finds` or `unconfirmed`. `sizes`: bytes of the input as it was found
+    `pc` None: no instruction did it. `folder`: `crashes` or `unconfirmed`. `sizes`: bytes of the input as it was found
     and as it is left.
     """
 
@@ -57,8 +57,8 @@ class Find(msgspec.Struct, frozen=True, kw_only=True):
         return self.folder == CONFIRMED
 
 
-class Finds:
-    """All that was found so far. `more`: by name, inputs that came down to the same find or were not looked at.
+class Triage:
+    """All that was found so far. `more`: by name, inputs that came down to the same crash or were not looked at.
 
     `unrepeated`: inputs that the engine said had failed and that do not fail again.
     """
@@ -67,7 +67,7 @@ class Finds:
         self,
         target: Target,
         reached: Reached,
-        court: Court,
+        oracle: Oracle,
         folder: CampaignFolder,
         sources: Sources,
         minimise_s: float = MINIMISE_S,
@@ -75,33 +75,33 @@ class Finds:
     ) -> None:
         self.target = target
         self.reached = reached
-        self.court = court
+        self.oracle = oracle
         self.folder = folder
         self.sources = sources
         self.minimise_s = minimise_s
         self.tell = tell
-        self.found: list[Find] = []
+        self.found: list[Crash] = []
         self.more: Counter[str] = Counter()
         self.unrepeated = 0
-        self._by_key: dict[tuple[str, int | None, str], Find] = {}
+        self._by_key: dict[tuple[str, int | None, str], Crash] = {}
         self._in_vain: Counter[tuple[str, int | None]] = Counter()
-        self._last: dict[tuple[str, int | None], Find] = {}
+        self._last: dict[tuple[str, int | None], Crash] = {}
 
     @property
-    def confirmed(self) -> list[Find]:
-        return [find for find in self.found if find.confirmed]
+    def confirmed(self) -> list[Crash]:
+        return [crash for crash in self.found if crash.confirmed]
 
     @property
-    def unconfirmed(self) -> list[Find]:
-        return [find for find in self.found if not find.confirmed]
+    def unconfirmed(self) -> list[Crash]:
+        return [crash for crash in self.found if not crash.confirmed]
 
-    def take(self, data: bytes) -> Find | None:
-        """An input that failed on a target; the find that it is, if it is a new one."""
-        finding = self._finding(data)
-        if finding is None:
+    def take(self, data: bytes) -> Crash | None:
+        """An input that failed on a target; the crash that it is, if it is a new one."""
+        failure = self._failure(data)
+        if failure is None:
             self.unrepeated += 1
             return None
-        group = _group(finding)
+        group = _group(failure)
         if self._in_vain[group] >= SAME_TRIED:
             self.more[self._last[group].name] += 1
             return None
@@ -112,23 +112,23 @@ class Finds:
         if known is not None and known.confirmed:
             self._count(key)
             return None
-        again = self._finding(small) or finding
-        judgement = self.court.confirm(self.target, small, again)
-        if judgement.failure is None and small != data:
-            whole = self.court.confirm(self.target, data, finding)
+        again = self._failure(small) or failure
+        verdict = self.oracle.confirm(self.target, small, again)
+        if verdict.failure is None and small != data:
+            whole = self.oracle.confirm(self.target, data, failure)
             if whole.failure is not None:  # smaller, it is only the target's
-                small, judgement, again = data, whole, finding
+                small, verdict, again = data, whole, failure
                 counts = self.reached.run(small)
         if known is not None:
-            if judgement.failure is None:
+            if verdict.failure is None:
                 self._count(key)
                 return None
             self._take_back(known)
         sizes = (len(data), len(small))
-        return self._keep(key, small, again.pc, again.what, judgement, counts, sizes)
+        return self._keep(key, small, again.pc, again.what, verdict, counts, sizes)
 
-    def take_judged(self, data: bytes, failure: Failure, expected: Expected) -> Find | None:
-        """An input in whose World one of the checks in `expected` failed; the find, if it is a new one."""
+    def take_judged(self, data: bytes, failure: Failure, expected: Expected) -> Crash | None:
+        """An input in whose World one of the checks in `expected` failed; the crash, if it is a new one."""
         group = (failure.check, None)
         if self._in_vain[group] >= SAME_TRIED:
             self.more[self._last[group].name] += 1
@@ -144,29 +144,29 @@ class Finds:
         if key in self._by_key:
             self._count(key)
             return None
-        judgement = self.judged(small, expected)
-        return self._keep(key, small, 0, "", judgement, counts, (len(data), len(small)))
+        verdict = self.judged(small, expected)
+        return self._keep(key, small, 0, "", verdict, counts, (len(data), len(small)))
 
-    def judged(self, data: bytes, expected: Expected) -> Judgement:
+    def judged(self, data: bytes, expected: Expected) -> OracleVerdict:
         """What the checks in `expected`, and those that are always on, say of an input."""
-        return self.court.judged(self.target, data, expected)
+        return self.oracle.judged(self.target, data, expected)
 
-    def _finding(self, data: bytes) -> Finding | None:
-        return self.target.finding if self.target.run(data) else None
+    def _failure(self, data: bytes) -> TargetFailure | None:
+        return self.target.failure if self.target.run(data) else None
 
     def _fails(self, data: bytes, group: tuple[str, int | None]) -> bool:
-        finding = self._finding(data)
-        return finding is not None and _group(finding) == group
+        failure = self._failure(data)
+        return failure is not None and _group(failure) == group
 
-    def _take_back(self, find: Find) -> None:
-        """A find that was not confirmed, of which another input shows now that it is real."""
-        self.found.remove(find)
-        self.more[find.name] += 1
-        self.folder.remove(find.folder, find.name)
+    def _take_back(self, crash: Crash) -> None:
+        """A crash that was not confirmed, of which another input shows now that it is real."""
+        self.found.remove(crash)
+        self.more[crash.name] += 1
+        self.folder.remove(crash.folder, crash.name)
 
     def _count(self, key: tuple[str, int | None, str]) -> None:
-        find = self._by_key[key]
-        self.more[find.name] += 1
+        crash = self._by_key[key]
+        self.more[crash.name] += 1
         self._in_vain[key[:2]] += 1
 
     def _keep(
@@ -175,14 +175,14 @@ class Finds:
         data: bytes,
         pc: int,
         what: str,
-        judgement: Judgement,
+        verdict: OracleVerdict,
         counts: Counts,
         sizes: tuple[int, int],
-    ) -> Find:
+    ) -> Crash:
         check, place_pc, path = key
         name = "-".join([check, *([] if place_pc is None else [f"{place_pc:04x}"]), path])
-        failure = judgement.failure
-        find = Find(
+        failure = verdict.failure
+        crash = Crash(
             name=name,
             check=check,
             pc=place_pc,
@@ -193,13 +193,13 @@ class Finds:
             sizes=sizes,
             fault=failure is not None and failure.fault,
         )
-        case = judgement.case or self.court.stream(self.target, data)
-        self.leave(find.folder, name, data, case, counts)
-        self.found.append(find)
-        self._by_key[key] = find
-        self._last[key[:2]] = find
+        case = verdict.case or self.oracle.stream(self.target, data)
+        self.leave(crash.folder, name, data, case, counts)
+        self.found.append(crash)
+        self._by_key[key] = crash
+        self._last[key[:2]] = crash
         self._in_vain[key[:2]] = 0
-        return find
+        return crash
 
     def leave(self, folder: str, name: str, data: bytes, stream: str, counts: Counts) -> Path:
         """The files of an input; returns the stream's path."""
@@ -215,6 +215,6 @@ class Finds:
         return report.tracefile
 
 
-def _group(finding: Finding) -> tuple[str, int | None]:
+def _group(failure: TargetFailure) -> tuple[str, int | None]:
     """Check and PC of what a target found."""
-    return finding.check, finding.pc or None
+    return failure.check, failure.pc or None

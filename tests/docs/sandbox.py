@@ -128,12 +128,12 @@ def late_case(folder: Path) -> None:
 
 
 def dimmer(folder: Path) -> None:
-    """The firmware of examples/fuzz-slip, with its finds beside it; `mine.ihx` is the one that is right."""
+    """The firmware of examples/fuzz-slip, with its cases beside it; `mine.ihx` is the one that is right."""
     example = folder / "fuzz-slip"
     children.run(["make", "-s"], cwd=example, check=True, capture_output=True)
     shutil.rmtree(folder / "build")
     shutil.copytree(example / "build", folder / "build")
-    shutil.copytree(example / "finds", folder / "finds")
+    shutil.copytree(example / "cases", folder / "cases")
     copy_image(folder / "build" / "mended.ihx", folder / "mine.ihx")
 
 

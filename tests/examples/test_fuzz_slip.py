@@ -18,7 +18,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "fuzz-slip"
 CRYSTAL_HZ = 11_059_200
 CHECK = f"{EXAMPLE / 'dimmer_check.py'}:lamps_as_told"
 PROGRAM = "from mirotwin.entry import main; main()"
-FINDS = sorted((EXAMPLE / "finds").glob("*.stream"))
+CASES = sorted((EXAMPLE / "cases").glob("*.stream"))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -97,7 +97,7 @@ def test_its_mistake_is_found_among_the_escapes_and_the_mended_one_stands(images
 
 
 @needs_sdcc
-@pytest.mark.parametrize("path", FINDS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
 def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
     from mirotwin.verify.bare.case import replay_bare
 
@@ -123,7 +123,7 @@ def test_the_command_of_its_page_finds_both_and_nothing_in_the_mended_one(images
             CHECK,
             "--expect-all",
             "--corpus",
-            EXAMPLE / "finds",
+            EXAMPLE / "cases",
         ]
         command = [sys.executable, "-c", PROGRAM, "fuzz", image, *options, "--time", "1s", "--out", out]
         environment = {
@@ -132,9 +132,9 @@ def test_the_command_of_its_page_finds_both_and_nothing_in_the_mended_one(images
         }
         done = children.run([*map(str, command)], env=environment, capture_output=True, text=True)
         assert done.returncode == code, done.stdout + done.stderr
-        found = {path.name.partition("-")[0] for path in out.glob("finds/*.stream")}
+        found = {path.name.partition("-")[0] for path in out.glob("crashes/*.stream")}
         assert found == ({"lamps_as_told", "no_fault"} if code else set())
 
 
 def test_there_is_a_find_of_each_kind():
-    assert {path.stem.partition("-")[0] for path in FINDS} == {"no_fault", "lamps_as_told"}
+    assert {path.stem.partition("-")[0] for path in CASES} == {"no_fault", "lamps_as_told"}

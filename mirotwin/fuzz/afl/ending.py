@@ -14,7 +14,7 @@ _REASON = re.compile(r"OS message : (.*)")
 REMEDIES = (
     (
         "valid input seed that does not crash",
-        "each seed fails by itself: these are finds; give one that does not",
+        "each seed fails by itself: these are crashes; give one that does not",
     ),
     ("No usable test cases", "give a folder with at least one file that is not empty"),
     ("no test cases", "give a folder with at least one file that is not empty"),

@@ -119,7 +119,7 @@ class AflRun:
         )
 
     def new_crashes(self) -> list[Path]:
-        """Inputs with a finding that were not given before. Different jobs may find the same."""
+        """Inputs with a failure that were not given before. Different jobs may find the same."""
         return self._new("crashes")
 
     def new_queue(self) -> list[Path]:
@@ -127,7 +127,7 @@ class AflRun:
         return self._new("queue")
 
     def earlier_crashes(self) -> list[Path]:
-        """Inputs with a finding of the times before: a campaign that was killed may not have looked at them."""
+        """Inputs with a failure of the times before: a campaign that was killed may not have looked at them."""
         now = [job.folder / "crashes" for job in self.jobs]
         return [path for path in sorted(self._out.glob("*/crashes*/id:*")) if path.parent not in now]
 

@@ -7,8 +7,8 @@ SPECIFICATION is the JSON of a `TargetSpec`. BESIDE is a path without ending: `B
 
 AFL++ expects a server that forks a child for each input, and tells its process id and its wait status. Here the target
 puts itself back instead: the id is one that no process has, because AFL++ kills that process when an answer takes too
-long. The wait status is 0, or a signal number for a find. AFL++ reads the id without a limit of time, so both are
-written at once at the end: it is woken once an input instead of twice, and a slow target is no hang. Hangs are findings
+long. The wait status is 0, or a signal number for a crash. AFL++ reads the id without a limit of time, so both are
+written at once at the end: it is woken once an input instead of twice, and a slow target is no hang. Hangs are failures
 of the target, which limits virtual time.
 
 What the four bytes at the start say (`FS_OPT_..` in AFL++ 4's types.h): options are used, the size of the map, and test
@@ -44,7 +44,7 @@ NO_PROCESS = 0x7FFF_FFFE
 """Above the highest process id of Linux (2^22)."""
 
 FIRST_SIGNAL, LAST_SIGNAL = 33, 126
-"""Signals that stand for the kinds of findings 1, 2, ..: none that a program is killed with by accident."""
+"""Signals that stand for the kinds of failures 1, 2, ..: none that a program is killed with by accident."""
 
 NOTHING, FOUND, REFUSED, BROKEN = 0, 1, 2, 70
 """Exit codes. AFL++ sees none of them: it ends a server by a signal."""
@@ -70,7 +70,7 @@ def wait_status(kind: int) -> int:
 
 
 def kind_of_signal(number: int) -> int:
-    """The kind of finding that a signal stands for."""
+    """The kind of failure that a signal stands for."""
     return number - FIRST_SIGNAL + 1
 
 
@@ -120,11 +120,11 @@ def _is_writable(number: int) -> bool:
 
 
 def run_once(target: Target, data: bytes) -> int:
-    """One run as a person wants to see it: the finding, and the input as lines. Returns the exit code."""
+    """One run as a person wants to see it: the failure, and the input as lines. Returns the exit code."""
     if not target.run(data):
         print("nothing found")
         return NOTHING
-    found = target.finding
+    found = target.failure
     print(f"{found.check}: {found.what} (tick {found.tick}, PC {found.pc:#06x})" if found else "found")
     print(target.describe(data))
     return FOUND

@@ -23,7 +23,7 @@ START_MS = 120_000
 """Time for a target to start: Python, the modules and the boot of the firmware, on a machine that does other things."""
 
 REASONS = {
-    "AFL_I_DONT_CARE_ABOUT_MISSING_CRASHES": "finds come as a status: a core_pattern that starts a program is harmless",
+    "AFL_I_DONT_CARE_ABOUT_MISSING_CRASHES": "a crash is a status: a core_pattern that starts a program is harmless",
     "AFL_SKIP_CPUFREQ": "CPU scaling costs some speed and does no harm; changing it takes root",
     "AFL_SKIP_BIN_CHECK": "the target is a Python program, which no compiler has instrumented",
     "AFL_MAP_SIZE": "bytes of the edge map; the default is eight times as large and slower",
@@ -62,7 +62,7 @@ class Call(msgspec.Struct, frozen=True):
     lengths: tuple[int, int] = (1, LONGEST_BYTES)
 
     def line(self, job: int, jobs: int) -> list[str]:
-        """The command of one of the jobs: the first is the main one, the others take its finds over.
+        """The command of one of the jobs: the first is the main one, the others take its crashes over.
 
         Raises BadInput for a folder whose name means something to afl-fuzz.
         """

@@ -2,5 +2,5 @@
 
 What belongs here: the compiled part of fuzzing. `program.py` makes characters of an input's bytes, `harness.py` sends
 them to a board or to the bare processor, and `fast_oracle.py` judges what the robot did. What does not: choosing
-inputs, and what a find is good for (`mirotwin.fuzz`).
+inputs, and what a crash is good for (`mirotwin.fuzz`).
 """

@@ -1,7 +1,8 @@
 """What a MIRO must do with what its serial port received, judged from the event log while it runs.
 
-A find counts once the check of the same name fails for it in a world (`mirotwin.verify.checks`). Both judge by the same
-rules, `miro_protocol.robot_rules`; this oracle takes the frames that the robot received for those that the host sent.
+A crash counts once the check of the same name fails for it in a world (`mirotwin.verify.checks`). Both judge by the
+same rules, `miro_protocol.robot_rules`; this oracle takes the frames that the robot received for those that the host
+sent.
 
     RECEIVED --> window of the decoder --> fresh? --> what the wheels have to be told, and until when
     COMMAND of an LM629 --> order to a wheel -----> compared with it

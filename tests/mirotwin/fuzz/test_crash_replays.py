@@ -1,4 +1,4 @@
-"""A find is left as a case: its replay gives the same verdict on both engines and whatever the processor offers."""
+"""A crash is left as a case: its replay gives the same verdict on both engines and whatever the processor offers."""
 
 import os
 import sys
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from miro_robot.image import load_hex
-from mirotwin.fuzz.oracle import Place, WorldCourt
+from mirotwin.fuzz.oracle import Place, WorldOracle
 from mirotwin.fuzz.target import target_for
 from tests import children
 from tests.mutants.build import build
@@ -16,7 +16,7 @@ from tests.mutants.planted import PLANTED
 from tests.mutants.sdcc import needs_sdcc
 
 MIROTWIN = Path(sys.executable).with_name("mirotwin")
-FINDS = {
+CRASHES = {
     "takes frames with a bad CRC": (b"\x0c\x09\x01\x00\x10\x00\x20\x00", "accepts_only_sent", 1),
     "lets go of a chip in the middle of a command": (b"\x05\x00\x01" + bytes(10), "no_fault", 3),
 }
@@ -43,14 +43,14 @@ def firmware(name):
 
 
 def case_of(name, folder):
-    """The case file of a find, and the image that it is about."""
+    """The case file of a crash, and the image that it is about."""
     image = load_hex(firmware(name))
-    data, check, _ = FINDS[name]
+    data, check, _ = CRASHES[name]
     target = target_for(image)
     assert target.run(data)
-    assert target.finding.check in (check, "moves_only_when_fresh")
-    judged = WorldCourt(Place(image, 3, 0)).confirm(target, data, target.finding)
-    case = folder / "find.stream"
+    assert target.failure.check in (check, "moves_only_when_fresh")
+    judged = WorldOracle(Place(image, 3, 0)).confirm(target, data, target.failure)
+    case = folder / "crash.stream"
     case.write_text(judged.case)
     return case, image.path
 
@@ -62,11 +62,11 @@ def replayed(case, image, *options, env=None):
 
 
 @needs_sdcc
-@pytest.mark.parametrize("name", FINDS)
+@pytest.mark.parametrize("name", CRASHES)
 def test_a_find_replays_to_the_same_verdict_everywhere(name, tmp_path):
     case, image = case_of(name, tmp_path)
     first = replayed(case, image, "--engine", "compiled")
-    assert first[0] == FINDS[name][2], first
+    assert first[0] == CRASHES[name][2], first
     assert "fails as recorded" in first[1] + first[2]
     assert replayed(case, image, "--engine", "python") == first
     for change in ENVIRONMENTS:

@@ -46,7 +46,7 @@ def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin
     assert lines[-1] == f"written to {tmp_path / 'out'}"
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["complete"]
-    assert any(find["confirmed"] for find in summary["finds"])
+    assert any(crash["confirmed"] for crash in summary["crashes"])
     assert (tmp_path / "out" / "coverage.info").read_text().startswith("TN:\nSF:")
     assert list((tmp_path / "out" / "corpus").iterdir())
 
@@ -57,7 +57,7 @@ def test_shipped_firmware_passes_and_coverage_is_told(mirotwin, engines, tmp_pat
     assert (code, err) == (0, "")
     assert out.startswith("miro.ihx: ")
     assert "never reached: " in out
-    assert "no finds" in out.splitlines()
+    assert "no crashes" in out.splitlines()
 
 
 def test_an_input_that_reaches_a_function_is_left_as_a_stream(mirotwin, engines, tmp_path):
@@ -79,7 +79,7 @@ def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
     code, out, _ = mirotwin("fuzz", "--time", "3s", *arguments, "--out", tmp_path / "out")
     assert code == 1
     assert "wheels_within_m_s: judged " in out
-    assert list((tmp_path / "out" / "finds").glob("wheels_within_m_s-*.stream"))
+    assert list((tmp_path / "out" / "crashes").glob("wheels_within_m_s-*.stream"))
 
 
 BROKEN = """
@@ -134,7 +134,7 @@ def test_plain_lines_where_stderr_is_no_terminal(tmp_path):
     line = next(line for line in err.splitlines() if line.startswith("mirotwin: fuzzing miro.ihx: 0:0"))
     assert line.rpartition(", ")[2].endswith(" left")
     assert "/s, " in line
-    assert " edges, no finds" in line
+    assert " edges, no crashes" in line
 
 
 # ---- what cannot be used ---------------------------------------------------------------------------------------
@@ -173,10 +173,10 @@ def test_a_folder_with_something_in_it_is_refused_and_an_earlier_campaign_is_rep
     assert mirotwin(*arguments)[0] == 0
     code, _, err = mirotwin(*arguments)
     assert (code, "is not empty" in err, "--force" in err) == (2, True, True)
-    (out / "finds").mkdir(exist_ok=True)
-    (out / "finds" / "old.stream").write_text("old")
+    (out / "crashes").mkdir(exist_ok=True)
+    (out / "crashes" / "old.stream").write_text("old")
     assert mirotwin(*arguments, "--force")[0] == 0
-    assert not (out / "finds" / "old.stream").exists()
+    assert not (out / "crashes" / "old.stream").exists()
     (out / "mine.txt").write_text("mine")
     code, _, err = mirotwin(*arguments, "--force")
     assert (code, "holds what no campaign leaves (mine.txt)" in err) == (2, True)

@@ -12,7 +12,7 @@ MISTAKE = "takes frames with a bad CRC"
 def test_saved_cases_fail_with_the_mistake_and_pass_without(mirotwin, engines, built, tmp_path):
     image = built(MISTAKE)
     mirotwin("fuzz", image, "--time", "5s", "--minimise", "1s", "-q", "--out", tmp_path / "out")
-    cases = tmp_path / "out" / "finds"
+    cases = tmp_path / "out" / "crashes"
     for other in set(cases.iterdir()) - set(
         cases.glob("moves_only_when_fresh-*")
     ):  # chance finds more than one

@@ -10,6 +10,6 @@ def test_characters_behind_the_tested_frame_do_not_end_the_time_that_its_test_ha
     target = target_for(load_hex(image_path()))
     # A frame, repeated until its test falls into the end of the 110 ms, and the next frame without a pause behind it.
     data = bytes.fromhex("0000000088889a8888888800")
-    assert target.run(data) == 0, target.finding
+    assert target.run(data) == 0, target.failure
     found = verdicts(target.image, target.script(data))
     assert [name for name, verdict in found.items() if verdict == "failed"] == []

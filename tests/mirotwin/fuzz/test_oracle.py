@@ -1,4 +1,4 @@
-"""A find counts once a World says so, and what is left of it gives the verdict again."""
+"""A crash counts once a World says so, and what is left of it gives the verdict again."""
 
 import pytest
 
@@ -6,25 +6,25 @@ from miro_protocol import stream
 from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.image.debug_info import Sources
 from mirotwin.fuzz.files import CampaignFolder
-from mirotwin.fuzz.oracle import NEVER_SLEEPS, Place, WorldCourt, expected_of, judge
+from mirotwin.fuzz.oracle import NEVER_SLEEPS, Place, WorldOracle, expected_of, judge
 from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.seeds import seeds
-from mirotwin.fuzz.target import Finding, target_for
-from mirotwin.fuzz.triage import Finds
+from mirotwin.fuzz.target import TargetFailure, target_for
+from mirotwin.fuzz.triage import Triage
 from mirotwin.verify.checks.registry import CHECKS
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image, planted
 
 
-def court(image):
-    return WorldCourt(Place(image))
+def oracle(image):
+    return WorldOracle(Place(image))
 
 
-def finds_of(image, tmp_path, kind="session"):
+def triage_of(image, tmp_path, kind="session"):
     target = target_for(image, kind)
     reached = Reached(image, lambda: target_for(image, kind))
     folder = CampaignFolder(tmp_path / "out")
     folder.make()
-    return Finds(target, reached, court(image), folder, Sources([image.path.parent]))
+    return Triage(target, reached, oracle(image), folder, Sources([image.path.parent]))
 
 
 def test_each_name_of_the_quick_judgement_is_a_check():
@@ -33,16 +33,16 @@ def test_each_name_of_the_quick_judgement_is_a_check():
 
 
 def test_what_shipped_firmware_does_right_is_not_confirmed(tmp_path):
-    finds = finds_of(own_image(), tmp_path)
+    triage = triage_of(own_image(), tmp_path)
     for check in ("no_fault", "acts_within_ms", NEVER_SLEEPS):
-        said = Finding(check, 900_000, 0, "said")
-        assert finds.court.confirm(finds.target, seeds("session", 3, 0)[0], said).failure is None
+        said = TargetFailure(check, 900_000, 0, "said")
+        assert triage.oracle.confirm(triage.target, seeds("session", 3, 0)[0], said).failure is None
 
 
 def test_an_input_that_does_not_fail_again_is_counted_and_left_out(tmp_path):
-    finds = finds_of(own_image(), tmp_path)
-    assert finds.take(seeds("session", 3, 0)[0]) is None
-    assert (finds.found, finds.unrepeated) == ([], 1)
+    triage = triage_of(own_image(), tmp_path)
+    assert triage.take(seeds("session", 3, 0)[0]) is None
+    assert (triage.found, triage.unrepeated) == ([], 1)
 
 
 def damaged(place=14):
@@ -54,19 +54,19 @@ def damaged(place=14):
 @needs_sdcc
 def test_a_find_is_minimised_confirmed_and_left_as_a_case_that_replays(tmp_path, mirotwin):
     image = planted("takes frames with a bad CRC")
-    finds = finds_of(image, tmp_path)
+    triage = triage_of(image, tmp_path)
     data = damaged()
-    assert finds.target.run(data)
-    find = finds.take(data)
-    assert find is not None
-    assert find.confirmed
-    assert find.sizes[0] == len(data) > find.sizes[1]
-    left = {path.name for path in (tmp_path / "out" / "finds").iterdir()}
-    assert left == {f"{find.name}.{suffix}" for suffix in ("stream", "input", "txt", "info")}
-    case = tmp_path / "out" / "finds" / f"{find.name}.stream"
-    assert stream.read(case).header.verdict == find.verdict
+    assert triage.target.run(data)
+    crash = triage.take(data)
+    assert crash is not None
+    assert crash.confirmed
+    assert crash.sizes[0] == len(data) > crash.sizes[1]
+    left = {path.name for path in (tmp_path / "out" / "crashes").iterdir()}
+    assert left == {f"{crash.name}.{suffix}" for suffix in ("stream", "input", "txt", "info")}
+    case = tmp_path / "out" / "crashes" / f"{crash.name}.stream"
+    assert stream.read(case).header.verdict == crash.verdict
     code, _, err = mirotwin("replay", case, "--firmware", image.path)
-    assert (code, err) == (1, f"mirotwin: fails as recorded: {find.verdict}\n")
+    assert (code, err) == (1, f"mirotwin: fails as recorded: {crash.verdict}\n")
     code, out, _ = mirotwin("replay", case, "--firmware", own_image().path)
     assert out.startswith("cured: ") or code == 1
 
@@ -76,60 +76,62 @@ def test_minimising_twice_leaves_the_same_bytes(tmp_path):
     image = planted("takes frames with a bad CRC")
     left = []
     for number in range(2):
-        finds = finds_of(image, tmp_path / str(number))
-        find = finds.take(damaged(15))
-        left.append((find, (tmp_path / str(number) / "out" / "finds" / f"{find.name}.input").read_bytes()))
+        triage = triage_of(image, tmp_path / str(number))
+        crash = triage.take(damaged(15))
+        left.append(
+            (crash, (tmp_path / str(number) / "out" / "crashes" / f"{crash.name}.input").read_bytes())
+        )
     assert left[0] == left[1]
 
 
 @needs_sdcc
 def test_many_inputs_of_one_mistake_come_down_to_few_finds(tmp_path):
-    finds = finds_of(planted("takes frames with a bad CRC"), tmp_path)
+    triage = triage_of(planted("takes frames with a bad CRC"), tmp_path)
     failing = [damaged(place) + bytes(extra) for place in range(9, 22) for extra in range(3)]
-    failing = [data for data in failing if finds.target.run(data)]
+    failing = [data for data in failing if triage.target.run(data)]
     assert len(failing) > 20
     for data in failing:
-        finds.take(data)
-    assert 1 <= len(finds.found) <= 3
-    assert len(finds.found) + finds.more.total() == len(failing)
+        triage.take(data)
+    assert 1 <= len(triage.found) <= 3
+    assert len(triage.found) + triage.more.total() == len(failing)
 
 
 @needs_sdcc
 def test_what_a_world_does_not_find_wrong_is_kept_apart(tmp_path, monkeypatch):
-    finds = finds_of(planted("takes frames with a bad CRC"), tmp_path)
-    monkeypatch.setattr(finds, "court", court(own_image()))  # there the same input does no harm
-    find = finds.take(damaged())
-    assert not find.confirmed
-    assert finds.unconfirmed == [find]
-    kept = tmp_path / "out" / "unconfirmed" / f"{find.name}.stream"
+    triage = triage_of(planted("takes frames with a bad CRC"), tmp_path)
+    monkeypatch.setattr(triage, "oracle", oracle(own_image()))  # there the same input does no harm
+    crash = triage.take(damaged())
+    assert not crash.confirmed
+    assert triage.unconfirmed == [crash]
+    kept = tmp_path / "out" / "unconfirmed" / f"{crash.name}.stream"
     assert stream.read(kept).header.verdict is None
-    assert not (tmp_path / "out" / "finds").exists()
+    assert not (tmp_path / "out" / "crashes").exists()
 
 
 @needs_sdcc
 def test_an_input_that_a_world_finds_wrong_takes_the_place_of_one_that_it_did_not(tmp_path, monkeypatch):
-    finds = finds_of(planted("takes frames with a bad CRC"), tmp_path)
+    triage = triage_of(planted("takes frames with a bad CRC"), tmp_path)
     with monkeypatch.context() as patched:
-        patched.setattr(finds, "court", court(own_image()))
-        finds.take(damaged())
-    find = finds.take(damaged())
-    assert find.confirmed
-    assert (finds.found, finds.more[find.name]) == ([find], 1)
+        patched.setattr(triage, "oracle", oracle(own_image()))
+        triage.take(damaged())
+    crash = triage.take(damaged())
+    assert crash.confirmed
+    assert (triage.found, triage.more[crash.name]) == ([crash], 1)
     assert not list((tmp_path / "out" / "unconfirmed").iterdir())
-    assert len(list((tmp_path / "out" / "finds").iterdir())) == 4
+    assert len(list((tmp_path / "out" / "crashes").iterdir())) == 4
 
 
 def test_a_find_of_a_check_in_python_is_made_small_in_worlds(tmp_path):
-    finds = finds_of(own_image(), tmp_path)
+    triage = triage_of(own_image(), tmp_path)
     expected = {"wheels_within_m_s": {"limit_m_s": 0.1, "overshoot_m_s": 0.0}}
     data = bytes([6, 0, 64, 0, 64, *bytes(8), 6, 0, 64, 0, 64, *bytes(8)])
-    failure = finds.judged(data, expected).failure
+    failure = triage.judged(data, expected).failure
     assert failure is not None
-    find = finds.take_judged(data, failure, expected)
-    assert find is not None
-    assert find.confirmed
-    assert find.check == "wheels_within_m_s"
-    assert find.sizes[1] < len(data)
+    crash = triage.take_judged(data, failure, expected)
+    assert crash is not None
+    assert crash.confirmed
+    assert crash.check == "wheels_within_m_s"
+    assert crash.sizes[1] < len(data)
 
 
 @pytest.mark.parametrize("kind", ["bytes", "frames", "session"])
@@ -137,6 +139,6 @@ def test_seeds_do_no_harm_in_target_and_world(kind):
     image = own_image()
     target = target_for(image, kind)
     for data in seeds(kind, 3, 0):
-        assert (target.run(data), target.finding) == (0, None)
+        assert (target.run(data), target.failure) == (0, None)
         expected = {name: True for name in NAMES if name}
         assert judge(Place(image), target.script(data), expected).failure is None

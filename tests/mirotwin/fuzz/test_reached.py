@@ -1,4 +1,4 @@
-"""What inputs reach, and the path that tells finds apart."""
+"""What inputs reach, and the path that tells crashes apart."""
 
 from mirotwin.fuzz.inputs import input_of
 from mirotwin.fuzz.reached import Reached

@@ -107,7 +107,7 @@ def test_a_robot_in_a_world_receives_the_same_characters_at_the_same_ticks(shipp
 @settings(deadline=None, max_examples=60, derandomize=True)
 @given(SESSIONS)
 def test_the_shipped_firmware_passes_the_fast_oracle_and_the_checks(shipped, data):
-    assert shipped.run(data) == 0, shipped.finding
+    assert shipped.run(data) == 0, shipped.failure
     _, checks = world_of(shipped, data, JUDGED)
     assert not checks.failures
 
@@ -128,7 +128,7 @@ def test_the_fast_oracle_finds_what_the_check_of_that_name_finds(name):
     firmware = build({mistake.file: mistake.applied(source_files()[mistake.file])})
     target = target_for(load_hex(firmware.image))
     assert target.run(data)
-    assert target.finding.check == check
+    assert target.failure.check == check
     _, checks = world_of(target, data, JUDGED)
     assert check in {failure.check for failure in checks.failures}
 
@@ -153,7 +153,7 @@ def test_wheels_that_stop_already_need_no_new_order_for_velocity_0(shipped):
     acceleration = b"\x05\x00\x02\x10" + bytes(9)
     stopped = b"\x00" + bytes(4)
     data = acceleration + b"\x00\x00\x00\x00\x04" + acceleration + stopped + stopped + b"\x0a\x80"
-    assert shipped.run(data) == 0, shipped.finding
+    assert shipped.run(data) == 0, shipped.failure
     _, checks = world_of(shipped, data, JUDGED)
     assert not checks.failures
 
@@ -168,7 +168,7 @@ def test_a_frame_right_at_150_ms_is_not_judged():
 def test_a_reset_in_the_middle_of_a_command_is_not_judged(shipped):
     for waited in range(8):
         data = b"\x00\x10\x00\x10\x00" + bytes([0x0A, waited]) + b"\x09\x00\x55" * waited + b"\x0f"
-        assert shipped.run(data) == 0, shipped.finding
+        assert shipped.run(data) == 0, shipped.failure
 
 
 def stop_after_ms(target, waited):
@@ -177,7 +177,7 @@ def stop_after_ms(target, waited):
     code = target.run(
         b"\x00\x10\x00\x10\x00\x0b\x18" + bytes([0x0A, waited]) + b"\x0c\x1e\x01\x00\x07\x00\x07\x00\x0b\x10"
     )
-    assert code == 0, target.finding
+    assert code == 0, target.failure
     events = [target.board.log.event(serial) for serial in range(begun, target.board.log.end)]
     stop = [tick for tick, kind, told, *_ in events if kind == event_log.COMMAND and told & 0xFF == 1][2]
     frame_end = [tick for tick, kind, *_ in events if kind == event_log.RECEIVED][30]

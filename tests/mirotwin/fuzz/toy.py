@@ -5,18 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from mirotwin.fuzz.spec import TargetSpec
-from mirotwin.fuzz.target import Finding
+from mirotwin.fuzz.target import TargetFailure
 
 
 class Toy:
-    """Edge 0 for each input, 1 for an F in front, 2 once for each byte. A finding for FZ, by the byte behind it."""
+    """Edge 0 for each input, 1 for an F in front, 2 once for each byte. A failure for FZ, by the byte behind it."""
 
     input = "bytes"
     map_size = 64
 
     def __init__(self) -> None:
         self.executions = self.frames_fed = self.characters_fed = 0
-        self.finding: Finding | None = None
+        self.failure: TargetFailure | None = None
         self.edges: Any = bytearray(self.map_size)
 
     def use_map(self, edges: Any) -> None:
@@ -28,11 +28,11 @@ class Toy:
         self.edges[0] = 1
         self.edges[1] = int(data[:1] == b"F")
         self.edges[2] = len(data) & 0xFF
-        self.finding = None
+        self.failure = None
         if data[:2] == b"FZ":
             pc = data[2] if len(data) > 2 else 0
-            self.finding = Finding("no_fault", 1, pc, "FZ")
-        return int(self.finding is not None)
+            self.failure = TargetFailure("no_fault", 1, pc, "FZ")
+        return int(self.failure is not None)
 
 
 def toy(spec: TargetSpec) -> Toy:

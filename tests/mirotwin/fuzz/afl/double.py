@@ -13,18 +13,18 @@ WORD = b"DUCK"
 
 
 class Found:
-    """A finding of the double."""
+    """A failure of the double."""
 
     def __init__(self, check: str, pc: int) -> None:
         self.check, self.tick, self.pc, self.what = check, 24, pc, f"found at {pc}"
 
 
 class Double:
-    """One branch for each byte of `WORD` that stands in its place; the whole word is a finding of kind 2.
+    """One branch for each byte of `WORD` that stands in its place; the whole word is a failure of kind 2.
 
     Edges begin at 1: afl-showmap leaves cell 0 out.
 
-    `kind`: findings have this number. `raises`: a run of an input that begins with `!` raises; `sleeps`: it sleeps.
+    `kind`: failures have this number. `raises`: a run of an input that begins with `!` raises; `sleeps`: it sleeps.
     """
 
     input = "bytes"
@@ -36,7 +36,7 @@ class Double:
     ) -> None:
         self.kind, self.raises, self.sleeps, self.always = kind, raises, sleeps, always
         self.edges: Any = bytearray(MAP_SIZE)
-        self.finding: Any = None
+        self.failure: Any = None
         self.frames_fed = self.characters_fed = self.executions = 0
 
     def use_map(self, edges: Any) -> None:
@@ -50,14 +50,14 @@ class Double:
                 raise RuntimeError("the double raises")
             if self.sleeps:
                 time.sleep(3600)
-        self.finding = None
+        self.failure = None
         right = 0
         self._count(1)
         while right < len(WORD) and right < len(data) and data[right] == WORD[right]:
             right += 1
             self._count(1 + right)
         if right == len(WORD) or self.always:
-            self.finding = Found("word", right)
+            self.failure = Found("word", right)
             return self.kind
         return 0
 

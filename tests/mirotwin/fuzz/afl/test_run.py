@@ -60,13 +60,13 @@ def found(tmp_path):
 def test_afl_finds_the_word_by_its_branches(found):
     run, crash = found
     assert crash.read_bytes().startswith(WORD)
-    assert "sig:34" in crash.name, "a find of kind 2"
+    assert "sig:34" in crash.name, "a crash of kind 2"
     assert crash not in run.new_crashes(), "each is given once"
     queue = run.new_queue()
     assert queue[0].name.endswith("orig:0000-hello"), "the seed comes first"
     progress = until(lambda: (now := run.progress()).executions_per_s and now, "a rate")
     assert progress.executions > 1000
-    assert progress.edges == 4, "of inputs without a find: one, and three letters of the word"
+    assert progress.edges == 4, "of inputs without a crash: one, and three letters of the word"
     assert progress.crashes == 1
     assert progress.corpus_count == len(queue)
     assert progress.stability_percent == 100.0

@@ -80,18 +80,18 @@ def test_firmware_that_polls_for_ever_is_listened_to_for_a_while_and_nothing_is_
 def test_a_fault_is_found_with_tick_and_place(firmware):
     target = BareTarget(image(firmware), "bytes")
     assert target.run(b"ab!cd") == NO_FAULT_CODE
-    found = target.finding
+    found = target.failure
     assert (found.check, found.pc) == ("no_fault", 0x4000)
     assert "executed outside the loaded image at 0x4000" in found.what
     assert found.tick > target.exchange().received[2].tick
     assert target.run(b"abcd") == 0
-    assert target.finding is None
+    assert target.failure is None
 
 
 def test_firmware_that_sleeps_no_more_is_found_and_only_where_it_is_one_that_sleeps():
     target = BareTarget(image(SLEEPS), "bytes")
     assert target.run(b"a?") == NEVER_SLEEPS_CODE
-    assert target.finding.check == "never_sleeps"
+    assert target.failure.check == "never_sleeps"
     assert target.run(b"a") == 0
 
 
@@ -189,8 +189,8 @@ def test_a_check_judges_each_run_and_sees_memory_characters_and_time():
     target = BareTarget(image(SLEEPS), "bytes", check=check(keeps_the_last))
     assert target.run(b"abc") == 0
     assert target.run(b"ab\xff") == CHECK_CODE
-    assert target.finding.what == "the last one is 255"
-    assert target.finding.check == "keeps_the_last"
+    assert target.failure.what == "the last one is 255"
+    assert target.failure.check == "keeps_the_last"
 
 
 def test_a_check_that_raises_is_a_finding_that_says_where():
@@ -199,8 +199,8 @@ def test_a_check_that_raises_is_a_finding_that_says_where():
 
     target = BareTarget(image(SLEEPS), "bytes", check=check(divides))
     assert target.run(b"ab") == CHECK_CODE
-    assert "raised ZeroDivisionError" in target.finding.what
-    assert "test_bare.py:" in target.finding.what
+    assert "raised ZeroDivisionError" in target.failure.what
+    assert "test_bare.py:" in target.failure.what
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ def test_finds_are_confirmed_from_power_on_and_left_as_cases_that_replay(mirotwi
     code, out, err = campaign(mirotwin, tmp_path, hexes["sleeps"], "--input", "bytes", "--corpus", inputs)
     assert code == 1
     assert "not confirmed" not in out + err
-    cases = sorted((tmp_path / "out" / "finds").glob("*.stream"))
+    cases = sorted((tmp_path / "out" / "crashes").glob("*.stream"))
     assert {path.name.partition("-")[0] for path in cases} == {"never_sleeps", "no_fault"}
     assert {path.read_text().partition(" > ")[2].strip() for path in cases} >= {"21", "3f"}
     for path in cases:
@@ -63,7 +63,7 @@ def test_finds_are_confirmed_from_power_on_and_left_as_cases_that_replay(mirotwi
         assert (again, err.startswith("mirotwin: fails as recorded: ")) == (failed, True)
         again, out, _ = mirotwin("replay", str(path), "--firmware", hexes["mended"])
         assert (again, out.startswith("cured: ")) == (0, True)
-    folder = str(tmp_path / "out" / "finds")
+    folder = str(tmp_path / "out" / "crashes")
     code, out, _ = mirotwin("fuzz", hexes["sleeps"], "--regress", folder)
     assert (code, out.splitlines()[-1]) == (1, f"{len(cases)} cases: 0 passed, {len(cases)} failed")
     code, out, _ = mirotwin("fuzz", hexes["mended"], "--regress", folder, "--bare")
@@ -78,7 +78,7 @@ def test_a_check_looks_at_what_is_new_or_at_everything(mirotwin, engines, hexes,
         code, out, err = campaign(mirotwin, tmp_path, hexes["polls"], *options)
         assert code == 1
         assert "it heard a q" in err
-        case = next((out_folder / "finds").glob("never_q-*.stream"))
+        case = next((out_folder / "crashes").glob("never_q-*.stream"))
         again = next(line for line in out.splitlines() if line.startswith(f"    mirotwin replay {case}"))
         assert again.endswith(f" --expect {check}")
         assert mirotwin(*shlex.split(again)[1:])[2].startswith("mirotwin: fails as recorded: never_q")
@@ -130,7 +130,7 @@ def test_what_does_not_go_together_is_refused(mirotwin, engines, hexes, tmp_path
 def test_a_case_of_a_bare_processor_is_not_played_on_the_robot(mirotwin, engines, hexes, tmp_path):
     inputs = corpus(tmp_path, b"!")
     campaign(mirotwin, tmp_path, hexes["sleeps"], "--input", "bytes", "--corpus", inputs)
-    case = str(next((tmp_path / "out" / "finds").glob("no_fault-*.stream")))
+    case = str(next((tmp_path / "out" / "crashes").glob("no_fault-*.stream")))
     for arguments, said in (
         (("replay", case), "is for a bare processor, which has no firmware of its own; give --firmware"),
         (

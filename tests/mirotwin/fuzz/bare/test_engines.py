@@ -19,7 +19,7 @@ for kind in ("bytes", "frames", "session"):
     edges = bytearray(target.map_size)
     target.use_map(edges)
     for data in (b"", b"ab!", b"a?" if kind == "bytes" else b"b", draw.randbytes(12), draw.randbytes(30)):
-        run = target.run(data), target.finding, target.exchange().sent, target.end_tick(), target.describe(data)
+        run = target.run(data), target.failure, target.exchange().sent, target.end_tick(), target.describe(data)
         print(kind, *run, sum(place * count for place, count in enumerate(edges)))
 """
 

@@ -1,4 +1,4 @@
-"""Finds on a bare processor as files: the same verdict again, on this firmware and on others."""
+"""Crashes on a bare processor as files: the same verdict again, on this firmware and on others."""
 
 import pytest
 
@@ -28,11 +28,11 @@ def case(tmp_path, data, firmware=SLEEPS, check=None):
     """The file of what a target finds in `data`."""
     target = BareTarget(image(firmware), "bytes", check=check)
     assert target.run(data)
-    found = target.finding
+    found = target.failure
     heard = target.script(data)
     end_tick = found.tick + (AHEAD_TICKS if found.check == "no_fault" else 0)
     failure = failure_of(BareRun(target.image, target.line, heard, end_tick), found.check, check)
-    path = tmp_path / "find.stream"
+    path = tmp_path / "crash.stream"
     path.write_text(case_text(target.image, target.line, heard, end_tick, failure))
     return path
 
@@ -168,4 +168,4 @@ def test_the_bare_machine_of_fw_run_has_the_same_fault_from_the_levels_on_its_pi
             tick += 11_520
     machine = BareMachine(image(SLEEPS), pins=tuple(events))
     machine.run(max_cycles=100_000)
-    assert (machine.faults[0].tick, machine.faults[0].pc) == (target.finding.tick, target.finding.pc)
+    assert (machine.faults[0].tick, machine.faults[0].pc) == (target.failure.tick, target.failure.pc)
