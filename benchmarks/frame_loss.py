@@ -34,7 +34,9 @@ from miro_robot.image import load_hex
 from miro_robot.mcs51.line import Line
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
-from miro_sim.radio import Downlink, RadioParams, SlicerParams, Uplink
+from miro_sim.radio.downlink import Downlink
+from miro_sim.radio.params import Radio, SlicerParams
+from miro_sim.radio.uplink import Uplink
 
 LEVELS_DB = (7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0)
 FIRST_TICK = 240_000  # after the firmware's start
@@ -81,22 +83,22 @@ def frame(robots: int, number: int, draws: Stream) -> bytes:
 
 def decoder(robots: int, eb_n0_db: float, frames: int, seed: int) -> Point:
     """The decoder in Python, behind a UART with the PC's bit time."""
-    params = RadioParams.of(eb_n0_db=eb_n0_db)
+    params = Radio(eb_n0_db=eb_n0_db)
     return Point(robots, "decoder", eb_n0_db, frames, *received(robots, params, frames, seed, eb_n0_db))
 
 
 def slicer(robots: int, eb_n0_db: float, frames: int, seed: int) -> Point:
     """The same with the threshold of an AC-coupled slicer."""
-    part = SlicerParams.of(settle_s=0.004, offset=-0.5, eb_n0_db=eb_n0_db)
-    params = RadioParams.of(eb_n0_db=eb_n0_db, slicer=part)
+    part = SlicerParams(settle_s=0.004, offset=-0.5)
+    params = Radio(eb_n0_db=eb_n0_db, slicer=part)
     return Point(robots, "slicer", eb_n0_db, frames, *received(robots, params, frames, seed, eb_n0_db))
 
 
-def received(robots: int, params: RadioParams, frames: int, seed: int, eb_n0_db: float) -> tuple[int, int]:
+def received(robots: int, params: Radio, frames: int, seed: int, eb_n0_db: float) -> tuple[int, int]:
     """How many of so many frames do not come out of the decoder as they were sent; how many come out wrong."""
     line, draws = Line(), Stream(seed, "velocities")
     downlink = Downlink(params, seed, f"decoder{robots}/{eb_n0_db}")
-    uart = Uplink(RadioParams.ideal(), seed, "uart")
+    uart = Uplink(Radio.ideal(), seed, "uart")
     downlink.listen(0, line)
     uart.listen(line)
     scanner = Decoder(robots)
@@ -122,7 +124,7 @@ def firmware(robots: int, eb_n0_db: float, frames: int, seed: int) -> Point:
     board.cpu.load(image.code, image.used)
     addresses = [symbol.address for name in COUNTERS if (symbol := image.symbols.find(name))]
     draws = Stream(seed, "velocities")
-    downlink = Downlink(RadioParams.of(eb_n0_db=eb_n0_db), seed, f"firmware{robots}/{eb_n0_db}")
+    downlink = Downlink(Radio(eb_n0_db=eb_n0_db), seed, f"firmware{robots}/{eb_n0_db}")
     downlink.listen(0, board.cpu.rxd)
     for number in range(frames):
         start = FIRST_TICK + number * CONTROL_PERIOD_TICKS

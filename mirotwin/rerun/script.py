@@ -15,10 +15,10 @@ from miro_protocol.stream_header import Header
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.periods import Period
+from miro_sim.radio.params import Radio
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, load, of_table
 from miro_sim.scenario.keys import MAX_NETWORKS, Network, Scenario
-from miro_sim.scenario.radio_keys import Radio
 
 DEFAULT_SCENARIO = "fig6"
 AFTERMATH_TICKS = TICKS_PER_SECOND

@@ -30,7 +30,9 @@ from miro_robot.mcs51.execute import WIRE_FULL
 from miro_robot.mcs51.line import Line
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
-from miro_sim.radio import Downlink, RadioParams, Uplink
+from miro_sim.radio.downlink import Downlink
+from miro_sim.radio.params import Radio
+from miro_sim.radio.uplink import Uplink
 from mirotwin.testing.noisy_wire import NoisyWire, Trouble
 
 MS = TICKS_PER_SECOND // 1000
@@ -87,13 +89,13 @@ class Bench:
         self,
         n: int = 3,
         slot: int = 0,
-        radio: RadioParams | None = None,
+        radio: Radio | None = None,
         seed: int = 0,
         image: Image | None = None,
     ) -> None:
         self.n = n
         self.slot = slot
-        self.radio = radio or RadioParams.ideal()
+        self.radio = radio or Radio.ideal()
         if not 0 <= slot < n:
             raise ValueError(f"slot {slot} does not exist in a network of {n}; use 0 to {n - 1}")
         if self.radio.jitter_ticks or self.radio.baud_offset_ppm or self.radio.crystal_offset_ppm:

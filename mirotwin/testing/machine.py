@@ -21,7 +21,7 @@ from miro_protocol.strategies import numbers
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_DATA, VELOCITY, FrameType, Opcode
 from miro_robot.firmware import image_path
 from miro_robot.image import Image
-from miro_sim.radio import RadioParams
+from miro_sim.radio.params import Radio
 from mirotwin.testing import shrinking
 from mirotwin.testing.bench import MS, Bench, LinkFailure
 from mirotwin.testing.bench_case import case_of_bench
@@ -42,7 +42,7 @@ class LinkMachine(RuleBasedStateMachine):
     """
 
     image: ClassVar[Image | None] = None
-    profiles: ClassVar[st.SearchStrategy[RadioParams]] = link_profiles()
+    profiles: ClassVar[st.SearchStrategy[Radio]] = link_profiles()
     stream_file: ClassVar[Path | None] = Path("link-failure.stream")
     shrink_seconds: ClassVar[float] = 30.0
 

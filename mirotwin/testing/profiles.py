@@ -4,31 +4,28 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.seed import MAX_SEED
-from miro_sim.radio import RadioParams, error_threshold
-from miro_sim.radio.params import ChainParams
+from miro_sim.radio.params import Bursts, Dropouts, Radio
 
-MS = TICKS_PER_SECOND // 1000
 BIT_ERROR_RATES = (0.0, 1e-4, 1e-3, 1e-2)
 
 
-def link_profiles() -> st.SearchStrategy[RadioParams]:
+def link_profiles() -> st.SearchStrategy[Radio]:
     """Radios from an ideal wire (what shrinking ends at) to a keyed carrier with noise, one wrong bit in 100, bursts,
     drop-outs, false start bits and lost characters; without what leaves the grid of bits (see `Bench`).
     """
-    wires = st.just(RadioParams.ideal())
+    wires = st.just(Radio.ideal())
     radios = st.builds(
-        RadioParams,
-        latency_ticks=st.sampled_from([0, 1, 2500, 5 * MS]),
-        error_threshold=st.sampled_from([error_threshold(rate) for rate in BIT_ERROR_RATES]),
+        Radio,
+        latency_s=st.sampled_from([0.0, 1 / 24e6, 1 / 9600, 0.005]),
+        bit_error_rate=st.sampled_from(BIT_ERROR_RATES),
         carrier=st.sampled_from(["on", "keyed"]),
-        keyup_ticks=st.sampled_from([MS, 2 * MS]),
+        keyup_s=st.sampled_from([0.001, 0.002]),
         squelch=st.booleans(),
-        bursts=st.none() | st.just(ChainParams.of(1e-3, 1e-2)),
-        dropouts=st.none() | st.just(ChainParams.lasting(0.3, 0.02)),
-        false_start_threshold=st.sampled_from([0, error_threshold(0.002)]),
-        lost_threshold=st.sampled_from([0, error_threshold(0.01)]),
+        bursts=st.none() | st.just(Bursts(good_to_bad=1e-3, bad_to_good=1e-2)),
+        dropouts=st.none() | st.just(Dropouts(every_s=0.3, length_s=0.02)),
+        false_starts_hz=st.sampled_from([0.0, 19.2]),
+        lost_character_rate=st.sampled_from([0.0, 0.01]),
     )
     return st.one_of(wires, radios)
 

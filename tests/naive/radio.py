@@ -12,14 +12,15 @@ from fractions import Fraction
 from functools import cache
 from typing import NamedTuple
 
-from miro_sim.radio import ChainParams, RadioParams, SlicerParams
+from miro_sim.radio.params import Bursts, Dropouts, Radio, SlicerParams
+from miro_sim.radio.probability import margin_table
 from tests.naive import rng
 
 Sent = list[tuple[int, bytes] | tuple[int, bytes, tuple[int, ...]]]
 """(tick of the first start bit at the transmitter, bytes, indices of those with a bad stop bit, if any)."""
 Edges = list[tuple[int, int]]  # (tick, level)
 Symbol = tuple[int, bool, int]
-NO_OTHERS: list[tuple[RadioParams, str, Sent]] = []
+NO_OTHERS: list[tuple[Radio, str, Sent]] = []
 
 
 def wire_bits(data: bytes) -> list[int]:
@@ -28,7 +29,7 @@ def wire_bits(data: bytes) -> list[int]:
 
 
 @cache
-def chain_states(params: ChainParams, seed: int, name: str, slots: int) -> list[bool]:
+def chain_states(params: Bursts | Dropouts, seed: int, name: str, slots: int) -> list[bool]:
     """Bad or good in slots 0 .. slots-1, by the book: step by step from a good start."""
     bad, states = False, []
     for slot in range(slots):
@@ -38,7 +39,7 @@ def chain_states(params: ChainParams, seed: int, name: str, slots: int) -> list[
     return states
 
 
-def chain_bad(params: ChainParams | None, seed: int, name: str, slot: int) -> bool:
+def chain_bad(params: Bursts | Dropouts | None, seed: int, name: str, slot: int) -> bool:
     return params is not None and chain_states(params, seed, name, slot - slot % 256 + 256)[slot]
 
 
@@ -58,7 +59,7 @@ class OnAir(NamedTuple):
 class Sender:
     """Everything that a transmitter ever sends, as it arrives at robots with the crystal of `listener`."""
 
-    def __init__(self, params: RadioParams, listener: RadioParams, seed: int, name: str, sent: Sent) -> None:
+    def __init__(self, params: Radio, listener: Radio, seed: int, name: str, sent: Sent) -> None:
         self.params = params
         own = Fraction(2500 * (10**6 + params.crystal_offset_ppm), 10**6 + params.baud_offset_ppm)
         self.bit_ticks = Fraction(
@@ -101,38 +102,39 @@ class Sender:
 class Slicer:
     """Its threshold as the mean of what came in, in steps of at most a bit time."""
 
-    def __init__(self, params: SlicerParams | None) -> None:
+    def __init__(self, params: SlicerParams | None, eb_n0_db: float | None) -> None:
         self.params = params
+        self.thresholds = () if eb_n0_db is None else margin_table(eb_n0_db)
         self.mean = self.signal = self.tick = 0
 
     def hear(self, tick: int, signal: int) -> None:
         if self.params is None:
             return
-        target = self.signal * 65536 + self.params.offset if self.signal else 0
+        target = self.signal * 65536 + self.params.offset_units if self.signal else 0
         for step in [2500] * ((tick - self.tick) // 2500) + [(tick - self.tick) % 2500]:
             self.mean += ((target - self.mean) * (self.params.gain * step // 2500)) // 65536
         self.tick, self.signal = tick, signal
 
     def chance(self, level: int) -> int:
         assert self.params is not None
-        margin = 65536 - (2 * level - 1) * (self.mean - self.params.offset)
-        return self.params.thresholds[min(max((margin + 65536) // 512, 0), 512)]
+        margin = 65536 - (2 * level - 1) * (self.mean - self.params.offset_units)
+        return self.thresholds[min(max((margin + 65536) // 512, 0), 512)]
 
 
 def downlink_edges(
     until: int,
-    params: RadioParams,
+    params: Radio,
     seed: int,
     name: str,
     robot: str,
     sent: Sent,
-    others: list[tuple[RadioParams, str, Sent]] = NO_OTHERS,
+    others: list[tuple[Radio, str, Sent]] = NO_OTHERS,
 ) -> Edges:
     """Every change of the level on a robot's RXD wire before `until`, the wire being at mark before tick 0."""
     senders = [Sender(params, params, seed, name, sent)]
     senders += [Sender(its, params, seed, its_name, its_sent) for its, its_name, its_sent in others]
     ticks = set(range(0, until, 2500)).union(*(sender.event_ticks() for sender in senders))
-    slicer = Slicer(params.slicer)
+    slicer = Slicer(params.slicer, params.eb_n0_db)
     decided: dict[object, int] = {}
     levels = {}
     for tick in sorted(tick for tick in ticks if 0 <= tick < until):
@@ -156,7 +158,7 @@ def decide(
     rank: int,
     on_air: OnAir | None,
     senders: list[Sender],
-    params: RadioParams,
+    params: Radio,
     slicer: Slicer,
     seed: int,
     robot: str,
@@ -195,7 +197,7 @@ def decide(
     return 1 if lost else level
 
 
-def uplink_level(tick: int, params: RadioParams, seed: int, name: str, wires: list[Edges]) -> int:
+def uplink_level(tick: int, params: Radio, seed: int, name: str, wires: list[Edges]) -> int:
     """The level at the PC's receiver; `wires` are the TXD edges of robots 0, 1, .."""
     u = tick - params.latency_ticks
     levels = []
@@ -213,7 +215,7 @@ def uplink_level(tick: int, params: RadioParams, seed: int, name: str, wires: li
     return min(levels) ^ wrong
 
 
-def uplink_edges(until: int, params: RadioParams, seed: int, name: str, wires: list[Edges]) -> Edges:
+def uplink_edges(until: int, params: Radio, seed: int, name: str, wires: list[Edges]) -> Edges:
     """Every change of the level before `until`."""
     latency = params.latency_ticks
     ticks = {slot + latency for slot in range(0, until, 2500)}

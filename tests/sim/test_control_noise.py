@@ -10,7 +10,7 @@ from miro_protocol.decoder import Decoder, Received
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import ScenarioError, parse
-from miro_sim.scenario.radio_keys import ControlNoise
+from miro_sim.scenario.keys import ControlNoise
 from miro_sim.world.control_noise import NoisyCommands
 from miro_sim.world.world import World
 

@@ -20,7 +20,7 @@ from miro_protocol.table import downlink
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.periods import Axis, RobotPeriod
 from miro_sim.radio.condition import UP
-from miro_sim.radio.params import RadioParams
+from miro_sim.radio.params import Radio
 from miro_sim.radio.probability import ONE
 from miro_sim.world.events import SIDES, Event
 from mirotwin.verify.checks.failsafe import ACTING_MS
@@ -50,7 +50,7 @@ class ActsAtAll(Check, frozen=True, kw_only=True, tag="acts_at_all"):
         return AliveJudge(self, subject)
 
 
-def frames_needed(params: RadioParams, characters: int) -> int:
+def frames_needed(params: Radio, characters: int) -> int:
     """So many frames in a row that a radio like this does not lose all of them; 0: nothing can be said."""
     if abs(params.baud_offset_ppm - params.crystal_offset_ppm) > FURTHEST_PPM:
         return 0

@@ -4,19 +4,3 @@ What belongs here: levels on wires as a function of time, what disturbs them, th
 one, and the PC's UART. What the bytes mean belongs to `miro_protocol`; who sends when to the station and the
 firmware.
 """
-
-from miro_sim.radio.downlink import Downlink
-from miro_sim.radio.listener import Listener
-from miro_sim.radio.params import ChainParams, RadioParams, SlicerParams
-from miro_sim.radio.probability import error_threshold
-from miro_sim.radio.uplink import Uplink
-
-__all__ = [
-    "ChainParams",
-    "Downlink",
-    "Listener",
-    "RadioParams",
-    "SlicerParams",
-    "Uplink",
-    "error_threshold",
-]

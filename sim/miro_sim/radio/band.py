@@ -20,7 +20,7 @@ from miro_exact.rng import Stream
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
 from miro_sim.radio.condition import DOWN, NOISE, UP
-from miro_sim.radio.params import RadioParams
+from miro_sim.radio.params import Radio
 
 _NEVER = NEVER_TICK
 _BIT = 2500
@@ -38,7 +38,7 @@ class Transmitter:
     STATE = {"last_edge": ("q", -1, NEVER_TICK)}
     NOT_STATE = ("bursts", "dropouts", "line")
 
-    def __init__(self, line: Line, params: RadioParams, seed: int, name: str) -> None:
+    def __init__(self, line: Line, params: Radio, seed: int, name: str) -> None:
         self.line = line
         self.bursts = None if params.bursts is None else Chain(params.bursts, seed, f"{name}/bursts")
         self.dropouts = None if params.dropouts is None else Chain(params.dropouts, seed, f"{name}/dropouts")
@@ -61,7 +61,7 @@ class Band:
         "threshold",
     )
 
-    def __init__(self, params: RadioParams, seed: int, name: str) -> None:
+    def __init__(self, params: Radio, seed: int, name: str) -> None:
         self.params = params
         self.seed = seed
         self.name = name

@@ -16,7 +16,7 @@ Before slot 0 the state is good.
 from __future__ import annotations
 
 from miro_exact.rng import Stream
-from miro_sim.radio.params import ChainParams
+from miro_sim.radio.params import Bursts, Dropouts
 
 _ONE = 1 << 32
 
@@ -26,7 +26,7 @@ class Chain:
 
     NOT_STATE = ("stream", "enter", "stay", "slot", "answer")
 
-    def __init__(self, params: ChainParams, seed: int, name: str) -> None:
+    def __init__(self, params: Bursts | Dropouts, seed: int, name: str) -> None:
         self.stream = Stream(seed, name)
         self.enter = params.enter
         self.stay = _ONE - params.leave  # draws from here on end the bad state

@@ -17,7 +17,7 @@ from miro_exact.state import TICK
 from miro_protocol.transmission import check_bad_stop
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.listener import Listener
-from miro_sim.radio.params import RadioParams
+from miro_sim.radio.params import Radio
 from miro_sim.radio.sender import Sender
 
 MEMORY_TICKS = 2 * HOST_BIT_TICKS
@@ -45,15 +45,20 @@ class Downlink:
         "listeners": [Listener],
         "overheard": [Sender],
     }
-    NOT_STATE = ("audience", "jitter", "lost", "name", "params", "punctual", "seed")
+    NOT_STATE = (
+        *("audience", "jitter", "jitter_ticks", "lost", "lost_threshold"),
+        *("name", "params", "punctual", "seed"),
+    )
 
-    def __init__(self, params: RadioParams, seed: int, name: str) -> None:
+    def __init__(self, params: Radio, seed: int, name: str) -> None:
         self.params = params
         self.seed = seed
         self.name = name
         self.jitter = Stream(seed, f"{name}/jitter")
         self.lost = Stream(seed, f"{name}/lost_frames")
-        self.punctual = params.jitter_ticks == 0 and params.bit_ticks == HOST_BIT_TICKS
+        self.jitter_ticks = params.jitter_ticks
+        self.lost_threshold = params.lost_frame_threshold
+        self.punctual = self.jitter_ticks == 0 and params.bit_ticks == HOST_BIT_TICKS
         self.listeners: dict[int, Listener] = {}
         self.sender = Sender(params, params.crystal_offset_ppm)
         self.overheard: list[Sender] = []
@@ -112,14 +117,14 @@ class Downlink:
         stops = bytearray(len(data) if bad_stop else 0)
         for place in bad_stop:
             stops[place] = 1
-        late = self.jitter.u32(start_tick // HOST_BIT_TICKS) * (self.params.jitter_ticks + 1) >> 32
+        late = self.jitter.u32(start_tick // HOST_BIT_TICKS) * (self.jitter_ticks + 1) >> 32
         arrival = max(start_tick + self.sender.latency + late, self.busy_tick)
         for sender in (self.sender, *(sender for _, sender in self.audience)):
             sender.transmissions.append((arrival, bytes(data), bytes(stops)))
         air_ticks = len(data) * HOST_CHARACTER_TICKS
         self.free_tick = start_tick + air_ticks
         self.busy_tick = max(arrival + air_ticks, self.sender.end(len(self.sender.transmissions) - 1))
-        if self.lost.below(start_tick // HOST_BIT_TICKS, self.params.lost_frame_threshold):
+        if self.lost.below(start_tick // HOST_BIT_TICKS, self.lost_threshold):
             for sender in (self.sender, *(sender for _, sender in self.audience)):
                 sender.transmissions.pop()
         return self.free_tick

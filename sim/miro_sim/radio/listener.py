@@ -23,7 +23,7 @@ from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
 from miro_sim.radio.condition import DOWN, NOISE, UP
-from miro_sim.radio.params import RadioParams
+from miro_sim.radio.params import Radio
 from miro_sim.radio.sender import Sender
 from miro_sim.radio.slicer import Slicer
 
@@ -58,7 +58,7 @@ class Listener:
         "threshold",
     )
 
-    def __init__(self, line: Line, params: RadioParams, seed: int, name: str) -> None:
+    def __init__(self, line: Line, params: Radio, seed: int, name: str) -> None:
         self.line = line
         self.errors = Stream(seed, f"{name}/errors")
         self.noise = Stream(seed, f"{name}/noise")
@@ -72,7 +72,9 @@ class Listener:
         self.lost_threshold = params.lost_threshold
         self.bursts = None if params.bursts is None else Chain(params.bursts, seed, f"{name}/bursts")
         self.dropouts = None if params.dropouts is None else Chain(params.dropouts, seed, f"{name}/dropouts")
-        self.slicer = None if params.slicer is None else Slicer(params.slicer)
+        self.slicer: Slicer | None = None
+        if params.slicer is not None and params.eb_n0_db is not None:
+            self.slicer = Slicer(params.slicer, params.eb_n0_db)
         parts = (self.bursts, self.dropouts, self.slicer)
         self.perfect_idle = not self.false_start and all(part is None for part in parts)
         self.condition = UP

@@ -1,193 +1,225 @@
-"""The parameters of a radio band, in the units of the models: ticks and 2^-32."""
+"""What a radio network is like: the keys of a scenario's `[network.radio]`, and the ticks and chances they stand for.
+
+Chances are thresholds of a 32-bit draw: a probability times 2^32.
+"""
 
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 
 from miro_exact import clock
 from miro_sim.radio.probability import (
-    ONE,
     error_threshold,
     fsk_threshold,
-    margin_table,
     mean_threshold,
     rate_threshold,
     threshold,
 )
 
-MAX_OFFSET_PPM = 50_000
+BIT_S = 1 / 9600
+BIT_ERROR_RATE = 1e-4
+"""What holds when a scenario names neither a bit-error rate nor Eb/N0."""
 SLICER_ONE = 65_536
 """Half the distance of mark and space at the discriminator, in the units of the slicer's threshold."""
 
-
-class ChainParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A two-state chain over bit times: `enter`, `leave` are the probabilities of a change, times 2^32.
-
-    Raises ValueError unless each is in 0 .. 2^32 and both together are, which is what lets `chain` look
-    any place up by itself.
-    """
-
-    enter: int
-    leave: int
-
-    def __post_init__(self) -> None:
-        if self.enter < 0 or self.leave < 0 or self.enter + self.leave > ONE:
-            raise ValueError(f"chances {self.enter} and {self.leave} of a change are not within 0 .. 2^32")
-
-    @classmethod
-    def of(cls, enter: float, leave: float) -> ChainParams:
-        """From two probabilities a bit."""
-        return cls(enter=threshold(enter), leave=threshold(leave))
-
-    @classmethod
-    def lasting(cls, every_s: float, length_s: float) -> ChainParams:
-        """From the mean time between two events (end to start) and the mean length of one."""
-        return cls(enter=mean_threshold(every_s), leave=mean_threshold(length_s))
+ProfileName = Annotated[str, msgspec.Meta(max_length=40)]
+WITHIN = {
+    "latency_s": (0.0, 0.030),
+    "jitter_s": (0.0, 0.030),
+    "keyup_s": (0.0, 0.030),
+    "bit_error_rate": (0.0, 0.5),
+    "eb_n0_db": (-20.0, 60.0),
+    "channel": (0, 999),
+    "baud_offset_ppm": (-50_000, 50_000),
+    "crystal_offset_ppm": (-50_000, 50_000),
+    "false_starts_hz": (0.0, 9600.0),
+    "lost_character_rate": (0.0, 1.0),
+    "lost_frames": (0.0, 1.0),
+    "good_to_bad": (0.0, 1.0),
+    "bad_to_good": (0.0, 1.0),
+    "every_s": (0.000105, 1e6),
+    "length_s": (0.000105, 1e6),
+    "settle_s": (0.000105, 1.0),
+    "offset": (-1.0, 1.0),
+}
 
 
-class SlicerParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """An AC-coupled slicer.
-
-    gain        part of the way to the input that the threshold goes in a bit time, times 2^16
-    offset      input that stands for "no deviation" while there is a carrier, in 1/65536 of the deviation
-    thresholds  chance of a wrong bit by margin, see `probability.margin_table`
-    """
-
-    gain: int
-    offset: int
-    thresholds: tuple[int, ...]
+class _Ranged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Numbers that are in their range, see WITHIN, or None."""
 
     def __post_init__(self) -> None:
-        if not 0 < self.gain <= 1 << 16:
-            raise ValueError(f"slicer gain {self.gain} is outside 1 .. 2^16")
-        if abs(self.offset) > SLICER_ONE:
-            raise ValueError(f"slicer offset {self.offset} is outside +-2^16")
-
-    @classmethod
-    def of(cls, *, settle_s: float, offset: float, eb_n0_db: float) -> SlicerParams:
-        """From the time constant, the offset in units of the deviation, and the signal-to-noise ratio."""
-        settle_ticks = clock.ticks(settle_s)
-        if settle_ticks < clock.HOST_BIT_TICKS:
-            raise ValueError(f"settle_s {settle_s} is shorter than a bit (1/9600 s)")
-        exact = Fraction(repr(float(offset)))
-        return cls(
-            gain=((clock.HOST_BIT_TICKS << 17) // settle_ticks + 1) // 2,
-            offset=(2 * exact * SLICER_ONE + 1) // 2,
-            thresholds=margin_table(eb_n0_db),
-        )
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            if value is None or name not in WITHIN:
+                continue
+            low, high = WITHIN[name]
+            if not low <= value <= high:
+                raise ValueError(f"{name} must be {low:g} to {high:g}, got {value!r}")
 
 
-class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One band of one network. What is 0 or None is off.
+class Bursts(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Gilbert-Elliott: chances a bit time of going bad and good again, and the error rate while it is bad."""
 
-    latency_ticks          from the UART pin of the sender to that of the receiver
-    jitter_ticks           a transmission is late by 0 to so much on top
-    error_threshold        a bit is wrong with this probability times 2^32
-    carrier                "keyed": on for each transmission; "on": always, idle is mark
-    keyup_ticks            a keyed carrier comes up (as mark) so long before the first start bit
-    squelch                without a carrier the receiver puts out mark instead of its slicer's noise
-    baud_offset_ppm        the PC's UART is so much faster than 9600 baud
-    crystal_offset_ppm     the robots' crystals are so much faster than 24 MHz
-    bursts                 Gilbert-Elliott: times of many errors, `burst_threshold`
-    dropouts               times without a carrier
-    slicer                 a slicer whose threshold follows the signal
-    false_start_threshold  a bit time of idle carrier is a space
-    lost_threshold         a character never gets to the robot's UART
-    lost_frame_threshold   a transmission never goes on the air
+    good_to_bad: float
+    bad_to_good: float
+    bit_error_rate: float = 0.5
 
-    Raises ValueError naming the field.
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.good_to_bad + self.bad_to_good > 1.0:
+            raise ValueError(
+                f"bad_to_good: {self.bad_to_good} and good_to_bad {self.good_to_bad} make more than 1;"
+                " a state must last a bit on average"
+            )
+
+    @property
+    def enter(self) -> int:
+        """Chance of going bad in a bit time."""
+        return threshold(self.good_to_bad)
+
+    @property
+    def leave(self) -> int:
+        """Chance of going good in a bit time."""
+        return threshold(self.bad_to_good)
+
+
+class Dropouts(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Times without a carrier: mean time from the end of one to the next, and mean length."""
+
+    every_s: float
+    length_s: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if BIT_S / self.every_s + BIT_S / self.length_s >= 1.0:
+            raise ValueError(
+                f"every_s: {self.every_s} and length_s {self.length_s} are too short together;"
+                f" one of them must last more than a bit ({BIT_S:.6f} s)"
+            )
+
+    @property
+    def enter(self) -> int:
+        """Chance of losing the carrier in a bit time."""
+        return mean_threshold(self.every_s)
+
+    @property
+    def leave(self) -> int:
+        """Chance of its coming back in a bit time."""
+        return mean_threshold(self.length_s)
+
+
+class SlicerParams(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """An AC-coupled slicer: its time constant, and the offset of the carriers in units of the deviation."""
+
+    settle_s: float = 0.004
+    offset: float = 0.0
+
+    @property
+    def gain(self) -> int:
+        """Part of the way to the input that the threshold goes in a bit time, times 2^16."""
+        return ((clock.HOST_BIT_TICKS << 17) // clock.ticks(self.settle_s) + 1) // 2
+
+    @property
+    def offset_units(self) -> int:
+        """Input that stands for "no deviation" while there is a carrier, in 1/65536 of the deviation."""
+        return (2 * Fraction(repr(float(self.offset))) * SLICER_ONE + 1) // 2
+
+
+class Radio(_Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One radio network: 9600 baud down to the robots and, with `telemetry`, a second band up.
+
+    `carrier` keyed is a transmitter that is on per frame only, `keyup_s` before its first start bit;
+    between frames the receiver's slicer makes noise, unless `squelch` holds it at mark. Errors come from
+    `bit_error_rate` or from `eb_n0_db`, not both. Networks with the same `channel` hear each other; without
+    one a network is alone. `lost_frames`: chance for each transmission down that it never goes on the air.
+    `profile` names sets of these keys, see `profiles`; keys that are given win.
     """
 
-    latency_ticks: int = 0
-    jitter_ticks: int = 0
-    error_threshold: int = 0
+    profile: ProfileName | tuple[ProfileName, ...] = ()
+    latency_s: float = 0.0
+    jitter_s: float = 0.0
+    bit_error_rate: float | None = None
+    eb_n0_db: float | None = None
     carrier: Literal["keyed", "on"] = "keyed"
-    keyup_ticks: int = 24_000
+    keyup_s: float = 0.001
     squelch: bool = False
+    telemetry: bool = True
+    channel: int | None = None
     baud_offset_ppm: int = 0
     crystal_offset_ppm: int = 0
-    bursts: ChainParams | None = None
-    burst_threshold: int = ONE // 2
-    dropouts: ChainParams | None = None
+    false_starts_hz: float = 0.0
+    lost_character_rate: float = 0.0
+    lost_frames: float = 0.0
+    bursts: Bursts | None = None
+    dropouts: Dropouts | None = None
     slicer: SlicerParams | None = None
-    false_start_threshold: int = 0
-    lost_threshold: int = 0
-    lost_frame_threshold: int = 0
 
     def __post_init__(self) -> None:
-        for field in ("latency_ticks", "jitter_ticks", "keyup_ticks"):
-            if not 0 <= getattr(self, field) < clock.TICKS_PER_SECOND:
-                raise ValueError(f"{field} {getattr(self, field)} is outside 0 .. one second")
-        for field in (
-            *("error_threshold", "burst_threshold", "false_start_threshold"),
-            *("lost_threshold", "lost_frame_threshold"),
-        ):
-            if not 0 <= getattr(self, field) <= ONE:
-                raise ValueError(f"{field} {getattr(self, field)} is outside 0 .. 2^32")
-        for field in ("baud_offset_ppm", "crystal_offset_ppm"):
-            if abs(getattr(self, field)) > MAX_OFFSET_PPM:
-                raise ValueError(f"{field} {getattr(self, field)} is outside +-{MAX_OFFSET_PPM}")
-        if self.carrier not in ("keyed", "on"):
-            raise ValueError(f"carrier {self.carrier!r} is neither 'keyed' nor 'on'")
+        super().__post_init__()
+        if self.eb_n0_db is None:
+            if self.slicer is not None:
+                raise ValueError(
+                    "slicer: its bit errors follow from Eb/N0; give eb_n0_db, not bit_error_rate"
+                )
+            if self.bit_error_rate is None:
+                msgspec.structs.force_setattr(self, "bit_error_rate", BIT_ERROR_RATE)
+        elif self.bit_error_rate is not None:
+            raise ValueError("eb_n0_db: sets the same as bit_error_rate; give one of the two")
+
+    @classmethod
+    def ideal(cls) -> Radio:
+        """A wire: no latency, no errors, mark level while idle."""
+        return cls(bit_error_rate=0.0, keyup_s=0.0, squelch=True)
+
+    @property
+    def latency_ticks(self) -> int:
+        """From the UART pin of the sender to that of the receiver."""
+        return clock.ticks(self.latency_s)
+
+    @property
+    def jitter_ticks(self) -> int:
+        """A transmission is late by 0 to so much on top."""
+        return clock.ticks(self.jitter_s)
+
+    @property
+    def keyup_ticks(self) -> int:
+        """A keyed carrier comes up (as mark) so long before the first start bit."""
+        return clock.ticks(self.keyup_s)
 
     @property
     def bit_ticks(self) -> Fraction:
         """One bit of the PC on a robot's clock: both offsets are one ratio, since that clock is the tick."""
         return bit_ticks(self.baud_offset_ppm, self.crystal_offset_ppm)
 
-    @classmethod
-    def of(
-        cls,
-        *,
-        latency_s: float = 0.0,
-        jitter_s: float = 0.0,
-        bit_error_rate: float | None = None,
-        eb_n0_db: float | None = None,
-        carrier: Literal["keyed", "on"] = "keyed",
-        keyup_s: float = 0.001,
-        squelch: bool = False,
-        baud_offset_ppm: int = 0,
-        crystal_offset_ppm: int = 0,
-        bursts: ChainParams | None = None,
-        burst_error_rate: float = 0.5,
-        dropouts: ChainParams | None = None,
-        slicer: SlicerParams | None = None,
-        false_starts_hz: float = 0.0,
-        lost_character_rate: float = 0.0,
-        lost_frames: float = 0.0,
-    ) -> RadioParams:
-        """The same from seconds and probabilities; the errors from a rate (default 0) or from Eb/N0.
+    @property
+    def error_threshold(self) -> int:
+        """Chance of a wrong bit."""
+        if self.eb_n0_db is not None:
+            return fsk_threshold(self.eb_n0_db)
+        return error_threshold(self.bit_error_rate or 0.0)
 
-        Raises ValueError for both at once.
-        """
-        if bit_error_rate is not None and eb_n0_db is not None:
-            raise ValueError("bit_error_rate and eb_n0_db set the same; give one of the two")
-        errors = error_threshold(bit_error_rate or 0.0) if eb_n0_db is None else fsk_threshold(eb_n0_db)
-        return cls(
-            latency_ticks=clock.ticks(latency_s),
-            jitter_ticks=clock.ticks(jitter_s),
-            error_threshold=errors,
-            carrier=carrier,
-            keyup_ticks=clock.ticks(keyup_s),
-            squelch=squelch,
-            baud_offset_ppm=baud_offset_ppm,
-            crystal_offset_ppm=crystal_offset_ppm,
-            bursts=bursts,
-            burst_threshold=error_threshold(burst_error_rate),
-            dropouts=dropouts,
-            slicer=slicer,
-            false_start_threshold=rate_threshold(false_starts_hz),
-            lost_threshold=threshold(lost_character_rate, "lost_character_rate"),
-            lost_frame_threshold=threshold(lost_frames, "lost_frames"),
-        )
+    @property
+    def burst_threshold(self) -> int:
+        """Chance of a wrong bit in a burst."""
+        return error_threshold(self.bursts.bit_error_rate) if self.bursts else 0
 
-    @classmethod
-    def ideal(cls) -> RadioParams:
-        """An ideal link: no latency, no errors, mark level while idle."""
-        return cls(keyup_ticks=0, squelch=True)
+    @property
+    def false_start_threshold(self) -> int:
+        """Chance that a bit time of idle carrier is a space."""
+        return rate_threshold(self.false_starts_hz)
+
+    @property
+    def lost_threshold(self) -> int:
+        """Chance that a character never gets to the robot's UART."""
+        return threshold(self.lost_character_rate)
+
+    @property
+    def lost_frame_threshold(self) -> int:
+        """Chance that a transmission never goes on the air."""
+        return threshold(self.lost_frames)
 
 
 def bit_ticks(baud_offset_ppm: int, crystal_offset_ppm: int) -> Fraction:

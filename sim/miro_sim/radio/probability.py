@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from miro_exact import clock, dmath
+from miro_exact import clock
 
 ONE = 1 << 32
 """The threshold that every draw is below."""
@@ -45,9 +45,15 @@ def mean_threshold(mean_s: float) -> int:
     return threshold(BIT_S / exact)
 
 
+def _exp(x: float) -> float:
+    from miro_exact import dmath  # a hot module: not before the engine was chosen
+
+    return dmath.exp(x)
+
+
 def fsk_exponent(eb_n0_db: float) -> float:
     """Eb / 2N0 as a plain number from Eb/N0 in decibels."""
-    return 0.5 * dmath.exp(eb_n0_db * LN10_TENTH)
+    return 0.5 * _exp(eb_n0_db * LN10_TENTH)
 
 
 def fsk_threshold(eb_n0_db: float) -> int:
@@ -55,7 +61,7 @@ def fsk_threshold(eb_n0_db: float) -> int:
 
     Source: J. G. Proakis, Digital Communications, non-coherent detection of binary orthogonal FSK.
     """
-    return int(2147483648.0 * dmath.exp(-fsk_exponent(eb_n0_db)) + 0.5)
+    return int(2147483648.0 * _exp(-fsk_exponent(eb_n0_db)) + 0.5)
 
 
 def margin_table(eb_n0_db: float) -> tuple[int, ...]:
@@ -69,6 +75,6 @@ def margin_table(eb_n0_db: float) -> tuple[int, ...]:
     table = []
     for step in range(-MARGIN_STEPS, 3 * MARGIN_STEPS + 1):
         margin = float(step) / float(MARGIN_STEPS)
-        wrong = int(2147483648.0 * dmath.exp(-(exponent * (margin * margin))) + 0.5)
+        wrong = int(2147483648.0 * _exp(-(exponent * (margin * margin))) + 0.5)
         table.append(ONE - wrong if step < 0 else wrong)
     return tuple(table)

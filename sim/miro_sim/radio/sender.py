@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from miro_exact.clock import CHARACTER_BITS, NEVER_TICK
 from miro_exact.state import Rows
-from miro_sim.radio.params import RadioParams, bit_ticks
+from miro_sim.radio.params import Radio, bit_ticks
 
 _CHARACTER = 10
 assert CHARACTER_BITS == _CHARACTER
@@ -32,7 +32,7 @@ class Sender:
     }
     NOT_STATE = ("always_on", "denominator", "keyup", "latency", "numerator")
 
-    def __init__(self, params: RadioParams, crystal_offset_ppm: int) -> None:
+    def __init__(self, params: Radio, crystal_offset_ppm: int) -> None:
         bit = bit_ticks(params.baud_offset_ppm, crystal_offset_ppm)
         self.numerator = bit.numerator
         self.denominator = bit.denominator

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from miro_exact.state import TICK
 from miro_sim.radio.params import SlicerParams
+from miro_sim.radio.probability import margin_table
 
 _BIT = 2500
 _ONE = 65536
@@ -27,12 +28,12 @@ class Slicer:
     STATE = {"tick": TICK, "signal": ("i", -1, 1), "mean": ("q", -4 * 65536, 4 * 65536)}
     NOT_STATE = ("gain", "offset", "table")
 
-    def __init__(self, params: SlicerParams) -> None:
+    def __init__(self, params: SlicerParams, eb_n0_db: float) -> None:
         self.gain = params.gain
-        self.offset = params.offset
+        self.offset = params.offset_units
         self.table = [0] * 513
-        for index in range(_TABLE):
-            self.table[index] = params.thresholds[index]
+        for index, chance in enumerate(margin_table(eb_n0_db)):
+            self.table[index] = chance
         self.tick = 0
         self.signal = 0
         self.mean = 0

@@ -13,7 +13,7 @@ from miro_exact.clock import CHARACTER_BITS, NEVER_TICK
 from miro_exact.state import FLAG, TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.band import Band
-from miro_sim.radio.params import RadioParams
+from miro_sim.radio.params import Radio
 
 _STOP = 9  # number of the stop bit, the start bit being 0
 assert CHARACTER_BITS == _STOP + 1
@@ -37,7 +37,7 @@ class Uplink:
     }
     NOT_STATE = ("denominator", "name", "numerator")
 
-    def __init__(self, params: RadioParams, seed: int, name: str) -> None:
+    def __init__(self, params: Radio, seed: int, name: str) -> None:
         self.name = name
         self.band = Band(params, seed, name)
         self.numerator = params.bit_ticks.numerator

@@ -25,10 +25,8 @@ from miro_host.references.registry import REFERENCES
 from miro_host.wheels import Wheels
 from miro_protocol.table import DOWNLINK
 from miro_sim.plant.params import DriveParams
-from miro_sim.radio import ChainParams, RadioParams, SlicerParams
 from miro_sim.scenario import keys as sc
 from miro_sim.scenario.camera_keys import SeeingCamera
-from miro_sim.scenario.radio_keys import Radio
 
 DEGREE = 0.017453292519943295
 
@@ -138,33 +136,3 @@ def drive_for(robot: sc.Robot, left: float, right: float) -> DriveParams:
         right_radius_factor=body.right_radius_factor * (1.0 + spread * (2.0 * right - 1.0)),
     )
     return msgspec.structs.replace(robot.drive, chassis=drawn)
-
-
-def radio_for(radio: Radio) -> RadioParams:
-    """The air of one network."""
-    bursts, dropouts = radio.bursts, radio.dropouts
-    return RadioParams.of(
-        latency_s=radio.latency_s,
-        jitter_s=radio.jitter_s,
-        bit_error_rate=radio.bit_error_rate,
-        eb_n0_db=radio.eb_n0_db,
-        carrier=radio.carrier,
-        keyup_s=radio.keyup_s,
-        squelch=radio.squelch,
-        baud_offset_ppm=radio.baud_offset_ppm,
-        crystal_offset_ppm=radio.crystal_offset_ppm,
-        bursts=None if bursts is None else ChainParams.of(bursts.good_to_bad, bursts.bad_to_good),
-        burst_error_rate=0.5 if bursts is None else bursts.bit_error_rate,
-        dropouts=None if dropouts is None else ChainParams.lasting(dropouts.every_s, dropouts.length_s),
-        slicer=_slicer_for(radio),
-        false_starts_hz=radio.false_starts_hz,
-        lost_character_rate=radio.lost_character_rate,
-        lost_frames=radio.lost_frames,
-    )
-
-
-def _slicer_for(radio: Radio) -> SlicerParams | None:
-    slicer = radio.slicer
-    if slicer is None or radio.eb_n0_db is None:
-        return None
-    return SlicerParams.of(settle_s=slicer.settle_s, offset=slicer.offset, eb_n0_db=radio.eb_n0_db)

@@ -97,10 +97,10 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
         path = f"{path}.{inner[1]}" if path else inner[1]
         what = inner[2]
     limit = re.fullmatch(r"(\w+) must be (.*), got (.*)", what)
-    if limit:  # a parameter of the drive
-        return ScenarioError(
-            origin, f"{path}.{limit[1]}", f"{limit[3]} is out of range", f"must be {limit[2]}"
-        )
+    if limit:  # a parameter of the drive or of the radio
+        path = f"{path}.{limit[1]}"
+        remedy = f"must be {limit[2]}{_unit_of(path)}"
+        return ScenarioError(origin, path, f"{limit[3]} is out of range", remedy)
     what, _, remedy = what.partition("; ")
     value = _value_at(raw, path)
     return ScenarioError(origin, path, *_explain(what, path, value, remedy or _choices_at(raw, path)))

@@ -19,8 +19,8 @@ from miro_host.wheels import MAX_WORD_BITS, MIN_WORD_BITS
 from miro_protocol.table import DOWNLINK
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 from miro_sim.plant.params import DriveParams
+from miro_sim.radio.params import Radio
 from miro_sim.scenario.camera_keys import Camera, PitchCm, PixelCamera
-from miro_sim.scenario.radio_keys import ControlNoise, Radio
 
 MAX_TORQUE_CONSTANT = 10.0  # Nm/A; beyond it a motor of this size is a mistyped unit
 MAX_NETWORKS = 32  # building and simulating one takes as long as a whole run of fig6
@@ -81,6 +81,17 @@ class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 f"drive: {voltage_v} V, {constant} Nm/A and {encoder.lines} lines make {counts_per_s:.3g} counts/s"
                 f" without load; at most {MAX_COUNTS_PER_S:.0f} (the LM629 itself follows 1000000)"
             )
+
+
+class ControlNoise(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The paper's "noise in control signal" (section V-A): bounds of what is added to the commands sent.
+
+    0 and 0 is none. Every control period each robot's v and w get a draw of their own, uniform within the
+    bound: the paper gives neither bounds nor distribution.
+    """
+
+    v_m_s: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
+    w_rad_s: Annotated[float, Meta(ge=0.0, le=40.0)] = 0.0
 
 
 class Network(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

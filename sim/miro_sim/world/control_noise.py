@@ -15,7 +15,7 @@ from __future__ import annotations
 from miro_exact.rng import Stream
 from miro_host.pilot import Command
 from miro_host.wheels import Wheels
-from miro_sim.scenario.radio_keys import ControlNoise
+from miro_sim.scenario.keys import ControlNoise
 
 
 class NoisyCommands:

@@ -16,9 +16,9 @@ from miro_protocol.transmission import DOWN, UP, Transmission, check_bad_stop, o
 from miro_robot.image import Image
 from miro_robot.mcs51.execute import STOPPED
 from miro_sim.periods import RobotPeriod
-from miro_sim.radio import Downlink, Uplink
+from miro_sim.radio.downlink import Downlink
+from miro_sim.radio.uplink import Uplink
 from miro_sim.scenario import keys as sc
-from miro_sim.scenario.build import radio_for
 from miro_sim.world.actions import SETTLE_TICKS, Actions
 from miro_sim.world.control_noise import NoisyCommands
 from miro_sim.world.events import Event, HostLog, of_action
@@ -70,7 +70,7 @@ class Network:
         self.spec = spec
         self.index = index
         self.compute_ticks = ticks(scenario.host.compute_s)
-        self.keyup_ticks = ticks(spec.radio.keyup_s) if spec.radio.carrier == "keyed" else 0
+        self.keyup_ticks = spec.radio.keyup_ticks if spec.radio.carrier == "keyed" else 0
         self.robots = [
             Robot(robot, scenario, index, spec.robots, seed, image)
             for robot in sorted(spec.robot, key=lambda robot: robot.slot)
@@ -83,7 +83,7 @@ class Network:
             for robot in self.robots
         ]
         self.station = Station(spec.robots, telemetry=spec.radio.telemetry)
-        radio = radio_for(spec.radio)
+        radio = spec.radio
         self.downlink = Downlink(radio, seed, f"net{index}/down")
         self.uplink = Uplink(radio, seed, f"net{index}/up")
         for robot in self.robots:

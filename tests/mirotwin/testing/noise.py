@@ -9,13 +9,13 @@ No frame may be accepted, and the firmware's counters must be the Python decoder
 import sys
 import time
 
-from miro_sim.radio import RadioParams
+from miro_sim.radio.params import Radio
 from mirotwin.testing.bench import MS, Bench
 
 
 def listen(seconds: int, n: int, seed: int = 0) -> Bench:
     """A robot that heard noise for so long."""
-    bench = Bench(n, 0, RadioParams(), seed)
+    bench = Bench(n, 0, Radio(bit_error_rate=0.0), seed)
     bench.wait(1000 * seconds * MS)
     return bench
 

@@ -8,14 +8,14 @@ from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame
 from miro_robot.firmware import image_path
 from miro_robot.image import Symbol, Symbols, load_hex
 from miro_robot.mcs51.line import Line
-from miro_sim.radio import RadioParams
+from miro_sim.radio.params import Radio
 from mirotwin.testing.bench import MS, Bench, LinkFailure
 from mirotwin.testing.noisy_wire import NoisyWire, Trouble
 from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.testing.noise import listen
 
 __all__ = ["mirotwin"]
-NOISY = RadioParams.of(bit_error_rate=3e-3)
+NOISY = Radio(bit_error_rate=3e-3)
 
 
 def team(seq: int, n: int = 3, ask: bool = False) -> TeamFrame:
@@ -146,8 +146,8 @@ def test_replay_of_what_the_robot_heard_counts_the_same(mirotwin, tmp_path, seed
     ("arguments", "said"),
     [
         ({"n": 3, "slot": 3}, "slot 3 does not exist"),
-        ({"radio": RadioParams(jitter_ticks=2500)}, "jitter and offsets"),
-        ({"radio": RadioParams(baud_offset_ppm=100)}, "jitter and offsets"),
+        ({"radio": Radio(jitter_s=0.001)}, "jitter and offsets"),
+        ({"radio": Radio(baud_offset_ppm=100)}, "jitter and offsets"),
     ],
 )
 def test_a_bench_that_could_not_keep_its_promises_is_refused(arguments, said):

@@ -17,7 +17,7 @@ from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import TeamFrame
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim.radio import RadioParams
+from miro_sim.radio.params import Radio
 from mirotwin.testing.bench import Bench, LinkFailure
 from mirotwin.testing.bench_case import case_of_bench
 from mirotwin.testing.machine import LinkMachine
@@ -47,7 +47,7 @@ def test_every_radio_that_is_drawn_can_be_put_on_the_bench(radio, seed, n):
 
 @pytest.mark.parametrize("wanted", ["bit errors", "squelch", "latency", "always on"])
 def test_profiles_of_every_kind_are_drawn(wanted):
-    def shows(radio: RadioParams) -> bool:
+    def shows(radio: Radio) -> bool:
         return {
             "bit errors": radio.error_threshold > 0,
             "squelch": not radio.squelch,
@@ -76,7 +76,7 @@ def broken(tmp_path_factory):
 def test_a_planted_fault_is_found_and_shrunk_to_a_stream_file_that_shows_it_again(mirotwin, broken, tmp_path):
     class Planted(LinkMachine):
         image = broken
-        profiles = st.just(RadioParams.ideal())
+        profiles = st.just(Radio.ideal())
         stream_file = tmp_path / "failure.stream"
 
     with pytest.raises(LinkFailure, match=r"undefined opcode A5 .* in _telemetry_answer") as caught:

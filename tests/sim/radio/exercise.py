@@ -5,30 +5,33 @@ import hashlib
 from miro_exact.rng import Stream
 from miro_exact.state import snapshot
 from miro_robot.mcs51.line import Line
-from miro_sim.radio import ChainParams, Downlink, RadioParams, SlicerParams, Uplink
+from miro_sim.radio.downlink import Downlink
+from miro_sim.radio.params import Bursts, Dropouts, Radio, SlicerParams
+from miro_sim.radio.uplink import Uplink
 from tests.naive.radio import wire_bits
+from tests.sim.radio.radios import clean
 
 ROBOTS = 3
 PERIOD = 800_800
 
 
-PLAIN = RadioParams.of(latency_s=0.0001, bit_error_rate=1e-2)
-EVERYTHING = RadioParams.of(
+PLAIN = clean(latency_s=0.0001, bit_error_rate=1e-2)
+EVERYTHING = clean(
     latency_s=0.0001,
     jitter_s=0.001,
     eb_n0_db=9.0,
     baud_offset_ppm=777,
     crystal_offset_ppm=-51,
-    bursts=ChainParams.of(1e-3, 1e-2),
-    dropouts=ChainParams.lasting(0.3, 0.02),
-    slicer=SlicerParams.of(settle_s=0.004, offset=-0.5, eb_n0_db=9.0),
+    bursts=Bursts(good_to_bad=1e-3, bad_to_good=1e-2),
+    dropouts=Dropouts(every_s=0.3, length_s=0.02),
+    slicer=SlicerParams(settle_s=0.004, offset=-0.5),
     false_starts_hz=100.0,
     lost_character_rate=0.02,
     lost_frames=0.1,
 )
 
 
-def exercise(seed: int, radio: RadioParams) -> str:
+def exercise(seed: int, radio: Radio) -> str:
     """Everything that three robots and their PC hear, with a neighbour on the frequency."""
     down, up = Downlink(radio, seed, "down"), Uplink(radio, seed, "up")
     neighbour = Downlink(EVERYTHING, seed, "neighbour")

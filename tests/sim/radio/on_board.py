@@ -7,7 +7,8 @@ from typing import Any
 
 from miro_exact.rng import Stream
 from miro_robot.mcs51.cpu import Cpu
-from miro_sim.radio import Downlink, RadioParams
+from miro_sim.radio.downlink import Downlink
+from miro_sim.radio.params import Radio
 from tests.robot.firmware.rig import BOOTED, MS, Rig
 from tests.robot.mcs51.rig import cpu_with
 from tests.robot.mcs51.test_uart import RECEIVER, TIMER2_9600
@@ -37,7 +38,7 @@ def slow_receiver(tens: int) -> Cpu:
     return cpu_with("MOV R0,#30h\n" + TIMER2_9600 + "MOV SCON,#50h\n" + SLOW.format(tens=tens))
 
 
-def hears(cpu: Cpu, radio: RadioParams, seed: int, sent: Iterable[tuple[Any, ...]], until: int) -> Cpu:
+def hears(cpu: Cpu, radio: Radio, seed: int, sent: Iterable[tuple[Any, ...]], until: int) -> Cpu:
     """The CPU after listening to these transmissions up to a tick; stream names begin with net/robot0."""
     downlink = Downlink(radio, seed, "net")
     downlink.listen(0, cpu.rxd)
@@ -53,7 +54,7 @@ def stored(cpu: Cpu) -> bytes:
     return bytes(cpu.peek_iram(place) for place in range(0x30, cpu.peek_iram(0)))
 
 
-def seed_where(radio: RadioParams, start: int, bits: int, wanted: Callable[[list[int]], bool]) -> int:
+def seed_where(radio: Radio, start: int, bits: int, wanted: Callable[[list[int]], bool]) -> int:
     """The first seed whose errors in a transmission of so many bits from tick `start` on are as wanted."""
     for seed in range(1_000_000):
         errors = Stream(seed, "net/robot0/errors")
@@ -66,7 +67,7 @@ def seed_where(radio: RadioParams, start: int, bits: int, wanted: Callable[[list
 class RadioRig(Rig):
     """A robot whose RXD hangs on a downlink, `self.downlink`; send there, then `run_to`."""
 
-    def __init__(self, radio: RadioParams, seed: int = 0, n: int = 3) -> None:
+    def __init__(self, radio: Radio, seed: int = 0, n: int = 3) -> None:
         super().__init__(n=n, boot=False)
         self.downlink = Downlink(radio, seed, "net")
         self.downlink.listen(0, self.cpu.rxd)

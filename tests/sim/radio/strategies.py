@@ -3,43 +3,53 @@ pieces."""
 
 from hypothesis import strategies as st
 
-from miro_sim.radio import ChainParams, RadioParams, SlicerParams
+from miro_sim.radio.params import Bursts, Dropouts, SlicerParams
+from tests.sim.radio.radios import clean
 
-rates = st.sampled_from([0, 2**32 // 100, 2**32 // 4, 2**31, 2**32])
+rates = st.sampled_from([0.0, 0.01, 0.25, 0.5])
+chances = st.sampled_from([0.0, 0.0, 0.2, 1.0])
 offsets = st.sampled_from([0, 0, 1, -1, 173, -10_000, 50_000, -50_000])
 
 
 @st.composite
-def chains(draw):
+def bursts(draw):
     """Chains of short and long runs, also those that never change and those that always do."""
-    enter = draw(st.sampled_from([0, 1, 2**32 // 300, 2**32 // 7, 2**31, 2**32]))
-    leave = draw(st.sampled_from([0, 1, 2**32 // 50, 2**32 // 3, 2**31, 2**32]))
-    return ChainParams(enter=enter, leave=min(leave, 2**32 - enter))
+    enter = draw(st.sampled_from([0.0, 2**-32, 1 / 300, 1 / 7, 0.5, 1.0]))
+    leave = draw(st.sampled_from([0.0, 2**-32, 0.02, 1 / 3, 0.5, 1.0]))
+    leave = min(leave, 1.0 - enter)
+    return Bursts(good_to_bad=enter, bad_to_good=leave, bit_error_rate=draw(rates))
 
 
+dropouts = st.builds(
+    Dropouts,
+    every_s=st.sampled_from([0.00025, 0.001, 0.3, 1e6]),
+    length_s=st.sampled_from([0.00025, 0.001, 0.02, 1e6]),
+)
 slicers = st.builds(
-    SlicerParams.of,
+    SlicerParams,
     settle_s=st.sampled_from([0.000105, 0.004, 0.3]),
     offset=st.sampled_from([-1.0, -0.5, 0.0, 0.3, 1.0]),
-    eb_n0_db=st.sampled_from([-20.0, 0.0, 9.0, 13.35, 60.0]),
+)
+signals_db = st.sampled_from([-20.0, 0.0, 9.0, 13.35, 60.0])
+errors = st.one_of(
+    st.fixed_dictionaries({"bit_error_rate": rates}),
+    st.fixed_dictionaries({"eb_n0_db": signals_db, "slicer": st.none() | slicers}),
 )
 params = st.builds(
-    RadioParams,
+    lambda errors, **keys: clean(**errors, **keys),
+    errors,
     latency_ticks=st.sampled_from([0, 1, 2499, 2500, 7777]),
     jitter_ticks=st.sampled_from([0, 0, 1, 2500, 60_000]),
-    error_threshold=rates,
     carrier=st.sampled_from(["keyed", "on"]),
     keyup_ticks=st.sampled_from([0, 1, 2500, 24_000]),
     squelch=st.booleans(),
     baud_offset_ppm=offsets,
     crystal_offset_ppm=offsets,
-    bursts=st.none() | chains(),
-    burst_threshold=rates,
-    dropouts=st.none() | chains(),
-    slicer=st.none() | slicers,
-    false_start_threshold=rates,
-    lost_threshold=st.sampled_from([0, 0, 2**32 // 5, 2**32]),
-    lost_frame_threshold=st.sampled_from([0, 0, 2**31, 2**32]),
+    bursts=st.none() | bursts(),
+    dropouts=st.none() | dropouts,
+    false_starts_hz=st.sampled_from([0.0, 96.0, 2400.0, 9600.0]),
+    lost_character_rate=chances,
+    lost_frames=chances,
 )
 seeds = st.integers(0, 2**63 - 1)
 

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_sim.radio import ChainParams
 from miro_sim.radio.chain import Chain
+from miro_sim.radio.params import Bursts
 from miro_sim.scenario import profiles
 from miro_sim.scenario.file import load
 from tests.naive import radio as naive
-from tests.sim.radio.strategies import chains, seeds
+from tests.sim.radio.strategies import bursts, dropouts, seeds
 
 SECONDS = 100
 SLOTS = 9600 * SECONDS
@@ -28,7 +28,7 @@ RAYLEIGH = [
 
 
 @settings(deadline=None)
-@given(chains(), seeds, st.lists(st.integers(0, 1023), min_size=1, max_size=60))
+@given(bursts() | dropouts, seeds, st.lists(st.integers(0, 1023), min_size=1, max_size=60))
 def test_any_slot_in_any_order_is_as_the_naive_chain_has_it_step_by_step(params, seed, slots):
     states = naive.chain_states(params, seed, "fade", 1024)
     chain = Chain(params, seed, "fade")
@@ -50,7 +50,7 @@ def test_a_fading_profile_is_as_often_and_as_long_below_as_rayleighs_crossings(
     """Within four standard deviations of the chain's figures, which are the table's but for its rounding."""
     bursts = profiles.keys_of(name)["bursts"]
     enter, leave = bursts["good_to_bad"], bursts["bad_to_good"]
-    chain = Chain(ChainParams.of(enter, leave), 3, name)
+    chain = Chain(Bursts(good_to_bad=enter, bad_to_good=leave), 3, name)
     states = [chain.bad(slot) for slot in range(SLOTS)]
     fades = runs_of(states)
     share = enter / (enter + leave)
@@ -92,4 +92,5 @@ def test_at_the_speed_of_the_figures_a_mean_fade_stops_a_robot_and_at_the_larges
 
 
 def test_a_chain_shows_what_it_is():
-    assert repr(Chain(ChainParams(enter=5, leave=7), 0, "a")) == "Chain('a', enter=5, leave=7)"
+    never = Bursts(good_to_bad=0.0, bad_to_good=1.0)
+    assert repr(Chain(never, 0, "a")) == f"Chain('a', enter=0, leave={2**32})"

@@ -6,8 +6,10 @@ from itertools import pairwise
 import pytest
 
 from miro_robot.mcs51.line import Line
-from miro_sim.radio import ChainParams, Downlink, RadioParams
+from miro_sim.radio.downlink import Downlink
+from miro_sim.radio.params import Bursts, Dropouts
 from tests.naive import radio as naive
+from tests.sim.radio.radios import ALWAYS, clean
 
 DATA = bytes(i * 73 & 255 for i in range(25))
 PERIOD = 700_000  # of frames that take 625 000 ticks
@@ -37,7 +39,7 @@ def wrong(levels):
 @pytest.mark.parametrize(("eb_n0_db", "rate"), [(8.93, 1e-2), (10.94, 1e-3), (12.31, 1e-4)])
 def test_the_errors_at_a_signal_to_noise_ratio_are_as_many_as_the_formula_says(eb_n0_db, rate):
     """250 000 bits each, within four standard deviations of a binomial."""
-    radio = RadioParams.of(eb_n0_db=eb_n0_db, carrier="on")
+    radio = clean(eb_n0_db=eb_n0_db, carrier="on")
     count = sum(len(wrong(levels)) for levels in heard(radio, 11, 1000))
     expected = 0.5 * math.exp(-(10 ** (eb_n0_db / 10)) / 2)
     assert abs(count - 250_000 * expected) < 4 * (250_000 * expected) ** 0.5
@@ -59,14 +61,14 @@ def arrivals(radio, seed=1, frames=200, period=800_800):
 
 
 def test_jitter_spreads_evenly_over_latency_and_what_is_on_top():
-    late = arrivals(RadioParams(latency_ticks=1000, jitter_ticks=24_000, squelch=True))
+    late = arrivals(clean(latency_ticks=1000, jitter_ticks=24_000, squelch=True))
     assert all(1000 <= tick <= 25_000 for tick in late)
     assert min(late) < 2500 < 23_500 < max(late)
     assert sum(late) / len(late) == pytest.approx(13_000, abs=4 * 24_000 / (12 * len(late)) ** 0.5)
 
 
 def test_a_late_transmission_holds_up_the_next_one_but_never_overlaps_it():
-    radio = RadioParams(jitter_ticks=100_000, squelch=True, keyup_ticks=0)
+    radio = clean(jitter_ticks=100_000, squelch=True, keyup_ticks=0)
     downlink, up = Downlink(radio, 2, "net"), Line()
     downlink.listen(0, up)
     for number in range(40):
@@ -89,7 +91,7 @@ def test_a_late_transmission_holds_up_the_next_one_but_never_overlaps_it():
 )
 def test_a_fast_pc_makes_short_bits_and_a_fast_robot_finds_them_long(baud, crystal, last_edge):
     """22 500 ticks to the stop bit, divided by 1 + baud, times 1 + crystal, rounded down once."""
-    radio = RadioParams(baud_offset_ppm=baud, crystal_offset_ppm=crystal, squelch=True, keyup_ticks=0)
+    radio = clean(baud_offset_ppm=baud, crystal_offset_ppm=crystal, squelch=True, keyup_ticks=0)
     downlink, line = Downlink(radio, 0, "net"), Line()
     downlink.listen(0, line)
     downlink.send(100_000, b"\x00")
@@ -99,7 +101,7 @@ def test_a_fast_pc_makes_short_bits_and_a_fast_robot_finds_them_long(baud, cryst
 
 def test_fractions_of_a_tick_do_not_add_up():
     """At 9600 baud + 3 ppm a bit is 2499.9925.. ticks; bit 9990 of a long transmission is one rounding off."""
-    radio = RadioParams(baud_offset_ppm=3, squelch=True, keyup_ticks=0)
+    radio = clean(baud_offset_ppm=3, squelch=True, keyup_ticks=0)
     downlink, line = Downlink(radio, 0, "net"), Line()
     downlink.listen(0, line)
     downlink.send(0, b"\xff" * 1000)
@@ -108,20 +110,18 @@ def test_fractions_of_a_tick_do_not_add_up():
 
 
 def test_a_dropped_carrier_is_noise_or_mark_and_comes_back():
-    always = ChainParams(enter=2**32, leave=0)
-    assert heard(RadioParams(dropouts=always, squelch=True)) == [[1] * 250]
-    noise = heard(RadioParams(dropouts=always), frames=20)
+    always = ALWAYS
+    assert heard(clean(dropouts=always, squelch=True)) == [[1] * 250]
+    noise = heard(clean(dropouts=always), frames=20)
     assert sum(map(sum, noise)) == pytest.approx(2500, abs=4 * 35)
-    now_and_then = ChainParams.lasting(0.05, 0.01)
-    damaged = [
-        len(wrong(levels)) for levels in heard(RadioParams(dropouts=now_and_then, squelch=True), 3, 40)
-    ]
+    now_and_then = Dropouts(every_s=0.05, length_s=0.01)
+    damaged = [len(wrong(levels)) for levels in heard(clean(dropouts=now_and_then, squelch=True), 3, 40)]
     assert 0 in damaged
     assert max(damaged) > 20
 
 
 def test_errors_come_in_bursts_and_are_few_in_between():
-    radio = RadioParams(bursts=ChainParams.of(2e-3, 1e-2), burst_threshold=2**31, carrier="on")
+    radio = clean(bursts=Bursts(good_to_bad=2e-3, bad_to_good=1e-2), carrier="on")
     places = [
         250 * frame + place for frame, levels in enumerate(heard(radio, 4, 80)) for place in wrong(levels)
     ]
@@ -132,7 +132,7 @@ def test_errors_come_in_bursts_and_are_few_in_between():
 
 
 def test_an_idle_carrier_has_as_many_false_starts_as_asked_for():
-    radio = RadioParams.of(false_starts_hz=50.0, carrier="on")
+    radio = clean(false_starts_hz=50.0, carrier="on")
     downlink, line = Downlink(radio, 6, "net"), Line()
     downlink.listen(0, line)
     spaces = 0
@@ -146,7 +146,7 @@ def test_an_idle_carrier_has_as_many_false_starts_as_asked_for():
 
 
 def test_a_lost_character_is_mark_all_along_and_its_neighbours_are_whole():
-    radio = RadioParams.of(lost_character_rate=0.1, squelch=True)
+    radio = clean(lost_character_rate=0.1, squelch=True)
     lost = 0
     for levels in heard(radio, 7, 40):
         for character in range(25):
@@ -158,7 +158,7 @@ def test_a_lost_character_is_mark_all_along_and_its_neighbours_are_whole():
 
 
 def collided(others_start, mine=b"\x0f" * 20, other=b"\xf0" * 20, radio=None):
-    radio = radio or RadioParams(squelch=True)
+    radio = radio or clean(squelch=True)
     one, two = Downlink(radio, 8, "one"), Downlink(radio, 8, "two")
     lines = Line(), Line()
     for link, line in zip((one, two), lines, strict=True):
@@ -190,7 +190,7 @@ def test_two_transmitters_that_say_the_same_do_not_disturb_each_other():
 
 
 def test_where_two_differ_the_level_is_a_fair_coin():
-    radio = RadioParams(squelch=True, keyup_ticks=0)
+    radio = clean(squelch=True, keyup_ticks=0)
     one, two, line = Downlink(radio, 9, "one"), Downlink(radio, 9, "two"), Line()
     one.listen(0, line)
     one.overhear(two)
@@ -202,7 +202,7 @@ def test_where_two_differ_the_level_is_a_fair_coin():
 
 
 def test_a_neighbour_must_be_announced_before_its_carrier_comes_up_here():
-    one, two = Downlink(RadioParams(), 0, "one"), Downlink(RadioParams(), 0, "two")
+    one, two = Downlink(clean(), 0, "one"), Downlink(clean(), 0, "two")
     one.overhear(two)
     one.settle(500_000)
     with pytest.raises(ValueError, match=r"two: the carrier for tick 510000 .* settled up to 500000"):
@@ -213,30 +213,30 @@ def test_a_neighbour_must_be_announced_before_its_carrier_comes_up_here():
 
 def test_lost_frames_are_as_many_as_asked_for_and_the_others_are_whole():
     quiet = [1] * len(BITS)
-    levels = heard(RadioParams.of(lost_frames=0.3, squelch=True), 3, 1000)
+    levels = heard(clean(lost_frames=0.3, squelch=True), 3, 1000)
     assert all(frame in (BITS, quiet) for frame in levels)
     assert abs(levels.count(quiet) / 1000 - 0.3) < 4 * (0.3 * 0.7 / 1000) ** 0.5
-    assert heard(RadioParams.of(lost_frames=1.0, squelch=True), 3, 5) == [quiet] * 5
+    assert heard(clean(lost_frames=1.0, squelch=True), 3, 5) == [quiet] * 5
 
 
 OTHERS = {
-    "bursts": {"bursts": ChainParams.of(1e-3, 1e-3), "burst_threshold": 0},
-    "dropouts": {"dropouts": ChainParams.of(0.0, 1e-3)},
-    "false starts": {"false_start_threshold": 2**30},
-    "lost": {"lost_threshold": 1},
-    "lost frames": {"lost_frame_threshold": 1},
+    "bursts": {"bursts": Bursts(good_to_bad=1e-3, bad_to_good=1e-3, bit_error_rate=0.0)},
+    "dropouts": {"dropouts": Dropouts(every_s=1e6, length_s=0.1)},
+    "false starts": {"false_starts_hz": 2400.0},
+    "lost": {"lost_character_rate": 2**-32},
+    "lost frames": {"lost_frames": 2**-32},
     "jitter": {"jitter_ticks": 0},
 }
 
 
 @pytest.mark.parametrize("extra", OTHERS.values(), ids=OTHERS)
 def test_a_disturbance_that_does_not_strike_leaves_all_other_draws_as_they_are(extra):
-    plain = {"error_threshold": 2**32 // 50, "carrier": "on", "keyup_ticks": 24_000}
+    plain = {"bit_error_rate": 0.02, "carrier": "on", "keyup_ticks": 24_000}
     quiet = {**plain, **extra}
-    if "burst_threshold" in extra:  # without an error of its own a burst only takes errors away
-        with_bursts = heard(RadioParams(**quiet), 10, 20)
+    if "bursts" in extra:  # without an error of its own a burst only takes errors away
+        with_bursts = heard(clean(**quiet), 10, 20)
         assert {(f, p) for f, levels in enumerate(with_bursts) for p in wrong(levels)} <= {
-            (f, p) for f, levels in enumerate(heard(RadioParams(**plain), 10, 20)) for p in wrong(levels)
+            (f, p) for f, levels in enumerate(heard(clean(**plain), 10, 20)) for p in wrong(levels)
         }
     else:
-        assert heard(RadioParams(**quiet), 10, 20) == heard(RadioParams(**plain), 10, 20)
+        assert heard(clean(**quiet), 10, 20) == heard(clean(**plain), 10, 20)

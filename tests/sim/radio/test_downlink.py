@@ -11,8 +11,9 @@ from miro_exact.state import restore, snapshot
 from miro_protocol.line import LineReceiver
 from miro_protocol.transmission import Transmission
 from miro_robot.mcs51.line import Line
-from miro_sim.radio import Downlink, RadioParams
+from miro_sim.radio.downlink import Downlink
 from tests.naive import radio as naive
+from tests.sim.radio.radios import clean
 from tests.sim.radio.strategies import cuts, flawed, neighbours, params, seeds
 
 UNTIL = 1_500_000
@@ -101,11 +102,11 @@ def test_a_snapshot_at_any_tick_carries_the_bytes_in_the_air(radio, seed, sent, 
 
 def test_a_snapshot_does_not_fit_a_network_of_another_size():
     with pytest.raises(ValueError, match="bytes"):
-        restore(band(RadioParams())[0], snapshot(band(RadioParams(), robots=(0, 1))[0]))
+        restore(band(clean())[0], snapshot(band(clean(), robots=(0, 1))[0]))
 
 
 def test_a_keyed_carrier_is_noise_then_mark_then_data_then_noise():
-    radio = RadioParams(latency_ticks=100)
+    radio = clean(latency_ticks=100)
     downlink, lines = band(radio, seed=4)
     downlink.send(100_000, b"\x55")
     downlink.settle(250_000)
@@ -117,7 +118,7 @@ def test_a_keyed_carrier_is_noise_then_mark_then_data_then_noise():
     assert [tick for tick, _ in edges if tick > 125_100]
 
 
-@pytest.mark.parametrize("radio", [RadioParams(squelch=True), RadioParams(carrier="on")])
+@pytest.mark.parametrize("radio", [clean(squelch=True), clean(carrier="on")])
 def test_a_squelched_or_an_idle_carrier_is_mark(radio):
     downlink, lines = band(radio)
     downlink.settle(UNTIL)
@@ -125,7 +126,7 @@ def test_a_squelched_or_an_idle_carrier_is_mark(radio):
 
 
 def test_errors_hit_each_robot_on_its_own_and_as_often_as_the_rate_says():
-    radio = RadioParams.of(bit_error_rate=1e-2, carrier="on")
+    radio = clean(bit_error_rate=1e-2, carrier="on")
     downlink, lines = band(radio, seed=9, robots=(0, 1, 2))
     for start in range(0, 400 * 25_000 * 25, 25_000 * 25):
         downlink.send(start, bytes(25))
@@ -140,7 +141,7 @@ def test_errors_hit_each_robot_on_its_own_and_as_often_as_the_rate_says():
 def test_latency_moves_the_errors_with_the_bits():
     heard = []
     for latency in (0, 1234):
-        radio = RadioParams(latency_ticks=latency, error_threshold=2**32 // 20, squelch=True)
+        radio = clean(latency_ticks=latency, bit_error_rate=0.05, squelch=True)
         downlink, lines = band(radio, seed=5)
         downlink.send(50_000, bytes(range(20)))
         downlink.settle(700_000)
@@ -149,7 +150,7 @@ def test_latency_moves_the_errors_with_the_bits():
 
 
 def test_noise_is_balanced():
-    downlink, lines = band(RadioParams(), seed=8)
+    downlink, lines = band(clean(), seed=8)
     marks = 0
     for until in range(2_500_000, 25_000_001, 2_500_000):
         downlink.settle(until)
@@ -159,7 +160,7 @@ def test_noise_is_balanced():
 
 
 def test_a_transmission_must_be_announced_before_its_carrier_comes_up():
-    downlink, _ = band(RadioParams(keyup_ticks=1000, latency_ticks=10))
+    downlink, _ = band(clean(keyup_ticks=1000, latency_ticks=10))
     downlink.settle(50_010)
     with pytest.raises(ValueError, match=r"tick 50999 reaches the robots at tick 50009.*settled up to 50010"):
         downlink.send(50_999, b"x")
@@ -167,7 +168,7 @@ def test_a_transmission_must_be_announced_before_its_carrier_comes_up():
 
 
 def test_a_carrier_that_is_always_on_needs_no_announcement_before_the_start_bit():
-    downlink, _ = band(RadioParams(carrier="on"))
+    downlink, _ = band(clean(carrier="on"))
     downlink.settle(50_000)
     downlink.send(50_000, b"x")
     with pytest.raises(ValueError, match="busy until 75000"):
@@ -177,11 +178,11 @@ def test_a_carrier_that_is_always_on_needs_no_announcement_before_the_start_bit(
 
 def test_an_empty_transmission_is_refused():
     with pytest.raises(ValueError, match="at least one byte"):
-        band(RadioParams())[0].send(100_000, b"")
+        band(clean())[0].send(100_000, b"")
 
 
 def test_a_robot_joins_once_and_before_the_start():
-    downlink, _ = band(RadioParams())
+    downlink, _ = band(clean())
     with pytest.raises(ValueError, match="robot 0"):
         downlink.listen(0, Line())
     downlink.settle(1)
@@ -192,18 +193,18 @@ def test_a_robot_joins_once_and_before_the_start():
 def test_a_wire_that_was_open_is_settled_by_the_downlink_only():
     line = Line()
     line.settled_tick = NEVER_TICK
-    Downlink(RadioParams(), 0, "net").listen(0, line)
+    Downlink(clean(), 0, "net").listen(0, line)
     assert line.settled_tick == 0
 
 
 def test_a_downlink_shows_what_it_is_about_to_send():
-    downlink, _ = band(RadioParams())
+    downlink, _ = band(clean())
     downlink.send(100_000, b"\x55\xff")
     assert repr(downlink) == "Downlink('net', robots [0], settled_tick=0, [(100000, '55 ff')])"
 
 
 def test_bad_stop_bits_are_saved():
-    one, other = band(RadioParams())[0], band(RadioParams())[0]
+    one, other = band(clean())[0], band(clean())[0]
     one.send(100_000, b"\x55")
     one.send(200_000, b"ab", (1,))
     restore(other, snapshot(one))
@@ -212,7 +213,7 @@ def test_bad_stop_bits_are_saved():
 
 
 def test_a_bad_stop_bit_is_space_for_three_quarters_of_a_bit():
-    downlink, lines = band(RadioParams(carrier="on"))
+    downlink, lines = band(clean(carrier="on"))
     downlink.send(100_000, b"\xff\xff", (0,))
     downlink.settle(200_000)
     bad = 100_000 + 9 * 2500
@@ -225,7 +226,7 @@ def test_a_bad_stop_bit_is_space_for_three_quarters_of_a_bit():
 @settings(deadline=None)
 @given(flawed())
 def test_a_plain_uart_hears_the_characters_and_which_stop_bits_were_bad(sent):
-    downlink, lines = band(RadioParams(carrier="on"))
+    downlink, lines = band(clean(carrier="on"))
     for one in sent:
         downlink.send(*one)
     downlink.settle(UNTIL)
@@ -236,12 +237,12 @@ def test_a_plain_uart_hears_the_characters_and_which_stop_bits_were_bad(sent):
 @pytest.mark.parametrize("bad_stop", [(2,), (-1,), (1, 1), (1, 0)])
 def test_a_bad_stop_bit_of_no_character_is_refused(bad_stop):
     with pytest.raises(ValueError, match="must be ascending indices of 2 characters"):
-        band(RadioParams())[0].send(100_000, b"ab", bad_stop)
+        band(clean())[0].send(100_000, b"ab", bad_stop)
 
 
 @pytest.mark.parametrize("stops", [b"\1", b"\1\0\0"])
 def test_stops_of_another_length_are_no_state(stops):
-    downlink = band(RadioParams())[0]
+    downlink = band(clean())[0]
     downlink.send(100_000, b"ab", (1,))
     saved = snapshot(downlink)
     sent = struct.pack("<I", 4) + b"ab\0\1"

@@ -8,17 +8,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_robot.mcs51.line import Line
-from miro_sim.radio import Downlink, RadioParams, Uplink
+from miro_sim.radio.downlink import Downlink
+from miro_sim.radio.params import Radio
+from miro_sim.radio.uplink import Uplink
 from tests import children
 from tests.naive import radio as naive
 from tests.sim.radio import exercise
+from tests.sim.radio.radios import clean
 from tests.sim.radio.strategies import seeds, transmissions
 
 
 def echo(params, seed, sent, until):
     """The symbols that come back when a robot's RXD is wired to its TXD."""
     line = Line()
-    down, up = Downlink(params, seed, "down"), Uplink(RadioParams.ideal(), seed, "up")
+    down, up = Downlink(params, seed, "down"), Uplink(Radio.ideal(), seed, "up")
     down.listen(0, line)
     up.listen(line)
     for start, data in sent:
@@ -30,7 +33,7 @@ def echo(params, seed, sent, until):
 @settings(deadline=None)
 @given(seeds, transmissions(), st.integers(0, 30_000))
 def test_a_wire_down_and_up_is_the_identity_on_bytes_and_their_ticks(seed, sent, latency):
-    params = RadioParams(squelch=True, latency_ticks=latency)
+    params = clean(squelch=True, latency_ticks=latency)
     expected = [
         (byte, True, start + latency + 25_000 * i) for start, data in sent for i, byte in enumerate(data)
     ]
@@ -44,12 +47,12 @@ def test_a_character_of_marks_brings_the_uart_into_step_after_noise(seed, data):
     start = 200_000
     sent = [(start, b"\x55\x55\xff" + data)]
     until = start + 25_000 * (3 + len(data))
-    symbols = echo(RadioParams(), seed, sent, until)
+    symbols = echo(clean(), seed, sent, until)
     assert bytes(byte for byte, _, tick in symbols if tick >= start + 75_000) == data
 
 
 def test_the_measured_bit_error_rate_is_the_one_asked_for():
-    params = RadioParams.of(bit_error_rate=1e-2, carrier="on")
+    params = clean(bit_error_rate=1e-2, carrier="on")
     line = Line()
     downlink = Downlink(params, 21, "down")
     downlink.listen(0, line)

@@ -6,19 +6,24 @@ from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot, values
 from miro_robot.mcs51.line import Line
-from miro_sim.radio import Downlink, RadioParams, SlicerParams
-from miro_sim.radio.probability import fsk_threshold
+from miro_sim.radio.downlink import Downlink
+from miro_sim.radio.params import SlicerParams
+from miro_sim.radio.probability import fsk_threshold, margin_table
 from miro_sim.radio.slicer import Slicer
 from tests.naive import radio as naive
-from tests.sim.radio.strategies import slicers
+from tests.sim.radio.radios import clean
+from tests.sim.radio.strategies import signals_db, slicers
 
 BIT = 2500
-TYPICAL = SlicerParams.of(settle_s=0.004, offset=0.0, eb_n0_db=11.0)
+EB_N0_DB = 11.0
+TYPICAL = SlicerParams(settle_s=0.004, offset=0.0)
 
 
-@given(slicers, st.lists(st.tuples(st.integers(0, 9000), st.sampled_from([-1, 0, 1])), max_size=40))
-def test_threshold_and_chances_are_those_of_the_naive_twin(params, steps):
-    slicer, twin = Slicer(params), naive.Slicer(params)
+@given(
+    slicers, signals_db, st.lists(st.tuples(st.integers(0, 9000), st.sampled_from([-1, 0, 1])), max_size=40)
+)
+def test_threshold_and_chances_are_those_of_the_naive_twin(params, eb_n0_db, steps):
+    slicer, twin = Slicer(params, eb_n0_db), naive.Slicer(params, eb_n0_db)
     tick = 0
     for step, signal in steps:
         tick += step
@@ -29,7 +34,7 @@ def test_threshold_and_chances_are_those_of_the_naive_twin(params, steps):
 
 
 def fed(params, *signals):
-    slicer = Slicer(params)
+    slicer = Slicer(params, EB_N0_DB)
     for number, signal in enumerate(signals):
         slicer.hear(number * BIT, signal)
     return slicer
@@ -45,7 +50,7 @@ def test_a_run_of_marks_makes_marks_dear_and_spaces_cheap():
     """38.4 bits are one time constant: 1 - 1/e of the way, in steps of a bit a little more."""
     slicer = fed(TYPICAL, *[1] * 39)
     assert slicer.mean / 65536 == pytest.approx(0.632, abs=0.01)
-    assert slicer.threshold(0) < TYPICAL.thresholds[256] < slicer.threshold(1)
+    assert slicer.threshold(0) < margin_table(EB_N0_DB)[256] < slicer.threshold(1)
 
 
 def test_a_line_that_idles_for_long_is_noise():
@@ -54,14 +59,14 @@ def test_a_line_that_idles_for_long_is_noise():
 
 
 def test_an_offset_of_the_carriers_is_forgotten_after_some_time_constants():
-    params = SlicerParams.of(settle_s=0.004, offset=-0.5, eb_n0_db=11.0)
+    params = SlicerParams(settle_s=0.004, offset=-0.5)
     assert fed(params, 0, 1).threshold(1) > 20 * fed(params, 0, *[1, -1] * 150).threshold(1)
 
 
 def wrong_bits(preamble_characters, keyup_ticks=24_000, frames=200):
     """Wrong bits of 17 balanced characters after so many 55h, in frames on a carrier that is half a deviation off."""
-    slicer = SlicerParams.of(settle_s=0.004, offset=-0.5, eb_n0_db=11.0)
-    radio = RadioParams.of(eb_n0_db=11.0, slicer=slicer)
+    slicer = SlicerParams(settle_s=0.004, offset=-0.5)
+    radio = clean(eb_n0_db=11.0, slicer=slicer)
     downlink, line = Downlink(radio, 5, "net"), Line()
     listener = downlink.listen(0, line)
     wrong = 0
@@ -87,6 +92,6 @@ def test_key_up_without_enough_preamble_costs_bits():
 
 def test_a_state_can_be_put_back():
     slicer = fed(TYPICAL, 1, 1, -1)
-    other = Slicer(TYPICAL)
+    other = Slicer(TYPICAL, EB_N0_DB)
     restore(other, snapshot(slicer))
     assert repr(other) == repr(slicer)

@@ -3,12 +3,13 @@
 import pytest
 
 from miro_protocol.frames import TeamFrame, encode
-from miro_sim.radio import ChainParams, RadioParams
+from miro_sim.radio.params import Dropouts
 from tests.sim.radio.on_board import RadioRig, hears, receiver, seed_where, slow_receiver, stored
+from tests.sim.radio.radios import ALWAYS, clean
 
 START = 100_000
-QUIET = RadioParams(squelch=True)
-NOISY = RadioParams.of(bit_error_rate=0.01, squelch=True)
+QUIET = clean(squelch=True)
+NOISY = clean(bit_error_rate=0.01, squelch=True)
 PERIOD = 800_800
 LEAD = 6  # characters before the sync
 
@@ -46,11 +47,11 @@ def test_a_wrong_start_bit_slips_to_the_next_fall_and_the_characters_come_out_of
 
 def test_a_false_start_bit_on_an_idle_carrier_is_a_character_and_can_swallow_a_real_start():
     """A space of one bit time: the UART reads it as a start bit, and FFh out of the idle line behind."""
-    always_idle = RadioParams(carrier="on", false_start_threshold=2**32 // 12)
+    always_idle = clean(carrier="on", false_starts_hz=800.0)
     heard = pairs(hears(receiver(), always_idle, 3, [], 30 * 25_000))
     assert len(heard) > 5
     assert all(good for _, good in heard[:1])
-    quiet = RadioParams(carrier="on")
+    quiet = clean(carrier="on")
     assert pairs(hears(receiver(), quiet, 3, [], 30 * 25_000)) == []
     text = b"\x55" * 10
     whole = pairs(hears(receiver(), quiet, 3, [(START, text)], 20 * 25_000))
@@ -60,7 +61,7 @@ def test_a_false_start_bit_on_an_idle_carrier_is_a_character_and_can_swallow_a_r
 
 
 def test_a_lost_character_leaves_a_gap_and_the_others_whole():
-    losing = RadioParams.of(lost_character_rate=0.3, squelch=True)
+    losing = clean(lost_character_rate=0.3, squelch=True)
     heard = pairs(hears(receiver(), losing, 1, [(START, bytes(range(65, 85)))], 30 * 25_000))
     letters = [byte for byte, good in heard if good]
     assert len(letters) == len(heard) < 20
@@ -80,7 +81,7 @@ def test_a_uart_that_is_not_read_in_time_loses_characters(tens, whole):
 @pytest.mark.parametrize(("baud", "whole"), [(0, True), (20_000, True), (-20_000, True), (50_000, False)])
 def test_a_uart_follows_an_offset_of_two_percent_but_not_of_five(baud, whole):
     text = bytes([0x00, 0xFF, 0x55, 0x80, 0x01, 0x7F] * 3)
-    radio = RadioParams(baud_offset_ppm=baud, squelch=True)
+    radio = clean(baud_offset_ppm=baud, squelch=True)
     heard = pairs(hears(receiver(), radio, 0, [(START, text)], 25 * 25_000))
     assert (heard == [(byte, 1) for byte in text]) == whole
 
@@ -143,7 +144,7 @@ def test_a_wrong_start_bit_slips_a_byte_and_costs_the_frame():
 
 
 def test_lost_characters_cost_frames_and_the_numbers_step_over_them():
-    rig = robot_after(RadioParams.of(lost_character_rate=0.03, squelch=True), 2, 12)
+    rig = robot_after(clean(lost_character_rate=0.03, squelch=True), 2, 12)
     accepted, rejected, stale = rig.counters
     assert 2 < accepted < 12
     assert (rejected, stale) == (0, 0)
@@ -152,9 +153,9 @@ def test_lost_characters_cost_frames_and_the_numbers_step_over_them():
 
 def test_a_robot_out_of_reach_for_a_while_comes_back_by_itself():
     """Dropped for good: nothing comes through, noise or not; never dropped: everything does."""
-    gone = ChainParams(enter=2**32, leave=0)
-    assert robot_after(RadioParams(dropouts=gone), 4, 5).counters == (0, 0, 0)
-    back = robot_after(RadioParams(dropouts=ChainParams.lasting(0.15, 0.05)), 4, 20)
+    gone = ALWAYS
+    assert robot_after(clean(dropouts=gone), 4, 5).counters == (0, 0, 0)
+    back = robot_after(clean(dropouts=Dropouts(every_s=0.15, length_s=0.05)), 4, 20)
     accepted, _, stale = back.counters
     assert 5 < accepted < 20
     assert stale == 0
@@ -163,5 +164,5 @@ def test_a_robot_out_of_reach_for_a_while_comes_back_by_itself():
 def test_the_firmware_takes_frames_from_a_pc_whose_clock_is_one_percent_off():
     """The spacing rule allows 4.8 %."""
     for ppm in (10_000, -10_000):
-        radio = RadioParams(baud_offset_ppm=ppm, crystal_offset_ppm=-ppm // 100)
+        radio = clean(baud_offset_ppm=ppm, crystal_offset_ppm=-ppm // 100)
         assert robot_after(radio, 5, 6).counters == (6, 0, 0)

@@ -6,12 +6,13 @@ from hypothesis import strategies as st
 
 from miro_exact.state import restore, snapshot
 from miro_robot.mcs51.line import Line
-from miro_sim.radio import RadioParams, Uplink
+from miro_sim.radio.uplink import Uplink
 from tests.naive import radio as naive
+from tests.sim.radio.radios import clean
 from tests.sim.radio.strategies import cuts, params, seeds, transmissions
 
 UNTIL = 1_500_000
-CLEAN = RadioParams()
+CLEAN = clean()
 
 
 def txd(sent, bit_ticks=2496):
@@ -88,7 +89,7 @@ def test_without_errors_every_byte_arrives_at_any_clock_within_two_percent(sent,
 
 
 def test_a_symbol_carries_the_tick_of_its_start_edge_at_the_pc():
-    uplink = band(RadioParams(latency_ticks=700), 0, [[(10_000, b"\x00\xff")]])
+    uplink = band(clean(latency_ticks=700), 0, [[(10_000, b"\x00\xff")]])
     assert uplink.receive(UNTIL) == [(0x00, True, 10_700), (0xFF, True, 10_700 + 24_960)]
 
 
@@ -145,7 +146,7 @@ def test_two_robots_at_once_are_mixed_and_space_wins():
 
 
 def test_the_bit_error_rate_of_the_samples_is_the_one_asked_for():
-    uplink = Uplink(RadioParams.of(bit_error_rate=1e-2), 3, "net")
+    uplink = Uplink(clean(bit_error_rate=1e-2), 3, "net")
     line = Line()
     uplink.listen(line)
     received = 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from miro_robot.image import Image
-from miro_sim.radio.params import RadioParams
+from miro_sim.radio.params import Radio
 from miro_sim.scenario.file import load, parse
 from miro_sim.world.world import World
 from mirotwin.verify.checks.alive import FRAMES, frames_needed
@@ -151,6 +151,6 @@ def test_one_dead_robot_among_others_is_named():
 
 
 def test_a_radio_that_loses_frames_needs_more_of_them():
-    assert frames_needed(RadioParams(), 23) == FRAMES
-    assert frames_needed(RadioParams.of(lost_frames=0.1), 23) == 13
-    assert frames_needed(RadioParams.of(lost_frames=1.0), 23) == 0
+    assert frames_needed(Radio(), 23) == FRAMES
+    assert frames_needed(Radio(lost_frames=0.1), 23) == 13
+    assert frames_needed(Radio(lost_frames=1.0), 23) == 0
