@@ -59,7 +59,7 @@ class Wanted(msgspec.Struct, frozen=True):
 
 
 class Trial(msgspec.Struct, frozen=True):
-    """What came of it. `found_s`: None where nothing was found; `checks`: those that failed; `seeded`: by a seed.
+    """The result. `found_s`: None where nothing was found; `checks`: those that failed; `seeded`: by a seed.
     `refused`: why no target could be made, because the firmware does not come up: `found_s` is 0.0.
     """
 

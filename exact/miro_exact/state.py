@@ -18,7 +18,7 @@ enter a digest stands in `NOT_HASHED`. Tables of base classes come first. The or
 depth first; bytes are those of `fields.py`.
 
 Two methods of a part are called if it has them. `before_save` brings up to date what runs late; it changes nothing that
-the part will do. `after_load` works out anew what follows from the fields (caches, edges seen), and raises ValueError
+the part will do. `after_load` works out again what follows from the fields (caches, edges seen), and raises ValueError
 where fields that are each in their range contradict each other.
 
 `load` takes any bytes: it first checks all lengths and ranges and writes nothing, then writes and calls `after_load`.

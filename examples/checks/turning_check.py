@@ -13,7 +13,7 @@ from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject
 
 
 class TurnsAtMost(Check, frozen=True, kw_only=True, tag="turns_at_most_rad_s"):
-    """The robot turns at most so fast at the begin of each control period, from `from_s` on."""
+    """The robot turns at most so fast at the start of each control period, from `from_s` on."""
 
     KIND: ClassVar[Kind] = "safety"
     MAIN: ClassVar[str] = "limit_rad_s"

@@ -194,7 +194,7 @@ def _failure(word: str, plugin: Law[Any] | Estimator[Any], error: BaseException)
 
 
 def check_answer(answer: object, inner: tuple[str, ...]) -> None:
-    """Raises ValueError for an answer that is none, for one without the inner values, and for NaN and infinity."""
+    """Raises ValueError for an answer that is not one, for one without the inner values, and for NaN and infinity."""
     if isinstance(answer, Accelerations):
         _check("v_dot_m_s2", answer.v_dot_m_s2)
         _check("w_dot_rad_s2", answer.w_dot_rad_s2)
@@ -207,7 +207,7 @@ def check_answer(answer: object, inner: tuple[str, ...]) -> None:
 
 
 def check_estimate(estimate: object, inner: tuple[str, ...]) -> None:
-    """Raises ValueError for an estimate that is none, one without the named values, NaN, infinity and odd wheels."""
+    """Raises ValueError for an estimate that is not one, one without the named values, NaN, infinity and odd wheels."""
     if not isinstance(estimate, Estimate) or not isinstance(estimate.posture, Posture):
         raise ValueError(f"`step` returned {str(estimate)[:40]!r}, which is no Estimate of a Posture")
     posture = estimate.posture

@@ -1,4 +1,4 @@
-"""`mirotwin campaign`: `FILE.toml` makes the runs of a campaign, `show RESULTS.parquet` says what came of them."""
+"""`mirotwin campaign`: `FILE.toml` makes the runs of a campaign, `show RESULTS.parquet` shows the results."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class CampaignGroup(LazyGroup):
     short_help="Runs a scenario many times, varied, and compares.",
 )
 def campaign() -> None:
-    """Runs a scenario over seeds and values of its keys, and says what came of it.
+    """Runs a scenario over seeds and values of its keys, and shows the results.
 
     FILE.toml says which runs; `mirotwin examples campaign` writes one.
     """

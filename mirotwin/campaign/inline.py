@@ -1,4 +1,4 @@
-"""Values as TOML writes them on one line: what stands behind `KEY=` in a setting."""
+"""Values as TOML writes them on one line: what stands after `KEY=` in a setting."""
 
 from __future__ import annotations
 

@@ -163,7 +163,7 @@ def _no_journal(path: Path) -> BadInput:
 
 
 def outcomes(path: Path) -> Iterator[tuple[Outcome, int]]:
-    """Each outcome of the file, and the offset behind it. Raises BadInput for a line that is none."""
+    """Each outcome of the file, and the offset after it. Raises BadInput for a line that is not one."""
     decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Outcome)
     with path.open("rb") as stream:
         end = len(stream.readline(_LINE_BYTES))

@@ -49,7 +49,7 @@ class Comparison(msgspec.Struct, frozen=True):
 
 
 def campaign_page(path: Path) -> bytes:
-    """The page of a results file. Raises BadInput for a file that is none, and where Bokeh is not installed."""
+    """The page of a results file. Raises BadInput for a file that is not one, and where Bokeh is not installed."""
     require_bokeh()
     rows = Rows(path)
     if not rows.count:
@@ -178,7 +178,7 @@ def _seeds(rows: Rows) -> str:
 
 
 def _badge(counts: dict[str, int]) -> tuple[str, str]:
-    """A word, and the numbers behind it."""
+    """A word, and the numbers after it."""
     wrong = [
         f"{counts[name]} {word}" for name, word in (("failed", "failed"), ("fault", "with a firmware fault"))
     ]

@@ -54,7 +54,7 @@ def run(
 
     `executor`: any of `concurrent.futures`, which stays open; without one, a process for each core. Results that are
     there already are those of the same campaign, and are left as they are, or BadInput is raised; with `force` they are
-    made anew. `many`: more than 100 000 runs are meant. Interrupted, it goes on when it is called again.
+    made again. `many`: more than 100 000 runs are meant. Interrupted, it goes on when it is called again.
     """
     path = Path(results)
     tables.require_arrow()

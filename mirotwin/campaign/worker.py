@@ -40,7 +40,7 @@ class Work(msgspec.Struct, frozen=True):
 
 
 class Outcome(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What came of a run. `verdict`: passed, failed (a check or a step), fault (of the firmware) or error (no run).
+    """The result of a run. `verdict`: passed, failed (a check or a step), fault (of the firmware) or error (no run).
 
     `error`: why there are no figures. `failure`: the first check or step that failed. `checks`: name -> verdict.
     `wall_s`: the simulation loop. `refused`: by a worker, which `where` names; there is no run then.

@@ -43,7 +43,7 @@ def sources_of(image: Image, given: Sequence[str]) -> Sources:
 
 
 def checked_sources(given: Sequence[str]) -> Sequence[str]:
-    """The folders of --sources. Raises BadInput for what is none."""
+    """The folders of --sources. Raises BadInput for what is not one."""
     for folder in given:
         if not Path(folder).is_dir():
             raise BadInput(folder, "--sources", "there is no such folder", "name the one with the C files")

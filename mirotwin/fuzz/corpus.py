@@ -51,7 +51,7 @@ MOST = 2000
 
 
 class Corpus(msgspec.Struct, frozen=True):
-    """`inputs`, no two the same, and `notes`: what a user should hear about files that are none."""
+    """`inputs`, no two the same, and `notes`: what a user should hear about files that are not inputs."""
 
     inputs: tuple[bytes, ...]
     notes: tuple[str, ...] = ()

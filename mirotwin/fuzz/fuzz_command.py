@@ -54,7 +54,7 @@ from mirotwin.verify.wanted import silent_scenario
 LONGEST_S = 1e7
 AWAKE_MS = 1000 * AWAKE_TICKS // TICKS_PER_SECOND
 INTERRUPTED_S = 5.0
-"""How long inputs are still looked at behind a Ctrl-C."""
+"""How long inputs are still looked at after a Ctrl-C."""
 
 
 class Asked(msgspec.Struct, frozen=True, kw_only=True):
@@ -326,7 +326,7 @@ def _check_at_rest(target: Target, image: Image) -> None:
     harness = getattr(target, "harness", None)
     if harness is not None and not harness.sleeps:
         complain(
-            f"{image.path}: never sleeps (IDL); each run goes on for {AWAKE_MS} ms behind its last character"
+            f"{image.path}: never sleeps (IDL); each run goes on for {AWAKE_MS} ms after its last character"
         )
     if failure is not None:
         what = f"fails before it has heard anything: {failure.check}: {failure.what}"

@@ -38,7 +38,7 @@ class Ended(msgspec.Struct, frozen=True):
 def report(
     campaign: Campaign, image: Image, out: Path, covering: str | None, ended: Ended, quiet: bool
 ) -> int:
-    """Writes the files of the campaign and says what came of it; the exit code."""
+    """Writes the files of the campaign and shows the results; the exit code."""
     triage = campaign.triage
     tracefile = triage.write_coverage(out / COVERAGE, triage.reached.total)
     never = never_reached(tracefile)

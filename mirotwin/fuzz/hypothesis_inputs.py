@@ -113,7 +113,7 @@ def _settings(size: int, slot: int) -> Bytes:
 
 
 def _unknown(size: int, slot: int) -> Bytes:
-    """The same with any opcode, and no zeros behind it."""
+    """The same with any opcode, and no zeros after it."""
     return _exactly(size - 1).map(lambda drawn: _BYTES[slot] + drawn)
 
 

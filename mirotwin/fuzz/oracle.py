@@ -32,7 +32,7 @@ from mirotwin.verify.checks.watching import Checks
 from mirotwin.verify.wanted import silent_scenario
 
 AFTER_TICKS = TICKS_PER_SECOND // 20
-"""How long a world goes on behind the input and the crash: an answer may take 30 ms, a frame 10 ms."""
+"""How long a world goes on after the input and the crash: an answer may take 30 ms, a frame 10 ms."""
 _SETTLED_TICKS = TICKS_PER_SECOND // 100
 
 Expected = Mapping[str, Any]
@@ -146,7 +146,7 @@ def _scenario(place: Place, end_tick: int) -> Scenario:
 
 
 def _questions(heard: Sequence[ScriptItem], found_tick: int, robots: int) -> list[Transmission]:
-    """Two team frames behind the input, so late that one of them at least is fresh: a robot that lives acts on it."""
+    """Two team frames after the input, so late that one of them at least is fresh: a robot that lives acts on it."""
     ends = [one.end_tick if isinstance(one, Transmission) else one.tick for one in heard]
     tick = max([found_tick, *ends]) + FRESH_AGAIN_TICKS + _SETTLED_TICKS
     found: list[Transmission] = []

@@ -19,7 +19,7 @@ from mirotwin.ports.sockets import TcpEndpoint
 BAUD = 9600
 LONGEST_SUBOPTION = 256
 NONSENSE = (struct.error, TypeError, ValueError, KeyError, IndexError)
-"""What `PortManager` raises for a command that is cut short or has values that are none."""
+"""What `PortManager` raises for a command that is cut short or has values that do not exist."""
 
 
 class Rfc2217Endpoint(TcpEndpoint):

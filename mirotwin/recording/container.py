@@ -32,7 +32,7 @@ from mirotwin.recording.writer import MAGIC
 LONGEST = 256 << 20  # of a record; ours are chunks of 1 MiB and attachments of some KiB
 _HEAD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")  # times, uncompressed size, CRC, length of the compression's name
-_DATA_LENGTH = 8  # bytes, behind the compression's name
+_DATA_LENGTH = 8  # bytes, after the compression's name
 _CRC = 4  # bytes
 _COMPRESSIONS = (b"lz4", b"zstd")  # but for none
 _READ: dict[int, Callable[[ReadDataStream], McapRecord]] = {
@@ -84,7 +84,7 @@ class _Container:
         self.place = 0  # of the record under way
         self.checksum = 0  # of what the next section's CRC covers, so far
         self.data_ended = False
-        self.last = b""  # bytes that were read, behind the first magic
+        self.last = b""  # bytes that were read, after the first magic
 
     def records(self) -> Iterator[tuple[int, McapRecord]]:
         self._begin()
@@ -221,4 +221,4 @@ def _in_row(body: bytes, place: int, whole: bool) -> Iterator[McapRecord]:
         yield from _in(opcode, body[first:end], True)
         place = end
     if whole and place != len(body):
-        raise ValueError("the last record of a chunk ends behind it")
+        raise ValueError("the last record of a chunk ends after it")

@@ -50,7 +50,7 @@ class Fault(Protocol):
 class Source(msgspec.Struct, frozen=True):
     """What a run was made from: scenario text, seed, firmware file, and its symbols (name -> address,
     space). `state`: the form of the states that its digests are of (`Flat.tables`), "" where it is not known.
-    `resumed`: the saved world that the run went on from, empty for one from its begin.
+    `resumed`: the saved world that the run went on from, empty for a run from its start.
     """
 
     scenario_name: str

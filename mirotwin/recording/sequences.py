@@ -88,7 +88,7 @@ def unlike(one: Sequence[LogEntry], other: Sequence[LogEntry], within_ticks: int
     """The pairs that differ, in the order of time; None stands where one side has nothing.
 
     Two that say the same are alike if they are at most `within_ticks` apart. After a pair that is not alike the
-    comparison goes on behind it: what is missing on one side shifts nothing.
+    comparison goes on after it: what is missing on one side shifts nothing.
     """
     first = second = 0
     while first < len(one) and second < len(other):

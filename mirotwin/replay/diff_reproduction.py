@@ -24,7 +24,7 @@ Both = tuple[Recording, Recording]
 
 
 class Again(msgspec.Struct, frozen=True):
-    """What came of it. `period`: the first control period that differs."""
+    """The result. `period`: the first control period that differs."""
 
     period: int | None = None
     state: StateDifference | None = None

@@ -29,7 +29,7 @@ def replay_case(job: Job, image: Image, file: str, quiet: bool) -> int:
     with ProgressBar("replaying", -(-end_tick // CONTROL_PERIOD_TICKS), quiet) as bar:
         try:
             with plain_parameters(file, "replayed"):
-                while not world.stopped and world.tick < end_tick:  # it may end behind its scenario
+                while not world.stopped and world.tick < end_tick:  # a case may end after its scenario does
                     world.run_to(min(end_tick, (world.index + 1) * CONTROL_PERIOD_TICKS))
                     bar.to(world.index)
         except TransmissionError as error:

@@ -16,7 +16,7 @@ _BANKS = 0x20
 _RAM_BYTES = 0x100
 _SIZE = re.compile(r"^S:(?:G|F\w+)\$(\w+)\$\w+\$\w+\(\{([0-9]{1,3})\}", re.MULTILINE)
 STACK = "__start__stack"
-"""SDCC's name for the first byte behind all variables."""
+"""SDCC's name for the first byte after all variables."""
 
 
 def variables(image: Image) -> list[tuple[int, str]]:

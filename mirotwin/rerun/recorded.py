@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def image_of(recording: Recording, path: str | Path) -> Image:
-    """The image in the recording, with the symbols it had when it was recorded. Raises BadInput for what is none."""
+    """The image in the recording, with the symbols it had when it was recorded. Raises BadInput for what is not one."""
     source = recording.source
     image = parse_hex(source.firmware, Path(path) / "firmware.ihx")
     symbols = Symbols({name: Symbol(address, space) for name, (address, space) in source.symbols.items()})
@@ -55,7 +55,7 @@ def world_of(recording: Recording, path: str, image: Image | None = None, script
 
 
 def repeating(recording: Recording, path: str, period: int, scripted: bool) -> World | None:
-    """A world that repeats the recording, at the begin of control period `period`; see `world_of`.
+    """A world that repeats the recording, at the start of control period `period`; see `world_of`.
 
     None: a run that was resumed, or it does not give the recorded digests up to there. Another version of this program
     made the recording, input was put in beside a controller, or it was edited.

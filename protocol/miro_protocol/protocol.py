@@ -51,7 +51,7 @@ class Protocol(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     def repair(self, body: bytes, number: int | None = None) -> bytes:
         """The frame that comes closest to `body`, whatever that is. Raises nothing.
 
-        `number`: the frame is so many frames behind the first one of its session; a format with sequence numbers puts
+        `number`: the frame is so many frames after the first one of its session; a format with sequence numbers puts
         the right one in. None: those that stand in the body stay.
         """
         raise NotImplementedError

@@ -116,7 +116,7 @@ class Reader:
 
     def _take_header(self, line: Line) -> None:
         if not self._in_header:
-            raise line.error(1, "a line of the header behind the first tick", "put it above all ticks")
+            raise line.error(1, "a line of the header after the first tick", "put it above all ticks")
         self._header_lines.append((line.number, line.text))
 
     def _close_header(self) -> None:

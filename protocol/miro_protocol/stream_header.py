@@ -3,7 +3,7 @@
     #: scenario = "fig6"
     #: seed = 7
 
-One blank behind `#:` is not part of the document.
+One blank after `#:` is not part of the document.
 """
 
 from __future__ import annotations

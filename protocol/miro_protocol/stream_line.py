@@ -42,7 +42,7 @@ StreamItem = ScriptItem | PinLevel
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What one line says, the comment behind it, and the number of the line (0: of no file)."""
+    """What one line says, the comment after it, and the number of the line (0: of no file)."""
 
     what: StreamItem
     comment: str = ""

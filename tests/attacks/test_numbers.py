@@ -1,4 +1,4 @@
-"""Numbers that are none, too long, or out of every range, in each option of each command that takes one."""
+"""Numbers that are not numbers, too long, or out of every range, in each option of each command that takes one."""
 
 import click
 import pytest

@@ -31,7 +31,7 @@ def _parser() -> argparse.ArgumentParser:
         "--plain", action="store_true", help="changes by chance, even where Atheris is installed"
     )
     parser.add_argument(
-        "--keep", action="store_true", help="choose the kept inputs anew, from all that were found"
+        "--keep", action="store_true", help="choose the kept inputs again, from all that were found"
     )
     parser.add_argument("--run", type=Path, metavar="FILE", help="one input, with its traceback")
     return parser

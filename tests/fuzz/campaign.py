@@ -167,7 +167,7 @@ def once(name: str, path: Path, sanitize: bool) -> int:
 
 
 def keep(name: str) -> int:
-    """Chooses the kept inputs anew from those kept, seeds and found ones, in a process of its own; how many."""
+    """Chooses the kept inputs again from those kept, seeds and found ones, in a process of its own; how many."""
     folders = [str(WORK / part / name) for part in ("found", "seeds")]
     command = [sys.executable, "-m", "tests.fuzz.choose", name, TARGETS[name].engine, *folders]
     children.run(command, cwd=ROOT, env=child_environment({}), check=True)

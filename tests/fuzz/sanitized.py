@@ -47,7 +47,7 @@ class Build(NamedTuple):
 
 
 def built(folder: Path, guided: bool) -> Build:
-    """The build in `folder`, made anew when the sources have changed. Raises MissingError."""
+    """The build in `folder`, made again when the sources have changed. Raises MissingError."""
     guided = guided and shutil.which("clang") is not None
     compiler = "clang" if guided else "gcc" if shutil.which("gcc") else "clang"
     if shutil.which(compiler) is None:

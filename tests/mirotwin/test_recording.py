@@ -272,7 +272,7 @@ def nested(depth: int) -> bytes:
     [
         (chunk(bytes(100), size=3 << 30), "an uncompressed chunk of 100 bytes says that it has 3221225472"),
         (chunk(bytes(100), data_size=3 << 30), "the lengths of a chunk and of its data do not agree"),
-        (chunk(struct.pack("<BQ", Opcode.MESSAGE, 1 << 40)), "the last record of a chunk ends behind it"),
+        (chunk(struct.pack("<BQ", Opcode.MESSAGE, 1 << 40)), "the last record of a chunk ends after it"),
         (struct.pack("<BQ", Opcode.CHUNK, 3) + b"abc", "a chunk is too short"),
         (nested(2), "a chunk within a chunk"),
         (nested(3000), "a chunk within a chunk"),

@@ -53,7 +53,7 @@ _RECEPTION = (
         "counts a run in 8 bits",
         "acts_within_ms",
         (("decode.c", "    else if (run < RX_SIZE)\n        ++run;\n", "    else\n        ++run;\n"),),
-        "The 256th character without a pause begins the run anew.",
+        "The 256th character without a pause begins the run again.",
         "a frame behind some 240 characters that are no frame, without a pause",
     ),
     ForFuzzing(
@@ -75,7 +75,7 @@ _RECEPTION = (
             ),
         ),
         "A character that comes while a frame is dealt with is forgotten, and the decoder stays behind.",
-        "a character within 2 ms behind a frame, then a frame",
+        "a character within 2 ms after a frame, then a frame",
     ),
     ForFuzzing(
         "takes from the count of the interrupt",
@@ -103,8 +103,8 @@ _RECEPTION = (
 """,
             ),
         ),
-        "A character whose interrupt falls into a few microseconds behind a frame is forgotten.",
-        "a character in a window of some microseconds behind a frame, then a frame",
+        "A character whose interrupt falls into a few microseconds after a frame is forgotten.",
+        "a character in a window of some microseconds after a frame, then a frame",
     ),
 )
 _FAILSAFE = (
@@ -152,7 +152,7 @@ _SERVICE = (
         "no_fault",
         (("motion.c", "i != sizeof filter; ++i)", "i <= sizeof filter; ++i)"),),
         "The ninth byte falls on the return address of the main loop's call.",
-        "a service frame with gains for this robot, and one of some bytes behind them",
+        "a service frame with gains for this robot, and one of some bytes after them",
     ),
     ForFuzzing(
         "waits for standstill",

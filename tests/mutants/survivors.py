@@ -29,5 +29,5 @@ class Survivor(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def survivors(path: Path = TABLE) -> dict[str, Survivor]:
-    """By id. Raises `msgspec.ValidationError` for an entry that is none."""
+    """By id. Raises `msgspec.ValidationError` for an entry that is not one."""
     return msgspec.toml.decode(path.read_bytes(), type=dict[str, Survivor])

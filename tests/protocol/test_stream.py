@@ -135,7 +135,7 @@ REFUSED = [
     (V2 + "5 * P1.0 1 1", 2, 13, "not an action", ""),
     (V2 + "5 *  # P1.0", 2, 4, "not an action", ""),
     (V2 + "9 > 55\n8 * P1.0 0", 3, 1, "tick 8 goes backwards", ""),
-    (V2 + "5 > 55\n#: seed = 1", 3, 1, "a line of the header behind the first tick", "above all ticks"),
+    (V2 + "5 > 55\n#: seed = 1", 3, 1, "a line of the header after the first tick", "above all ticks"),
     (
         V2 + "#: seed = 1\n#: sead = 2\n",
         3,

@@ -19,7 +19,7 @@ What a measurement may be, besides good:
     same or older exposure    ignored: a frame that the grabber repeats holds nothing new.
     far from the prediction   refused: its distance in standard deviations, sqrt(e^T S^-1 e) with S the covariance of
                               the innovation e = (x, y, theta), is above `gate`. When `REFUSED` measurements in a row
-                              are far, the robot is somewhere else: the posture begins anew, the factors stay.
+                              are far, the robot is somewhere else: the posture starts again, the factors stay.
 
 A `Sighting` brings the tick of its exposure, counted on the same clock as t_s, and its confidence; the standard
 deviations are divided by the confidence, but by no less than `LEAST_CONFIDENCE`. Any other measurement is `age_s` old.
@@ -137,7 +137,7 @@ class Ekf(Estimator[EkfParameters]):
         self.refused = 0
 
     def check_memory(self) -> None:
-        """Raises ValueError for a number that is none. There are no other attributes: this class is ours."""
+        """Raises ValueError for a number that is not one. There are no other attributes: this class is ours."""
         if not self.filter.finite():
             raise ValueError("the filter holds a number that is not finite")
 
@@ -146,7 +146,7 @@ class Ekf(Estimator[EkfParameters]):
         super().after_load()
         if not 0 <= self.refused < REFUSED:
             raise ValueError(
-                f"{self.refused} measurements in a row were refused, which begins anew at {REFUSED}"
+                f"{self.refused} measurements in a row were refused, the filter starts again at {REFUSED}"
             )
 
     def step(self, given: EstimatorInput) -> Estimate | None:

@@ -310,7 +310,7 @@ class Filter:
         self.tidy()
 
     def count(self, extra: int, extra_m: float, variance: float, gate: float) -> bool:
-        """Corrects by what a rim went beyond what was commanded since its last count, then counts anew.
+        """Corrects by what a rim went beyond what was commanded since its last count, then counts again.
 
         False, and nothing but the new beginning, if that is more than `gate` standard deviations from expectation.
         """

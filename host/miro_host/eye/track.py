@@ -70,7 +70,7 @@ class Track:
         return Posture(self.x_m, self.y_m, self.theta_rad)
 
     def remember(self, sighting: Sighting) -> None:
-        """Takes the next sighting; one of the same tick replaces the last, an older one begins anew."""
+        """Takes the next sighting; one of the same tick replaces the last, an older one starts again."""
         if self.seen and sighting.tick > self.tick:
             self.before_tick = self.tick
             self.before_x_m = self.x_m

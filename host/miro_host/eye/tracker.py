@@ -73,7 +73,7 @@ class Tracker:
     ) -> None:
         """`team`: a colour of `patterns.TEAMS`; `robots`: numbers in `patterns.IDENTITIES`.
 
-        Raises ValueError for what is none of these, and EyeError for a colour without a class.
+        Raises ValueError for what is not one of these, and EyeError for a colour without a class.
         """
         _check(team, robots, pattern, centroid, window_px)
         self.team = team

@@ -55,7 +55,7 @@ class Job:
                     preexec_fn=prepare,
                 )
             except OSError as error:
-                raise BadInput(line[0], "", error.strerror or f"{error}", "install AFL++ anew") from None
+                raise BadInput(line[0], "", error.strerror or f"{error}", "install AFL++ again") from None
 
     @property
     def process(self) -> int:

@@ -49,7 +49,7 @@ FIRST_SIGNAL, LAST_SIGNAL = 33, 126
 NOTHING, FOUND, REFUSED, BROKEN = 0, 1, 2, 70
 """Exit codes. AFL++ sees none of them: it ends a server by a signal."""
 RUNS_A_COUNT = 64
-"""Executions after which the counters are written anew."""
+"""Executions after which the counters are written again."""
 
 
 class Served(Protocol):

@@ -1,4 +1,4 @@
-"""The bytes on the wire as people read them: one line a frame, or a run of bytes that is none."""
+"""The bytes on the wire as people read them: one line a frame, or a run of bytes that is not one."""
 
 from __future__ import annotations
 

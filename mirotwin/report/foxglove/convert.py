@@ -33,7 +33,7 @@ FAULT = "fault"
 
 
 class Converted(msgspec.Struct):
-    """What came of it. `notes`: what is missing, and why, a line each."""
+    """The result. `notes`: what is missing, and why, a line each."""
 
     periods: int
     images: int

@@ -65,7 +65,7 @@ class RobotNotes:
 
 
 def _more(before: int | None, now: int | None) -> int:
-    """By how much a counter rose; a counter that is lower began anew."""
+    """By how much a counter rose; a counter that is lower started again."""
     if before is None or now is None or (now < before and before < COUNTER // 2):
         return 0
     return (now - before) % COUNTER

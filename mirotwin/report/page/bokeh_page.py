@@ -1,7 +1,7 @@
 """Bokeh's part of a page: its JavaScript from the wheel, and the figures as JSON that is the same each time.
 
 Bokeh numbers its models from 1000 on in each process, so a second page in one process would have other numbers: they
-are given anew, from 1 on in the order in which they stand. Colours are names (`ink`, `truth`): tags like
+are numbered from 1 in the order of the page. Colours are names (`ink`, `truth`): tags like
 `line_color=truth` on a model say which of its properties has which colour, and the page puts them in, for light and for
 dark. bokeh is loaded when it is used; it comes with the extra `report`.
 """

@@ -3,7 +3,7 @@
 Postures are the recorded numbers, unchanged; what a period does not have is NaN.
 
 The LM629's velocity is known at each exposure. The actual one is the mean over the period before it: counts that the
-encoder has moved on, in the samples of 8192 ticks that lie between. NaN where the position was set anew meanwhile.
+encoder has moved on, in the samples of 8192 ticks that lie between. NaN where the position was set meanwhile.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ class Wheel:
         before, self._position = self._position, axis.real_position
         self.told.append(NAN if told is None else told / UNITS_PER_COUNT * M_S_PER_COUNT)
         self.profile.append(axis.desired_velocity * _VELOCITY_SCALE)
-        anew = any(opcode in _SETS_POSITION for _, opcode, _ in axis.commands)
-        if before is None or anew:
+        again = any(opcode in _SETS_POSITION for _, opcode, _ in axis.commands)
+        if before is None or again:
             self.actual.append(NAN)
             return
         moved = (axis.real_position - before + _WRAP // 2) % _WRAP - _WRAP // 2

@@ -175,7 +175,7 @@ def _fates(
     delay: int,
     over_tick: int,
 ) -> list[Mark]:
-    """What came of each transmission; characters that belong to none are noise."""
+    """The result of each transmission; characters that belong to none are noise."""
     begins = [one.tick + delay - SLACK_TICKS for one in sent]
     ends = [one.tick + delay + len(one.data) * HOST_CHARACTER_TICKS + SLACK_TICKS for one in sent]
     damaged: dict[int, int] = {}  # transmission -> characters of it in no frame

@@ -36,7 +36,7 @@ class Fault(msgspec.Struct, frozen=True):
 
 
 class Again(msgspec.Struct, frozen=True):
-    """What came of it. `image` has its debug files where they are; `robot`: whose processor was watched."""
+    """The result. `image` has its debug files where they are; `robot`: whose processor was watched."""
 
     periods: list[Period]
     end_tick: int

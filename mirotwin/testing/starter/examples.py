@@ -39,7 +39,7 @@ def folder() -> Path:
 
 
 def files(name: str) -> Iterator[tuple[str, Path]]:
-    """(name to write, file) of an example. Raises BadInput for a name that is none."""
+    """(name to write, file) of an example. Raises BadInput for a name that is not one."""
     if name not in EXAMPLES:
         close = get_close_matches(name, EXAMPLES, n=1)
         hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(EXAMPLES)}"

@@ -112,7 +112,7 @@ class Exchange(msgspec.Struct, frozen=True):
 
     @property
     def sent_since_reset(self) -> bytes:
-        """What was sent behind the last reset, which may have cut something off."""
+        """What was sent after the last reset, which may have cut something off."""
         return bytes(one.value for one in self.sent if self.reset_tick is None or one.tick > self.reset_tick)
 
 

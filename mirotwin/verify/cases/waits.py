@@ -1,4 +1,4 @@
-"""What a wait that was in vain comes to as a check, so that its case can be judged again."""
+"""What a wait that failed comes to as a check, so that its case can be judged again."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _WHAT: dict[type[conditions.Condition], str] = {
 
 
 def expect_of_wait(expired: WaitExpired, after_tick: int) -> dict[str, Any] | None:
-    """The check that fails as this wait did, which began behind `after_tick`.
+    """The check that fails as this wait did, which began after `after_tick`.
 
     None where no check can judge it: several conditions, pins, places in the program, predicates.
     """

@@ -1,6 +1,6 @@
 """Checks of where a robot is: near its reference, settled in time, on the pitch.
 
-They look once a control period, at its begin, as the summary does. A failure is noted where the robot begins to be
+They look once a control period, at its start, as the summary does. A failure is noted where the robot begins to be
 wrong.
 """
 

@@ -33,7 +33,7 @@ class NoFault(FaultCheck, frozen=True, kw_only=True, tag="no_fault"):
 
 class Lm629Protocol(FaultCheck, frozen=True, kw_only=True, tag="lm629_protocol"):
     """The LM629s are used as their data sheet says: timing, never written while busy, one at a time on the bus, and no
-    command that they refuse (bit 1 of the status byte, as it is at the begin of a control period).
+    command that they refuse (bit 1 of the status byte, as it is at the start of a control period).
     """
 
     KINDS = (FaultKind.BUS_CONTENTION, FaultKind.LM629_BUSY, FaultKind.LM629_TIMING)

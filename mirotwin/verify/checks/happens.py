@@ -28,7 +28,7 @@ _CONDITIONS: dict[str, tuple[type[conditions.Condition], dict[str, Any], str]] =
 
 
 class EventCheck(Check, frozen=True, kw_only=True):
-    """An event behind `after_tick`, up to `until_tick`, at the robot in `slot` (default: the first) or at its PC.
+    """An event after `after_tick`, up to `until_tick`, at the robot in `slot` (default: the first) or at its PC.
 
     `value`: of a character; `command`: name of an LM629 command, `side`: of which chip. For `answer`, `slot` is who
     answers, default anybody.
@@ -45,7 +45,7 @@ class EventCheck(Check, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         if self.until_tick <= self.after_tick:
-            raise ValueError(f"until_tick {self.until_tick}: give one behind after_tick {self.after_tick}")
+            raise ValueError(f"until_tick {self.until_tick}: give one after `after_tick` {self.after_tick}")
         _, _, narrow = _CONDITIONS[self.what]
         for key, allowed in (
             ("value", narrow == "value"),
@@ -70,7 +70,7 @@ class EventCheck(Check, frozen=True, kw_only=True):
 
     def problem(self, end_tick: int) -> str:
         if self.until_tick > end_tick:
-            return f"until_tick {self.until_tick} is behind the end of the run, tick {end_tick}"
+            return f"until_tick {self.until_tick} is after the end of the run, tick {end_tick}"
         return ""
 
     def judge(self, subject: Subject) -> Judge[Check]:

@@ -173,7 +173,7 @@ class FirstFailure(msgspec.Struct, frozen=True):
 
 
 class Expectation(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What came of a check, over all robots.
+    """The result of a check, over all robots.
 
     `kind`: safety (never) or liveness (within a time). `verdict`: passed, failed, or "not judged" where the run had no
     occasion for it. `failures`: how many; `first`: the earliest.

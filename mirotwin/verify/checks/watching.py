@@ -1,4 +1,4 @@
-"""Feeds the checks of a run while it is under way, and says what came of them.
+"""Feeds the checks of a run while it is under way, and shows the results.
 
     checks = Checks(world)
     while not world.finished:

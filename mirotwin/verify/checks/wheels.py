@@ -19,7 +19,7 @@ _UNITS_OF_1616 = 256.0
 
 class WheelsWithin(Check, frozen=True, kw_only=True, tag="wheels_within_m_s"):
     """No wheel is told to turn faster than so, rim speed at the nominal radius, and none is faster than that and
-    `overshoot_m_s` at the begin of a control period.
+    `overshoot_m_s` at the start of a control period.
     """
 
     KIND: ClassVar[Kind] = "safety"

@@ -1,7 +1,7 @@
 """Tries rules on an image: a world for each rule, run to the end of its trial.
 
 Every trial ends at a tick that is known in advance, whatever the firmware does: one that never boots or sends without
-end costs the same virtual time. Trials go on behind a firmware fault, but end behind a thousand. Faults break the rules
+end costs the same virtual time. Trials go on after a firmware fault, but end after a thousand. Faults break the rules
 about them, whichever trial they came in.
 """
 
@@ -31,7 +31,7 @@ FAULTS_KEPT = 20
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """What came of a rule. `failures`: in the order of time, the first hundred. `faults`: (network, slot, fault) of
+    """The result of a rule. `failures`: in the order of time, the first hundred. `faults`: (network, slot, fault) of
     its trial, the first twenty a robot; `fault_count` of all. `cases`: name and text of a file for each failure.
     `cause`: the rule is not judged, because this one failed. `hint`: what the firmware does instead, if that is known.
     """

@@ -1,7 +1,7 @@
 """What one robot was seen to do in a trial, by its wires and chips: nothing here knows a symbol of the firmware.
 
 What a wheel is told is what its LM629 was told; what the robot says is what the PC heard; what the chips are doing is
-read at the begin of each control period.
+read at the start of each control period.
 """
 
 from __future__ import annotations
@@ -75,12 +75,12 @@ class Seen:
             self.answers.append(Answer(event.tick, event.frame, said))
 
     def take_period(self, tick: int, record: RobotPeriod, board: Board) -> None:
-        """The robot as it was at the begin of a control period, and its board as it is now."""
+        """The robot as it was at the start of a control period, and its board as it is now."""
         self.periods.append((tick, record))
         self.samples.append((tick, board.left.sample_tick, board.right.sample_tick))
 
     def restarted(self, tick: int) -> None:
-        """The processor begins anew: nothing that wheels were told before holds on."""
+        """The processor starts again: nothing that wheels were told before holds on."""
         self._orders = Orders()
         for side in SIDES:
             self.orders[side].append(Order(tick, side, "off"))
@@ -143,7 +143,7 @@ class Seen:
         return [one for one in self.answers if after_tick < one.tick <= until_tick]
 
     def chips(self, after_tick: int, until_tick: int) -> Iterator[tuple[int, str, Axis]]:
-        """Tick, side and state of both chips at the begin of each control period in between."""
+        """Tick, side and state of both chips at the start of each control period in between."""
         for tick, record in self.periods:
             if after_tick < tick <= until_tick:
                 yield tick, SIDES[0], record.left

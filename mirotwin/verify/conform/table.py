@@ -48,7 +48,7 @@ def chapter_of(rule: Rule) -> Chapter:
 
 @cache
 def presupposed(rule: Rule) -> tuple[Rule, ...]:
-    """All rules that `rule` presupposes, also by way of others: each behind those that it presupposes itself."""
+    """All rules that `rule` presupposes, also by way of others: each after those that it presupposes itself."""
     found: dict[str, Rule] = {}
     for one in map(find, rule.presupposes):
         found |= {other.id: other for other in (*presupposed(one), one)}

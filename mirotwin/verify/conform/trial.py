@@ -112,7 +112,7 @@ def _network(topology: Topology, places: Iterator[tuple[float, float]]) -> str:
 
 
 def run_trial(world: World) -> None:
-    """To its end, or behind a thousand firmware faults."""
+    """To its end, or after a thousand firmware faults."""
     while not world.finished and fault_count(world) < MOST_FAULTS:
         world.run_to(world.tick + (LOOK_TICKS if world.tick < CONTROL_PERIOD_TICKS else CONTROL_PERIOD_TICKS))
 

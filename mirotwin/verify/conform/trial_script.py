@@ -106,7 +106,7 @@ class How(TypedDict, total=False):
 class TrialScript:
     """The host of network `network`. `now`: when it can speak next; `seq`: of its last fresh frame.
 
-    `said`, `done` and `expected` are what comes of it.
+    `said`, `done` and `expected` are the result.
     """
 
     def __init__(self, topology: Topology, network: int = 0) -> None:
@@ -230,7 +230,7 @@ class TrialScript:
         return begun
 
     def characters(self, data: bytes, bad_stop: tuple[int, ...] = ()) -> None:
-        """Characters right behind what was said last, if nothing was waited."""
+        """Characters right after what was said last, if nothing was waited."""
         self.said.append(Transmission(self.now, DOWN, data, self.network, bad_stop))
         self.now += len(data) * self.character_ticks
 

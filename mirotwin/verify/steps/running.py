@@ -37,7 +37,7 @@ LINES = 5
 
 
 class Outcome(msgspec.Struct, frozen=True):
-    """What came of a file. `lines`: each failure as one line, none where it passed; `notes`: what else there is to say.
+    """The result of a file. `lines`: each failure as one line, none where it passed; `notes`: what else to say.
 
     `error`: it could not be run. `done` of `steps`; `tick`: where the run ended. `left`: the folder with its case.
     `left_out`: what settings left out of the scenario, a line each.

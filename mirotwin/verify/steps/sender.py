@@ -2,7 +2,7 @@
 
 Numbers: each frame takes the next of 64; a poll the next whose turn is the robot's that is asked. A stream announces
 each frame just before it goes out, so that a step can change or end it at any time; a frame that finds the transmitter
-busy follows behind.
+busy follows.
 """
 
 from __future__ import annotations

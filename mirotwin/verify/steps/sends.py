@@ -157,7 +157,7 @@ def acceleration_units(acceleration_m_s2: float) -> int:
 
 
 class SendBytes(Send, frozen=True, kw_only=True, tag="bytes"):
-    """Characters as they are: pairs of hex digits, a `!` behind one whose stop bit is bad (`55 55! ff`)."""
+    """Characters as they are: pairs of hex digits, a `!` after one whose stop bit is bad (`55 55! ff`)."""
 
     hex: str
 

@@ -25,7 +25,7 @@ from miro_robot.mcs51.xram import XramBus
 
 CRYSTAL_HZ = 24_000_000
 CRYSTAL_RANGE_HZ = (32_768, 100_000_000)
-_SLICE = 200_000  # cycles after which a jump to itself that interrupts left is looked at anew
+_SLICE = 200_000  # cycles after which a jump to itself that interrupts left is looked at again
 _FAULTS_KEPT = 100
 _EA, _SOURCES = 0x80, 0x3F  # of IE
 
@@ -95,7 +95,7 @@ class BareMachine:
         self.faults: list[FirmwareFault] = []  # the first hundred
         self.faults_lost = 0  # how many more there were
         self.next_feed = 0  # cycle at which to look after the inputs
-        self.next_check = 0  # ... and at which to set `ends` anew
+        self.next_check = 0  # ... and at which to set `ends` again
         self.ends: tuple[int, ...] = ()  # jumps to themselves that may be its end
         self.loaded = bytearray(0x10000)  # 1 where executing is legal; up to date while the state is saved
         self.dead = False  # it has ended; what it sent may still be on its way

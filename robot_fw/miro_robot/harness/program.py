@@ -18,7 +18,7 @@
     C       DAMAGE          place in the next frame, bits to turn over
     D       CUT             characters that the next frame has
     E       STOP_BIT        place in the next frame of a bad stop bit
-    F       RESET           - the reset pin, right behind the characters so far, and 5 ms to come up before the pauses
+    F       RESET           - the reset pin, right after the characters so far, and 5 ms to come up before the pauses
 
 Velocity -32768 is an encoding error, which no host sends: -32767 goes out in its place.
 
@@ -198,7 +198,7 @@ class Program:
         return self.count < _MOST and self.length < _MOST_TICKS
 
     def _next(self) -> int:
-        """The next byte of the input, 0 behind its end."""
+        """The next byte of the input, 0 after its end."""
         if self._place >= self._end:
             return 0
         value = self._data[self._place]

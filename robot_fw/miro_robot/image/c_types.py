@@ -42,7 +42,7 @@ class CType(msgspec.Struct, frozen=True):
 
 
 class Field(msgspec.Struct, frozen=True):
-    """A member of a struct or union, so many bytes behind its begin."""
+    """A member of a struct or union, so many bytes from its start."""
 
     name: str
     offset: int

@@ -199,5 +199,5 @@ def _inside(
     if kind.kind != "array" or kind.element is None:
         raise BadInput(image.path, name, f"{kind} is no array")
     if at >= kind.count:
-        raise BadInput(image.path, name, f"{at} is behind the end of {kind}", f"give 0 to {kind.count - 1}")
+        raise BadInput(image.path, name, f"{at} is after the end of {kind}", f"give 0 to {kind.count - 1}")
     return msgspec.structs.replace(found, address=found.address + at * kind.element.size, type=kind.element)

@@ -16,7 +16,7 @@ class Counters(Watcher):
     """Counts by code address; one object may watch several CPUs that run the same image.
 
     `executed_at(a)`: times the instruction at `a` ran; `cycles_at(a)`: machine cycles it took; `jumped_at(a)`: times
-    the program went on somewhere else than behind it.
+    the program went on somewhere else than after it.
     """
 
     def __init__(self) -> None:

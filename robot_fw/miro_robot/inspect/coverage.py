@@ -20,7 +20,7 @@ from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.opcodes import is_conditional
 
 Counts = dict[int, tuple[int, int]]
-"""By address: how often the instruction ran, and how often it went on elsewhere than behind itself."""
+"""By address: how often the instruction ran, and how often it went on elsewhere than after itself."""
 
 
 class Share(msgspec.Struct, frozen=True):

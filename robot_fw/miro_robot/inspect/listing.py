@@ -27,7 +27,7 @@ class Row(msgspec.Struct, frozen=True):
 
 
 def rows(image: Image, debug: DebugInfo, names: SymbolNames, executed: Collection[int] = ()) -> Iterator[Row]:
-    """All of the image in the order of addresses. Instructions are taken one behind the other from each name on; one
+    """All of the image in the order of addresses. Instructions are taken one after the other from each name on; one
     whose operand would reach into what has a name of its own is data. `executed`: places where instructions begin
     for sure, which sets right what a table between instructions of a bare image has put out of step.
     """

@@ -124,7 +124,7 @@ class StackReader:
         return {address: at.height for address, at in reached.items()}, unknown
 
     def _after(self, address: int, at: _At) -> tuple[int, _At, set[str]]:
-        """Bytes of code taken, what holds behind them, and what could not be told."""
+        """Bytes of code taken, what holds after them, and what could not be told."""
         code = self.code[address : address + 6].ljust(6, b"\0")
         opcode, size, height = code[0], LENGTH[code[0]], at.height
         if all(want in (-1, byte) for want, byte in zip(_FRAME, code, strict=True)):
@@ -146,7 +146,7 @@ class StackReader:
         return size, at, {"SP set by a value that is not known"}
 
     def _branch(self, address: int) -> int | None:
-        """Where a jump goes; None for what is none, and for calls."""
+        """Where a jump goes; None for what is not one, and for calls."""
         opcode = self.code[address]
         if opcode == _SJMP or is_conditional(opcode):
             size = LENGTH[opcode]

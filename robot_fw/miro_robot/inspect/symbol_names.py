@@ -79,7 +79,7 @@ def functions(image: Image) -> list[tuple[int, str]]:
 
 
 def _sweep(image: Image) -> dict[int, bool]:
-    """Addresses of instructions, one behind the other, and whether the one before goes elsewhere or is padding."""
+    """Addresses of instructions, one after the other, and whether the one before goes elsewhere or is padding."""
     found: dict[int, bool] = {}
     for first, end in image.used:
         address = first

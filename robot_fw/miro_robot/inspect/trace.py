@@ -42,7 +42,7 @@ class Trace(Watcher):
         self.sleep = (
             0,
             0,
-        )  # first cycle of the stretch of sleep that is still to be written, and the one behind it
+        )  # first cycle of the stretch of sleep that is still to be written, and the one after it
         self.static: dict[bytes, str | None] = {}  # by address and code: the part that is always the same
 
     def attached(self, cpu: Cpu) -> None:

@@ -138,7 +138,7 @@ class Core:
                 self.edge_before = self.edge_outer[self.edge_depth]
 
     def line_at(self, address: int) -> int:
-        """`LINE` of the opcode at `address` and, in the upper half, the address behind its instruction."""
+        """`LINE` of the opcode at `address` and, in the upper half, the address after its instruction."""
         line = self.line_of[self.rom[address]]
         return line | ((address + (line >> 13)) & 0xFFFF) << 16
 

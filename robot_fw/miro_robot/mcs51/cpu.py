@@ -303,7 +303,7 @@ class Cpu(Executor):
         return 0
 
     def _attend(self, now: int) -> int:
-        """Everything due at the begin of cycle `now`: 1 if that was an interrupt."""
+        """Everything due at the start of cycle `now`: 1 if that was an interrupt."""
         peripherals = self.peripherals
         peripherals.apply_pushes(now)
         peripherals.sample_pins(now)

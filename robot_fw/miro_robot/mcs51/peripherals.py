@@ -216,7 +216,7 @@ class Peripherals:
         return shifted if shifted < tick else tick
 
     def clock_serial(self) -> None:
-        """Works out the serial port's 16x ticks anew, after anything that they depend on has changed."""
+        """Works out the serial port's 16x ticks again, after anything that they depend on has changed."""
         self.settle()
         self._set_serial_clock()
 

@@ -279,7 +279,7 @@ class Uart:
                     idle = (tick - 1 - self.rx_next) // self.rx_period + 1
                 self.rx_count += idle
                 self.rx_next += idle * self.rx_period
-                if self.rx_next >= tick:  # else what comes next looks anew
+                if self.rx_next >= tick:  # else what comes next looks again
                     self.rx_last = self.level(self.rx_next - self.rx_period)
                 continue
             now = self.rx_next

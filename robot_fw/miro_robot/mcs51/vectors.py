@@ -58,7 +58,7 @@ def encode(vectors: list[Vector]) -> bytes:
 
 
 def decode(content: bytes) -> list[Vector]:
-    """The vectors in a file. Raises msgspec.ValidationError for what is none."""
+    """The vectors in a file. Raises msgspec.ValidationError for what is not one."""
     return msgspec.json.decode(content, type=list[Vector])
 
 

@@ -137,7 +137,7 @@ class RollingBall(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 class Disturbance(_Positive, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A force along the robot's axis (forward) and a yaw torque (counter-clockwise) on its body.
 
-    Added up: a constant, a sine from tick 0 on, and noise, which is drawn anew every period within +- the bound.
+    Added up: a constant, a sine from tick 0 on, and noise, which is drawn again every period within +- the bound.
     """
 
     force_n: float = 0.0

@@ -31,7 +31,7 @@ DISTURBING_CHASSIS = (
 
 
 class VariantError(BadInput):
-    """A `variant` that is none: what, and what to write instead."""
+    """A `variant` that does not exist, and what to write instead."""
 
     def __init__(self, what: str, remedy: str) -> None:
         super().__init__("", "variant", what, remedy)

@@ -110,7 +110,7 @@ class Actions:
         return Power(one.tick, self.network, one.slot, one.value)
 
     def check(self, slots: Sequence[int]) -> None:
-        """Raises ValueError where what was loaded concerns a robot that is not in `slots`, or a level that is none."""
+        """Raises ValueError for a robot that is not in `slots`, and a level other than 0 and 1."""
         for one in self.waiting:
             if one.what in (RESET, POWER) and (one.slot not in slots or one.value > 1):
                 raise ValueError(

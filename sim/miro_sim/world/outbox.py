@@ -113,7 +113,7 @@ class Outbox:
         self.waiting.sort(key=lambda one: one.sent.tick)
 
     def end_tick(self, free_tick: int) -> int:
-        """When the transmitter is free behind everything that waits."""
+        """When the transmitter is free after everything that waits."""
         return max([free_tick, *(one.sent.end_tick for one in self.waiting)])
 
     def due(self, until_tick: int) -> list[Transmission]:

@@ -2,7 +2,7 @@
 
 The world runs in pieces that end before the control period does. If the condition came true inside one, the world
 goes back to the piece's begin and runs again to the tick of the event: a run gives the same bits however it is cut, so
-nothing is lost and nothing is changed. Events behind that tick are left to the next wait.
+nothing is lost and nothing is changed. Events after that tick are left to the next wait.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ class Waits:
         self.backlog += watch.edges()
 
     def _decode(self, place: tuple[int, int], serial: int, event: Event) -> None:
-        """Gives a character to the robot's decoder; a frame that it completes is an event right behind it."""
+        """Gives a character to the robot's decoder; a frame that it completes is an event right after it."""
         symbol = (event.value, event.good_stop, event.tick)
         for result in self.decoders[place].feed_symbols([symbol]):
             if isinstance(result, Received):
@@ -206,7 +206,7 @@ class Waits:
 
 
 class _Place:
-    """What a wait had seen at the begin of a piece."""
+    """What a wait had seen at the start of a piece."""
 
     def __init__(self, waits: Waits, watch: Watch) -> None:
         self.next_edge = watch.next_edge

@@ -197,7 +197,7 @@ class World:
     ) -> int:
         """Puts characters on the air of `network`; returns the tick of the first start bit.
 
-        Without `at_tick` they queue behind what is being sent, as in the FIFO of a serial port. Key-up and radio
+        Without `at_tick` they queue after what is being sent, as in the FIFO of a serial port. Key-up and radio
         apply as for the station's own; a frame of the station that meets a busy transmitter is dropped and counted.
         `bad_stop`: indices of the characters whose stop bit is to be bad: space for three quarters of a bit.
         Raises ValueError for a network that is not there, a tick before `earliest_tick`, a transmitter that is busy
@@ -223,7 +223,7 @@ class World:
         """Announces what is done to a robot or a radio at a tick: `Reset`, `Power`, `RadioState`.
 
         Before anything else that happens at that tick. Raises ValueError for a tick before `earliest_action_tick`, a
-        network or a robot that is not there, and for levels that are none.
+        network or a robot that is not there, and for levels that are not.
         """
         self._announce(action, self.earliest_action_tick)
 

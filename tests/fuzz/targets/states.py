@@ -68,7 +68,7 @@ def _loading(make: Callable[[], Any], states: Sequence[bytes], go_on: Callable[[
 
 
 class _World:
-    """A world with its `Flat` state; what is put is sealed anew."""
+    """A world with its `Flat` state; what is put is sealed again."""
 
     def __init__(self, profile: str) -> None:
         from tests.sim.mutated_worlds import fresh

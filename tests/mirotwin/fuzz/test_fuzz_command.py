@@ -207,7 +207,7 @@ def test_firmware_that_never_sleeps_is_fuzzed_with_a_word_about_it(mirotwin, eng
     assert source.count("        sleep = IDL;\n") == 1
     built = build({"main.c": source.replace("        sleep = IDL;\n", "        sleep = 0;\n")})
     code, _, err = mirotwin("fuzz", built.image, "--time", "1s", "--out", tmp_path / "out")
-    assert "miro.ihx: never sleeps (IDL); each run goes on for 10 ms behind its last character" in err
+    assert "miro.ihx: never sleeps (IDL); each run goes on for 10 ms after its last character" in err
     assert code in (0, 1)
 
 

@@ -88,7 +88,7 @@ def test_a_world_that_is_behind_catches_up_without_skipping_and_says_by_how_much
     session.run_to(ticks(0.1))
     assert session.live().late_max_ms < 3
     session.pace.now += ticks(0.25)  # type: ignore[attr-defined]
-    session.run_to(ticks(0.8))  # a slice of 2 ms takes 1 ms: after 0.46 s it is 20 ms behind
+    session.run_to(ticks(0.8))  # a slice of 2 ms takes 1 ms: after 0.46 s it is 20 ms after
     live = session.live()
     assert 240 < live.late_max_ms < 260
     assert 0.44 < live.late_s < 0.48

@@ -182,7 +182,7 @@ def test_110_ms_count_from_the_character_also_when_the_robot_was_loading(place, 
 
 
 def stop_behind(rig: Rig, seq: int, behind: int, at: int) -> float:
-    """Milliseconds from the end of a frame that ends at `at`, with characters right behind it, to the stop."""
+    """Milliseconds from the end of a frame that ends at `at`, with characters right after it, to the stop."""
     data = encode(TeamFrame(0, seq, ((1000, 1000),) * rig.n), rig.n)
     rig.send(data + bytes(behind), at=at - len(data) * CHARACTER)
     rig.run_to(at + 15 * MS)

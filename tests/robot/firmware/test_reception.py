@@ -131,7 +131,7 @@ def test_the_comparison_sees_a_difference():
     st.lists(st.integers(0, 1), max_size=400), st.integers(1, 2 * BIT), st.sampled_from([3, 5]), st.booleans()
 )
 def test_the_first_frame_after_any_garbage_on_the_line_is_taken(levels, width, n, at_once):
-    """Garbage of any pulse width and phase, the frame right behind it or after a key-up."""
+    """Garbage of any pulse width and phase, the frame right after it or after a key-up."""
     rig = Rig(n=n)
     start = rig.now + CHARACTER
     rig.pending += [(start + place * width, level) for place, level in enumerate(levels)]

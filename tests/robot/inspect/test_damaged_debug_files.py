@@ -20,7 +20,7 @@ _POINT = "T:Fmain$point[({0}S:S$x$0_0$0({4}SF:S),Z,0,0)]"
         ["S:G$x$0_0$0({70000}DA70000d,SC:S),E,0,0"],
         ["S:G$x$0_0$0({1}" + "DA1d," * 2000 + "SC:S),E,0,0"],
         ["T:Fmain$self[({0}S:S$x$0_0$0({1}STself:S),Z,0,0)]", "S:G$x$0_0$0({1}STself:S),E,0,0"],
-        [_POINT, "S:G$x$0_0$0({3}STpoint:S),E,0,0"],  # its member ends behind it
+        [_POINT, "S:G$x$0_0$0({3}STpoint:S),E,0,0"],  # its member ends after it
         [
             *(
                 f"T:Fmain$p{at}[" + f"({{0}}S:S$y$0_0$0({{1}}STp{at + 1}:S),Z,0,0)" * 9 + "]"

@@ -173,7 +173,7 @@ def test_members_that_are_not_named_stay(program, cpu):
 REFUSED = {
     "unt": "there is no such variable",
     "pt.q": "struct point has no member q; it has x, y, z",
-    "arr[4]": r"4 is behind the end of uint8\[4\]; give 0 to 3",
+    "arr[4]": r"4 is after the end of uint8\[4\]; give 0 to 3",
     "uc[0]": "uint8 is no array",
     "main": "main: is code, no variable",
     "twice": "there are several of this name; give one of other:twice, typed:twice",

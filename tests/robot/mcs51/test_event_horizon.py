@@ -1,6 +1,6 @@
 """A CPU that knows when its next event is does the same as one that looks at each instruction.
 
-Restoring a state makes the CPU work out its next event anew. So one CPU runs, another one is put into its own state
+Restoring a state makes the CPU work out its next event again. So one CPU runs, another one is put into its own state
 before every instruction, and both must be in the same state in the end.
 """
 
@@ -70,12 +70,12 @@ SJMP loop
 CYCLES = 400
 
 
-def state_after(code: bytes, levels: list[int], anew: bool) -> bytes:
+def state_after(code: bytes, levels: list[int], again: bool) -> bytes:
     cpu = Cpu(RecordingBus())
     cpu.load(code)
     for number, level in enumerate(levels):
         cpu.rxd.append(12 * 37 * (number + 1), level)
-    if not anew:
+    if not again:
         cpu.run(CYCLES)
     while cpu.cycles < CYCLES:
         restore(cpu, snapshot(cpu))
@@ -100,4 +100,4 @@ def test_it_takes_every_interrupt_when_one_that_looks_at_each_instruction_does(
 ):
     parts = ["\n".join(part) for part in (timer0, timer1, serial)]
     code = assemble(PROGRAM.format(*parts, t2con, "\n".join(loop)))
-    assert state_after(code, levels, anew=False) == state_after(code, levels, anew=True)
+    assert state_after(code, levels, again=False) == state_after(code, levels, again=True)

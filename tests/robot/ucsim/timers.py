@@ -24,7 +24,7 @@ _CONTROL = (_TCON, _TCON, _T2CON)
 class Program(NamedTuple):
     timer: int
     code: bytes
-    end: int  # address of its last instruction, relative to its begin
+    end: int  # address of its last instruction, relative to its start
 
 
 def draw(random: Random) -> Program:

@@ -61,7 +61,7 @@ def told(world: World, tick: int, data: bytes) -> None:
 
 
 def in_one_piece(world: World, sent: list[tuple[int, bytes]]) -> str:
-    """The digest of a run that is told everything at its begin."""
+    """The digest of a run that is told everything at its start."""
     for tick, data in sent:
         told(world, tick, data)
     world.run_to(PERIODS * CONTROL_PERIOD_TICKS)

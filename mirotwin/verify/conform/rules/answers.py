@@ -251,7 +251,7 @@ def _status(answer: Answer, seen: Seen) -> str:
 
 
 def _around(answer: Answer, seen: Seen) -> tuple[RobotPeriod, RobotPeriod]:
-    """The robot at the begin of the last control period before an answer was asked for, and of the first behind it."""
+    """The robot at the start of the last control period before an answer was asked for, and of the first after it."""
     begun = answer.frame.start_tick - ms(14.0)
     before = [record for tick, record in seen.periods if tick <= begun]
     after = [record for tick, record in seen.periods if tick >= answer.tick]
@@ -403,7 +403,7 @@ def rejected(script: TrialScript) -> None:
     script.characters(bytes(40))
     script.wait(12.0)
     counted()
-    for syncs in (40, 90, 150):  # each sync with a whole window behind it is one
+    for syncs in (40, 90, 150):  # each sync with a whole window after it is one
         script.characters(SYNC * syncs)
         count += (2 * syncs - size) // 2 + 1
         script.wait(20.0)

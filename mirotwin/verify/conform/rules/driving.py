@@ -156,7 +156,7 @@ def kept(script: TrialScript) -> None:
     for sign in (1, -1, 1):
         frame = _only(script, 300 * sign, -311 * sign, gap_ms=65.0)
         script.obeyed(frame)
-        script.unchanged(frame.end_tick + ACTING_TICKS, script.now, f"velocities kept behind {frame.what}")
+        script.unchanged(frame.end_tick + ACTING_TICKS, script.now, f"velocities kept after {frame.what}")
         _reached(script, frame)
 
 

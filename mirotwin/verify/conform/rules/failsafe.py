@@ -80,7 +80,7 @@ def _stop_of_a_busy_robot(script: TrialScript) -> None:
         script.service(slot, Opcode.ACCELERATION, DEFAULT_ACCELERATION.to_bytes(4, "little"), gap_ms=0.0)
         script.wait(112.0)
         script.characters(SYNC * syncs)
-        last = script.team(what=f"team frame behind {syncs} syncs", lead=b"")
+        last = script.team(what=f"team frame after {syncs} syncs", lead=b"")
         script.obeyed(last)
         stops_behind(script, last)
         script.wait(130.0)

@@ -54,10 +54,10 @@ def refused(script: TrialScript, ways: Iterable[tuple[str, How]], in_a_row: int 
 def preamble(script: TrialScript) -> None:
     ways: tuple[tuple[str, How], ...] = (
         ("without preamble", How(lead=b"")),
-        ("behind FFh alone", How(lead=b"\xff")),
-        ("behind AAh", How(lead=b"\xaa" * 5)),
-        ("behind 00h", How(lead=b"\x00" * 3)),
-        ("behind half a sync", How(lead=SYNC[:1])),
+        ("after FFh alone", How(lead=b"\xff")),
+        ("after AAh", How(lead=b"\xaa" * 5)),
+        ("after 00h", How(lead=b"\x00" * 3)),
+        ("after half a sync", How(lead=SYNC[:1])),
         ("with a bad stop bit before its sync", How(bad_stop=-1)),
         ("with a pause before its sync", How(pauses={0: 300.0})),
         ("with a pause in its preamble", How(pauses={-2: 5000.0})),
@@ -114,7 +114,7 @@ def crc(script: TrialScript) -> None:
 
 
 def leaving(register: int) -> int:
-    """What a CRC field must be wrong by so that a receiver's register is wrong by `register` behind it."""
+    """What a CRC field must be wrong by so that a receiver's register is wrong by `register` after it."""
     for _ in range(16):
         top = register & 0x8000
         register = (register ^ POLYNOMIAL_REFLECTED if top else register) << 1 | (1 if top else 0)
@@ -274,7 +274,7 @@ def _payload(words: Iterable[tuple[int, int]]) -> bytes:
     "The first undamaged frame MUST be taken, whatever garbage came right before it.",
     RECEPTION,
     presupposes=("P09", "P10", "P14"),
-    broken="a frame right behind garbage is lost",
+    broken="a frame right after garbage is lost",
 )
 def garbage(script: TrialScript) -> None:
     noise = bytes(int(_CHANCE.uniform(9000 + at) * 256) for at in range(300))
@@ -293,7 +293,7 @@ def garbage(script: TrialScript) -> None:
     )
     for what, characters in kinds:
         script.characters(characters)
-        script.obeyed(script.team(what=f"team frame right behind {what}", lead=b""))
+        script.obeyed(script.team(what=f"team frame right after {what}", lead=b""))
     frames = (
         ("a bad stop bit", How(bad_stop=5)),
         ("a pause", How(pauses={7: 400.0})),
@@ -302,9 +302,9 @@ def garbage(script: TrialScript) -> None:
     for what, how in frames:
         damaged: How = {"fresh": False, "gap_ms": 0.0, **how}
         script.team(**damaged)
-        script.obeyed(script.team(what=f"team frame right behind one with {what}", lead=b""))
+        script.obeyed(script.team(what=f"team frame right after one with {what}", lead=b""))
     for _ in range(3):  # none of three is lost, without a pause between them
-        script.obeyed(script.team(what="team frame right behind another", lead=b"", gap_ms=0.0))
+        script.obeyed(script.team(what="team frame right after another", lead=b"", gap_ms=0.0))
     script.wait(12.0)
 
 
@@ -313,12 +313,12 @@ def garbage(script: TrialScript) -> None:
     "A window with a wrong CRC MUST cost no frame: a sync in front of a frame is no reason to lose it.",
     RECEPTION,
     presupposes=("P07",),
-    broken="a frame behind a false sync is lost",
+    broken="a frame after a false sync is lost",
 )
 def false_syncs(script: TrialScript) -> None:
     for length in range(2, script.form.size, 3):
         lead = SYNC + bytes(range(0x60, 0x60 + length - 2))
-        script.obeyed(script.team(what=f"team frame {length} characters behind a sync", lead=lead))
+        script.obeyed(script.team(what=f"team frame {length} characters after a sync", lead=lead))
 
 
 @CHAPTER.rule(
@@ -330,4 +330,4 @@ def false_syncs(script: TrialScript) -> None:
 )
 def slicer_noise(script: TrialScript) -> None:
     for count in range(8):
-        script.obeyed(script.team(what="team frame behind noise", gap_ms=14.0 + 3.7 * count))
+        script.obeyed(script.team(what="team frame after noise", gap_ms=14.0 + 3.7 * count))

@@ -39,7 +39,7 @@ TEXTS = st.lists(
 
 
 def naive(text: str) -> tuple[bytes, tuple[int, int] | None]:
-    """Bytes and the place of the first thing that is none, character by character."""
+    """Bytes and the place of the first thing that is not one, character by character."""
     found = bytearray()
     place = 0
     while place < len(text):

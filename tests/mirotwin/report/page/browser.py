@@ -1,6 +1,6 @@
 """Chromium without a screen, for tests of pages, and the pictures that they are compared with.
 
-python -m tests.mirotwin.report.page.browser          makes the pictures in `pictures/` anew
+python -m tests.mirotwin.report.page.browser          makes the pictures in `pictures/` again
 """
 
 from __future__ import annotations

@@ -90,7 +90,7 @@ MISTAKES = {
         *("decode.c", "else if (run < RX_SIZE)\n        ++run;", "else\n        ++run;"),
         "P13",
     ),
-    "begins anew after a bad CRC": Mistake(
+    "starts again after a bad CRC": Mistake(
         *("decode.c", "++frames_rejected;", "++frames_rejected; run = 0;"),
         "P14",
     ),
