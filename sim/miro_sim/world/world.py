@@ -223,7 +223,7 @@ class World:
         """Announces what is done to a robot or a radio at a tick: `Reset`, `Power`, `RadioState`.
 
         Before anything else that happens at that tick. Raises ValueError for a tick before `earliest_action_tick`, a
-        network or a robot that is not there, and for levels that are not.
+        network or a robot that is not there, and for levels other than 0 and 1.
         """
         self._announce(action, self.earliest_action_tick)
 
