@@ -50,7 +50,7 @@ def run_ratio(runs: int) -> float:
         began_s = time.process_time()
         run_single(job)
         whole_s = time.process_time() - began_s
-        world = World(prepared(job.origin, job.text, job.settings).scenario, job.seed, image_of(""))
+        world = World(prepared(job.origin, job.text, job.settings).text.scenario, job.seed, image_of(""))
         began_s = time.process_time()
         while not world.finished:
             world.step()

@@ -12,24 +12,19 @@ Ctrl-C stops it after the cells that are under way, and prints the rows that are
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 import time
 from collections.abc import Iterable, Iterator
 from statistics import median
 from typing import NamedTuple
 
-from benchmarks.figures import range_of_seeds
-from miro_host.posture import Posture
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
-from miro_sim.scenario.file import load
-from miro_sim.world.world import World
-from mirotwin.campaign.execute import in_order
-from mirotwin.campaign.processes import cores, processes
-from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
+from benchmarks.figures import Figure, figure_of, range_of_seeds
+from mirotwin.campaign.design import Level
+from mirotwin.campaign.drive import outcomes_of
+from mirotwin.campaign.plan import plan_of_levels
+from mirotwin.campaign.processes import cores
+from mirotwin.campaign.workers import Processes
 
-LAST_SECOND = 30
 FIGURES = ("fig6", "fig8")
 FRAME_S = 1001 / 30000
 SMALL_NOISE = ("camera.position_error_cm=0.3", "camera.heading_error_deg=0.6")
@@ -117,22 +112,6 @@ CASES = (
 )  # fmt: skip
 
 
-class Outcome(NamedTuple):
-    """Of one run: rms position error of the last second, cm, and whether the robot was outside the bounds in it."""
-
-    rms_cm: float
-    unsettled: bool
-
-
-class Cell(NamedTuple):
-    """A cell of the table: number of a case, controller, figure; and its seeds."""
-
-    number: int
-    controller: str
-    figure: str
-    seeds: range
-
-
 def settings_of(case: Case, controller: str) -> list[str]:
     """All settings of a run, in their order."""
     age = f"{case.delay_frames * FRAME_S:.9f}"
@@ -140,39 +119,14 @@ def settings_of(case: Case, controller: str) -> list[str]:
     return ["variant=ideal", *SMALL_NOISE, *steered, *case.settings]
 
 
-def run(cell: Cell) -> list[Outcome]:
-    """The runs of one cell of the table."""
-    text = load(cell.figure, settings_of(CASES[cell.number], cell.controller))
-    image = load_hex(image_path())
-    return [_run(World(text.scenario, seed, image)) for seed in cell.seeds]
-
-
-def _run(world: World) -> Outcome:
-    errors = []
-    while not world.finished:
-        robot = world.step().robots[0]
-        errors.append(_error(robot.truth, robot.reference))
-    last = errors[-LAST_SECOND:]
-    rms = math.sqrt(math.fsum(position * position for position, _ in last) / len(last))
-    return Outcome(rms, any(position > SETTLED_CM or heading > SETTLED_RAD for position, heading in last))
-
-
-def _error(truth: Posture, reference: Posture) -> tuple[float, float]:
-    """Distance in cm, and heading error in rad."""
-    way_m = math.hypot(truth.x_m - reference.x_m, truth.y_m - reference.y_m)
-    return 100.0 * way_m, abs(math.remainder(truth.theta_rad - reference.theta_rad, 2.0 * math.pi))
-
-
-def row(case: Case, cells: dict[tuple[str, str], list[Outcome]]) -> str:
+def row(case: Case, cells: dict[tuple[str, str], list[Figure]]) -> str:
     """One line of the table: a cell for each figure and controller."""
     parts = [case.name]
     for figure in FIGURES:
         for controller in CONTROLLERS:
-            outcomes = cells[figure, controller]
-            lost = sum(outcome.unsettled for outcome in outcomes)
-            parts.append(
-                f"{median(outcome.rms_cm for outcome in outcomes):.2f}" + (f" ({lost})" if lost else "")
-            )
+            runs = cells[figure, controller]
+            lost = sum(run.settled_s is None for run in runs)
+            parts.append(f"{median(run.position_cm for run in runs):.2f}" + (f" ({lost})" if lost else ""))
     return f"| {' | '.join(parts)} |"
 
 
@@ -205,21 +159,20 @@ def main(arguments: list[str] | None = None) -> int:
         )
     if given.jobs < 1:
         parser.error("--jobs must be 1 or above")
-    plan = [
-        Cell(number, name, figure, given.seeds)
-        for number in numbers
-        for figure in FIGURES
-        for name in CONTROLLERS
+    cells = [(number, figure, name) for number in numbers for figure in FIGURES for name in CONTROLLERS]
+    levels = [
+        Level(f"{cell}", tuple(settings_of(CASES[cell[0]], cell[2])), scenario=cell[1]) for cell in cells
     ]
-    found: dict[tuple[int, str, str], list[Outcome]] = {}
+    plan = plan_of_levels("disturbances", levels, given.seeds)
+    found: dict[tuple[int, str, str], list[Figure]] = {}
     begun = time.monotonic()
     interrupted = False
     try:
-        results = in_order(run, plan, processes(given.jobs), 2 * given.jobs)
-        for cell, outcomes in zip(plan, results, strict=True):
-            found[cell[:3]] = outcomes
-            left = (time.monotonic() - begun) / len(found) * (len(plan) - len(found))
-            text = f"\r{len(found)} of {len(plan)} cells, {left:.0f} s left  "
+        outcomes = outcomes_of([plan.work(run) for run in range(plan.runs)], Processes(given.jobs))
+        for cell in cells:
+            found[cell] = [figure_of(seed, next(outcomes)) for seed in given.seeds]
+            left = (time.monotonic() - begun) / len(found) * (len(cells) - len(found))
+            text = f"\r{len(found)} of {len(cells)} cells, {left:.0f} s left  "
             print(text, end="", file=sys.stderr, flush=True)
     except KeyboardInterrupt:
         interrupted = True
@@ -228,13 +181,13 @@ def main(arguments: list[str] | None = None) -> int:
     for line in head():
         print(line)
     for number in numbers:
-        cells = {
-            (figure, name): found.get((number, name, figure), [])
+        line = {
+            (figure, name): found.get((number, figure, name), [])
             for figure in FIGURES
             for name in CONTROLLERS
         }
-        if all(cells.values()):
-            print(row(CASES[number], cells))
+        if all(line.values()):
+            print(row(CASES[number], line))
     return 130 if interrupted else 0
 
 

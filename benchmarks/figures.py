@@ -6,35 +6,36 @@ rms      position, x, y in cm over the last second, truth against reference: med
          order, the last of 20) and worst of the position
 never    runs that are outside 3 cm or 0.15 rad at some time of the last second, as a robot that has settled is not
 settled  median of the time after which a run stays inside, of the runs that are not counted as never
-back     runs in which the robot moves backwards by more than 1 cm/s at some time of the first half
+back     runs in which the robot moves backwards by more than 1 cm/s at some time
 faults   firmware faults, all runs added up
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import statistics
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import TICKS_PER_SECOND
-from miro_robot.firmware import image_path
-from miro_robot.image import load_hex
-from miro_sim.scenario import file
-from miro_sim.world.world import World
-from mirotwin.campaign.execute import in_order
-from mirotwin.campaign.processes import cores, processes
+from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from mirotwin.campaign.design import Level
+from mirotwin.campaign.drive import outcomes_of
+from mirotwin.campaign.plan import plan_of_levels
+from mirotwin.campaign.processes import cores
 from mirotwin.campaign.seeds import seeds_of
-from mirotwin.recording.track import Tracks
-from mirotwin.report.summary import tracking_of
+from mirotwin.campaign.single import run_single
+from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.workers import Processes
 
-BACKWARDS_M_S = -0.01
+PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
+RMS = ("rms_position_cm", "rms_x_cm", "rms_y_cm", "rms_theta_deg")
 HEAD = f"{'scenario':12} {'runs':>4}  {'rms position: median 95 % worst':32} {'x':>7} {'y':>7}"
 HEAD += "  never  settled  back  faults"
 
 
-class Outcome(NamedTuple):
+class Figure(NamedTuple):
     """What one run amounts to. `settled_s` is None for a run that never settles."""
 
     seed: int
@@ -68,41 +69,27 @@ class Row(NamedTuple):
         return f"{name:12} {self.runs:4}  {position:32} {self.x_cm:7.2f} {self.y_cm:7.2f} {counts}"
 
 
-class Task(NamedTuple):
-    """A name or file of a scenario, settings, seed."""
-
-    source: str
-    settings: tuple[str, ...]
-    seed: int
-
-
-def drive(task: Task) -> Outcome:
-    """One run. Raises BadInput."""
-    source, settings, seed = task
-    world = World(file.load(source, settings).scenario, seed, load_hex(image_path()))
-    tracks, speeds = Tracks(), []
-    while not world.finished:
-        period = world.step()
-        tracks.add(period)
-        speeds.append(period.robots[0].v_m_s)
-    errors = next(iter(tracks.robots.values())).errors
-    tracking = tracking_of(errors)
-    last = [sample for sample in errors if sample.tick > errors[-1].tick - TICKS_PER_SECOND]
-    figures = (tracking.rms_position_cm, tracking.rms_x_cm, tracking.rms_y_cm, tracking.rms_theta_deg)
-    position_cm, x_cm, y_cm, theta_deg = (0.0 if figure is None else figure for figure in figures)
-    return Outcome(
+def figure_of(seed: int, outcome: Outcome) -> Figure:
+    """What a run of a campaign amounts to. Raises BadInput for one that could not be made."""
+    if outcome.error:
+        raise BadInput("", f"seed {seed}", outcome.error)
+    found = outcome.figures
+    settling_s = found["settling_s"]
+    last_s = PERIOD_S * (math.ceil(found["simulated_s"] / PERIOD_S - 1e-6) - 1)  # the last exposure
+    position_cm, x_cm, y_cm, theta_deg = (0.0 if found[name] is None else found[name] for name in RMS)
+    return Figure(
         seed=seed,
         position_cm=position_cm,
         x_cm=x_cm,
         y_cm=y_cm,
         theta_deg=theta_deg,
-        settled_s=tracking.settling_s if all(sample.settled for sample in last) else None,
-        backwards=min(speeds[: len(speeds) // 2], default=0.0) < BACKWARDS_M_S,
-        faults=world.counters()["firmware"]["faults"] or 0,
+        settled_s=None if settling_s is None or settling_s > last_s - 1.0 else settling_s,
+        backwards=bool(found["backward_s"]),
+        faults=found["faults"] or 0,
     )
 
 
-def row(outcomes: Sequence[Outcome]) -> Row:
+def row(outcomes: Sequence[Figure]) -> Row:
     """The runs of one scenario, counted up."""
     positions = sorted(outcome.position_cm for outcome in outcomes)
     settled = [outcome.settled_s for outcome in outcomes if outcome.settled_s is not None]
@@ -120,12 +107,12 @@ def row(outcomes: Sequence[Outcome]) -> Row:
     )
 
 
-def outcomes(source: str, settings: Sequence[str], seeds: Iterable[int], jobs: int = 1) -> list[Outcome]:
-    """The runs of one scenario, in the order of the seeds, in `jobs` processes."""
-    tasks = [Task(source, tuple(settings), seed) for seed in seeds]
-    if jobs == 1:
-        return [drive(task) for task in tasks]
-    return list(in_order(drive, tasks, processes(jobs), 4 * jobs))
+def figures(source: str, settings: Sequence[str], seeds: range, jobs: int = 1) -> list[Figure]:
+    """The runs of one scenario, in the order of the seeds, in `jobs` processes. Raises BadInput."""
+    plan = plan_of_levels(source, [Level(source, scenario=source)], seeds, settings)
+    works = [plan.work(run) for run in range(plan.runs)]
+    outcomes = map(run_single, works) if jobs == 1 else outcomes_of(works, Processes(jobs))
+    return [figure_of(seed, outcome) for seed, outcome in zip(seeds, outcomes, strict=True)]
 
 
 def range_of_seeds(text: str) -> range:
@@ -149,7 +136,7 @@ def main() -> None:
     print(HEAD)
     for source in options.scenario:
         try:
-            found = outcomes(source, options.settings, options.seeds, options.jobs)
+            found = figures(source, options.settings, options.seeds, options.jobs)
         except BadInput as error:
             parser.error(str(error))
         for one in found if options.each else ():

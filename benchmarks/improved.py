@@ -13,23 +13,23 @@ import argparse
 import math
 import sys
 from collections.abc import Iterable, Sequence
-from functools import cache
 from statistics import median
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from benchmarks.figures import range_of_seeds
+from miro_exact.bad_input import BadInput
 from miro_exact.rng import Stream
 from miro_host.posture import Posture
-from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
 from miro_sim.pitch import ground
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario.build import reference_for
-from miro_sim.world.world import World
-from mirotwin.campaign.execute import in_order
-from mirotwin.campaign.processes import cores, processes
-from mirotwin.recording.track import Tracks
-from mirotwin.report.summary import tracking_of
+from mirotwin.campaign.design import Level
+from mirotwin.campaign.drive import outcomes_of
+from mirotwin.campaign.plan import plan_of_levels
+from mirotwin.campaign.worker import Outcome, Work
+from mirotwin.campaign.workers import Processes
 
 ANYWHERE_M = 10.0
 WHITE = 'camera={kind="gaussian"}'
@@ -128,45 +128,36 @@ def start_of(seed: int, near_m: float) -> Posture:
         index += 3
 
 
-@cache
-def _image() -> Image:
-    return load_hex(image_path())
-
-
-class Task(NamedTuple):
-    """A run of a case: seed, law, estimator, and further keys of the estimator's table."""
-
-    case: Case
-    seed: int
-    law: str
-    estimator: str
-    keys: str = ""
-
-
-def run(task: Task) -> Result:
-    """To its end."""
-    case, seed, law, estimator, keys = task
+def works(case: Case, seeds: range, law: str, estimator: str, keys: str = "") -> list[Work]:
+    """The runs of a case. `keys`: further ones of the estimator's table."""
     spread = "" if case.wheel_spread is None or estimator == "none" else f",wheel_spread={case.wheel_spread}"
     controller = () if law == "yang_kim" else (f'network.robot.controller={{law="{law}"}}',)
     more = f",{keys}" if keys else ""
-    sets = [*case.sets, *controller, f'network.robot.estimator={{kind="{estimator}"{spread}{more}}}']
+    sets = (*case.sets, *controller, f'network.robot.estimator={{kind="{estimator}"{spread}{more}}}')
+    plan = plan_of_levels(case.name, [Level(case.name, sets, case.scenario)], seeds)
+    found = [plan.work(run) for run in range(plan.runs)]
     if case.near_m:
-        start = start_of(seed, case.near_m)
-        heading_rad = scenario_heading_rad(case)
-        sets += [
-            f"network.robot.start_error_x_cm={100.0 * start.x_m!r}",
-            f"network.robot.start_error_y_cm={100.0 * start.y_m!r}",
-            f"network.robot.start_error_theta_rad={math.remainder(start.theta_rad - heading_rad, math.tau)!r}",
-        ]
-    world = World(scenario_file.load(case.scenario, tuple(sets)).scenario, seed, _image())
-    tracks = Tracks()
-    while not world.finished:
-        tracks.add(world.step())
-    errors = next(iter(tracks.robots.values())).errors
-    found = tracking_of(errors)
-    assert found.rms_position_cm is not None
-    assert found.off_pitch_s is not None
-    return Result(found.rms_position_cm, errors[len(errors) - 1].settled, found.off_pitch_s)
+        found = [replace(one, settings=(*one.settings, *start_settings(case, one.seed))) for one in found]
+    return found
+
+
+def start_settings(case: Case, seed: int) -> tuple[str, ...]:
+    """The start that is drawn for a seed."""
+    start = start_of(seed, case.near_m)
+    turned_rad = math.remainder(start.theta_rad - scenario_heading_rad(case), math.tau)
+    return (
+        f"network.robot.start_error_x_cm={100.0 * start.x_m!r}",
+        f"network.robot.start_error_y_cm={100.0 * start.y_m!r}",
+        f"network.robot.start_error_theta_rad={turned_rad!r}",
+    )
+
+
+def result_of(outcome: Outcome) -> Result:
+    """Raises BadInput for a run that could not be made."""
+    if outcome.error:
+        raise BadInput("", f"run {outcome.run}", outcome.error)
+    found = outcome.figures
+    return Result(found["rms_position_cm"], found["settled"], found["off_pitch_s"])
 
 
 def scenario_heading_rad(case: Case) -> float:
@@ -197,10 +188,10 @@ def table(chosen: Iterable[Case], seeds: range, *parts: str) -> bool:
     all_good = True
     for case in chosen:
         count = len(seeds) * case.runs_a_seed
-        tasks = [Task(case, seed, *parts) for seed in range(seeds.start, seeds.start + count)]
+        jobs = works(case, range(seeds.start, seeds.start + count), *parts)
         results = []
-        for result in in_order(run, tasks, processes(cores()), 4 * cores()):
-            results.append(result)
+        for outcome in outcomes_of(jobs, Processes()):
+            results.append(result_of(outcome))
             print(f"\r{case.name}: {len(results)} of {count}   ", end="", file=sys.stderr, flush=True)
         print("\r\033[K", end="", file=sys.stderr, flush=True)
         line, good = row(case, results)

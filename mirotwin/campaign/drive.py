@@ -8,10 +8,14 @@ from __future__ import annotations
 
 import concurrent.futures as futures
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import closing
+
+import msgspec
 
 from miro_exact.bad_input import BadInput
+from mirotwin.campaign.journal import in_order
 from mirotwin.campaign.worker import Outcome, Work, work
 from mirotwin.campaign.workers import Workers
 
@@ -21,6 +25,13 @@ TRIES = 2
 """So often a job that was under way when a process ended is tried by itself."""
 FRUITLESS = 20
 """So many executors in a row that end before any run does."""
+
+
+def outcomes_of(jobs: Sequence[Work], workers: Workers) -> Iterator[Outcome]:
+    """The outcome of each job in their order, numbered from 0, as soon as it and those before it are there."""
+    drive = Drive(lambda run: msgspec.structs.replace(jobs[run], run=run), workers)
+    with closing(drive.outcomes(range(len(jobs)))) as found:
+        yield from in_order(found)
 
 
 class Drive:

@@ -10,7 +10,7 @@ last line may be cut off, and is left out. Once a second the file is written to 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -183,11 +183,11 @@ def outcomes(path: Path) -> Iterator[tuple[Outcome, int]]:
             yield found, end
 
 
-def in_order(path: Path) -> Iterator[Outcome]:
+def in_order(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
     """Each run's outcome in the order of the plan; only those are kept that came before their turn."""
     early: dict[int, Outcome] = {}
     turn = 0
-    for outcome, _ in outcomes(path):
+    for outcome in outcomes:
         if outcome.run >= turn:
             early.setdefault(outcome.run, outcome)
         while turn in early:

@@ -19,7 +19,7 @@ from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, load
 from miro_sim.scenario.settings import EXPECT, OPTION, option_words
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN
-from mirotwin.campaign.design import Design, Level, Value
+from mirotwin.campaign.design import Design, Factor, Level, Value
 from mirotwin.campaign.file import CampaignFile, parse, read
 from mirotwin.campaign.single import image_of, prepared
 from mirotwin.campaign.versions import Versions, versions
@@ -116,6 +116,12 @@ def parse_plan(text: str, path: str | Path, settings: Sequence[str] = ()) -> Pla
     return plan_of(parse(text, Path(path)), settings)
 
 
+def plan_of_levels(name: str, levels: Sequence[Level], seeds: range, settings: Sequence[str] = ()) -> Plan:
+    """Each level with each seed, outside of any file: `name` stands for it in errors. Each has its scenario."""
+    design = Design(seeds[0], len(seeds), (Factor("case", tuple(levels)),))
+    return plan_of(CampaignFile(name, levels[0].scenario, "", (), 0.0, design), settings)
+
+
 def plan_of(file: CampaignFile, settings: Sequence[str] = ()) -> Plan:
     """Looks at everything that the runs need. Raises BadInput with the place in the file."""
     made = tuple((text, " ".join(option_words(text))) for text in settings)
@@ -193,7 +199,7 @@ class _Tried:
             if isinstance(step, CheckStep):
                 self.checks |= dict.fromkeys(check.name for check in step.checks)
         places = _places(self.plan, levels, drawn)
-        self.notes |= dict.fromkeys(_placed_note(self.plan, places, note) for note in ready.notes)
+        self.notes |= dict.fromkeys(_placed_note(self.plan, places, note) for note in ready.text.notes)
 
 
 def _places(plan: Plan, levels: Sequence[Level], drawn: Sequence[Value]) -> dict[str, str]:

@@ -20,7 +20,7 @@ from miro_exact.bad_input import BadInput, shortened
 from miro_exact.inputs import check_regular
 from mirotwin.campaign.columns import CHECK, FIGURES
 from mirotwin.campaign.design import Level
-from mirotwin.campaign.journal import Head, in_order
+from mirotwin.campaign.journal import Head, in_order, outcomes
 from mirotwin.campaign.plan import OWN_IMAGE, Plan
 from mirotwin.campaign.worker import Outcome
 from mirotwin.shell.outputs import OutputError, whole_file
@@ -107,7 +107,7 @@ def write(plan: Plan, head: Head, journal: Path, results: Path) -> None:
         pq.ParquetWriter(wall_file, wall, compression="zstd") as walls,
     ):
         count = 0
-        for group in _groups(in_order(journal)):
+        for group in _groups(in_order(one for one, _ in outcomes(journal))):
             count += len(group)
             rows.write_table(_table([_row(plan, one) for one in group], schema))
             walls.write_table(_table([{"run": one.run, "wall_s": one.wall_s} for one in group], wall))

@@ -5,6 +5,8 @@ A process keeps images, and scenarios with their settings, so that a run costs l
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,12 +16,13 @@ from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from miro_sim.periods import Period
-from miro_sim.scenario.file import parse_noted
-from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.file import ScenarioText, of_text
 from miro_sim.world.world import World
 from mirotwin.campaign.columns import figures_of
 from mirotwin.campaign.wall import now_s
 from mirotwin.campaign.worker import Outcome, Work
+from mirotwin.recording.recorder import Recorder
+from mirotwin.recording.source import source_of
 from mirotwin.recording.track import Tracks
 from mirotwin.report.seen import Seen
 from mirotwin.report.summary import summarise
@@ -36,12 +39,11 @@ from mirotwin.verify.steps.reading import steps_of
 
 
 class Prepared(msgspec.Struct, frozen=True):
-    """A scenario with its settings made, what it expects, its steps, and what the settings left out."""
+    """A scenario with its settings made, what it expects, and its steps."""
 
-    scenario: Scenario
+    text: ScenarioText
     expected: dict[Place, list[Check]]
     steps: list[Step]
-    notes: tuple[str, ...] = ()
 
 
 @lru_cache(maxsize=16)
@@ -55,9 +57,8 @@ def image_of(path: str) -> Image:
 @lru_cache(maxsize=64)
 def prepared(origin: str, text: str, settings: tuple[str, ...]) -> Prepared:
     """Raises BadInput for a scenario that cannot be run with these settings."""
-    scenario, notes = parse_noted(text, origin, settings)
-    expected, steps = expectations_of(scenario, origin), steps_of(scenario, origin)
-    return Prepared(scenario, expected, steps, notes)
+    found = of_text(text, origin, settings)
+    return Prepared(found, expectations_of(found.scenario, origin), steps_of(found.scenario, origin))
 
 
 def run_single(job: Work) -> Outcome:
@@ -77,16 +78,18 @@ def _run(job: Work) -> Outcome:
     image = image_of(job.firmware.path)
     found = prepared(job.origin, job.text, job.settings)
     check_symbols(found.steps, image, job.origin)
-    world = World(found.scenario, job.seed, image)
+    scenario = found.text.scenario
+    world = World(scenario, job.seed, image)
     checks = Checks(world, found.expected)
     player = Player(world, found.steps, job.origin) if found.steps else None
-    tracks, seen = Tracks(), Seen(found.scenario.camera.delay_frames)
+    tracks, seen = Tracks(), Seen(scenario.camera.delay_frames)
     began_s = now_s()
-    _move(world, player, tracks, seen)
+    with _recorder(job.recording, found.text, world) as recorder:
+        _move(world, player, tracks, seen, recorder)
     wall_s = now_s() - began_s
     checks.finish()
     summary = summarise(
-        scenario=found.scenario.name,
+        scenario=scenario.name,
         seed=job.seed,
         engine=job.engine,
         tracks=tracks,
@@ -94,7 +97,7 @@ def _run(job: Work) -> Outcome:
         wall_s=wall_s,
         counters=world.counters(),
         firmware_sha256=image.sha256 or "",
-        gains=gains_of(found.scenario),
+        gains=gains_of(scenario),
     )
     verdicts = _verdicts(checks, player)
     failure = _failure(checks, player)
@@ -109,16 +112,25 @@ def _run(job: Work) -> Outcome:
     )
 
 
-def _move(world: World, player: Player | None, tracks: Tracks, seen: Seen) -> None:
+@contextmanager
+def _recorder(path: str, text: ScenarioText, world: World) -> Iterator[Recorder | None]:
+    if not path:
+        yield None
+        return
+    with Path(path).open("wb") as stream, Recorder(stream, source_of(text, world)) as recorder:
+        yield recorder
+
+
+def _move(world: World, player: Player | None, tracks: Tracks, seen: Seen, recorder: Recorder | None) -> None:
     def keep(period: Period) -> None:
         tracks.add(period)
         if period.robots:
             seen.add(period.robots[0], period.tick)
+        if recorder is not None:
+            recorder.write_theories(tracks.theories())
 
-    if player is None:
-        runner.run(world, on_period=keep)
-    else:
-        runner.run(world, on_period=keep, move=player.play)
+    runner.run(world, recorder, on_period=keep, move=None if player is None else player.play)
+    if player is not None:
         player.finish()
 
 

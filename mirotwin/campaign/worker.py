@@ -27,7 +27,10 @@ class Firmware(msgspec.Struct, frozen=True):
 
 
 class Work(msgspec.Struct, frozen=True):
-    """One run: a whole scenario as text, `settings` to make in it, and a seed. `run`: its number in the plan."""
+    """One run: a whole scenario as text, `settings` to make in it, and a seed. `run`: its number in the plan.
+
+    `recording`: the file for a recording, if it is recorded.
+    """
 
     run: int
     origin: str
@@ -37,6 +40,7 @@ class Work(msgspec.Struct, frozen=True):
     firmware: Firmware
     engine: str
     versions: Versions
+    recording: str = ""
 
 
 class Outcome(msgspec.Struct, frozen=True, omit_defaults=True):

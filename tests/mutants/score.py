@@ -22,7 +22,6 @@ from pathlib import Path
 
 import msgspec
 
-from mirotwin.campaign.execute import in_order
 from mirotwin.campaign.processes import cores, processes
 from tests.mutants.build import CACHE, build, shipped
 from tests.mutants.draw import COUNT, SEED, drawn, mutants_of, source_files
@@ -96,7 +95,8 @@ def fate(job: Job) -> Fate:
 
 def fates(jobs: Iterable[Job], count: int) -> Iterator[Fate]:
     """What comes of each job, in their order, by so many processes."""
-    yield from in_order(fate, jobs, processes(count), 2 * count)
+    with processes(count) as executor:
+        yield from executor.map(fate, jobs)
 
 
 def merged(before: Fate, now: Fate, tried: tuple[str, ...], rules: tuple[str, ...]) -> Fate:

@@ -6,7 +6,7 @@
 import msgspec
 import pytest
 
-from benchmarks.figures import Outcome, outcomes, row
+from benchmarks.figures import Figure, figures, row
 from miro_host.laws.epsilon_tracking import ILLUSTRATIVE, RETUNED, THEORY, EpsilonTrackingParameters
 from miro_host.references.arc import ArcRef
 from miro_host.references.line import LineRef
@@ -78,7 +78,7 @@ def test_the_commented_gains_of_figs_9_and_10_are_the_other_two_sets(name):
 @pytest.mark.parametrize("name", ["fig6", "fig7", "fig8"])
 def test_the_papers_law_ends_within_the_papers_measurement_error(name):
     """Measured with seeds 0 to 49: median 1.20, 1.24, 1.22 cm, worst 2.62, 2.34, 2.64 cm, all settled."""
-    found = outcomes(name, (), range(8))
+    found = figures(name, (), range(8))
     assert row(found).median_cm <= 2.0
     assert max(one.position_cm for one in found) <= 3.3
     assert not any(one.faults for one in found)
@@ -88,12 +88,12 @@ def test_the_papers_law_ends_within_the_papers_measurement_error(name):
 @pytest.mark.parametrize("name", ["fig7", "fig8"])
 def test_with_large_initial_errors_the_robot_goes_back_as_well_as_forward(name):
     """The forward and backward motion that the paper reports of both figures; 50 of 50 seeds."""
-    assert all(one.backwards for one in outcomes(name, (), range(4)))
+    assert all(one.backwards for one in figures(name, (), range(4)))
 
 
 def test_a_row_counts_up_what_its_runs_came_to():
     runs = [
-        Outcome(seed, float(seed), 0.5, 2.0, 1.0, None if seed > 47 else 1.0, seed > 44, 0)
+        Figure(seed, float(seed), 0.5, 2.0, 1.0, None if seed > 47 else 1.0, seed > 44, 0)
         for seed in range(50)
     ]
     found = row(runs)
@@ -104,17 +104,17 @@ def test_a_row_counts_up_what_its_runs_came_to():
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_scenario_that_cannot_be_run_is_a_line_from_any_process(jobs):
-    with pytest.raises(ValueError, match=r"^fig6: --set camera.kind=3: .*"):
-        outcomes("fig6", ["camera.kind=3"], range(2), jobs)
+    with pytest.raises(ValueError, match=r"^fig6: .*--set camera.kind=3"):
+        figures("fig6", ["camera.kind=3"], range(2), jobs)
 
 
-def ratio(found: list[Outcome]) -> float:
+def ratio(found: list[Figure]) -> float:
     return row(found).y_cm / row(found).x_cm
 
 
 def test_with_gains_searched_for_fig_9_looks_like_the_papers():
     """The robot stays off the line, in Y three times as far as in X. A demonstration: the next tests say of what."""
-    found = outcomes("fig9", (), range(6))
+    found = figures("fig9", (), range(6))
     assert ratio(found) >= 3.0
     assert all(one.settled_s is None for one in found)
 
@@ -122,7 +122,7 @@ def test_with_gains_searched_for_fig_9_looks_like_the_papers():
 @pytest.mark.parametrize("name", ["fig9", "fig10"])
 def test_with_the_gains_of_the_theory_the_robot_never_settles(name):
     """The same gains hold epsilon in continuous time (`tests/host/test_epsilon_tracking.py`)."""
-    found = outcomes(name, set_to(THEORY), range(4))
+    found = figures(name, set_to(THEORY), range(4))
     assert all(one.settled_s is None for one in found)
     assert row(found).median_cm > 20.0
 
@@ -130,4 +130,4 @@ def test_with_the_gains_of_the_theory_the_robot_never_settles(name):
 @pytest.mark.parametrize("name", CAPTIONS)
 def test_retuned_for_the_loop_the_same_law_comes_to_the_path_from_all_five_starts(name):
     """So Figs. 9 and 10 show gains and sampling; they do not show that the paper's law is the better one."""
-    assert row(outcomes(name, set_to(RETUNED), range(4))).median_cm < 3.0
+    assert row(figures(name, set_to(RETUNED), range(4))).median_cm < 3.0

@@ -11,6 +11,7 @@ from miro_sim.pitch import ground
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario.build import dead_s
 from miro_sim.world.world import World
+from mirotwin.campaign.single import run_single
 
 CASES = {case.name: case for case in improved.cases()}
 SHORT = ("duration_s=2.0", 'camera={kind="gaussian"}', 'network.robot.controller={law="body_frame"}')
@@ -23,18 +24,21 @@ def run_world(*sets, seed=1, scenario="fig6"):
     return world
 
 
+def run_case(name, estimator):
+    (job,) = improved.works(CASES[name], range(1, 2), "body_frame", estimator)
+    return improved.result_of(run_single(job))
+
+
 @pytest.mark.parametrize("estimator", ["ekf", "ekf+telemetry"])
 def test_a_calibrated_camera_brings_the_robot_within_a_millimetre_and_a_half(estimator):
-    result = improved.run(improved.Task(CASES["calibrated, Fig. 6"], 1, "body_frame", estimator))
+    result = run_case("calibrated, Fig. 6", estimator)
     assert result.settled
     assert 0.0 < result.position_cm < 0.15
     assert result.off_pitch_s == 0.0
 
 
 def test_uneven_wheels_do_not_lead_the_robot_aside():
-    result = improved.run(
-        improved.Task(CASES["wheels 1.05 and 0.95, calibrated, Fig. 8"], 1, "body_frame", "ekf")
-    )
+    result = run_case("wheels 1.05 and 0.95, calibrated, Fig. 8", "ekf")
     assert result.position_cm < 0.3
 
 
@@ -48,20 +52,8 @@ def test_starts_are_drawn_on_the_pitch_near_enough_and_over_all_headings():
 def test_a_start_that_was_drawn_is_where_the_robot_starts():
     case = CASES["starts within 60 cm, arc"]
     start = improved.start_of(3, case.near_m)
-    turned = math.remainder(start.theta_rad - improved.scenario_heading_rad(case), math.tau)
     assert improved.scenario_heading_rad(case) == math.radians(60.0)
-    world = run_world(
-        *(
-            f"network.robot.start_error_{name}={value!r}"
-            for name, value in (
-                ("x_cm", 100.0 * start.x_m),
-                ("y_cm", 100.0 * start.y_m),
-                ("theta_rad", turned),
-            )
-        ),
-        "duration_s=0.01",
-        scenario="fig8",
-    )
+    world = run_world(*improved.start_settings(case, 3), "duration_s=0.01", scenario="fig8")
     theta_rad = world.networks[0].robots[0].drive.pose_at(0)[2]
     assert abs(math.remainder(theta_rad - start.theta_rad, math.tau)) < 1e-9
 

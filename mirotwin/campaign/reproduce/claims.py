@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 
-from mirotwin.campaign.job import Row
 from mirotwin.campaign.reproduce.plan import (
     CONTROL_NOISE,
     EPSILONS,
@@ -22,7 +21,7 @@ from mirotwin.campaign.reproduce.plan import (
     STARTS,
     Group,
 )
-from mirotwin.campaign.reproduce.rows import Table, count, middle, never_settled, settled
+from mirotwin.campaign.reproduce.rows import RunRow, Table, count, middle, never_settled, settled
 
 HOLDS, PART, NOT, NOT_JUDGED = "holds", "holds in part", "does not hold", "not judged"
 MOST = 0.9
@@ -48,13 +47,13 @@ def findings(table: Table) -> list[Finding]:
 
 def rows_of(
     table: Table, figure: int, controller: str, camera: str = "", disturbance: str = ""
-) -> Sequence[Row]:
+) -> Sequence[RunRow]:
     """The rows of one group; none, if it was not run."""
     start = next(start for start in STARTS if start.figure == figure)
     return table.get(Group(start, controller, camera, disturbance).label, ())
 
 
-def _converges(rows: Sequence[Row]) -> str:
+def _converges(rows: Sequence[RunRow]) -> str:
     """The verdict on runs of one group that have to converge."""
     position = middle(settled(rows), "rms_position_cm")
     near = position is not None and position <= BOUND_CM
@@ -76,7 +75,7 @@ def _approach(figure: int, words: str) -> Callable[[Table], Finding]:
     return claim
 
 
-def _error(rows: Sequence[Row]) -> str:
+def _error(rows: Sequence[RunRow]) -> str:
     found = settled(rows)
     return f"{number(middle(found, 'rms_position_cm'))} cm; {len(found)} of {len(rows)} runs"
 
@@ -137,12 +136,12 @@ def _heading(table: Table) -> Finding:
     )
 
 
-def _or_why_not(value: float | None, rows: Sequence[Row]) -> str:
+def _or_why_not(value: float | None, rows: Sequence[RunRow]) -> str:
     """A figure of the runs that settle."""
     return number(value) if value is not None else _not_judged(rows)
 
 
-def _not_judged(rows: Sequence[Row]) -> str:
+def _not_judged(rows: Sequence[RunRow]) -> str:
     return f"not judged: 0 of {len(rows)} settle"
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from mirotwin.campaign.job import Row
+from mirotwin.campaign.reproduce.rows import RunRow
 from mirotwin.campaign.versions import versions
 
 METADATA = "ro-crate-metadata.json"
@@ -36,13 +36,13 @@ FORMATS = {
 """By suffix: media type, and what such a file is."""
 
 
-def write_rows(rows: Sequence[Row], path: Path) -> None:
-    """All runs as Parquet, columns as in `Row`."""
+def write_rows(rows: Sequence[RunRow], path: Path) -> None:
+    """All runs as Parquet, columns as in `RunRow`."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     types = {"str": pa.string(), "int": pa.int64(), "bool": pa.bool_(), "float": pa.float64()}
-    schema = pa.schema([(field.name, types[_kind(field.type)]) for field in msgspec.structs.fields(Row)])
+    schema = pa.schema([(field.name, types[_kind(field.type)]) for field in msgspec.structs.fields(RunRow)])
     table = pa.Table.from_pylist([msgspec.structs.asdict(row) for row in rows], schema=schema)
     pq.write_table(table, path, compression="zstd")
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from mirotwin.campaign.job import Row
 from mirotwin.campaign.reproduce.claims import findings, number, rows_of
 from mirotwin.campaign.reproduce.plan import (
     CAMERAS,
@@ -19,7 +18,7 @@ from mirotwin.campaign.reproduce.plan import (
     STARTS,
     Start,
 )
-from mirotwin.campaign.reproduce.rows import Table, middle, never_settled, percentile, settled
+from mirotwin.campaign.reproduce.rows import RunRow, Table, middle, never_settled, percentile, settled
 
 NAMES = {
     PAPER: "the paper's law",
@@ -90,7 +89,7 @@ def _figures(table: Table, folder: str) -> Iterator[str]:
         yield ""
 
 
-def _line(name: str, rows: Sequence[Row]) -> str:
+def _line(name: str, rows: Sequence[RunRow]) -> str:
     backward = len([1 for row in rows if row.reversals > 0])
     across = len([1 for row in rows if row.crossings > 0])
     cells = [

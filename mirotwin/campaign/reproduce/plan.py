@@ -6,12 +6,15 @@ here each of them also runs from those of the other.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import msgspec
 
 from miro_host.laws.epsilon_tracking import THEORY as THEORY_GAINS
-from mirotwin.campaign.job import Job
+from miro_sim.scenario.file import source_text
+from mirotwin.campaign.design import Level
+from mirotwin.campaign.plan import Plan, plan_of_levels
+from mirotwin.campaign.worker import Work
 
 PAPER = "paper"
 IMPROVED = "improved"
@@ -141,15 +144,24 @@ GROUPS = (
 )
 
 
-def jobs(seeds: Sequence[int]) -> list[Job]:
-    """One for each group and seed."""
-    return [Job(group.label, *group.scenario(), seed) for group in GROUPS for seed in seeds]
+def plan_of(seeds: range) -> Plan:
+    """All groups with all seeds."""
+    levels = []
+    for group in GROUPS:
+        scenario, settings = group.scenario()
+        levels.append(Level(group.label, settings, scenario))
+    return plan_of_levels("mirotwin reproduce", levels, seeds)
 
 
-def recorded(seeds: Mapping[str, int], place: Callable[[str], str]) -> list[Job]:
-    """One for each group in `seeds`, with that seed. `place`: the file for a recording, by its name."""
-    return [
-        Job(group.label, *group.scenario(), seeds[group.label], place(group.recording))
-        for group in GROUPS
-        if group.label in seeds
-    ]
+def recorded(plan: Plan, seeds: Mapping[str, int], place: Callable[[str], str]) -> list[Work]:
+    """The run of each group in `seeds` with that seed, of the whole scenario with what it expects.
+
+    `place`: the file for a recording, by its name.
+    """
+    found = []
+    for index, group in enumerate(GROUPS):
+        if group.label in seeds:
+            run = index * plan.design.seed_count + seeds[group.label] - plan.design.first_seed
+            text, path = source_text(group.scenario()[0]), place(group.recording)
+            found.append(msgspec.structs.replace(plan.work(run), text=text, recording=path))
+    return found

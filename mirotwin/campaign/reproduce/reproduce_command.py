@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,8 @@ import click
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from mirotwin.campaign.execute import in_order
-from mirotwin.campaign.job import Job, Row, run
-from mirotwin.campaign.processes import cores, processes
+from mirotwin.campaign.drive import outcomes_of
+from mirotwin.campaign.plan import Plan
 from mirotwin.campaign.reproduce.crate import METADATA, metadata, write_rows
 from mirotwin.campaign.reproduce.page import page
 from mirotwin.campaign.reproduce.pictures import course, draw
@@ -28,12 +27,14 @@ from mirotwin.campaign.reproduce.plan import (
     STARTS,
     Group,
     Start,
-    jobs,
+    plan_of,
     recorded,
 )
-from mirotwin.campaign.reproduce.rows import by_label, middle_seeds
+from mirotwin.campaign.reproduce.rows import RunRow, by_label, middle_seeds, row_of
 from mirotwin.campaign.results import require_arrow
 from mirotwin.campaign.seeds import seeds_of
+from mirotwin.campaign.worker import Work
+from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.firmware.held_signals import Hold, held_signals
 from mirotwin.shell.options import Place, Whole, choose_engine, engine_option
 from mirotwin.shell.outputs import OutputFolder, check_new, told_when_full, whole_file
@@ -44,8 +45,6 @@ PAGE = "reproduction.md"
 FOLDER = "reproduction"
 ROWS = "rows.csv"
 TABLE = "rows.parquet"
-AHEAD = 4
-"""Jobs for each process that are handed over: enough to keep it busy, few enough to stop soon."""
 
 
 class Seeds(click.ParamType[range]):
@@ -121,7 +120,7 @@ def reproduce(
     folder = OutputFolder(out / FOLDER, force, names)
     if (out / FOLDER).is_dir() or (out / PAGE).exists():
         check_new(out / PAGE, "--out", force)
-    processors = count or cores()
+    plan, workers = plan_of(seeds), Processes(count)
     with (
         held_signals() as hold,
         folder,
@@ -129,9 +128,9 @@ def reproduce(
         told_when_full(out / FOLDER, "--out"),
     ):
         folder.keep = (ROWS,)
-        found = _run(jobs(seeds), processors, folder.part(ROWS), hold, quiet)
+        found = _run(plan, workers, folder.part(ROWS), hold, quiet)
         shown = middle_seeds(by_label(found))
-        _record(recorded(shown, lambda name: str(folder.part(name))), processors, hold, quiet)
+        _record(recorded(plan, shown, lambda name: str(folder.part(name))), workers, hold, quiet)
         for start in STARTS:
             _draw(start, folder, shown)
         text = page(by_label(found), f"{seeds[0]} to {seeds[-1]}", FOLDER)
@@ -165,34 +164,30 @@ def _pictures() -> list[str]:
     return [f"{start.name}.svg" for start in STARTS]
 
 
-def _run(plan: Sequence[Job], count: int, path: Path, hold: Hold, quiet: bool) -> list[Row]:
+def _run(plan: Plan, workers: Workers, path: Path, hold: Hold, quiet: bool) -> list[RunRow]:
     """All rows, each in the file as soon as it is there."""
-    found: list[Row] = []
-    names = [field.name for field in msgspec.structs.fields(Row)]
+    found: list[RunRow] = []
+    names = [field.name for field in msgspec.structs.fields(RunRow)]
     with (
         path.open("w", newline="", encoding="utf-8") as stream,
-        ProgressBar("running", len(plan), quiet) as bar,
+        ProgressBar("running", plan.runs, quiet) as bar,
     ):
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(names)
         with hold.released():
-            for row in _rows(plan, count):
-                found.append(row)
-                writer.writerow(msgspec.structs.astuple(row))
+            for outcome in outcomes_of([plan.work(run) for run in range(plan.runs)], workers):
+                found.append(row_of(plan, outcome))
+                writer.writerow(msgspec.structs.astuple(found[-1]))
                 stream.flush()
                 bar.to(len(found))
     return found
 
 
-def _record(plan: Sequence[Job], count: int, hold: Hold, quiet: bool) -> None:
+def _record(jobs: Sequence[Work], workers: Workers, hold: Hold, quiet: bool) -> None:
     """The runs that are shown, once more, with their recordings."""
-    with ProgressBar("recording", len(plan), quiet) as bar, hold.released():
-        for done, _ in enumerate(_rows(plan, count), 1):
+    with ProgressBar("recording", len(jobs), quiet) as bar, hold.released():
+        for done, _ in enumerate(outcomes_of(jobs, workers), 1):
             bar.to(done)
-
-
-def _rows(plan: Sequence[Job], count: int) -> Iterator[Row]:
-    yield from in_order(run, plan, processes(count), AHEAD * count)
 
 
 def _draw(start: Start, folder: OutputFolder, seeds: Mapping[str, int]) -> None:
@@ -217,7 +212,7 @@ def _draw(start: Start, folder: OutputFolder, seeds: Mapping[str, int]) -> None:
     draw(folder.part(f"{start.name}.svg"), title, courses)
 
 
-def _failures(found: Sequence[Row]) -> int:
+def _failures(found: Sequence[RunRow]) -> int:
     failed = [row for row in found if row.error]
     for row in failed[:5]:
         complain(f"{row.label}, seed {row.seed}: {row.error}")

@@ -1,29 +1,85 @@
-"""The rows of a group: medians, shares and counts."""
+"""A row of figures for each run; medians, shares and counts of a group's rows."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
-from mirotwin.campaign.job import Row
+import msgspec
 
-Table = Mapping[str, Sequence[Row]]
+from mirotwin.campaign.plan import Plan
+from mirotwin.campaign.worker import Outcome
+
+
+class RunRow(msgspec.Struct, frozen=True):
+    """What the first robot of a run did; `error` says why there is nothing else.
+
+    `rms_*`: root mean square over the last second, truth against reference; `seen_*`: measurement against the reference
+    at its exposure (None, if the robot was not seen in that second). `settling_s` as in summary.json; `settled` at the
+    end of the run. The last five: `report.theory`, None or 0 where no
+    host steered it.
+    """
+
+    label: str
+    scenario: str
+    seed: int
+    error: str = ""
+    digest: str = ""
+    rms_x_cm: float | None = None
+    rms_y_cm: float | None = None
+    rms_theta_deg: float | None = None
+    rms_position_cm: float | None = None
+    seen_x_cm: float | None = None
+    seen_y_cm: float | None = None
+    seen_theta_deg: float | None = None
+    seen_position_cm: float | None = None
+    settling_s: float | None = None
+    settled: bool = False
+    off_pitch_s: float | None = None
+    faults: int = 0
+    reversals: int = 0
+    backward_s: float = 0.0
+    crossings: int = 0
+    frames_across: int = 0
+    chattering_m_s2: float | None = None
+
+
+_COLUMNS = {"crossings": "assumption_3_crossings", "frames_across": "assumption_3_frames"}
+"""Figures that a campaign's results name otherwise."""
+
+
+def row_of(plan: Plan, outcome: Outcome) -> RunRow:
+    """The row of a run that was made."""
+    point = plan.design.point(outcome.run)
+    (level,) = point.levels
+    found: dict[str, Any] = {}
+    for name in RunRow.__struct_fields__:
+        value = outcome.figures.get(_COLUMNS.get(name, name))
+        if value is not None:
+            found[name] = value
+    return RunRow(
+        f"{level.value}", level.scenario, point.seed, error=outcome.error, digest=outcome.digest, **found
+    )
+
+
+Table = Mapping[str, Sequence[RunRow]]
 """Rows by the label of their group, in the order of the seeds."""
 
 
-def by_label(rows: Iterable[Row]) -> dict[str, list[Row]]:
+def by_label(rows: Iterable[RunRow]) -> dict[str, list[RunRow]]:
     """Groups in the order in which they come."""
-    found: dict[str, list[Row]] = {}
+    found: dict[str, list[RunRow]] = {}
     for row in rows:
         found.setdefault(row.label, []).append(row)
     return found
 
 
-def values(rows: Sequence[Row], name: str) -> list[float]:
+def values(rows: Sequence[RunRow], name: str) -> list[float]:
     """One figure of all rows that have it, in their order."""
     return [float(value) for row in rows if (value := getattr(row, name)) is not None]
 
 
-def middle(rows: Sequence[Row], name: str) -> float | None:
+def middle(rows: Sequence[RunRow], name: str) -> float | None:
     """The median, None where no row has it."""
     found = sorted(values(rows, name))
     if not found:
@@ -32,7 +88,7 @@ def middle(rows: Sequence[Row], name: str) -> float | None:
     return found[half] if len(found) % 2 else 0.5 * (found[half - 1] + found[half])
 
 
-def percentile(rows: Sequence[Row], name: str, share: float) -> float | None:
+def percentile(rows: Sequence[RunRow], name: str, share: float) -> float | None:
     """The smallest value that so large a share of the rows does not exceed (nearest rank)."""
     found = sorted(values(rows, name))
     if not found:
@@ -51,16 +107,16 @@ def middle_seeds(table: Table) -> dict[str, int]:
     return found
 
 
-def count(rows: Sequence[Row], holds: Callable[[Row], bool]) -> int:
+def count(rows: Sequence[RunRow], holds: Callable[[RunRow], bool]) -> int:
     """In how many rows."""
     return len([row for row in rows if holds(row)])
 
 
-def never_settled(rows: Sequence[Row]) -> int:
+def never_settled(rows: Sequence[RunRow]) -> int:
     """Runs that end outside of 3 cm or 0.15 rad, and runs that failed."""
     return count(rows, lambda row: not row.settled)
 
 
-def settled(rows: Sequence[Row]) -> list[Row]:
+def settled(rows: Sequence[RunRow]) -> list[RunRow]:
     """Runs that end within 3 cm and 0.15 rad. Errors of the others say only how far they got in 6 s."""
     return [row for row in rows if row.settled]

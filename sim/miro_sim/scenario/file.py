@@ -72,12 +72,16 @@ def load(source: str, settings: Sequence[str] = (), also: Also = nothing_else) -
     """The scenario that `source` names: a file if it ends in .toml or has a path separator, else a
     built-in. `settings` and `also` as `parse` takes them.
     """
-    text = source_text(source)
+    return of_text(source_text(source), source, settings, also)
+
+
+def of_text(text: str, origin: str, settings: Sequence[str] = (), also: Also = nothing_else) -> ScenarioText:
+    """As `load`, of a text that `origin` names."""
     notes: list[str] = []
-    raw, scenario, complete = _parsed(text, source, settings, also, notes)
+    raw, scenario, complete = _parsed(text, origin, settings, also, notes)
     if settings or not complete:
-        text = written(raw, source, settings)
-    return ScenarioText(source, text, scenario, tuple(settings), tuple(notes))
+        text = written(raw, origin, settings)
+    return ScenarioText(origin, text, scenario, tuple(settings), tuple(notes))
 
 
 def source_text(source: str) -> str:
@@ -105,13 +109,6 @@ def decode(raw: bytes, origin: str) -> str:
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise ScenarioError(origin, f"line {line}", "not UTF-8 text", "save the file as UTF-8") from None
-
-
-def parse_noted(text: str, origin: str, settings: Sequence[str] = ()) -> tuple[Scenario, tuple[str, ...]]:
-    """As `parse`, with what the settings left out, a line each."""
-    notes: list[str] = []
-    _, scenario, _ = _parsed(text, origin, settings, nothing_else, notes)
-    return scenario, tuple(notes)
 
 
 def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = nothing_else) -> Scenario:

@@ -10,7 +10,6 @@ from click.testing import CliRunner
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.file import load
 from mirotwin.campaign import builtin
-from mirotwin.campaign.job import Job, run
 from mirotwin.campaign.plan import load_plan
 from mirotwin.campaign.rows import Rows
 from mirotwin.commands import main
@@ -79,25 +78,6 @@ def test_an_entry_is_a_law_in_every_scenario_and_its_figures_and_digests_are_in_
     for name in FIGURES:
         assert name in rows.metrics()
         assert f"`{name}`" in PAGE
-
-
-def test_the_errors_that_the_camera_shows_are_those_of_the_reproduction(tmp_path):
-    text = f'scenario = "fig6"\nseeds = 3\nset = {{ {SHORT.replace("=", " = ")} }}\n'
-    (tmp_path / "one.toml").write_text(text, encoding="utf-8")
-    command = [
-        "campaign",
-        str(tmp_path / "one.toml"),
-        "--jobs",
-        "1",
-        "-q",
-        "--out",
-        str(tmp_path / "one.parquet"),
-    ]
-    assert CliRunner().invoke(main, command).exit_code == 0
-    rows = Rows(tmp_path / "one.parquet")
-    twin = run(Job("", "fig6", (SHORT,), 3))
-    for name in ("digest", "seen_x_cm", "seen_y_cm", "seen_theta_deg", "seen_position_cm", "rms_position_cm"):
-        assert rows.column(name) == [getattr(twin, name)]
 
 
 @pytest.mark.parametrize("name", ["line", "turned", "arc", "radio", "slip"])

@@ -5,8 +5,8 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from mirotwin.campaign.job import Row
 from mirotwin.campaign.reproduce.crate import PROFILE, metadata, write_rows
+from mirotwin.campaign.reproduce.rows import RunRow
 from mirotwin.commands import main
 
 DAY = "2026-11-22"
@@ -49,7 +49,7 @@ def test_each_file_is_a_part_with_its_relative_path_and_each_reference_has_its_e
 
 
 def test_the_same_files_and_the_same_date_give_the_same_bytes(tmp_path):
-    rows = [Row("a", "fig6", 1, rms_x_cm=0.5), Row("a", "fig6", 2, error="no such thing")]
+    rows = [RunRow("a", "fig6", 1, rms_x_cm=0.5), RunRow("a", "fig6", 2, error="no such thing")]
     for name in ("one.parquet", "two.parquet"):
         write_rows(rows, tmp_path / name)
     assert (tmp_path / "one.parquet").read_bytes() == (tmp_path / "two.parquet").read_bytes()

@@ -14,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_sim.scenario.file import load
-from mirotwin.campaign.job import Row
 from mirotwin.campaign.reproduce.claims import HOLDS, NOT, NOT_JUDGED, PART, findings
 from mirotwin.campaign.reproduce.page import page
 from mirotwin.campaign.reproduce.plan import (
@@ -27,11 +26,20 @@ from mirotwin.campaign.reproduce.plan import (
     RETUNED,
     STARTS,
     Group,
-    jobs,
+    plan_of,
     recorded,
 )
 from mirotwin.campaign.reproduce.reproduce_command import _failures
-from mirotwin.campaign.reproduce.rows import by_label, middle, middle_seeds, never_settled, percentile
+from mirotwin.campaign.reproduce.rows import (
+    RunRow,
+    by_label,
+    middle,
+    middle_seeds,
+    never_settled,
+    percentile,
+    row_of,
+)
+from mirotwin.campaign.worker import Outcome
 from mirotwin.commands import main
 
 DAY = "2026-11-22"
@@ -52,7 +60,7 @@ def table(**changes):
     for group in GROUPS:
         values = {**VALUES, **({"seen_position_cm": 0.1} if group.controller == IMPROVED else {})}
         values.update(changes.get(group.label.replace("-", "_").replace(".", "_"), {}))
-        found[group.label] = [Row(group.label, group.start.proposed, seed, **values) for seed in range(20)]
+        found[group.label] = [RunRow(group.label, group.start.proposed, seed, **values) for seed in range(20)]
     return found
 
 
@@ -210,18 +218,32 @@ def test_each_controller_runs_from_each_start_with_the_gains_of_its_path():
 
 
 def test_of_each_group_the_run_with_the_median_error_is_recorded():
-    plan = jobs(range(5, 8))
-    assert len(plan) == 3 * len(GROUPS)
-    assert not any(job.recording for job in plan)
-    table = {"fig6-paper": [Row("fig6-paper", "fig6", n, rms_position_cm=abs(n - 6.9)) for n in range(5, 9)]}
-    table["fig7-paper"] = [Row("fig7-paper", "fig7", 5, error="failed")]
+    plan = plan_of(range(5, 8))
+    assert plan.runs == 3 * len(GROUPS)
+    assert not any(plan.work(run).recording for run in range(plan.runs))
+    table = {
+        "fig6-paper": [RunRow("fig6-paper", "fig6", n, rms_position_cm=abs(n - 6.9)) for n in range(5, 9)]
+    }
+    table["fig7-paper"] = [RunRow("fig7-paper", "fig7", 5, error="failed")]
     assert middle_seeds(table) == {"fig6-paper": 6}
-    (job,) = recorded(middle_seeds(table), lambda name: f"out/{name}")
-    assert (job.seed, job.recording) == (6, "out/fig6-paper.mcap")
+    (job,) = recorded(plan, middle_seeds(table), lambda name: f"out/{name}")
+    assert (job.origin, job.seed, job.recording) == ("fig6", 6, "out/fig6-paper.mcap")
+    assert job.settings == Group(STARTS[0], PAPER).scenario()[1]
+    assert "tracks_within_cm" in job.text
+
+
+def test_a_row_has_the_figures_of_its_run_or_its_error():
+    plan = plan_of(range(5, 7))
+    figures = {"rms_x_cm": 0.5, "assumption_3_crossings": 2, "chattering_m_s2": None, "settled": True}
+    row = row_of(plan, Outcome(1, digest="d", figures=figures))
+    assert row == RunRow(
+        "fig6-paper", "fig6", 6, digest="d", rms_x_cm=0.5, crossings=2, settled=True, chattering_m_s2=None
+    )
+    assert row_of(plan, Outcome(0, error="no")) == RunRow("fig6-paper", "fig6", 5, error="no")
 
 
 def test_statistics_are_the_plain_ones():
-    rows = [Row("a", "s", n, rms_x_cm=float(n), settled=n != 4) for n in range(20)]
+    rows = [RunRow("a", "s", n, rms_x_cm=float(n), settled=n != 4) for n in range(20)]
     assert middle(rows, "rms_x_cm") == 9.5
     assert percentile(rows, "rms_x_cm", 0.95) == 18.0
     assert percentile(rows, "rms_x_cm", 1.0) == 19.0
@@ -239,6 +261,15 @@ def test_seeds_that_are_none_are_refused(seeds):
     assert "--seeds" in result.output
 
 
+@pytest.fixture
+def short_runs(monkeypatch):
+    whole = Group.scenario
+    monkeypatch.setattr(
+        Group, "scenario", lambda group: (whole(group)[0], (*whole(group)[1], "duration_s=1.1"))
+    )
+
+
+@pytest.mark.usefixtures("short_runs")
 def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_in_a_deposit(tmp_path):
     for options in (("--out", tmp_path / "a", "--jobs", "1"), ("--deposit", tmp_path / "b", "--date", DAY)):
         result = called(*options, "--seeds", "4")
@@ -259,7 +290,7 @@ def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_
         assert described[name]["contentSize"] == str(len(content))
     table = pq.read_table(tmp_path / "b/reproduction/rows.parquet")
     assert table["label"].to_pylist() == [group.label for group in GROUPS]
-    assert table.column_names == list(Row.__struct_fields__)
+    assert table.column_names == list(RunRow.__struct_fields__)
     names = {path.name for path in first}
     assert {"reproduction.md", "rows.csv", *(f"fig{n}.svg" for n in range(6, 11))} <= names
     assert len([name for name in names if name.endswith(".mcap")]) == len(GROUPS)
@@ -288,5 +319,5 @@ def test_a_page_that_is_there_is_not_replaced_without_force(tmp_path):
 
 
 def test_runs_that_failed_are_told_and_end_with_2(capsys):
-    assert _failures([Row("a", "fig6", 1, error="no such seed"), Row("a", "fig6", 2)]) == 2
+    assert _failures([RunRow("a", "fig6", 1, error="no such seed"), RunRow("a", "fig6", 2)]) == 2
     assert "1 of 2 runs failed" in capsys.readouterr().err
