@@ -32,6 +32,7 @@ SECTIONS = {
         "conform": Lazy(
             "mirotwin.verify.conform.conform_command", "Tries the protocol's rules on a firmware image."
         ),
+        "debug": Lazy("mirotwin.debug.debug_command", "Steps through the firmware, forwards and backwards."),
         "fuzz": Lazy("mirotwin.fuzz.fuzz_command", "Looks for inputs that make a firmware image fail."),
     },
     "Recorded data": {

@@ -48,6 +48,8 @@ class RobotRun:
 
     def __init__(self, world: World, network: int = 0, index: int = 0, periods: int | None = None) -> None:
         self.world = world
+        self.network = network
+        self.index = index
         self.board: Board | None = world.networks[network].robots[index].board
         self.cpu = world.networks[network].robots[index].board.cpu
         self.image = world.image
@@ -93,6 +95,10 @@ class BareRun:
         if not self.over:
             pause = -(-tick // CYCLE_TICKS)
             self.ended = self.machine.run(self.until, self.max_cycles, pause=pause)
+
+    def resume(self) -> None:
+        """The machine was put back to an earlier moment."""
+        self.ended = Ended.PAUSED
 
 
 def watch(

@@ -22,7 +22,10 @@ Kind = Literal["int", "float", "bool", "bit", "bits", "array", "struct", "pointe
 
 
 class CType(msgspec.Struct, frozen=True):
-    """A type. `size` in bytes; of `bits`, those that hold them. `element`, `count`: of an array; `tag`: of a struct."""
+    """A type. `size` in bytes; of `bits`, those that hold them. `element`, `count`: of an array; `tag`: of a struct.
+
+    Of a pointer, `element` is what it points to (None where that is not known) and `tag` the record's letters.
+    """
 
     kind: Kind
     size: int
@@ -62,6 +65,19 @@ _NAMED = re.compile(r"(u?)int(8|16|32|64)(?:\[([0-9]{1,5})\])?")
 _POINTERS = ("DG", "DC", "DX", "DD", "DI", "DP", "DA")
 _PLAIN: dict[str, Kind] = {"": "bool", "SF": "float", "SX": "bit", "SV": "void", "DF": "function"}
 _NUMBERS = ("SC", "SS", "SI", "SL")
+_POINTED_BYTES = {
+    "SC": 1,
+    "SS": 2,
+    "SI": 2,
+    "SL": 4,
+    "SF": 4,
+    "DG": 3,
+    "DC": 2,
+    "DX": 2,
+    "DD": 1,
+    "DI": 1,
+    "DP": 1,
+}
 
 
 def type_of(chain: str, size: int, signed: bool) -> CType | None:
@@ -86,7 +102,8 @@ def _type_of(chain: str, size: int, signed: bool) -> CType | None:
     if not size:
         return None
     if head in _POINTERS:
-        return CType("pointer", size)
+        points = _type_of(inner, _POINTED_BYTES.get(inner.partition(",")[0], 0), signed)
+        return CType("pointer", size, element=points, tag=head)
     return CType("int", size, signed) if head in _NUMBERS else None
 
 

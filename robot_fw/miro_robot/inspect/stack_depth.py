@@ -10,6 +10,8 @@ SDCC does not use. So the result is a lower bound.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import msgspec
 
 from miro_robot.image import Image
@@ -20,8 +22,10 @@ _RETI, _JMP_TABLE, _SJMP = 0x32, 0x73, 0x80
 _PUSH, _POP, _INC, _DEC, _MOV_DATA, _MOV_DIRECT = 0xC0, 0xD0, 0x05, 0x15, 0x75, 0x85
 _FRAME = (0xE5, _SP, 0x24, -1, 0xF5, _SP)  # MOV A,SP; ADD A,#n; MOV SP,A
 _WRITES = {0x05, 0x15, 0x42, 0x43, 0x52, 0x53, 0x62, 0x63, 0x75, 0x85, 0xC5, 0xD0, 0xD5, 0xF5}
-_VECTORS = tuple(range(0x03, 0x2C, 8))
+VECTORS = tuple(range(0x03, 0x2C, 8))
 _CALL_BYTES = 2
+_RAM_BYTES = 0x100
+_TABLE_JUMPS = (0x02, *range(0x01, 0x100, 0x20))  # LJMP and AJMP
 
 
 class Depth(msgspec.Struct, frozen=True):
@@ -66,7 +70,7 @@ class StackReader:
 
     def all(self) -> StackDepth:
         """Of the whole image."""
-        interrupts = [self.depth(at) for at in _VECTORS if self._loaded(at) and self._is_vector(at)]
+        interrupts = [self.depth(at) for at in VECTORS if self._loaded(at) and self._is_vector(at)]
         deepest = max(interrupts, key=lambda one: one.size, default=None)
         return StackDepth(self.depth(0), deepest)
 
@@ -110,6 +114,9 @@ class StackReader:
             address, at = waiting.pop()
             if not self._loaded(address) or (address in reached and reached[address].height >= at.height):
                 continue
+            if at.height >= _RAM_BYTES:
+                unknown.add("a loop that fills the stack")
+                continue
             reached[address] = at
             size, after, odd = self._after(address, at)
             unknown |= odd
@@ -121,7 +128,14 @@ class StackReader:
                 waiting.append((to, after))
             if opcode == _JMP_TABLE:
                 unknown.add("a jump by a table")
+                waiting += [(place, after) for place in self._table(address + size)]
         return {address: at.height for address, at in reached.items()}, unknown
+
+    def _table(self, address: int) -> Iterator[int]:
+        """The jumps that follow JMP @A+DPTR one behind the other, as SDCC writes a table."""
+        while self._loaded(address) and self.code[address] in _TABLE_JUMPS:
+            yield address
+            address += LENGTH[self.code[address]]
 
     def _after(self, address: int, at: _At) -> tuple[int, _At, set[str]]:
         """Bytes of code taken, what holds after them, and what could not be told."""

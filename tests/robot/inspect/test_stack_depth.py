@@ -51,10 +51,16 @@ def test_the_deepest_interrupt_comes_on_top():
         ("f:\nLCALL f\nRET", "recursion"),
         ("JMP @A+DPTR", "a jump by a table"),
         ("MOV SP,A\nend:\nSJMP end", "SP set by a value that is not known"),
+        ("again:\nPUSH ACC\nSJMP again", "a loop that fills the stack"),
     ],
 )
 def test_what_cannot_be_told_is_said(text, said):
     assert said in depth(text).unknown
+
+
+def test_the_jumps_of_a_table_are_followed():
+    text = "JMP @A+DPTR\nLJMP one\nLJMP two\none:\nPUSH ACC\nend:\nSJMP end\ntwo:\nPUSH ACC\nPUSH B\nSJMP end"
+    assert depth(text).main.size == 2
 
 
 PARTS = st.lists(st.sampled_from(["PUSH ACC", "POP B", "INC SP", "DEC SP", "NOP", "LCALL f"]), max_size=30)

@@ -1,0 +1,108 @@
+"""Which functions are under way: read from the stack, by what the code says of its height at each instruction.
+
+              ┌ base: where the return address of the function ends
+.. | caller's | low high | what the function pushed so far | free ..
+                                                           └ SP: base + height of the instruction that is next
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from miro_robot.image import Image
+from miro_robot.inspect.stack_depth import VECTORS, StackReader
+from miro_robot.inspect.symbol_names import SymbolNames
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.opcodes import is_call, target
+
+_MOST_FRAMES = 128  # two bytes each fill internal RAM
+_LCALL_BYTES, _ACALL_BYTES = 3, 2
+
+
+class Frame(msgspec.Struct, frozen=True):
+    """A function under way: `pc` is what it executes next, `entry` where it was entered, `base` SP at that moment.
+
+    `by_interrupt`: the hardware called it. `known`: whether the frames outside of it can be told.
+    """
+
+    pc: int
+    entry: int
+    base: int
+    by_interrupt: bool
+    known: bool
+
+
+class Unwinder:
+    """Reads the frames of a CPU that runs `image`. `heights`: instruction -> (bytes above the entry, entry)."""
+
+    def __init__(self, image: Image, names: SymbolNames) -> None:
+        self.code = image.code
+        self._reader = StackReader(image)
+        self._ways: dict[int, list[tuple[int, int]]] = {}  # instruction -> (height, entry) of each way to it
+        self._called: set[int] = set()
+        self._enter(0)
+        self.vectors = set()
+        for vector in VECTORS:
+            if vector not in self._ways:  # start-up code may lie where no interrupt is used
+                self.vectors.add(vector)
+                self._enter(vector)
+        for first, _ in names.functions:
+            if first not in self._ways:  # called by a pointer, if at all
+                self._enter(first)
+        self.heights = {
+            address: found
+            for address, ways in self._ways.items()
+            if (found := _agreed(ways, names.function(address)[0])) is not None
+        }
+
+    def _enter(self, entry: int) -> None:
+        """Notes the heights of a function, and of all that it calls."""
+        waiting = [entry]
+        while waiting:
+            entry = waiting.pop()
+            if entry in self._called:
+                continue
+            self._called.add(entry)
+            for address, height in self._reader.heights(entry).items():
+                self._ways.setdefault(address, []).append((height, entry))
+                to = target(self.code, address) if is_call(self.code[address]) else None
+                waiting += [] if to is None else [to]
+
+    def base(self, cpu: Cpu) -> int:
+        """Of the function that `cpu` is in; SP itself where the code does not tell."""
+        return cpu.sp - self.heights.get(cpu.pc, (0, 0))[0]
+
+    def frames(self, cpu: Cpu) -> list[Frame]:
+        """From the innermost outwards. The last one is `known` if it is that of reset."""
+        found: list[Frame] = []
+        pc, sp = cpu.pc, cpu.sp
+        while len(found) < _MOST_FRAMES:
+            height, entry = self.heights.get(pc, (0, -1))
+            base = sp - height
+            back = cpu.peek_iram(base - 1) | cpu.peek_iram(base) << 8
+            by_interrupt = entry in self.vectors
+            known = entry >= 0 and (entry == 0 or (base > 0 and (by_interrupt or self._follows_call(back))))
+            found.append(Frame(pc, entry if entry >= 0 else pc, base, by_interrupt, known))
+            if entry == 0 or not known:
+                break
+            pc, sp = back, base - 2
+        return found
+
+    def call_before(self, address: int) -> int:
+        """Where the call stands that returns to `address`; -1 where none does."""
+        for size in (_LCALL_BYTES, _ACALL_BYTES):
+            place = (address - size) & 0xFFFF
+            if is_call(self.code[place]) and (self.code[place] == 0x12) == (size == _LCALL_BYTES):
+                return place
+        return -1
+
+    def _follows_call(self, address: int) -> bool:
+        return self.call_before(address) >= 0
+
+
+def _agreed(ways: list[tuple[int, int]], own: int) -> tuple[int, int] | None:
+    """The height that all ways to an instruction agree in; where they do not, that from the function's own begin."""
+    for height, entry in ways:
+        if entry == own:
+            return height, entry
+    return ways[0] if len({height for height, _ in ways}) == 1 else None

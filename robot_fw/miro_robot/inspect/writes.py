@@ -1,0 +1,96 @@
+"""Which bytes an instruction writes: what a data breakpoint has to look at, without executing step by step.
+
+Direct and bit forms tell it by themselves. What goes through R0 and R1, DPTR, the bank and the stack pointer is known
+only before it is executed. Not seen: what hardware changes, and what A, B, DPTR, PSW and SP become by the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from miro_robot.mcs51.cpu import Cpu
+from miro_robot.mcs51.opcodes import LENGTH, ROW, is_call
+
+_DIRECT = {0x05, 0x15, 0x42, 0x43, 0x52, 0x53, 0x62, 0x63, 0x75, 0x86, 0x88, 0xC5, 0xD0, 0xD5, 0xF5}  # rows
+_BIT = {0x10, 0x92, 0xB2, 0xC2, 0xD2}
+_REGISTER = {0x08, 0x18, 0x78, 0xA8, 0xC8, 0xD8, 0xF8}
+_INDIRECT = {0x06, 0x16, 0x76, 0xA6, 0xC6, 0xD6, 0xF6}
+_MOV_DIRECT, _PUSH, _MOVX_DPTR, _MOVX_PAGE, _JBC = 0x85, 0xC0, 0xF0, 0xF2, 0x10
+_BANKS, _FIRST_SFR, _BITS_OF_IRAM, _P2 = 0x20, 0x80, 0x20, 0xA0
+
+
+class Bytes:
+    """`count` bytes of a memory: "iram", "sfr" or "xram"."""
+
+    def __init__(self, space: str, first: int, count: int) -> None:
+        self.space = space
+        self.first = first
+        self.end = first + count
+
+    def writers(self, code: bytes, instructions: Iterable[int]) -> set[int]:
+        """Those of the `instructions` that may write one of them."""
+        return {address for address in instructions if self._may(code, address)}
+
+    def are_written(self, cpu: Cpu) -> bool:
+        """Whether the instruction that `cpu` executes next writes one of them."""
+        pc, opcode = cpu.pc, cpu.code_at(cpu.pc)
+        row = ROW[opcode]
+        direct = _direct(row, cpu.code_at((pc + 1) & 0xFFFF), cpu.code_at((pc + 2) & 0xFFFF))
+        if row == _JBC and not cpu_bit(cpu, cpu.code_at((pc + 1) & 0xFFFF)):
+            return False
+        if direct >= 0:
+            return self._holds("iram" if direct < _FIRST_SFR else "sfr", direct)
+        if row in _REGISTER:
+            return self._holds("iram", cpu.bank + (opcode & 7))
+        if row in _INDIRECT:
+            return self._holds("iram", cpu.peek_iram(cpu.bank + (opcode & 1)))
+        if row == _PUSH or is_call(opcode):
+            pushed = range(1, 2 if row == _PUSH else 3)
+            return any(self._holds("iram", (cpu.sp + at) & 0xFF) for at in pushed)
+        if row == _MOVX_DPTR:
+            return self._holds("xram", cpu.dptr)
+        if row == _MOVX_PAGE:
+            return self._holds("xram", cpu.sfr(_P2) << 8 | cpu.peek_iram(cpu.bank + (opcode & 1)))
+        return False
+
+    def _holds(self, space: str, address: int) -> bool:
+        return space == self.space and self.first <= address < self.end
+
+    def _may(self, code: bytes, address: int) -> bool:
+        opcode, first, second = code[address], code[(address + 1) & 0xFFFF], code[(address + 2) & 0xFFFF]
+        row = ROW[opcode]
+        direct = _direct(row, first, second)
+        if direct >= 0:
+            return self._holds("iram" if direct < _FIRST_SFR else "sfr", direct)
+        if row in _REGISTER:
+            return self.space == "iram" and self.first < _BANKS
+        if row in _INDIRECT or row == _PUSH or is_call(opcode):
+            return self.space == "iram"
+        return row in (_MOVX_DPTR, _MOVX_PAGE) and self.space == "xram"
+
+
+def _direct(row: int, first: int, second: int) -> int:
+    """The direct address that an instruction writes, -1 for none; of a bit, that of its byte."""
+    if row == _MOV_DIRECT:
+        return second
+    if row in _BIT:
+        return first & 0xF8 if first >= _FIRST_SFR else _BITS_OF_IRAM + (first >> 3)
+    return first if row in _DIRECT else -1
+
+
+def cpu_bit(cpu: Cpu, bit: int) -> int:
+    """The bit at a bit address, of a port its latch."""
+    byte = cpu.sfr(bit & 0xF8) if bit >= _FIRST_SFR else cpu.peek_iram(_BITS_OF_IRAM + (bit >> 3))
+    return byte >> (bit & 7) & 1
+
+
+def instructions_of(code: bytes, used: Iterable[tuple[int, int]], known: Iterable[int]) -> set[int]:
+    """Where instructions may begin: the `known` places, and those one behind the other from each of them on."""
+    found: set[int] = set()
+    loaded = [range(first, end) for first, end in used]
+    waiting = sorted({*known, *(one.start for one in loaded)})
+    for address in waiting:
+        while address not in found and any(address in one for one in loaded):
+            found.add(address)
+            address += LENGTH[code[address]]
+    return found

@@ -1,0 +1,124 @@
+"""Expressions mean what C means by them."""
+
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mirotwin.debug.expression import NoValue, Value, content, expression
+from mirotwin.debug.symbols import Moment
+from tests.mirotwin.debug.runs import SECOND, debugger_of, robot_run
+
+
+class Numbers:
+    """A scope of plain numbers."""
+
+    def __init__(self, **numbers):
+        self.numbers = numbers
+
+    def find(self, name, module):
+        return Value(number=self.numbers[name])
+
+
+def value(text, scope=None):
+    scope = scope or Numbers(a=7, b=-2, c=0)
+    return content(expression(text)(scope), scope)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a + b * 3", 1),
+        ("(a + b) * 3", 15),
+        ("a / b", -3),
+        ("a % b", 1),
+        ("-a / 2", -3),
+        ("a >= 7 && b < 0", 1),
+        ("c && 1 / c", 0),
+        ("a || 1 / c", 1),
+        ("!c + !a", 1),
+        ("~0x0f & 0xff", 0xF0),
+        ("1 << 4 | 1", 17),
+        ("a == 7 == 1", 1),
+        ("'A' + '\\n'", 75),
+        ("a.0 + a.3", 1),
+    ],
+)
+def test_operators_have_the_ranks_of_c(text, expected):
+    assert value(text) == expected
+
+
+@given(
+    st.lists(
+        st.sampled_from(["a", "b", "3", "+", "-", "*", "(", ")", "&", "<", ".", "[", "]", "0x", "'", "$"])
+    )
+)
+def test_what_cannot_be_read_is_said(parts):
+    with suppress(NoValue):
+        value(" ".join(parts))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "1 +", "(1", "a b", "1 << 99", "1 / 0", "(" * 200 + "1" + ")" * 200, "a[0]", "*a", "&a"]
+)
+def test_what_has_no_value_is_refused(text):
+    with pytest.raises(NoValue):
+        value(text)
+
+
+@pytest.fixture(scope="module")
+def debugger():
+    debugger = debugger_of(robot_run())
+    debugger.add("take_body", debugger.symbols.at("take_body").addresses)
+    debugger.go_to(SECOND // 2)
+    debugger.go_on()
+    return debugger
+
+
+def shown(debugger, text, frame=0):
+    moment = debugger.moment(frame)
+    return content(expression(text)(moment), moment)
+
+
+@pytest.mark.parametrize(
+    ("text", "same"),
+    [
+        ("frames_accepted", "iram[&frames_accepted] + 256 * iram[&frames_accepted + 1]"),
+        ("failsafe:age", "age"),
+        ("P1.3", "P1 >> 3 & 1"),
+        ("RI", "SCON.0"),
+        ("R3", "iram[(PSW & 0x18) + 3]"),
+        ("lm629.left.pid.kp", "400"),
+        ("PC", "take_body"),
+        ("cycle * 12", "tick"),
+        ("A", "sfr[0xe0]"),
+        ("code[PC]", "code[take_body]"),
+        ("from", "R7"),
+    ],
+)
+def test_names_mean_variables_registers_bits_chips_and_memories(debugger, text, same):
+    assert shown(debugger, text) == shown(debugger, same)
+
+
+def test_what_is_not_live_says_so(debugger):
+    look = debugger_of(robot_run())
+    look.add("look", look.symbols.at("failsafe_look").addresses)
+    look.go_on()
+    with pytest.raises(NoValue, match="behind is not live: it was optimised away"):
+        shown(look, "behind")
+    with pytest.raises(NoValue, match="its registers belong to the function that is called"):
+        expression("from")(Moment(debugger.symbols, debugger.core, debugger.frames()[0], innermost=False))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("frames_acepted", "did you mean frames_accepted"),
+        ("xram[1]", "there is no xram"),
+        ("iram[256]", "give 0 to 255"),
+    ],
+)
+def test_a_name_that_is_not_there_names_what_comes_close(debugger, text, said):
+    with pytest.raises(NoValue, match=said):
+        shown(debugger, text)
