@@ -81,10 +81,12 @@ class EngineFinder:
 
     @cached_property
     def sources(self) -> dict[str, Path]:
-        """Dotted name -> source file of every hot module that is installed."""
-        from miro_exact.hot_modules import hot_sources
+        """Dotted name -> source file of every hot module that is installed, and of what they share."""
+        from miro_exact.hot_modules import SHARED, hot_sources
 
-        return hot_sources(installed_dirs())
+        dirs = installed_dirs()
+        package, _, name = SHARED.partition(".")
+        return {SHARED: dirs[package] / name, **hot_sources(dirs)}
 
     def missing(self) -> list[str]:
         """Hot modules that have no compiled twin."""

@@ -13,6 +13,8 @@ from pathlib import Path
 
 DISPATCH_MARK = b"mirotwin: dispatch replicated"
 """Bytes that the build leaves in a compiled module whose interpreter loop it could reshape (`threaded`)."""
+SHARED = "miro_exact.cython_shared"
+"""A compiled module without source of ours: Cython's own code that all the others import."""
 _CIMPORT = re.compile(r"^from (\S+) cimport ([^#\n]+)", re.MULTILINE)
 
 

@@ -37,10 +37,8 @@ def tree(tmp_path):
 
 
 def with_compiled_modules(tree):
-    for source in hot_modules.hot_sources({"": ROOT}).values():
-        built = hot_modules.compiled_file(source)
-        if built is not None and ".venv" not in built.parts and "build" not in built.parts:
-            shutil.copy(built, tree / built.relative_to(ROOT))
+    for built in engine.install().compiled():
+        shutil.copy(built, tree / built.relative_to(ROOT))
     return tree
 
 
