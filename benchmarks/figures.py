@@ -26,7 +26,7 @@ from mirotwin.campaign.plan import plan_of_levels
 from mirotwin.campaign.processes import cores
 from mirotwin.campaign.seeds import seeds_of
 from mirotwin.campaign.single import run_single
-from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
@@ -69,7 +69,7 @@ class Row(NamedTuple):
         return f"{name:12} {self.runs:4}  {position:32} {self.x_cm:7.2f} {self.y_cm:7.2f} {counts}"
 
 
-def figure_of(seed: int, outcome: Outcome) -> Figure:
+def figure_of(seed: int, outcome: RunOutcome) -> Figure:
     """What a run of a campaign amounts to. Raises BadInput for one that could not be made."""
     if outcome.error:
         raise BadInput("", f"seed {seed}", outcome.error)

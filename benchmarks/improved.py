@@ -28,7 +28,7 @@ from miro_sim.scenario.build import reference_for
 from mirotwin.campaign.design import Level
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import plan_of_levels
-from mirotwin.campaign.worker import Outcome, Work
+from mirotwin.campaign.worker import RunOutcome, Work
 from mirotwin.campaign.workers import Processes
 
 ANYWHERE_M = 10.0
@@ -152,7 +152,7 @@ def start_settings(case: Case, seed: int) -> tuple[str, ...]:
     )
 
 
-def result_of(outcome: Outcome) -> Result:
+def result_of(outcome: RunOutcome) -> Result:
     """Raises BadInput for a run that could not be made."""
     if outcome.error:
         raise BadInput("", f"run {outcome.run}", outcome.error)

@@ -15,7 +15,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
-from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.rerun import runner
 
 
@@ -24,7 +24,7 @@ def ratio(name: str, recorded: bool) -> float:
     image = load_hex(image_path())
     text = scenario_file.load(name)
     world = World(text.scenario, 0, image)
-    source = Source(name, text.text, 0, image.path.read_bytes(), image.sha256)
+    source = RunSource(name, text.text, 0, image.path.read_bytes(), image.sha256)
     with Recorder(io.BytesIO(), source) as recorder:
         start = time.perf_counter()
         runner.run(world, recorder if recorded else None)

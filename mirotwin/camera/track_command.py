@@ -38,7 +38,7 @@ class Robots(click.types.StringParamType):
         return tuple(map(int, words))
 
 
-class Line(msgspec.Struct):
+class TrackLine(msgspec.Struct):
     """One robot in one frame, as `--json` prints it; what is measured is null for a lost robot."""
 
     frame: int
@@ -149,13 +149,13 @@ def _utf8(name: str) -> str:
     return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
-def _line(frame: int, name: str, tick: int, robot: int, seen: Sighting | None) -> Line:
+def _line(frame: int, name: str, tick: int, robot: int, seen: Sighting | None) -> TrackLine:
     if seen is None:
-        return Line(frame, name, tick, robot, True)
-    return Line(frame, name, tick, robot, False, seen.x_m, seen.y_m, seen.theta_rad, seen.confidence)
+        return TrackLine(frame, name, tick, robot, True)
+    return TrackLine(frame, name, tick, robot, False, seen.x_m, seen.y_m, seen.theta_rad, seen.confidence)
 
 
-def _row(line: Line) -> str:
+def _row(line: TrackLine) -> str:
     head = f"{line.frame:6d} {line.robot:6d}"
     x_m, y_m, theta_rad, confidence = line.x_m, line.y_m, line.theta_rad, line.confidence
     if x_m is None or y_m is None or theta_rad is None or confidence is None:

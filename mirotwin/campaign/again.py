@@ -11,11 +11,11 @@ from typing import Any
 
 from miro_sim.scenario.settings import option_words
 from mirotwin.campaign.inline import inline
-from mirotwin.campaign.results import About
+from mirotwin.campaign.results import ResultsInfo
 from mirotwin.shell.command_line import command_line, operand
 
 
-def arm_line(about: About, levels: Mapping[str, Any]) -> str:
+def arm_line(about: ResultsInfo, levels: Mapping[str, Any]) -> str:
     """`mirotwin run ..` with all that the levels of the factors set; "" for a file that does not say it."""
     if not about.scenario:
         return ""
@@ -32,7 +32,7 @@ def arm_line(about: About, levels: Mapping[str, Any]) -> str:
     )
 
 
-def drawn_words(about: About, row: Mapping[str, Any]) -> str:
+def drawn_words(about: ResultsInfo, row: Mapping[str, Any]) -> str:
     """What was drawn for a row, as words of that command."""
     words = [word for name in about.drawn for word in ("--set", f"{name}={inline(row[name])}")]
     return shlex.join(words)

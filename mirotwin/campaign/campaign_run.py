@@ -17,7 +17,7 @@ from mirotwin.campaign.plan import Plan, load_plan
 from mirotwin.campaign.results import counted, require_arrow
 from mirotwin.campaign.running import Tally
 from mirotwin.campaign.seeds import seeds_of
-from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, set_option
 from mirotwin.shell.program import (
@@ -126,7 +126,7 @@ def _run(plan: Plan, results: Path, workers: Workers, force: bool, quiet: bool) 
     bar: ProgressBar | None = None
     last: Tally | None = None
 
-    def show(tally: Tally, outcome: Outcome) -> None:
+    def show(tally: Tally, outcome: RunOutcome) -> None:
         nonlocal bar, last
         last = tally
         if bar is None:

@@ -13,9 +13,9 @@ from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from mirotwin.campaign.columns import CHECK
-from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, Difference, difference
+from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, MetricDifference, difference
 from mirotwin.campaign.design import Value
-from mirotwin.campaign.rows import UNSETTLED, VERDICTS, Rows, paired, paired_levels
+from mirotwin.campaign.rows import UNSETTLED, VERDICTS, ResultRows, paired, paired_levels
 from mirotwin.campaign.statistics import Figures, Interval, figures
 from mirotwin.shell.console import show as show_table
 from mirotwin.shell.options import Number, Place
@@ -26,7 +26,7 @@ MOST_GROUPS = 50
 """More are in --json only."""
 
 
-class Group(msgspec.Struct, frozen=True):
+class GroupFigures(msgspec.Struct, frozen=True):
     """Runs with the same levels of some factors."""
 
     factors: dict[str, Value]
@@ -82,7 +82,7 @@ def show(
     """
     if compare is not None and against is not None:
         raise click.UsageError("--compare and --against do not go together.")
-    rows = Rows(results)
+    rows = ResultRows(results)
     for name in metrics:
         rows.check_metric(name)
     if not rows.count:
@@ -95,7 +95,7 @@ def show(
     return DONE
 
 
-def _show(rows: Rows, metrics: Sequence[str], by: Sequence[str], as_json: bool) -> None:
+def _show(rows: ResultRows, metrics: Sequence[str], by: Sequence[str], as_json: bool) -> None:
     columns = {name: rows.numbers(name) for name in metrics}
     verdicts = rows.column("verdict")
     groups = rows.groups(by)
@@ -104,7 +104,7 @@ def _show(rows: Rows, metrics: Sequence[str], by: Sequence[str], as_json: bool) 
         numbers = {name: column[np.array(members)] for name, column in columns.items()}
         seeds = samples[np.array(members)]
         found.append(
-            Group(
+            GroupFigures(
                 factors=dict(zip(by, levels, strict=True)),
                 runs=len(members),
                 verdicts={name: [verdicts[row] for row in members].count(name) for name in VERDICTS},
@@ -123,7 +123,7 @@ def _show(rows: Rows, metrics: Sequence[str], by: Sequence[str], as_json: bool) 
         show_line(f"{len(groups) - len(found)} more groups: --by names fewer factors, --json shows all")
 
 
-def _groups_table(groups: Sequence[Group]) -> Table:
+def _groups_table(groups: Sequence[GroupFigures]) -> Table:
     table = Table(box=None, pad_edge=False)
     for name in (*(groups[0].factors if groups else ()), "runs", *VERDICTS, "metric"):
         table.add_column(name)
@@ -152,7 +152,7 @@ def _cells(found: Figures | None) -> list[str]:
     return [f"{found.count}", _number(found.median), _interval(found.median_interval), *spread]
 
 
-def _compare(rows: Rows, text: str, metrics: Sequence[str], as_json: bool) -> int:
+def _compare(rows: ResultRows, text: str, metrics: Sequence[str], as_json: bool) -> int:
     name, first, second = rows.two_levels(text)
     pairs = paired_levels(rows, name, first, second)
     if not pairs:
@@ -167,8 +167,8 @@ def _compare(rows: Rows, text: str, metrics: Sequence[str], as_json: bool) -> in
     return DONE
 
 
-def _against(rows: Rows, path: Path, metrics: Sequence[str], tolerance: float, as_json: bool) -> int:
-    baseline = Rows(path)
+def _against(rows: ResultRows, path: Path, metrics: Sequence[str], tolerance: float, as_json: bool) -> int:
+    baseline = ResultRows(path)
     for name in metrics:
         baseline.check_metric(name)
     pairs = paired(baseline, rows)
@@ -203,13 +203,13 @@ def _against(rows: Rows, path: Path, metrics: Sequence[str], tolerance: float, a
 
 
 def _differences(
-    first: Rows, second: Rows, pairs: Sequence[tuple[int, int]], metrics: Sequence[str]
-) -> list[Difference]:
+    first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]], metrics: Sequence[str]
+) -> list[MetricDifference]:
     found = [difference(name, first, second, pairs) for name in metrics]
     return [one for one in found if one is not None]
 
 
-def _differences_table(found: Sequence[Difference], first: str, second: str) -> Table:
+def _differences_table(found: Sequence[MetricDifference], first: str, second: str) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("metric")
     for name in ("pairs", "left out", "seeds", first, second, "difference", "95 % interval", "median"):
@@ -233,7 +233,7 @@ def _differences_table(found: Sequence[Difference], first: str, second: str) -> 
     return table
 
 
-def _sentence(one: Difference) -> str:
+def _sentence(one: MetricDifference) -> str:
     """What has got worse, by how much, and with which interval."""
     means = f"from {_number(one.first)} to {_number(one.second)}"
     interval = f" (95 % interval {_interval(one.interval)})" if one.interval is not None else ""

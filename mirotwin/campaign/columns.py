@@ -16,9 +16,9 @@ from typing import Any, get_args, get_type_hints
 
 from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.recording.track import Tracks
-from mirotwin.report.seen import Seen
-from mirotwin.report.summary import Firmware, Link, Summary, Tracking, Vision, tracking_of
-from mirotwin.report.theory import Assumption1, Assumption2, Assumption3, Disturbance, Theory
+from mirotwin.report.seen import MeasuredErrors
+from mirotwin.report.summary import FirmwareCounts, LinkCounts, Summary, Tracking, VisionCounts, tracking_of
+from mirotwin.report.theory import Assumption1, Assumption2, Assumption3, DisturbanceFigures, Theory
 
 OWN = ("run", "draw", "seed", "verdict", "error", "failure", "digest")
 """Names that no factor can have."""
@@ -28,13 +28,13 @@ SEEN = ("seen_x_cm", "seen_y_cm", "seen_theta_deg", "seen_position_cm")
 _PARTS: tuple[tuple[str, tuple[str, ...], type], ...] = (
     ("", ("tracking",), Tracking),
     ("", ("theory",), Theory),
-    ("", ("theory", "disturbance"), Disturbance),
+    ("", ("theory", "disturbance"), DisturbanceFigures),
     ("assumption_1_", ("theory", "assumption_1"), Assumption1),
     ("assumption_2_", ("theory", "assumption_2"), Assumption2),
     ("assumption_3_", ("theory", "assumption_3"), Assumption3),
-    ("", ("link",), Link),
-    ("vision_", ("vision",), Vision),
-    ("", ("firmware",), Firmware),
+    ("", ("link",), LinkCounts),
+    ("vision_", ("vision",), VisionCounts),
+    ("", ("firmware",), FirmwareCounts),
 )
 """Prefix of the columns, where the figures stand in a summary, and their struct."""
 
@@ -58,7 +58,7 @@ FIGURES: Mapping[str, type] = {
 `worst_rms_position_cm`: the largest `rms_position_cm` of all robots."""
 
 
-def figures_of(summary: Summary, tracks: Tracks, seen: Seen) -> dict[str, Any]:
+def figures_of(summary: Summary, tracks: Tracks, seen: MeasuredErrors) -> dict[str, Any]:
     """The figures of one run; None for what it does not have. `seen`: the first robot's."""
     found: dict[str, Any] = {
         "simulated_s": summary.simulated_s,
@@ -74,7 +74,7 @@ def figures_of(summary: Summary, tracks: Tracks, seen: Seen) -> dict[str, Any]:
     return found
 
 
-def _seen(tracks: Tracks, seen: Seen) -> dict[str, float | None]:
+def _seen(tracks: Tracks, seen: MeasuredErrors) -> dict[str, float | None]:
     everyone = [track.errors for track in tracks.robots.values() if len(track.errors)]
     if not everyone:
         return dict.fromkeys(SEEN)

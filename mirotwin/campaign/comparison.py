@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from mirotwin.campaign.rows import Rows
+from mirotwin.campaign.rows import ResultRows
 from mirotwin.campaign.statistics import Interval, mean, mean_interval, quantile
 
 FEWEST_FOR_GATE = 20
@@ -23,7 +23,7 @@ GATED = ("rms_position_cm", "rms_theta_deg", "settling_s", "unsettled", "failed"
 MORE_IS_BETTER = ("frames_accepted", "frames_sent", "simulated_s", "vision_frames", "idle_cycles")
 
 
-class Difference(msgspec.Struct, frozen=True):
+class MetricDifference(msgspec.Struct, frozen=True):
     """A metric in `pairs` pairs of `seeds` seeds: means of both, and of second minus first with its interval.
 
     `without`: pairs that are left out, because one of the two runs does not have the metric. `median`: of the
@@ -54,7 +54,9 @@ class Difference(msgspec.Struct, frozen=True):
         return self.interval.low > allowed
 
 
-def difference(metric: str, first: Rows, second: Rows, pairs: Sequence[tuple[int, int]]) -> Difference | None:
+def difference(
+    metric: str, first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]]
+) -> MetricDifference | None:
     """Of the pairs (row of `first`, row of `second`) in which both have the metric; None where there are none."""
     before, after = first.numbers(metric), second.numbers(metric)
     places = np.array(pairs, dtype=np.int64).reshape(-1, 2)
@@ -64,7 +66,7 @@ def difference(metric: str, first: Rows, second: Rows, pairs: Sequence[tuple[int
     if not len(ours):
         return None
     apart, seeds = theirs - ours, second.samples()[places[both, 1]]
-    return Difference(
+    return MetricDifference(
         metric=metric,
         pairs=len(apart),
         without=len(places) - len(apart),

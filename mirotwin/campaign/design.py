@@ -75,7 +75,7 @@ class Draw(msgspec.Struct, frozen=True):
         return f"{self.name}={inline(value)}"
 
 
-class Point(msgspec.Struct, frozen=True):
+class DesignPoint(msgspec.Struct, frozen=True):
     """What one run has: the level of each factor, the values drawn, the number of the draw, and the seed."""
 
     levels: tuple[Level, ...]
@@ -106,7 +106,7 @@ class Design(msgspec.Struct, frozen=True):
         """What is varied, in the order of the columns."""
         return [*(factor.name for factor in self.factors), *(draw.name for draw in self.draws)]
 
-    def point(self, run: int) -> Point:
+    def point(self, run: int) -> DesignPoint:
         """What run number `run` has, from 0."""
         rest, seed = divmod(run, self.seed_count)
         rest, draw = divmod(rest, self.draw_count)
@@ -115,7 +115,7 @@ class Design(msgspec.Struct, frozen=True):
             rest, level = divmod(rest, len(factor.levels))
             levels.append(factor.levels[level])
         drawn = tuple(one.value(self.draw_seed, draw) for one in self.draws)
-        return Point(tuple(reversed(levels)), drawn, draw, self.first_seed + seed)
+        return DesignPoint(tuple(reversed(levels)), drawn, draw, self.first_seed + seed)
 
     def settings(self, levels: Sequence[Level], drawn: Sequence[Value]) -> tuple[str, ...]:
         """What a point sets, in the order of the file."""

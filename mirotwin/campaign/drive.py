@@ -16,7 +16,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from mirotwin.campaign.journal import in_order
-from mirotwin.campaign.worker import Outcome, Work, work
+from mirotwin.campaign.worker import RunOutcome, Work, work
 from mirotwin.campaign.workers import Workers
 
 SPREAD = 4096
@@ -27,7 +27,7 @@ FRUITLESS = 20
 """So many executors in a row that end before any run does."""
 
 
-def outcomes_of(jobs: Sequence[Work], workers: Workers) -> Iterator[Outcome]:
+def outcomes_of(jobs: Sequence[Work], workers: Workers) -> Iterator[RunOutcome]:
     """The outcome of each job in their order, numbered from 0, as soon as it and those before it are there."""
     drive = Drive(lambda run: msgspec.structs.replace(jobs[run], run=run), workers)
     with closing(drive.outcomes(range(len(jobs)))) as found:
@@ -41,12 +41,12 @@ class Drive:
         self.job = job
         self.workers = workers
         self._executor: Executor | None = None
-        self._pending: dict[Future[Outcome], int] = {}
+        self._pending: dict[Future[RunOutcome], int] = {}
         self._alone: deque[int] = deque()
         self._tries: dict[int, int] = {}
         self._fruitless = 0
 
-    def outcomes(self, runs: Iterable[int]) -> Generator[Outcome]:
+    def outcomes(self, runs: Iterable[int]) -> Generator[RunOutcome]:
         """Each as soon as it is there. Whoever stops asking, or is interrupted, leaves no job behind."""
         self._runs = iter(runs)
         self._next = next(self._runs, None)
@@ -89,7 +89,7 @@ class Drive:
         found, self._next = self._next, next(self._runs, None)
         return found
 
-    def _take(self, done: Iterable[Future[Outcome]]) -> Iterator[Outcome]:
+    def _take(self, done: Iterable[Future[RunOutcome]]) -> Iterator[RunOutcome]:
         lost = []
         for future in done:
             run = self._pending.pop(future)
@@ -99,7 +99,7 @@ class Drive:
                 lost.append(run)
                 continue
             except self.workers.ended as error:
-                yield Outcome(run, error=f"ended its worker (killed, or out of memory): {error}")
+                yield RunOutcome(run, error=f"ended its worker (killed, or out of memory): {error}")
                 continue
             except self.workers.gone:
                 raise self._gone() from None
@@ -112,14 +112,14 @@ class Drive:
         if lost:
             yield from self._broken(lost)
 
-    def _broken(self, lost: list[int]) -> list[Outcome]:
+    def _broken(self, lost: list[int]) -> list[RunOutcome]:
         """A new executor for the jobs of the one that is broken. Outcomes of those that have had all their tries."""
         lost = sorted([*lost, *self._pending.values()])
         self._pending.clear()
         self._restart()
         if len(lost) == 1 and self._tries.get(lost[0], 0) >= TRIES:
             self._tries.pop(lost[0])
-            return [Outcome(lost[0], error="ended the process that ran it (killed, or out of memory)")]
+            return [RunOutcome(lost[0], error="ended the process that ran it (killed, or out of memory)")]
         for run in lost:
             self._tries[run] = self._tries.get(run, 0) + 1
         self._alone.extendleft(reversed(lost))

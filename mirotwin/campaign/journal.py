@@ -22,7 +22,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
 from mirotwin.campaign.versions import Versions
 from mirotwin.campaign.wall import now_s
-from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.worker import RunOutcome
 
 FORM = 1
 SYNC_S = 1.0
@@ -86,7 +86,7 @@ class Journal:
     def close(self) -> None:
         self._stream.close()
 
-    def add(self, outcome: Outcome) -> None:
+    def add(self, outcome: RunOutcome) -> None:
         """Writes the outcome of a run; a second one of the same run is left out."""
         if self.done[outcome.run]:
             return
@@ -162,9 +162,9 @@ def _no_journal(path: Path) -> BadInput:
     return BadInput(path, "", "is no campaign's file", "choose another file with --out, or take it away")
 
 
-def outcomes(path: Path) -> Iterator[tuple[Outcome, int]]:
+def outcomes(path: Path) -> Iterator[tuple[RunOutcome, int]]:
     """Each outcome of the file, and the offset after it. Raises BadInput for a line that is not one."""
-    decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(Outcome)
+    decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(RunOutcome)
     with path.open("rb") as stream:
         end = len(stream.readline(_LINE_BYTES))
         for number, line in enumerate(iter(lambda: stream.readline(_LINE_BYTES), b""), 2):
@@ -175,7 +175,7 @@ def outcomes(path: Path) -> Iterator[tuple[Outcome, int]]:
             if not line.endswith(b"\n"):
                 return
             end += len(line)
-            found: Outcome | None = None
+            found: RunOutcome | None = None
             with suppress(msgspec.DecodeError, UnicodeDecodeError):
                 found = decoder.decode(line)
             if found is None:
@@ -183,9 +183,9 @@ def outcomes(path: Path) -> Iterator[tuple[Outcome, int]]:
             yield found, end
 
 
-def in_order(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
+def in_order(outcomes: Iterable[RunOutcome]) -> Iterator[RunOutcome]:
     """Each run's outcome in the order of the plan; only those are kept that came before their turn."""
-    early: dict[int, Outcome] = {}
+    early: dict[int, RunOutcome] = {}
     turn = 0
     for outcome in outcomes:
         if outcome.run >= turn:

@@ -11,9 +11,9 @@ import numpy as np
 
 from miro_exact.bad_input import BadInput
 from mirotwin.campaign.again import arm_line, drawn_words
-from mirotwin.campaign.comparison import GATED, Difference, difference
+from mirotwin.campaign.comparison import GATED, MetricDifference, difference
 from mirotwin.campaign.design import Value
-from mirotwin.campaign.rows import VERDICTS, Rows, paired_levels
+from mirotwin.campaign.rows import VERDICTS, ResultRows, paired_levels
 from mirotwin.campaign.statistics import Figures, figures
 from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.document import render
@@ -44,14 +44,14 @@ class Comparison(msgspec.Struct, frozen=True):
     first: Value
     second: Value
     pairs: int
-    differences: list[Difference]
+    differences: list[MetricDifference]
     figure: str
 
 
 def campaign_page(path: Path) -> bytes:
     """The page of a results file. Raises BadInput for a file that is not one, and where Bokeh is not installed."""
     require_bokeh()
-    rows = Rows(path)
+    rows = ResultRows(path)
     if not rows.count:
         raise BadInput(path, "", "holds no runs", "give the results of a campaign")
     metrics = [name for name in METRICS if name in rows.metrics()]
@@ -80,7 +80,7 @@ def campaign_page(path: Path) -> bytes:
     return render("campaign.html", made, _data(rows), values)
 
 
-def _by(rows: Rows) -> tuple[str, ...]:
+def _by(rows: ResultRows) -> tuple[str, ...]:
     """As many factors, from the first on, as make no more arms than a picture can have."""
     factors = rows.about.factors
     while factors and len(rows.groups(factors)) > MOST_ARMS:
@@ -99,7 +99,7 @@ def label_of(by: Sequence[str], levels: Sequence[Value]) -> str:
 
 
 def _arms(
-    rows: Rows,
+    rows: ResultRows,
     by: tuple[str, ...],
     groups: dict[tuple[Value, ...], list[int]],
     metrics: Sequence[str],
@@ -129,7 +129,7 @@ def _arms(
     return found
 
 
-def _comparisons(rows: Rows, made: dict[str, Any]) -> list[Comparison]:
+def _comparisons(rows: ResultRows, made: dict[str, Any]) -> list[Comparison]:
     """Each level of a factor against its first one."""
     from mirotwin.campaign.plots import Apart, apart  # loads Bokeh
 
@@ -152,14 +152,14 @@ def _comparisons(rows: Rows, made: dict[str, Any]) -> list[Comparison]:
     return found
 
 
-def _apart(rows: Rows, metric: str, pairs: Sequence[tuple[int, int]]) -> Any:
+def _apart(rows: ResultRows, metric: str, pairs: Sequence[tuple[int, int]]) -> Any:
     numbers = rows.numbers(metric)
     places = np.array(pairs, dtype=np.int64)
     found = numbers[places[:, 1]] - numbers[places[:, 0]]
     return found[~np.isnan(found)]
 
 
-def _failed(rows: Rows) -> list[tuple[int, str, int, str, str]]:
+def _failed(rows: ResultRows) -> list[tuple[int, str, int, str, str]]:
     """Run, arm, seed, verdict and what it said, of each run that has not passed."""
     factors = rows.about.factors
     columns = [rows.column(name) for name in ("run", "seed", "verdict", "error", "failure")]
@@ -171,7 +171,7 @@ def _failed(rows: Rows) -> list[tuple[int, str, int, str, str]]:
     ]
 
 
-def _seeds(rows: Rows) -> str:
+def _seeds(rows: ResultRows) -> str:
     seeds = rows.column("seed")
     first, last = min(seeds), max(seeds)
     return f"{first}" if first == last else f"{first} to {last}"
@@ -188,7 +188,7 @@ def _badge(counts: dict[str, int]) -> tuple[str, str]:
     return worst, said or f"{counts['passed']} runs passed"
 
 
-def _data(rows: Rows) -> bytes:
+def _data(rows: ResultRows) -> bytes:
     """What composes the command of each row: those of the arms, and for each row its arm, seed and what was drawn."""
     factors, about = rows.about.factors, rows.about
     arms = rows.groups(factors)
@@ -210,5 +210,5 @@ def _data(rows: Rows) -> bytes:
     )
 
 
-def _drawn(rows: Rows, drawn: dict[str, list[Any]], row: int) -> str:
+def _drawn(rows: ResultRows, drawn: dict[str, list[Any]], row: int) -> str:
     return drawn_words(rows.about, {name: column[row] for name, column in drawn.items()})

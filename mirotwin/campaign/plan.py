@@ -23,7 +23,7 @@ from mirotwin.campaign.design import Design, Factor, Level, Value
 from mirotwin.campaign.file import CampaignFile, parse, read
 from mirotwin.campaign.single import image_of, prepared
 from mirotwin.campaign.versions import Versions, versions
-from mirotwin.campaign.worker import Firmware, Work
+from mirotwin.campaign.worker import ImageFile, Work
 from mirotwin.verify.steps.keys import CheckStep
 from mirotwin.verify.steps.plan import check_symbols
 
@@ -45,7 +45,7 @@ class Plan(msgspec.Struct, frozen=True):
 
     file: CampaignFile
     scenarios: Mapping[str, ScenarioSource]
-    images: Mapping[str, Firmware]
+    images: Mapping[str, ImageFile]
     checks: tuple[str, ...]
     versions: Versions
     notes: tuple[str, ...] = ()
@@ -145,14 +145,14 @@ def _scenarios(file: CampaignFile) -> dict[str, ScenarioSource]:
     return found
 
 
-def _images(file: CampaignFile) -> dict[str, Firmware]:
+def _images(file: CampaignFile) -> dict[str, ImageFile]:
     found = {}
     for name, place in _named(file, file.firmware, "firmware"):
         path = "" if name == OWN_IMAGE else name
         if not Path(path or image_path()).exists():
             raise BadInput(file.path, place, f"there is no image {path}", "give the path of an .ihx file")
         try:
-            found[name] = Firmware(path, image_of(path).sha256 or "")
+            found[name] = ImageFile(path, image_of(path).sha256 or "")
         except BadInput as error:
             raise BadInput(file.path, place, f"{error}") from None
     return found

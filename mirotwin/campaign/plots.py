@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 from bokeh.models import ColumnDataSource, DataRange1d, FactorRange, Range1d, Span
 
-from mirotwin.campaign.comparison import Difference
+from mirotwin.campaign.comparison import MetricDifference
 from mirotwin.campaign.statistics import Figures, Numbers
 from mirotwin.report.page.axes import at_least, panel, tagged
 
@@ -43,7 +43,7 @@ class Arm(msgspec.Struct, frozen=True):
 class Apart(msgspec.Struct, frozen=True):
     """The difference of a metric in pairs, and each pair's own."""
 
-    difference: Difference
+    difference: MetricDifference
     numbers: Numbers
 
 

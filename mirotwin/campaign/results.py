@@ -22,7 +22,7 @@ from mirotwin.campaign.columns import CHECK, FIGURES
 from mirotwin.campaign.design import Level
 from mirotwin.campaign.journal import Head, in_order, outcomes
 from mirotwin.campaign.plan import OWN_IMAGE, Plan
-from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.worker import RunOutcome
 from mirotwin.shell.outputs import OutputError, whole_file
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ META = b"mirotwin_campaign"
 OPTION = "--out"
 
 
-class About(msgspec.Struct, frozen=True):
+class ResultsInfo(msgspec.Struct, frozen=True):
     """What a results file says of itself. `factors`: columns of the design, `drawn`: those of its random part.
 
     What makes a row again, by names without folders: `scenario`, `firmware`, `settings` of all runs, and the `levels`
@@ -67,9 +67,9 @@ def wall_path(results: Path) -> Path:
     return results.with_suffix(".wall.parquet")
 
 
-def about(plan: Plan, head: Head) -> About:
+def about(plan: Plan, head: Head) -> ResultsInfo:
     design = plan.design
-    return About(
+    return ResultsInfo(
         head,
         Path(plan.file.path).stem,
         tuple(factor.name for factor in design.factors),
@@ -118,7 +118,7 @@ def write(plan: Plan, head: Head, journal: Path, results: Path) -> None:
             )
 
 
-def read(path: str | Path) -> tuple[pa.Table, About]:
+def read(path: str | Path) -> tuple[pa.Table, ResultsInfo]:
     """The rows of a results file, and what it says of itself. Raises BadInput for any other file."""
     require_arrow()
     import pyarrow as pa
@@ -155,7 +155,7 @@ def _check_size(path: str | Path, metadata: Any) -> None:
         raise BadInput(path, "", f"holds {size >> 20} MiB, more than {MOST_BYTES >> 20}", GIVE)
 
 
-def _check_columns(path: str | Path, schema: Any, about: About) -> None:
+def _check_columns(path: str | Path, schema: Any, about: ResultsInfo) -> None:
     """What statistics rely on: a seed in each row, and each factor once, with values that can be compared."""
     kinds = ("int64", "double", "bool", "string")
     named = (*about.factors, *about.drawn)
@@ -186,7 +186,7 @@ def counted(path: Path, listed: int) -> dict[str, tuple[int, list[tuple[int, str
     return found
 
 
-def read_about(path: str | Path) -> About:
+def read_about(path: str | Path) -> ResultsInfo:
     """Only what the file says of itself. Raises BadInput for any other file."""
     require_arrow()
     import pyarrow as pa
@@ -198,9 +198,9 @@ def read_about(path: str | Path) -> About:
         raise BadInput(path, "", "is no Parquet file", "choose another file with --out") from None
 
 
-def about_of(path: str | Path, metadata: Mapping[bytes, bytes] | None) -> About:
+def about_of(path: str | Path, metadata: Mapping[bytes, bytes] | None) -> ResultsInfo:
     try:
-        return msgspec.json.decode((metadata or {})[META], type=About)
+        return msgspec.json.decode((metadata or {})[META], type=ResultsInfo)
     except (KeyError, msgspec.DecodeError, UnicodeDecodeError):
         what = "is no campaign's results"
         raise BadInput(
@@ -233,7 +233,7 @@ def _kind(values: Iterable[Any]) -> type:
     return kinds.pop() if len(kinds) == 1 else str
 
 
-def _row(plan: Plan, outcome: Outcome) -> dict[str, Any]:
+def _row(plan: Plan, outcome: RunOutcome) -> dict[str, Any]:
     row: dict[str, Any] = {"run": outcome.run, **plan.varied(outcome.run)}
     for draw in plan.design.draws:
         if _kind(draw.ends()) is str:
@@ -261,6 +261,6 @@ def _table(rows: list[dict[str, Any]], schema: pa.Schema) -> pa.Table:
     return pa.Table.from_arrays(columns, schema=schema)
 
 
-def _groups(outcomes: Iterator[Outcome]) -> Iterator[list[Outcome]]:
+def _groups(outcomes: Iterator[RunOutcome]) -> Iterator[list[RunOutcome]]:
     while group := list(islice(outcomes, ROWS)):
         yield group

@@ -16,7 +16,7 @@ from miro_exact.bad_input import BadInput
 from mirotwin.campaign.columns import CHECK, FIGURES
 from mirotwin.campaign.design import Value
 from mirotwin.campaign.inline import inline
-from mirotwin.campaign.results import About, read
+from mirotwin.campaign.results import ResultsInfo, read
 from mirotwin.campaign.statistics import Numbers, Seeds
 
 VERDICTS = ("failed", "fault", "error")
@@ -25,14 +25,14 @@ NOT_FIGURES = ("settled",)
 """Has a share of its own."""
 
 
-class Rows:
+class ResultRows:
     """The rows of one results file."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         table, about = read(path)
         self.table = table
-        self.about: About = about
+        self.about: ResultsInfo = about
         self.count: int = table.num_rows
 
     @property
@@ -125,7 +125,7 @@ class Rows:
         )
 
 
-def paired(before: Rows, after: Rows) -> list[tuple[int, int]]:
+def paired(before: ResultRows, after: ResultRows) -> list[tuple[int, int]]:
     """Rows of the same runs in two files. Raises BadInput where there are none."""
     if sorted(before.varied) != sorted(after.varied):
         what = f"varies {', '.join(before.varied) or 'nothing'}, not {', '.join(after.varied) or 'nothing'}"
@@ -138,7 +138,7 @@ def paired(before: Rows, after: Rows) -> list[tuple[int, int]]:
     return found
 
 
-def paired_levels(rows: Rows, name: str, first: Value, second: Value) -> list[tuple[int, int]]:
+def paired_levels(rows: ResultRows, name: str, first: Value, second: Value) -> list[tuple[int, int]]:
     """Rows that differ in one factor: those with `first`, and their twins with `second`."""
     values, keys = rows.column(name), rows.keys(without=name)
     places = {key: row for row, key in enumerate(keys) if values[row] == first}

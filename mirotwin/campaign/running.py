@@ -13,7 +13,7 @@ from mirotwin.campaign import results as tables
 from mirotwin.campaign.drive import Drive
 from mirotwin.campaign.journal import FORM, Head, Journal, journal_path
 from mirotwin.campaign.plan import Plan
-from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.shell.outputs import check_file
 
@@ -48,7 +48,7 @@ def run(
     *,
     force: bool = False,
     many: bool = False,
-    on_outcome: Callable[[Tally, Outcome], object] = lambda tally, outcome: None,
+    on_outcome: Callable[[Tally, RunOutcome], object] = lambda tally, outcome: None,
 ) -> Tally:
     """Makes all runs that `results` lacks, and writes it.
 
@@ -93,7 +93,7 @@ def _make(
     journal: Journal,
     workers: Workers,
     tally: Tally,
-    on_outcome: Callable[[Tally, Outcome], object],
+    on_outcome: Callable[[Tally, RunOutcome], object],
 ) -> None:
     if tally.done == plan.runs:
         return

@@ -20,11 +20,11 @@ from miro_sim.scenario.file import ScenarioText, of_text
 from miro_sim.world.world import World
 from mirotwin.campaign.columns import figures_of
 from mirotwin.campaign.wall import now_s
-from mirotwin.campaign.worker import Outcome, Work
+from mirotwin.campaign.worker import RunOutcome, Work
 from mirotwin.recording.recorder import Recorder
 from mirotwin.recording.source import source_of
 from mirotwin.recording.track import Tracks
-from mirotwin.report.seen import Seen
+from mirotwin.report.seen import MeasuredErrors
 from mirotwin.report.summary import summarise
 from mirotwin.report.theory import gains_of
 from mirotwin.rerun import runner
@@ -61,20 +61,20 @@ def prepared(origin: str, text: str, settings: tuple[str, ...]) -> Prepared:
     return Prepared(found, expectations_of(found.scenario, origin), steps_of(found.scenario, origin))
 
 
-def run_single(job: Work) -> Outcome:
+def run_single(job: Work) -> RunOutcome:
     """Runs it to the end; whatever goes wrong becomes the outcome's error."""
     try:
         return _run(job)
     except BadInput as error:
         show_traceback(error)
-        return Outcome(job.run, error=f"{error}")
+        return RunOutcome(job.run, error=f"{error}")
     except ValueError as error:  # numbers with which nothing can be computed, a part that fails
-        return Outcome(job.run, error=f"cannot be run: {error}")
+        return RunOutcome(job.run, error=f"cannot be run: {error}")
     except Exception as error:  # a fault of this program costs one run, too
-        return Outcome(job.run, error=f"internal error: {type(error).__name__}: {error}")
+        return RunOutcome(job.run, error=f"internal error: {type(error).__name__}: {error}")
 
 
-def _run(job: Work) -> Outcome:
+def _run(job: Work) -> RunOutcome:
     image = image_of(job.firmware.path)
     found = prepared(job.origin, job.text, job.settings)
     check_symbols(found.steps, image, job.origin)
@@ -82,7 +82,7 @@ def _run(job: Work) -> Outcome:
     world = World(scenario, job.seed, image)
     checks = Checks(world, found.expected)
     player = Player(world, found.steps, job.origin) if found.steps else None
-    tracks, seen = Tracks(), Seen(scenario.camera.delay_frames)
+    tracks, seen = Tracks(), MeasuredErrors(scenario.camera.delay_frames)
     began_s = now_s()
     with _recorder(job.recording, found.text, world) as recorder:
         _move(world, player, tracks, seen, recorder)
@@ -101,7 +101,7 @@ def _run(job: Work) -> Outcome:
     )
     verdicts = _verdicts(checks, player)
     failure = _failure(checks, player)
-    return Outcome(
+    return RunOutcome(
         run=job.run,
         verdict="fault" if summary.firmware.faults else "failed" if failure else "passed",
         failure=failure,
@@ -121,7 +121,9 @@ def _recorder(path: str, text: ScenarioText, world: World) -> Iterator[Recorder 
         yield recorder
 
 
-def _move(world: World, player: Player | None, tracks: Tracks, seen: Seen, recorder: Recorder | None) -> None:
+def _move(
+    world: World, player: Player | None, tracks: Tracks, seen: MeasuredErrors, recorder: Recorder | None
+) -> None:
     def keep(period: Period) -> None:
         tracks.add(period)
         if period.robots:

@@ -19,7 +19,7 @@ from mirotwin.campaign.versions import Versions, versions
 Figure = float | int | bool | str | None
 
 
-class Firmware(msgspec.Struct, frozen=True):
+class ImageFile(msgspec.Struct, frozen=True):
     """An image by its path ("" for the robot's own), and the hash that its file has to have."""
 
     path: str
@@ -37,13 +37,13 @@ class Work(msgspec.Struct, frozen=True):
     text: str
     settings: tuple[str, ...]
     seed: int
-    firmware: Firmware
+    firmware: ImageFile
     engine: str
     versions: Versions
     recording: str = ""
 
 
-class Outcome(msgspec.Struct, frozen=True, omit_defaults=True):
+class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
     """The result of a run. `verdict`: passed, failed (a check or a step), fault (of the firmware) or error (no run).
 
     `error`: why there are no figures. `failure`: the first check or step that failed. `checks`: name -> verdict.
@@ -62,11 +62,11 @@ class Outcome(msgspec.Struct, frozen=True, omit_defaults=True):
     where: str = ""
 
 
-def work(job: Work) -> Outcome:
+def work(job: Work) -> RunOutcome:
     """Runs a job to its end. Nothing but an outcome comes back, whatever happens to the run."""
     refused = _refusal(job)
     if refused:
-        return Outcome(job.run, refused=refused, where=place())
+        return RunOutcome(job.run, refused=refused, where=place())
     from mirotwin.campaign.single import run_single  # loads hot modules
 
     return run_single(job)
@@ -98,7 +98,7 @@ def _engine(name: str) -> str:
 
 
 @cache
-def _firmware(wanted: Firmware) -> str:
+def _firmware(wanted: ImageFile) -> str:
     """Why an image cannot be run here; its content does not travel, so it has to be the same file."""
     from mirotwin.campaign.single import image_of
 

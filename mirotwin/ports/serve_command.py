@@ -15,7 +15,7 @@ from mirotwin.ports.live import LONGEST_S, live_scenario
 from mirotwin.ports.serve_ports import PortOptions, open_ports, ports_option
 from mirotwin.ports.session import Session
 from mirotwin.recording.source import source_of
-from mirotwin.report.live import Live
+from mirotwin.report.live import LiveFigures
 from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.pacing import FASTEST, Pace
 from mirotwin.run.run_files import RunFiles
@@ -156,7 +156,7 @@ def _leave_case(folder: OutputFolder, world: World, trace: Trace, checks: Checks
     folder.part(CASE).write_text(text, encoding="utf-8")
 
 
-def _paced(live: Live) -> str:
+def _paced(live: LiveFigures) -> str:
     """How far the world was behind."""
     most = f"at most {live.late_max_ms:.1f} ms behind the wall clock"
     return f"{most}; by 20 ms or more for {live.late_s:.2f} s" if live.late_s else most

@@ -16,7 +16,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds, ticks
 from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import Endpoint, Tell
-from mirotwin.report.live import Live
+from mirotwin.report.live import LiveFigures
 from mirotwin.rerun.pacing import Pace
 
 SLICE_S = 0.002
@@ -110,9 +110,9 @@ class Session:
         came = any(endpoint.clients for endpoint in self.endpoints)
         return came and not any(endpoint.client or endpoint.port.waiting for endpoint in self.endpoints)
 
-    def live(self) -> Live:
+    def live(self) -> LiveFigures:
         """What the summary says of the session."""
-        return Live(
+        return LiveFigures(
             realtime=self.pace.factor,
             late_max_ms=1000.0 * seconds(self.pace.late_ticks),
             late_s=self.pace.late_s,

@@ -202,11 +202,11 @@ OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {
 }
 
 
-def message_type(place: topics.Place) -> type[msgspec.Struct] | None:
+def message_type(topic: topics.Topic) -> type[msgspec.Struct] | None:
     """The struct of the messages there, or None if there is no such channel."""
-    if place.slot >= 0:
-        return ROBOT_CHANNELS.get(place.channel)
-    return OTHER_CHANNELS.get(place.channel)
+    if topic.slot >= 0:
+        return ROBOT_CHANNELS.get(topic.channel)
+    return OTHER_CHANNELS.get(topic.channel)
 
 
 def messages(period: Period) -> Iterator[tuple[str, int, msgspec.Struct]]:

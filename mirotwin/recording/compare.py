@@ -32,7 +32,7 @@ WITHIN_COUNTS_PER_SAMPLE = 0.25
 _VELOCITY_UNIT = 65536.0
 
 
-class Rule(msgspec.Struct, frozen=True):
+class CompareRule(msgspec.Struct, frozen=True):
     """What counts as a difference. Differences at ticks from `from_tick` to before `to_tick` (None: the end) are told.
 
     `within_ticks`: of bytes and commands; `within_counts`, `within_counts_per_sample`: of wheels. `host`: also what the
@@ -49,11 +49,11 @@ class Rule(msgspec.Struct, frozen=True):
     digests: bool = False
 
 
-EXACT = Rule()
+EXACT = CompareRule()
 
 
 def differences(
-    recorded: Sequence[Period], replayed: Sequence[Period], rule: Rule = EXACT
+    recorded: Sequence[Period], replayed: Sequence[Period], rule: CompareRule = EXACT
 ) -> list[Difference]:
     """All differences of two runs under a rule, in the order of time, as far as both go.
 
@@ -68,7 +68,7 @@ def differences(
     return [difference for difference in found if rule.from_tick <= difference.tick < to_tick]
 
 
-def _all(one: Sequence[Period], other: Sequence[Period], rule: Rule) -> Iterator[Difference]:
+def _all(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
     """Causes before effects: of those at one tick the first is the first to be told."""
     if rule.kind in ("bits", "commands"):
         yield from _commands(one, other, rule)
@@ -91,7 +91,7 @@ def _all(one: Sequence[Period], other: Sequence[Period], rule: Rule) -> Iterator
 Named = Iterator[tuple[str, fields.Value, fields.Value]]
 
 
-def _values(robot: RobotPeriod, twin: RobotPeriod, rule: Rule) -> Named:
+def _values(robot: RobotPeriod, twin: RobotPeriod, rule: CompareRule) -> Named:
     """Every value that is not the same."""
     theirs = dict(fields.response(twin))
     for name, value in fields.response(robot):
@@ -105,7 +105,7 @@ def _values(robot: RobotPeriod, twin: RobotPeriod, rule: Rule) -> Named:
                 yield name, mine.get(name), theirs.get(name)
 
 
-def _wheels(robot: RobotPeriod, twin: RobotPeriod, rule: Rule) -> Named:
+def _wheels(robot: RobotPeriod, twin: RobotPeriod, rule: CompareRule) -> Named:
     for side, axis, other in (("left", robot.left, twin.left), ("right", robot.right, twin.right)):
         for name in ("real_position", "desired_position"):
             one, two = getattr(axis, name), getattr(other, name)
@@ -116,7 +116,7 @@ def _wheels(robot: RobotPeriod, twin: RobotPeriod, rule: Rule) -> Named:
             yield f"lm629 {side} desired_velocity", velocity, twins
 
 
-def _commands(one: Sequence[Period], other: Sequence[Period], rule: Rule) -> Iterator[Difference]:
+def _commands(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
     """Commands are known up to the last exposure: one that comes later in one run may not have been recorded."""
     exact = rule.kind == "bits"
     within_ticks = 0 if exact else rule.within_ticks
@@ -128,7 +128,7 @@ def _commands(one: Sequence[Period], other: Sequence[Period], rule: Rule) -> Ite
             yield from _unlike(here, there, within_ticks, known_tick, place)
 
 
-def _air(one: Sequence[Period], other: Sequence[Period], rule: Rule) -> Iterator[Difference]:
+def _air(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
     """Characters are known once their stop bits were sampled."""
     within_ticks = rule.within_ticks if rule.kind == "bytes" else 0
     end_tick = one[-1].tick + CONTROL_PERIOD_TICKS

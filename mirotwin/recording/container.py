@@ -61,7 +61,7 @@ class _Compressed(Exception):
     """A chunk that is compressed, and by what."""
 
 
-class Readable(Protocol):
+class ByteSource(Protocol):
     """An open file or pipe."""
 
     def read(self, size: int, /) -> bytes:
@@ -69,7 +69,7 @@ class Readable(Protocol):
         ...
 
 
-def records(source: Readable, path: str) -> Iterator[tuple[int, McapRecord]]:
+def records(source: ByteSource, path: str) -> Iterator[tuple[int, McapRecord]]:
     """(offset, record) of schemas, channels, messages, attachments and metadata; RecordingError where it cannot go on.
 
     `path` names the file in errors.
@@ -78,7 +78,7 @@ def records(source: Readable, path: str) -> Iterator[tuple[int, McapRecord]]:
 
 
 class _Container:
-    def __init__(self, source: Readable, path: str) -> None:
+    def __init__(self, source: ByteSource, path: str) -> None:
         self.source = source
         self.path = path
         self.place = 0  # of the record under way

@@ -14,7 +14,7 @@ from mirotwin.recording.capture import render
 from mirotwin.recording.capture.detect import FORMATS, NAMES, detect
 from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.layout import Layouts, look
-from mirotwin.recording.capture.rows import Row, rows
+from mirotwin.recording.capture.rows import DecodedRow, rows
 from mirotwin.recording.capture.source import READ_ERRORS, Source, open_source
 from mirotwin.shell.options import Place, choose_engine, engine_option
 from mirotwin.shell.program import DONE, complain
@@ -87,7 +87,7 @@ def _counted(sent: Iterable[Transmission], given: Input, bar: ProgressBar) -> It
             bar.to(shown)
 
 
-def _print_table(given: Input, source: Source, layouts: Layouts, found: Iterable[Row]) -> int:
+def _print_table(given: Input, source: Source, layouts: Layouts, found: Iterable[DecodedRow]) -> int:
     out = sys.stdout
     totals = render.Totals()
     out.write(f"{one_line(given.label)}: {NAMES[source.format]}{layouts}\n{render.units_line()}\n")
@@ -101,7 +101,7 @@ def _print_table(given: Input, source: Source, layouts: Layouts, found: Iterable
     return DONE
 
 
-def _print_json(given: Input, source: Source, found: Iterable[Row]) -> int:
+def _print_json(given: Input, source: Source, found: Iterable[DecodedRow]) -> int:
     def put(line: bytes) -> None:
         sys.stdout.write(line.decode() + "\n")
 

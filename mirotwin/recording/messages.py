@@ -8,7 +8,7 @@ from mcap.records import Attachment, Channel, Message, Metadata
 
 from miro_exact.bad_input import one_line, shortened
 from mirotwin.recording import channels
-from mirotwin.recording.container import Readable, RecordingError, records
+from mirotwin.recording.container import ByteSource, RecordingError, records
 from mirotwin.recording.recorder import (
     BROKEN_OFF,
     FIRMWARE_ATTACHMENT,
@@ -18,21 +18,21 @@ from mirotwin.recording.recorder import (
     SCENARIO_ATTACHMENT,
     SYMBOLS_ATTACHMENT,
 )
-from mirotwin.recording.topics import Place, place_of
+from mirotwin.recording.topics import Topic, topic_of
 
 ATTACHMENTS = (SCENARIO_ATTACHMENT, FIRMWARE_ATTACHMENT, SYMBOLS_ATTACHMENT)
 AGAIN = "record the run again"
 
 
 class Messages:
-    """Iterates over (place, message) of those of `kinds` (default: all). Raises RecordingError where it cannot go on.
+    """Iterates over (topic, message) of those of `kinds` (default: all). Raises RecordingError where it cannot go on.
 
     `path` names the file in errors. `metadata` (None: not a recording of this program) and `attachments` stand at the
     beginning of a file and are there with the first message. `broken_off`: what to say of a run that was.
     """
 
     def __init__(
-        self, source: Readable, path: str, kinds: Collection[type[msgspec.Struct]] | None = None
+        self, source: ByteSource, path: str, kinds: Collection[type[msgspec.Struct]] | None = None
     ) -> None:
         self.path = path
         self.kinds = kinds
@@ -42,20 +42,20 @@ class Messages:
         self.broken_off = ""
         self._topic = ""
         self._records = records(source, path)
-        self._channels: dict[int, tuple[str, Place, msgspec.json.Decoder[Any]]] = {}
+        self._channels: dict[int, tuple[str, Topic, msgspec.json.Decoder[Any]]] = {}
 
-    def __iter__(self) -> Iterator[tuple[Place, Any]]:
+    def __iter__(self) -> Iterator[tuple[Topic, Any]]:
         for offset, record in self._records:
             self.offset = offset
             if isinstance(record, Message):
                 channel = self._channels.get(record.channel_id)
                 if channel is not None:
-                    self._topic, place, decoder = channel
+                    self._topic, topic, decoder = channel
                     try:
                         message = decoder.decode(record.data)
                     except (msgspec.DecodeError, ValueError) as error:
                         raise self.unfit(error) from None
-                    yield place, message
+                    yield topic, message
             elif isinstance(record, Channel):
                 self._open(record)
             elif isinstance(record, Attachment) and record.name in (*ATTACHMENTS, RESUMED_ATTACHMENT):
@@ -64,12 +64,12 @@ class Messages:
                 self._take_metadata(record)
 
     def _open(self, record: Channel) -> None:
-        place = place_of(record.topic)
-        kind = None if place is None else channels.message_type(place)
-        if place is None or kind is None or record.id in self._channels:
+        topic = topic_of(record.topic)
+        kind = None if topic is None else channels.message_type(topic)
+        if topic is None or kind is None or record.id in self._channels:
             return
         if self.kinds is None or kind in self.kinds:
-            self._channels[record.id] = (record.topic, place, msgspec.json.Decoder(kind))
+            self._channels[record.id] = (record.topic, topic, msgspec.json.Decoder(kind))
 
     def _take_metadata(self, record: Metadata) -> None:
         if record.name == BROKEN_OFF:

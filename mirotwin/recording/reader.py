@@ -27,9 +27,9 @@ from mirotwin.recording.recorder import (
     RESUMED_ATTACHMENT,
     SCENARIO_ATTACHMENT,
     SYMBOLS_ATTACHMENT,
-    Source,
+    RunSource,
 )
-from mirotwin.recording.topics import Place
+from mirotwin.recording.topics import Topic
 
 NOT_READ = (ImageMessage, TheoryMessage)
 KINDS = tuple(kind for kind in (*ROBOT_CHANNELS.values(), *OTHER_CHANNELS.values()) if kind not in NOT_READ)
@@ -39,7 +39,7 @@ KINDS = tuple(kind for kind in (*ROBOT_CHANNELS.values(), *OTHER_CHANNELS.values
 class Recording(msgspec.Struct, frozen=True):
     """A run that was recorded. `broken_off`: what to say of one that does not go to its end, else empty."""
 
-    source: Source
+    source: RunSource
     periods: tuple[Period, ...]
     broken_off: str = ""
 
@@ -60,9 +60,9 @@ def parse(data: bytes, path: str) -> Recording:
     collector = _Collector(lambda: RESUMED_ATTACHMENT in messages.attachments)
     cut: Cut | None = None
     try:
-        for place, message in messages:
+        for topic, message in messages:
             try:
-                collector.take(place, message)
+                collector.take(topic, message)
             except (ValueError, KeyError) as error:
                 raise messages.unfit(error) from None
     except Cut as error:
@@ -91,16 +91,16 @@ class _Collector:
         self.actions: list[Action] = []
         self.periods: list[Period] = []
 
-    def take(self, place: Place, message: Any) -> None:
+    def take(self, topic: Topic, message: Any) -> None:
         """Raises ValueError or KeyError for a message that does not belong there."""
         if isinstance(message, channels.PeriodMessage):
             self._close(message)
         elif isinstance(message, channels.WireMessage):
-            self.wire.append(channels.transmission(place.network, message))
+            self.wire.append(channels.transmission(topic.network, message))
         elif isinstance(message, channels.ActionMessage):
-            self.actions.append(channels.action(place.network, message))
-        elif place.channel not in ("samples", "fault"):
-            self.robots.setdefault((place.network, place.slot), {})[place.channel] = message
+            self.actions.append(channels.action(topic.network, message))
+        elif topic.channel not in ("samples", "fault"):
+            self.robots.setdefault((topic.network, topic.slot), {})[topic.channel] = message
 
     def _close(self, message: channels.PeriodMessage) -> None:
         if not self.periods and self.resumed():
@@ -119,7 +119,7 @@ class _Collector:
         self.actions = []
 
 
-def _source(messages: Messages) -> Source:
+def _source(messages: Messages) -> RunSource:
     """What the run was made from. Raises RecordingError for what is missing."""
     messages.check_ours()
     metadata, attachments = messages.metadata or {}, messages.attachments
@@ -134,7 +134,7 @@ def _source(messages: Messages) -> Source:
         symbols = msgspec.json.decode(attachments[SYMBOLS_ATTACHMENT], type=dict[str, tuple[int, str]])
     except (UnicodeDecodeError, msgspec.DecodeError) as error:
         raise messages.error(brief(error), AGAIN) from None
-    return Source(
+    return RunSource(
         scenario_name=metadata.get("scenario", ""),
         scenario_text=text,
         seed=int(seed),

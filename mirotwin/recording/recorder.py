@@ -34,7 +34,7 @@ BROKEN_OFF = "mirotwin.broken_off"
 and when, if that is why."""
 
 
-class Fault(Protocol):
+class AnyFault(Protocol):
     """What a recording keeps of a firmware fault (`miro_robot.faults.FirmwareFault`)."""
 
     @property
@@ -47,7 +47,7 @@ class Fault(Protocol):
     def symbol(self) -> str: ...
 
 
-class Source(msgspec.Struct, frozen=True):
+class RunSource(msgspec.Struct, frozen=True):
     """What a run was made from: scenario text, seed, firmware file, and its symbols (name -> address,
     space). `state`: the form of the states that its digests are of (`Flat.tables`), "" where it is not known.
     `resumed`: the saved world that the run went on from, empty for a run from its start.
@@ -78,7 +78,7 @@ class Recorder:
     def __init__(
         self,
         stream: Writable,
-        source: Source,
+        source: RunSource,
         undisturbed: AbstractContextManager[object] | None = None,
     ) -> None:
         self._undisturbed = undisturbed or nullcontext()
@@ -155,7 +155,7 @@ class Recorder:
             self._write_waiting()
             self._add(topics.robot_topic(network, slot, "samples"), sample.tick, sample)
 
-    def write_faults(self, network: int, slot: int, faults: Sequence[Fault]) -> None:
+    def write_faults(self, network: int, slot: int, faults: Sequence[AnyFault]) -> None:
         """Adds a robot's firmware faults."""
         topic = topics.robot_topic(network, slot, "fault")
         with self._undisturbed:

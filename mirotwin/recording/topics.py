@@ -17,7 +17,7 @@ IMAGE = "camera/image"
 _TOPIC = re.compile(rf"/net([0-9]{{1,9}})(?:/robot([0-9]{{1,9}}))?/([a-z0-9_]+|{IMAGE})")
 
 
-class Place(NamedTuple):
+class Topic(NamedTuple):
     """What a topic names. `network`, `slot`: -1 where it is of the world, or of a whole network."""
 
     channel: str
@@ -41,12 +41,12 @@ def image_topic(network: int) -> str:
     return f"/net{network}/{IMAGE}"
 
 
-def place_of(topic: str) -> Place | None:
+def topic_of(topic: str) -> Topic | None:
     """What `topic` names; None if it has not the form of one of ours."""
     if topic == PERIOD:
-        return Place(PERIOD)
+        return Topic(PERIOD)
     found = _TOPIC.fullmatch(topic)
     if found is None:
         return None
     network, slot, channel = found.groups()
-    return Place(channel, int(network), -1 if slot is None else int(slot))
+    return Topic(channel, int(network), -1 if slot is None else int(slot))

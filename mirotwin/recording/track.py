@@ -25,7 +25,7 @@ TWO_PI = 6.283185307179586
 SETTLED_CM = 3.0
 SETTLED_RAD = 0.15
 
-Place = tuple[int, int]
+RobotId = tuple[int, int]
 """Network and slot of a robot."""
 
 
@@ -48,7 +48,7 @@ class ErrorSample(msgspec.Struct, frozen=True):
         return self.position_cm <= SETTLED_CM and abs(self.theta_rad) <= SETTLED_RAD
 
 
-class Errors(Sequence[ErrorSample]):
+class TrackingErrors(Sequence[ErrorSample]):
     """Tracking errors of one robot in the order of time."""
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ class Points:
         self.y_cm.append(100.0 * y_m)
 
 
-class Line:
+class Series:
     """A value against time."""
 
     def __init__(self) -> None:
@@ -99,11 +99,11 @@ class Line:
         self.values = array("d")
 
 
-class Track:
+class RobotTrack:
     """One robot: errors, where it was, should have been and was seen, and what the theory says of it."""
 
     def __init__(self) -> None:
-        self.errors = Errors()
+        self.errors = TrackingErrors()
         self.truth = Points()
         self.reference = Points()
         self.seen = Points()
@@ -128,8 +128,8 @@ class Tracks:
     def __init__(self, periods: Iterable[Period] = ()) -> None:
         self.count = 0
         self.digest = ""
-        self.robots: dict[Place, Track] = {}
-        self.inner: dict[str, dict[Place, Line]] = {}
+        self.robots: dict[RobotId, RobotTrack] = {}
+        self.inner: dict[str, dict[RobotId, Series]] = {}
         for period in periods:
             self.add(period)
 
@@ -139,7 +139,7 @@ class Tracks:
             place = (robot.network, robot.slot)
             track = self.robots.get(place)
             if track is None:
-                track = self.robots[place] = Track()
+                track = self.robots[place] = RobotTrack()
             track.add(robot, period.tick)
             if robot.control is not None:
                 self._add_inner(place, period.tick, robot.control.inner)
@@ -152,11 +152,11 @@ class Tracks:
             if track.theory.now is not None:
                 yield network, slot, track.theory.now
 
-    def _add_inner(self, place: Place, tick: int, inner: dict[str, float]) -> None:
+    def _add_inner(self, place: RobotId, tick: int, inner: dict[str, float]) -> None:
         for name, value in inner.items():
             line = self.inner.setdefault(name, {}).get(place)
             if line is None:
-                line = self.inner[name][place] = Line()
+                line = self.inner[name][place] = Series()
             line.times_s.append(seconds(tick))
             line.values.append(value)
 

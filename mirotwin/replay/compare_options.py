@@ -14,8 +14,8 @@ from mirotwin.recording.compare import (
     WITHIN_COUNTS,
     WITHIN_COUNTS_PER_SAMPLE,
     WITHIN_TICKS,
+    CompareRule,
     Kind,
-    Rule,
 )
 from mirotwin.shell.command import Option, Options
 from mirotwin.shell.options import FROM, JSON, TO, FiniteNumber, Whole
@@ -86,10 +86,10 @@ class CompareOptions(Options, frozen=True, kw_only=True):
             raise BadInput("", place, "the window is empty", "--to must be later")
 
     @property
-    def rule(self) -> Rule:
+    def rule(self) -> CompareRule:
         """The comparison that was asked for."""
         ms, counts, per_sample = self.within_ms, self.within_counts, self.within_counts_per_sample
-        return Rule(
+        return CompareRule(
             kind=self.kind,
             within_ticks=WITHIN_TICKS if ms is None else int(Fraction(ms) * _TICKS_PER_MS),
             within_counts=WITHIN_COUNTS if counts is None else counts,

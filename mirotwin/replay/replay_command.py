@@ -15,7 +15,7 @@ from miro_sim.radio.downlink import TransmissionError
 from miro_sim.world.world import World
 from mirotwin.firmware.sources_option import SourceFolders, checked_sources
 from mirotwin.fuzz.fuzz_bare import replay_bare_case
-from mirotwin.recording.compare import Rule, differences
+from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.difference import Difference
 from mirotwin.replay.compare_options import CompareOptions
 from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
@@ -164,7 +164,7 @@ def _refuse(file: str, what: str, given: Sequence[str]) -> None:
         raise BadInput(file, given[0], what, "leave it out")
 
 
-def _periods(file: str, job: Job, rule: Rule) -> int | None:
+def _periods(file: str, job: Job, rule: CompareRule) -> int | None:
     """How many control periods are replayed; None: to the end of the scenario."""
     if not job.recorded:
         ends = [tick for tick in (rule.to_tick, job.case.end_tick) if tick]

@@ -10,7 +10,7 @@ import msgspec
 from miro_robot.image import Image
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_sim.scenario.keys import Scenario
-from mirotwin.recording.recorder import Source
+from mirotwin.recording.recorder import RunSource
 
 
 class SourceDifference(msgspec.Struct, frozen=True):
@@ -27,7 +27,7 @@ class SourceDifference(msgspec.Struct, frozen=True):
 class Made(msgspec.Struct, frozen=True):
     """What a recording was made from. `image` None: what it holds is none."""
 
-    source: Source
+    source: RunSource
     scenario: Scenario
     image: Image | None
 

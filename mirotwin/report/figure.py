@@ -8,7 +8,7 @@ from pathlib import Path
 from miro_exact.clock import seconds
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD, ErrorSample, Tracks
 from mirotwin.report.summary import rms_name, settling_text, tracking_of
-from mirotwin.report.svg import COLOURS, Box, Drawing, Panel
+from mirotwin.report.svg import COLOURS, Drawing, Panel, PanelBox
 
 ERRORS = (
     ("(b)  x_e", "x_e [cm]", "x_cm", SETTLED_CM, "cm"),
@@ -74,9 +74,9 @@ def _inner_panel(tracks: Tracks, name: str) -> Panel:
     return panel
 
 
-def _box(columns: int, column: int, top: float, height: float) -> Box:
+def _box(columns: int, column: int, top: float, height: float) -> PanelBox:
     width = (WIDTH - LEFT - RIGHT - GAP * (columns - 1)) / columns
-    return Box(LEFT + column * (width + GAP), top, width, height)
+    return PanelBox(LEFT + column * (width + GAP), top, width, height)
 
 
 def _heading(scenario: str, seed: int, title: str, errors: Sequence[ErrorSample]) -> tuple[str, str]:

@@ -11,7 +11,7 @@ LEFT, RIGHT = "left_factor", "right_factor"
 """Values by which an estimator names the wheels' radii."""
 
 
-class Factor(msgspec.Struct, frozen=True):
+class WheelFactor(msgspec.Struct, frozen=True):
     """A wheel's radius over the nominal one: as it is, and as the estimator has it at the end."""
 
     true: float
@@ -23,8 +23,8 @@ class LearntWheels(msgspec.Struct, frozen=True):
 
     network: int
     slot: int
-    left: Factor
-    right: Factor
+    left: WheelFactor
+    right: WheelFactor
 
 
 def learnt_wheels(networks: Sequence[Any]) -> tuple[LearntWheels, ...]:
@@ -35,8 +35,8 @@ def learnt_wheels(networks: Sequence[Any]) -> tuple[LearntWheels, ...]:
             estimate = robot.pilot.command.estimate
             if LEFT in estimate and RIGHT in estimate:
                 chassis = robot.drive.params.chassis
-                left = Factor(chassis.left_radius_factor, estimate[LEFT])
-                right = Factor(chassis.right_radius_factor, estimate[RIGHT])
+                left = WheelFactor(chassis.left_radius_factor, estimate[LEFT])
+                right = WheelFactor(chassis.right_radius_factor, estimate[RIGHT])
                 found.append(LearntWheels(network.index, robot.slot, left, right))
     return tuple(found)
 

@@ -14,7 +14,7 @@ class Plug(msgspec.Struct, frozen=True):
     dropped: int
 
 
-class Live(msgspec.Struct, frozen=True):
+class LiveFigures(msgspec.Struct, frozen=True):
     """A session: virtual seconds in a second of the wall clock, and how far the world was behind it.
 
     `late_max_ms` in virtual time at most; `late_s`: how much of it was passed 20 ms or more behind.

@@ -14,11 +14,11 @@ from miro_exact.inputs import read_input
 from miro_robot.image import Image
 from miro_sim.radio.downlink import TransmissionError
 from mirotwin.firmware.coverage_files import source_folders
-from mirotwin.recording.compare import Rule, differences
+from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.frames import Extras, extras_of
 from mirotwin.report.page.reproduction import Again, run_again
-from mirotwin.report.page.run_page import About, Material, Replayed, run_page
+from mirotwin.report.page.run_page import Material, PageHeader, Replayed, run_page
 from mirotwin.report.summary import Summary
 from mirotwin.rerun.job import Job, load_job
 from mirotwin.shell.options import plain_parameters
@@ -128,7 +128,7 @@ def _of_recording(wanted: Wanted, file: str, job: Job, image: Image) -> Material
         notes.append(_played_with(image, "recording", job.image))
     what = f"Another firmware ({image.path.name})" if other else "This page's own run of it"
     # the state of a controller is not computed again, so that digests of states say nothing here
-    found = differences(job.recorded[: len(again.periods)], again.periods, Rule(to_tick=end_tick))
+    found = differences(job.recorded[: len(again.periods)], again.periods, CompareRule(to_tick=end_tick))
     return Material(
         about=_about("run", file, job, image, notes, _command(wanted, file)),
         scenario=job.scenario,
@@ -184,8 +184,8 @@ def _said(job: Job, again: Again) -> list[str]:
     return [f"What was recorded{now}. Recorded: {verdict}"]
 
 
-def _about(kind: str, file: str, job: Job, image: Image, notes: Sequence[str], again: str) -> About:
-    return About(
+def _about(kind: str, file: str, job: Job, image: Image, notes: Sequence[str], again: str) -> PageHeader:
+    return PageHeader(
         kind=kind,
         file=Path(file).name,
         seed=job.seed,

@@ -12,19 +12,19 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
 from miro_sim.periods import RobotPeriod
-from mirotwin.recording.track import Errors, error_of
+from mirotwin.recording.track import TrackingErrors, error_of
 from mirotwin.report.summary import Tracking, tracking_of
 
 LONGEST_FRAMES = 40
 """More than any camera's delay: so long a reference is kept."""
 
 
-class Seen:
+class MeasuredErrors:
     """Errors of one robot as its host sees them. `delay_frames`: of a camera whose measurements bear no tick."""
 
     def __init__(self, delay_frames: int) -> None:
         self.delay_frames = delay_frames
-        self.errors = Errors()
+        self.errors = TrackingErrors()
         self._references: dict[int, Posture] = {}
 
     def tracking(self, after_tick: int) -> Tracking:

@@ -7,11 +7,11 @@ from typing import Any
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
-from mirotwin.recording.track import ErrorSample, Place, Tracks
+from mirotwin.recording.track import ErrorSample, RobotId, Tracks
 from mirotwin.report.learnt_calibration import LearntCalibration
 from mirotwin.report.learnt_wheels import LearntWheels
-from mirotwin.report.live import Live
-from mirotwin.report.theory import Gains, Theory, theory_of
+from mirotwin.report.live import LiveFigures
+from mirotwin.report.theory import SlidingGains, Theory, theory_of
 from mirotwin.verify.checks.interface import Expectation
 
 
@@ -41,7 +41,7 @@ class RobotTracking(msgspec.Struct, frozen=True, omit_defaults=True):
     theory: Theory | None = None
 
 
-class Link(msgspec.Struct, frozen=True):
+class LinkCounts(msgspec.Struct, frozen=True):
     """Frames sent by all hosts; accepted, rejected (CRC) and stale as counted by the robots' firmware,
     added up.
 
@@ -56,7 +56,7 @@ class Link(msgspec.Struct, frozen=True):
     bit_errors: int
 
 
-class Vision(msgspec.Struct, frozen=True):
+class VisionCounts(msgspec.Struct, frozen=True):
     """What the cameras of all hosts saw: frames exposed, robots not found in them, frames dropped and repeated.
 
     `wrong`: measurements further off than three times the worst case of the calibration, `swapped`: nearer to another
@@ -71,7 +71,7 @@ class Vision(msgspec.Struct, frozen=True):
     swapped: int
 
 
-class Firmware(msgspec.Struct, frozen=True):
+class FirmwareCounts(msgspec.Struct, frozen=True):
     """The image and what it executed; `machine_cycles` includes `idle_cycles`; all robots added up."""
 
     sha256: str
@@ -81,7 +81,7 @@ class Firmware(msgspec.Struct, frozen=True):
     faults: int
 
 
-class Steps(msgspec.Struct, frozen=True, omit_defaults=True):
+class StepResults(msgspec.Struct, frozen=True, omit_defaults=True):
     """Results of a scenario's steps (`mirotwin.verify.steps`): how many were done, which failed and how.
 
     `expectations`: the checks that steps began.
@@ -114,9 +114,9 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     wall_s: float
     realtime_factor: float
     tracking: Tracking
-    link: Link
-    firmware: Firmware
-    vision: Vision | None = None
+    link: LinkCounts
+    firmware: FirmwareCounts
+    vision: VisionCounts | None = None
     calibrations: tuple[LearntCalibration, ...] = ()
     wheels: tuple[LearntWheels, ...] = ()
     theory: Theory | None = None
@@ -126,8 +126,8 @@ class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     resumed_s: float | None = None
     set: tuple[str, ...] = ()
     expectations: tuple[Expectation, ...] = ()
-    live: Live | None = None
-    steps: Steps | None = None
+    live: LiveFigures | None = None
+    steps: StepResults | None = None
 
 
 def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
@@ -196,13 +196,15 @@ def summarise(
     settings: tuple[str, ...] = (),
     calibrations: tuple[LearntCalibration, ...] = (),
     wheels: tuple[LearntWheels, ...] = (),
-    gains: Mapping[Place, Gains] = {},
+    gains: Mapping[RobotId, SlidingGains] = {},
     expectations: tuple[Expectation, ...] = (),
-    steps: Steps | None = None,
+    steps: StepResults | None = None,
 ) -> Summary:
     """The summary of a run; `counters` as `World.counters()` gives them, `gains` as `theory.gains_of`."""
     everyone = tuple(
-        RobotTracking(*place, tracking_of(track.errors), theory_of(track.theory, gains.get(place, Gains())))
+        RobotTracking(
+            *place, tracking_of(track.errors), theory_of(track.theory, gains.get(place, SlidingGains()))
+        )
         for place, track in tracks.robots.items()
     )
     return Summary(
@@ -214,9 +216,9 @@ def summarise(
         wall_s=wall_s,
         realtime_factor=seconds(simulated_ticks - resumed_ticks) / wall_s if wall_s > 0.0 else 0.0,
         tracking=everyone[0].tracking if everyone else tracking_of([]),
-        link=Link(**counters["link"]),
-        firmware=Firmware(sha256=firmware_sha256, **counters["firmware"]),
-        vision=Vision(**counters["vision"]) if counters["vision"] else None,
+        link=LinkCounts(**counters["link"]),
+        firmware=FirmwareCounts(sha256=firmware_sha256, **counters["firmware"]),
+        vision=VisionCounts(**counters["vision"]) if counters["vision"] else None,
         calibrations=calibrations,
         wheels=wheels,
         theory=everyone[0].theory if everyone else None,
@@ -242,7 +244,7 @@ def off_pitch_text(summary: Summary) -> str:
     return f"off it for {', '.join(left)} (the pitch has no walls here)" if left else ""
 
 
-def vision_text(vision: Vision) -> str:
+def vision_text(vision: VisionCounts) -> str:
     """What the cameras saw, for people: what did not happen is left out, but for lost robots."""
     happened = {
         "frames dropped": vision.dropped,

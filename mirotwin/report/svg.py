@@ -43,7 +43,7 @@ svg{--ink:#1c1c1c;--paper:#fff;--grid:#e6e6e6;--frame:#8a8a8a;--band:#eef2f8;
 """
 
 
-class Box(NamedTuple):
+class PanelBox(NamedTuple):
     """Left, top, width and height in pixels."""
 
     x: float
@@ -52,7 +52,7 @@ class Box(NamedTuple):
     height: float
 
 
-class Mark(NamedTuple):
+class Stroke(NamedTuple):
     """Points and how they are drawn: `style` of STYLE, `colour` 0 (ink) to 5."""
 
     x: Sequence[float]
@@ -73,7 +73,7 @@ class Panel:
         self.y_label = y_label
         self.band = band
         self.equal = equal
-        self.marks: list[Mark] = []
+        self.marks: list[Stroke] = []
         self.small = False
         """Smaller text, and no numbers below."""
         self.y_range: tuple[float, float] | None = None
@@ -81,14 +81,14 @@ class Panel:
     def line(self, x: Sequence[float], y: Sequence[float], *, colour: int, **look: str) -> None:
         """`style`: classes besides `line`; `label`: its name in the legend."""
         style = f"line {look.get('style', '')}".rstrip()
-        self.marks.append(Mark(x, y, style, colour, look.get("label", "")))
+        self.marks.append(Stroke(x, y, style, colour, look.get("label", "")))
 
     def dots(self, x: Sequence[float], y: Sequence[float], *, colour: int, label: str = "") -> None:
-        self.marks.append(Mark(x, y, "dots", colour, label))
+        self.marks.append(Stroke(x, y, "dots", colour, label))
 
     def start(self, x: float, y: float, *, colour: int) -> None:
         """A ring."""
-        self.marks.append(Mark([x], [y], "start", colour, ""))
+        self.marks.append(Stroke([x], [y], "start", colour, ""))
 
     def spans(self) -> tuple[float, float, float, float]:
         """The least and the most of x, then of y."""
@@ -108,7 +108,7 @@ class Drawing:
             style = "mid" if number else "mid head"
             self._parts.append(_text(width / 2, 24 + 20 * number, text, style, sub=False))
 
-    def add(self, panel: Panel, box: Box) -> None:
+    def add(self, panel: Panel, box: PanelBox) -> None:
         self._parts += _Axes(panel, box).parts()
 
     def write(self, path: Path) -> None:
@@ -118,7 +118,7 @@ class Drawing:
 class _Axes:
     """A panel in its box: pixels of values."""
 
-    def __init__(self, panel: Panel, box: Box) -> None:
+    def __init__(self, panel: Panel, box: PanelBox) -> None:
         self.panel = panel
         self.box = box
         x_low, x_high, y_low, y_high = panel.spans()
@@ -188,7 +188,7 @@ class _Axes:
                 made.append(f'<path class="{mark.style}" style="{colour}" d="{self._path(mark, dots)}"/>')
         return made
 
-    def _path(self, mark: Mark, dots: bool) -> str:
+    def _path(self, mark: Stroke, dots: bool) -> str:
         step = -(-len(mark.x) // MOST_POINTS)
         points = zip(mark.x[::step], mark.y[::step], strict=True)
         known = (one for one in points if math.isfinite(one[0]) and math.isfinite(one[1]))
@@ -209,7 +209,7 @@ class _Axes:
         back = _rect("legend", left - 6, self.box.y + 4, max(widths) + 2, 17.0 * len(named) + 5)
         return [back] + [self._name(mark, left, self.box.y + 19 + 17 * row) for row, mark in enumerate(named)]
 
-    def _name(self, mark: Mark, x: float, y: float) -> str:
+    def _name(self, mark: Stroke, x: float, y: float) -> str:
         shape = f"M{x + 9:.1f} {y - 4:.1f}h0" if mark.style == "dots" else f"M{x:.1f} {y - 4:.1f}h18"
         sample = f'<path class="{mark.style}" style="stroke:var(--c{mark.colour})" d="{shape}"/>'
         return sample + _text(x + 24, y, mark.label, "small", sub=False)

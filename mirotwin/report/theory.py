@@ -14,7 +14,7 @@ from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.theory_track import PERIOD_S, Broken, TheoryTrack
 
 
-class Gains(msgspec.Struct, frozen=True):
+class SlidingGains(msgspec.Struct, frozen=True):
     """P_1 in m/s2 and P_2 in rad/s2 of a robot's law; None where it has no such gain.
 
     `layer_*`: the widths of the boundary layers of s_1 and s_2; None where sgn switches without one.
@@ -26,7 +26,7 @@ class Gains(msgspec.Struct, frozen=True):
     layer_s2_rad_s: float | None = None
 
 
-class Disturbance(msgspec.Struct, frozen=True):
+class DisturbanceFigures(msgspec.Struct, frozen=True):
     """f of equation (15) over the run's control periods, against the gains of condition (17).
 
     `*_above_*`: the share of the periods in which |f_i| is greater than P_i, and than the authority, what P_i leaves
@@ -82,7 +82,7 @@ class Theory(msgspec.Struct, frozen=True):
     commanded acceleration (both: `chattering`).
     """
 
-    disturbance: Disturbance | None
+    disturbance: DisturbanceFigures | None
     assumption_1: Assumption1
     assumption_2: Assumption2
     assumption_3: Assumption3
@@ -92,7 +92,7 @@ class Theory(msgspec.Struct, frozen=True):
     effort_m_s2: float | None
 
 
-def gains_of(scenario: Scenario) -> Mapping[tuple[int, int], Gains]:
+def gains_of(scenario: Scenario) -> Mapping[tuple[int, int], SlidingGains]:
     """The gains of each robot that the paper's law steers, by network and slot: other laws have other surfaces."""
     return {
         (index, robot.slot): _gains(robot.controller)
@@ -101,16 +101,16 @@ def gains_of(scenario: Scenario) -> Mapping[tuple[int, int], Gains]:
     }
 
 
-def _gains(controller: object) -> Gains:
+def _gains(controller: object) -> SlidingGains:
     if not isinstance(controller, PaperGains):
-        return Gains()
+        return SlidingGains()
     if controller.switching == "sign":
-        return Gains(controller.p1_m_s2, controller.p2_rad_s2)
+        return SlidingGains(controller.p1_m_s2, controller.p2_rad_s2)
     layers = controller.layer_s1_m_s, controller.layer_s2_rad_s
-    return Gains(controller.p1_m_s2, controller.p2_rad_s2, *layers)
+    return SlidingGains(controller.p1_m_s2, controller.p2_rad_s2, *layers)
 
 
-def theory_of(track: TheoryTrack, gains: Gains) -> Theory | None:
+def theory_of(track: TheoryTrack, gains: SlidingGains) -> Theory | None:
     """The figures of one robot; None where no host steered it."""
     if not track.chattering.commands:
         return None
@@ -138,10 +138,10 @@ def _when(broken: Broken) -> tuple[float, float | None, float | None]:
     return _time_s(broken.count), seconds(broken.first_tick), seconds(broken.last_tick)
 
 
-def _disturbance(track: TheoryTrack, gains: Gains) -> Disturbance | None:
+def _disturbance(track: TheoryTrack, gains: SlidingGains) -> DisturbanceFigures | None:
     if not track.f1_m_s2:
         return None
-    return Disturbance(
+    return DisturbanceFigures(
         *_sizes(track.f1_m_s2),
         *_sizes(track.f2_rad_s2),
         gains.p1_m_s2,

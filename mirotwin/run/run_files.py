@@ -21,12 +21,12 @@ from miro_exact.inputs import read_input
 from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin.firmware.held_signals import Hold
-from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.track import Tracks
 from mirotwin.report.learnt_calibration import learnt_calibrations
 from mirotwin.report.learnt_wheels import learnt_wheels
-from mirotwin.report.live import Live
-from mirotwin.report.summary import Steps, Summary, summarise, to_json
+from mirotwin.report.live import LiveFigures
+from mirotwin.report.summary import StepResults, Summary, summarise, to_json
 from mirotwin.report.theory import gains_of
 from mirotwin.rerun import runner
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
@@ -49,7 +49,7 @@ FLUSH_S = 0.2
 class LiveSession(runner.Simulation, Protocol):
     """A world that a wall clock and clients drive."""
 
-    def live(self) -> Live: ...
+    def live(self) -> LiveFigures: ...
 
 
 class RunFiles:
@@ -62,7 +62,7 @@ class RunFiles:
     def __init__(
         self,
         folder: OutputFolder,
-        source: Source,
+        source: RunSource,
         world: World,
         engine: str,
         hold: Hold,
@@ -188,10 +188,10 @@ class RunFiles:
         )
         return summary if self.session is None else replace(summary, live=self.session.live())
 
-    def _steps(self, player: Player) -> Steps:
+    def _steps(self, player: Player) -> StepResults:
         verdicts = [verdict for checks in player.checks for verdict in checks.verdicts()]
         failed = f"{player.failure}" if player.failure else ""
-        return Steps(player.done, len(player.steps), failed, tuple(verdicts))
+        return StepResults(player.done, len(player.steps), failed, tuple(verdicts))
 
     def _leave_parts(self, reason: str) -> None:
         """What is left when the run is broken off: nothing, if not even one control period was recorded.

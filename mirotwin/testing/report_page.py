@@ -16,7 +16,7 @@ from mirotwin.firmware.coverage_files import source_folders
 from mirotwin.report.page.bokeh_page import has_bokeh
 from mirotwin.report.page.document import MOST_BYTES
 from mirotwin.report.page.reproduction import run_again
-from mirotwin.report.page.run_page import About, Material, run_page
+from mirotwin.report.page.run_page import Material, PageHeader, run_page
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.cases.case import tables_of
@@ -48,7 +48,7 @@ def _material(rig: Rig, name: str, caught: BaseException | None, text: str, agai
     world = World(scenario, wanted.seed, wanted.image, rig.trace.script())
     done = run_again(world, rig.tick, expected)
     return Material(
-        about=About(
+        about=PageHeader(
             kind="failed test",
             file=name,
             name=name,

@@ -14,7 +14,7 @@ from miro_robot.image.symbol_files import parse_cdb, parse_listing, parse_map
 from mirotwin import campaign
 from mirotwin.camera import picture
 from mirotwin.campaign.again import arm_line
-from mirotwin.campaign.rows import Rows
+from mirotwin.campaign.rows import ResultRows
 from tests import children
 from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of
 
@@ -221,14 +221,14 @@ def test_results_that_no_campaign_wrote_are_refused(name, results, tmp_path):
     change, about, said = WRONG_RESULTS[name]
     path = changed(results, tmp_path / "bad.parquet", change, about)
     with pytest.raises(BadInput) as caught:
-        Rows(path)
+        ResultRows(path)
     assert f"{path}" in str(caught.value)
     assert said in str(caught.value)
 
 
 def test_results_that_vary_nothing_are_read(results, tmp_path):
     path = changed(results, tmp_path / "few.parquet", about=lambda text: text.replace(FACTOR, '"factors":[]'))
-    assert list(Rows(path).groups(())) == [()]
+    assert list(ResultRows(path).groups(())) == [()]
 
 
 def test_a_name_in_results_that_looks_like_an_option_is_a_file_in_the_line_to_copy(results, tmp_path):
@@ -237,5 +237,5 @@ def test_a_name_in_results_that_looks_like_an_option_is_a_file_in_the_line_to_co
         tmp_path / "named.parquet",
         about=lambda text: text.replace('"scenario":"fig7"', '"scenario":"--out=x"'),
     )
-    about, levels = Rows(path).about, {"network.radio.bit_error_rate": 0.0}
+    about, levels = ResultRows(path).about, {"network.radio.bit_error_rate": 0.0}
     assert arm_line(about, levels).startswith("mirotwin run ./--out=x --set ")

@@ -24,11 +24,11 @@ from mirotwin.recording import channels, topics
 from mirotwin.recording import recorder as recorder_module
 from mirotwin.recording.container import RecordingError, records
 from mirotwin.recording.reader import parse, read
-from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.writer import MAGIC
 from tests.mirotwin.synthetic import periods
 
-SOURCE = Source(
+SOURCE = RunSource(
     scenario_name="fig6",
     scenario_text="# ä\nname = 'fig6'\n",
     seed=(1 << 63) - 1,
@@ -38,7 +38,7 @@ SOURCE = Source(
 )
 
 
-def recorded(count: int = 3, source: Source = SOURCE) -> bytes:
+def recorded(count: int = 3, source: RunSource = SOURCE) -> bytes:
     stream = io.BytesIO()
     with Recorder(stream, source) as recorder:
         for period in periods(count, [(0, 0), (0, 2), (1, 0)]):
@@ -136,23 +136,23 @@ def test_inner_values_of_different_laws_have_schemas_that_name_them():
 
 
 def message_type_of(topic: str) -> type[msgspec.Struct] | None:
-    place = topics.place_of(topic)
+    place = topics.topic_of(topic)
     return None if place is None else channels.message_type(place)
 
 
 @pytest.mark.parametrize(
     ("topic", "place"),
     [
-        ("/period", topics.Place("/period")),
-        ("/net0/wire", topics.Place("wire", 0)),
-        ("/net12/robot3/lm629", topics.Place("lm629", 12, 3)),
+        ("/period", topics.Topic("/period")),
+        ("/net0/wire", topics.Topic("wire", 0)),
+        ("/net12/robot3/lm629", topics.Topic("lm629", 12, 3)),
         ("/net0/robot/lm629", None),
         ("/net\u0663/wire", None),
         ("/period/", None),
     ],
 )
 def test_a_topic_says_what_it_names(topic, place):
-    assert topics.place_of(topic) == place
+    assert topics.topic_of(topic) == place
 
 
 @pytest.mark.parametrize("change", [b'"bad_stop":[3,19]', b'"bad_stop":[18,3]', b'"bad_stop":[3,-1]'])

@@ -19,10 +19,10 @@ from miro_sim.periods import Control, RobotPeriod
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording.reader import parse
-from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.theory_track import TheoryTrack
 from mirotwin.recording.track import Tracks
-from mirotwin.report.theory import Gains, Theory, authority, gains_of, theory_of, theory_text
+from mirotwin.report.theory import SlidingGains, Theory, authority, gains_of, theory_of, theory_text
 from mirotwin.rerun import runner
 from tests.mirotwin.mutated_files import without_sums
 from tests.mirotwin.synthetic import periods, robot
@@ -38,7 +38,7 @@ COMMANDS = st.none() | st.builds(
 
 
 ORIGIN, HERE = Posture(0.0, 0.0, 0.0), Posture(0.5, 0.0, 0.0)
-NO_GAINS = Gains()
+NO_GAINS = SlidingGains()
 
 
 def period(
@@ -61,7 +61,7 @@ def track_of(run: list[RobotPeriod]) -> TheoryTrack:
     return track
 
 
-def theory(run: list[RobotPeriod], gains: Gains = NO_GAINS) -> Theory:
+def theory(run: list[RobotPeriod], gains: SlidingGains = NO_GAINS) -> Theory:
     found = theory_of(track_of(run), gains)
     assert found is not None
     return found
@@ -87,7 +87,7 @@ def test_a_robot_that_does_at_once_what_it_is_told_has_no_disturbance():
     run = [
         period(HERE, (v, 0.0), commanded(after)) for v, after in zip(speeds, [*speeds[1:], 0.0], strict=True)
     ]
-    found = theory(run, Gains(0.05, 1.0)).disturbance
+    found = theory(run, SlidingGains(0.05, 1.0)).disturbance
     assert found is not None
     assert found.f1_largest_m_s2 == pytest.approx(0.0, abs=1e-9)
     assert (found.f1_above_p1, found.f2_above_p2) == (0.0, 0.0)
@@ -99,7 +99,7 @@ def test_a_robot_that_is_a_period_late_has_the_change_of_its_command_as_disturba
     run = [period(HERE, (v, 0.0), commanded(given)) for given, v in zip(told, did, strict=True)]
     track = track_of(run)
     assert list(track.f1_m_s2) == pytest.approx([0.1 / PERIOD_S, -0.1 / PERIOD_S, 0.0], abs=1e-9)
-    found = theory_of(track, Gains(0.05, None))
+    found = theory_of(track, SlidingGains(0.05, None))
     assert found is not None
     assert found.disturbance is not None
     assert found.disturbance.f1_above_p1 == pytest.approx(2 / 3)
@@ -117,7 +117,7 @@ SURFACES = st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 )
 def test_inside_a_layer_f_is_measured_against_the_part_of_p_that_is_left(told, p1, layer):
     run = [period(HERE, (0.0, 0.0), commanded(v, s1=s1, s2=s2)) for v, (s1, s2) in told]
-    found = theory(run, Gains(p1, None, layer, None)).disturbance
+    found = theory(run, SlidingGains(p1, None, layer, None)).disturbance
     assert found is not None
     f1 = naive.disturbances(run)[:, 0]
     left = [p1 * min(abs(s1) / layer, 1.0) for _, (s1, _) in told[:-1]]
@@ -132,7 +132,7 @@ def test_inside_a_layer_f_is_measured_against_the_part_of_p_that_is_left(told, p
 
 def test_without_a_layer_all_of_p_is_left_wherever_the_surface_is_not_zero():
     run = [period(HERE, (0.0, 0.0), commanded(0.001, s1=s1, s2=0.0)) for s1 in (0.01, -0.01, 0.0, 0.0)]
-    found = theory(run, Gains(0.05, None)).disturbance
+    found = theory(run, SlidingGains(0.05, None)).disturbance
     assert found is not None
     assert (found.f1_above_p1, found.f1_above_authority) == (0.0, 0.0)
     assert authority(0.01, 0.05, None) == 0.05
@@ -141,7 +141,7 @@ def test_without_a_layer_all_of_p_is_left_wherever_the_surface_is_not_zero():
 
 def test_of_a_law_that_does_not_say_its_surfaces_no_authority_is_known():
     run = [period(HERE, (0.0, 0.0), commanded(0.1)) for _ in range(3)]
-    found = theory(run, Gains(0.05, 1.0, 0.1, 0.1)).disturbance
+    found = theory(run, SlidingGains(0.05, 1.0, 0.1, 0.1)).disturbance
     assert found is not None
     assert (found.f1_above_authority, found.f2_above_authority) == (None, None)
 
@@ -229,7 +229,7 @@ def test_a_change_of_direction_counts_and_trembling_at_rest_does_not():
 
 def test_a_robot_that_nobody_steers_has_no_theory():
     track = track_of([period(HERE), period(HERE)])
-    assert theory_of(track, Gains()) is None
+    assert theory_of(track, SlidingGains()) is None
     assert track.now is None
 
 
@@ -239,13 +239,13 @@ def test_the_line_on_the_screen_names_what_does_not_hold():
         period(Posture(0.5, 0.0, angle), (v, 0.0), commanded(given), reference=at)
         for given, v, angle, at in zip(told, did, (1.3, 1.5, 1.6, 2.0), (ORIGIN, *[HERE] * 3), strict=True)
     ]
-    assert theory_text(theory(run, Gains(0.05, 1.0))) == (
+    assert theory_text(theory(run, SlidingGains(0.05, 1.0))) == (
         "assumption 3 within 0.1 rad in 2 frames, crossed 1 x; |f1| > P1 in 67 %; |f2| > P2 in 0 %;"
         " backward for 0.03 s"
     )
     layered = [msgspec.structs.replace(one, control=commanded(0.1, s1=0.001, s2=0.0)) for one in run]
     assert "|f1| > P1 in 0 % (> P1 |sat(s1)| in 67 %)" in theory_text(
-        theory(layered, Gains(10.0, 1.0, 0.1, 0.1))
+        theory(layered, SlidingGains(10.0, 1.0, 0.1, 0.1))
     )
     still = [period(HERE, (0.0, 0.0), commanded(0.0), reference=at) for at in (ORIGIN, HERE, HERE)]
     assert theory_text(theory(still)) == ""
@@ -253,16 +253,16 @@ def test_the_line_on_the_screen_names_what_does_not_hold():
 
 def test_the_gains_are_those_of_each_robots_law():
     scenario = load("fig6").scenario
-    assert gains_of(scenario) == {(0, 0): Gains(0.77, 1.48, 0.4, 0.149)}
+    assert gains_of(scenario) == {(0, 0): SlidingGains(0.77, 1.48, 0.4, 0.149)}
     signs = load("fig6", ['network.robot.controller.switching="sign"']).scenario
-    assert gains_of(signs) == {(0, 0): Gains(0.77, 1.48)}
+    assert gains_of(signs) == {(0, 0): SlidingGains(0.77, 1.48)}
     other = load("fig6", ['network.robot.controller={law="body_frame"}']).scenario
-    assert gains_of(other) == {(0, 0): Gains(None, None)}
+    assert gains_of(other) == {(0, 0): SlidingGains(None, None)}
 
 
 # In the recording.
 
-SOURCE = Source("fig6", "name = 'fig6'\n", 1, b":00000001FF\r\n", "ab" * 32)
+SOURCE = RunSource("fig6", "name = 'fig6'\n", 1, b":00000001FF\r\n", "ab" * 32)
 
 
 def recorded(count: int, with_theory: bool) -> bytes:

@@ -30,7 +30,7 @@ BOUND_CM = 2.40
 """The paper's own measurement error."""
 
 
-class Finding(msgspec.Struct, frozen=True):
+class ClaimResult(msgspec.Struct, frozen=True):
     """A claim, its criterion, what was measured, and what follows."""
 
     figure: str
@@ -40,7 +40,7 @@ class Finding(msgspec.Struct, frozen=True):
     verdict: str
 
 
-def findings(table: Table) -> list[Finding]:
+def findings(table: Table) -> list[ClaimResult]:
     """All claims, in the order of the paper."""
     return [claim(table) for claim in CLAIMS]
 
@@ -67,10 +67,10 @@ CONVERGES = (
 )
 
 
-def _approach(figure: int, words: str) -> Callable[[Table], Finding]:
-    def claim(table: Table) -> Finding:
+def _approach(figure: int, words: str) -> Callable[[Table], ClaimResult]:
+    def claim(table: Table) -> ClaimResult:
         rows = rows_of(table, figure, PAPER)
-        return Finding(f"Fig. {figure}", words, CONVERGES, _error(rows), _converges(rows))
+        return ClaimResult(f"Fig. {figure}", words, CONVERGES, _error(rows), _converges(rows))
 
     return claim
 
@@ -80,14 +80,14 @@ def _error(rows: Sequence[RunRow]) -> str:
     return f"{number(middle(found, 'rms_position_cm'))} cm; {len(found)} of {len(rows)} runs"
 
 
-def _robust(words: str, disturbances: Sequence[str]) -> Callable[[Table], Finding]:
-    def claim(table: Table) -> Finding:
+def _robust(words: str, disturbances: Sequence[str]) -> Callable[[Table], ClaimResult]:
+    def claim(table: Table) -> ClaimResult:
         measured, verdicts = [], []
         for disturbance in disturbances:
             groups = [rows_of(table, figure, PAPER, "", disturbance) for figure in (6, 7, 8)]
             verdicts += [_converges(rows) for rows in groups]
             measured.append(f"{disturbance}: {', '.join(_error(rows) for rows in groups)}")
-        return Finding(
+        return ClaimResult(
             "Figs. 6 to 8",
             words,
             f"with each disturbance and from each start {CONVERGES}",
@@ -105,14 +105,14 @@ def _of_cases(cases: Sequence[bool | None]) -> str:
     return HOLDS if all(cases) else PART if any(cases) else NOT
 
 
-def _asymptotic(table: Table) -> Finding:
+def _asymptotic(table: Table) -> ClaimResult:
     pairs = [
         [middle(settled(rows_of(table, figure, one)), "seen_position_cm") for one in (PAPER, IMPROVED)]
         for figure in (6, 7, 8)
     ]
     small = [None if seen is None or better is None else seen <= 2.0 * better for seen, better in pairs]
     texts = [numbers(values) for values in zip(*pairs, strict=True)]
-    return Finding(
+    return ClaimResult(
         "Figs. 6 to 8",
         "all three posture variables converge asymptotically",
         "what the camera sees of the error, and the law therefore could take away, is at most twice that of the"
@@ -122,11 +122,11 @@ def _asymptotic(table: Table) -> Finding:
     )
 
 
-def _heading(table: Table) -> Finding:
+def _heading(table: Table) -> ClaimResult:
     groups = [rows_of(table, figure, PAPER) for figure in (6, 7, 8)]
     headings = [middle(settled(rows), "rms_theta_deg") for rows in groups]
     judged = [heading <= 4.83 for heading in headings if heading is not None]
-    return Finding(
+    return ClaimResult(
         "Figs. 6 to 8",
         "the heading error goes to zero, robustly",
         "its median rms over the runs that settle is within the measurement error of 4.83 degrees",
@@ -145,12 +145,12 @@ def _not_judged(rows: Sequence[RunRow]) -> str:
     return f"not judged: 0 of {len(rows)} settle"
 
 
-def _motion(figure: int, words: str) -> Callable[[Table], Finding]:
-    def claim(table: Table) -> Finding:
+def _motion(figure: int, words: str) -> Callable[[Table], ClaimResult]:
+    def claim(table: Table) -> ClaimResult:
         rows = rows_of(table, figure, PAPER)
         moved = count(rows, lambda row: row.reversals > 0)
         share = moved / len(rows) if rows else 0.0
-        return Finding(
+        return ClaimResult(
             f"Fig. {figure}",
             words,
             f"in {100 * MOST:.0f} % of the runs the robot drives backward for a while",
@@ -161,10 +161,10 @@ def _motion(figure: int, words: str) -> Callable[[Table], Finding]:
     return claim
 
 
-def _assumption_3(table: Table) -> Finding:
+def _assumption_3(table: Table) -> ClaimResult:
     rows = rows_of(table, 7, PAPER)
     crossed = count(rows, lambda row: row.crossings > 0)
-    return Finding(
+    return ClaimResult(
         "Fig. 7",
         "the motion comes from assumption 3, which the robot keeps: its heading is never across the line to the origin",
         "no run crosses it (from -3.09 rad, with the origin behind it, the robot cannot turn to 0 otherwise)",
@@ -174,14 +174,14 @@ def _assumption_3(table: Table) -> Finding:
     )
 
 
-def _epsilon_fails(table: Table) -> Finding:
+def _epsilon_fails(table: Table) -> ClaimResult:
     measured, failing = [], 0
     for controller in EPSILONS:
         rows = [row for figure in (9, 10) for row in rows_of(table, figure, controller)]
         never = never_settled(rows)
         failing += bool(rows) and never >= MOST * len(rows)
         measured.append(f"{controller.removeprefix('epsilon, ')}: {never} of {len(rows)} runs never settle")
-    return Finding(
+    return ClaimResult(
         "Figs. 9, 10",
         "epsilon-tracking fails to converge",
         f"{100 * MOST:.0f} % of the runs end outside of 3 cm or 0.15 rad, whatever the gains",
@@ -190,7 +190,7 @@ def _epsilon_fails(table: Table) -> Finding:
     )
 
 
-def _epsilon_y(table: Table) -> Finding:
+def _epsilon_y(table: Table) -> ClaimResult:
     measured, wide = [], []
     for controller in EPSILONS:
         for figure in (9, 10):
@@ -198,7 +198,7 @@ def _epsilon_y(table: Table) -> Finding:
             x, y = middle(rows, "rms_x_cm"), middle(rows, "rms_y_cm")
             wide.append(None if x is None or y is None else y >= 2.0 * x)
             measured.append(f"{_short(controller)}, Fig. {figure}: x {number(x)}, y {number(y)} cm")
-    return Finding(
+    return ClaimResult(
         "Figs. 9, 10",
         "in particular in the Y direction",
         "the median error in y of all runs is at least twice that in x, on the line and on the curve, whatever the"
@@ -212,14 +212,14 @@ def _short(controller: str) -> str:
     return controller.removeprefix("epsilon, ")
 
 
-def _chattering(table: Table) -> Finding:
+def _chattering(table: Table) -> ClaimResult:
     texts, higher = [], []
     for figure in (9, 10):
         for controller in EPSILONS:
             text, case = _compared(table, figure, controller, "chattering_m_s2")
             higher.append(case)
             texts.append(f"Fig. {figure}, {_short(controller)}: {text}")
-    return Finding(
+    return ClaimResult(
         "Figs. 9, 10",
         "its chattering is higher than that of the proposed law",
         "from the same starts the median index of chattering in m/s2, over the runs that settle, is higher than that of"
@@ -229,13 +229,13 @@ def _chattering(table: Table) -> Finding:
     )
 
 
-def _superior(table: Table) -> Finding:
+def _superior(table: Table) -> ClaimResult:
     texts, better = [], []
     for figure in (6, 7, 8, 9, 10):
         text, case = _compared(table, figure, RETUNED, "rms_position_cm")
         better.append(case)
         texts.append(f"Fig. {figure}: {text}")
-    return Finding(
+    return ClaimResult(
         "Figs. 6 to 10",
         "the proposed law is superior in tracking and robustness",
         "its median error in cm, over the runs that settle, is smaller from every start than that of epsilon-tracking"
@@ -256,7 +256,7 @@ def _compared(table: Table, figure: int, controller: str, name: str) -> tuple[st
     return f"{number(ours)} beside {number(other)}", ours < other
 
 
-CLAIMS: tuple[Callable[[Table], Finding], ...] = (
+CLAIMS: tuple[Callable[[Table], ClaimResult], ...] = (
     _approach(6, "from small initial errors the robot approaches the line"),
     _approach(7, "from large initial errors, too"),
     _motion(7, "the heading is stabilised through forward and backward motion"),

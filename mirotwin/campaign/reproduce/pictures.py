@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 from miro_exact.clock import seconds
 from mirotwin.recording.reader import read
-from mirotwin.recording.track import Errors, Track
+from mirotwin.recording.track import RobotTrack, TrackingErrors
 from mirotwin.report.figure import ERRORS
-from mirotwin.report.seen import Seen
-from mirotwin.report.svg import Box, Drawing, Panel
+from mirotwin.report.seen import MeasuredErrors
+from mirotwin.report.svg import Drawing, Panel, PanelBox
 
 SIZE = (1000, 1010)
 LEFT, RIGHT, TOP, GAP = 66, 20, 70, 64
@@ -25,13 +25,13 @@ class Course(NamedTuple):
     """One recorded run: its name in the legend, its track, and errors as the camera sees them."""
 
     name: str
-    track: Track
-    seen: Errors
+    track: RobotTrack
+    seen: TrackingErrors
 
 
 def course(name: str, path: str | Path, delay_frames: int) -> Course:
     """The first robot of a recording. `delay_frames`: of a camera whose measurements bear no tick."""
-    track, seen = Track(), Seen(delay_frames)
+    track, seen = RobotTrack(), MeasuredErrors(delay_frames)
     for period in read(path).periods:
         track.add(period.robots[0], period.tick)
         seen.add(period.robots[0], period.tick)
@@ -74,5 +74,5 @@ def _path_panel(courses: Sequence[Course], seen: bool) -> Panel:
     return panel
 
 
-def _box(side: int, top: float, height: float) -> Box:
-    return Box(LEFT + side * (WIDTH + GAP), top, WIDTH, height)
+def _box(side: int, top: float, height: float) -> PanelBox:
+    return PanelBox(LEFT + side * (WIDTH + GAP), top, WIDTH, height)

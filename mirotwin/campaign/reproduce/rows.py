@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from mirotwin.campaign.plan import Plan
-from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.worker import RunOutcome
 
 
 class RunRow(msgspec.Struct, frozen=True):
@@ -48,7 +48,7 @@ _COLUMNS = {"crossings": "assumption_3_crossings", "frames_across": "assumption_
 """Figures that a campaign's results name otherwise."""
 
 
-def row_of(plan: Plan, outcome: Outcome) -> RunRow:
+def row_of(plan: Plan, outcome: RunOutcome) -> RunRow:
     """The row of a run that was made."""
     point = plan.design.point(outcome.run)
     (level,) = point.levels

@@ -9,7 +9,7 @@ import msgspec
 from miro_protocol.events import Damaged
 from miro_protocol.frames import TeamFrame, TelemetryFrame, describe
 from miro_protocol.transmission import Transmission
-from mirotwin.recording.capture.rows import Row, rows
+from mirotwin.recording.capture.rows import DecodedRow, rows
 
 
 class FrameLine(msgspec.Struct, frozen=True):
@@ -35,7 +35,7 @@ def frame_lines(sent: Iterable[Transmission], robots: Mapping[int, int]) -> Iter
         yield FrameLine(row.event.start_tick, row.direction, row.network, slot, _text(row))
 
 
-def _text(row: Row) -> str:
+def _text(row: DecodedRow) -> str:
     event, message = row.event, row.message
     if isinstance(event, Damaged):
         reason = event.reason.name.lower().replace("_", " ")

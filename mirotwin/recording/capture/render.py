@@ -28,7 +28,7 @@ from miro_protocol.table import (
     FrameType,
     Opcode,
 )
-from mirotwin.recording.capture.rows import Row
+from mirotwin.recording.capture.rows import DecodedRow
 
 SHOWN_BYTES = 16
 UNITS = {
@@ -53,7 +53,7 @@ def head_line(timed: bool) -> str:
     return f"{place}  dir  net  {'frame':<12}  seq  {'state':<12}  fields"
 
 
-def table_line(row: Row, timed: bool) -> str:
+def table_line(row: DecodedRow, timed: bool) -> str:
     """One row; damage shows its first bytes."""
     event = row.event
     tick = event.start_tick
@@ -77,7 +77,7 @@ def kind(event: Received, message: Message | None) -> str:
     return FrameType(event.type).name.lower()
 
 
-def described(row: Row) -> str:
+def described(row: DecodedRow) -> str:
     """A few words: what a frame is, or what is wrong with these bytes. The comment in a stream file."""
     event = row.event
     if isinstance(event, Damaged):
@@ -85,7 +85,7 @@ def described(row: Row) -> str:
     return describe(row.message) if row.message is not None else f"unknown content: {row.unknown}"
 
 
-def contents(row: Row) -> str:
+def contents(row: DecodedRow) -> str:
     """The fields of a frame in one line."""
     message = row.message
     if message is None:
@@ -99,7 +99,7 @@ def _shown(value: Any) -> str:
     return ("+".join(value) or "none") if isinstance(value, list) else str(value)
 
 
-def json_line(row: Row, timed: bool) -> bytes:
+def json_line(row: DecodedRow, timed: bool) -> bytes:
     """One row as a JSON object."""
     event = row.event
     place = {
@@ -159,7 +159,7 @@ class Totals:
         self.counts: Counter[str] = Counter()
         self.reasons: Counter[str] = Counter()
 
-    def add(self, row: Row) -> None:
+    def add(self, row: DecodedRow) -> None:
         event = row.event
         if isinstance(event, Damaged):
             self.counts["damaged"] += 1

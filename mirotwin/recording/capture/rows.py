@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from miro_protocol.robot_receiver import Reception
 
 
-class Row(msgspec.Struct, frozen=True):
+class DecodedRow(msgspec.Struct, frozen=True):
     """One frame or damaged run.
 
     `offset` counts the characters of this network and direction before it. `fresh` is None for damage and for
@@ -49,27 +49,27 @@ class _Decoding:
         self.offset = 0
         self.end_tick = 0
 
-    def hear(self, sent: Transmission) -> Iterator[Row]:
+    def hear(self, sent: Transmission) -> Iterator[DecodedRow]:
         self.end_tick = sent.end_tick
         return self.rows(self.robot.hear(sent) if self.robot else _answers(self.decoder.hear(sent)))
 
-    def flush(self) -> Iterator[Row]:
+    def flush(self) -> Iterator[DecodedRow]:
         return self.rows(self.robot.flush() if self.robot else _answers(self.decoder.flush()))
 
-    def rows(self, found: Iterable[Reception]) -> Iterator[Row]:
+    def rows(self, found: Iterable[Reception]) -> Iterator[DecodedRow]:
         for event, fresh in found:
             yield self.row(event, fresh)
             self.offset += len(event.data)
 
-    def row(self, event: Event, fresh: bool | None) -> Row:
+    def row(self, event: Event, fresh: bool | None) -> DecodedRow:
         if not isinstance(event, Received):
-            return Row(self.offset, self.direction, self.network, event)
+            return DecodedRow(self.offset, self.direction, self.network, event)
         message, unknown = None, ""
         try:
             message = event.message(self.layout)
         except ContentError as error:
             unknown = str(error)
-        return Row(self.offset, self.direction, self.network, event, message, fresh, unknown)
+        return DecodedRow(self.offset, self.direction, self.network, event, message, fresh, unknown)
 
 
 def _answers(events: Iterable[Event]) -> Iterator[Reception]:
@@ -77,7 +77,7 @@ def _answers(events: Iterable[Event]) -> Iterator[Reception]:
     return ((event, None) for event in events)
 
 
-def rows(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator[Row]:
+def rows(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator[DecodedRow]:
     """Rows in the order in which their last characters came. An error of `sent` comes after all before it.
 
     After a pause of two characters or more what came before it cannot become a frame any more: it is given out.

@@ -23,7 +23,7 @@ from mirotwin.recording.container import Cut, RecordingError, records
 from mirotwin.recording.images import ImageMessage
 from mirotwin.recording.messages import AGAIN, brief
 from mirotwin.recording.recorder import BROKEN_OFF, METADATA
-from mirotwin.recording.topics import IMAGE, PERIOD, Place, image_topic, place_of
+from mirotwin.recording.topics import IMAGE, PERIOD, Topic, image_topic, topic_of
 from mirotwin.recording.writer import McapWriter, Writable
 from mirotwin.report.foxglove import derived, notes, topics
 from mirotwin.report.foxglove.derived import Derived, Said
@@ -72,7 +72,7 @@ class _Conversion:
         self._images = msgspec.json.Decoder(ImageMessage)
         self._faults = msgspec.json.Decoder(FaultMessage)
         self._schemas: dict[int, int] = {}  # theirs by number -> ours
-        self._channels: dict[int, tuple[int, Place | None]] = {}
+        self._channels: dict[int, tuple[int, Topic | None]] = {}
         self._named: dict[str, int] = {}
         self._topics: dict[str, int] = {}
         self._next = 0
@@ -109,39 +109,39 @@ class _Conversion:
             raise BadInput(
                 self.path, "", what, "open it in Foxglove, or give the run.mcap that it was made of"
             )
-        place = place_of(record.topic)
+        topic = topic_of(record.topic)
         schema = self._schemas.get(record.schema_id, 0)
         kept = 0
-        if place is None or place.channel != IMAGE:
+        if topic is None or topic.channel != IMAGE:
             kept = self.writer.add_channel(record.topic, record.message_encoding, schema)
-        self._channels[record.id] = kept, place
+        self._channels[record.id] = kept, topic
 
     def _take_message(self, record: Message) -> None:
-        number, place = self._channels.get(record.channel_id, (0, None))
+        number, topic = self._channels.get(record.channel_id, (0, None))
         if number:
             self.writer.add_message(number, record.log_time, record.data)
-        if place is None:
+        if topic is None:
             return
-        if place.channel == IMAGE:
-            self._take_image(place, record)
-        elif place.channel == FAULT and place.slot >= 0:
+        if topic.channel == IMAGE:
+            self._take_image(topic, record)
+        elif topic.channel == FAULT and topic.slot >= 0:
             fault = self._faults.decode(record.data)
-            line = notes.of_fault(place.network, place.slot, fault.tick, fault.text)
+            line = notes.of_fault(topic.network, topic.slot, fault.tick, fault.text)
             self._add(derived.log(fault.tick, line))
-        elif place.channel == PERIOD and self._next < len(self.periods):
+        elif topic.channel == PERIOD and self._next < len(self.periods):
             period = self.periods[self._next]
             self._next += 1
             for said in self.derive.period(period):
                 self._add(said)
 
-    def _take_image(self, place: Place, record: Message) -> None:
+    def _take_image(self, topic: Topic, record: Message) -> None:
         try:
             found = self._images.decode(record.data)
         except (msgspec.DecodeError, ValueError) as error:
-            where = f"{image_topic(place.network)} at {record.log_time} ns"
+            where = f"{image_topic(topic.network)} at {record.log_time} ns"
             raise RecordingError(self.path, where, brief(error), AGAIN) from None
         self.result.images += 1
-        self._add(derived.image(place.network, found.tick, found.data))
+        self._add(derived.image(topic.network, found.tick, found.data))
 
     def _add(self, said: Said) -> None:
         topic, tick, message = said

@@ -30,7 +30,7 @@ from mirotwin.report.foxglove.shapes import Point
 AGAIN = 30
 """Control periods from one message about what stands still to the next."""
 
-Place = tuple[int, int]
+RobotId = tuple[int, int]
 """Network and slot of a robot."""
 
 
@@ -64,14 +64,14 @@ class Derived:
         self._lens = (
             scenario.camera if scenario and isinstance(scenario.camera, SeeingCamera) else None
         )  # a Gaussian camera has none
-        self._paths: dict[Place, tuple[Point, ...]] = {}
+        self._paths: dict[RobotId, tuple[Point, ...]] = {}
         for network, spec in enumerate(() if scenario is None else scenario.networks):
             for robot in spec.robot:
                 assert scenario is not None
                 points = paths.reference_points(robot, scenario.duration_s)
                 self._paths[network, robot.slot] = points
-        self._trails: dict[Place, paths.Trail] = {}
-        self._notes: dict[Place, notes.RobotNotes] = {}
+        self._trails: dict[RobotId, paths.Trail] = {}
+        self._notes: dict[RobotId, notes.RobotNotes] = {}
         self._count = 0
 
     def period(self, period: Period) -> Iterator[Said]:

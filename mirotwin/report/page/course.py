@@ -20,8 +20,8 @@ from miro_host.wheels import UNITS_PER_COUNT, Wheels
 from miro_robot.lm629.commands import BY_OPCODE
 from miro_sim.periods import Axis, Period, RobotPeriod
 from mirotwin.recording.channels import SampleMessage
-from mirotwin.recording.track import Errors, Place, error_of
-from mirotwin.report.seen import Seen
+from mirotwin.recording.track import RobotId, TrackingErrors, error_of
+from mirotwin.report.seen import MeasuredErrors
 
 Column: TypeAlias = "array[float]"
 SIDES = ("left", "right")
@@ -79,23 +79,23 @@ class Fine:
 class RobotCourse:
     """One robot. `seen`: errors of measurements at their exposure; `steered`: a host steers it along its reference."""
 
-    def __init__(self, place: Place, steered: bool, delay_frames: int) -> None:
+    def __init__(self, place: RobotId, steered: bool, delay_frames: int) -> None:
         self.place = place
         self.steered = steered
         self.truth, self.reference, self.measured = Postures(), Postures(), Postures()
-        self.errors = Errors()
+        self.errors = TrackingErrors()
         self.v_m_s, self.w_rad_s = column(), column()
         self.told_v_m_s, self.told_w_rad_s = column(), column()
         self.wheels = {side: Wheel() for side in SIDES}
         self.fine = {side: Fine() for side in SIDES}
-        self._seen = Seen(delay_frames)
+        self._seen = MeasuredErrors(delay_frames)
 
     @property
     def name(self) -> str:
         return f"net{self.place[0]}/robot{self.place[1]}"
 
     @property
-    def seen(self) -> Errors:
+    def seen(self) -> TrackingErrors:
         return self._seen.errors
 
     def add(self, robot: RobotPeriod, tick: int) -> None:
@@ -135,7 +135,7 @@ def course_of(
     periods: Sequence[Period], steered: Sequence[bool], delay_frames: int, shown: range | None = None
 ) -> Course:
     """Of the periods with a number in `shown`. `steered`: for each network, whether its host steers."""
-    robots: dict[Place, RobotCourse] = {}
+    robots: dict[RobotId, RobotCourse] = {}
     ticks = []
     for period in periods:
         if shown is not None and period.index not in shown:
@@ -150,7 +150,7 @@ def course_of(
     return Course(first, ticks, list(robots.values()))
 
 
-def add_samples(course: Course, samples: Sequence[tuple[Place, SampleMessage]]) -> None:
+def add_samples(course: Course, samples: Sequence[tuple[RobotId, SampleMessage]]) -> None:
     """Puts the LM629 samples of a full recording to their robots, as far as the course goes."""
     if not course.ticks:
         return

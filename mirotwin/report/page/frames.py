@@ -17,7 +17,7 @@ from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.container import Cut
 from mirotwin.recording.images import ImageMessage
 from mirotwin.recording.messages import Messages
-from mirotwin.recording.track import Place
+from mirotwin.recording.track import RobotId
 
 QUALITY = 72
 """Of a JPEG; noise of the picture is hardly kept below 60."""
@@ -35,7 +35,7 @@ class Extras(msgspec.Struct, frozen=True):
     """What a recording holds besides control periods. `broken_off`: its run did not come to its end."""
 
     frames: Sequence[CameraFrame] = ()
-    samples: Sequence[tuple[Place, SampleMessage]] = ()
+    samples: Sequence[tuple[RobotId, SampleMessage]] = ()
     broken_off: bool = False
 
 
@@ -43,7 +43,7 @@ def extras_of(path: str | Path, from_tick: int, to_tick: int, frames: bool) -> E
     """Frames, if they are wanted, and samples from `from_tick` to before `to_tick`. Raises RecordingError."""
     kinds: list[type[msgspec.Struct]] = [SampleMessage, *([ImageMessage] if frames else [])]
     found: list[CameraFrame] = []
-    samples: list[tuple[Place, SampleMessage]] = []
+    samples: list[tuple[RobotId, SampleMessage]] = []
     with open(path, "rb") as stream:
         messages = Messages(stream, str(path), kinds)
         cut = False

@@ -37,7 +37,7 @@ SLACK_TICKS = 24_000
 """By so much a frame may arrive before it should: rounding of delays."""
 
 
-class Mark(msgspec.Struct, frozen=True):
+class LinkMark(msgspec.Struct, frozen=True):
     """Something on a lane from `start_tick` to `end_tick`."""
 
     lane: str
@@ -122,9 +122,9 @@ class LinkLog:
             else:
                 self._arrivals[place].take(event)
 
-    def marks(self) -> list[Mark]:
+    def marks(self) -> list[LinkMark]:
         """All marks, lane by lane, in the order of time."""
-        found: list[Mark] = []
+        found: list[LinkMark] = []
         for network in self.world.networks:
             index = network.index
             sent = [one for one in self.wire if one.network == index and one.direction == DOWN]
@@ -142,7 +142,7 @@ class LinkLog:
         return found
 
 
-def lanes_of(marks: Sequence[Mark]) -> list[str]:
+def lanes_of(marks: Sequence[LinkMark]) -> list[str]:
     """Names of the lanes, in the order in which they are drawn from the top."""
     return list(dict.fromkeys(mark.lane for mark in marks))
 
@@ -161,10 +161,10 @@ def _said(frame: Received, robots: int) -> str:
         return f"unknown frame seq={frame.seq}"
 
 
-def _sent(sent: Transmission, named: str) -> Mark:
+def _sent(sent: Transmission, named: str) -> LinkMark:
     end = sent.tick + len(sent.data) * HOST_CHARACTER_TICKS
     text = named or _characters(len(sent.data))
-    return Mark(f"net{sent.network} PC sends", "sent" if named else "raw", sent.tick, end, text)
+    return LinkMark(f"net{sent.network} PC sends", "sent" if named else "raw", sent.tick, end, text)
 
 
 def _fates(
@@ -174,7 +174,7 @@ def _fates(
     arrivals: Sequence[Arrival],
     delay: int,
     over_tick: int,
-) -> list[Mark]:
+) -> list[LinkMark]:
     """The result of each transmission; characters that belong to none are noise."""
     begins = [one.tick + delay - SLACK_TICKS for one in sent]
     ends = [one.tick + delay + len(one.data) * HOST_CHARACTER_TICKS + SLACK_TICKS for one in sent]
@@ -193,13 +193,13 @@ def _fates(
             else:
                 noise.append(tick)
         for first, last, count in _together(noise):
-            marks.append(Mark(lane, "noise", first, last, f"{_characters(count)} of noise"))
+            marks.append(LinkMark(lane, "noise", first, last, f"{_characters(count)} of noise"))
     for number, name in enumerate(named):
         start, end = begins[number] + SLACK_TICKS, ends[number] - SLACK_TICKS
         kind = _fate(frames.get(number), damaged.get(number, 0), end + SLACK_TICKS > over_tick)
         if name or kind not in ("lost", "open"):
             shown = min(end, over_tick) if kind == "open" else end
-            marks.append(Mark(lane, kind, start, shown, f"{name or 'no frame'}: {kind}"))
+            marks.append(LinkMark(lane, kind, start, shown, f"{name or 'no frame'}: {kind}"))
     return sorted(marks, key=lambda mark: mark.start_tick)
 
 
@@ -223,7 +223,7 @@ def _fate(fresh: bool | None, damaged: int, at_the_end: bool) -> str:
     return "damaged" if damaged else "lost"
 
 
-def _answers(heard: Sequence[Transmission], events: Sequence[Event], network: int) -> list[Mark]:
+def _answers(heard: Sequence[Transmission], events: Sequence[Event], network: int) -> list[LinkMark]:
     """What the PC heard: characters without a valid answer are a damaged one, or too few for that, noise."""
     answers = [event for event in events if event.what == "answer" and event.frame is not None]
     marks = []
@@ -235,7 +235,7 @@ def _answers(heard: Sequence[Transmission], events: Sequence[Event], network: in
         who = (
             ", ".join(_answer(event) for event in within) or f"{_characters(len(one.data))}, no valid answer"
         )
-        marks.append(Mark(f"net{network} PC hears", kind, one.tick, end, who))
+        marks.append(LinkMark(f"net{network} PC hears", kind, one.tick, end, who))
     return marks
 
 
@@ -243,9 +243,11 @@ def _answer(event: Event) -> str:
     return _said(event.frame, 3) if event.frame is not None else ""
 
 
-def _action(event: Event) -> Mark:
+def _action(event: Event) -> LinkMark:
     lane = f"net{event.network} done to it"
-    return Mark(lane, "action", event.tick, event.tick + HOST_CHARACTER_TICKS, f"{event}".partition(": ")[2])
+    return LinkMark(
+        lane, "action", event.tick, event.tick + HOST_CHARACTER_TICKS, f"{event}".partition(": ")[2]
+    )
 
 
 def _characters(count: int) -> str:

@@ -16,7 +16,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
 from mirotwin.report.page.axes import add_cursor, add_failures, at_least, panel, tagged, time_range
 from mirotwin.report.page.course import SIDES, Course, RobotCourse
-from mirotwin.report.page.link import Mark, lanes_of
+from mirotwin.report.page.link import LinkMark, lanes_of
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 MOST_FAILURES = 20
@@ -42,7 +42,7 @@ HOLLOW, WRONG = ("lost",), ("damaged", "lost")
 Figures = dict[str, Any]
 
 
-def figures_of(course: Course, marks: Sequence[Mark], failure_ticks: Sequence[int]) -> Figures:
+def figures_of(course: Course, marks: Sequence[LinkMark], failure_ticks: Sequence[int]) -> Figures:
     """All figures by the id of their element."""
     times = time_range(course.times_s, PERIOD_S)
     made: Figures = {}
@@ -135,7 +135,7 @@ def _widen(made: Any, number: int, course: Course, least: float, *columns: Any) 
         _of_robot(points, number)
 
 
-def _link(marks: Sequence[Mark], times: Any) -> Any:
+def _link(marks: Sequence[LinkMark], times: Any) -> Any:
     lanes = lanes_of(marks)
     made = panel(
         "",

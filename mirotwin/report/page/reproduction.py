@@ -20,7 +20,7 @@ from miro_robot.inspect.watcher import attach, detach
 from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin.firmware.coverage_files import with_debug_files
-from mirotwin.report.page.link import LinkLog, Mark
+from mirotwin.report.page.link import LinkLog, LinkMark
 from mirotwin.verify.checks.expect import Place
 from mirotwin.verify.checks.interface import Check, Expectation, Failure
 from mirotwin.verify.checks.watching import Checks
@@ -44,7 +44,7 @@ class Again(msgspec.Struct, frozen=True):
     verdicts: tuple[Expectation, ...]
     failures: list[Failure]
     faults: list[Fault]
-    marks: list[Mark]
+    marks: list[LinkMark]
     image: Image
     robot: str
     profile: Profile

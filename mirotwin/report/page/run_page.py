@@ -19,17 +19,17 @@ from mirotwin.report.page.course import Column, Course, Postures, RobotCourse, a
 from mirotwin.report.page.document import render
 from mirotwin.report.page.firmware import SHOWN, coverage_rows, function_rows
 from mirotwin.report.page.frames import CameraFrame, Extras
-from mirotwin.report.page.link import Mark, lanes_of
+from mirotwin.report.page.link import LinkMark, lanes_of
 from mirotwin.report.page.pitch import pitch_of
 from mirotwin.report.page.reproduction import Again
-from mirotwin.report.summary import Steps, rms_name, settling_text, tracking_of
+from mirotwin.report.summary import StepResults, rms_name, settling_text, tracking_of
 
 FIRST = 200
 """Failures of checks, and differences, that are listed."""
 SILENT = "silent"
 
 
-class About(msgspec.Struct, frozen=True):
+class PageHeader(msgspec.Struct, frozen=True):
     """What the header says. `kind`: run, case or failed test; `file`: its name without folders; `name`: of a test.
 
     `notes`: what is to be known before all else, a line each; `report`: the text that a failed test left; `again`:
@@ -58,7 +58,7 @@ class Replayed(msgspec.Struct, frozen=True):
 class Material(msgspec.Struct, frozen=True):
     """All that a page is made from. `periods`: those that are drawn; `shown`: numbers of the wanted ones."""
 
-    about: About
+    about: PageHeader
     scenario: Scenario
     scenario_text: str
     periods: Sequence[Period]
@@ -66,7 +66,7 @@ class Material(msgspec.Struct, frozen=True):
     sources: Sources
     extras: Extras = Extras()
     replayed: Replayed | None = None
-    steps: Steps | None = None
+    steps: StepResults | None = None
     shown: range | None = None
     broken_off: bool = False
 
@@ -150,7 +150,7 @@ def _facts(material: Material, course: Course) -> list[tuple[str, str, str]]:
     return facts
 
 
-def _within(marks: Sequence[Mark], course: Course) -> list[Mark]:
+def _within(marks: Sequence[LinkMark], course: Course) -> list[LinkMark]:
     return [mark for mark in marks if _shows(course, mark.start_tick)]
 
 
@@ -158,11 +158,11 @@ def _shows(course: Course, tick: int) -> bool:
     return bool(course.ticks) and course.ticks[0] <= tick < course.ticks[-1] + CONTROL_PERIOD_TICKS
 
 
-def _count(marks: Sequence[Mark], kind: str) -> int:
+def _count(marks: Sequence[LinkMark], kind: str) -> int:
     return len([mark for mark in marks if mark.kind == kind])
 
 
-def _counts(marks: Sequence[Mark], lane: str) -> list[tuple[str, int]]:
+def _counts(marks: Sequence[LinkMark], lane: str) -> list[tuple[str, int]]:
     found: dict[str, int] = {}
     for mark in marks:
         if mark.lane == lane:
@@ -171,7 +171,7 @@ def _counts(marks: Sequence[Mark], lane: str) -> list[tuple[str, int]]:
 
 
 def _data(
-    course: Course, marks: Sequence[Mark], frames: Sequence[CameraFrame], ticks: Sequence[int]
+    course: Course, marks: Sequence[LinkMark], frames: Sequence[CameraFrame], ticks: Sequence[int]
 ) -> bytes:
     """What the page's JavaScript needs: postures as 64-bit floats in base64, so that none is rounded."""
     lanes = lanes_of(marks)

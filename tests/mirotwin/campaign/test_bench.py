@@ -11,7 +11,7 @@ from miro_exact.bad_input import BadInput
 from miro_sim.scenario.file import load
 from mirotwin.campaign import builtin
 from mirotwin.campaign.plan import load_plan
-from mirotwin.campaign.rows import Rows
+from mirotwin.campaign.rows import ResultRows
 from mirotwin.commands import main
 
 ROOT = Path(__file__).parents[3]
@@ -71,7 +71,7 @@ def test_an_entry_is_a_law_in_every_scenario_and_its_figures_and_digests_are_in_
     command = ["campaign", "bench1", "--seeds", "0", "--jobs", "1", "-q", "--out", str(results), *options]
     done = CliRunner().invoke(main, command)
     assert done.exit_code == 0, done.output
-    rows = Rows(results)
+    rows = ResultRows(results)
     assert rows.count == 5
     assert rows.about.campaign == "bench1"
     assert len(set(rows.column("digest"))) == 5

@@ -18,7 +18,7 @@ from mirotwin.campaign.plan import plan_of_levels
 from mirotwin.campaign.processes import processes
 from mirotwin.campaign.seeds import seeds_of
 from mirotwin.campaign.single import run_single
-from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.recording.reader import read
 
@@ -62,7 +62,7 @@ def test_whoever_stops_asking_leaves_no_job_behind(monkeypatch):
     def slow(job):
         time.sleep(0.02)
         made.append(job.run)
-        return Outcome(job.run)
+        return RunOutcome(job.run)
 
     monkeypatch.setattr("mirotwin.campaign.drive.work", slow)
     with ThreadPoolExecutor(1) as executor:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from benchmarks.intervals import coverage
 from miro_exact.rng import Stream
-from mirotwin.campaign.comparison import Difference
+from mirotwin.campaign.comparison import MetricDifference
 from mirotwin.campaign.statistics import (
     FEWEST,
     STREAM,
@@ -105,7 +105,7 @@ def test_intervals_hold_what_they_should_where_scenarios_of_a_seed_are_correlate
 def of(metric="rms_position_cm", first=2.0, low=0.1, high=0.3, **more):
     interval = None if low is None else Interval(low, high)
     values = {"higher": 10, "lower": 2, **more}
-    return Difference(metric, 20, 0, 20, first, first + 0.2, 0.2, interval, 0.2, **values)
+    return MetricDifference(metric, 20, 0, 20, first, first + 0.2, 0.2, interval, 0.2, **values)
 
 
 @pytest.mark.parametrize(

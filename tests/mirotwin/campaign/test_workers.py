@@ -15,7 +15,7 @@ from miro_exact.bad_input import BadInput
 from miro_sim.world.world import World
 from mirotwin import campaign
 from mirotwin.campaign.drive import Drive
-from mirotwin.campaign.worker import Outcome, work
+from mirotwin.campaign.worker import RunOutcome, work
 from mirotwin.campaign.workers import Processes, Workers
 from tests import children
 from tests.mirotwin.campaign.plans import SHORT, InThisProcess, plan_of, rows
@@ -140,9 +140,9 @@ def test_at_most_so_many_runs_are_ahead_of_the_first_that_is_missing(monkeypatch
             if run == 0:
                 return held
             if run == 9:
-                threading.Timer(0.2, held.set_result, [Outcome(0)]).start()
+                threading.Timer(0.2, held.set_result, [RunOutcome(0)]).start()
             future = Future()
-            future.set_result(Outcome(run))
+            future.set_result(RunOutcome(run))
             return future
 
     workers = Workers(Holding())

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from miro_robot.image import Image, Symbols
-from mirotwin.recording.compare import Rule, differences
+from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.sequences import characters
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.moved import moved
@@ -60,7 +60,7 @@ def test_the_effect_is_where_the_states_differ_for_good_and_go_different_ways(
     image, folder = images["late"]
     found = apart(image, folder).effect
     assert found is not None
-    replayed = differences(periods(world()), periods(world(image)), Rule(kind="commands"))
+    replayed = differences(periods(world()), periods(world(image)), CompareRule(kind="commands"))
     assert replayed[0].recorded is not None
     assert replayed[0].recorded.startswith("LTRJ 1Fh 0400 at tick ")  # the smooth stop
     assert 0 < replayed[0].tick - found.one.tick < 24_000  # in the failsafe's own millisecond
@@ -75,7 +75,7 @@ def test_a_build_of_another_layout_is_compared_by_variables_with_who_wrote_them(
 ):
     image, folder = images["late and moved"]
     assert not same_layout(own_image(), image)
-    first = differences(periods(world()), periods(world(image)), Rule(kind="commands"))[0]
+    first = differences(periods(world()), periods(world(image)), CompareRule(kind="commands"))[0]
     found = apart(image, folder, first.tick + 24_000)
     assert (found.changed, found.effect) == (None, None)
     assert "lies at other addresses" in found.notes[0]
@@ -101,10 +101,10 @@ def test_builds_that_differ_in_speed_alone_send_the_same_commands(
     assert [one.text for one in heard] == [one.text for one in later]
     assert later[0].tick > heard[0].tick + 2496
     assert "wire" in {one.channel for one in differences(recorded, replayed)}
-    assert differences(recorded, replayed, Rule(kind="commands")) == []
-    assert differences(recorded, replayed, Rule(kind="bytes")) == []
-    assert differences(recorded, replayed, Rule(kind="wheels")) == []
-    assert differences(recorded, replayed, Rule(kind="commands", within_ticks=100)) != []
+    assert differences(recorded, replayed, CompareRule(kind="commands")) == []
+    assert differences(recorded, replayed, CompareRule(kind="bytes")) == []
+    assert differences(recorded, replayed, CompareRule(kind="wheels")) == []
+    assert differences(recorded, replayed, CompareRule(kind="commands", within_ticks=100)) != []
 
 
 def test_without_a_compiler_a_patched_constant_is_found_too():

@@ -12,7 +12,7 @@ from miro_protocol.stream import write
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
 from mirotwin.recording import reader as recording_reader
-from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.recorder import Recorder, RunSource
 from tests.mirotwin.conftest import hex_file
 
 IDLE_FOR_EVER = b"\x80\xfe"
@@ -142,7 +142,7 @@ def test_a_recording_cut_short_in_its_end_is_compared_as_far_as_it_goes(mirotwin
 
 
 def test_a_recording_without_a_control_period_is_refused(mirotwin, tmp_path):
-    source = Source(
+    source = RunSource(
         scenario_name="x", scenario_text="", seed=1, firmware=b"rubbish", firmware_sha256="", symbols={}
     )
     path = tmp_path / "odd.mcap"

@@ -12,7 +12,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_protocol.actions import Power, RadioState, Reset
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Period
-from mirotwin.recording.compare import Difference, Rule, differences
+from mirotwin.recording.compare import CompareRule, Difference, differences
 from mirotwin.recording.difference import first_per_channel
 from mirotwin.recording.sequences import SAME_TICKS, LogEntry, unlike
 from tests.mirotwin.synthetic import periods
@@ -61,15 +61,15 @@ def with_position(offset: int, name: str = "real_position") -> list[Period]:
 
 @pytest.mark.parametrize("kind", ["bits", "bytes", "commands", "wheels"])
 def test_a_run_equals_itself_under_every_rule(kind):
-    assert differences(RUN, RUN, Rule(kind=kind, host=True, digests=True)) == []
+    assert differences(RUN, RUN, CompareRule(kind=kind, host=True, digests=True)) == []
 
 
 def test_commands_may_come_at_another_time_within_the_tolerance():
     recorded, faster = with_commands([100_000, 900_000]), with_commands([97_504, 897_504])
     assert len(differences(recorded, faster)) == 2
-    assert differences(recorded, faster, Rule(kind="commands")) == []
-    assert differences(recorded, faster, Rule(kind="commands", within_ticks=2496)) == []
-    (first, _) = differences(recorded, faster, Rule(kind="commands", within_ticks=2495))
+    assert differences(recorded, faster, CompareRule(kind="commands")) == []
+    assert differences(recorded, faster, CompareRule(kind="commands", within_ticks=2496)) == []
+    (first, _) = differences(recorded, faster, CompareRule(kind="commands", within_ticks=2495))
     assert (first.recorded, first.replayed) == (
         "LTRJ 1Fh 0400 at tick 100000",
         "LTRJ 1Fh 0400 at tick 97504",
@@ -77,7 +77,9 @@ def test_commands_may_come_at_another_time_within_the_tolerance():
 
 
 def test_another_value_at_the_same_time_is_a_difference_under_commands():
-    (found,) = differences(with_commands([100_000]), with_commands([100_000], "0401"), Rule(kind="commands"))
+    (found,) = differences(
+        with_commands([100_000]), with_commands([100_000], "0401"), CompareRule(kind="commands")
+    )
     assert found.channel == "lm629 left command"
     assert (found.network, found.slot, found.tick) == (0, 0, 100_000)
 
@@ -87,29 +89,32 @@ def test_a_missing_command_shifts_none_behind_it():
     (found,) = differences(
         with_commands(every),
         with_commands([tick for tick in every if tick != 1_000_000]),
-        Rule(kind="commands"),
+        CompareRule(kind="commands"),
     )
     assert (found.tick, found.replayed) == (1_000_000, None)
 
 
 def test_wheels_and_pwm_are_no_matter_to_commands_nor_commands_to_wheels():
-    assert differences(RUN, with_position(1000), Rule(kind="commands")) == []
-    assert differences(with_commands([100_000]), with_commands([]), Rule(kind="wheels")) == []
+    assert differences(RUN, with_position(1000), CompareRule(kind="commands")) == []
+    assert differences(with_commands([100_000]), with_commands([]), CompareRule(kind="wheels")) == []
 
 
 @pytest.mark.parametrize(("name", "within"), [("real_position", 20), ("desired_position", 20)])
 def test_positions_may_differ_by_the_tolerance_and_no_count_more(name, within):
     for offset in (within, -within):
-        assert differences(RUN, with_position(offset, name), Rule(kind="wheels")) == []
-    found = differences(RUN, with_position(within + 1, name), Rule(kind="wheels"))
+        assert differences(RUN, with_position(offset, name), CompareRule(kind="wheels")) == []
+    found = differences(RUN, with_position(within + 1, name), CompareRule(kind="wheels"))
     assert {(one.slot, one.channel) for one in found} == {(2, f"lm629 right {name}")}
     assert len(found) == len(RUN)
 
 
 def test_desired_velocities_may_differ_by_the_tolerance():
     for offset, count in ((16_384, 0), (16_385, len(RUN))):
-        assert len(differences(RUN, with_position(offset, "desired_velocity"), Rule(kind="wheels"))) == count
-    rule = Rule(kind="wheels", within_counts_per_sample=1.0)
+        assert (
+            len(differences(RUN, with_position(offset, "desired_velocity"), CompareRule(kind="wheels")))
+            == count
+        )
+    rule = CompareRule(kind="wheels", within_counts_per_sample=1.0)
     assert differences(RUN, with_position(65_536, "desired_velocity"), rule) == []
 
 
@@ -118,7 +123,7 @@ def test_bytes_are_compared_one_by_one_however_they_are_parted():
     parted = with_answers(
         Transmission(300_100, "<", b"\x55"), Transmission(300_000 + 2 * 24_960, "<", b"\xd4")
     )
-    (found,) = differences(one, parted, Rule(kind="bytes"))
+    (found,) = differences(one, parted, CompareRule(kind="bytes"))
     assert found.recorded == "2d at tick 324960"
     assert found.replayed is None
     assert len(differences(one, parted)) == 3
@@ -128,7 +133,7 @@ def test_a_bad_stop_bit_is_part_of_a_byte():
     (found,) = differences(
         with_answers(Transmission(300_000, "<", b"\x55\x2d")),
         with_answers(Transmission(300_000, "<", b"\x55\x2d", 0, (1,))),
-        Rule(kind="bytes"),
+        CompareRule(kind="bytes"),
     )
     assert found.replayed == "2d with a bad stop bit at tick 324960"
 
@@ -136,17 +141,17 @@ def test_a_bad_stop_bit_is_part_of_a_byte():
 def test_what_is_under_way_at_the_end_is_not_compared_with_a_tolerance():
     end = len(RUN) * CONTROL_PERIOD_TICKS
     late = with_answers(Transmission(end - 26_000, "<", b"\x55"))
-    assert differences(late, with_answers(), Rule(kind="bytes")) == []
+    assert differences(late, with_answers(), CompareRule(kind="bytes")) == []
     assert len(differences(late, with_answers())) == 1
     command = RUN[-1].tick - 10_000
-    assert differences(with_commands([command]), with_commands([]), Rule(kind="commands")) == []
+    assert differences(with_commands([command]), with_commands([]), CompareRule(kind="commands")) == []
     assert len(differences(with_commands([command]), with_commands([]))) == 1
 
 
 def test_only_differences_in_the_window_are_told():
     moved = with_position(1)
     assert len(differences(RUN, moved)) == 6
-    window = Rule(from_tick=2 * CONTROL_PERIOD_TICKS, to_tick=4 * CONTROL_PERIOD_TICKS)
+    window = CompareRule(from_tick=2 * CONTROL_PERIOD_TICKS, to_tick=4 * CONTROL_PERIOD_TICKS)
     assert [one.period for one in differences(RUN, moved, window)] == [2, 3]
 
 
@@ -155,7 +160,7 @@ def test_the_hosts_values_and_actions_are_compared_on_request():
     robots = (msgspec.structs.replace(RUN[2].robots[0], control=None), RUN[2].robots[1])
     changed = [*RUN[:2], msgspec.structs.replace(RUN[2], robots=robots, actions=actions), *RUN[3:]]
     assert differences(RUN, changed) == []
-    found = differences(RUN, changed, Rule(host=True))
+    found = differences(RUN, changed, CompareRule(host=True))
     named = {one.channel for one in found}
     assert {"control v_m_s", "control inner.u1", "actions"} <= named
     assert [one.replayed for one in found if one.channel == "actions"] == [
@@ -167,7 +172,7 @@ def test_the_hosts_values_and_actions_are_compared_on_request():
 def test_a_digest_alone_is_a_difference_at_the_end_of_its_period():
     changed = [*RUN[:3], msgspec.structs.replace(RUN[3], digest="00" * 32), *RUN[4:]]
     assert differences(RUN, changed) == []
-    (found,) = differences(RUN, changed, Rule(digests=True))
+    (found,) = differences(RUN, changed, CompareRule(digests=True))
     assert (found.tick, found.period, found.channel) == (4 * CONTROL_PERIOD_TICKS, 3, "digest")
     assert str(found).startswith("tick 3203200 (0.133467 s), /period digest: recorded ")
     assert found.as_json()["replayed"] == "00" * 32
@@ -245,5 +250,5 @@ def test_what_a_chip_answers_is_no_part_of_a_command():
         ]
 
     one, other = reading("00000a3d"), reading("00000a46")
-    assert differences(one, other, Rule(kind="commands")) == []
+    assert differences(one, other, CompareRule(kind="commands")) == []
     assert differences(one, other)[0].recorded == "RDRP 0Ah 00000a3d at tick 0"

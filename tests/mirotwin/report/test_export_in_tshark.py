@@ -11,7 +11,7 @@ from miro_robot.image import load_hex
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
 from mirotwin.commands import main
-from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.recorder import Recorder, RunSource
 from tests.protocol.test_dissector import dissected, values
 
 SCENARIO = """
@@ -69,7 +69,7 @@ def run(tmp_path_factory):
     world.networks[0].station.request(2, 1, (1, 2, 3, 4))
     world.networks[1].station.request(4, 2, (5973,))
     wire = []
-    source = Source("two", text, 3, image.path.read_bytes(), image.sha256)
+    source = RunSource("two", text, 3, image.path.read_bytes(), image.sha256)
     with (folder / "run.mcap").open("wb") as stream, Recorder(stream, source) as recorder:
         for _ in range(12):
             period = world.step()

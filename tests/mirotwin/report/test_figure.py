@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from miro_sim.periods import Control
 from mirotwin.recording.track import Tracks
 from mirotwin.report.figure import draw
-from mirotwin.report.svg import MOST_POINTS, Box, Drawing, Panel, ticks
+from mirotwin.report.svg import MOST_POINTS, Drawing, Panel, PanelBox, ticks
 from tests.mirotwin.synthetic import periods
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -64,7 +64,7 @@ def test_a_value_that_is_no_number_is_left_out_and_one_value_has_an_axis(tmp_pat
     panel = Panel("one")
     panel.line([0.0, 1.0, 2.0], [1.0, float("nan"), 1.0], colour=1)
     drawing = Drawing(200, 200, ())
-    drawing.add(panel, Box(40, 20, 140, 140))
+    drawing.add(panel, PanelBox(40, 20, 140, 140))
     drawing.write(tmp_path / "a.svg")
     assert "nan" not in (tmp_path / "a.svg").read_text("utf-8")
     assert panel.spans() == (0.0, 2.0, 0.5, 1.5)
@@ -74,6 +74,6 @@ def test_a_run_of_hours_has_a_picture_of_bounded_size(tmp_path):
     panel = Panel("long")
     panel.line(range(10 * MOST_POINTS), [index % 97 for index in range(10 * MOST_POINTS)], colour=1)
     drawing = Drawing(1000, 400, ())
-    drawing.add(panel, Box(60, 20, 900, 340))
+    drawing.add(panel, PanelBox(60, 20, 900, 340))
     drawing.write(tmp_path / "a.svg")
     assert (tmp_path / "a.svg").stat().st_size < 20 * MOST_POINTS

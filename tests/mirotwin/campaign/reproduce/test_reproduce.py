@@ -39,7 +39,7 @@ from mirotwin.campaign.reproduce.rows import (
     percentile,
     row_of,
 )
-from mirotwin.campaign.worker import Outcome
+from mirotwin.campaign.worker import RunOutcome
 from mirotwin.commands import main
 
 DAY = "2026-11-22"
@@ -235,11 +235,11 @@ def test_of_each_group_the_run_with_the_median_error_is_recorded():
 def test_a_row_has_the_figures_of_its_run_or_its_error():
     plan = plan_of(range(5, 7))
     figures = {"rms_x_cm": 0.5, "assumption_3_crossings": 2, "chattering_m_s2": None, "settled": True}
-    row = row_of(plan, Outcome(1, digest="d", figures=figures))
+    row = row_of(plan, RunOutcome(1, digest="d", figures=figures))
     assert row == RunRow(
         "fig6-paper", "fig6", 6, digest="d", rms_x_cm=0.5, crossings=2, settled=True, chattering_m_s2=None
     )
-    assert row_of(plan, Outcome(0, error="no")) == RunRow("fig6-paper", "fig6", 5, error="no")
+    assert row_of(plan, RunOutcome(0, error="no")) == RunRow("fig6-paper", "fig6", 5, error="no")
 
 
 def test_statistics_are_the_plain_ones():

@@ -19,7 +19,7 @@ from miro_sim.scenario.file import load
 from mirotwin.recording.capture import recorded
 from mirotwin.recording.capture.input import Input
 from mirotwin.recording.container import RecordingError
-from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.recorder import Recorder, RunSource
 from tests.mirotwin.synthetic import periods
 
 PERIOD = 800_800
@@ -30,7 +30,7 @@ TEXT = load("fig6").text
 
 def recording(wires: list[tuple[Transmission, ...]], text: str = TEXT) -> bytes:
     stream = BytesIO()
-    source = Source(scenario_name="x", scenario_text=text, seed=1, firmware=b"", firmware_sha256="")
+    source = RunSource(scenario_name="x", scenario_text=text, seed=1, firmware=b"", firmware_sha256="")
     with Recorder(stream, source) as recorder:
         for index, wire in enumerate(wires):
             recorder.write(Period(index, index * PERIOD, (), wire, "00"))

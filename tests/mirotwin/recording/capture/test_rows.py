@@ -12,7 +12,7 @@ from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
 from mirotwin.recording.capture.detect import FORMATS
 from mirotwin.recording.capture.input import Input
-from mirotwin.recording.capture.rows import Row, rows
+from mirotwin.recording.capture.rows import DecodedRow, rows
 from mirotwin.recording.capture.source import READ_ERRORS, open_source
 
 CHARACTER = 25_000
@@ -22,13 +22,13 @@ def team(seq: int, n: int = 3) -> bytes:
     return encode(TeamFrame(0, seq, ((seq, -seq),) * n), n)
 
 
-def decoded(sent: Iterable[Transmission], n: int = 3) -> list[Row]:
+def decoded(sent: Iterable[Transmission], n: int = 3) -> list[DecodedRow]:
     return list(rows(sent, lambda network: n))
 
 
-def read(path: Path, format: str) -> tuple[list[Row], Exception | None]:
+def read(path: Path, format: str) -> tuple[list[DecodedRow], Exception | None]:
     """Everything in a file, and the error it ends with."""
-    found: list[Row] = []
+    found: list[DecodedRow] = []
     with Input(str(path)) as given:
         try:
             for row in rows(open_source(given, format, print).sent, lambda network: 3):
@@ -65,7 +65,7 @@ def test_any_bytes_in_any_format_give_rows_and_at_most_the_formats_own_error(  #
     path.write_bytes(magic + data)
     found, error = read(path, format)
     assert error is None or str(error).startswith(str(path))
-    assert all(isinstance(row, Row) for row in found)
+    assert all(isinstance(row, DecodedRow) for row in found)
 
 
 def test_freshness_is_judged_as_the_robot_does():

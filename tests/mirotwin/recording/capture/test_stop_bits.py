@@ -15,9 +15,9 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.recorded import transmissions, transmissions_of
-from mirotwin.recording.capture.rows import Row, rows
+from mirotwin.recording.capture.rows import DecodedRow, rows
 from mirotwin.recording.reader import parse
-from mirotwin.recording.recorder import Recorder, Source
+from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.rerun import runner
 from tests.mirotwin.conftest import mirotwin
 from tests.sim.world.rig import image
@@ -38,14 +38,14 @@ def recorded(seed: int) -> tuple[bytes, list[tuple[int, bytes]]]:
     """The recording of a noisy run, and start and body of the answers that the PC took."""
     world = noisy_world(seed)
     stream = io.BytesIO()
-    source = Source(scenario_name="x", scenario_text="", seed=seed, firmware=b"", firmware_sha256="")
+    source = RunSource(scenario_name="x", scenario_text="", seed=seed, firmware=b"", firmware_sha256="")
     with Recorder(stream, source) as recorder:
         runner.run(world, recorder, False, lambda period: period.index == PERIODS)
     answers = [event.frame for _, event in world.networks[0].log.since(0) if event.what == "answer"]
     return stream.getvalue(), [(answer.start_tick, answer.body) for answer in answers if answer is not None]
 
 
-def listed(path: Path) -> list[Row]:
+def listed(path: Path) -> list[DecodedRow]:
     with Input(str(path)) as given:
         return [row for row in rows(transmissions(given, {}), lambda network: 3) if row.direction == UP]
 
@@ -69,7 +69,7 @@ def test_the_answers_in_a_recording_are_those_that_the_pc_took(tmp_path, seed):
 @pytest.mark.parametrize("place", [5, 12, 18])
 def test_an_answer_refused_for_one_stop_bit_even_its_last_is_listed_as_refused(mirotwin, tmp_path, place):
     answer = encode(TelemetryFrame(3, 1), 3)
-    source = Source(scenario_name="x", scenario_text="", seed=1, firmware=b"", firmware_sha256="")
+    source = RunSource(scenario_name="x", scenario_text="", seed=1, firmware=b"", firmware_sha256="")
     recording, exported = tmp_path / "run.mcap", tmp_path / "run.stream"
     with recording.open("wb") as stream, Recorder(stream, source) as recorder:
         wire = (Transmission(90_000, UP, answer, 0, (place,)), Transmission(900_000, UP, answer))

@@ -194,7 +194,7 @@ def test_the_log_tells_of_lost_robots_and_frames(shown):
 
 def recorded(count: int, add: Callable[[Recorder], object], scenario: str = "") -> bytes:
     """A recording of synthetic periods, whose scenario says nothing unless told."""
-    source = reader.Source("none", scenario, 0, b":00000001FF\n", "0" * 64)
+    source = reader.RunSource("none", scenario, 0, b":00000001FF\n", "0" * 64)
     stream = io.BytesIO()
     with Recorder(stream, source) as recorder:
         for period in synthetic.periods(count):
