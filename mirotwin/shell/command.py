@@ -33,6 +33,7 @@ class Argument(NamedTuple):
 
     metavar: str
     type: Any = None
+    several: bool = False
 
 
 class Option:
@@ -87,8 +88,7 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
             if field.record is not None:
                 yield from value._words()
             elif value != field.default:
-                values = value if field.default == () else (value,)
-                for one in values:
+                for one in value if field.several else (value,):
                     yield from field.words(one)
 
     def given(self, *names: str) -> list[str]:
@@ -127,6 +127,11 @@ class _Field(NamedTuple):
     required: bool
 
     @property
+    def several(self) -> bool:
+        """Whether the value is a tuple of those on the command line."""
+        return self.declared.several if isinstance(self.declared, Argument) else self.default == ()
+
+    @property
     def label(self) -> str:
         """How a message calls it."""
         if isinstance(self.declared, Argument):
@@ -150,11 +155,16 @@ class _Field(NamedTuple):
     def parameter(self) -> click.Parameter:
         declared = self.declared
         given: dict[str, Any] = {"required": self.required}
-        if self.default not in (None, (), False):
+        if (
+            not self.required
+            and self.default is not None
+            and self.default != ()
+            and self.default is not False
+        ):
             given["default"] = self.default
         assert declared is not None
         if isinstance(declared, Argument):
-            nargs = -1 if self.default == () else 1
+            nargs = -1 if declared.several else 1
             return click.Argument(
                 [self.name], metavar=declared.metavar, type=declared.type, nargs=nargs, **given
             )
@@ -167,7 +177,7 @@ class _Field(NamedTuple):
             type=declared.type,
             metavar=declared.metavar,
             multiple=self.default == (),
-            show_default="default" in given,
+            show_default=given.get("default", "") != "",
             **({"is_flag": True} if self.default is False else {}),
             **given,
         )

@@ -12,7 +12,8 @@ import pytest
 
 from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
-from mirotwin.verify.steps.running import Outcome, reproduce_line, run_test, stem_of
+from mirotwin.testing.test_command import TestOptions
+from mirotwin.verify.steps.running import Outcome, run_test, stem_of
 
 
 class ScenarioFailed(Exception):
@@ -40,7 +41,9 @@ class ScenarioItem(pytest.Item):
         firmware = _path(self.config, "firmware")
         seed = self.seed
         file = relative(self.path)
-        again = reproduce_line(file, seed, None if firmware is None else str(firmware), ())
+        again = TestOptions(
+            paths=(file,), seed=seed, firmware=None if firmware is None else str(firmware)
+        ).command_line()
         try:
             image = _image(str(firmware or image_path()))
         except ValueError as error:

@@ -5,28 +5,30 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
-
-import click
+from typing import Annotated
 
 from miro_exact.bad_input import BadInput
-from miro_exact.seed import MAX_SEED
+from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import (
-    Place,
-    Whole,
+    ARTIFACTS,
+    JUNIT,
+    NAME,
+    QUIET,
+    SET,
+    Engine,
+    Firmware,
+    Seed,
     choose_engine,
-    engine_option,
-    firmware_option,
     load_image,
-    set_option,
 )
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, show_line, tell_notes
 from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, replay_line, report_line
-from mirotwin.verify.expectations import expect_option
+from mirotwin.verify.expectations import Expected, as_settings
 from mirotwin.verify.steps.collecting import SUFFIX, collect
 from mirotwin.verify.steps.keys import end_ms
-from mirotwin.verify.steps.running import Outcome, Verdict, reproduce_line, run_test, stem_of
+from mirotwin.verify.steps.running import Outcome, Verdict, run_test, stem_of
 
 WORDS = {"passed": "passed", "failed": "FAILED", "fault": "FAULT", "error": "ERROR"}
 CODES: dict[Verdict, int] = {
@@ -38,77 +40,80 @@ CODES: dict[Verdict, int] = {
 """In the order of precedence."""
 
 
-@click.command(short_help="Runs scenario files as tests: steps, checks, a verdict each.")
-@click.argument("paths", metavar="DIR|FILE..", nargs=-1, required=True, type=Place())
-@click.option("-k", "word", metavar="TEXT", default="", help="Only files with TEXT in their path.")
-@click.option(
-    "--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Master seed of all noise."
-)
-@set_option("A key to set in each scenario, as for `run`; may be repeated.")
-@expect_option
-@firmware_option("Image to run instead of the robot's own.")
-@engine_option
-@click.option(
-    "--junit", type=Place(path_type=Path), metavar="FILE", help="Write the verdicts as JUnit XML, too."
-)
-@click.option(
-    "--artifacts",
-    type=Place(path_type=Path),
-    metavar="DIR",
-    help="Folder for what files leave: worlds that `save` steps keep; of one that fails its case, for `replay`.",
-)
-@click.option(
-    "--pages", is_flag=True, help="With --artifacts: make the page of each failure, as `report` does."
-)
-@click.option("-q", "--quiet", is_flag=True, help="No line for a file that passed.")
-def test(
-    paths: tuple[str, ...],
-    word: str,
-    seed: int,
-    settings: tuple[str, ...],
-    expected: tuple[str, ...],
-    firmware: str | None,
-    engine: str | None,
-    junit: Path | None,
-    artifacts: Path | None,
-    pages: bool,
-    quiet: bool,
-) -> int:
+class TestOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "test"
+    __test__ = False  # for pytest: no test, whatever its name
+    paths: Annotated[tuple[str, ...], Argument("DIR|FILE..", NAME, several=True)]
+    word: Annotated[str, Option("-k", metavar="TEXT", help="Only files with TEXT in their path.")] = ""
+    seed: Seed = 0
+    settings: Annotated[
+        tuple[str, ...], SET.saying("A key to set in each scenario, as for `run`; may be repeated.")
+    ] = ()
+    expected: Expected = ()
+    firmware: Firmware = None
+    engine: Engine = None
+    junit: Annotated[Path | None, JUNIT.saying("Write the verdicts as JUnit XML, too.")] = None
+    artifacts: Annotated[
+        Path | None,
+        ARTIFACTS.saying(
+            "Folder for what files leave: worlds that `save` steps keep; of one that fails its case, for `replay`."
+        ),
+    ] = None
+    pages: Annotated[
+        bool, Option(help="Make the page of each failure, as `report` does.", needs="artifacts")
+    ] = False
+    quiet: Annotated[bool, QUIET.saying("No line for a file that passed.")] = False
+
+    def line_for(self, file: str) -> str:
+        """The command that gives the verdict on this file again."""
+        again = TestOptions(
+            paths=(file,),
+            seed=self.seed,
+            settings=self.settings,
+            expected=self.expected,
+            firmware=self.firmware,
+        )
+        return again.command_line()
+
+
+@command_of(TestOptions)
+def test(options: TestOptions) -> int:
     """Runs each *.scenario.toml that is named or lies below DIR: its steps, what it expects, and the checks that are
     always on. One line each with the verdict, and one for each failure.
 
     Exit code 1: a step or a check failed; 3: the firmware did what it must not; 2: a file cannot be run, or there is
     none. Where several apply: 2, then 3, then 1.
     """
-    choose_engine(engine)
-    if pages and artifacts is None:
-        raise click.UsageError("--pages needs --artifacts.")
-    files = collect(paths)
+    choose_engine(options.engine)
+    word, junit = options.word, options.junit
+    files = collect(options.paths)
     chosen = [file for file in files if word.lower() in file.lower()]
     if not chosen:
         what = f"{len(files)} files, none with {word!r} in its path" if files else f"no *{SUFFIX} there"
-        raise BadInput(" ".join(paths), "", what, f"nothing was tested; a test is a scenario in a *{SUFFIX}")
+        raise BadInput(
+            " ".join(options.paths), "", what, f"nothing was tested; a test is a scenario in a *{SUFFIX}"
+        )
     if junit is not None:
         check_file(junit, "--junit")
         check_not_input(junit, "--junit", *chosen)
-    image = load_image(firmware)
-    settings = (*settings, *expected)
+    image = load_image(options.firmware)
+    settings = (*options.settings, *as_settings(options.expected))
     left_out: dict[str, None] = {}
     outcomes: list[Outcome] = []
     times_s: list[float] = []
     for file in chosen:
         began_s = time.perf_counter()
-        again = reproduce_line(file, seed, firmware, settings)
-        outcome = run_test(file, image, seed, settings, artifacts, again)
+        again = options.line_for(file)
+        outcome = run_test(file, image, options.seed, settings, options.artifacts, again)
         times_s.append(time.perf_counter() - began_s)
         outcomes.append(outcome)
         tell_notes(note for note in outcome.left_out if note not in left_out)
         left_out |= dict.fromkeys(outcome.left_out)
-        _show(outcome, quiet, again)
-        if pages and outcome.left:
+        _show(outcome, options.quiet, again)
+        if options.pages and outcome.left:
             _page(outcome.left)
     if junit is not None:
-        lines = [reproduce_line(file, seed, firmware, settings) for file in chosen]
+        lines = list(map(options.line_for, chosen))
         _write_junit(junit, outcomes, times_s, lines)
     return _summary(outcomes)
 

@@ -4,17 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
 import click
 import msgspec
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput
-from miro_exact.seed import MAX_SEED
 from miro_robot.image import Image
+from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.junit import TestCase, junit_xml
-from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, load_image, stack_option
+from mirotwin.shell.options import (
+    ALL,
+    ARTIFACTS,
+    JSON,
+    JUNIT,
+    NAME,
+    QUIET,
+    SEED,
+    Engine,
+    StackFrom,
+    choose_engine,
+    load_image,
+)
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, complain, show_line
 from mirotwin.shell.progress import ProgressBar
@@ -24,61 +37,42 @@ from mirotwin.verify.conform.causes import begin_with, causes_first, folded
 from mirotwin.verify.conform.explain import explain
 from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.run import Outcome, case_names, failure_text, try_all, with_faults
-from mirotwin.verify.conform.table import ALL, LONG, RULES, chapter_of, find
+from mirotwin.verify.conform.table import ALL as EVERY_RULE
+from mirotwin.verify.conform.table import LONG, RULES, chapter_of, find
 
 LINES = 5
 """Firmware faults that are listed."""
 
 
-@click.command(short_help="Tries the protocol's rules on a firmware image.")
-@click.argument("image", metavar="[IMAGE.ihx]", type=Place(), required=False)
-@click.option(
-    "--rule", "ids", metavar="ID", multiple=True, help="A rule to try, such as P12; may be repeated."
-)
-@click.option("--long", is_flag=True, help="Also try the rules that take minutes of virtual time.")
-@click.option("--list", "listing", is_flag=True, help="List the rules and try none.")
-@click.option("--all", "everything", is_flag=True, help="Of rules that are not judged, a line each.")
-@click.option(
-    "--explain",
-    "explained",
-    metavar="ID",
-    help="Show what happened in the trial of one rule, and try no other.",
-)
-@click.option("--json", "as_json", is_flag=True, help="One line of JSON a rule instead of the table.")
-@click.option(
-    "--junit", type=Place(path_type=Path), metavar="FILE.xml", help="Write JUnit XML, replacing the file."
-)
-@click.option(
-    "--artifacts",
-    type=Place(path_type=Path),
-    metavar="DIR",
-    help="Leave each failure there as a case, P12.stream, for `mirotwin replay`; earlier ones are replaced.",
-)
-@click.option(
-    "--seed",
-    type=Whole(0, MAX_SEED),
-    default=0,
-    show_default=True,
-    help="Seed of the noise between keyed frames.",
-)
-@stack_option
-@engine_option
-@click.option("-q", "--quiet", is_flag=True, help="No progress bar, and of the table the rules that failed.")
-def conform(
-    image: str | None,
-    ids: tuple[str, ...],
-    long: bool,
-    listing: bool,
-    everything: bool,
-    explained: str | None,
-    as_json: bool,
-    junit: Path | None,
-    artifacts: Path | None,
-    seed: int,
-    stack_from: int | None,
-    engine: str | None,
-    quiet: bool,
-) -> int:
+class ConformOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "conform"
+    image: Annotated[str | None, Argument("[IMAGE.ihx]", NAME)] = None
+    ids: Annotated[
+        tuple[str, ...], Option("--rule", metavar="ID", help="A rule to try, such as P12; may be repeated.")
+    ] = ()
+    long: Annotated[bool, Option(help="Also try the rules that take minutes of virtual time.")] = False
+    listing: Annotated[bool, Option("--list", help="List the rules and try none.")] = False
+    everything: Annotated[bool, ALL.saying("Of rules that are not judged, a line each.")] = False
+    explain: Annotated[
+        str | None,
+        Option(metavar="ID", help="Show what happened in the trial of one rule, and try no other."),
+    ] = None
+    as_json: Annotated[bool, JSON.saying("One line of JSON a rule instead of the table.")] = False
+    junit: Annotated[Path | None, JUNIT] = None
+    artifacts: Annotated[
+        Path | None,
+        ARTIFACTS.saying(
+            "Leave each failure there as a case, P12.stream, for `mirotwin replay`; earlier ones are replaced."
+        ),
+    ] = None
+    seed: Annotated[int, SEED.saying("Seed of the noise between keyed frames.")] = 0
+    stack_from: StackFrom = None
+    engine: Engine = None
+    quiet: Annotated[bool, QUIET.saying("No progress bar, and of the table the rules that failed.")] = False
+
+
+@command_of(ConformOptions)
+def conform(options: ConformOptions) -> int:
     """Tries each rule of docs/conformance.md on IMAGE.ihx (default: the robot's own firmware).
 
     A rule is what a host says, and what robots have to make of it, seen at pins, wires and LM629 alone: an image needs
@@ -88,22 +82,24 @@ def conform(
 
     Exit code 1: a rule failed; 3: the firmware did what it must not (bus, stack, ..) in one of the trials.
     """
-    choose_engine(engine)
-    rules = list(dict.fromkeys(map(find, ids))) or list(ALL if long or listing else RULES)
-    if listing:
-        _list(rules, as_json)
+    choose_engine(options.engine)
+    every = EVERY_RULE if options.long or options.listing else RULES
+    rules = list(dict.fromkeys(map(find, options.ids))) or list(every)
+    junit, artifacts, quiet = options.junit, options.artifacts, options.quiet
+    if options.listing:
+        _list(rules, options.as_json)
         return DONE
     if junit is not None:
         check_file(junit, "--junit")
-        check_not_input(junit, "--junit", image)
-    firmware = load_image(image, named=False, stack_from=stack_from)
-    if explained is not None:
-        return _explain(find(explained), firmware, seed)
+        check_not_input(junit, "--junit", options.image)
+    firmware = load_image(options.image, named=False, stack_from=options.stack_from)
+    if options.explain is not None:
+        return _explain(find(options.explain), firmware, options.seed)
     if artifacts is not None:
         _make_room(artifacts, rules)
     outcomes: list[Outcome] = []
     with ProgressBar("trying rules", len(rules), quiet) as bar:
-        for outcome in try_all(rules, firmware, seed, keep=artifacts is not None):
+        for outcome in try_all(rules, firmware, options.seed, keep=artifacts is not None):
             outcomes.append(outcome)
             bar.to(len(outcomes))
             if artifacts is not None:
@@ -112,13 +108,17 @@ def conform(
                     leave_image(artifacts, firmware)
     outcomes = with_faults(outcomes, rules)
     if junit is not None:
-        properties = {"firmware": firmware.path.name, "firmware_sha256": firmware.sha256, "seed": f"{seed}"}
+        properties = {
+            "firmware": firmware.path.name,
+            "firmware_sha256": firmware.sha256,
+            "seed": f"{options.seed}",
+        }
         with whole_file(junit, "--junit") as part:
             part.write_bytes(junit_xml("mirotwin conform", _test_cases(outcomes, rules), properties))
-    if as_json:
+    if options.as_json:
         _print_json(outcomes)
     else:
-        _print_table(outcomes, rules, quiet, everything)
+        _print_table(outcomes, rules, quiet, options.everything)
         if artifacts is not None and not quiet:
             _print_replays(outcomes, artifacts)
     return _report_faults(outcomes) or (

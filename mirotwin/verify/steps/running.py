@@ -15,9 +15,7 @@ from miro_host.plugins import PluginError
 from miro_robot.image import Image
 from miro_sim.scenario.file import ScenarioText, load
 from miro_sim.scenario.keys import Scenario
-from miro_sim.scenario.settings import option_words
 from miro_sim.world.world import World
-from mirotwin.shell.command_line import command_line, operand
 from mirotwin.shell.outputs import whole_file
 from mirotwin.shell.tracebacks import show_traceback
 from mirotwin.verify.cases.artifacts import clear, leave, report_line
@@ -55,14 +53,6 @@ class Outcome(msgspec.Struct, frozen=True):
     firmware_sha256: str = ""
     left: str = ""
     left_out: tuple[str, ...] = ()
-
-
-def reproduce_line(path: str, seed: int, firmware: str | None, settings: Sequence[str]) -> str:
-    """The command that gives the verdict again."""
-    words = ["--firmware", operand(firmware)] if firmware else []
-    for setting in settings:
-        words += option_words(setting)
-    return command_line("test", operand(path), "--seed", f"{seed}", *words)
 
 
 def everything(scenario: Scenario, origin: str) -> None:

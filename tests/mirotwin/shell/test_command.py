@@ -26,7 +26,7 @@ class LookOptions(Options, frozen=True, kw_only=True):
     COMMAND = "camera look"
     file: Annotated[str, Argument("FILE", NAME)]
     out: Annotated[Path | None, Option("-o", "--out", type=PATH, help="File to write.")] = None
-    number: Annotated[int, Option(type=Whole(0), help="How many.")] = 3
+    number: Annotated[int, Option(type=Whole(0), help="How many.")] = 0
     settings: Annotated[tuple[str, ...], Option("--set", help="A key.")] = ()
     window: WindowOptions = WindowOptions()
     live: Annotated[str | None, Option(help="Watch.", alone="here")] = None
@@ -87,7 +87,7 @@ def test_options_that_do_not_go_together_are_refused(words, said):
 
 
 def test_the_line_has_only_what_differs_from_the_defaults():
-    assert LookOptions(file="a.mcap", number=3).command_line() == "mirotwin camera look a.mcap"
+    assert LookOptions(file="a.mcap", number=0).command_line() == "mirotwin camera look a.mcap"
     assert LookOptions(file="a b", out=Path("-o.png"), settings=("x='1'",)).command_line() == (
         """mirotwin camera look 'a b' --out ./-o.png --set 'x='"'"'1'"'"''"""
     )
@@ -98,7 +98,7 @@ def test_the_help_shows_options_below_their_heading():
     assert said.split("\n\n")[1:3] == ["  Looks.", "  At FILE."]
     options, window = said.split("Options:\n")[1].split("Window:\n")
     assert "--number N" in options
-    assert "[default: 3; x>=0]" in options
+    assert "[default: 0; x>=0]" in options
     assert [line.split()[0] for line in window.splitlines()] == ["--to", "--wide"]
 
 

@@ -41,7 +41,7 @@ def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(folde
     assert (
         "\nwrong.scenario.toml: step 3.within_s: unknown key; use within_ms, in milliseconds\n" in done.stdout
     )
-    assert "\nagain: mirotwin test late.scenario.toml --seed 0\n" in done.stdout
+    assert "\nagain: mirotwin test late.scenario.toml\n" in done.stdout
     assert "Traceback" not in done.stdout
     assert ".py:" not in done.stdout
     (suite,) = ElementTree.parse(folder / "out.xml").getroot()

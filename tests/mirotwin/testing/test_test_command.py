@@ -49,7 +49,7 @@ def test_each_file_has_a_line_with_its_verdict_and_one_for_each_failure(mirotwin
     assert lines[2].startswith(
         f"    step failed: step 3 (too soon): expect answer: tick 600000 (25.000 ms): {wanted}"
     )
-    assert lines[3] == "    mirotwin test hil/sub/b.scenario.toml --seed 0"
+    assert lines[3] == "    mirotwin test hil/sub/b.scenario.toml"
     assert lines[4] == "ERROR  hil/sub/c.scenario.toml"
     assert lines[5].endswith("c.scenario.toml: step 3.within_s: unknown key; use within_ms, in milliseconds")
     assert lines[7].startswith("    expectation failed: failsafe_stop_ms: net0/robot0: tick ")
@@ -162,7 +162,7 @@ def test_a_failure_leaves_a_case_whose_replay_gives_line_and_exit_code(mirotwin,
     code, _, err = mirotwin("run", "left/hil-sub-e/scenario.toml", "--out", "again", "-q", "--no-figure")
     assert code == 1
     assert err == f"mirotwin: {report[1]}\n"
-    assert report[-1] == "mirotwin test hil/sub/e.scenario.toml --seed 0 --set duration_s=0.4"
+    assert report[-1] == "mirotwin test hil/sub/e.scenario.toml --set duration_s=0.4"
 
 
 def test_a_folder_is_cleared_once_its_test_passes(mirotwin, folder):
