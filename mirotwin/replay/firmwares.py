@@ -79,7 +79,7 @@ def _first_mapped(
     """The first changed instruction that the first firmware executes, and the one in its place in the second."""
     one, other = worlds
     robots = [(network.index, robot.slot) for network in one.networks for robot in network.robots]
-    reached = [Reached(place=at, network=net, slot=slot) for net, slot in robots for at in mapping.places]
+    reached = [Reached(address=at, network=net, slot=slot) for net, slot in robots for at in mapping.places]
     try:
         event = one.run_until(reached, until_tick - one.tick) if reached else None
     except WaitExpired:
@@ -89,7 +89,7 @@ def _first_mapped(
     there = mapping.places[event.address]
     place = programs[0].place(event.address, event.tick)
     try:
-        twin = Reached(place=there, network=event.network, slot=event.slot)
+        twin = Reached(address=there, network=event.network, slot=event.slot)
         tick = other.run_until([twin], until_tick - other.tick).tick
     except WaitExpired:
         tick = event.tick

@@ -136,7 +136,7 @@ class Stepper:
         one, other = self.pair.one, self.pair.other
         places = changed_instructions(one.image, other.image)
         conditions = [
-            Reached(place=place, network=robot.network, slot=robot.slot)
+            Reached(address=place, network=robot.network, slot=robot.slot)
             for robot in _robots(one)
             for place in places
         ]

@@ -21,14 +21,14 @@ from miro_protocol.frames import (
     TelemetryFrame,
     encode,
 )
-from miro_protocol.table import SEQ_MODULUS, FrameType
+from miro_protocol.table import SEQ_MODULUS, Flags, FrameType
 from miro_sim.periods import Period
 from miro_sim.world.conditions import Answer, Condition, Heard
 from miro_sim.world.events import Event
 from miro_sim.world.waits import WaitExpired, Waits
 from miro_sim.world.world import World
 from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called, why_ended
-from mirotwin.verify.cases.waits import expect_of_silence, expect_of_wait
+from mirotwin.verify.checks.happens import expect_of
 
 _CHARACTERS_KEPT = 4096
 Velocities = Mapping[int, tuple[int, int]]
@@ -158,11 +158,9 @@ class Link:
         if wrong:
             names = ", ".join(TelemetryFrame.__slots__)
             raise BadInput("", "link.expect", f"telemetry has no field {wrong[0]!r}", f"it has {names}")
-        slot = fields.get("slot")
         filters = ", ".join(f"{name}={value}" for name, value in fields.items())
         what = f"no answer{' with ' + filters if fields else ''} within {within / 24_000:g} ms"
-        judged = fields.keys() <= {"slot"}  # no check asks for other fields
-        deadline = _Deadline(self, what, within, Answer(network=self.network, robot=slot), judged)
+        deadline = _Deadline(self, what, within, _answer_with(self.network, fields))
         while True:
             self._gather()
             for place, (_, answer) in enumerate(self._open):
@@ -202,7 +200,8 @@ class Link:
                     ) from None
                 return
             if event.tick > begun:
-                expect = expect_of_silence(Heard(network=self.network), begun, begun + for_ticks)
+                silence = Heard(network=self.network)
+                expect = expect_of("never_happens", silence, begun, begun + for_ticks)
                 raise WaitFailed(f"{what}: broken", begun, event.tick, [event], expect)
 
     def _look(self, period: Period) -> None:
@@ -233,10 +232,19 @@ class Link:
         return f"Link(net{self.network}, seq={self.seq}, {len(self.answers)} answers, {len(self._open)} not taken)"
 
 
+def _answer_with(network: int, fields: Mapping[str, int]) -> Answer:
+    """The condition for an answer with these fields of a telemetry frame."""
+    wanted: dict[str, Any] = dict(fields)
+    flags = wanted.pop("flags", None)
+    for flag in Flags if flags is not None else ():
+        wanted[str(flag.name).lower()] = bool(flags & flag)
+    return Answer(network=network, **wanted)
+
+
 class _Deadline:
     """The end of one wait of a link, which may go on several times."""
 
-    def __init__(self, link: Link, what: str, within: int, condition: Condition, judged: bool) -> None:
+    def __init__(self, link: Link, what: str, within: int, condition: Condition, judged: bool = True) -> None:
         if within < 0:
             raise ValueError(f"within {within}: give a number of ticks that is not negative, ms(40)")
         self.link = link
@@ -256,5 +264,5 @@ class _Deadline:
             seen = sorted([*self.seen, *error.seen], key=lambda event: event.tick)
             seen = [event for event in seen if event.tick >= self.begun]
             what = self.what if error.tick >= self.end else f"{self.what}: {why_ended(world)}"
-            expect = expect_of_wait(error, self.begun) if self.judged else None
+            expect = expect_of("happens", self.condition, self.begun, error.tick) if self.judged else None
             raise WaitFailed(what, self.begun, error.tick, seen, expect) from None

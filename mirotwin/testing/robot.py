@@ -116,7 +116,8 @@ class RobotUnderTest:
         if isinstance(place, str):
             self._check_symbol(place)
         begun = self.world.tick
-        condition = Reached(place=place, network=self.network, slot=self.slot)
+        symbol, address = (place, None) if isinstance(place, str) else (None, place)
+        condition = Reached(symbol=symbol, address=address, network=self.network, slot=self.slot)
         try:
             return self._waits.until([condition], within)
         except WaitExpired as error:

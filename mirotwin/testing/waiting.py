@@ -14,7 +14,7 @@ from miro_protocol.frames import ContentError, TeamFrame, describe
 from miro_sim.world.events import Event
 from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
-from mirotwin.verify.cases.waits import expect_of_wait
+from mirotwin.verify.checks.happens import expect_of
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -51,7 +51,9 @@ class WaitFailed(AssertionError):
         wanted = " or ".join(map(str, expired.conditions))
         seen = [event for event in expired.seen if event.tick >= expired.begun_tick]
         why = f": {why_ended(world)}" if world.finished else ""
-        expect = expect_of_wait(expired, expired.begun_tick)
+        expect = None
+        if len(expired.conditions) == 1:
+            expect = expect_of("happens", expired.conditions[0], expired.begun_tick, expired.tick)
         return cls(f"no {wanted}{why}", expired.begun_tick, expired.tick, seen, expect)
 
 

@@ -25,7 +25,7 @@ from mirotwin.verify.checks.interface import Check
 from mirotwin.verify.checks.judges import problem_of_class
 from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS
 
-EXAMPLE_VALUES = {"what": '"fault"', "until_tick": "24000000"}
+EXAMPLE_VALUES = {"condition": '{ event = "fault" }', "until_tick": "24000000"}
 """What a message writes for a parameter without a default."""
 WHERE_CHECKS_ARE = (
     "`mirotwin scenarios checks` lists them, `mirotwin examples checks` writes one of your own to pip install"
@@ -129,8 +129,9 @@ def _takes_a_table(struct: type[Check], name: str) -> tuple[str, str]:
     remedy = f"write {name} = {{ {keys} }}"
     info = cast(msgspec.inspect.StructType, msgspec.inspect.type_info(struct))
     for field in info.fields:
-        if field.required and isinstance(field.type, msgspec.inspect.LiteralType):
-            remedy += f"; {field.encode_name}: {', '.join(map(str, field.type.values))}"
+        if field.required and isinstance(field.type, msgspec.inspect.UnionType):
+            kinds = [one for one in field.type.types if isinstance(one, msgspec.inspect.StructType)]
+            remedy += f"; {kinds[0].tag_field}: {', '.join(str(one.tag) for one in kinds)}"
     return f"{name} takes a table", remedy
 
 

@@ -110,7 +110,7 @@ C_co = TypeVar("C_co", bound=Check, covariant=True)
 class Judge(Generic[C_co]):
     """Judges one robot by one check. `failures`: the first hundred; `failed`: how many there were."""
 
-    HEARS: ClassVar[tuple[str, ...]] = ()
+    HEARS: tuple[str, ...] = ()
     """Kinds of event that `event` gets, of `EVENTS`: of the robot and of its network's PC. `frame` is a valid frame at
     the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
 

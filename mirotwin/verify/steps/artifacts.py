@@ -3,8 +3,7 @@
 report.txt        the lines of the verdict, and the command that gives it again
 scenario.toml     the whole scenario with all that was set: `mirotwin run` gives the verdict again
 case.stream       what was sent and done, with the check that failed: `mirotwin replay` does; not where no check can
-                  judge it, as for pins, wheels, places in the program and single fields of an answer: there
-                  sent.stream
+                  judge it, as for pins, wheels and addresses in the program: there sent.stream
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ import msgspec
 from miro_sim.world.world import World
 from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.trace import Trace
-from mirotwin.verify.cases.waits import table_of
+from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.watching import Checks
 from mirotwin.verify.steps.keys import HoldStep, NeverStep, WaitStep
@@ -34,13 +33,13 @@ def case_of_step(player: Player, trace: Trace) -> str | None:
     step = player.steps[failure.number - 1]
     if isinstance(step, HoldStep) or not isinstance(step, WaitStep | NeverStep):
         return None
-    condition = step.happening.exactly()
-    table = None if condition is None else table_of(condition)
-    if table is None or (isinstance(step, WaitStep) and not failure.in_vain):
+    if isinstance(step, WaitStep) and not failure.timed_out:
         return None
     name = "happens" if isinstance(step, WaitStep) else "never_happens"
     until_tick = max(failure.tick, player.world.tick)
-    expect = {name: {**table, "after_tick": failure.begun_tick, "until_tick": until_tick}}
+    expect = expect_of(name, step.condition, failure.begun_tick, until_tick)
+    if expect is None:
+        return None
     again = _judged_again(player.world, trace, expect)
     return None if again is None else case_text(player.world, trace, expect, str(again))
 

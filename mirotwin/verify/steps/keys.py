@@ -11,8 +11,8 @@ import msgspec
 from msgspec import Meta
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds, ticks
+from miro_sim.world.conditions import Condition, Network, Slot, SpeedMS, WheelSpeeds
 from mirotwin.verify.checks.interface import Check
-from mirotwin.verify.steps.happenings import Happening, Network, Slot, SpeedMS, WheelsAt
 from mirotwin.verify.steps.sends import Send
 
 LONGEST_MS = 86_400_000.0
@@ -107,24 +107,24 @@ class WaitStep(Step, frozen=True, kw_only=True):
     """
 
     verb: Verb
-    happening: Happening
+    condition: Condition
     within_ms: WithinMs | None = None
     from_now: bool = False
 
     @property
     def network(self) -> int:
-        return self.happening.network
+        return self.condition.network
 
     def needs_ticks(self) -> int:
         return 0 if self.within_ms is None else ms_ticks(self.within_ms)
 
     def said(self) -> str:
-        return f"{self.verb} {self.happening.name}"
+        return f"{self.verb} {self.condition.what}"
 
     @property
     def wanted(self) -> str:
         within = "" if self.within_ms is None else f" within {self.within_ms:g} ms"
-        return f"{self.happening}{within}"
+        return f"{self.condition}{within}"
 
 
 class NeverStep(Step, frozen=True, kw_only=True):
@@ -132,18 +132,18 @@ class NeverStep(Step, frozen=True, kw_only=True):
 
     VERB = "never"
 
-    happening: Happening
+    condition: Condition
     for_ms: PauseMs
 
     @property
     def network(self) -> int:
-        return self.happening.network
+        return self.condition.network
 
     def lasts_ticks(self) -> int:
         return ms_ticks(self.for_ms)
 
     def said(self) -> str:
-        return f"never {self.happening.name}"
+        return f"never {self.condition.what}"
 
 
 class HoldStep(Step, frozen=True, kw_only=True):
@@ -151,12 +151,12 @@ class HoldStep(Step, frozen=True, kw_only=True):
 
     VERB = "hold"
 
-    happening: WheelsAt
+    condition: WheelSpeeds
     for_ms: PauseMs
 
     @property
     def network(self) -> int:
-        return self.happening.network
+        return self.condition.network
 
     def lasts_ticks(self) -> int:
         return ms_ticks(self.for_ms)

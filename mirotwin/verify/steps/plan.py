@@ -10,7 +10,7 @@ from miro_protocol.table import DOWNLINK
 from miro_robot.image import Image
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.keys import Network, Scenario
-from mirotwin.verify.steps.happenings import Happening, Reached
+from miro_sim.world.conditions import Condition, Reached
 from mirotwin.verify.steps.keys import (
     CheckStep,
     HoldStep,
@@ -52,10 +52,10 @@ def problem(step: Step, scenario: Scenario) -> str:
         if step.every_ticks < shortest_ticks:
             return f"every_ms: {step.every_ms:g} is too short; a frame takes {end_ms(shortest_ticks)}"
         return _beyond(step.slot, network)
-    happening = happening_of(step)
-    if happening is not None:
-        slot = getattr(happening, "slot", None)
-        return happening.problem() or ("" if slot is None else _absent(slot, network))
+    condition = condition_of(step)
+    if condition is not None:
+        slot = getattr(condition, "slot", None)
+        return "" if slot is None else _absent(slot, network)
     if isinstance(step, CheckStep):
         if not step.check:
             return "check: there is no check; give it keys as [expect] has them"
@@ -67,9 +67,9 @@ def problem(step: Step, scenario: Scenario) -> str:
     return ""
 
 
-def happening_of(step: Step) -> Happening | None:
+def condition_of(step: Step) -> Condition | None:
     """What a step waits for, if it does."""
-    return step.happening if isinstance(step, WaitStep | NeverStep | HoldStep) else None
+    return step.condition if isinstance(step, WaitStep | NeverStep | HoldStep) else None
 
 
 def _of_send(step: SendStep, network: Network) -> str:
@@ -120,12 +120,12 @@ def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:
 def check_symbols(steps: Sequence[Step], image: Image, origin: str) -> None:
     """Raises ScenarioError for a step that waits for a symbol which the image does not have."""
     for step in steps:
-        happening = happening_of(step)
-        if not isinstance(happening, Reached) or happening.symbol is None:
+        condition = condition_of(step)
+        if not isinstance(condition, Reached) or condition.symbol is None:
             continue
         place = f"step {step.number}.symbol"
-        symbol = image.symbols.find(happening.symbol)
+        symbol = image.symbols.find(condition.symbol)
         if symbol is None or symbol.space != "code":
             what = "is no symbol of" if symbol is None else "is not in code memory:"
             remedy = "C names are those of functions that are not static; `mirotwin fw disasm` shows them"
-            raise ScenarioError(origin, place, f"{happening.symbol!r} {what} {image.path}", remedy)
+            raise ScenarioError(origin, place, f"{condition.symbol!r} {what} {image.path}", remedy)

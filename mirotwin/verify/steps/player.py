@@ -20,12 +20,11 @@ import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.world.conditions import Condition
+from miro_sim.world.conditions import Answer, Condition, WheelSpeeds, When, answer_fields, speeds_of
 from miro_sim.world.events import Event
 from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
 from miro_sim.world.world import World
 from mirotwin.verify.checks.watching import Checks
-from mirotwin.verify.steps.happenings import Answer, Happening, WheelsAt, answer_fields, speeds_of
 from mirotwin.verify.steps.keys import (
     CheckStep,
     HoldStep,
@@ -47,7 +46,7 @@ from mirotwin.verify.steps.sender import Host
 class StepFailure(msgspec.Struct, frozen=True):
     """`step` failed at `tick`: what was wanted, what was found.
 
-    `begun_tick`: where the step began; `in_vain`: it waited for what did not come.
+    `begun_tick`: where the step began; `timed_out`: it waited for what did not come.
     """
 
     step: str
@@ -56,7 +55,7 @@ class StepFailure(msgspec.Struct, frozen=True):
     tick: int
     wanted: str
     found: str
-    in_vain: bool = False
+    timed_out: bool = False
 
     def __str__(self) -> str:
         return (
@@ -67,9 +66,9 @@ class StepFailure(msgspec.Struct, frozen=True):
 class _Failed(Exception):
     """A step was not fulfilled, at a tick."""
 
-    def __init__(self, tick: int, wanted: str, found: str, in_vain: bool = False) -> None:
+    def __init__(self, tick: int, wanted: str, found: str, timed_out: bool = False) -> None:
         super().__init__(wanted, found)
-        self.in_vain = in_vain
+        self.timed_out = timed_out
         self.tick = tick
         self.wanted = wanted
         self.found = found
@@ -104,7 +103,7 @@ class Player:
                     failed.tick,
                     failed.wanted,
                     failed.found,
-                    failed.in_vain,
+                    failed.timed_out,
                 )
                 return
             except ValueError as error:
@@ -137,9 +136,9 @@ class Player:
             case WaitStep():
                 self._wait_for(step)
             case NeverStep():
-                self._never(step, step.happening, None)
+                self._never(step, step.condition, step.condition)
             case HoldStep():
-                self._never(step, step.happening, step.happening.opposite())
+                self._never(step, step.condition, _opposite(step.condition))
             case PauseStep():
                 self._pause(world.tick + step.lasts_ticks())
             case CheckStep():
@@ -159,32 +158,29 @@ class Player:
     # Waiting
 
     def _wait_for(self, step: WaitStep) -> None:
-        world, happening = self.world, step.happening
+        world, wanted = self.world, step.condition
         begun_tick = world.tick
         if step.from_now:
             world.waits.collect()
             world.waits.pass_over()
         until_tick = NEVER_TICK if step.within_ms is None else begun_tick + step.needs_ticks()
         seen: list[Event] = []
-        while True:
-            event = self._next(happening.kind(), until_tick, seen)
-            if event is None:
-                raise _Failed(world.tick, step.wanted, self._nothing(happening, seen), in_vain=True)
-            if happening.fits(event, self.hosts[step.network].robots):
-                return
-            if step.verb == "expect":
-                raise _Failed(event.tick, step.wanted, self._other(happening, event))
-            seen.append(event)
+        kind = wanted.any_of_its_kind() if step.verb == "expect" else wanted
+        event = self._next(kind, until_tick, seen)
+        if event is None:
+            raise _Failed(world.tick, step.wanted, self._nothing(wanted, seen), timed_out=True)
+        if kind != wanted and not wanted.met_by(event):
+            raise _Failed(event.tick, step.wanted, self._other(wanted, event))
 
-    def _never(self, step: NeverStep | HoldStep, happening: Happening, opposite: Condition | None) -> None:
+    def _never(self, step: NeverStep | HoldStep, condition: Condition, forbidden: Condition) -> None:
         world = self.world
         world.waits.collect()
         world.waits.pass_over()
         until_tick = world.tick + step.lasts_ticks()
-        while (event := self._next(opposite or happening.kind(), until_tick, [])) is not None:
-            if opposite is not None or happening.fits(event, self.hosts[step.network].robots):
-                wanted = f"{'no ' if opposite is None else ''}{happening} for {step.for_ms:g} ms"
-                raise _Failed(event.tick, wanted, self._other(happening, event))
+        event = self._next(forbidden, until_tick, [])
+        if event is not None:
+            wanted = f"{'no ' if condition is forbidden else ''}{condition} for {step.for_ms:g} ms"
+            raise _Failed(event.tick, wanted, self._other(condition, event))
         if world.tick < until_tick:
             raise _Failed(world.tick, f"{step.for_ms:g} ms of it", self._end())
 
@@ -235,34 +231,37 @@ class Player:
         stopped = "a firmware fault has stopped the run" if self.world.stopped else "the run is over"
         return f"that {stopped}"
 
-    def _nothing(self, happening: Happening, seen: Sequence[Event]) -> str:
+    def _nothing(self, wanted: Condition, seen: Sequence[Event]) -> str:
         """What there was instead of the event that was wanted."""
         found = [self._end()] if self.world.finished else []
-        if isinstance(happening, WheelsAt):
-            found.append(self._speeds(happening))
+        if isinstance(wanted, WheelSpeeds):
+            found.append(self._speeds(wanted))
         found.append(_meanwhile(seen))
         return "; ".join(found)
 
-    def _other(self, happening: Happening, event: Event) -> str:
+    def _other(self, wanted: Condition, event: Event) -> str:
         """The event that came instead."""
-        if isinstance(happening, WheelsAt):
-            return self._speeds(happening)
+        if isinstance(wanted, WheelSpeeds):
+            return self._speeds(wanted)
         _, _, said = f"{event}".partition(": ")
-        if isinstance(happening, Answer):
-            fields = answer_fields(event, self.hosts[event.network].robots)
-            asked = {
-                key: value for key, value in msgspec.structs.asdict(happening).items() if value is not None
-            }
+        if isinstance(wanted, Answer):
             shown = [
-                f"{key} = {str(value).lower()}" for key, value in fields.items() if key in ("slot", *asked)
+                f"{key} = {str(value).lower()}"
+                for key, value in answer_fields(event).items()
+                if key == "slot" or getattr(wanted, key) is not None
             ]
             said = f"{said} with {', '.join(shown)}"
         return said
 
-    def _speeds(self, happening: WheelsAt) -> str:
-        robot = self.world.robot(happening.network, self._slot(happening.slot, happening.network))
+    def _speeds(self, wanted: WheelSpeeds) -> str:
+        robot = self.world.robot(wanted.network, self._slot(wanted.slot, wanted.network))
         left, right = speeds_of(robot)
         return f"left_m_s = {left:.4f}, right_m_s = {right:.4f}"
+
+
+def _opposite(speeds: WheelSpeeds) -> Condition:
+    """True as soon as the wheels turn otherwise."""
+    return When(network=speeds.network, slot=speeds.slot, predicate=lambda robot: not speeds.predicate(robot))
 
 
 def _meanwhile(seen: Sequence[Event]) -> str:

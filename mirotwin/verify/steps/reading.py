@@ -16,9 +16,9 @@ import msgspec
 
 from miro_sim.scenario.errors import ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
+from miro_sim.world.conditions import CONDITIONS, Heard, WheelSpeeds
 from mirotwin.verify.checks.expect import checks_of_table
 from mirotwin.verify.steps import plan
-from mirotwin.verify.steps.happenings import HAPPENINGS, Heard, WheelsAt
 from mirotwin.verify.steps.keys import (
     PLAIN,
     VERBS,
@@ -90,24 +90,24 @@ class _Table:
             return SendStep(what=self.rest(self.choice(verb, SENDS), verb), **common)
         if verb == "silence_for_ms":
             for_ms = self.taken(verb, PauseMs)
-            return NeverStep(happening=self.rest(Heard, verb, hidden=("byte",)), for_ms=for_ms, **common)
-        happening = self.choice(verb, {"wheels": WheelsAt} if verb == "hold" else HAPPENINGS)
+            return NeverStep(condition=self.rest(Heard, verb, hidden=("byte",)), for_ms=for_ms, **common)
+        kind = self.choice(verb, {"wheels": WheelSpeeds} if verb == "hold" else CONDITIONS)
         if verb in ("never", "hold"):
             self.need_for_ms()
             for_ms = self.taken("for_ms", PauseMs)
-            what = self.rest(happening, verb)
-            if isinstance(what, WheelsAt) and verb == "hold":
-                return HoldStep(happening=what, for_ms=for_ms, **common)
-            return NeverStep(happening=what, for_ms=for_ms, **common)
+            what = self.rest(kind, verb)
+            if isinstance(what, WheelSpeeds) and verb == "hold":
+                return HoldStep(condition=what, for_ms=for_ms, **common)
+            return NeverStep(condition=what, for_ms=for_ms, **common)
         within_ms = self.taken("within_ms", WithinMs, None)
         from_now = self.taken("from_now", bool, False)
-        what = self.rest(happening, verb)
-        return WaitStep(verb=verb, happening=what, within_ms=within_ms, from_now=from_now, **common)  # type: ignore[arg-type]
+        what = self.rest(kind, verb)
+        return WaitStep(verb=verb, condition=what, within_ms=within_ms, from_now=from_now, **common)  # type: ignore[arg-type]
 
     # Keys
 
     def taken(self, key: str, type_: Any, default: Any = ...) -> Any:
-        """The value of a key that is no key of the happening or frame, taken out of the table."""
+        """The value of a key that is no key of the condition or frame, taken out of the table."""
         if default is not ... and key not in self.table:
             return default
         try:

@@ -11,7 +11,7 @@ from msgspec import Meta
 from miro_host.wheels import TICKS_PER_S, TICKS_PER_SAMPLE, UNITS_PER_COUNT, Wheels, nearest
 from miro_protocol.frames import ServiceFrame
 from miro_protocol.table import DOWNLINK, SEQ_MODULUS, Opcode
-from mirotwin.verify.steps.happenings import Network, Slot, SpeedMS
+from miro_sim.world.conditions import Network, Slot, SpeedMS
 
 CHARACTER = re.compile(r"([0-9a-fA-F]{2})(!?)")
 MOST_ACCELERATION_M_S2 = 16_000.0

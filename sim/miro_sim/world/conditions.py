@@ -1,133 +1,280 @@
-"""The conditions of a wait: `World.run_until(condition)`.
+"""The conditions of a wait: one struct a kind, for `World.run_until`, for steps, checks and cases.
 
-`slot` None is the network's first robot; conditions of the PC have none.
+A file names them by `event = "answer"`, or as a step does: `wait_for = "answer"`. Fields that are left out may be
+anything; `slot` None is the network's first robot, but for `Answer`. Only code can give a predicate (`When`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import msgspec
+from msgspec import Meta
 
+from miro_host.wheels import Wheels
+from miro_protocol.frames import ContentError, TelemetryFrame
+from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, Flags
 from miro_robot.lm629.commands import BY_NAME
-from miro_sim.world.events import PC, SIDES, Event
+from miro_sim.world.events import PC, Event
+from miro_sim.world.pins import PINS
 
 if TYPE_CHECKING:
     from miro_sim.world.robot import Robot
 
+Slot = Annotated[int, Meta(ge=0, le=4)]
+Network = Annotated[int, Meta(ge=0, le=31)]
+Seq = Annotated[int, Meta(ge=0, lt=SEQ_MODULUS)]
+Byte = Annotated[int, Meta(ge=0, le=0xFF)]
+Word = Annotated[int, Meta(ge=0, le=0xFFFF)]
+SpeedMS = Annotated[float, Meta(ge=-2.876, le=2.876)]
+"""What a 16-bit word carries."""
+C = TypeVar("C", bound="Condition")
 
-class Condition(msgspec.Struct, frozen=True, kw_only=True):
-    """Something that becomes true at a tick, on `network` and there at `slot`."""
 
-    network: int = 0
-    slot: int | None = None
+class Condition(
+    msgspec.Struct,
+    frozen=True,
+    forbid_unknown_fields=True,
+    kw_only=True,
+    tag_field="event",
+    omit_defaults=True,
+):
+    """Something that becomes true at a tick, at the PC of `network`. Raises ValueError for what can never be."""
+
+    DETAILS: ClassVar[tuple[str, ...]] = ()
+    """The fields in which events of one kind differ."""
+
+    network: Network = 0
+
+    @property
+    def what(self) -> str:
+        """The kind, as files and events name it."""
+        return str(self.__struct_config__.tag)
+
+    def at_slot(self, first_slot: int) -> int:
+        """The slot at which it happens, where `first_slot` is the network's first robot; -1 for the PC."""
+        return PC
 
     def met_by(self, event: Event) -> bool:
         """Whether this event, of the network and slot that are meant, fulfils the condition."""
-        raise NotImplementedError
+        return event.what == self.what
+
+    def any_of_its_kind(self: C) -> C:
+        """The condition that every event of this kind fulfils, at the same place."""
+        return msgspec.structs.replace(self, **dict.fromkeys(self.DETAILS))
+
+    def __str__(self) -> str:
+        given = msgspec.to_builtins(self, enc_hook=_name_of)
+        keys = [
+            f"{key} = {msgspec.json.encode(value).decode()}" for key, value in given.items() if key != "event"
+        ]
+        return f"{self.what}{' with ' * bool(keys)}{', '.join(keys)}"
 
 
-class Sent(Condition, frozen=True, kw_only=True):
+class AtRobot(Condition, frozen=True, kw_only=True):
+    """Base of what happens at the robot in `slot`."""
+
+    slot: Slot | None = None
+
+    def at_slot(self, first_slot: int) -> int:
+        return first_slot if self.slot is None else self.slot
+
+
+class Answer(Condition, frozen=True, kw_only=True, tag="answer"):
+    """The PC hears a valid answer: of the robot in `slot` or of any, with these fields."""
+
+    DETAILS = (
+        "seq",
+        *(str(flag.name).lower() for flag in Flags),
+        *("status_left", "status_right", "position_left", "position_right", "accepted", "rejected"),
+    )
+
+    slot: Slot | None = None
+    seq: Seq | None = None
+    stopped: bool | None = None
+    motors_off: bool | None = None
+    init_failed: bool | None = None
+    status_left: Byte | None = None
+    status_right: Byte | None = None
+    position_left: Word | None = None
+    position_right: Word | None = None
+    accepted: Byte | None = None
+    rejected: Byte | None = None
+
+    def met_by(self, event: Event) -> bool:
+        if event.what != "answer" or self.slot not in (None, event.value):
+            return False
+        wanted = {key: value for key in self.DETAILS if (value := getattr(self, key)) is not None}
+        return not wanted or wanted.items() <= answer_fields(event).items()
+
+
+def answer_fields(event: Event) -> dict[str, int | bool]:
+    """What an answer says, under the keys of `Answer`; nothing where it says what no robot may."""
+    try:
+        answer = None if event.frame is None else event.frame.message(max(ROBOT_COUNTS))
+    except ContentError:
+        return {}
+    if not isinstance(answer, TelemetryFrame):
+        return {}
+    flags = {str(flag.name).lower(): bool(answer.flags & flag) for flag in Flags}
+    return flags | {key: getattr(answer, key) for key in ("slot", *Answer.DETAILS) if key not in flags}
+
+
+class Heard(Condition, frozen=True, kw_only=True, tag="heard"):
+    """The PC hears a character (`byte`: this one) from a robot."""
+
+    DETAILS = ("byte",)
+
+    byte: Byte | None = None
+
+    def met_by(self, event: Event) -> bool:
+        return event.what == "heard" and self.byte in (None, event.value)
+
+
+class Sent(Condition, frozen=True, kw_only=True, tag="sent"):
     """The network's host begins a transmission."""
 
-    def met_by(self, event: Event) -> bool:
-        return event.what == "sent"
 
+class Frame(AtRobot, frozen=True, kw_only=True, tag="frame"):
+    """A robot's serial port has received the last character of a valid frame, fresh or not."""
 
-class Heard(Condition, frozen=True, kw_only=True):
-    """The PC hears a character (`value`: this one) from a robot."""
+    DETAILS = ("seq",)
 
-    value: int | None = None
-
-    def met_by(self, event: Event) -> bool:
-        return event.what == "heard" and self.value in (None, event.value)
-
-
-class Answer(Condition, frozen=True, kw_only=True):
-    """The PC hears a valid answer, of the robot in slot `robot` or of any."""
-
-    robot: int | None = None
+    seq: Seq | None = None
 
     def met_by(self, event: Event) -> bool:
-        return event.what == "answer" and self.robot in (None, event.value)
-
-
-class Byte(Condition, frozen=True, kw_only=True):
-    """A robot's serial port has received a character (`value`: this one), or with `sent` has sent it."""
-
-    value: int | None = None
-    sent: bool = False
-
-    def met_by(self, event: Event) -> bool:
-        return event.what == ("transmitted" if self.sent else "received") and self.value in (
-            None,
-            event.value,
+        return event.what == "frame" and (
+            self.seq is None or (event.frame is not None and event.frame.seq == self.seq)
         )
 
 
-class Frame(Condition, frozen=True, kw_only=True):
-    """A robot's serial port has received the last character of a valid frame, fresh or not."""
+class Received(AtRobot, frozen=True, kw_only=True, tag="received"):
+    """A robot's serial port has received a character (`byte`: this one)."""
+
+    DETAILS = ("byte",)
+
+    byte: Byte | None = None
 
     def met_by(self, event: Event) -> bool:
-        return event.what == "frame"
+        return event.what == "received" and self.byte in (None, event.value)
 
 
-class Command(Condition, frozen=True, kw_only=True):
-    """An LM629 has completed a command: of one `side` or either, of this `name` (`STT`, ..) or any."""
+class Transmitted(AtRobot, frozen=True, kw_only=True, tag="transmitted"):
+    """A robot's serial port has sent a character (`byte`: this one)."""
 
-    name: str | None = None
+    DETAILS = ("byte",)
+
+    byte: Byte | None = None
+
+    def met_by(self, event: Event) -> bool:
+        return event.what == "transmitted" and self.byte in (None, event.value)
+
+
+class Command(AtRobot, frozen=True, kw_only=True, tag="command"):
+    """An LM629 has completed a command: of one `side` or either, of this `name` (`STT`, ..), with the data `hex`."""
+
+    DETAILS = ("name", "hex")
+
     side: Literal["left", "right"] | None = None
+    name: str | None = None
+    hex: str | None = None
 
     def __post_init__(self) -> None:
         if self.name is not None and self.name not in BY_NAME:
-            raise ValueError(f"{self.name!r} is no LM629 command; there are {', '.join(BY_NAME)}")
-        if self.side not in (None, *SIDES):
-            raise ValueError(f"side {self.side!r}: give left or right")
+            raise ValueError(f"name: {self.name!r} is not an LM629 command; there are {', '.join(BY_NAME)}")
+        if self.side not in (None, "left", "right"):
+            raise ValueError(f"side: {self.side!r} is not a side; give left or right")
+        try:
+            bytes.fromhex(self.hex or "")
+        except ValueError:
+            what = f"hex: {self.hex!r} are not bytes; write pairs of hex digits, as in '00 05'"
+            raise ValueError(what) from None
 
     def met_by(self, event: Event) -> bool:
-        name_fits = self.name is None or event.opcode == BY_NAME[self.name].opcode
-        return event.what == "command" and name_fits and self.side in (None, event.side)
+        return (
+            event.what == "command"
+            and self.side in (None, event.side)
+            and (self.name is None or event.opcode == BY_NAME[self.name].opcode)
+            and (self.hex is None or event.data == bytes.fromhex(self.hex))
+        )
 
 
-class Fault(Condition, frozen=True, kw_only=True):
-    """The firmware does what it must not."""
+class WheelSpeeds(AtRobot, frozen=True, kw_only=True, tag="wheels"):
+    """The wheels turn as fast as this, by the truth of the drive: the rim's speed.
 
-    def met_by(self, event: Event) -> bool:
-        return event.what == "fault"
-
-
-class Reached(Condition, frozen=True, kw_only=True):
-    """The instruction at `place`, an address or a symbol of the image, is the next to be executed.
-
-    `address` is filled in by the world.
+    A state rather than an event: asked at each sample of the robot's left LM629, every 341 us.
     """
 
-    place: int | str
-    address: int = -1
+    left_m_s: SpeedMS | None = None
+    right_m_s: SpeedMS | None = None
+    tolerance_m_s: Annotated[float, Meta(gt=0.0, le=1.0)] = 0.02
+
+    at: ClassVar[Literal["sample"]] = "sample"
+
+    def __post_init__(self) -> None:
+        if self.left_m_s is None and self.right_m_s is None:
+            raise ValueError("wheels: no speed is given; give left_m_s, right_m_s or both")
 
     def met_by(self, event: Event) -> bool:
-        return event.what == "reached" and event.address == self.address
+        return event.what == "true"
+
+    def predicate(self, robot: Robot) -> bool:
+        """Whether the wheels are so fast now."""
+        for wanted, found in zip((self.left_m_s, self.right_m_s), speeds_of(robot), strict=True):
+            if wanted is not None and abs(found - wanted) > self.tolerance_m_s:
+                return False
+        return True
 
 
-class Edge(Condition, frozen=True, kw_only=True):
+def speeds_of(robot: Robot) -> tuple[float, float]:
+    """(left, right) in m/s, as the chassis moves."""
+    v_m_s, w_rad_s = robot.drive.velocity_at(robot.board.left.sample_tick)
+    return Wheels(track_m=robot.spec.drive.chassis.track_m).split(v_m_s, w_rad_s)
+
+
+class Edge(AtRobot, frozen=True, kw_only=True, tag="edge"):
     """A `pin` of the robot's board changes (to `level`): `rxd`, `txd`, `P1.0`, `left.hi`, .. (`pins.PINS`)."""
+
+    DETAILS = ("level",)
 
     pin: str
     level: Literal[0, 1] | None = None
+
+    def __post_init__(self) -> None:
+        if self.pin not in PINS:
+            wired = ", ".join(pin for pin in PINS if not pin.startswith("P"))
+            raise ValueError(f"pin: {self.pin!r} is not a pin; there are {wired} and P0.0 to P3.7")
 
     def met_by(self, event: Event) -> bool:
         return event.what == "edge" and event.pin == self.pin and self.level in (None, event.value)
 
 
-class Touch(Condition, frozen=True, kw_only=True):
-    """A robot of the network touches another robot on the pitch, seen on the contact grid of 1 ms."""
+class Reached(AtRobot, frozen=True, kw_only=True, tag="reached"):
+    """The instruction at a `symbol` of the image, or at an `address`, is the next to be executed."""
+
+    symbol: str | None = None
+    address: Word | None = None
+
+    def __post_init__(self) -> None:
+        if (self.symbol is None) == (self.address is None):
+            raise ValueError("reached: takes a symbol or an address; give one of the two")
+        if self.address is not None and not 0 <= self.address <= 0xFFFF:
+            raise ValueError(f"address: {self.address} is not an address; give 0 to 0xffff")
 
     def met_by(self, event: Event) -> bool:
-        return event.what == "touch"
+        return event.what == "reached" and event.address == self.address
 
 
-class When(Condition, frozen=True, kw_only=True):
+class Fault(AtRobot, frozen=True, kw_only=True, tag="fault"):
+    """The firmware does what it must not."""
+
+
+class Touch(Condition, frozen=True, kw_only=True, tag="touch"):
+    """A robot of the network touches another robot on the pitch, seen on the contact grid of 1 ms."""
+
+
+class When(AtRobot, frozen=True, kw_only=True, tag="when"):
     """`predicate(robot)` is true, asked at each sample of the robot's left LM629, or after each instruction.
 
     `at = "instruction"` is some 70 times slower. The predicate reads the robot and changes nothing.
@@ -140,11 +287,17 @@ class When(Condition, frozen=True, kw_only=True):
         return event.what == "true"
 
 
-AT_THE_PC = (Sent, Heard, Answer, Touch)
+def _name_of(predicate: Any) -> str:
+    return str(getattr(predicate, "__qualname__", predicate))
 
 
-def place_of(condition: Condition, first_slot: int) -> int:
-    """The slot at which events for this condition happen."""
-    if isinstance(condition, AT_THE_PC):
-        return PC
-    return first_slot if condition.slot is None else condition.slot
+Recorded = Answer | Heard | Frame | Command | Received | Transmitted | Sent | Fault | Touch
+"""Those that happen whether somebody waits for them or not: the logs hold them, so a check can judge them."""
+CONDITIONS: dict[str, type[Condition]] = {
+    str(struct.__struct_config__.tag): struct
+    for struct in (
+        *(Answer, Heard, Frame, Command, WheelSpeeds, Edge, Reached),
+        *(Received, Transmitted, Sent, Fault, Touch),
+    )
+}
+"""By the name that a file gives them."""

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from miro_exact.clock import CYCLE_TICKS
-from miro_sim.world.conditions import Condition, Edge, Reached, When, place_of
+from miro_sim.world.conditions import Condition, Edge, Reached, WheelSpeeds, When
 from miro_sim.world.events import PC, Event
-from miro_sim.world.pins import PINS, PinWatch
+from miro_sim.world.pins import PinWatch
 
 if TYPE_CHECKING:
-    from miro_sim.world.robot import Robot
     from miro_sim.world.world import World
 
 _EDGES, _TRUE = 1 << 40, 1 << 41
@@ -24,24 +23,25 @@ _EDGES, _TRUE = 1 << 40, 1 << 41
 class Watch:
     """A context: within it the robots of `world` look out for `conditions`.
 
-    Raises ValueError for a network, slot, pin or symbol that is not there.
+    Raises ValueError for a network, slot or symbol that is not there. `conditions`: each with network and slot.
     """
 
     def __init__(self, world: World, conditions: Sequence[Condition]) -> None:
         self.world = world
-        self.conditions = [self._resolved(condition) for condition in conditions]
+        self.conditions = [
+            (self._place(condition), self._with_address(condition)) for condition in conditions
+        ]
         self.pins: dict[tuple[int, int], PinWatch] = {}
         self.next_edge = _EDGES
 
     def __enter__(self) -> Watch:
-        for condition in self.conditions:
-            robot = self._robot(condition)
+        for place, condition in self.conditions:
             if isinstance(condition, Reached):
-                assert robot is not None
+                assert condition.address is not None
+                robot = self.world.robot(*place)
                 robot.marks = (*robot.marks, condition.address)
-            elif isinstance(condition, When):
-                assert robot is not None
-                robot.asked.append((condition.predicate, condition.at))
+            elif isinstance(condition, When | WheelSpeeds):
+                self.world.robot(*place).asked.append((condition.predicate, condition.at))
         self.begin_again(_EDGES)
         return self
 
@@ -56,8 +56,8 @@ class Watch:
 
     def wants(self, event: Event) -> bool:
         """Whether one of the conditions is met by `event`."""
-        for condition in self.conditions:
-            if (event.network, event.slot) == (condition.network, condition.slot) and condition.met_by(event):
+        for place, condition in self.conditions:
+            if (event.network, event.slot) == place and condition.met_by(event):
                 return True
         return False
 
@@ -68,10 +68,9 @@ class Watch:
         self.next_edge = next_edge
         self._close_pins()
         pins: dict[tuple[int, int], set[str]] = {}
-        for condition in self.conditions:
+        for place, condition in self.conditions:
             if isinstance(condition, Edge):
-                assert condition.slot is not None
-                pins.setdefault((condition.network, condition.slot), set()).add(condition.pin)
+                pins.setdefault(place, set()).add(condition.pin)
         for (network, slot), names in pins.items():
             self.pins[network, slot] = PinWatch(self.world.robot(network, slot).board, frozenset(names))
 
@@ -103,42 +102,32 @@ class Watch:
         """Predicates that are true before anything moves."""
         tick = self.world.tick
         found = []
-        for condition in self.conditions:
-            robot = self._robot(condition)
-            if isinstance(condition, When) and robot is not None and condition.predicate(robot):
-                network, slot = condition.network, robot.spec.slot
+        for (network, slot), condition in self.conditions:
+            if not isinstance(condition, When | WheelSpeeds):
+                continue
+            if condition.predicate(self.world.robot(network, slot)):
                 event = Event(tick=tick, what="true", network=network, slot=slot)
                 found.append(((tick, network, slot, _TRUE), event))
         return found
 
     # What the conditions mean
 
-    def _robot(self, condition: Condition) -> Robot | None:
-        if condition.slot is None or condition.slot == PC:
-            return None
-        return self.world.robot(condition.network, condition.slot)
-
-    def _resolved(self, condition: Condition) -> Condition:
-        """The condition with its slot, and with the address that it means."""
+    def _place(self, condition: Condition) -> tuple[int, int]:
+        """Network and slot at which it happens."""
         networks = self.world.networks
         if not 0 <= condition.network < len(networks):
             raise ValueError(f"there is no network {condition.network}; there are {len(networks)}, from 0 on")
-        slot = place_of(condition, networks[condition.network].robots[0].spec.slot)
+        slot = condition.at_slot(networks[condition.network].robots[0].spec.slot)
         if slot != PC:
             self.world.robot(condition.network, slot)
-        if isinstance(condition, Edge) and condition.pin not in PINS:
-            raise ValueError(f"{condition.pin!r} is no pin; there are {', '.join(PINS)}")
-        if isinstance(condition, Reached):
-            condition = msgspec.structs.replace(condition, address=self._address(condition.place))
-        return msgspec.structs.replace(condition, slot=slot)
+        return condition.network, slot
 
-    def _address(self, place: int | str) -> int:
-        if isinstance(place, int):
-            if not 0 <= place <= 0xFFFF:
-                raise ValueError(f"{place} is no address: give 0 to 0xffff")
-            return place
-        symbol = self.world.image.symbols.find(place)
+    def _with_address(self, condition: Condition) -> Condition:
+        """The condition with the address that its symbol has."""
+        if not isinstance(condition, Reached) or condition.symbol is None:
+            return condition
+        symbol = self.world.image.symbols.find(condition.symbol)
         if symbol is None or symbol.space != "code":
             what = "is no symbol of" if symbol is None else "is not in code memory:"
-            raise ValueError(f"{place!r} {what} {self.world.image.path}")
-        return symbol.address
+            raise ValueError(f"{condition.symbol!r} {what} {self.world.image.path}")
+        return msgspec.structs.replace(condition, symbol=None, address=symbol.address)

@@ -187,7 +187,7 @@ class World:
         what was seen meanwhile; default: the end of the scenario. Raises ValueError for a network, robot, pin or
         symbol that is not there.
 
-            world.run_until(conditions.Answer(robot=0), within=ticks(0.040))
+            world.run_until(conditions.Answer(slot=0), within=ticks(0.040))
         """
         conditions = [condition] if isinstance(condition, waiting.Condition) else list(condition)
         return self.waits.until(conditions, None if within is None else _whole(within))

@@ -208,7 +208,7 @@ def test_firmware_without_symbols_says_what_is_missing(mirotwin, finished, tmp_p
     assert f"no symbols of {image}: put its .map, .cdb and .rst beside it" in err
 
 
-@pytest.mark.parametrize("format", ["2", "4", "next"])
+@pytest.mark.parametrize("format", ["2", "5", "next"])
 def test_a_recording_of_another_format_is_refused_with_the_reason(
     mirotwin,
     finished,

@@ -124,7 +124,7 @@ def test_in_noise_robot_and_pc_hear_characters_that_nobody_sent():
     world = driving()
     world.run_to(world.set_radio("noise"))
     assert world.run_until(wait.Heard(), within=PERIOD).what == "heard"
-    assert world.run_until(wait.Byte(), within=PERIOD).what == "received"
+    assert world.run_until(wait.Received(), within=PERIOD).what == "received"
 
 
 def test_an_answer_does_not_come_through_a_radio_that_is_off():

@@ -169,9 +169,9 @@ def test_a_frame_with_a_bad_stop_bit_is_recorded_as_sent_and_refused_by_the_robo
     world = silent()
     tick = world.inject(FRAME, at_tick=100_000, bad_stop=(place,))
     world.run_to(tick + place * HOST_CHARACTER_TICKS)
-    event = world.run_until(wait.Byte(value=FRAME[place]), within=2 * HOST_CHARACTER_TICKS)
+    event = world.run_until(wait.Received(byte=FRAME[place]), within=2 * HOST_CHARACTER_TICKS)
     while event.tick < tick + place * HOST_CHARACTER_TICKS:
-        event = world.run_until(wait.Byte(value=FRAME[place]), within=2 * HOST_CHARACTER_TICKS)
+        event = world.run_until(wait.Received(byte=FRAME[place]), within=2 * HOST_CHARACTER_TICKS)
     assert not event.good_stop
     second = world.inject(FRAME, at_tick=2 * PERIOD)
     world.run_to(4 * PERIOD)

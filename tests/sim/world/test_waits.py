@@ -16,11 +16,11 @@ from tests.sim.world.rig import PERIOD, fig6, two_networks
 
 WAITS = {
     "sent": wait.Sent(),
-    "byte": wait.Byte(),
-    "byte sent": wait.Byte(sent=True),
+    "received": wait.Received(),
+    "transmitted": wait.Transmitted(),
     "frame": wait.Frame(),
     "command": wait.Command(name="STT", side="right"),
-    "symbol": wait.Reached(place="motion_team"),
+    "symbol": wait.Reached(symbol="motion_team"),
     "edge of rxd": wait.Edge(pin="rxd"),
     "edge of pwm": wait.Edge(pin="left.pwm"),
     "answer": wait.Answer(),
@@ -88,7 +88,7 @@ def test_a_wait_ends_where_the_pin_has_changed_and_not_a_tick_before():
 
 def test_a_wait_for_a_symbol_ends_before_its_instruction():
     world = fig6()
-    reached = world.run_until(wait.Reached(place="main"))
+    reached = world.run_until(wait.Reached(symbol="main"))
     cpu = world.robot().board.cpu
     assert cpu.pc == reached.address == world.image.symbols.find("main").address
     assert 12 * cpu.cycles == world.tick == reached.tick
@@ -96,8 +96,8 @@ def test_a_wait_for_a_symbol_ends_before_its_instruction():
 
 def test_the_next_wait_for_the_same_address_ends_at_its_next_execution():
     world = fig6()
-    place = world.image.symbols.find("motion_team").address
-    counts = [world.run_until(wait.Reached(place=place)).value for _ in range(6)]
+    address = world.image.symbols.find("motion_team").address
+    counts = [world.run_until(wait.Reached(address=address)).value for _ in range(6)]
     assert counts == sorted(set(counts))
 
 
@@ -165,7 +165,7 @@ def test_a_predicate_is_asked_after_each_instruction_on_request():
 
 def test_a_wait_in_vain_ends_on_the_tick_and_says_what_was_seen():
     world = fig6()
-    with pytest.raises(WaitExpired, match=r"tick 100000: 100000 ticks passed without Fault") as caught:
+    with pytest.raises(WaitExpired, match=r"tick 100000: 100000 ticks passed without fault") as caught:
         world.run_until(wait.Fault(), within=100_000)
     assert world.tick == 100_000
     assert "sent" in {event.what for event in caught.value.seen}
@@ -182,11 +182,9 @@ def test_a_wait_without_end_ends_with_the_run():
     ("condition", "message"),
     [
         (wait.Answer(network=2), "there is no network 2; there are 2"),
-        (wait.Byte(slot=1), "net0 has no robot in slot 1; there is 0, 2"),
-        (wait.Reached(place="mian"), "'mian' is no symbol of"),
-        (wait.Reached(place="frames_accepted"), "'frames_accepted' is not in code memory"),
-        (wait.Reached(place=0x10000), "65536 is no address"),
-        (wait.Edge(pin="P4.0"), "'P4.0' is no pin; there are rxd, txd"),
+        (wait.Received(slot=1), "net0 has no robot in slot 1; there is 0, 2"),
+        (wait.Reached(symbol="mian"), "'mian' is no symbol of"),
+        (wait.Reached(symbol="frames_accepted"), "'frames_accepted' is not in code memory"),
     ],
 )
 def test_a_condition_on_what_is_not_there_is_refused_before_anything_moves(condition, message):
@@ -197,9 +195,21 @@ def test_a_condition_on_what_is_not_there_is_refused_before_anything_moves(condi
     assert world.run_until(wait.Sent(), within=100_000).tick == 96_000
 
 
-def test_no_command_of_that_name_is_refused_where_it_is_written():
-    with pytest.raises(ValueError, match="'SST' is no LM629 command"):
-        wait.Command(name="SST")
+@pytest.mark.parametrize(
+    ("kind", "fields", "message"),
+    [
+        (wait.Command, {"name": "SST"}, "name: 'SST' is not an LM629 command; there are RESET, "),
+        (wait.Command, {"side": "top"}, "side: 'top' is not a side; give left or right"),
+        (wait.Command, {"hex": "0"}, "hex: '0' are not bytes; write pairs of hex digits"),
+        (wait.Edge, {"pin": "P4.0"}, "pin: 'P4.0' is not a pin; there are rxd, txd"),
+        (wait.Reached, {"address": 0x10000}, "address: 65536 is not an address; give 0 to 0xffff"),
+        (wait.Reached, {}, "reached: takes a symbol or an address"),
+        (wait.WheelSpeeds, {}, "wheels: no speed is given; give left_m_s, right_m_s or both"),
+    ],
+)
+def test_what_can_never_be_is_refused_where_it_is_written(kind, fields, message):
+    with pytest.raises(ValueError, match=message):
+        kind(**fields)
 
 
 def test_robots_of_several_networks_are_waited_for_apart():

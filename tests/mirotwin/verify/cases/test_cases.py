@@ -15,7 +15,7 @@ from miro_sim.world import conditions
 from miro_sim.world.waits import WaitExpired
 from mirotwin.verify.cases.case import case_of_checks, case_text, tables_of, write_case
 from mirotwin.verify.cases.trace import Trace
-from mirotwin.verify.cases.waits import expect_of_silence, expect_of_wait
+from mirotwin.verify.checks.happens import expect_of
 from tests import children
 from tests.mirotwin.conftest import mirotwin
 from tests.mirotwin.verify.checks.rig import MS, needs_sdcc, own_image, planted, silent_world, team
@@ -114,12 +114,16 @@ def test_a_wait_that_was_in_vain_is_judged_again(mirotwin, tmp_path):
     trace = Trace(world)
     world.run_to(60 * MS)
     with pytest.raises(WaitExpired) as caught:
-        world.run_until(conditions.Answer(robot=1), within=50 * MS)
-    expect = expect_of_wait(caught.value, 60 * MS)
+        world.run_until(conditions.Answer(slot=1), within=50 * MS)
+    expect = expect_of("happens", caught.value.conditions[0], 60 * MS, world.tick)
     assert expect == {
-        "happens": {"what": "answer", "network": 0, "slot": 1, "after_tick": 60 * MS, "until_tick": 110 * MS}
+        "happens": {
+            "condition": {"event": "answer", "slot": 1},
+            "after_tick": 60 * MS,
+            "until_tick": 110 * MS,
+        }
     }
-    line = "happens: net0/robot1: tick 2640000 (110.000 ms): wanted answer of robot 1 within 50.000 ms, found none"
+    line = "happens: net0/robot1: tick 2640000 (110.000 ms): wanted answer with slot = 1 within 50.000 ms, found none"
     write_case(tmp_path / "a.stream", case_text(world, trace, expect, line))
     code, _, err = mirotwin("replay", tmp_path / "a.stream", "-q")
     assert (code, err) == (1, f"mirotwin: fails as recorded: {line}\n")
@@ -131,7 +135,7 @@ def test_an_event_that_must_not_come_is_judged_again(mirotwin, tmp_path):
     world.run_to(60 * MS)
     world.inject(encode(team(1, 900, 900, ask=True), 3))
     heard = world.run_until(conditions.Heard(), within=80 * MS)
-    expect = expect_of_silence(conditions.Heard(), 60 * MS, 140 * MS)
+    expect = expect_of("never_happens", conditions.Heard(), 60 * MS, 140 * MS)
     assert expect is not None
     write_case(tmp_path / "a.stream", case_text(world, trace, expect, "never_happens: of old"))
     code, _, err = mirotwin("replay", tmp_path / "a.stream", "-q")
@@ -140,10 +144,10 @@ def test_an_event_that_must_not_come_is_judged_again(mirotwin, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "condition", [conditions.When(predicate=bool), conditions.Edge(pin="rxd"), conditions.Reached(place=3)]
+    "condition", [conditions.When(predicate=bool), conditions.Edge(pin="rxd"), conditions.Reached(address=3)]
 )
 def test_waits_that_only_their_program_can_judge_make_no_check(condition):
-    assert expect_of_silence(condition, 0, 1) is None
+    assert expect_of("never_happens", condition, 0, 1) is None
 
 
 @settings(max_examples=20, deadline=None)

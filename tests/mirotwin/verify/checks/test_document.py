@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from miro_sim.scenario.file import parse
+from miro_sim.world.conditions import Fault
 from mirotwin.verify.checks.expect import expectations_of, struct_of
 from mirotwin.verify.checks.registry import ALWAYS_ON, CHECKS
 
@@ -28,7 +29,7 @@ def test_a_row_says_kind_parameters_and_defaults(name):
     said = dict(re.findall(r"`(\w+)`(?: ([\d.]+))?", parameters))
     assert list(said) == list(struct.__struct_fields__)
     assert struct.MAIN in ("", *list(said)[:1])
-    event = {"what": "answer", "until_tick": 1} if "what" in said else {}
+    event = {"condition": Fault(), "until_tick": 1} if "condition" in said else {}
     given = {struct.MAIN: "P01" if struct.MAIN == "rule" else 1} if struct.MAIN else event
     made = struct(**given)
     for key, default in said.items():

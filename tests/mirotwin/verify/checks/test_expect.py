@@ -135,8 +135,8 @@ def test_what_cannot_be_expected_is_said_with_its_path(line, said):
 
 @pytest.mark.parametrize("value", ["true", "'v<0.05'", "3"])
 def test_a_check_that_takes_a_table_is_answered_with_one_that_can_be_used(value):
-    table = '{ what = "fault", until_tick = 24000000 }'
-    said = f"two: expect.never_happens: never_happens takes a table; write never_happens = {table}; what: answer, "
+    table = '{ condition = { event = "fault" }, until_tick = 24000000 }'
+    said = f"two: expect.never_happens: never_happens takes a table; write never_happens = {table}; event: answer, "
     with pytest.raises(ScenarioError, match=re.escape(said)):
         names(f"[expect]\nnever_happens = {value}")
     assert names(f"[expect]\nnever_happens = {table}")[0, 0] == [*ALWAYS_ON, "never_happens"]

@@ -63,7 +63,7 @@ def test_stops_and_waits_at_any_tick_change_no_verdict(seed):
         if draw.random() < 0.5:
             world.run_to(world.tick + draw.randrange(1, 900_000))
         else:
-            world.run_until([conditions.Byte(), conditions.Sent()])
+            world.run_until([conditions.Received(), conditions.Sent()])
 
     whole = judged(seed, World.step)
     assert judged(seed, wander) == whole

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from mirotwin.verify.steps.happenings import HAPPENINGS
+from miro_sim.world.conditions import CONDITIONS
 from mirotwin.verify.steps.keys import VERBS, StreamStep
 from mirotwin.verify.steps.running import run_test
 from mirotwin.verify.steps.sends import SENDS, SendFrame
@@ -30,7 +30,7 @@ def test_each_verb_has_a_row():
 
 
 def test_each_kind_of_event_has_a_row_with_its_keys():
-    for name, struct in HAPPENINGS.items():
+    for name, struct in CONDITIONS.items():
         (row,) = [row for head, row in ROWS if re.search(rf"`{name}`", head)]
         keys = set(struct.__struct_encode_fields__) - EVERYWHERE
         assert keys <= set(re.findall(r"`(\w+)`", row)), name

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import parse
-from mirotwin.verify.steps.happenings import HAPPENINGS, Command, WheelsAt
+from miro_sim.world.conditions import CONDITIONS, Command, WheelSpeeds
 from mirotwin.verify.steps.keys import PLAIN, VERBS, NeverStep, PauseStep, SendStep, WaitStep
 from mirotwin.verify.steps.plan import check_symbols
 from mirotwin.verify.steps.reading import steps_of
@@ -45,9 +45,9 @@ WRONG = {
     '{ wait_for = "telemetry" }': "step 1.wait_for: 'telemetry' is not one of the choices; use answer, heard,",
     '{ expect = "answer", acepted = 3 }': "step 1.acepted: unknown key; did you mean accepted?",
     '{ expect = "answer", slot = 2 }': "step 1.slot: there is no robot in slot 2; there is 0",
-    '{ expect = "command", name = "GO" }': "step 1.name: 'GO' is no LM629 command; there are RESET, STT,",
-    '{ expect = "command", hex = "0" }': "step 1.hex: '0' are no bytes; write pairs of hex digits",
-    '{ expect = "edge", pin = "P4.0" }': "step 1.pin: 'P4.0' is no pin; there are rxd, txd,",
+    '{ expect = "command", name = "GO" }': "step 1.name: 'GO' is not an LM629 command; there are RESET, STT,",
+    '{ expect = "command", hex = "0" }': "step 1.hex: '0' are not bytes; write pairs of hex digits",
+    '{ expect = "edge", pin = "P4.0" }': "step 1.pin: 'P4.0' is not a pin; there are rxd, txd,",
     '{ expect = "edge" }': "step 1.pin: this key is missing; add it",
     '{ expect = "reached" }': "step 1.reached: takes a symbol or an address; give one of the two",
     '{ expect = "wheels" }': "step 1.wheels: no speed is given; give left_m_s, right_m_s or both",
@@ -141,8 +141,8 @@ def test_steps_know_their_number_and_note():
     assert first == SendStep(number=1, note="off", what=SendTeam(left_m_s=1.0))
     assert f"{first}" == "step 1 (off): send team"
     assert isinstance(second, NeverStep)
-    assert (second.number, second.for_ms, second.happening.name) == (2, 3.0, "heard")
-    assert third == WaitStep(number=3, verb="wait_for", happening=Command(name_="STT"))
+    assert (second.number, second.for_ms, second.condition.what) == (2, 3.0, "heard")
+    assert third == WaitStep(number=3, verb="wait_for", condition=Command(name="STT"))
 
 
 def test_bytes_carry_their_stop_bits():
@@ -160,7 +160,7 @@ KEYS = sorted(
         *VERBS,
         *(
             key
-            for struct in (*HAPPENINGS.values(), *SENDS.values())
+            for struct in (*CONDITIONS.values(), *SENDS.values())
             for key in struct.__struct_encode_fields__
         ),
         *(key for struct in PLAIN.values() for key in struct.__struct_encode_fields__),
@@ -168,7 +168,7 @@ KEYS = sorted(
     }
 )
 WORDS = st.sampled_from(
-    [*HAPPENINGS, *SENDS, "on", "off", "up", "left", "STT", "txd", "a.world", "55 55!", ""]
+    [*CONDITIONS, *SENDS, "on", "off", "up", "left", "STT", "txd", "a.world", "55 55!", ""]
 )
 PLAIN_VALUES = st.one_of(
     WORDS, st.text(max_size=8), st.booleans(), st.integers(-3, 300), st.floats(-3.0, 300.0), st.just(1 << 70)
@@ -221,6 +221,6 @@ def test_steps_say_what_their_tables_say(tables):
             assert step.what == SendTeam(left_m_s=table.get("left_m_s"), ask=table.get("ask", False))
         elif isinstance(step, WaitStep):
             assert step.within_ms == table.get("within_ms")
-            assert msgspec.to_builtins(step.happening).get("accepted") == table.get("accepted")
+            assert msgspec.to_builtins(step.condition).get("accepted") == table.get("accepted")
         else:
-            assert step.happening == WheelsAt(left_m_s=table["left_m_s"])  # type: ignore[attr-defined]
+            assert step.condition == WheelSpeeds(left_m_s=table["left_m_s"])  # type: ignore[attr-defined]
