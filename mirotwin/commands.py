@@ -27,7 +27,7 @@ SECTIONS = {
             "mirotwin.testing.examples_command", "Lists the examples, or writes one into a folder."
         ),
         "test": Lazy(
-            "mirotwin.testing.test_command", "Runs scenario files as tests: steps, checks, a verdict each."
+            "mirotwin.testing.test_command", "Runs scenario files and cases as tests, a verdict each."
         ),
         "conform": Lazy(
             "mirotwin.verify.conform.conform_command", "Tries the protocol's rules on a firmware image."

@@ -198,7 +198,7 @@ class Campaign:
         if self.expected:
             self._to_judge.append(data)
         if self.covering is not None and self.reached_by is None and self.covering.address in counts:
-            stream = self.triage.oracle.stream(self.triage.target, data)
+            stream = self.triage.oracle.judged(data, {}).stream()
             self.reached_by = self.triage.leave("covering", self.covering.name, data, stream, counts)
 
     def _judge(self, data: bytes) -> None:

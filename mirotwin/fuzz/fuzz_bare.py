@@ -1,27 +1,20 @@
-"""`mirotwin fuzz --bare`: any firmware with a serial port, and its cases."""
+"""The options of `mirotwin fuzz --bare`: any firmware with a serial port."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import click
 import msgspec
 from click.core import ParameterSource
 
-from miro_exact.bad_input import BadInput
 from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.fuzz.spec import TargetSpec
-from mirotwin.shell.console import show
 from mirotwin.shell.options import Whole, load_image
-from mirotwin.shell.program import DIVERGENCE, complain
-
-if TYPE_CHECKING:
-    from mirotwin.fuzz.bare_oracle import BareProcessorOracle
 
 Command = Callable[..., Any]
-_ROBOTS_OWN = ("robots", "slot")
+_ROBOTS_OWN = ("robots", "slot", "checks")
 _BARE = "--bare"
 
 
@@ -33,7 +26,8 @@ class BareAsked(msgspec.Struct, frozen=True, kw_only=True):
     baud: int | None
     boot_ms: int | None
     protocol: str | None
-    expect_all: bool
+    check: str | None
+    check_all: bool
 
 
 def bare_fuzz_options(command: Command) -> Command:
@@ -47,7 +41,10 @@ def bare_fuzz_options(command: Command) -> Command:
         ("--boot-ms", {"type": Whole(1, 60_000), "metavar": "MS"},
          "With --bare: time to start up, unless it sleeps earlier. Default 200."),
         ("--protocol", {"metavar": "NAME[:KEY=VALUE,..]"}, "With --bare: the format that makes frames of bodies."),
-        ("--expect-all", {"is_flag": True}, "With --bare: --expect judges each input, not only those that are new."),
+        ("--check", {"metavar": "NAME"},
+         "With --bare: a check in Python that judges each input that found something new: by its name, or"
+         " FILE.py:FUNCTION."),
+        ("--check-all", {"is_flag": True}, "With --bare: --check judges each input, not only those that are new."),
     )  # fmt: skip
     for name, settings, text in reversed(words):
         command = click.option(name, help=text, **settings)(command)
@@ -75,76 +72,18 @@ def load_bare_firmware(path: str | None) -> Image:
     return load_image(path, SPACE_BYTES)
 
 
-def bare_spec(
-    image: str, kind: str, engine: Literal["compiled", "python"], asked: BareAsked, checks: tuple[str, ...]
-) -> TargetSpec:
+def bare_spec(image: str, kind: str, engine: Literal["compiled", "python"], asked: BareAsked) -> TargetSpec:
     """What the processes of the engine run."""
-    if len(checks) > 1:
-        raise click.UsageError(f"{_BARE} takes one --expect.")
-    if asked.expect_all and not checks:
-        raise click.UsageError("--expect-all needs an --expect.")
+    if asked.check_all and asked.check is None:
+        raise click.UsageError("--check-all needs a --check.")
     parameters = {"crystal_hz": asked.crystal, "boot_ms": asked.boot_ms}
     return TargetSpec(
         board="bare",
         image=image,
         input=kind,
         protocol=asked.protocol or "",
-        check=checks[0] if asked.expect_all else "",
+        check=(asked.check or "") if asked.check_all else "",
         baud=asked.baud or 0,
         parameters={name: value for name, value in parameters.items() if value is not None},
         engine=engine,
     )
-
-
-def bare_seeds(spec: TargetSpec) -> list[bytes]:
-    """Inputs to begin with. Raises BadInput for a firmware or options with which there is no target."""
-    from mirotwin.fuzz.bare import bare_target
-
-    return bare_target(spec).seeds()
-
-
-def bare_oracle(checks: tuple[str, ...]) -> tuple[BareProcessorOracle, dict[str, Any]]:
-    """Who confirms crashes, and what new inputs are judged by. Raises BadInput for a check that there is not."""
-    from mirotwin.fuzz.bare_oracle import BareProcessorOracle
-    from mirotwin.verify.bare.exchange import check_named
-
-    if not checks:
-        return BareProcessorOracle(), {}
-    check = check_named(checks[0])
-    return BareProcessorOracle(check), {check.name: True}
-
-
-def replay_bare_case(path: str, firmware: str | None, checks: tuple[str, ...]) -> int:
-    """`mirotwin replay` of such a file; the exit code is that of its check. Raises BadInput without --firmware.
-
-    `checks`: those of --expect, at most one, for a case that names one that is in a file.
-    """
-    from mirotwin.verify.bare.case import replay_bare
-
-    if firmware is None:
-        remedy = "give --firmware IMAGE.ihx"
-        raise BadInput(path, "", "is for a bare processor, which has no firmware of its own", remedy)
-    if len(checks) > 1:
-        raise BadInput(path, "--expect", "a case of a bare processor has one check", "give one")
-    verdict = replay_bare(path, load_image(firmware, SPACE_BYTES), checks[0] if checks else None)
-    if verdict.failed or verdict.code == DIVERGENCE:
-        complain(verdict.line)
-    else:
-        show(verdict.line)
-    return verdict.code
-
-
-def check_given(path: Path, checks: tuple[str, ...]) -> str | None:
-    """The one of --expect that a case names, if any."""
-    from mirotwin.verify.bare.case import check_of_case
-
-    named = check_of_case(path)
-    return next((text for text in checks if text.rpartition(":")[2] == named), None)
-
-
-def problem_of_bare_case(path: Path, image: Image, check: str | None) -> str:
-    """Why a case fails on `image`, or the empty string. `check`: as of --expect, for a case that names it."""
-    from mirotwin.verify.bare.case import replay_bare
-
-    verdict = replay_bare(path, image, check)
-    return verdict.line if verdict.failed else ""

@@ -25,28 +25,18 @@ from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
-from mirotwin.fuzz.fuzz_bare import (
-    BareAsked,
-    bare_fuzz_options,
-    bare_oracle,
-    bare_seeds,
-    bare_spec,
-    load_bare_firmware,
-    take_bare_fuzz,
-)
+from mirotwin.fuzz.fuzz_bare import bare_fuzz_options, bare_spec, load_bare_firmware, take_bare_fuzz
 from mirotwin.fuzz.fuzz_progress import FuzzProgress
-from mirotwin.fuzz.fuzz_regress import refuse_others, regress
 from mirotwin.fuzz.fuzz_summary import Ended, report
-from mirotwin.fuzz.oracle import Oracle, WorldOracle
-from mirotwin.fuzz.oracle import Place as RobotPlace
+from mirotwin.fuzz.oracle import oracle_of
 from mirotwin.fuzz.reached import Reached
-from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from mirotwin.fuzz.triage import MINIMISE_S, Crash, Triage
 from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, load_image
 from mirotwin.shell.program import Terminated, complain
 from mirotwin.shell.times import WallTime
+from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.expectations import as_setting, refuse_files
 from mirotwin.verify.wanted import silent_scenario
@@ -103,8 +93,7 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
     "checks",
     metavar="KEY[=VALUE]",
     multiple=True,
-    help="A check that judges each input that found something new, as for `run`; may be repeated. With --bare: a check"
-    " by its name, or FILE.py:FUNCTION.",
+    help="A check that judges each input that found something new, as for `run`; may be repeated.",
 )
 @click.option(
     "--covering", metavar="SYMBOL", help="Look for an input that reaches this function, and end with it."
@@ -129,9 +118,6 @@ class Asked(msgspec.Struct, frozen=True, kw_only=True):
     show_default=True,
     help="Longest time for making a crash small.",
 )
-@click.option(
-    "--regress", "cases", type=Place(path_type=Path), metavar="DIR", help="Run the saved cases of a folder."
-)
 @bare_fuzz_options
 @sources_option
 @engine_option
@@ -142,7 +128,6 @@ def fuzz(
     robots: str,
     slot: int,
     out: Path | None,
-    cases: Path | None,
     engine: str | None,
     **given: Any,
 ) -> int:
@@ -156,63 +141,53 @@ def fuzz(
 
     Ctrl-C ends a campaign early, with all that was found.
 
-    Exit code 1: something was found and confirmed, or --covering was not reached; with --regress: a case fails.
+    Exit code 1: something was found and confirmed, or --covering was not reached.
     """
     active = cast(Literal["compiled", "python"], choose_engine(engine))
     bare = take_bare_fuzz(given)
     firmware = load_bare_firmware(image) if bare.bare else load_image(image)
-    if cases is not None:
-        refuse_others()
-        return regress(cases, firmware, engine, given["quiet"], given["checks"])
     if slot >= int(robots):
         raise click.UsageError(
             f"--slot {slot} does not exist among {robots} robots; give 0 to {int(robots) - 1}."
         )
     default = Path("runs") / f"fuzz-{firmware.path.stem}"
     asked = Asked(out=out or (default if given["force"] else unused(default)), **given)
-    if bare.bare:
-        return _bare_campaign(image or "", kind, active, firmware, asked, bare)
-    spec = TargetSpec(image=image or "", input=kind, robots=int(robots), slot=slot, engine=active)
-    expected = _expected(asked.checks)
-    oracle = WorldOracle(RobotPlace(firmware, spec.robots, spec.slot))
-    return _campaign(spec, firmware, asked, oracle, expected, seeds(spec.input, spec.robots, spec.slot))
-
-
-def _bare_campaign(
-    path: str, kind: str, engine: Literal["compiled", "python"], image: Image, asked: Asked, bare: BareAsked
-) -> int:
-    oracle, expected = bare_oracle(asked.checks)
-    spec = bare_spec(path, kind, engine, bare, asked.checks)
-    return _campaign(spec, image, asked, oracle, expected, bare_seeds(spec))
+    if not bare.bare:
+        spec = TargetSpec(image=image or "", input=kind, robots=int(robots), slot=slot, engine=active)
+        return _campaign(spec, firmware, asked, None, _expected(asked.checks))
+    check = None if bare.check is None else check_named(bare.check)
+    expected = {} if check is None else {check.name: True}
+    return _campaign(bare_spec(image or "", kind, active, bare), firmware, asked, check, expected)
 
 
 def _campaign(
     spec: TargetSpec,
     image: Image,
     asked: Asked,
-    oracle: Oracle,
+    check: NamedCheck | None,
     expected: dict[str, Any],
-    inputs: list[bytes],
 ) -> int:
     folder = CampaignFolder(asked.out, asked.force)
     check_outside(asked.out, asked.corpus)
     covering = _covering(asked.covering, image)
+    target = spec.make()
+    oracle = oracle_of(target, check)
+    inputs = target.seeds()
     if asked.corpus is not None:
         corpus = read_corpus(asked.corpus, spec.input, spec.robots)
         inputs = list(dict.fromkeys((*inputs, *corpus.inputs)))
         for note in corpus.notes:
             complain(note)
-    target = spec.make()
     _check_at_rest(target, image)
     reached = Reached(image, spec.make)
     if covering is not None and covering.address in reached.total:
         what = f"{covering.name} runs while the firmware starts, before any input"
         raise BadInput("", "--covering", what, "name a function that an input has to reach")
     folder.make()
-    triage = Triage(target, reached, oracle, folder, sources_of(image, asked.sources), asked.minimise_s)
+    triage = Triage(reached, oracle, folder, sources_of(image, asked.sources), asked.minimise_s)
     with folder.filled():
         campaign, asked = _begun(spec, asked, triage, folder, expected, covering, _sorted_out(target, inputs))
-        return _run(campaign, image, asked)
+        return _run(campaign, image, asked, check.text if check is not None and check.from_file else None)
 
 
 def _begun(
@@ -255,7 +230,7 @@ def _sorted_out(target: Target, inputs: list[bytes]) -> tuple[list[bytes], list[
     return failing, passing, silent
 
 
-def _run(campaign: Campaign, image: Image, asked: Asked) -> int:
+def _run(campaign: Campaign, image: Image, asked: Asked, check_in_file: str | None) -> int:
     """The campaign to its end, whatever ends it; the exit code."""
     stopped: BaseException | None = None
     left = 0
@@ -277,7 +252,7 @@ def _run(campaign: Campaign, image: Image, asked: Asked) -> int:
             stopped = error
             with suppress(BadInput, PluginError):
                 left = campaign.finish(progress.show, INTERRUPTED_S)
-    ended = Ended(left=left, complete=stopped is None, checks=asked.checks)
+    ended = Ended(left=left, complete=stopped is None, check=check_in_file)
     code = report(campaign, image, asked.out, asked.covering, ended, asked.quiet)
     if stopped is not None:
         raise stopped

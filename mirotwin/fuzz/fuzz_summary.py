@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
 
-from miro_robot.firmware import image_path
 from miro_robot.image import Image
 from miro_robot.inspect.coverage import branch_share, line_share
 from miro_robot.inspect.lcov import Tracefile
@@ -17,8 +15,7 @@ from mirotwin.fuzz.fuzz_progress import clock, counted
 from mirotwin.fuzz.triage import Crash
 from mirotwin.shell.console import show
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
-from mirotwin.verify.cases import replay_line as line
-from mirotwin.verify.expectations import is_in_file
+from mirotwin.verify.cases.replay_line import foreign_path, replay_line
 
 COVERAGE = "coverage.info"
 SUMMARY = "summary.json"
@@ -27,12 +24,12 @@ SUMMARY = "summary.json"
 class Ended(msgspec.Struct, frozen=True):
     """`left`: inputs that were not looked at; `complete`: whether it came to the end of its time.
 
-    `checks`: those of --expect.
+    `check`: FILE.py:FUNCTION of --check.
     """
 
     left: int
     complete: bool
-    checks: tuple[str, ...] = ()
+    check: str | None = None
 
 
 def report(
@@ -60,7 +57,7 @@ def report(
         show_line(f"{', '.join(campaign.expected)}: judged {counted(campaign.judged, 'input')}")
     if triage.unrepeated:
         complain(f"{counted(triage.unrepeated, 'input')} that the engine saw failing did not fail again")
-    _print_crashes(campaign, out, image, ended.checks)
+    _print_crashes(campaign, out, image, ended.check)
     if not quiet:
         show_line(f"written to {out}")
     missed = covering is not None and _print_covering(campaign, covering, image)
@@ -74,35 +71,28 @@ def never_reached(tracefile: Tracefile) -> list[str]:
     )
 
 
-def _print_crashes(campaign: Campaign, out: Path, image: Image, checks: Sequence[str]) -> None:
+def _print_crashes(campaign: Campaign, out: Path, image: Image, check: str | None) -> None:
     triage = campaign.triage
     show_line(counted(len(triage.confirmed), "crash", "crashes"))
     for crash in triage.confirmed:
-        _print_crash(crash, triage.more[crash.name], out, image, checks)
+        _print_crash(crash, triage.more[crash.name], out, image, check)
     if triage.unconfirmed:
         show_line(
             f"{len(triage.unconfirmed)} not confirmed: wrong on the target, right in a World; kept in"
             f" {out / 'unconfirmed'}"
         )
         for crash in triage.unconfirmed:
-            _print_crash(crash, triage.more[crash.name], out, image, checks)
+            _print_crash(crash, triage.more[crash.name], out, image, check)
 
 
-def _print_crash(crash: Crash, more: int, out: Path, image: Image, checks: Sequence[str]) -> None:
+def _print_crash(crash: Crash, more: int, out: Path, image: Image, check: str | None) -> None:
     where = f" in {crash.function}" if crash.function else ""
     again = f"; {counted(more, 'more input')}" if more else ""
     before, after = crash.sizes
     show_line(f"  {crash.name}{where}: {crash.verdict} ({after} bytes, found with {before}{again})")
-    in_file = next(
-        (text for text in checks if is_in_file(text) and text.rpartition(":")[2] == crash.check), ""
-    )
-    show_line(f"    {replay_line(out / crash.folder / f'{crash.name}.stream', image, in_file)}")
-
-
-def replay_line(stream: Path, image: Image, in_file: str = "") -> str:
-    """The command that plays it again. `in_file`: the check of a case that is in a file, which no case names."""
-    own = image.path.resolve() == image_path().resolve()
-    return line.replay_line(stream, None if own else image.path, in_file)
+    in_file = check if check is not None and crash.check == check.rpartition(":")[2] else None
+    stream = out / crash.folder / f"{crash.name}.stream"
+    show_line(f"    {replay_line(stream, foreign_path(image), in_file)}")
 
 
 def _print_covering(campaign: Campaign, symbol: str, image: Image) -> bool:
@@ -112,7 +102,7 @@ def _print_covering(campaign: Campaign, symbol: str, image: Image) -> bool:
         complain(f"--covering {symbol}: not reached by {inputs}; give it more --time, or a --corpus")
         return True
     show_line(f"--covering {symbol}: reached by {campaign.reached_by}")
-    show_line(f"    {replay_line(campaign.reached_by, image)}")
+    show_line(f"    {replay_line(campaign.reached_by, foreign_path(image))}")
     return False
 
 

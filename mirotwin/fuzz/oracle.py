@@ -1,6 +1,6 @@
-"""A crash played in a World, whose checks have the last word.
+"""Who has the last word on an input: it is played once more from power-on, without the machinery that found it.
 
-input ──► Target.script ──► World: ideal radio, carrier on, the robot of the target alone
+input ──► Target.script ──► a World: ideal radio, carrier on, the robot of the target alone; or a bare processor
                                   │ checks: the one that the crash names, and those that are always on
                                   ▼
                          failed: a case            passed: kept apart, as not confirmed
@@ -11,85 +11,107 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-import msgspec
-
-from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_protocol.actions import ScriptItem
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.robot_rules import TOLERANCE_TICKS
 from miro_protocol.table import FRESH_AGAIN_TICKS, FrameType
 from miro_protocol.transmission import DOWN, Transmission
-from miro_robot.image import Image
-from miro_sim.scenario.keys import Scenario
-from miro_sim.world.world import World
-from mirotwin.fuzz.target import Target, TargetFailure
-from mirotwin.verify.bare.case import NEVER_SLEEPS
-from mirotwin.verify.cases.case import case_of_checks, case_text
-from mirotwin.verify.cases.trace import Trace
+from mirotwin.fuzz.bare import BareTarget
+from mirotwin.fuzz.target import RobotTarget, Target, TargetFailure
+from mirotwin.verify.bare.case import NEVER_SLEEPS, NO_FAULT, BareRerun, rerun_bare
+from mirotwin.verify.bare.exchange import NamedCheck
+from mirotwin.verify.bare.run import AHEAD_TICKS
+from mirotwin.verify.cases.rerun import Rerun, rerun_robot
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.registry import CHECKS
-from mirotwin.verify.checks.watching import Checks
-from mirotwin.verify.wanted import silent_scenario
 
 AFTER_TICKS = TICKS_PER_SECOND // 20
 """How long a world goes on after the input and the crash: an answer may take 30 ms, a frame 10 ms."""
 _SETTLED_TICKS = TICKS_PER_SECOND // 100
+SILENCES = ("failsafe_stop_ms", "motors_off_ms")
 
 Expected = Mapping[str, Any]
 """Checks by name with their parameters, as the table `[expect]` of a scenario."""
 
 
-class Place(msgspec.Struct, frozen=True):
-    """What is fuzzed: the image, and the robot's slot in a network of so many."""
+class OracleVerdict(Protocol):
+    """What became of an input that was played again."""
 
-    image: Image
-    robots: int = 3
-    slot: int = 0
-
-
-class OracleVerdict(msgspec.Struct, frozen=True):
-    """What a world made of an input. `failure`: the first check that failed, None if none did; `case`: its text."""
-
-    failure: Failure | None
-    case: str = ""
-
-
-class Oracle(Protocol):
-    """Who has the last word on an input."""
-
-    def confirm(self, target: Target, data: bytes, failure: TargetFailure) -> OracleVerdict:
-        """Judges an input in which a target found that."""
+    @property
+    def failure(self) -> Failure | None:
+        """The first check that failed, None if none did."""
         ...
 
-    def judged(self, target: Target, data: bytes, expected: Expected) -> OracleVerdict:
-        """Judges an input by these checks, and by those that are always on. Raises PluginError where one raises."""
+    def case(self) -> str:
+        """The case of that failure."""
         ...
 
-    def stream(self, target: Target, data: bytes) -> str:
+    def stream(self) -> str:
         """The input as a stream file that nothing is expected of."""
         ...
 
 
-class WorldOracle:
-    """A World with the robot of `place`."""
+class Oracle(Protocol):
+    """Judges inputs of `target`."""
 
-    def __init__(self, place: Place) -> None:
-        self.place = place
+    @property
+    def target(self) -> Target: ...
+    def confirm(self, data: bytes, failure: TargetFailure) -> OracleVerdict:
+        """Judges an input in which the target failed so."""
+        ...
 
-    def confirm(self, target: Target, data: bytes, failure: TargetFailure) -> OracleVerdict:
-        heard = target.script(data)
+    def judged(self, data: bytes, expected: Expected) -> OracleVerdict:
+        """Judges an input by these checks, and by those that are always on. Raises PluginError where one raises."""
+        ...
+
+
+class RobotOracle:
+    """Judges by a World with the robot of `target`."""
+
+    def __init__(self, target: RobotTarget) -> None:
+        self.target = target
+
+    def confirm(self, data: bytes, failure: TargetFailure) -> Rerun:
+        script = self.target.script(data)
         if failure.check == NEVER_SLEEPS:
-            heard = [*heard, *_questions(heard, failure.tick, self.place.robots)]
-        return judge(self.place, heard, expected_of(failure.check), failure.tick)
+            script = [*script, *_questions(script, failure.tick, self.target.robots)]
+        return self._rerun(script, expected_of(failure.check), failure.tick)
 
-    def judged(self, target: Target, data: bytes, expected: Expected) -> OracleVerdict:
-        return judge(self.place, target.script(data), expected)
+    def judged(self, data: bytes, expected: Expected) -> Rerun:
+        return self._rerun(self.target.script(data), expected, 0)
 
-    def stream(self, target: Target, data: bytes) -> str:
-        return stream_of(self.place, target.script(data))
+    def _rerun(self, script: Sequence[ScriptItem], expected: Expected, last_tick: int) -> Rerun:
+        target, until_tick = self.target, max(last_tick, _end_tick(script)) + AFTER_TICKS
+        return rerun_robot(target.image, target.robots, target.slot, script, expected, until_tick)
 
 
-SILENCES = ("failsafe_stop_ms", "motors_off_ms")
+class BareProcessorOracle:
+    """Judges by a bare processor; `check` judges where it is asked to. Raises BadInput where the check fails itself."""
+
+    def __init__(self, target: BareTarget, check: NamedCheck | None = None) -> None:
+        self.target = target
+        self.check = check
+
+    def confirm(self, data: bytes, failure: TargetFailure) -> BareRerun:
+        after_ticks = AHEAD_TICKS if failure.check == NO_FAULT else 0  # the instruction itself
+        return self._rerun(data, failure.check, failure.tick + after_ticks)
+
+    def judged(self, data: bytes, expected: Expected) -> BareRerun:
+        self.target.run(data)
+        return self._rerun(data, next(iter(expected), NO_FAULT), self.target.end_tick())
+
+    def _rerun(self, data: bytes, name: str, until_tick: int) -> BareRerun:
+        target = self.target
+        return rerun_bare(target.image, target.line, target.script(data), until_tick, name, self.check)
+
+
+def oracle_of(target: Target, check: NamedCheck | None = None) -> Oracle:
+    """The oracle for a target of the product's own. `check`: as of --check, for a bare processor."""
+    if isinstance(target, BareTarget):
+        return BareProcessorOracle(target, check)
+    assert isinstance(target, RobotTarget)
+    return RobotOracle(target)
 
 
 def expected_of(check: str) -> dict[str, Any]:
@@ -101,54 +123,13 @@ def expected_of(check: str) -> dict[str, Any]:
     return {check: True} if check in CHECKS.names() else {}
 
 
-def judge(place: Place, heard: Sequence[ScriptItem], expected: Expected, last_tick: int = 0) -> OracleVerdict:
-    """What the checks say of a robot that hears this from power-on. `last_tick`: the run goes on beyond it at least.
-
-    Raises PluginError where a check raises.
-    """
-    world, trace, checks = _played(place, heard, expected, last_tick)
-    if not checks.failures:
-        return OracleVerdict(None)
-    return OracleVerdict(checks.failures[0], case_of_checks(world, trace, checks))
+def _end_tick(script: Sequence[ScriptItem]) -> int:
+    return max((one.end_tick if isinstance(one, Transmission) else one.tick for one in script), default=0)
 
 
-def stream_of(place: Place, heard: Sequence[ScriptItem]) -> str:
-    """The same as a stream file that nothing is expected of, for `mirotwin replay` and `mirotwin fw`."""
-    world, trace, _ = _played(place, heard, {}, 0)
-    return case_text(world, trace, {}, "")
-
-
-def _played(
-    place: Place, heard: Sequence[ScriptItem], expected: Expected, last_tick: int
-) -> tuple[World, Trace, Checks]:
-    script = sorted(heard, key=lambda one: one.tick)
-    ends = [one.end_tick if isinstance(one, Transmission) else one.tick for one in script]
-    end_tick = max([last_tick, *ends]) + AFTER_TICKS
-    scenario = msgspec.structs.replace(_scenario(place, end_tick), expect=dict(expected))
-    world = World(scenario, 0, place.image, script)
-    trace, checks = Trace(world), Checks(world)
-    world.run_to(-(-end_tick // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS)
-    checks.finish()
-    return world, trace, checks
-
-
-def _scenario(place: Place, end_tick: int) -> Scenario:
-    """One robot that stands, behind a radio without errors whose carrier is always on."""
-    whole_s = -(-end_tick // TICKS_PER_SECOND)  # whole seconds, so that few texts are read
-    return silent_scenario(
-        (
-            f"network.robots={place.robots}",
-            f"network.robot.slot={place.slot}",
-            'network.radio.carrier="on"',
-            f"duration_s={seconds((whole_s + 1) * TICKS_PER_SECOND)}",
-        )
-    )
-
-
-def _questions(heard: Sequence[ScriptItem], found_tick: int, robots: int) -> list[Transmission]:
+def _questions(script: Sequence[ScriptItem], found_tick: int, robots: int) -> list[Transmission]:
     """Two team frames after the input, so late that one of them at least is fresh: a robot that lives acts on it."""
-    ends = [one.end_tick if isinstance(one, Transmission) else one.tick for one in heard]
-    tick = max([found_tick, *ends]) + FRESH_AGAIN_TICKS + _SETTLED_TICKS
+    tick = max(found_tick, _end_tick(script)) + FRESH_AGAIN_TICKS + _SETTLED_TICKS
     found: list[Transmission] = []
     for seq in (1, 2):
         frame = TeamFrame(FrameType.TEAM, seq, ((256 * seq, 256 * seq),) * robots)

@@ -20,6 +20,7 @@ from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
 from mirotwin.fuzz.harness_target import MAP_SIZE as MAP_SIZE
 from mirotwin.fuzz.harness_target import HarnessTarget
+from mirotwin.fuzz.seeds import seeds
 from mirotwin.verify.bare.case import NEVER_SLEEPS
 
 NEVER_SLEEPS_CODE = len(NAMES)
@@ -55,6 +56,9 @@ class Target(Protocol):
     def run(self, data: Any) -> int: ...
     def script(self, data: bytes) -> list[ScriptItem]: ...
     def describe(self, data: bytes) -> str: ...
+    def seeds(self) -> list[bytes]:
+        """Inputs to begin with."""
+        ...
 
 
 class RobotTarget(HarnessTarget):
@@ -99,6 +103,9 @@ class RobotTarget(HarnessTarget):
         if self.board.faults:
             return TargetFailure(check, tick, self.oracle.pc, str(self.board.faults[0]))
         return TargetFailure(check, tick, 0, f"{check} at tick {tick}")
+
+    def seeds(self) -> list[bytes]:
+        return seeds(self.input, self.robots, self.slot)
 
     def __repr__(self) -> str:
         return f"RobotTarget({self.image.path}, input={self.input!r}, robot {self.slot} of {self.robots})"

@@ -24,7 +24,7 @@ from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.minimise import minimise
 from mirotwin.fuzz.oracle import Expected, Oracle, OracleVerdict
 from mirotwin.fuzz.reached import Reached
-from mirotwin.fuzz.target import Target, TargetFailure
+from mirotwin.fuzz.target import TargetFailure
 from mirotwin.verify.checks.interface import Failure
 
 MINIMISE_S = 10.0
@@ -65,7 +65,6 @@ class Triage:
 
     def __init__(
         self,
-        target: Target,
         reached: Reached,
         oracle: Oracle,
         folder: CampaignFolder,
@@ -73,7 +72,7 @@ class Triage:
         minimise_s: float = MINIMISE_S,
         tell: Callable[[], None] = lambda: None,
     ) -> None:
-        self.target = target
+        self.target = oracle.target
         self.reached = reached
         self.oracle = oracle
         self.folder = folder
@@ -113,9 +112,9 @@ class Triage:
             self._count(key)
             return None
         again = self._failure(small) or failure
-        verdict = self.oracle.confirm(self.target, small, again)
+        verdict = self.oracle.confirm(small, again)
         if verdict.failure is None and small != data:
-            whole = self.oracle.confirm(self.target, data, failure)
+            whole = self.oracle.confirm(data, failure)
             if whole.failure is not None:  # smaller, it is only the target's
                 small, verdict, again = data, whole, failure
                 counts = self.reached.run(small)
@@ -149,7 +148,7 @@ class Triage:
 
     def judged(self, data: bytes, expected: Expected) -> OracleVerdict:
         """What the checks in `expected`, and those that are always on, say of an input."""
-        return self.oracle.judged(self.target, data, expected)
+        return self.oracle.judged(data, expected)
 
     def _failure(self, data: bytes) -> TargetFailure | None:
         return self.target.failure if self.target.run(data) else None
@@ -193,8 +192,8 @@ class Triage:
             sizes=sizes,
             fault=failure is not None and failure.fault,
         )
-        case = verdict.case or self.oracle.stream(self.target, data)
-        self.leave(crash.folder, name, data, case, counts)
+        again = self.oracle.judged(data, {}).stream() if failure is None else verdict.case()
+        self.leave(crash.folder, name, data, again, counts)
         self.found.append(crash)
         self._by_key[key] = crash
         self._last[key[:2]] = crash

@@ -17,8 +17,8 @@ from mirotwin.recording.difference import Difference
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.writer import MAGIC
 from mirotwin.replay.compare_options import CompareOptions
-from mirotwin.replay.diff_reproduction import Again, run_again
 from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
+from mirotwin.replay.exact_difference import ExactDifference, locate
 from mirotwin.replay.replay_firmware import LinesFrom, load_images, program_of
 from mirotwin.replay.sources import Made, SourceDifference, source_differences
 from mirotwin.rerun.recorded import image_if_any
@@ -68,16 +68,16 @@ def diff(options: DiffOptions) -> int:
     found = differences(one.periods, other.periods, rule)
     lengths = len(one.periods), len(other.periods)
     images = load_images(options.lines_from, *(one.image for one in made))
-    again = Again()
+    exact = ExactDifference()
     if found:
         programs = [program_of(one.image, images, sources) for one in made if one.image is not None]
-        again = run_again((a, b), recordings, made, programs, found, notes)
+        exact = locate((a, b), recordings, made, programs, found, notes)
 
     if not options.quiet and not compare.as_json:
         _print_sources(origins)
         if found:
             print_differences(found, options.everything, WORDS)
-    code = _verdict(compare, origins, found, lengths, again, notes)
+    code = _verdict(compare, origins, found, lengths, exact, notes)
     if compare.as_json:
         document = {
             "a": a,
@@ -86,7 +86,7 @@ def diff(options: DiffOptions) -> int:
             "periods": {"a": lengths[0], "b": lengths[1]},
             **compare.rule_as_json(),
             **differences_as_json(found, options.everything, ("a", "b")),
-            **again.as_json(),
+            **exact.as_json(),
             "notes": notes,
             "exit_code": code,
         }
@@ -169,17 +169,17 @@ def _verdict(
     sources: Sequence[SourceDifference],
     found: Sequence[Difference],
     lengths: tuple[int, int],
-    again: Again,
+    exact: ExactDifference,
     notes: Sequence[str],
 ) -> int:
     code = DONE
     if found:
         code = DIVERGENCE
-        complain(f"the recordings differ in control period {again.period}, {found[0].said(WORDS)}")
-        if again.state is not None:
-            complain(f"their states differ from {again.state} on")
-        if again.firmwares is not None:
-            print_firmwares(again.firmwares, WORDS)
+        complain(f"the recordings differ in control period {exact.period}, {found[0].said(WORDS)}")
+        if exact.state is not None:
+            complain(f"their states differ from {exact.state} on")
+        if exact.firmwares is not None:
+            print_firmwares(exact.firmwares, WORDS)
     if lengths[0] != lengths[1] and compare.rule.to_tick is None:
         code = DIVERGENCE
         complain(f"A has {lengths[0]} control periods, B has {lengths[1]}")

@@ -10,22 +10,19 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
+from miro_robot.image import Image
 from miro_sim.periods import Period
-from miro_sim.radio.downlink import TransmissionError
-from miro_sim.world.world import World
 from mirotwin.firmware.sources_option import SourceFolders, checked_sources
-from mirotwin.fuzz.fuzz_bare import replay_bare_case
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.difference import Difference
 from mirotwin.replay.compare_options import CompareOptions
 from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
 from mirotwin.replay.firmwares import FirmwareDifference
-from mirotwin.replay.replay_case import replay_case
+from mirotwin.replay.replay_case import replay_bare_case, replay_case
 from mirotwin.replay.replay_firmware import LinesFrom, firmwares_apart, load_images, program_of
 from mirotwin.replay.replay_tables import SHOWN, print_frames, print_response
-from mirotwin.rerun import runner
 from mirotwin.rerun.faults import report_faults
-from mirotwin.rerun.job import Job, load_job
+from mirotwin.rerun.job import Job, load_job, rerun_job
 from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import (
@@ -36,7 +33,6 @@ from mirotwin.shell.options import (
     Engine,
     StackFrom,
     choose_engine,
-    plain_parameters,
 )
 from mirotwin.shell.outputs import RECORDINGS, file_in
 from mirotwin.shell.program import DIVERGENCE, DONE, complain
@@ -44,12 +40,12 @@ from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.cases.replay_line import CaseOptions
-from mirotwin.verify.checks.expect import expectations_of, says_anything
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.cases.rerun import Rerun
+from mirotwin.verify.checks.expect import says_anything
 from mirotwin.verify.expectations import as_settings, expectations_text, report_failures
 
 _OF_A_RECORDING = ("kind", "within_ms", "within_counts", "within_counts_per_sample", "from_time")
-_OF_THE_WORLD = (*_OF_A_RECORDING, "seed", "settings")
+_OF_THE_WORLD = (*_OF_A_RECORDING, "seed", "settings", "expected")
 
 
 class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
@@ -91,7 +87,7 @@ def replay(options: ReplayOptions) -> int:
 
     A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
     1, or 3 for a firmware fault; 0 if other firmware or settings cure it, 4 if it does not fail again without them.
-    A case of `mirotwin fuzz --bare` needs --firmware, and --expect FILE.py:FUNCTION if its check is in a file.
+    A case of `mirotwin fuzz --bare` needs --firmware, and --check FILE.py:FUNCTION if its check is in a file.
 
     Where --expect is given, that decides: a difference is only told, and the exit code is 1 if a check fails, else 0.
     What the recorded scenario expects is judged too, but a difference goes before it.
@@ -102,7 +98,8 @@ def replay(options: ReplayOptions) -> int:
     if is_bare_case(file):
         _refuse(file, "is not for a case of a bare processor", options.given(*_OF_THE_WORLD))
         choose_engine(options.engine)
-        return replay_bare_case(file, options.firmware, options.expected)
+        return replay_bare_case(file, options.firmware, options.check)
+    _refuse(file, "is for a case of a bare processor", options.given("check"))
     settings = (*options.settings, *as_settings(options.expected))
     if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
@@ -115,18 +112,15 @@ def replay(options: ReplayOptions) -> int:
         _refuse(file, "is not for a case, which ends where it failed", options.given("to_time", "as_json"))
         return replay_case(job, image, file, options.quiet)
     judged = says_anything(job.scenario)
-    with plain_parameters(file, "replayed"):
-        world = job.world(image)
-    checks = Checks(world, expectations_of(job.scenario, file))
     periods = _periods(file, job, compare.rule)
-    replayed = _run(file, world, periods, options.quiet or compare.as_json)
+    again = _rerun(file, job, image, periods, options.quiet or compare.as_json)
+    world, checks, replayed = again.world, again.checks, again.periods
     rule = msgspec.structs.replace(compare.rule, digests=job.state == world.state.tables())
     found = differences(job.recorded, replayed, rule)
     apart = None
     if found and job.image is not None and job.image.code != image.code:
         programs = program_of(job.image, images, ()), program_of(image, (), options.sources)
         apart = firmwares_apart(file, job, programs, found)
-    checks.finish()
 
     if not options.quiet and not compare.as_json:
         print_frames(job, replayed, options.everything)
@@ -179,21 +173,15 @@ def _periods(file: str, job: Job, rule: CompareRule) -> int | None:
     return min(there, -(-rule.to_tick // CONTROL_PERIOD_TICKS)) - first
 
 
-def _run(file: str, world: World, periods: int | None, quiet: bool) -> list[Period]:
-    replayed: list[Period] = []
-    with ProgressBar("replaying", periods or world.periods, quiet) as bar:
-
-        def keep(period: Period) -> bool:
-            replayed.append(period)
-            bar.to(len(replayed))
-            return len(replayed) == periods
-
-        try:
-            with plain_parameters(file, "replayed"):
-                runner.run(world, None, False, keep)
-        except TransmissionError as error:
-            raise BadInput(file, "", f"cannot be replayed beyond tick {world.tick}: {error}") from None
-    return replayed
+def _rerun(file: str, job: Job, image: Image, periods: int | None, quiet: bool) -> Rerun:
+    """The first `periods` of it, as far as the scenario goes."""
+    first = job.recorded[0].index if job.recorded else 0
+    last = job.periods if periods is None else min(first + periods, job.periods)
+    with ProgressBar("replaying", last - first, quiet) as bar:
+        until_tick = last * CONTROL_PERIOD_TICKS
+        return rerun_job(
+            job, image, file, until_tick, lambda tick: bar.to(tick // CONTROL_PERIOD_TICKS - first)
+        )
 
 
 def _verdict(

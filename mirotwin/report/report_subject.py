@@ -12,15 +12,14 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import read_input
 from miro_robot.image import Image
-from miro_sim.radio.downlink import TransmissionError
 from mirotwin.firmware.coverage_files import source_folders
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.frames import Extras, extras_of
-from mirotwin.report.page.reproduction import Again, run_again
+from mirotwin.report.page.reproduction import Reproduction, reproduce
 from mirotwin.report.page.run_page import Material, PageHeader, Replayed, run_page
 from mirotwin.report.summary import Summary
-from mirotwin.rerun.job import Job, load_job
+from mirotwin.rerun.job import Job, load_job, replaying
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
 from mirotwin.shell.progress import ProgressBar
@@ -91,19 +90,12 @@ def _file_of(subject: str) -> str:
     raise BadInput(subject, "", what, "give a run's folder, or that of one failed test")
 
 
-def _again(wanted: Wanted, file: str, job: Job, image: Image, end_tick: int | None) -> Again:
+def _reproduced(wanted: Wanted, file: str, job: Job, image: Image, until_tick: int | None) -> Reproduction:
     with plain_parameters(file, "replayed"):
         world = job.world(image)
-    expected = expectations_of(job.scenario, file)
-    end_tick = end_tick or world.periods * CONTROL_PERIOD_TICKS
-    try:
-        with (
-            ProgressBar("running it again", end_tick, wanted.quiet) as bar,
-            plain_parameters(file, "replayed"),
-        ):
-            return run_again(world, end_tick, expected, bar.to)
-    except TransmissionError as error:
-        raise BadInput(file, "", f"cannot be replayed beyond tick {world.tick}: {error}") from None
+    total = until_tick or job.periods * CONTROL_PERIOD_TICKS
+    with ProgressBar("running it again", total, wanted.quiet) as bar, replaying(file, world):
+        return reproduce(world, until_tick, expectations_of(job.scenario, file), bar.to)
 
 
 def _of_recording(wanted: Wanted, file: str, job: Job, image: Image) -> Material:
@@ -113,7 +105,7 @@ def _of_recording(wanted: Wanted, file: str, job: Job, image: Image) -> Material
         place = f"--from {wanted.from_tick}t"
         raise BadInput(file, place, f"the recording goes from tick {first} to {last}", "look within it")
     end_tick = (recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
-    again = _again(wanted, file, job, image, end_tick)
+    again = _reproduced(wanted, file, job, image, end_tick)
     other = job.image is None or job.image.code != image.code
     extras = extras_of(file, recorded[0].tick, end_tick, wanted.frames)
     summary = _summary(Path(file), job.recorded[-1].digest)
@@ -145,7 +137,7 @@ def _of_recording(wanted: Wanted, file: str, job: Job, image: Image) -> Material
 
 def _of_case(wanted: Wanted, file: str, job: Job, image: Image) -> Material:
     ends = [tick for tick in (job.case.end_tick, wanted.to_tick) if tick]
-    again = _again(wanted, file, job, image, min(ends, default=None))
+    again = _reproduced(wanted, file, job, image, min(ends, default=None))
     report = Path(file).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
     notes = [*([_played_with(image, "case")] if job.case.changed else []), *_said(job, again)]
@@ -175,7 +167,7 @@ def _played_with(image: Image, kind: str, recorded: Image | None = None) -> str:
     )
 
 
-def _said(job: Job, again: Again) -> list[str]:
+def _said(job: Job, again: Reproduction) -> list[str]:
     """What became of a case's verdict."""
     verdict = job.case.verdict
     if not verdict or verdict in map(str, again.failures):

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_protocol import stream
 from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import Transmission
 from miro_robot.image import Image
 from miro_sim.periods import Period
+from miro_sim.radio.downlink import TransmissionError
 from miro_sim.scenario.file import changed
 from miro_sim.scenario.file import parse as parse_scenario
 from miro_sim.scenario.keys import Scenario
@@ -32,10 +35,11 @@ from mirotwin.rerun.script import (
     script_of_stream,
 )
 from mirotwin.shell.command_line import command_line, operand
-from mirotwin.shell.options import choose_engine, load_image
+from mirotwin.shell.options import choose_engine, load_image, plain_parameters
 from mirotwin.shell.outputs import RECORDING
 from mirotwin.shell.program import complain
 from mirotwin.verify.cases.artifacts import image_beside
+from mirotwin.verify.cases.rerun import Rerun, rerun
 from mirotwin.verify.checks.expect import expectations_of
 
 if TYPE_CHECKING:
@@ -67,6 +71,11 @@ class Job(msgspec.Struct, frozen=True):
     state: str = ""
     case: Case = Case()
     resumed: bytes = b""
+
+    @property
+    def periods(self) -> int:
+        """Control periods of its scenario."""
+        return max(1, -(-ticks(self.scenario.duration_s) // CONTROL_PERIOD_TICKS))
 
     def world(self, image: Image | None = None) -> World:
         """A world that is to do it again, with `image`; a run that was resumed begins where that one did."""
@@ -137,6 +146,30 @@ def load_stream(file: str, engine: str | None) -> Job:
     given = stream.decode(data, file)
     case = Case(given.header.verdict or "", given.header.end_tick or 0)
     return msgspec.structs.replace(_job_of_stream(given, file, (), None), case=case)
+
+
+def rerun_job(
+    job: Job,
+    image: Image,
+    file: str,
+    until_tick: int | None = None,
+    progress: Callable[[int], object] = lambda tick: None,
+) -> Rerun:
+    """Sends it again on `image`, under what its scenario expects; None: to the end of that. Raises BadInput."""
+    with plain_parameters(file, "replayed"):
+        world = job.world(image)
+    with replaying(file, world):
+        return rerun(world, until_tick, expectations_of(job.scenario, file), progress)
+
+
+@contextmanager
+def replaying(file: str, world: World) -> Iterator[None]:
+    """Within it, what cannot be sent or computed is bad input of `file`."""
+    try:
+        with plain_parameters(file, "replayed"):
+            yield
+    except TransmissionError as error:
+        raise BadInput(file, "", f"cannot be replayed beyond tick {world.tick}: {error}") from None
 
 
 _PAIRS = re.compile(rb"^\s*[0-9a-fA-F]{2}", re.MULTILINE)

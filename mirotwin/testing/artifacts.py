@@ -6,20 +6,15 @@ import hashlib
 import json
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import msgspec
-
-from miro_exact.bad_input import BadInput
-from miro_sim.world.world import World
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed, at
 from mirotwin.verify.cases.artifacts import leave
 from mirotwin.verify.cases.case import case_of_checks, case_text
+from mirotwin.verify.cases.rerun import case_of_expect
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.checks.watching import Checks
 
 SUMMARY = "summary.json"
 _NAME_CHARACTERS = 80
@@ -63,23 +58,10 @@ def case_of(rig: Rig, failures: Sequence[Failure], caught: BaseException | None)
     if rig.written:
         return None
     if isinstance(caught, WaitFailed) and caught.expect is not None:
-        failure = _judged_again(rig, caught.expect)
-        if failure is not None:
-            return case_text(rig.world, rig.trace, caught.expect, str(failure))
+        case = case_of_expect(rig.world, rig.trace, caught.expect)
+        if case is not None:
+            return case
     return case_of_checks(rig.world, rig.trace, rig.checks) if failures else None
-
-
-def _judged_again(rig: Rig, expect: Mapping[str, Any]) -> Failure | None:
-    """What the check says when all that went into the world goes into a new one."""
-    scenario = msgspec.structs.replace(rig.wanted.scenario, expect=dict(expect))
-    world = World(scenario, rig.wanted.seed, rig.wanted.image, rig.trace.script())
-    try:
-        checks = Checks(world)
-    except BadInput:  # a wait for no time at all is no check
-        return None
-    world.run_to(rig.world.tick)
-    checks.finish()
-    return next((one for one in checks.failures if one.check in expect), None)
 
 
 def leave_test(folder: Path, rig: Rig, failures: Sequence[Failure], text: str, case: str | None) -> None:

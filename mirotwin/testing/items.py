@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 
 from miro_exact.bad_input import BadInput
-from miro_robot.firmware import image_path
 from miro_sim.world.waits import WaitExpired
 from mirotwin.testing.artifacts import SUMMARY, case_of, folder_of, leave_test, story, test_line
 from mirotwin.testing.report_page import page_of
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
-from mirotwin.verify.cases.artifacts import PAGE, clear, replay_line, report_line
+from mirotwin.verify.cases.artifacts import PAGE, case_line, clear, report_line
+from mirotwin.verify.cases.replay_line import foreign_path
 from mirotwin.verify.wanted import marked, wanted
 
 OWN = ("miro_", "mirotwin")
@@ -97,7 +97,7 @@ def tell(
     where = ""
     if folder is not None:
         where = str(_relative(item.config, folder))
-        lines += [] if case is None else [replay_line(where, rig.wanted.image.path == image_path())]
+        lines += [] if case is None else [case_line(where, foreign_path(rig.wanted.image) is None)]
     text = story(rig, failures, lines)
     if folder is not None and not rig.written:
         text += f"\n{report_line(where)}"

@@ -19,7 +19,6 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition,
 from miro_protocol.frames import ServiceFrame, TeamFrame, encode
 from miro_protocol.strategies import numbers
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_DATA, VELOCITY, FrameType, Opcode
-from miro_robot.firmware import image_path
 from miro_robot.image import Image
 from miro_sim.radio.params import Radio
 from mirotwin.testing import shrinking
@@ -27,7 +26,7 @@ from mirotwin.testing.bench import MS, Bench, LinkFailure
 from mirotwin.testing.bench_case import case_of_bench
 from mirotwin.testing.profiles import link_profiles, seeds
 from mirotwin.verify.cases.case import write_case
-from mirotwin.verify.cases.replay_line import replay_line
+from mirotwin.verify.cases.replay_line import foreign_path, replay_line
 
 STEPS = st.sampled_from([1, 1, 1, 2, 8, 9, 0, 63])
 """How far the sequence number moves: mostly as a host's does, but also as one that is stuck or restarted."""
@@ -145,6 +144,6 @@ class LinkMachine(RuleBasedStateMachine):
         if shrinking.is_last_run() and hasattr(self, "bench"):
             case = case_of_bench(self.bench)
         write_case(file, failure.stream if case is None else case)
-        image = None if self.image is None or self.image.path == image_path() else self.image.path
+        image = None if self.image is None else foreign_path(self.image)
         what = "see it with" if case is None else "it fails again by"
         return f"written to {file}; {what}: {replay_line(file, image)}"

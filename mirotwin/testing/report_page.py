@@ -15,7 +15,7 @@ from miro_sim.world.world import World
 from mirotwin.firmware.coverage_files import source_folders
 from mirotwin.report.page.bokeh_page import has_bokeh
 from mirotwin.report.page.document import MOST_BYTES
-from mirotwin.report.page.reproduction import run_again
+from mirotwin.report.page.reproduction import reproduce
 from mirotwin.report.page.run_page import Material, PageHeader, run_page
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
@@ -46,7 +46,7 @@ def _material(rig: Rig, name: str, caught: BaseException | None, text: str, agai
             known = [check.name for check in expected.get(place, ())]
             expected[place] = [*expected.get(place, ()), *(one for one in checks if one.name not in known)]
     world = World(scenario, wanted.seed, wanted.image, rig.trace.script())
-    done = run_again(world, rig.tick, expected)
+    done = reproduce(world, rig.tick, expected)
     return Material(
         about=PageHeader(
             kind="failed test",

@@ -1,9 +1,10 @@
-"""`mirotwin test`: scenario files as tests, for people and machines without pytest."""
+"""`mirotwin test`: scenario files and cases as tests, for people and machines without pytest."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Annotated
 
@@ -24,9 +25,12 @@ from mirotwin.shell.options import (
 )
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, show_line, tell_notes
-from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, replay_line, report_line
-from mirotwin.verify.expectations import Expected, as_settings
-from mirotwin.verify.steps.collecting import SUFFIX, collect
+from mirotwin.testing.case_test import CaseTests
+from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, case_line, report_line
+from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
+from mirotwin.verify.cases.replay_line import replay_line
+from mirotwin.verify.expectations import CHECK, Expected, as_settings
+from mirotwin.verify.steps.collecting import KINDS, collect
 from mirotwin.verify.steps.keys import end_ms
 from mirotwin.verify.steps.running import Outcome, Verdict, run_test, stem_of
 
@@ -51,6 +55,10 @@ class TestOptions(Options, frozen=True, kw_only=True):
     ] = ()
     expected: Expected = ()
     firmware: Firmware = None
+    checks: Annotated[
+        tuple[str, ...],
+        CHECK.saying("FILE.py:FUNCTION, for cases of a bare processor whose check is in a file."),
+    ] = ()
     engine: Engine = None
     junit: Annotated[Path | None, JUNIT.saying("Write the verdicts as JUnit XML, too.")] = None
     artifacts: Annotated[
@@ -65,7 +73,7 @@ class TestOptions(Options, frozen=True, kw_only=True):
     quiet: Annotated[bool, QUIET.saying("No line for a file that passed.")] = False
 
     def line_for(self, file: str) -> str:
-        """The command that gives the verdict on this file again."""
+        """The command that gives the verdict on this scenario again."""
         again = TestOptions(
             paths=(file,),
             seed=self.seed,
@@ -81,6 +89,9 @@ def test(options: TestOptions) -> int:
     """Runs each *.scenario.toml that is named or lies below DIR: its steps, what it expects, and the checks that are
     always on. One line each with the verdict, and one for each failure.
 
+    Cases (*.stream), of a failure that was mended, run with their own seed and settings, and pass where their check
+    passes. One of a bare processor needs --firmware.
+
     Exit code 1: a step or a check failed; 3: the firmware did what it must not; 2: a file cannot be run, or there is
     none. Where several apply: 2, then 3, then 1.
     """
@@ -89,22 +100,33 @@ def test(options: TestOptions) -> int:
     files = collect(options.paths)
     chosen = [file for file in files if word.lower() in file.lower()]
     if not chosen:
-        what = f"{len(files)} files, none with {word!r} in its path" if files else f"no *{SUFFIX} there"
+        what = f"{len(files)} files, none with {word!r} in its path" if files else f"no {KINDS} there"
         raise BadInput(
-            " ".join(options.paths), "", what, f"nothing was tested; a test is a scenario in a *{SUFFIX}"
+            " ".join(options.paths),
+            "",
+            what,
+            "nothing was tested; a test is a scenario or a case in such a file",
         )
     if junit is not None:
         check_file(junit, "--junit")
         check_not_input(junit, "--junit", *chosen)
-    image = load_image(options.firmware)
     settings = (*options.settings, *as_settings(options.expected))
     left_out: dict[str, None] = {}
     outcomes: list[Outcome] = []
     times_s: list[float] = []
+    cases = CaseTests(options.firmware, options.engine, options.checks)
+    lines, image_of = [], cache(load_image)
     for file in chosen:
         began_s = time.perf_counter()
-        again = options.line_for(file)
-        outcome = run_test(file, image, options.seed, settings, options.artifacts, again)
+        if file.endswith(CASE_SUFFIX):
+            outcome = cases.run(file)
+            again = replay_line(file, options.firmware, cases.check_of(file))
+        else:
+            again = options.line_for(file)
+            outcome = run_test(
+                file, image_of(options.firmware), options.seed, settings, options.artifacts, again
+            )
+        lines.append(again)
         times_s.append(time.perf_counter() - began_s)
         outcomes.append(outcome)
         tell_notes(note for note in outcome.left_out if note not in left_out)
@@ -113,9 +135,12 @@ def test(options: TestOptions) -> int:
         if options.pages and outcome.left:
             _page(outcome.left)
     if junit is not None:
-        lines = list(map(options.line_for, chosen))
         _write_junit(junit, outcomes, times_s, lines)
-    return _summary(outcomes)
+    code = _summary(outcomes)
+    if cases.unused:
+        what = f"no case is judged by {sorted(cases.unused)[0]}"
+        raise BadInput("", "--check", what, "leave it out, or name the one that the cases have in [expect]")
+    return code
 
 
 def _page(folder: str) -> None:
@@ -131,7 +156,7 @@ def _show(outcome: Outcome, quiet: bool, again: str) -> None:
     steps = f"{outcome.done} of {outcome.steps} steps, " if outcome.steps else ""
     how = (
         ""
-        if outcome.verdict == "error"
+        if outcome.verdict == "error" or not outcome.digest  # of a bare processor
         else f" ({steps}{end_ms(outcome.tick)}, digest {outcome.digest[:12]})"
     )
     show_line(f"{WORDS[outcome.verdict]}  {outcome.path}{how}")
@@ -141,7 +166,7 @@ def _show(outcome: Outcome, quiet: bool, again: str) -> None:
         show_line(f"    left in {outcome.left}")
         case = Path(outcome.left) / CASE
         if case.exists():
-            show_line(f"    {replay_line(outcome.left, not case.with_name(FIRMWARE).exists())}")
+            show_line(f"    {case_line(outcome.left, not case.with_name(FIRMWARE).exists())}")
         show_line(f"    {report_line(outcome.left)}")
     if not passed and outcome.verdict != "error":
         show_line(f"    {again}")

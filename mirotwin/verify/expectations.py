@@ -32,7 +32,7 @@ def refuse_files(given: Sequence[str]) -> None:
     """Raises UsageError for a check in a file: only firmware on a bare processor is judged by one."""
     for text in given:
         if is_in_file(text):
-            what = "a check in a file is for firmware on a bare processor"
+            what = "a check in a file is for firmware on a bare processor, and given by --check"
             remedy = (
                 "a check of a run is in an installed distribution, and named by its key:"
                 " `mirotwin examples checks` writes one of your own; pip install it"
@@ -52,25 +52,14 @@ def _as_settings(ctx: click.Context, param: click.Parameter, given: Sequence[str
 
 def expect_option(command: Command) -> Command:
     """Gives the command the expectations as settings."""
-    return _option(command, _as_settings)
-
-
-def plain_expect_option(command: Command) -> Command:
-    """The same as they were typed, for a command that also plays cases of a bare processor."""
-    return _option(
-        command, None, " For a case of a bare processor: FILE.py:FUNCTION, if its check is in a file."
-    )
-
-
-def _option(command: Command, callback: Callable[..., Any] | None, more: str = "") -> Command:
     return click.option(
         "--expect",
         "expected",
         metavar="KEY[=VALUE]",
         multiple=True,
-        callback=callback,
+        callback=_as_settings,
         help="A check of the run: a key of the scenario's [expect], such as tracks_within_cm=3; may be repeated. Exit"
-        " code 1 when one fails." + more,
+        " code 1 when one fails.",
     )(command)
 
 
@@ -81,6 +70,11 @@ EXPECT = Option(
     " code 1 when one fails.",
 )
 Expected = Annotated[tuple[str, ...], EXPECT]
+CHECK = Option(
+    "--check",
+    metavar="NAME",
+    help="For a bare processor: a check in Python by its name, or FILE.py:FUNCTION.",
+)
 
 
 def as_settings(expected: Sequence[str]) -> tuple[str, ...]:

@@ -102,11 +102,11 @@ def test_its_finds_fail_again_and_the_mended_one_cures_them(images, path):
     from mirotwin.verify.bare.case import replay_bare
 
     again = replay_bare(path, images["dimmer"], CHECK)
-    assert again.failed
-    assert again.line.startswith("fails as recorded: ")
+    assert again.failure is not None
+    assert again.lines[0].startswith("fails as recorded: ")
     assert again.code == (3 if "no_fault" in path.stem else 1)
     cured = replay_bare(path, images["mended"], CHECK)
-    assert (cured.code, cured.line.partition(":")[0]) == (0, "cured")
+    assert (cured.code, cured.lines[0].partition(":")[0]) == (0, "cured")
 
 
 @needs_sdcc
@@ -119,9 +119,9 @@ def test_the_command_of_its_page_finds_both_and_nothing_in_the_mended_one(images
             "--bare",
             "--crystal",
             CRYSTAL_HZ,
-            "--expect",
+            "--check",
             CHECK,
-            "--expect-all",
+            "--check-all",
             "--corpus",
             EXAMPLE / "cases",
         ]

@@ -21,7 +21,7 @@ from mirotwin.report.page.firmware import SHOWN, coverage_rows, function_rows
 from mirotwin.report.page.frames import CameraFrame, Extras
 from mirotwin.report.page.link import LinkMark, lanes_of
 from mirotwin.report.page.pitch import pitch_of
-from mirotwin.report.page.reproduction import Again
+from mirotwin.report.page.reproduction import Reproduction
 from mirotwin.report.summary import StepResults, rms_name, settling_text, tracking_of
 
 FIRST = 200
@@ -62,7 +62,7 @@ class Material(msgspec.Struct, frozen=True):
     scenario: Scenario
     scenario_text: str
     periods: Sequence[Period]
-    again: Again
+    again: Reproduction
     sources: Sources
     extras: Extras = Extras()
     replayed: Replayed | None = None

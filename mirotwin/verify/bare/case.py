@@ -35,13 +35,12 @@ from miro_robot.image import Image
 from mirotwin.verify.bare.exchange import OPTION, NamedCheck, check_named, installed_check
 from mirotwin.verify.bare.machine import BareLine
 from mirotwin.verify.bare.run import BareRun
+from mirotwin.verify.cases.verdict import CaseVerdict, verdict_of
 from mirotwin.verify.checks.interface import Failure
 
 NO_FAULT = "no_fault"
 NEVER_SLEEPS = "never_sleeps"
 """That the firmware did not go back to sleep. No check of a world has that name: what follows from it is judged."""
-FAULT_CODE, FAILED_CODE, DIVERGED_CODE = 3, 1, 4
-"""Exit codes, as everywhere: a firmware fault, an expectation that failed, a case that does not fail again."""
 
 
 class BareFailure(Failure, frozen=True, kw_only=True):
@@ -53,27 +52,46 @@ class BareFailure(Failure, frozen=True, kw_only=True):
         return f"{self.check}: tick {self.tick} ({self.tick * 1000 / self.crystal_hz:.3f} ms): {self.found}"
 
 
-class Verdict(msgspec.Struct, frozen=True):
-    """What became of a case: the exit code, and a line. `failed`: its check fails, as recorded or otherwise."""
+class BareRerun(msgspec.Struct, frozen=True):
+    """A script played from power-on. `failure`: what its check said, None where it passed."""
 
-    code: int
-    line: str
-    failed: bool
+    image: Image
+    line: BareLine
+    script: Sequence[ScriptItem]
+    end_tick: int
+    failure: BareFailure | None
+
+    def case(self) -> str:
+        """The case of the failure."""
+        assert self.failure is not None
+        end_tick = max(self.end_tick, self.failure.tick)
+        return case_text(self.image, self.line, self.script, end_tick, self.failure)
+
+    def stream(self) -> str:
+        """The script as a stream that nothing is expected of."""
+        return case_text(self.image, self.line, self.script, self.end_tick)
 
 
-def failure_of(run: BareRun, name: str, check: NamedCheck | None) -> BareFailure | None:
-    """What is wrong with a run, by the check `name`, or by a fault, which goes before it."""
+def rerun_bare(
+    image: Image,
+    line: BareLine,
+    script: Sequence[ScriptItem],
+    until_tick: int,
+    name: str = NO_FAULT,
+    check: NamedCheck | None = None,
+    source: str = "",
+) -> BareRerun:
+    """Plays a script from power-on to `until_tick`, under the check `name`; a fault goes before what that says."""
+    run = BareRun(image, line, script, until_tick, source)
     fault = run.processor.fault()
     what, tick = "", 12 * run.processor.cpu.cycles
     if fault is not None:
         name, what, tick = NO_FAULT, str(fault), fault.tick
     elif name == NEVER_SLEEPS:
         what = "" if run.idle else "the firmware is awake long after the last character"
-    elif check is not None:
+    elif check is not None and name == check.name:
         what = run.verdict(check)
-    if not what:
-        return None
-    return BareFailure(
+    failure = BareFailure(
         check=name,
         network=0,
         slot=0,
@@ -81,14 +99,15 @@ def failure_of(run: BareRun, name: str, check: NamedCheck | None) -> BareFailure
         wanted=name,
         found=what,
         fault=name == NO_FAULT,
-        crystal_hz=run.line.crystal_hz,
+        crystal_hz=line.crystal_hz,
     )
+    return BareRerun(image, line, script, until_tick, failure if what else None)
 
 
 def case_text(
     image: Image,
     line: BareLine,
-    heard: Sequence[ScriptItem],
+    script: Sequence[ScriptItem],
     end_tick: int,
     failure: BareFailure | None = None,
 ) -> str:
@@ -103,7 +122,7 @@ def case_text(
         header["expect"] = {failure.check: True}
     header["bare"] = msgspec.to_builtins(line)
     text = tomli_w.dumps(header).rstrip("\n")
-    return stream.format_stream([stream.Entry(one) for one in heard], stream_header.of_text(text))
+    return stream.format_stream([stream.Entry(one) for one in script], stream_header.of_text(text))
 
 
 def check_of_case(path: str | Path) -> str:
@@ -111,35 +130,19 @@ def check_of_case(path: str | Path) -> str:
     return _name(stream.read(path))
 
 
-def replay_bare(path: str | Path, image: Image, check: str | None = None) -> Verdict:
-    """Plays a case on `image`, from power-on. `check`: as of --expect, where the case names one that is in a file.
+def replay_bare(path: str | Path, image: Image, check: str | None = None) -> CaseVerdict:
+    """Plays a case on `image`, from power-on. `check`: FILE.py:FUNCTION, where the case names one that is in a file.
 
     Raises BadInput for what is no such case.
     """
     case = stream.read(path)
-    name = _name(case)
-    line = _line(case)
-    judge = None if name in (NO_FAULT, NEVER_SLEEPS, "") else _check(case, name, check)
-    heard = _heard(case)
-    header = case.header
-    run = BareRun(
-        image, line, heard, header.end_tick or max((one.tick for one in heard), default=0), case.source
-    )
-    failure = failure_of(run, name, judge)
-    recorded = header.verdict or ""
-    if failure is not None:
-        if str(failure) == recorded:
-            line_said = f"fails as recorded: {failure}"
-        elif recorded:
-            line_said = f"still fails, but not as recorded: {failure}; recorded: {recorded}"
-        else:
-            line_said = f"fails: {failure}"
-        return Verdict(FAULT_CODE if failure.fault else FAILED_CODE, line_said, True)
-    if not recorded:
-        return Verdict(0, "passes", False)
-    if header.firmware_sha256 not in (None, image.sha256):
-        return Verdict(0, f"cured: {name} passes; recorded: {recorded}", False)
-    return Verdict(DIVERGED_CODE, f"not reproduced: {name} passes; recorded: {recorded}", False)
+    name, line, header = _name(case), _line(case), case.header
+    judge = None if name in (NO_FAULT, NEVER_SLEEPS) else _check(case, name, check)
+    script = _heard(case)
+    end_tick = header.end_tick or max((one.tick for one in script), default=0)
+    failure = rerun_bare(image, line, script, end_tick, name, judge, case.source).failure
+    changed = header.firmware_sha256 not in (None, image.sha256)
+    return verdict_of(header.verdict or "", [] if failure is None else [failure], changed)
 
 
 def _name(case: stream.Stream) -> str:

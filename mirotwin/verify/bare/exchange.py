@@ -35,7 +35,7 @@ from miro_robot.image.variables import Variable, Variables, find_variable
 from miro_robot.inspect.values import bytes_at
 from miro_robot.mcs51.cpu import Cpu
 
-OPTION = "--expect"
+OPTION = "--check"
 GROUP = "mirotwin.bare_checks"
 
 

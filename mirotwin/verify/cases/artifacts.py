@@ -13,11 +13,10 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from miro_robot.firmware import image_path
 from miro_robot.image import Image
 from mirotwin.shell.command_line import command_line, operand
-from mirotwin.verify.cases import replay_line as line
 from mirotwin.verify.cases.case import write_case
+from mirotwin.verify.cases.replay_line import foreign_path, replay_line
 
 REPORT, CASE, SENT = "report.txt", "case.stream", "sent.stream"
 CASES = (CASE, SENT)
@@ -52,7 +51,7 @@ def leave(
 
 def leave_image(folder: Path, image: Image) -> None:
     """The image's own file, as long as that is what ran."""
-    if image.path == image_path() or not image.path.is_file():
+    if foreign_path(image) is None or not image.path.is_file():
         return
     content = image.path.read_bytes()
     if hashlib.sha256(content).hexdigest() != image.sha256:
@@ -78,9 +77,9 @@ MOST_BYTES = 1 << 20
 """An image of 8 KB is a file of 23 KB."""
 
 
-def replay_line(folder: str, own: bool, name: str = CASE) -> str:
+def case_line(folder: str, own: bool, name: str = CASE) -> str:
     """The command that gives the verdict of the case in `folder` again; `own`: with the robot's own firmware."""
-    return line.replay_line(f"{folder}/{name}", None if own else f"{folder}/{FIRMWARE}")
+    return replay_line(f"{folder}/{name}", None if own else f"{folder}/{FIRMWARE}")
 
 
 def report_line(folder: str) -> str:

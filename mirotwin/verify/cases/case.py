@@ -99,11 +99,23 @@ def write_case(path: str | os.PathLike[str], text: str) -> None:
     files.replace(Path(path), text.encode())
 
 
+def is_case(path: str | Path) -> bool:
+    """Whether a stream file expects something. One that cannot be read may: who runs it says what is wrong."""
+    if not _has_header(path):
+        return False
+    try:
+        return stream.read(path).header.expect is not None
+    except ValueError:
+        return True
+
+
 def is_bare_case(path: str | Path) -> bool:
     """Whether a file is a stream for a bare processor. Raises StreamError for a stream file that is wrong."""
+    return _has_header(path) and stream.read(path).header.bare is not None
+
+
+def _has_header(path: str | Path) -> bool:
     if not Path(path).is_file():
         return False
     with open(path, "rb") as file:
-        if not file.read(32).lstrip(b"\xef\xbb\xbf").startswith(b"# mirotwin stream 2"):
-            return False
-    return stream.read(path).header.bare is not None
+        return file.read(32).lstrip(b"\xef\xbb\xbf").startswith(b"# mirotwin stream 2")

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from os import PathLike
+from pathlib import Path
 from typing import Annotated
 
+from miro_robot.firmware import image_path
+from miro_robot.image import Image
 from mirotwin.shell.command import Argument, Options
 from mirotwin.shell.options import FIRMWARE, NAME
-from mirotwin.verify.expectations import EXPECT
+from mirotwin.verify.expectations import CHECK, Expected
 
 
 class CaseOptions(Options, frozen=True, kw_only=True):
@@ -19,20 +22,24 @@ class CaseOptions(Options, frozen=True, kw_only=True):
         str | None,
         FIRMWARE.saying("Image to run instead of the recorded one (of the robot's own, for a text stream)."),
     ] = None
-    expected: Annotated[
-        tuple[str, ...],
-        EXPECT.saying(
-            f"{EXPECT.help} For a case of a bare processor: FILE.py:FUNCTION, if its check is in a file."
-        ),
-    ] = ()
+    expected: Expected = ()
+    check: Annotated[
+        str | None,
+        CHECK.saying("FILE.py:FUNCTION, for a case of a bare processor whose check is in a file."),
+    ] = None
 
 
 def replay_line(
-    stream: str | PathLike[str], firmware: str | PathLike[str] | None = None, check: str = ""
+    stream: str | PathLike[str], firmware: str | PathLike[str] | None = None, check: str | None = None
 ) -> str:
     """The command that plays a stream or a case again, on that image (None: the robot's own).
 
     `check`: FILE.py:FUNCTION, which a case cannot name.
     """
     image = None if firmware is None else f"{firmware}"
-    return CaseOptions(file=f"{stream}", firmware=image, expected=(check,) if check else ()).command_line()
+    return CaseOptions(file=f"{stream}", firmware=image, check=check).command_line()
+
+
+def foreign_path(image: Image) -> Path | None:
+    """The path by which a command is told of `image`; None for the robot's own, which needs no word."""
+    return None if image.path.resolve() == image_path().resolve() else image.path

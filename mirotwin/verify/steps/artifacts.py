@@ -8,16 +8,11 @@ case.stream       what was sent and done, with the check that failed: `mirotwin 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-import msgspec
-
 from miro_sim.world.world import World
-from mirotwin.verify.cases.case import case_of_checks, case_text
+from mirotwin.verify.cases.case import case_of_checks
+from mirotwin.verify.cases.rerun import case_of_expect
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.happens import expect_of
-from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.watching import Checks
 from mirotwin.verify.steps.keys import HoldStep, NeverStep, WaitStep
 from mirotwin.verify.steps.player import Player
@@ -38,20 +33,7 @@ def case_of_step(player: Player, trace: Trace) -> str | None:
     name = "happens" if isinstance(step, WaitStep) else "never_happens"
     until_tick = max(failure.tick, player.world.tick)
     expect = expect_of(name, step.condition, failure.begun_tick, until_tick)
-    if expect is None:
-        return None
-    again = _judged_again(player.world, trace, expect)
-    return None if again is None else case_text(player.world, trace, expect, str(again))
-
-
-def _judged_again(world: World, trace: Trace, expect: Mapping[str, Any]) -> Failure | None:
-    """What the check says when all that went into the world goes into a new one."""
-    scenario = msgspec.structs.replace(world.scenario, expect=dict(expect))
-    again = World(scenario, world.seed, world.image, trace.script())
-    checks = Checks(again)
-    again.run_to(world.tick)
-    checks.finish()
-    return next((one for one in checks.failures if one.check in expect), None)
+    return None if expect is None else case_of_expect(player.world, trace, expect)
 
 
 def case_of_run(world: World, trace: Trace, checks: Checks) -> str | None:

@@ -168,7 +168,7 @@ def said_of(player: Player, checks: Checks) -> tuple[tuple[str, ...], tuple[str,
 
 def stem_of(path: str) -> str:
     """The name of a file without what its kind is called."""
-    return Path(path).name.removesuffix(".toml").removesuffix(".scenario")
+    return Path(path).name.removesuffix(".stream").removesuffix(".toml").removesuffix(".scenario")
 
 
 def keep_saved(player: Player, folder: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from miro_robot.image import load_hex
-from mirotwin.fuzz.oracle import Place, WorldOracle
+from mirotwin.fuzz.oracle import RobotOracle
 from mirotwin.fuzz.target import target_for
 from tests import children
 from tests.mutants.build import build
@@ -49,9 +49,9 @@ def case_of(name, folder):
     target = target_for(image)
     assert target.run(data)
     assert target.failure.check in (check, "moves_only_when_fresh")
-    judged = WorldOracle(Place(image, 3, 0)).confirm(target, data, target.failure)
+    judged = RobotOracle(target).confirm(data, target.failure)
     case = folder / "crash.stream"
-    case.write_text(judged.case)
+    case.write_text(judged.case())
     return case, image.path
 
 

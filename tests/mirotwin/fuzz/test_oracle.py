@@ -6,7 +6,7 @@ from miro_protocol import stream
 from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.image.debug_info import Sources
 from mirotwin.fuzz.files import CampaignFolder
-from mirotwin.fuzz.oracle import NEVER_SLEEPS, Place, WorldOracle, expected_of, judge
+from mirotwin.fuzz.oracle import NEVER_SLEEPS, RobotOracle, expected_of
 from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import TargetFailure, target_for
@@ -16,15 +16,14 @@ from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image, planted
 
 
 def oracle(image):
-    return WorldOracle(Place(image))
+    return RobotOracle(target_for(image))
 
 
 def triage_of(image, tmp_path, kind="session"):
-    target = target_for(image, kind)
     reached = Reached(image, lambda: target_for(image, kind))
     folder = CampaignFolder(tmp_path / "out")
     folder.make()
-    return Triage(target, reached, oracle(image), folder, Sources([image.path.parent]))
+    return Triage(reached, RobotOracle(target_for(image, kind)), folder, Sources([image.path.parent]))
 
 
 def test_each_name_of_the_quick_judgement_is_a_check():
@@ -36,7 +35,7 @@ def test_what_shipped_firmware_does_right_is_not_confirmed(tmp_path):
     triage = triage_of(own_image(), tmp_path)
     for check in ("no_fault", "acts_within_ms", NEVER_SLEEPS):
         said = TargetFailure(check, 900_000, 0, "said")
-        assert triage.oracle.confirm(triage.target, seeds("session", 3, 0)[0], said).failure is None
+        assert triage.oracle.confirm(seeds("session", 3, 0)[0], said).failure is None
 
 
 def test_an_input_that_does_not_fail_again_is_counted_and_left_out(tmp_path):
@@ -141,4 +140,4 @@ def test_seeds_do_no_harm_in_target_and_world(kind):
     for data in seeds(kind, 3, 0):
         assert (target.run(data), target.failure) == (0, None)
         expected = {name: True for name in NAMES if name}
-        assert judge(Place(image), target.script(data), expected).failure is None
+        assert RobotOracle(target).judged(data, expected).failure is None

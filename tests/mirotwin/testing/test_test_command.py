@@ -76,10 +76,10 @@ def test_a_firmware_fault_is_exit_code_3(mirotwin, folder):
 @pytest.mark.parametrize(
     ("arguments", "what"),
     [
-        (["empty"], "empty: no *.scenario.toml there; nothing was tested"),
+        (["empty"], "empty: no *.scenario.toml or *.stream there; nothing was tested"),
         (["hil", "-k", "zzz"], "hil: 5 files, none with 'zzz' in its path; nothing was tested"),
-        (["none"], "none: there is no such file or folder; name a folder, or a *.scenario.toml"),
-        (["hil/notes.toml"], "hil/notes.toml: is no *.scenario.toml; rename it"),
+        (["none"], "none: there is no such file or folder; name a folder, or a *.scenario.toml or *.stream"),
+        (["hil/notes.toml"], "hil/notes.toml: is no *.scenario.toml or *.stream; rename it"),
         (["hil", "--firmware", "none.ihx"], "none.ihx: there is no such file"),
         (
             ["hil", "--junit", "hil/a.scenario.toml"],

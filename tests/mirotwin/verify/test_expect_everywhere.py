@@ -66,7 +66,7 @@ def test_a_find_of_it_is_a_case_that_replays_to_the_same_failure(mirotwin, here)
         *("fuzz", "--time", "3s", "--jobs", 1, "--minimise", "1s", "--out", "out"), "--expect", "stands_still"
     )
     assert code == 1
-    case = next((here / "out" / "finds").glob("stands_still-*.stream"))
+    case = next((here / "out" / "crashes").glob("stands_still-*.stream"))
     assert f"    mirotwin replay {case.relative_to(here)}" in out
     code, _, err = mirotwin("replay", case, "-q")
     assert (code, err.startswith(f"mirotwin: fails as recorded: {STILL}")) == (1, True)
@@ -87,7 +87,10 @@ def test_a_wrong_name_is_told_the_nearest_one_and_a_file_is_refused(mirotwin, co
     assert "--expect stands_stil" in out + err
     code, _, err = mirotwin(*command, "--expect", "mine.py:stands_still")
     assert code == 2
-    assert "--expect mine.py:stands_still: a check in a file is for firmware on a bare processor; " in err
+    assert (
+        "--expect mine.py:stands_still: a check in a file is for firmware on a bare processor, and given by --check; "
+        in err
+    )
 
 
 NOTE = "leaves out calibration, pattern, centroid, window_px, self_calibration"

@@ -64,39 +64,39 @@ def test_finds_are_confirmed_from_power_on_and_left_as_cases_that_replay(mirotwi
         again, out, _ = mirotwin("replay", str(path), "--firmware", hexes["mended"])
         assert (again, out.startswith("cured: ")) == (0, True)
     folder = str(tmp_path / "out" / "crashes")
-    code, out, _ = mirotwin("fuzz", hexes["sleeps"], "--regress", folder)
-    assert (code, out.splitlines()[-1]) == (1, f"{len(cases)} cases: 0 passed, {len(cases)} failed")
-    code, out, _ = mirotwin("fuzz", hexes["mended"], "--regress", folder, "--bare")
-    assert (code, out.splitlines()[-1]) == (0, f"{len(cases)} cases: {len(cases)} passed, 0 failed")
+    code, out, _ = mirotwin("test", folder, "--firmware", hexes["sleeps"])
+    assert (code, out.count("FAULT"), out.count("FAILED")) == (3, len(cases) - 1, 1)
+    code, out, _ = mirotwin("test", folder, "--firmware", hexes["mended"])
+    assert (code, out.splitlines()[-1]) == (0, f"{len(cases)} passed")
 
 
 def test_a_check_looks_at_what_is_new_or_at_everything(mirotwin, engines, hexes, check, tmp_path):
     inputs = corpus(tmp_path, b"quiet")
-    for number, more in enumerate(((), ("--expect-all",))):
+    for number, more in enumerate(((), ("--check-all",))):
         out_folder = tmp_path / f"out{number}"
-        options = ("--input", "bytes", "--corpus", inputs, "--expect", check, "--out", str(out_folder), *more)
+        options = ("--input", "bytes", "--corpus", inputs, "--check", check, "--out", str(out_folder), *more)
         code, out, err = campaign(mirotwin, tmp_path, hexes["polls"], *options)
         assert code == 1
         assert "it heard a q" in err
         case = next((out_folder / "crashes").glob("never_q-*.stream"))
         again = next(line for line in out.splitlines() if line.startswith(f"    mirotwin replay {case}"))
-        assert again.endswith(f" --expect {check}")
+        assert again.endswith(f" --check {check}")
         assert mirotwin(*shlex.split(again)[1:])[2].startswith("mirotwin: fails as recorded: never_q")
     folder = str(case.parent)
-    code, out, _ = mirotwin("fuzz", hexes["polls"], "--regress", folder, "--expect", check)
+    code, out, _ = mirotwin("test", folder, "--firmware", hexes["polls"], "--check", check)
     assert (code, "FAILED" in out) == (1, True)
-    code, _, err = mirotwin("replay", str(case), "--firmware", hexes["polls"], "--expect", check)
+    code, _, err = mirotwin("replay", str(case), "--firmware", hexes["polls"], "--check", check)
     assert (code, err.startswith("mirotwin: fails as recorded: never_q")) == (1, True)
     code, _, err = mirotwin("replay", str(case), "--firmware", hexes["polls"])
     assert code == 2
-    assert "names the check 'never_q', which is not installed; give it: --expect FILE.py:never_q" in err
+    assert "names the check 'never_q', which is not installed; give it: --check FILE.py:never_q" in err
 
 
 def test_a_check_that_raises_ends_the_campaign_with_its_place(mirotwin, engines, hexes, check, tmp_path):
     (tmp_path / "mycheck.py").write_text("def never_q(run):\n    return run.nothing\n")
     inputs = corpus(tmp_path, b"quiet")
-    for more in ((), ("--expect-all",)):
-        options = ("--input", "bytes", "--corpus", inputs, "--expect", check, "--force", *more)
+    for more in ((), ("--check-all",)):
+        options = ("--input", "bytes", "--corpus", inputs, "--check", check, "--force", *more)
         code, _, err = campaign(mirotwin, tmp_path, hexes["polls"], *options)
         assert code == 2
         assert (
@@ -112,9 +112,9 @@ def test_a_check_that_raises_ends_the_campaign_with_its_place(mirotwin, engines,
         (("sleeps", "--protocol", "miro"), "--protocol does not go without --bare."),
         (("sleeps", "--crystal", "12000000"), "--crystal does not go without --bare."),
         (("sleeps", "--bare", "--slot", "1"), "--slot does not go with --bare."),
-        (("sleeps", "--bare", "--expect-all"), "--expect-all needs an --expect."),
+        (("sleeps", "--bare", "--check-all"), "--check-all needs a --check."),
         (("sleeps", "--bare", "--protocol", "mire"), "did you mean miro?"),
-        (("sleeps", "--bare", "--expect", "nothing"), "there is no check 'nothing' for a bare processor"),
+        (("sleeps", "--bare", "--check", "nothing"), "there is no check 'nothing' for a bare processor"),
         (("sleeps", "--bare", "--baud", "100000000"), "--baud: 100000000 is outside 50..750000"),
         (("faulty", "--bare"), "comes up with a fault"),
     ],

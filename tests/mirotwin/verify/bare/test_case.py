@@ -8,9 +8,10 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.bare.machine import BareMachine
 from miro_robot.bare.pins import PinEvent
 from mirotwin.fuzz.bare import BareTarget
-from mirotwin.verify.bare.case import case_text, failure_of, replay_bare
+from mirotwin.fuzz.oracle import BareProcessorOracle
+from mirotwin.verify.bare.case import case_text, replay_bare
 from mirotwin.verify.bare.exchange import NamedCheck
-from mirotwin.verify.bare.run import AHEAD_TICKS, BareRun
+from mirotwin.verify.bare.run import BareRun
 from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
 
 MENDED = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
@@ -29,11 +30,8 @@ def case(tmp_path, data, firmware=SLEEPS, check=None):
     target = BareTarget(image(firmware), "bytes", check=check)
     assert target.run(data)
     found = target.failure
-    heard = target.script(data)
-    end_tick = found.tick + (AHEAD_TICKS if found.check == "no_fault" else 0)
-    failure = failure_of(BareRun(target.image, target.line, heard, end_tick), found.check, check)
     path = tmp_path / "crash.stream"
-    path.write_text(case_text(target.image, target.line, heard, end_tick, failure))
+    path.write_text(BareProcessorOracle(target, check).confirm(data, found).case())
     return path
 
 
@@ -47,29 +45,29 @@ def case(tmp_path, data, firmware=SLEEPS, check=None):
 )
 def test_a_case_fails_again_as_recorded(tmp_path, data, firmware, code, said):
     again = replay_bare(case(tmp_path, data, firmware), image(firmware))
-    assert (again.code, again.failed) == (code, True)
-    assert again.line.startswith(said)
+    assert (again.code, again.failure is not None) == (code, True)
+    assert again.lines[0].startswith(said)
 
 
 @pytest.mark.parametrize("data", [b"ab!", b"ab?"])
 def test_other_firmware_cures_it(tmp_path, data):
     again = replay_bare(case(tmp_path, data), image(MENDED))
-    assert (again.code, again.failed) == (0, False)
-    assert again.line.startswith("cured: ")
+    assert (again.code, again.failure) == (0, None)
+    assert again.lines[0].startswith("cured: ")
 
 
 def test_other_firmware_may_fail_otherwise(tmp_path):
     again = replay_bare(case(tmp_path, b"ab!"), image("NOP\n" + SLEEPS.replace("ORG 23h", "ORG 23h")))
-    assert (again.code, again.failed) == (3, True)
-    assert again.line.startswith("still fails, but not as recorded: ")
+    assert (again.code, again.failure.fault) == (3, True)
+    assert again.lines[0].startswith("still fails, but not as recorded: ")
 
 
 def test_a_case_that_does_not_fail_again_differs(tmp_path):
     path = case(tmp_path, b"ab!")
     path.write_text(path.read_text().replace(" > 61 62 21", " > 61 62 20"))
     again = replay_bare(path, image(SLEEPS))
-    assert (again.code, again.failed) == (4, False)
-    assert again.line.startswith("not reproduced: no_fault passes")
+    assert (again.code, again.failure) == (4, None)
+    assert again.lines[0].startswith("not reproduced: no_fault passes")
 
 
 def test_a_case_of_a_check_needs_that_check(tmp_path):
@@ -77,14 +75,14 @@ def test_a_case_of_a_check_needs_that_check(tmp_path):
     file = tmp_path / "mycheck.py"
     file.write_text(WRONG.replace("short", "too_long"))
     again = replay_bare(path, image(SLEEPS), f"{file}:too_long")
-    assert (again.code, again.line.partition(":")[0]) == (1, "fails as recorded")
-    assert again.line.endswith("3 are too many")
+    assert (again.code, again.lines[0].partition(":")[0]) == (1, "fails as recorded")
+    assert again.lines[0].endswith("3 are too many")
     with pytest.raises(
-        BadInput, match="names the check 'too_long', which is not installed; give it: --expect "
+        BadInput, match="names the check 'too_long', which is not installed; give it: --check "
     ):
         replay_bare(path, image(SLEEPS))
     file.write_text(WRONG)
-    with pytest.raises(BadInput, match="is a case of the check 'too_long', and --expect gives 'short'"):
+    with pytest.raises(BadInput, match="is a case of the check 'too_long', and --check gives 'short'"):
         replay_bare(path, image(SLEEPS), f"{file}:short")
 
 
@@ -97,7 +95,7 @@ def test_a_case_runs_no_program_that_it_names(tmp_path, monkeypatch):
         path.write_text(honest.replace("too_long = true", f'"{name}" = true'))
         with pytest.raises(BadInput, match="which is not installed"):
             replay_bare(path, image(SLEEPS))
-        with pytest.raises(BadInput, match="and --expect gives 'f'"):
+        with pytest.raises(BadInput, match="and --check gives 'f'"):
             replay_bare(path, image(SLEEPS), f"{tmp_path}/evil.py:f")
         assert not (tmp_path / "was_run").exists()
 

@@ -57,7 +57,7 @@ def test_a_check_that_fails_itself_says_where(file, name, said):
     with pytest.raises(BadInput) as caught:
         check_named(f"{file}:{name}").judge("text")
     assert str(caught.value).endswith(said.format(file=file))
-    assert f"--expect {file}:{name}" in str(caught.value)
+    assert f"--check {file}:{name}" in str(caught.value)
 
 
 def test_what_is_no_check_is_refused(file, tmp_path):

@@ -23,7 +23,7 @@ from mirotwin.shell.options import plain_parameters
 Both = tuple[Recording, Recording]
 
 
-class Again(msgspec.Struct, frozen=True):
+class ExactDifference(msgspec.Struct, frozen=True):
     """The result. `period`: the first control period that differs."""
 
     period: int | None = None
@@ -38,14 +38,14 @@ class Again(msgspec.Struct, frozen=True):
         }
 
 
-def run_again(
+def locate(
     paths: tuple[str, str],
     recordings: Both,
     made: tuple[Made, Made],
     programs: Sequence[Program],
     found: Sequence[Difference],
     notes: list[str],
-) -> Again:
+) -> ExactDifference:
     """Runs both again as far as their digests allow; `notes` gets what could not be done, and why."""
     period = min(one.period for one in found)
     first = _first_period(recordings, period)
@@ -56,7 +56,7 @@ def run_again(
     except BadInput as error:
         notes.append(f"they cannot be run again: {error}")
     if worlds is None:
-        return Again(period)
+        return ExactDifference(period)
     one, other, scripted = worlds
     state = first_difference(one, other, (max(first, period) + 1) * CONTROL_PERIOD_TICKS)
     if state is None:
@@ -64,8 +64,10 @@ def run_again(
             f"run again, their states do not differ up to the end of control period {period}: what made the difference"
             " is in neither recording (another version of this program, or values that were changed)"
         )
-        return Again(period)
-    return Again(period, state, _firmwares(paths, recordings, made, programs, _seen_tick(found), scripted))
+        return ExactDifference(period)
+    return ExactDifference(
+        period, state, _firmwares(paths, recordings, made, programs, _seen_tick(found), scripted)
+    )
 
 
 def _first_period(recordings: Both, period: int) -> int:
