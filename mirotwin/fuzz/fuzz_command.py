@@ -28,8 +28,8 @@ from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
 from mirotwin.fuzz.fuzz_bare import bare_fuzz_options, bare_spec, load_bare_firmware, take_bare_fuzz
 from mirotwin.fuzz.fuzz_progress import FuzzProgress
 from mirotwin.fuzz.fuzz_summary import Ended, report
+from mirotwin.fuzz.input_coverage import Reached
 from mirotwin.fuzz.oracle import oracle_of
-from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from mirotwin.fuzz.triage import MINIMISE_S, Crash, Triage

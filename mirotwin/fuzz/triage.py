@@ -21,9 +21,9 @@ from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import collect, write
 from mirotwin.fuzz.budget import Budget
 from mirotwin.fuzz.files import CampaignFolder
+from mirotwin.fuzz.input_coverage import Reached
 from mirotwin.fuzz.minimise import minimise
 from mirotwin.fuzz.oracle import Expected, Oracle, OracleVerdict
-from mirotwin.fuzz.reached import Reached
 from mirotwin.fuzz.target import TargetFailure
 from mirotwin.verify.checks.interface import Failure
 

@@ -14,8 +14,8 @@ import msgspec
 
 from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_robot.inspect.watcher import Watcher, attach, detach
+from mirotwin.replay.annotated_image import Place, Program
 from mirotwin.replay.lockstep import Pair
-from mirotwin.replay.program import Place, Program
 from mirotwin.replay.variables import extents
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from miro_robot.image import Image
 from miro_sim.world.world import World
 from mirotwin.recording.difference import DIGEST, Difference
 from mirotwin.recording.reader import Recording
+from mirotwin.replay.annotated_image import Program
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS, StateDifference, first_difference
-from mirotwin.replay.program import Program
 from mirotwin.replay.sources import Made
 from mirotwin.rerun.recorded import repeating, world_of
 from mirotwin.shell.options import plain_parameters

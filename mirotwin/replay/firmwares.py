@@ -10,10 +10,10 @@ import msgspec
 from miro_robot.image import Image
 from miro_sim.world.conditions import Reached
 from miro_sim.world.waits import WaitExpired
+from mirotwin.replay.annotated_image import Program, same_layout
 from mirotwin.replay.builds import Builds, VariableDifference
 from mirotwin.replay.instructions import InstructionDifference, Stepper
 from mirotwin.replay.moved import Moved, moved
-from mirotwin.replay.program import Program, same_layout
 
 if TYPE_CHECKING:
     from miro_sim.world.world import World

@@ -19,8 +19,8 @@ from miro_robot.inspect.watcher import Watcher, attach, detach
 from miro_robot.mcs51.opcodes import LENGTH
 from miro_sim.world.conditions import Reached
 from miro_sim.world.waits import WaitExpired
+from mirotwin.replay.annotated_image import Place, Program, changed_instructions
 from mirotwin.replay.lockstep import LOOK_TICKS, Pair
-from mirotwin.replay.program import Place, Program, changed_instructions
 from mirotwin.replay.state_fields import FieldDifference, item_differences
 from mirotwin.replay.variables import STACK, name_of_byte
 

@@ -15,7 +15,7 @@ from difflib import SequenceMatcher
 import msgspec
 
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
-from mirotwin.replay.program import Program
+from mirotwin.replay.annotated_image import Program
 
 _OFFSET = re.compile(r"\+(0x[0-9a-f]+|\d+|[0-9A-F]+h)")
 _ADDRESS = re.compile(r"\b([0-9A-F]{4,5})h")

@@ -12,9 +12,9 @@ from miro_robot.image import Image, load_hex
 from miro_sim.world.world import World
 from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.recording.difference import Difference
+from mirotwin.replay.annotated_image import Program
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS
-from mirotwin.replay.program import Program
 from mirotwin.rerun.job import Job
 from mirotwin.shell.command import Option
 from mirotwin.shell.options import IMAGE, NAME, load_image, plain_parameters

@@ -8,9 +8,9 @@ import pytest
 from miro_robot.image import Image, Symbols
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.sequences import characters
+from mirotwin.replay.annotated_image import Program, changed_instructions, same_layout
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.moved import moved
-from mirotwin.replay.program import Program, changed_instructions, same_layout
 from mirotwin.replay.variables import extents, name_of_byte
 from tests.mirotwin.replay.rig import STOP_AT, built, periods, with_byte, world
 from tests.mirotwin.verify.checks.rig import needs_sdcc, own_image
