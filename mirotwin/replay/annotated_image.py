@@ -16,7 +16,7 @@ from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
 
 
-class Place(msgspec.Struct, frozen=True):
+class CodeLocation(msgspec.Struct, frozen=True):
     """An instruction that was executed at `tick`. `line`: `failsafe.c:41`, "" where no debug file tells.
 
     `symbol` with offset; `source`: what stands in that line, "" where the file is not there; `text` disassembled.
@@ -44,7 +44,7 @@ NOWHERE = Path("no-such-folder") / "image.ihx"
 """Of an image whose debug files are to be left alone."""
 
 
-class Program:
+class AnnotatedImage:
     """One image with its debug files, as far as they are there. `folders`: where C files may be.
 
     `problem`: why the debug files are not used, where they belong to another image.
@@ -66,11 +66,11 @@ class Program:
     def has_lines(self) -> bool:
         return bool(self.debug.lines)
 
-    def place(self, pc: int, tick: int) -> Place:
+    def place(self, pc: int, tick: int) -> CodeLocation:
         line = self.debug.line_at(pc)
         text = " ".join(disassemble(self.image.code, pc, self.names).split())
         source = "" if line is None else self.sources.text(line)
-        return Place(tick, pc, self.names.place(pc), "" if line is None else str(line), source, text)
+        return CodeLocation(tick, pc, self.names.place(pc), "" if line is None else str(line), source, text)
 
 
 def same_layout(one: Image, other: Image) -> bool:

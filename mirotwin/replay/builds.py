@@ -14,8 +14,8 @@ import msgspec
 
 from miro_exact.clock import CYCLE_TICKS, seconds
 from miro_robot.inspect.watcher import Watcher, attach, detach
-from mirotwin.replay.annotated_image import Place, Program
-from mirotwin.replay.lockstep import Pair
+from mirotwin.replay.annotated_image import AnnotatedImage, CodeLocation
+from mirotwin.replay.lockstep import WorldPair
 from mirotwin.replay.variables import extents
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class VariableDifference(msgspec.Struct, frozen=True):
     name: str
     one: int | str
     other: int | str
-    writers: tuple[Place | None, Place | None] = (None, None)
+    writers: tuple[CodeLocation | None, CodeLocation | None] = (None, None)
 
     def __str__(self) -> str:
         at = f"tick {self.tick} ({seconds(self.tick):.6f} s)"
@@ -66,10 +66,10 @@ class VariableDifference(msgspec.Struct, frozen=True):
 class Builds:
     """Two worlds at one tick with firmwares of other layouts. `looks`: how often both processors slept."""
 
-    def __init__(self, one: World, other: World, programs: tuple[Program, Program]) -> None:
-        self.pair = Pair(one, other)
-        self.programs = programs
-        first, second = (extents(program.image) for program in programs)
+    def __init__(self, one: World, other: World, annotated: tuple[AnnotatedImage, AnnotatedImage]) -> None:
+        self.pair = WorldPair(one, other)
+        self.annotated = annotated
+        first, second = (extents(image.image) for image in annotated)
         self.places = {
             name: (first[name][0], second[name][0], min(first[name][1], second[name][1]))
             for name in first
@@ -130,8 +130,8 @@ class Builds:
             for cpu, watcher in zip(cpus, watchers, strict=True):
                 detach(cpu, watcher)
         writers = [
-            None if watcher.last is None else program.place(*watcher.last)
-            for program, watcher in zip(self.programs, watchers, strict=True)
+            None if watcher.last is None else image.place(*watcher.last)
+            for image, watcher in zip(self.annotated, watchers, strict=True)
         ]
         return msgspec.structs.replace(found, writers=tuple(writers))
 

@@ -19,7 +19,7 @@ from mirotwin.recording.writer import MAGIC
 from mirotwin.replay.compare_options import CompareOptions
 from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
 from mirotwin.replay.exact_difference import ExactDifference, locate
-from mirotwin.replay.replay_firmware import LinesFrom, load_images, program_of
+from mirotwin.replay.replay_firmware import LinesFrom, annotated_of, load_images
 from mirotwin.replay.sources import Made, SourceDifference, source_differences
 from mirotwin.rerun.recorded import image_if_any
 from mirotwin.shell.command import Argument, Options, command_of
@@ -70,8 +70,8 @@ def diff(options: DiffOptions) -> int:
     images = load_images(options.lines_from, *(one.image for one in made))
     exact = ExactDifference()
     if found:
-        programs = [program_of(one.image, images, sources) for one in made if one.image is not None]
-        exact = locate((a, b), recordings, made, programs, found, notes)
+        annotated = [annotated_of(one.image, images, sources) for one in made if one.image is not None]
+        exact = locate((a, b), recordings, made, annotated, found, notes)
 
     if not options.quiet and not compare.as_json:
         _print_sources(origins)

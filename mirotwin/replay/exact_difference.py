@@ -13,7 +13,7 @@ from miro_robot.image import Image
 from miro_sim.world.world import World
 from mirotwin.recording.difference import DIGEST, Difference
 from mirotwin.recording.reader import Recording
-from mirotwin.replay.annotated_image import Program
+from mirotwin.replay.annotated_image import AnnotatedImage
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS, StateDifference, first_difference
 from mirotwin.replay.sources import Made
@@ -42,7 +42,7 @@ def locate(
     paths: tuple[str, str],
     recordings: Both,
     made: tuple[Made, Made],
-    programs: Sequence[Program],
+    annotated: Sequence[AnnotatedImage],
     found: Sequence[Difference],
     notes: list[str],
 ) -> ExactDifference:
@@ -66,7 +66,7 @@ def locate(
         )
         return ExactDifference(period)
     return ExactDifference(
-        period, state, _firmwares(paths, recordings, made, programs, _seen_tick(found), scripted)
+        period, state, _firmwares(paths, recordings, made, annotated, _seen_tick(found), scripted)
     )
 
 
@@ -112,16 +112,16 @@ def _firmwares(
     paths: tuple[str, str],
     recordings: Both,
     made: tuple[Made, Made],
-    programs: Sequence[Program],
+    annotated: Sequence[AnnotatedImage],
     tick: int,
     scripted: bool,
 ) -> FirmwareDifference | None:
     """Where the firmwares go apart, in runs that differ in nothing else."""
     alike = made[0].scenario == made[1].scenario and made[0].source.seed == made[1].source.seed
-    if not alike or len(programs) < 2 or programs[0].image.code == programs[1].image.code:
+    if not alike or len(annotated) < 2 or annotated[0].image.code == annotated[1].image.code:
         return None
 
     def make(image: Image) -> World:
         return world_of(recordings[0], paths[0], image, scripted)
 
-    return first_instruction(make, programs[0], programs[1], tick + LOOK_TICKS)
+    return first_instruction(make, annotated[0], annotated[1], tick + LOOK_TICKS)

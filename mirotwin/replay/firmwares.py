@@ -10,7 +10,7 @@ import msgspec
 from miro_robot.image import Image
 from miro_sim.world.conditions import Reached
 from miro_sim.world.waits import WaitExpired
-from mirotwin.replay.annotated_image import Program, same_layout
+from mirotwin.replay.annotated_image import AnnotatedImage, same_layout
 from mirotwin.replay.builds import Builds, VariableDifference
 from mirotwin.replay.instructions import InstructionDifference, Stepper
 from mirotwin.replay.moved import Moved, moved
@@ -45,25 +45,27 @@ class FirmwareDifference(msgspec.Struct, frozen=True):
         }
 
 
-def first_instruction(make: Make, one: Program, other: Program, until_tick: int) -> FirmwareDifference:
+def first_instruction(
+    make: Make, one: AnnotatedImage, other: AnnotatedImage, until_tick: int
+) -> FirmwareDifference:
     """Runs both firmwares from tick 0 to at most `until_tick` and finds where they go apart."""
-    programs = one, other
-    notes = list(_missing(programs))
+    annotated = one, other
+    notes = list(_missing(annotated))
 
     def worlds() -> tuple[World, World]:
         return make(one.image), make(other.image)
 
     if same_layout(one.image, other.image):
-        changed = Stepper(*worlds(), programs).changed(until_tick)
-        effect = Stepper(*worlds(), programs).effect(until_tick)
+        changed = Stepper(*worlds(), annotated).changed(until_tick)
+        effect = Stepper(*worlds(), annotated).effect(until_tick)
         if changed is None and effect is not None:
             notes.insert(0, "no changed instruction is executed: what differs is data in code memory")
         if effect is None:
             notes.insert(0, "the states are the same each millisecond: no instruction has a lasting effect")
         return FirmwareDifference(changed, effect, (), tuple(notes))
     mapping = moved(one, other)
-    mapped = _first_mapped(worlds(), programs, mapping, until_tick)
-    builds = Builds(*worlds(), programs)
+    mapped = _first_mapped(worlds(), annotated, mapping, until_tick)
+    builds = Builds(*worlds(), annotated)
     variables = builds.variables(until_tick)
     notes.insert(0, _compared(builds))
     if mapping.same or mapping.changed:
@@ -74,7 +76,10 @@ def first_instruction(make: Make, one: Program, other: Program, until_tick: int)
 
 
 def _first_mapped(
-    worlds: tuple[World, World], programs: tuple[Program, Program], mapping: Moved, until_tick: int
+    worlds: tuple[World, World],
+    annotated: tuple[AnnotatedImage, AnnotatedImage],
+    mapping: Moved,
+    until_tick: int,
 ) -> InstructionDifference | None:
     """The first changed instruction that the first firmware executes, and the one in its place in the second."""
     one, other = worlds
@@ -87,13 +92,13 @@ def _first_mapped(
     if event is None:
         return None
     there = mapping.places[event.address]
-    place = programs[0].place(event.address, event.tick)
+    place = annotated[0].place(event.address, event.tick)
     try:
         twin = Reached(address=there, network=event.network, slot=event.slot)
         tick = other.run_until([twin], until_tick - other.tick).tick
     except WaitExpired:
         tick = event.tick
-    return InstructionDifference(event.network, event.slot, place, programs[1].place(there, tick), ())
+    return InstructionDifference(event.network, event.slot, place, annotated[1].place(there, tick), ())
 
 
 def _compared(builds: Builds) -> str:
@@ -105,16 +110,16 @@ def _compared(builds: Builds) -> str:
     return f"{head}: compared were {len(builds.places)} variables by name, whenever both processors slept"
 
 
-def _missing(programs: tuple[Program, Program]) -> Iterator[str]:
+def _missing(annotated: tuple[AnnotatedImage, AnnotatedImage]) -> Iterator[str]:
     """What the debug files do not tell."""
-    for program in programs:
-        image = program.image
+    for one in annotated:
+        image = one.image
         beside = "put its .map, .cdb and .rst beside it"
         if not image.path.is_file():
             beside = "a recording holds no debug files; --lines-from names the file that they lie beside"
-        if program.problem is not None:
-            yield f"C lines are missing: {program.problem}"
+        if one.problem is not None:
+            yield f"C lines are missing: {one.problem}"
         elif not image.symbols.names:
             yield f"no symbols of {image.path}: {beside}"
-        elif not program.has_lines:
+        elif not one.has_lines:
             yield f"no C lines of {image.path}: {beside}"

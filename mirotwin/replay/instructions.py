@@ -19,8 +19,8 @@ from miro_robot.inspect.watcher import Watcher, attach, detach
 from miro_robot.mcs51.opcodes import LENGTH
 from miro_sim.world.conditions import Reached
 from miro_sim.world.waits import WaitExpired
-from mirotwin.replay.annotated_image import Place, Program, changed_instructions
-from mirotwin.replay.lockstep import LOOK_TICKS, Pair
+from mirotwin.replay.annotated_image import AnnotatedImage, CodeLocation, changed_instructions
+from mirotwin.replay.lockstep import LOOK_TICKS, WorldPair
 from mirotwin.replay.state_fields import FieldDifference, item_differences
 from mirotwin.replay.variables import STACK, name_of_byte
 
@@ -52,10 +52,10 @@ class InstructionDifference(msgspec.Struct, frozen=True):
 
     network: int
     slot: int
-    one: Place
-    other: Place
+    one: CodeLocation
+    other: CodeLocation
     values: tuple[FieldDifference, ...]
-    parted: Place | None = None
+    parted: CodeLocation | None = None
 
     def as_json(self) -> dict[str, Any]:
         return {
@@ -67,7 +67,7 @@ class InstructionDifference(msgspec.Struct, frozen=True):
         }
 
 
-class Step(NamedTuple):
+class ExecutedInstruction(NamedTuple):
     """An instruction, or an interrupt's call (`code` empty), and the processor's state after it."""
 
     cycle: int
@@ -77,7 +77,7 @@ class Step(NamedTuple):
     next_pc: int
 
 
-class Live:
+class LiveState:
     """The state of a processor without what lies above its stack pointer: nobody reads that before it is written.
 
     `stack`: where the stack begins, by the image's symbols; None: not known, and all of RAM counts.
@@ -97,39 +97,41 @@ class Live:
         return state[:top] + bytes(_RAM_BYTES - top) + state[_RAM_BYTES:]
 
 
-class Processors(Pair):
+class Processors(WorldPair):
     """Two worlds whose processors alone are compared."""
 
     def __init__(self, one: World, other: World) -> None:
         super().__init__(one, other)
         both = zip(_robots(one), _robots(other), strict=True)
-        self.live = [(Live(a.board.cpu, one.image), Live(b.board.cpu, other.image)) for a, b in both]
+        self.live = [
+            (LiveState(a.board.cpu, one.image), LiveState(b.board.cpu, other.image)) for a, b in both
+        ]
 
     def differ(self) -> bool:
         return any(here.save() != there.save() for here, there in self.live)
 
 
-class Steps(Watcher):
+class InstructionLog(Watcher):
     """Keeps what a processor does."""
 
     def __init__(self, cpu: Cpu, image: Image) -> None:
-        self.live = Live(cpu, image)
-        self.found: list[Step] = []
+        self.live = LiveState(cpu, image)
+        self.found: list[ExecutedInstruction] = []
 
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
         code = bytes(cpu.code_at(pc + offset) for offset in range(LENGTH[cpu.code_at(pc)]))
-        self.found.append(Step(start, pc, code, self.live.save(), cpu.pc))
+        self.found.append(ExecutedInstruction(start, pc, code, self.live.save(), cpu.pc))
 
     def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
-        self.found.append(Step(start, pc, b"", self.live.save(), cpu.pc))
+        self.found.append(ExecutedInstruction(start, pc, b"", self.live.save(), cpu.pc))
 
 
 class Stepper:
     """Two worlds at one tick with firmwares of the same layout."""
 
-    def __init__(self, one: World, other: World, programs: tuple[Program, Program]) -> None:
+    def __init__(self, one: World, other: World, annotated: tuple[AnnotatedImage, AnnotatedImage]) -> None:
         self.pair = Processors(one, other)
-        self.programs = programs
+        self.annotated = annotated
 
     def changed(self, until_tick: int) -> InstructionDifference | None:
         """The first changed instruction that is executed; both worlds stand before it then."""
@@ -156,7 +158,7 @@ class Stepper:
         for here, there in self._pieces(tick + 1, tick + 1):
             if here.robot is robot and here.steps and there.steps:
                 return self._difference(here, there, 0, -1)
-        one, other = (program.place(pc, tick) for program in self.programs)
+        one, other = (image.place(pc, tick) for image in self.annotated)
         return InstructionDifference(robot.network, robot.slot, one, other, ())
 
     def effect(self, until_tick: int) -> InstructionDifference | None:
@@ -196,9 +198,9 @@ class Stepper:
         robot = here.robot
         values = _values(robot, self.pair.one.image, here.steps[index].state, there.steps[index].state)
         places = [
-            program.place(step.pc, step.cycle * CYCLE_TICKS)
+            image.place(step.pc, step.cycle * CYCLE_TICKS)
             for at in (index, *([parted] if parted >= 0 else []))
-            for program, step in zip(self.programs, (here.steps[at], there.steps[at]), strict=True)
+            for image, step in zip(self.annotated, (here.steps[at], there.steps[at]), strict=True)
         ]
         return InstructionDifference(
             robot.network, robot.slot, places[0], places[1], tuple(values), *places[2:3]
@@ -210,18 +212,20 @@ class Stepped:
 
     def __init__(self, robot: Robot, image: Image) -> None:
         self.robot = robot
-        self.watcher = Steps(robot.board.cpu, image)
+        self.watcher = InstructionLog(robot.board.cpu, image)
         attach(robot.board.cpu, self.watcher)
 
     @property
-    def steps(self) -> list[Step]:
+    def steps(self) -> list[ExecutedInstruction]:
         return self.watcher.found
 
     def detach(self) -> None:
         detach(self.robot.board.cpu, self.watcher)
 
 
-def _lasting(one: Sequence[Step], other: Sequence[Step]) -> tuple[int, int] | None:
+def _lasting(
+    one: Sequence[ExecutedInstruction], other: Sequence[ExecutedInstruction]
+) -> tuple[int, int] | None:
     """From which step on the states are not the same again, and at which they go different ways (-1: at none)."""
     steps = list(zip(one, other, strict=False))
     first = len(steps)

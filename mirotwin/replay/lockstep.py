@@ -50,7 +50,7 @@ class StateDifference(msgspec.Struct, frozen=True):
         }
 
 
-class Pair:
+class WorldPair:
     """Two worlds at one tick. Raises ValueError for worlds that are not."""
 
     def __init__(self, one: World, other: World) -> None:
@@ -117,7 +117,7 @@ def first_difference(
     """
     if look_ticks < 1:
         raise ValueError(f"look_ticks is {look_ticks}: give 1 or more")
-    pair = Pair(one, other)
+    pair = WorldPair(one, other)
     if not pair.differ():
         end_tick = CONTROL_PERIOD_TICKS * min(one.periods, other.periods)
         found_tick = end_tick if until_tick is None else until_tick

@@ -15,7 +15,7 @@ from difflib import SequenceMatcher
 import msgspec
 
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
-from mirotwin.replay.annotated_image import Program
+from mirotwin.replay.annotated_image import AnnotatedImage
 
 _OFFSET = re.compile(r"\+(0x[0-9a-f]+|\d+|[0-9A-F]+h)")
 _ADDRESS = re.compile(r"\b([0-9A-F]{4,5})h")
@@ -45,7 +45,7 @@ class Moved(msgspec.Struct, frozen=True):
         return "; ".join(parts)
 
 
-def moved(one: Program, other: Program) -> Moved:
+def moved(one: AnnotatedImage, other: AnnotatedImage) -> Moved:
     """The map of the two, empty where one of them has no symbols."""
     here, there = _pieces(one), _pieces(other)
     same: list[str] = []
@@ -65,26 +65,28 @@ def moved(one: Program, other: Program) -> Moved:
     return Moved(tuple(same), tuple(changed), only, places)
 
 
-def _pieces(program: Program) -> dict[str, tuple[int, int]]:
+def _pieces(annotated: AnnotatedImage) -> dict[str, tuple[int, int]]:
     """Name -> where the code begins and ends, in the order of addresses."""
-    symbols = program.image.symbols
+    symbols = annotated.image.symbols
     if symbols.problem is not None:
         return {}
     found: dict[int, str] = {}
     for name, symbol in sorted(symbols.names.items()):
-        if symbol.space == "code" and any(first <= symbol.address < end for first, end in program.image.used):
+        if symbol.space == "code" and any(
+            first <= symbol.address < end for first, end in annotated.image.used
+        ):
             found.setdefault(symbol.address, name)
     starts = sorted(found)
     pieces = {}
     for start in starts:
-        end = next(end for first, end in program.image.used if first <= start < end)
+        end = next(end for first, end in annotated.image.used if first <= start < end)
         after = bisect.bisect_right(starts, start)
         pieces[found[start]] = (start, min([end, *starts[after : after + 1]]))
     return pieces
 
 
-def _instructions(program: Program, address: int, end: int) -> Iterator[Instruction]:
-    code, names = program.image.code, program.names
+def _instructions(annotated: AnnotatedImage, address: int, end: int) -> Iterator[Instruction]:
+    code, names = annotated.image.code, annotated.names
     while address < end:
         text = " ".join(disassemble(code, address, names).split())
         text = _ADDRESS.sub(lambda found: names.place(int(found[1], 16)), text)

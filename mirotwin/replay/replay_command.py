@@ -19,7 +19,7 @@ from mirotwin.replay.compare_options import CompareOptions
 from mirotwin.replay.differences import differences_as_json, print_differences, print_firmwares, print_json
 from mirotwin.replay.firmwares import FirmwareDifference
 from mirotwin.replay.replay_case import replay_bare_case, replay_case
-from mirotwin.replay.replay_firmware import LinesFrom, firmwares_apart, load_images, program_of
+from mirotwin.replay.replay_firmware import LinesFrom, annotated_of, firmwares_apart, load_images
 from mirotwin.replay.replay_tables import SHOWN, print_frames, print_response
 from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.job import Job, load_job, rerun_job
@@ -119,8 +119,8 @@ def replay(options: ReplayOptions) -> int:
     found = differences(job.recorded, replayed, rule)
     apart = None
     if found and job.image is not None and job.image.code != image.code:
-        programs = program_of(job.image, images, ()), program_of(image, (), options.sources)
-        apart = firmwares_apart(file, job, programs, found)
+        annotated = annotated_of(job.image, images, ()), annotated_of(image, (), options.sources)
+        apart = firmwares_apart(file, job, annotated, found)
 
     if not options.quiet and not compare.as_json:
         print_frames(job, replayed, options.everything)

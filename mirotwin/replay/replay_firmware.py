@@ -12,7 +12,7 @@ from miro_robot.image import Image, load_hex
 from miro_sim.world.world import World
 from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.recording.difference import Difference
-from mirotwin.replay.annotated_image import Program
+from mirotwin.replay.annotated_image import AnnotatedImage
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS
 from mirotwin.rerun.job import Job
@@ -43,16 +43,16 @@ def load_images(paths: Sequence[str], *recorded: Image | None) -> list[Image]:
     return images
 
 
-def program_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> Program:
+def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) -> AnnotatedImage:
     """The image with its debug files: those beside one of `images`, or the robot's own; C files also in `sources`."""
     known = next((one for one in images if one.code == image.code), with_debug_files(image))
     folder = source_folder()
     own = [] if folder is None or load_hex(image_path()).sha256 != image.sha256 else [folder]
-    return Program(known, [*own, *map(Path, sources)])
+    return AnnotatedImage(known, [*own, *map(Path, sources)])
 
 
 def firmwares_apart(
-    file: str, job: Job, programs: tuple[Program, Program], found: Sequence[Difference]
+    file: str, job: Job, annotated: tuple[AnnotatedImage, AnnotatedImage], found: Sequence[Difference]
 ) -> FirmwareDifference | None:
     """Where the recorded image and the one that ran go apart, up to the first difference."""
 
@@ -60,4 +60,4 @@ def firmwares_apart(
         return job.world(which)
 
     with plain_parameters(file, "replayed"):
-        return first_instruction(make, *programs, found[0].tick + LOOK_TICKS)
+        return first_instruction(make, *annotated, found[0].tick + LOOK_TICKS)

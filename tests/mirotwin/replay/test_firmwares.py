@@ -8,7 +8,7 @@ import pytest
 from miro_robot.image import Image, Symbols
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.sequences import characters
-from mirotwin.replay.annotated_image import Program, changed_instructions, same_layout
+from mirotwin.replay.annotated_image import AnnotatedImage, changed_instructions, same_layout
 from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.moved import moved
 from mirotwin.replay.variables import extents, name_of_byte
@@ -20,8 +20,11 @@ END = 9_600_000
 
 
 def apart(other: Image, folder: Path | None = None, until_tick: int = END) -> FirmwareDifference:
-    programs = Program(own_image(), [SOURCE]), Program(other, [] if folder is None else [folder])
-    return first_instruction(world, *programs, until_tick)
+    annotated = (
+        AnnotatedImage(own_image(), [SOURCE]),
+        AnnotatedImage(other, [] if folder is None else [folder]),
+    )
+    return first_instruction(world, *annotated, until_tick)
 
 
 @pytest.fixture(scope="module")
@@ -195,7 +198,7 @@ def test_a_build_whose_code_moved_is_mapped_by_symbols_and_the_changed_instructi
 @needs_sdcc
 def test_code_that_only_moved_counts_as_the_same(images):
     image, folder = images["slower"]
-    map_ = moved(Program(own_image(), [SOURCE]), Program(image, [folder]))
+    map_ = moved(AnnotatedImage(own_image(), [SOURCE]), AnnotatedImage(image, [folder]))
     assert len(map_.same) > 30
     assert set(map_.places)
     assert {own_image().symbols.name_at(at) for at in map_.places} == set(map_.changed)
