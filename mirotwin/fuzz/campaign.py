@@ -20,7 +20,7 @@ from typing import Any
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.engine import Engine, NoProgress, Progress
+from mirotwin.fuzz.engine import Engine, EngineProgress
 from mirotwin.fuzz.files import CampaignFolder
 from mirotwin.fuzz.triage import Crash, Triage
 
@@ -69,7 +69,7 @@ class Campaign:
         tell: Callable[[Crash], None] = lambda crash: None,
     ) -> None:
         self.engine = engine
-        self._progress: Progress = NoProgress()
+        self._progress = EngineProgress()
         self.triage = triage
         self.folder = folder
         self.expected = expected

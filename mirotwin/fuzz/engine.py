@@ -16,15 +16,22 @@ _TOKENS, _TOKEN = 32, 64
 """How many inputs are words of a foreign format, and how much of them."""
 
 
-class Progress(Protocol):
-    """How far an engine is. `run_time_s` of wall time; `edges`: places of the map that were ever counted."""
+class EngineProgress(msgspec.Struct, frozen=True):
+    """A campaign so far: `executions` since it began first, the rate of all its jobs together.
 
-    @property
-    def executions(self) -> int: ...
-    @property
-    def executions_per_s(self) -> float: ...
-    @property
-    def edges(self) -> int | None: ...
+    `edges`: of the job that has most, None as long as it has said nothing. `frames` and `characters`: what the machines
+    were fed. `stability_percent`: of the job with the least. `run_time_s` of wall time.
+    """
+
+    executions: int = 0
+    executions_per_s: float = 0.0
+    edges: int | None = None
+    crashes: int = 0
+    corpus_count: int = 0
+    stability_percent: float | None = None
+    run_time_s: float = 0.0
+    frames: int = 0
+    characters: int = 0
 
 
 class Engine(Protocol):
@@ -32,7 +39,7 @@ class Engine(Protocol):
 
     def start(self) -> None: ...
     def stop(self) -> None: ...
-    def progress(self) -> Progress: ...
+    def progress(self) -> EngineProgress: ...
     def new_crashes(self) -> list[Path]:
         """Inputs that failed, since the last call."""
         ...
@@ -40,14 +47,6 @@ class Engine(Protocol):
     def new_queue(self) -> list[Path]:
         """Inputs that found something new, since the last call."""
         ...
-
-
-class NoProgress(msgspec.Struct, frozen=True):
-    """Of what does nothing."""
-
-    executions: int = 0
-    executions_per_s: float = 0.0
-    edges: int | None = None
 
 
 class NoEngine:
@@ -59,8 +58,8 @@ class NoEngine:
     def stop(self) -> None:
         """Nothing."""
 
-    def progress(self) -> NoProgress:
-        return NoProgress()
+    def progress(self) -> EngineProgress:
+        return EngineProgress()
 
     def new_crashes(self) -> list[Path]:
         return []

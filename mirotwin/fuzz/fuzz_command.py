@@ -27,8 +27,8 @@ from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
 from mirotwin.fuzz.fuzz_bare import bare_fuzz_options, bare_spec, load_bare_firmware, take_bare_fuzz
 from mirotwin.fuzz.fuzz_progress import FuzzProgress
-from mirotwin.fuzz.fuzz_summary import Ended, report
-from mirotwin.fuzz.input_coverage import Reached
+from mirotwin.fuzz.fuzz_summary import CampaignEnd, report
+from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.oracle import oracle_of
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
@@ -179,7 +179,7 @@ def _campaign(
         for note in corpus.notes:
             complain(note)
     _check_at_rest(target, image)
-    reached = Reached(image, spec.make)
+    reached = InputCoverage(image, spec.make)
     if covering is not None and covering.address in reached.total:
         what = f"{covering.name} runs while the firmware starts, before any input"
         raise BadInput("", "--covering", what, "name a function that an input has to reach")
@@ -252,7 +252,7 @@ def _run(campaign: Campaign, image: Image, asked: Asked, check_in_file: str | No
             stopped = error
             with suppress(BadInput, PluginError):
                 left = campaign.finish(progress.show, INTERRUPTED_S)
-    ended = Ended(left=left, complete=stopped is None, check=check_in_file)
+    ended = CampaignEnd(left=left, complete=stopped is None, check=check_in_file)
     code = report(campaign, image, asked.out, asked.covering, ended, asked.quiet)
     if stopped is not None:
         raise stopped

@@ -21,7 +21,7 @@ COVERAGE = "coverage.info"
 SUMMARY = "summary.json"
 
 
-class Ended(msgspec.Struct, frozen=True):
+class CampaignEnd(msgspec.Struct, frozen=True):
     """`left`: inputs that were not looked at; `complete`: whether it came to the end of its time.
 
     `check`: FILE.py:FUNCTION of --check.
@@ -33,7 +33,7 @@ class Ended(msgspec.Struct, frozen=True):
 
 
 def report(
-    campaign: Campaign, image: Image, out: Path, covering: str | None, ended: Ended, quiet: bool
+    campaign: Campaign, image: Image, out: Path, covering: str | None, ended: CampaignEnd, quiet: bool
 ) -> int:
     """Writes the files of the campaign and shows the results; the exit code."""
     triage = campaign.triage
@@ -107,7 +107,7 @@ def _print_covering(campaign: Campaign, symbol: str, image: Image) -> bool:
 
 
 def _write_summary(
-    campaign: Campaign, out: Path, tracefile: Tracefile, never: list[str], ended: Ended
+    campaign: Campaign, out: Path, tracefile: Tracefile, never: list[str], ended: CampaignEnd
 ) -> None:
     status = campaign.status()
     lines, branches = line_share(tracefile), branch_share(tracefile)

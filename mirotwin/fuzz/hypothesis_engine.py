@@ -17,7 +17,7 @@ from pathlib import Path
 from types import TracebackType
 
 from miro_exact.bad_input import BadInput
-from mirotwin.fuzz.afl.statistics import Progress
+from mirotwin.fuzz.engine import EngineProgress
 from mirotwin.fuzz.hypothesis_process import KINDS, told
 from mirotwin.shell.children import python_module
 
@@ -95,13 +95,13 @@ class HypothesisRun:
         self._require_health()
         return any(process.poll() is None for process in self._processes)
 
-    def progress(self) -> Progress:
+    def progress(self) -> EngineProgress:
         """How far it is."""
         self._require_health()
         said = [one for one in (told(folder) for folder in self._folders) if one]
         run_time_s = time.monotonic() - self._began_s
         executions = sum(one.executions for one in said)
-        return Progress(
+        return EngineProgress(
             executions=executions,
             executions_per_s=executions / run_time_s if run_time_s > 0 else 0.0,
             edges=max((one.edges for one in said), default=None),

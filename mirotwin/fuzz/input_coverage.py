@@ -25,7 +25,7 @@ from mirotwin.fuzz.target import Target
 PATH_DIGITS = 6
 
 
-class Reached:
+class InputCoverage:
     """`total`: what ran in all inputs so far and while the firmware started; `idle`: functions that run in silence."""
 
     def __init__(self, image: Image, make: Callable[[], Target]) -> None:

@@ -21,7 +21,7 @@ from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import collect, write
 from mirotwin.fuzz.budget import Budget
 from mirotwin.fuzz.files import CampaignFolder
-from mirotwin.fuzz.input_coverage import Reached
+from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.minimise import minimise
 from mirotwin.fuzz.oracle import Expected, Oracle, OracleVerdict
 from mirotwin.fuzz.target import TargetFailure
@@ -65,7 +65,7 @@ class Triage:
 
     def __init__(
         self,
-        reached: Reached,
+        reached: InputCoverage,
         oracle: Oracle,
         folder: CampaignFolder,
         sources: Sources,

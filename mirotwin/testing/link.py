@@ -35,7 +35,7 @@ Velocities = Mapping[int, tuple[int, int]]
 """(left, right) by slot, in 1/256 count per LM629 sample."""
 
 
-class Sent(msgspec.Struct, frozen=True):
+class SentFrame(msgspec.Struct, frozen=True):
     """A transmission: first start bit, end of the last stop bit, its sequence number (None for bare characters)."""
 
     tick: int
@@ -74,7 +74,7 @@ class Link:
         bad_stop: Sequence[int] = (),
         at_tick: int | None = None,
         wait: bool = True,
-    ) -> Sent:
+    ) -> SentFrame:
         """Sends a frame, bare characters, or a team frame with `velocities` (robots that are not named: 0), and goes on
         to the end of the last character; without `wait`, virtual time stands still and the next frame queues.
 
@@ -91,7 +91,7 @@ class Link:
             if isinstance(message, TeamFrame):
                 self.velocities = dict(enumerate(message.velocities))
         tick = self.world.inject(data, self.network, at_tick, tuple(bad_stop))
-        sent = Sent(tick, tick + len(data) * HOST_CHARACTER_TICKS, number, data)
+        sent = SentFrame(tick, tick + len(data) * HOST_CHARACTER_TICKS, number, data)
         if wait:
             self.world.run_to(sent.end_tick)
         return sent
@@ -107,7 +107,7 @@ class Link:
         return TeamFrame(kind, (self.seq + 1) % SEQ_MODULUS if seq is None else seq, pairs)
 
     @shown_where_it_was_called
-    def poll(self, slot: int = 0, *, velocities: Velocities | None = None, wait: bool = True) -> Sent:
+    def poll(self, slot: int = 0, *, velocities: Velocities | None = None, wait: bool = True) -> SentFrame:
         """Asks the robot in `slot`: a team frame with the next number at its turn, and the velocities sent last."""
         if slot not in range(self.robots):
             raise ValueError(f"slot {slot!r} does not exist on a network of {self.robots} robots")
@@ -125,15 +125,15 @@ class Link:
             self.send(velocities=velocities)
             self.world.run_to(min(begun + CONTROL_PERIOD_TICKS, end_tick))
 
-    def ping(self, slot: int = 0) -> Sent:
+    def ping(self, slot: int = 0) -> SentFrame:
         """A service frame that changes nothing."""
         return self.send(ServiceFrame.ping((self.seq + 1) % SEQ_MODULUS, slot))
 
-    def set_acceleration(self, slot: int, value: int) -> Sent:
+    def set_acceleration(self, slot: int, value: int) -> SentFrame:
         """In 1/65536 count per sample^2."""
         return self.send(ServiceFrame.acceleration((self.seq + 1) % SEQ_MODULUS, slot, value))
 
-    def set_filter(self, slot: int, kp: int, ki: int, kd: int, il: int) -> Sent:
+    def set_filter(self, slot: int, kp: int, ki: int, kd: int, il: int) -> SentFrame:
         return self.send(ServiceFrame.filter((self.seq + 1) % SEQ_MODULUS, slot, kp, ki, kd, il))
 
     def radio(self, state: Literal["up", "down", "noise"]) -> None:

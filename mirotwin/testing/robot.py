@@ -29,7 +29,7 @@ _SCON, _REN = 0x98, 0x10
 Told = Literal["drive", "stop", "off"]
 
 
-class Wheel(msgspec.Struct, frozen=True):
+class WheelState(msgspec.Struct, frozen=True):
     """One wheel now. `told`: what its LM629 was told; `commanded`: the velocity, in 1/256 count per sample as a team
     frame has it, 0 unless it drives; `speed_m_s`: of the rim, in truth; `pwm`: duty in 1/128, negative backward;
     `position`: counts of the LM629 as of its last sample.
@@ -42,11 +42,11 @@ class Wheel(msgspec.Struct, frozen=True):
     position: int
 
 
-class Wheels(msgspec.Struct, frozen=True):
+class WheelStates(msgspec.Struct, frozen=True):
     """Both wheels at one tick."""
 
-    left: Wheel
-    right: Wheel
+    left: WheelState
+    right: WheelState
 
     @property
     def told(self) -> tuple[Told, Told]:
@@ -77,12 +77,12 @@ class RobotUnderTest:
         self._waits = Waits(world)
 
     @property
-    def wheels(self) -> Wheels:
+    def wheels(self) -> WheelStates:
         """What the wheels do now, and what they were told."""
         board, spec = self._robot.board, self._robot.spec
         v_m_s, w_rad_s = self._robot.drive.velocity_at(self.world.tick)
         half_m_s = 0.5 * spec.drive.chassis.track_m * w_rad_s
-        return Wheels(_wheel(board.left, v_m_s - half_m_s), _wheel(board.right, v_m_s + half_m_s))
+        return WheelStates(_wheel(board.left, v_m_s - half_m_s), _wheel(board.right, v_m_s + half_m_s))
 
     @property
     def pose(self) -> tuple[float, float, float]:
@@ -180,7 +180,7 @@ def is_up(robot: Robot) -> bool:
     return bool(robot.board.cpu.sfr(_SCON) & _REN)
 
 
-def _wheel(chip: Lm629, speed_m_s: float) -> Wheel:
+def _wheel(chip: Lm629, speed_m_s: float) -> WheelState:
     buffer = chip.trajectory_buffer
     control = buffer.taken_control
     told: Told = "drive"
@@ -192,4 +192,4 @@ def _wheel(chip: Lm629, speed_m_s: float) -> Wheel:
     if control & VELOCITY_MODE and not control & FORWARD:
         velocity = -velocity
     pwm = -chip.pwm_magnitude if chip.sign else chip.pwm_magnitude
-    return Wheel(told, velocity, speed_m_s, pwm, chip.real_position)
+    return WheelState(told, velocity, speed_m_s, pwm, chip.real_position)

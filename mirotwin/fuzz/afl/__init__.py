@@ -6,6 +6,5 @@ target process, `run` the campaign, `inputs` what it begins with.
 
 from mirotwin.fuzz.afl.run import AflRun
 from mirotwin.fuzz.afl.settings import missing
-from mirotwin.fuzz.afl.statistics import Progress
 
-__all__ = ["AflRun", "Progress", "missing"]
+__all__ = ["AflRun", "missing"]

@@ -21,7 +21,7 @@ LOG_BYTES = 1 << 20
 """A log is emptied when it is longer: afl-fuzz writes a line for each input that it takes up."""
 
 
-class Job:
+class AflJob:
     """A job by the name `name` in the folder `out`."""
 
     def __init__(self, out: Path, name: str) -> None:

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.afl.cores import cores_for, shared_cores
-from mirotwin.fuzz.afl.job import Job
+from mirotwin.fuzz.afl.job import AflJob
 from mirotwin.fuzz.afl.settings import LONGEST_BYTES, Call, environment, job_name, missing
-from mirotwin.fuzz.afl.statistics import Progress
 from mirotwin.fuzz.edges import EdgeUnion
+from mirotwin.fuzz.engine import EngineProgress
 
 if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
@@ -65,7 +65,7 @@ class AflRun:
         self._call = Call(tuple(target_args), seeds, out, dictionary, seconds, seed, lengths)
         self._environment = environment(os.environ, map_bytes)
         self._out = out
-        self.jobs = [Job(out, job_name(job, jobs)) for job in range(jobs)]
+        self.jobs = [AflJob(out, job_name(job, jobs)) for job in range(jobs)]
         self._handed_out: dict[str, dict[Path, None]] = {"queue": {}, "crashes": {}}
         self._union = None if watch is None else EdgeUnion(watch)
         self._counted: dict[Path, None] = {}
@@ -100,13 +100,13 @@ class AflRun:
         self._require_health()
         return any(job.running for job in self.jobs)
 
-    def progress(self) -> Progress:
+    def progress(self) -> EngineProgress:
         """How far it is."""
         self._require_health()
         said = [one for one in (job.statistics() for job in self.jobs) if one]
         stable = [share for share in (job.stability_percent() for job in self.jobs) if share is not None]
         fed = [job.fed() for job in self.jobs]
-        return Progress(
+        return EngineProgress(
             executions=self._executions(),
             executions_per_s=self._rate(),
             edges=self._edges([one.edges for one in said]),

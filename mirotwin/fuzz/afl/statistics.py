@@ -28,24 +28,6 @@ class Statistics(msgspec.Struct, frozen=True):
     run_time_s: float
 
 
-class Progress(msgspec.Struct, frozen=True):
-    """A campaign so far: `executions` since it began first, the rate of all its jobs together.
-
-    `edges`: of the job that has most, None as long as afl-fuzz has said nothing. `frames` and `characters`: what the
-    machines were fed. `stability_percent`: of the job with the least.
-    """
-
-    executions: int
-    executions_per_s: float
-    edges: int | None
-    crashes: int
-    corpus_count: int
-    stability_percent: float | None
-    run_time_s: float
-    frames: int = 0
-    characters: int = 0
-
-
 _LAST_KEY = "command_line"
 
 

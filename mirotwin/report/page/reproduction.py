@@ -25,7 +25,7 @@ from mirotwin.verify.checks.expect import Place
 from mirotwin.verify.checks.interface import Check, Expectation, Failure
 
 
-class Fault(msgspec.Struct, frozen=True):
+class RobotFault(msgspec.Struct, frozen=True):
     """What the firmware of a robot did that it must not do."""
 
     network: int
@@ -41,7 +41,7 @@ class Reproduction(msgspec.Struct, frozen=True):
     digest: str
     verdicts: tuple[Expectation, ...]
     failures: list[Failure]
-    faults: list[Fault]
+    faults: list[RobotFault]
     marks: list[LinkMark]
     image: Image
     robot: str
@@ -82,9 +82,9 @@ def reproduce(
     )
 
 
-def _faults(world: World) -> list[Fault]:
+def _faults(world: World) -> list[RobotFault]:
     return [
-        Fault(network.index, robot.slot, fault.tick, f"{fault}")
+        RobotFault(network.index, robot.slot, fault.tick, f"{fault}")
         for network in world.networks
         for robot in network.robots
         for fault in robot.board.faults

@@ -34,7 +34,7 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image
 from mirotwin.verify.bare.exchange import OPTION, NamedCheck, check_named, installed_check
 from mirotwin.verify.bare.machine import BareLine
-from mirotwin.verify.bare.run import BareRun
+from mirotwin.verify.bare.run import BarePlayback
 from mirotwin.verify.cases.verdict import CaseVerdict, verdict_of
 from mirotwin.verify.checks.interface import Failure
 
@@ -82,7 +82,7 @@ def rerun_bare(
     source: str = "",
 ) -> BareRerun:
     """Plays a script from power-on to `until_tick`, under the check `name`; a fault goes before what that says."""
-    run = BareRun(image, line, script, until_tick, source)
+    run = BarePlayback(image, line, script, until_tick, source)
     fault = run.processor.fault()
     what, tick = "", 12 * run.processor.cpu.cycles
     if fault is not None:

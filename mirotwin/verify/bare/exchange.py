@@ -50,7 +50,7 @@ class Character(NamedTuple):
     stop_good: bool = True
 
 
-class Memory:
+class MemoryView:
     """The memories of the processor, as they are at the end of the run. Good until the next run."""
 
     def __init__(self, cpu: Cpu, bus: RecordingBus, image: Image) -> None:
@@ -100,7 +100,7 @@ class Exchange(msgspec.Struct, frozen=True):
     begin_tick: int
     reset_tick: int | None
     end_tick: int
-    memory: Memory
+    memory: MemoryView
 
     @property
     def received_bytes(self) -> bytes:

@@ -11,7 +11,7 @@ from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.harness.recording_bus import RecordingBus
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import ASLEEP, Cpu
-from mirotwin.verify.bare.exchange import Character, Exchange, Memory
+from mirotwin.verify.bare.exchange import Character, Exchange, MemoryView
 
 BOOT_MS = 200
 _SLICE = 20_000  # cycles
@@ -55,7 +55,7 @@ class BareProcessor:
         self.cpu.load(image.code, image.used)
         self.cpu.txd.unread = True
         self.cpu.rxd.settled_tick = NEVER_TICK
-        self.memory = Memory(self.cpu, self.bus, image)
+        self.memory = MemoryView(self.cpu, self.bus, image)
         self.begin_tick = 0
 
     def start_up(self, crystal_hz: int, boot_ms: int) -> None:

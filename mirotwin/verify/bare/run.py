@@ -20,7 +20,7 @@ _BITS = 10
 _LOOK = 2_000  # cycles between two looks at whether firmware sleeps
 
 
-class BareRun:
+class BarePlayback:
     """`image` from power-on to `end_tick`, and on until it has sent what it had if it sleeps.
 
     `idle`: it slept within the last 30 ms (at 24 MHz) before the end, or `sleeps` says that it never does.

@@ -5,17 +5,11 @@ from __future__ import annotations
 import random
 import time
 from pathlib import Path
-from typing import NamedTuple
 
+from mirotwin.fuzz.engine import EngineProgress
 from mirotwin.fuzz.target import Target
 
 BATCH = 150
-
-
-class Progress(NamedTuple):
-    executions: int
-    executions_per_s: float
-    edges: int | None
 
 
 class RandomEngine:
@@ -41,10 +35,10 @@ class RandomEngine:
     def stop(self) -> None:
         self.stopped = True
 
-    def progress(self) -> Progress:
+    def progress(self) -> EngineProgress:
         run_s = time.monotonic() - self.began_s
         done = self.target.executions
-        return Progress(done, done / run_s, len(self.seen) - self.seen.count(0))
+        return EngineProgress(done, done / run_s, len(self.seen) - self.seen.count(0))
 
     def new_crashes(self) -> list[Path]:
         for _ in range(0 if self.stopped else BATCH):

@@ -1,6 +1,6 @@
 """What inputs reach, and the path that tells crashes apart."""
 
-from mirotwin.fuzz.input_coverage import Reached
+from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.inputs import input_of
 from mirotwin.fuzz.seeds import seeds, sent, talks
 from mirotwin.fuzz.target import target_for
@@ -9,7 +9,7 @@ from tests.mirotwin.verify.checks.rig import own_image
 
 def made():
     image = own_image()
-    return Reached(image, lambda: target_for(image))
+    return InputCoverage(image, lambda: target_for(image))
 
 
 def of_talk(number):

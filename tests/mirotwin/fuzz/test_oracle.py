@@ -6,7 +6,7 @@ from miro_protocol import stream
 from miro_robot.harness.fast_oracle import NAMES
 from miro_robot.image.debug_info import Sources
 from mirotwin.fuzz.files import CampaignFolder
-from mirotwin.fuzz.input_coverage import Reached
+from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.oracle import NEVER_SLEEPS, RobotOracle, expected_of
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import TargetFailure, target_for
@@ -20,7 +20,7 @@ def oracle(image):
 
 
 def triage_of(image, tmp_path, kind="session"):
-    reached = Reached(image, lambda: target_for(image, kind))
+    reached = InputCoverage(image, lambda: target_for(image, kind))
     folder = CampaignFolder(tmp_path / "out")
     folder.make()
     return Triage(reached, RobotOracle(target_for(image, kind)), folder, Sources([image.path.parent]))

@@ -9,7 +9,7 @@ from miro_protocol.miro_wire import Miro
 from miro_protocol.protocol import Protocol
 from mirotwin.fuzz.bare import CHECK_CODE, NEVER_SLEEPS_CODE, NO_FAULT_CODE, BareTarget, frame_input
 from mirotwin.verify.bare.exchange import NamedCheck
-from mirotwin.verify.bare.run import BareRun
+from mirotwin.verify.bare.run import BarePlayback
 from tests.mirotwin.verify.bare.firmwares import DEAF, FAULTY, POLLS, SERIAL, SLEEPS, image
 
 INPUTS = st.sampled_from(["bytes", "frames", "session"])
@@ -112,7 +112,7 @@ def test_any_input_gives_the_same_from_power_on_as_from_the_saved_moment(kind, f
     code = target.run(data)
     run = target.exchange()
     beyond = 240 if code == NO_FAULT_CODE else 0
-    again = BareRun(target.image, target.line, target.script(data), run.end_tick + beyond).processor
+    again = BarePlayback(target.image, target.line, target.script(data), run.end_tick + beyond).processor
     whole = again.exchange()
     assert whole.received == run.received
     assert whole.sent[: len(run.sent)] == run.sent

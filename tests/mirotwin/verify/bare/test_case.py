@@ -11,7 +11,7 @@ from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.oracle import BareProcessorOracle
 from mirotwin.verify.bare.case import case_text, replay_bare
 from mirotwin.verify.bare.exchange import NamedCheck
-from mirotwin.verify.bare.run import BareRun
+from mirotwin.verify.bare.run import BarePlayback
 from tests.mirotwin.verify.bare.firmwares import POLLS, SLEEPS, image
 
 MENDED = SLEEPS.replace("LJMP 4000h", "RETI").replace("stuck:\nSJMP stuck", "RETI")
@@ -147,7 +147,7 @@ def test_a_reset_starts_the_firmware_anew(tmp_path):
     line = BareTarget(image(SLEEPS), "bytes").line
     resets = [Reset(40_000, 0, 0, 1), Reset(40_048, 0, 0, 0)]
     said = [Transmission(5000, DOWN, b"a?"), *resets, Transmission(80_000, DOWN, b"b")]
-    run = BareRun(image(SLEEPS), line, said, 200_000)
+    run = BarePlayback(image(SLEEPS), line, said, 200_000)
     assert run.processor.exchange().sent_bytes == b"ab"
     assert run.idle
 
