@@ -7,7 +7,7 @@ import math
 import msgspec
 
 from miro_sim.pitch import ground
-from mirotwin.report.page.course import Course, Postures
+from mirotwin.report.page.tracks import Course, Postures
 
 MARGIN_CM = 3.0
 MOST_POINTS = 4000

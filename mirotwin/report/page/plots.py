@@ -15,7 +15,7 @@ from bokeh.models import BoxAnnotation, ColumnDataSource, FactorRange
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
 from mirotwin.report.page.axes import add_cursor, add_failures, at_least, panel, tagged, time_range
-from mirotwin.report.page.course import SIDES, Course, RobotCourse
+from mirotwin.report.page.tracks import SIDES, Course, RobotCourse
 from mirotwin.report.page.link import LinkMark, lanes_of
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)

@@ -15,7 +15,7 @@ from miro_robot.image.debug_info import Sources
 from miro_sim.periods import Period
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.difference import Difference, first_per_channel
-from mirotwin.report.page.course import Column, Course, Postures, RobotCourse, add_samples, course_of
+from mirotwin.report.page.tracks import Column, Course, Postures, RobotCourse, add_samples, course_of
 from mirotwin.report.page.document import render
 from mirotwin.report.page.firmware import SHOWN, coverage_rows, function_rows
 from mirotwin.report.page.frames import CameraFrame, Extras

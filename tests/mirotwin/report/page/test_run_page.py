@@ -15,7 +15,7 @@ import pytest
 
 from mirotwin.report.page import bokeh_page, document
 from mirotwin.report.page.axes import at_least
-from mirotwin.report.page.course import Course, RobotCourse
+from mirotwin.report.page.tracks import Course, RobotCourse
 from mirotwin.report.page.plots import LEAST_M_S, LEAST_RAD_S, figures_of
 from tests import children
 

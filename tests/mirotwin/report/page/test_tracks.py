@@ -9,7 +9,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.reader import read
 from mirotwin.recording.track import error_of
-from mirotwin.report.page.course import M_S_PER_COUNT, add_samples, course_of
+from mirotwin.report.page.tracks import M_S_PER_COUNT, add_samples, course_of
 from mirotwin.report.page.pitch import MOST_POINTS, pitch_of
 from tests.mirotwin import synthetic
 
