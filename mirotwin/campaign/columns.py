@@ -16,7 +16,6 @@ from typing import Any, get_args, get_type_hints
 
 from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.recording.track import Tracks
-from mirotwin.report.seen import MeasuredErrors
 from mirotwin.report.summary import FirmwareCounts, LinkCounts, Summary, Tracking, VisionCounts, tracking_of
 from mirotwin.report.theory import Assumption1, Assumption2, Assumption3, DisturbanceFigures, Theory
 
@@ -58,12 +57,12 @@ FIGURES: Mapping[str, type] = {
 `worst_rms_position_cm`: the largest `rms_position_cm` of all robots."""
 
 
-def figures_of(summary: Summary, tracks: Tracks, seen: MeasuredErrors) -> dict[str, Any]:
-    """The figures of one run; None for what it does not have. `seen`: the first robot's."""
+def figures_of(summary: Summary, tracks: Tracks) -> dict[str, Any]:
+    """The figures of one run; None for what it does not have."""
     found: dict[str, Any] = {
         "simulated_s": summary.simulated_s,
         **_over_robots(tracks),
-        **_seen(tracks, seen),
+        **_seen(tracks),
     }
     for prefix, place, struct in _PARTS:
         at: Any = summary
@@ -74,11 +73,13 @@ def figures_of(summary: Summary, tracks: Tracks, seen: MeasuredErrors) -> dict[s
     return found
 
 
-def _seen(tracks: Tracks, seen: MeasuredErrors) -> dict[str, float | None]:
-    everyone = [track.errors for track in tracks.robots.values() if len(track.errors)]
-    if not everyone:
+def _seen(tracks: Tracks) -> dict[str, float | None]:
+    """Of the first robot's measurements in the last second."""
+    first = next(iter(tracks.robots.values()), None)
+    if first is None:
         return dict.fromkeys(SEEN)
-    found = seen.tracking(everyone[0][-1].tick - TICKS_PER_SECOND)
+    after_tick = first.errors[-1].tick - TICKS_PER_SECOND
+    found = tracking_of([sample for sample in first.measured_errors if sample.tick > after_tick])
     return {name: getattr(found, f"rms_{name.removeprefix('seen_')}") for name in SEEN}
 
 

@@ -24,7 +24,6 @@ from mirotwin.campaign.worker import RunOutcome, Work
 from mirotwin.recording.recorder import Recorder
 from mirotwin.recording.source import source_of
 from mirotwin.recording.track import Tracks
-from mirotwin.report.seen import MeasuredErrors
 from mirotwin.report.summary import summarise
 from mirotwin.report.theory import gains_of
 from mirotwin.rerun import runner
@@ -82,10 +81,10 @@ def _run(job: Work) -> RunOutcome:
     world = World(scenario, job.seed, image)
     checks = Checks(world, found.expected)
     player = Player(world, found.steps, job.origin) if found.steps else None
-    tracks, seen = Tracks(), MeasuredErrors(scenario.camera.delay_frames)
+    tracks = Tracks(delay_frames=scenario.camera.delay_frames)
     began_s = now_s()
     with _recorder(job.recording, found.text, world) as recorder:
-        _move(world, player, tracks, seen, recorder)
+        _move(world, player, tracks, recorder)
     wall_s = now_s() - began_s
     checks.finish()
     summary = summarise(
@@ -106,7 +105,7 @@ def _run(job: Work) -> RunOutcome:
         verdict="fault" if summary.firmware.faults else "failed" if failure else "passed",
         failure=failure,
         digest=tracks.digest,
-        figures=figures_of(summary, tracks, seen),
+        figures=figures_of(summary, tracks),
         checks={verdict.name: verdict.verdict for verdict in verdicts},
         wall_s=wall_s,
     )
@@ -121,13 +120,9 @@ def _recorder(path: str, text: ScenarioText, world: World) -> Iterator[Recorder 
         yield recorder
 
 
-def _move(
-    world: World, player: Player | None, tracks: Tracks, seen: MeasuredErrors, recorder: Recorder | None
-) -> None:
+def _move(world: World, player: Player | None, tracks: Tracks, recorder: Recorder | None) -> None:
     def keep(period: Period) -> None:
         tracks.add(period)
-        if period.robots:
-            seen.add(period.robots[0], period.tick)
         if recorder is not None:
             recorder.write_theories(tracks.theories())
 

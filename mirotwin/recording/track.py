@@ -1,7 +1,7 @@
-"""The course of each robot in a run, as columns of numbers: what summary, table and figure are made from.
+"""What each robot did in a run, as columns of numbers: what summary, figures, pages and campaigns are made from.
 
-A run of hours has 100 000 periods an hour: a record of a period is some 3 KB, its row in these columns some 150
-bytes.
+A run of hours has 100 000 periods an hour: a record of a period is some 3 KB, its row in these columns some 200
+bytes. A column is an `array`, which grows; `numpy.asarray` reads it without a copy. What a row does not have is NaN.
 
 Errors are truth against the reference at the same tick, e = c - r in the paper's axes, heading wrapped to (-pi, pi].
 """
@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from typing import overload
+from typing import TypeAlias, overload
 
 import msgspec
 
-from miro_exact.clock import seconds
+from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_host.eye.track import Sighting
+from miro_host.posture import Posture
 from miro_sim.periods import Period, RobotPeriod
 from miro_sim.pitch import ground as pitch
 from mirotwin.recording.derived import TheoryMessage
@@ -24,9 +26,17 @@ from mirotwin.recording.theory_track import TheoryTrack
 TWO_PI = 6.283185307179586
 SETTLED_CM = 3.0
 SETTLED_RAD = 0.15
+NAN = math.nan
+LONGEST_FRAMES = 40
+"""More than any camera's delay: so long a reference is kept."""
 
 RobotId = tuple[int, int]
 """Network and slot of a robot."""
+Column: TypeAlias = "array[float]"
+
+
+def column() -> Column:
+    return array("d")
 
 
 class ErrorSample(msgspec.Struct, frozen=True):
@@ -79,53 +89,91 @@ class TrackingErrors(Sequence[ErrorSample]):
         return ErrorSample(self.ticks[index], *error, bool(self.off_pitch[index]))
 
 
-class Points:
-    """Points of the pitch in world axes."""
+class Postures:
+    """Postures as they were recorded, in m and rad."""
 
     def __init__(self) -> None:
-        self.x_cm = array("d")
-        self.y_cm = array("d")
+        self.x_m, self.y_m, self.theta_rad = column(), column(), column()
 
-    def append(self, x_m: float, y_m: float) -> None:
-        self.x_cm.append(100.0 * x_m)
-        self.y_cm.append(100.0 * y_m)
+    def append(self, at: Posture | None) -> None:
+        self.x_m.append(NAN if at is None else at.x_m)
+        self.y_m.append(NAN if at is None else at.y_m)
+        self.theta_rad.append(NAN if at is None else at.theta_rad)
+
+    def points_cm(self) -> tuple[list[float], list[float]]:
+        """x and y of those that are there."""
+        there = [(x, y) for x, y in zip(self.x_m, self.y_m, strict=True) if not math.isnan(x)]
+        return [100.0 * x for x, _ in there], [100.0 * y for _, y in there]
 
 
 class Series:
     """A value against time."""
 
     def __init__(self) -> None:
-        self.times_s = array("d")
-        self.values = array("d")
+        self.times_s, self.values = column(), column()
+
+    def append(self, tick: int, value: float) -> None:
+        self.times_s.append(seconds(tick))
+        self.values.append(value)
+
+
+class MeasuredErrors(TrackingErrors):
+    """Tracking errors as the PC could plot them: measurements against the reference at their exposure.
+
+    A measurement arrives some frames after its exposure. It is compared with the reference at the exposure, so a delay
+    by itself is no error: this is the best that a laboratory without another camera can plot. `delay_frames`: of a
+    camera whose measurements bear no tick.
+    """
+
+    def __init__(self, delay_frames: int) -> None:
+        super().__init__()
+        self.delay_frames = delay_frames
+        self._references: dict[int, Posture] = {}
+
+    def add(self, robot: RobotPeriod, tick: int) -> None:
+        """Takes over the measurement of the next control period."""
+        self._references[tick] = robot.reference
+        self._references.pop(tick - LONGEST_FRAMES * CONTROL_PERIOD_TICKS, None)
+        seen = robot.measurement
+        if seen is None:
+            return
+        exposed = seen.tick if isinstance(seen, Sighting) else tick - self.delay_frames * CONTROL_PERIOD_TICKS
+        reference = self._references.get(exposed)
+        if reference is not None:
+            self.append(error_of(msgspec.structs.replace(robot, truth=seen, reference=reference), exposed))
 
 
 class RobotTrack:
-    """One robot: errors, where it was, should have been and was seen, and what the theory says of it."""
+    """One robot: where it was, should have been and was measured; the errors in truth, and of the measurements.
 
-    def __init__(self) -> None:
+    `delay_frames` as in `MeasuredErrors`, which stay empty without it. `theory`: filled by `Tracks`.
+    """
+
+    def __init__(self, delay_frames: int | None = None) -> None:
+        self.truth, self.reference, self.measured = Postures(), Postures(), Postures()
         self.errors = TrackingErrors()
-        self.truth = Points()
-        self.reference = Points()
-        self.seen = Points()
+        self.measured_errors = MeasuredErrors(delay_frames or 0)
         self.theory = TheoryTrack()
+        self._measures = delay_frames is not None
 
     def add(self, robot: RobotPeriod, tick: int) -> None:
+        self.truth.append(robot.truth)
+        self.reference.append(robot.reference)
+        self.measured.append(robot.measurement)
         self.errors.append(error_of(robot, tick))
-        self.truth.append(robot.truth.x_m, robot.truth.y_m)
-        self.reference.append(robot.reference.x_m, robot.reference.y_m)
-        if robot.measurement is not None:
-            self.seen.append(robot.measurement.x_m, robot.measurement.y_m)
-        self.theory.add(robot, tick)
+        if self._measures:
+            self.measured_errors.add(robot, tick)
 
 
 class Tracks:
     """All robots of a run, in the order of the world.
 
     `count` control periods with `digest` at the end of the last one. `inner`: name of a law's inner value -> robot ->
-    its course, names in the order of the robots and of their laws.
+    its series, names in the order of the robots and of their laws. `delay_frames` as in `RobotTrack`.
     """
 
-    def __init__(self, periods: Iterable[Period] = ()) -> None:
+    def __init__(self, periods: Iterable[Period] = (), delay_frames: int | None = None) -> None:
+        self.delay_frames = delay_frames
         self.count = 0
         self.digest = ""
         self.robots: dict[RobotId, RobotTrack] = {}
@@ -139,8 +187,9 @@ class Tracks:
             place = (robot.network, robot.slot)
             track = self.robots.get(place)
             if track is None:
-                track = self.robots[place] = RobotTrack()
+                track = self.robots[place] = RobotTrack(self.delay_frames)
             track.add(robot, period.tick)
+            track.theory.add(robot, period.tick)
             if robot.control is not None:
                 self._add_inner(place, period.tick, robot.control.inner)
         self.count += 1
@@ -154,11 +203,10 @@ class Tracks:
 
     def _add_inner(self, place: RobotId, tick: int, inner: dict[str, float]) -> None:
         for name, value in inner.items():
-            line = self.inner.setdefault(name, {}).get(place)
-            if line is None:
-                line = self.inner[name][place] = Series()
-            line.times_s.append(seconds(tick))
-            line.values.append(value)
+            series = self.inner.setdefault(name, {}).get(place)
+            if series is None:
+                series = self.inner[name][place] = Series()
+            series.append(tick, value)
 
 
 def wrapped(angle_rad: float) -> float:

@@ -46,12 +46,13 @@ def path_panel(tracks: Tracks) -> Panel:
     panel = Panel("(a)  x-y, from the circle", "x [cm]", "y [cm]", equal=True)
     for index, (place, track) in enumerate(tracks.robots.items()):
         colour, first = 1 + index % COLOURS, index == 0
-        panel.dots(track.seen.x_cm, track.seen.y_cm, colour=colour, label="camera" if first else "")
+        panel.dots(*track.measured.points_cm(), colour=colour, label="camera" if first else "")
         label = "reference" if first else ""
-        panel.line(track.reference.x_cm, track.reference.y_cm, colour=0, style="dotted", label=label)
+        panel.line(*track.reference.points_cm(), colour=0, style="dotted", label=label)
         label = "robot" if len(tracks.robots) == 1 else f"robot {place[0]}/{place[1]}"
-        panel.line(track.truth.x_cm, track.truth.y_cm, colour=colour, label=label)
-        panel.start(track.truth.x_cm[0], track.truth.y_cm[0], colour=colour)
+        x_cm, y_cm = track.truth.points_cm()
+        panel.line(x_cm, y_cm, colour=colour, label=label)
+        panel.start(x_cm[0], y_cm[0], colour=colour)
     return panel
 
 
@@ -69,8 +70,8 @@ def _inner_panel(tracks: Tracks, name: str) -> Panel:
     panel = Panel(name.replace("_", "\u00a0"))
     panel.small = True
     robots = list(tracks.robots)
-    for place, line in tracks.inner[name].items():
-        panel.line(line.times_s, line.values, colour=1 + robots.index(place) % COLOURS, style="thin")
+    for place, series in tracks.inner[name].items():
+        panel.line(series.times_s, series.values, colour=1 + robots.index(place) % COLOURS, style="thin")
     return panel
 
 

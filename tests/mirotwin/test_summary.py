@@ -173,9 +173,9 @@ def test_the_columns_of_a_run_say_what_its_periods_say():
         records = [(period.robots[index], period.tick) for period in run]
         assert list(track.errors) == [error_of(*record) for record in records]
         assert track.errors[-2:] == [error_of(*record) for record in records[-2:]]
-        assert list(track.truth.x_cm) == [100.0 * robot.truth.x_m for robot, _ in records]
-        assert list(track.reference.y_cm) == [100.0 * robot.reference.y_m for robot, _ in records]
-        assert list(track.seen.x_cm) == [
+        assert track.truth.points_cm()[0] == [100.0 * robot.truth.x_m for robot, _ in records]
+        assert track.reference.points_cm()[1] == [100.0 * robot.reference.y_m for robot, _ in records]
+        assert track.measured.points_cm()[0] == [
             100.0 * robot.measurement.x_m for robot, _ in records if robot.measurement is not None
         ]
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 from miro_exact.clock import seconds
 from mirotwin.recording.reader import read
-from mirotwin.recording.track import RobotTrack, TrackingErrors
+from mirotwin.recording.track import RobotTrack
 from mirotwin.report.figure import ERRORS
-from mirotwin.report.seen import MeasuredErrors
 from mirotwin.report.svg import Drawing, Panel, PanelBox
 
 SIZE = (1000, 1010)
@@ -21,36 +19,27 @@ ROW_GAP = 74
 SIDES = ("in truth", "as the camera sees it")
 
 
-class Course(NamedTuple):
-    """One recorded run: its name in the legend, its track, and errors as the camera sees them."""
-
-    name: str
-    track: RobotTrack
-    seen: TrackingErrors
-
-
-def course(name: str, path: str | Path, delay_frames: int) -> Course:
+def track_of(path: str | Path, delay_frames: int) -> RobotTrack:
     """The first robot of a recording. `delay_frames`: of a camera whose measurements bear no tick."""
-    track, seen = RobotTrack(), MeasuredErrors(delay_frames)
+    track = RobotTrack(delay_frames)
     for period in read(path).periods:
         track.add(period.robots[0], period.tick)
-        seen.add(period.robots[0], period.tick)
-    return Course(name, track, seen.errors)
+    return track
 
 
-def draw(path: Path, title: str, courses: Sequence[Course]) -> None:
-    """Writes the SVG: left in truth, right as the camera sees it."""
+def draw(path: Path, title: str, tracks: Mapping[str, RobotTrack]) -> None:
+    """Writes the SVG of tracks by their names in the legend: left in truth, right as the camera sees it."""
     drawing = Drawing(*SIZE, (title,))
     for side in (0, 1):
-        drawing.add(_path_panel(courses, bool(side)), _box(side, TOP, PATH))
+        drawing.add(_path_panel(tracks, bool(side)), _box(side, TOP, PATH))
     top = TOP + PATH + ROW_GAP
     for title, label, column, band, unit in ERRORS:
         pair = [
             Panel(f"{title}   (shaded: within {band:g} {unit})", "t [s]", label, band=band) for _ in SIDES
         ]
         for side, panel in enumerate(pair):
-            for colour, one in enumerate(courses, start=1):
-                errors = one.seen if side else one.track.errors
+            for colour, track in enumerate(tracks.values(), start=1):
+                errors = track.measured_errors if side else track.errors
                 times_s = [seconds(tick) for tick in errors.ticks]
                 panel.line(times_s, getattr(errors, column), colour=colour, style="thin")
         spans = [panel.spans()[2:] for panel in pair]
@@ -62,15 +51,13 @@ def draw(path: Path, title: str, courses: Sequence[Course]) -> None:
     drawing.write(path)
 
 
-def _path_panel(courses: Sequence[Course], seen: bool) -> Panel:
+def _path_panel(tracks: Mapping[str, RobotTrack], seen: bool) -> Panel:
     panel = Panel(f"(a)  x-y, {SIDES[seen]}", "x [cm]", "y [cm]", equal=True)
-    reference = courses[0].track.reference
-    panel.line(
-        reference.x_cm, reference.y_cm, colour=0, style="thin dotted", label="" if seen else "reference"
-    )
-    for colour, one in enumerate(courses, start=1):
-        points = one.track.seen if seen else one.track.truth
-        panel.line(points.x_cm, points.y_cm, colour=colour, style="thin", label="" if seen else one.name)
+    x_cm, y_cm = next(iter(tracks.values())).reference.points_cm()
+    panel.line(x_cm, y_cm, colour=0, style="thin dotted", label="" if seen else "reference")
+    for colour, (name, track) in enumerate(tracks.items(), start=1):
+        x_cm, y_cm = (track.measured if seen else track.truth).points_cm()
+        panel.line(x_cm, y_cm, colour=colour, style="thin", label="" if seen else name)
     return panel
 
 

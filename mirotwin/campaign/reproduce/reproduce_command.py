@@ -17,7 +17,7 @@ from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import Plan
 from mirotwin.campaign.reproduce.crate import METADATA, metadata, write_rows
 from mirotwin.campaign.reproduce.page import page
-from mirotwin.campaign.reproduce.pictures import course, draw
+from mirotwin.campaign.reproduce.pictures import draw, track_of
 from mirotwin.campaign.reproduce.plan import (
     GROUPS,
     ILLUSTRATIVE,
@@ -200,16 +200,16 @@ def _draw(start: Start, folder: OutputFolder, seeds: Mapping[str, int]) -> None:
     }
     shown = (PAPER, LEARNING) if start.figure < 9 else (ILLUSTRATIVE, RETUNED, PAPER, LEARNING)
     groups = {controller: Group(start, controller) for controller in shown}
-    courses = [
-        course(f"{names[controller]} (seed {seeds[group.label]})", folder.part(group.recording), 1)
+    tracks = {
+        f"{names[controller]} (seed {seeds[group.label]})": track_of(folder.part(group.recording), 1)
         for controller, group in groups.items()
         if group.label in seeds
-    ]
-    if not courses:
+    }
+    if not tracks:
         return
     errors = f"{start.x_cm:.2f} cm, {start.y_cm:.2f} cm, {start.theta_rad:.2f} rad"
     title = f"Fig. {start.figure} again: {start.path}, initial errors ({errors})"
-    draw(folder.part(f"{start.name}.svg"), title, courses)
+    draw(folder.part(f"{start.name}.svg"), title, tracks)
 
 
 def _failures(found: Sequence[RunRow]) -> int:

@@ -7,7 +7,8 @@ import math
 import msgspec
 
 from miro_sim.pitch import ground
-from mirotwin.report.page.tracks import Course, Postures
+from mirotwin.recording.track import Postures
+from mirotwin.report.page.tracks import PageTracks
 
 MARGIN_CM = 3.0
 MOST_POINTS = 4000
@@ -43,13 +44,13 @@ class Pitch(msgspec.Struct, frozen=True):
     half: float = HALF_CM
 
 
-def pitch_of(course: Course) -> Pitch:
+def pitch_of(tracks: PageTracks) -> Pitch:
     paths, dots = [], []
     corners = [
         (100.0 * ground.LEFT_M, 100.0 * ground.BOTTOM_M),
         (100.0 * ground.RIGHT_M, 100.0 * ground.TOP_M),
     ]
-    for number, robot in enumerate(course.robots):
+    for number, robot in enumerate(tracks.robots):
         kinds = [("truth", robot.truth), *([("reference", robot.reference)] if robot.steered else [])]
         for kind, postures in kinds:
             places = _places(postures)

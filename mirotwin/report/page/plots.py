@@ -15,8 +15,8 @@ from bokeh.models import BoxAnnotation, ColumnDataSource, FactorRange
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
 from mirotwin.report.page.axes import add_cursor, add_failures, at_least, panel, tagged, time_range
-from mirotwin.report.page.tracks import SIDES, Course, RobotCourse
 from mirotwin.report.page.link import LinkMark, lanes_of
+from mirotwin.report.page.tracks import SIDES, PageTrack, PageTracks
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 MOST_FAILURES = 20
@@ -42,17 +42,17 @@ HOLLOW, WRONG = ("lost",), ("damaged", "lost")
 Figures = dict[str, Any]
 
 
-def figures_of(course: Course, marks: Sequence[LinkMark], failure_ticks: Sequence[int]) -> Figures:
+def figures_of(tracks: PageTracks, marks: Sequence[LinkMark], failure_ticks: Sequence[int]) -> Figures:
     """All figures by the id of their element."""
-    times = time_range(course.times_s, PERIOD_S)
+    times = time_range(tracks.times_s, PERIOD_S)
     made: Figures = {}
-    if any(robot.steered for robot in course.robots):
-        made["plot-position"] = _errors(course, times, "position error [cm]", SETTLED_CM, _position)
-        made["plot-heading"] = _errors(course, times, "heading error [rad]", SETTLED_RAD, _heading)
-    made["plot-v"] = _speeds(course, times, "v [m/s]", "v_m_s", LEAST_M_S)
-    made["plot-w"] = _speeds(course, times, "\u03c9 [rad/s]", "w_rad_s", LEAST_RAD_S)
+    if any(robot.steered for robot in tracks.robots):
+        made["plot-position"] = _errors(tracks, times, "position error [cm]", SETTLED_CM, _position)
+        made["plot-heading"] = _errors(tracks, times, "heading error [rad]", SETTLED_RAD, _heading)
+    made["plot-v"] = _speeds(tracks, times, "v [m/s]", "v_m_s", LEAST_M_S)
+    made["plot-w"] = _speeds(tracks, times, "\u03c9 [rad/s]", "w_rad_s", LEAST_RAD_S)
     for side in SIDES:
-        made[f"plot-{side}"] = _wheel(course, times, side)
+        made[f"plot-{side}"] = _wheel(tracks, times, side)
     if marks:
         made["plot-link"] = _link(marks, times)
     marked = list(dict.fromkeys(tick / TICKS_PER_SECOND for tick in failure_ticks))[:MOST_FAILURES]
@@ -73,13 +73,13 @@ def _heading(errors: Any) -> Any:
     return np.array(errors.theta_rad)
 
 
-def _errors(course: Course, times: Any, label: str, band: float, value_of: Callable[[Any], Any]) -> Any:
+def _errors(tracks: PageTracks, times: Any, label: str, band: float, value_of: Callable[[Any], Any]) -> Any:
     made = panel(label, times, x_label="t [s]")
     low = 0.0 if value_of is _position else -band
     shaded = BoxAnnotation(bottom=low, top=band, fill_alpha=1.0, line_color=None, level="underlay")
     made.add_layout(tagged(shaded, fill_color="band"))
-    for number, robot in enumerate(course.robots):
-        seen = {"t": _times(robot.seen.ticks), "value": value_of(robot.seen)}
+    for number, robot in enumerate(tracks.robots):
+        seen = {"t": _times(robot.measured_errors.ticks), "value": value_of(robot.measured_errors)}
         dots = made.scatter(
             "t", "value", source=ColumnDataSource(seen), size=3.5, line_color=None, fill_alpha=0.7
         )
@@ -93,29 +93,33 @@ def _errors(course: Course, times: Any, label: str, band: float, value_of: Calla
     return made
 
 
-def _speeds(course: Course, times: Any, label: str, name: str, least: float) -> Any:
+def _speeds(tracks: PageTracks, times: Any, label: str, name: str, least: float) -> Any:
     made = panel(label, times, x_label="t [s]")
-    for number, robot in enumerate(course.robots):
-        found = {"t": _of_course(course), "truth": _array(robot, name), "told": _array(robot, f"told_{name}")}
+    for number, robot in enumerate(tracks.robots):
+        found = {
+            "t": _period_times(tracks),
+            "truth": _array(robot, name),
+            "told": _array(robot, f"told_{name}"),
+        }
         source = ColumnDataSource(found)
         told = made.step("t", "told", source=source, mode="after", line_width=1.4)
         _of_robot(told, number, line_color="told")
         _of_robot(made.line("t", "truth", source=source, line_width=1.8), number, line_color="truth")
-        _widen(made, number, course, least, found["truth"], found["told"])
+        _widen(made, number, tracks, least, found["truth"], found["told"])
     return made
 
 
-def _wheel(course: Course, times: Any, side: str) -> Any:
+def _wheel(tracks: PageTracks, times: Any, side: str) -> Any:
     made = panel(f"{side} [m/s]", times, x_label="t [s]")
-    for number, robot in enumerate(course.robots):
+    for number, robot in enumerate(tracks.robots):
         wheel, fine = robot.wheels[side], robot.fine[side]
         found = {
-            "t": _of_course(course),
+            "t": _period_times(tracks),
             **{name: np.array(getattr(wheel, name)) for name in ("told", "actual")},
         }
         source = ColumnDataSource(found)
         of_profile = (
-            (fine.times_s, fine.profile) if len(fine.profile) else (_of_course(course), wheel.profile)
+            (fine.times_s, fine.values) if len(fine.values) else (_period_times(tracks), wheel.profile)
         )
         profile = ColumnDataSource({"t": np.array(of_profile[0]), "profile": np.array(of_profile[1])})
         told = made.step("t", "told", source=source, mode="after", line_width=1.0)
@@ -123,14 +127,14 @@ def _wheel(course: Course, times: Any, side: str) -> Any:
         _of_robot(made.line("t", "profile", source=profile, line_width=1.6), number, line_color="profile")
         actual = made.line("t", "actual", source=source, line_width=1.6)
         _of_robot(actual, number, line_color="truth")
-        _widen(made, number, course, LEAST_M_S, found["told"], found["actual"], of_profile[1])
+        _widen(made, number, tracks, LEAST_M_S, found["told"], found["actual"], of_profile[1])
     return made
 
 
-def _widen(made: Any, number: int, course: Course, least: float, *columns: Any) -> None:
+def _widen(made: Any, number: int, tracks: PageTracks, least: float, *columns: Any) -> None:
     """Makes the axis of one robot span `least` where its numbers vary by less: by two points that nobody sees."""
     if (ends := at_least(least, *columns)) is not None:
-        source = ColumnDataSource({"t": [course.times_s[0]] * 2, "value": list(ends)})
+        source = ColumnDataSource({"t": [tracks.times_s[0]] * 2, "value": list(ends)})
         points = made.scatter("t", "value", source=source, size=0, line_color=None, fill_alpha=0.0)
         _of_robot(points, number)
 
@@ -173,13 +177,13 @@ def _of_robot(renderer: Any, number: int, **colours: str) -> None:
     tagged(renderer.glyph, **colours)
 
 
-def _of_course(course: Course) -> Any:
-    return _times(course.ticks)
+def _period_times(tracks: PageTracks) -> Any:
+    return _times(tracks.ticks)
 
 
 def _times(ticks: Any) -> Any:
     return np.array(ticks, dtype=np.float64) / TICKS_PER_SECOND
 
 
-def _array(robot: RobotCourse, name: str) -> Any:
+def _array(robot: PageTrack, name: str) -> Any:
     return np.array(getattr(robot, name))

@@ -15,13 +15,14 @@ from miro_robot.image.debug_info import Sources
 from miro_sim.periods import Period
 from miro_sim.scenario.keys import Scenario
 from mirotwin.recording.difference import Difference, first_per_channel
-from mirotwin.report.page.tracks import Column, Course, Postures, RobotCourse, add_samples, course_of
+from mirotwin.recording.track import Column, Postures
 from mirotwin.report.page.document import render
 from mirotwin.report.page.firmware import SHOWN, coverage_rows, function_rows
 from mirotwin.report.page.frames import CameraFrame, Extras
 from mirotwin.report.page.link import LinkMark, lanes_of
 from mirotwin.report.page.pitch import pitch_of
 from mirotwin.report.page.reproduction import Reproduction
+from mirotwin.report.page.tracks import PageTrack, PageTracks, add_samples, tracks_of
 from mirotwin.report.summary import StepResults, rms_name, settling_text, tracking_of
 
 FIRST = 200
@@ -78,11 +79,11 @@ def run_page(material: Material) -> bytes:
     scenario, again = material.scenario, material.again
     steered = [network.host != SILENT for network in scenario.networks]
     delay_frames = getattr(scenario.camera, "delay_frames", 0)
-    course = course_of(material.periods, steered, delay_frames, material.shown)
-    add_samples(course, material.extras.samples)
-    marks = _within(again.marks, course)
+    tracks = tracks_of(material.periods, steered, delay_frames, material.shown)
+    add_samples(tracks, material.extras.samples)
+    marks = _within(again.marks, tracks)
     ticks = [*(one.tick for one in again.failures), *(one.tick for one in again.faults)]
-    figures = figures_of(course, marks, [tick for tick in ticks if _shows(course, tick)])
+    figures = figures_of(tracks, marks, [tick for tick in ticks if _shows(tracks, tick)])
     functions = function_rows(again.profile)
     values = {
         "about": material.about,
@@ -90,10 +91,10 @@ def run_page(material: Material) -> bytes:
         "scenario": scenario.name,
         "scenario_text": material.scenario_text,
         "verdict": _verdict(material),
-        "told": any(value == value for robot in course.robots for value in robot.told_v_m_s),
-        "facts": _facts(material, course),
-        "course": course,
-        "pitch": pitch_of(course),
+        "told": any(value == value for robot in tracks.robots for value in robot.told_v_m_s),
+        "facts": _facts(material, tracks),
+        "tracks": tracks,
+        "pitch": pitch_of(tracks),
         "again": again,
         "failures": again.failures[:FIRST],
         "more_failures": max(0, len(again.failures) - FIRST),
@@ -108,7 +109,7 @@ def run_page(material: Material) -> bytes:
         "channels": first_per_channel(material.replayed.differences)[:FIRST] if material.replayed else [],
         "frames": material.extras.frames,
     }
-    return render("run.html", figures, _data(course, marks, material.extras.frames, ticks), values)
+    return render("run.html", figures, _data(tracks, marks, material.extras.frames, ticks), values)
 
 
 def _verdict(material: Material) -> tuple[str, str]:
@@ -126,7 +127,7 @@ def _verdict(material: Material) -> tuple[str, str]:
     return ("broken off" if material.broken_off else "passed"), of
 
 
-def _facts(material: Material, course: Course) -> list[tuple[str, str, str]]:
+def _facts(material: Material, tracks: PageTracks) -> list[tuple[str, str, str]]:
     """Name, what is shown, and the whole of it where that is shortened."""
     about, digest = material.about, material.again.digest
     if material.periods and material.replayed is not None:
@@ -139,9 +140,9 @@ def _facts(material: Material, course: Course) -> list[tuple[str, str, str]]:
             f"{about.firmware} {about.firmware_sha256}",
         ),
         ("digest", digest[:12], digest),
-        ("simulated", f"{len(course.ticks) * CONTROL_PERIOD_TICKS / TICKS_PER_SECOND:.2f} s", ""),
+        ("simulated", f"{len(tracks.ticks) * CONTROL_PERIOD_TICKS / TICKS_PER_SECOND:.2f} s", ""),
     ]
-    for robot in course.robots[:1]:
+    for robot in tracks.robots[:1]:
         if robot.steered:
             found = tracking_of(robot.errors)
             rms = f"{found.rms_position_cm:.2f} cm, {found.rms_theta_deg:.2f}\u00b0"
@@ -150,12 +151,12 @@ def _facts(material: Material, course: Course) -> list[tuple[str, str, str]]:
     return facts
 
 
-def _within(marks: Sequence[LinkMark], course: Course) -> list[LinkMark]:
-    return [mark for mark in marks if _shows(course, mark.start_tick)]
+def _within(marks: Sequence[LinkMark], tracks: PageTracks) -> list[LinkMark]:
+    return [mark for mark in marks if _shows(tracks, mark.start_tick)]
 
 
-def _shows(course: Course, tick: int) -> bool:
-    return bool(course.ticks) and course.ticks[0] <= tick < course.ticks[-1] + CONTROL_PERIOD_TICKS
+def _shows(tracks: PageTracks, tick: int) -> bool:
+    return bool(tracks.ticks) and tracks.ticks[0] <= tick < tracks.ticks[-1] + CONTROL_PERIOD_TICKS
 
 
 def _count(marks: Sequence[LinkMark], kind: str) -> int:
@@ -171,18 +172,18 @@ def _counts(marks: Sequence[LinkMark], lane: str) -> list[tuple[str, int]]:
 
 
 def _data(
-    course: Course, marks: Sequence[LinkMark], frames: Sequence[CameraFrame], ticks: Sequence[int]
+    tracks: PageTracks, marks: Sequence[LinkMark], frames: Sequence[CameraFrame], ticks: Sequence[int]
 ) -> bytes:
     """What the page's JavaScript needs: postures as 64-bit floats in base64, so that none is rounded."""
     lanes = lanes_of(marks)
     kinds = list(dict.fromkeys(mark.kind for mark in marks))
     return msgspec.json.encode(
         {
-            "first": course.first,
-            "ticks": course.ticks,
+            "first": tracks.first,
+            "ticks": tracks.ticks,
             "period_ticks": CONTROL_PERIOD_TICKS,
             "ticks_per_s": TICKS_PER_SECOND,
-            "robots": [_robot(robot) for robot in course.robots],
+            "robots": [_robot(robot) for robot in tracks.robots],
             "failures": sorted(set(ticks)),
             "lanes": lanes,
             "kinds": kinds,
@@ -195,10 +196,10 @@ def _data(
     )
 
 
-def _robot(robot: RobotCourse) -> dict[str, Any]:
+def _robot(robot: PageTrack) -> dict[str, Any]:
     return {
         "name": robot.name,
-        "network": robot.place[0],
+        "network": robot.id[0],
         "steered": robot.steered,
         "truth": _packed(robot.truth),
         "reference": _packed(robot.reference),

@@ -15,8 +15,8 @@ import pytest
 
 from mirotwin.report.page import bokeh_page, document
 from mirotwin.report.page.axes import at_least
-from mirotwin.report.page.tracks import Course, RobotCourse
 from mirotwin.report.page.plots import LEAST_M_S, LEAST_RAD_S, figures_of
+from mirotwin.report.page.tracks import PageTrack, PageTracks
 from tests import children
 
 ADDRESS = re.compile(r"(?:https?|wss?|ftp|file):", re.IGNORECASE)
@@ -208,13 +208,13 @@ def test_a_case_of_another_firmware_says_so(fig6, other, tmp_path, mirotwin):
 def test_an_axis_never_shows_rounding_noise():
     noise = array("d", [0.2, 0.2 + 3e-17, 0.2 - 3e-17])
     ticks = [number * 800800 for number in range(3)]
-    robot = RobotCourse((0, 0), False, 0)
+    robot = PageTrack((0, 0), False, 0)
     nothing = array("d", [float("nan")] * 3)
     robot.v_m_s = robot.w_rad_s = noise
     robot.told_v_m_s = robot.told_w_rad_s = nothing
     for wheel in robot.wheels.values():
         wheel.told, wheel.profile, wheel.actual = nothing, noise, noise
-    made = figures_of(Course(0, ticks, [robot]), [], [])
+    made = figures_of(PageTracks(0, ticks, [robot]), [], [])
     for name, least in (("v", LEAST_M_S), ("w", LEAST_RAD_S), ("left", LEAST_M_S), ("right", LEAST_M_S)):
         drawn = [
             renderer.data_source.data[renderer.glyph.y]

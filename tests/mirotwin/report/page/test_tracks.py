@@ -9,8 +9,8 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.reader import read
 from mirotwin.recording.track import error_of
-from mirotwin.report.page.tracks import M_S_PER_COUNT, add_samples, course_of
 from mirotwin.report.page.pitch import MOST_POINTS, pitch_of
+from mirotwin.report.page.tracks import M_S_PER_COUNT, add_samples, tracks_of
 from tests.mirotwin import synthetic
 
 
@@ -21,7 +21,7 @@ def recorded(fig6):
 
 @pytest.fixture(scope="module")
 def robot(recorded):
-    return course_of(recorded, [True], 1).robots[0]
+    return tracks_of(recorded, [True], 1).robots[0]
 
 
 def columns(postures):
@@ -75,15 +75,15 @@ def test_a_position_that_overflows_its_register_is_no_jump():
     periods = [
         replace(one, robots=(robot,)) for one, robot in zip(synthetic.periods(2), (low, high), strict=True)
     ]
-    speeds = course_of(periods, [True], 0).robots[0].wheels["left"].actual
+    speeds = tracks_of(periods, [True], 0).robots[0].wheels["left"].actual
     assert speeds[1] == 20 / (CONTROL_PERIOD_TICKS / 8192) * M_S_PER_COUNT
 
 
 def test_a_window_has_the_periods_that_are_wanted():
-    course = course_of(list(synthetic.periods(10)), [True], 0, range(3, 7))
-    assert course.first == 3
-    assert course.ticks == [index * CONTROL_PERIOD_TICKS for index in range(3, 7)]
-    assert [course.index_at(tick) for tick in (0, course.ticks[1], course.ticks[2] - 1, 1 << 60)] == [
+    tracks = tracks_of(list(synthetic.periods(10)), [True], 0, range(3, 7))
+    assert tracks.first == 3
+    assert tracks.ticks == [index * CONTROL_PERIOD_TICKS for index in range(3, 7)]
+    assert [tracks.index_at(tick) for tick in (0, tracks.ticks[1], tracks.ticks[2] - 1, 1 << 60)] == [
         0,
         1,
         1,
@@ -92,29 +92,29 @@ def test_a_window_has_the_periods_that_are_wanted():
 
 
 def test_samples_of_a_full_recording_go_to_their_robots():
-    course = course_of(list(synthetic.periods(4, [(0, 0), (0, 2)])), [True], 0, range(1, 3))
-    inside, before = course.ticks[0] + 5, course.ticks[0] - 5
+    tracks = tracks_of(list(synthetic.periods(4, [(0, 0), (0, 2)])), [True], 0, range(1, 3))
+    inside, before = tracks.ticks[0] + 5, tracks.ticks[0] - 5
     samples = [((0, 2), SampleMessage(tick, 1, 2, 65536, 4, 5, 6, 131072, 8)) for tick in (before, inside)]
-    add_samples(course, samples)
-    assert not len(course.robots[0].fine["left"].profile)
-    fine = course.robots[1].fine["right"]
-    assert (list(fine.times_s), list(fine.profile)) == ([inside / TICKS_PER_SECOND], [2 * M_S_PER_COUNT])
+    add_samples(tracks, samples)
+    assert not len(tracks.robots[0].fine["left"].values)
+    fine = tracks.robots[1].fine["right"]
+    assert (list(fine.times_s), list(fine.values)) == ([inside / TICKS_PER_SECOND], [2 * M_S_PER_COUNT])
 
 
 def test_the_path_of_a_long_run_is_thinned_but_keeps_its_ends():
-    course = course_of(list(synthetic.periods(2 * MOST_POINTS + 4)), [True], 0)
-    path = next(path for path in pitch_of(course).paths if path.kind == "truth")
+    tracks = tracks_of(list(synthetic.periods(2 * MOST_POINTS + 4)), [True], 0)
+    path = next(path for path in pitch_of(tracks).paths if path.kind == "truth")
     points = path.points.split()
     assert len(points) <= MOST_POINTS + 1
-    truth = course.robots[0].truth
+    truth = tracks.robots[0].truth
     for point, index in ((points[0], 0), (points[-1], -1)):
         assert point == f"{100.0 * truth.x_m[index]:.2f},{100.0 * truth.y_m[index]:.2f}"
 
 
 def test_a_path_that_leaves_the_pitch_is_in_the_picture():
-    course = course_of(list(synthetic.periods(400)), [True], 0)  # 0.2 m/s for 13 s
-    left, top, width, height = map(float, pitch_of(course).view_box.split())
+    tracks = tracks_of(list(synthetic.periods(400)), [True], 0)  # 0.2 m/s for 13 s
+    left, top, width, height = map(float, pitch_of(tracks).view_box.split())
     assert left <= -13.0
-    assert left + width >= 100.0 * max(course.robots[0].truth.x_m) > 120.0
+    assert left + width >= 100.0 * max(tracks.robots[0].truth.x_m) > 120.0
     assert -top >= 83.0
     assert height >= 96.0
