@@ -265,7 +265,7 @@ def test_seeds_that_are_none_are_refused(seeds):
 def short_runs(monkeypatch):
     whole = Group.scenario
     monkeypatch.setattr(
-        Group, "scenario", lambda group: (whole(group)[0], (*whole(group)[1], "duration_s=1.1"))
+        Group, "scenario", lambda group: (whole(group)[0], (*whole(group)[1], "duration_s=2.5"))
     )
 
 
