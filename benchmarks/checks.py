@@ -18,7 +18,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from miro_sim.scenario import file as scenario_file
 from miro_sim.world.world import World
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 
 LARGEST_SHARE = 0.03
 ALL = (

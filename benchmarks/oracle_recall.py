@@ -27,8 +27,8 @@ from mirotwin.fuzz.inputs import SILENCE, input_of
 from mirotwin.fuzz.oracle import AFTER_TICKS, expected_of
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import RobotTarget, target_for
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.checks.registry import CHECKS
-from mirotwin.verify.checks.watching import Checks
 from mirotwin.verify.wanted import silent_scenario
 from tests.mutants.build import build
 from tests.mutants.draw import source_files

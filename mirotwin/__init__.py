@@ -42,14 +42,14 @@ if TYPE_CHECKING:
     from mirotwin.verify.cases.case import case_of_checks as case_of_checks
     from mirotwin.verify.cases.case import write_case as write_case
     from mirotwin.verify.cases.trace import Trace as Trace
-    from mirotwin.verify.checks.watching import Checks as Checks
-    from mirotwin.verify.checks.watching import ExpectationFailed as ExpectationFailed
+    from mirotwin.verify.checks.monitors import Checks as Checks
+    from mirotwin.verify.checks.monitors import ExpectationFailed as ExpectationFailed
 
 _PLACES = {
-    "Checks": "mirotwin.verify.checks.watching:Checks",
+    "Checks": "mirotwin.verify.checks.monitors:Checks",
     "Decoder": "miro_protocol.decoder:Decoder",
     "Event": "miro_sim.world.events:Event",
-    "ExpectationFailed": "mirotwin.verify.checks.watching:ExpectationFailed",
+    "ExpectationFailed": "mirotwin.verify.checks.monitors:ExpectationFailed",
     "Image": "miro_robot.image:Image",
     "Scenario": "miro_sim.scenario.keys:Scenario",
     "ServiceFrame": "miro_protocol.frames:ServiceFrame",

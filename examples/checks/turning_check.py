@@ -1,6 +1,6 @@
 """A check of one's own: the robot never turns faster than so.
 
-`mirotwin.verify.checks.interface` says what a judge may be told: besides control periods, as here, events of the logs
+`mirotwin.verify.checks.interface` says what a monitor may be told: besides control periods, as here, events of the logs
 and firmware faults.
 """
 
@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from msgspec import Meta
 
 from miro_sim.periods import RobotPeriod
-from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject
 
 
 class TurnsAtMost(Check, frozen=True, kw_only=True, tag="turns_at_most_rad_s"):
@@ -21,11 +21,11 @@ class TurnsAtMost(Check, frozen=True, kw_only=True, tag="turns_at_most_rad_s"):
     limit_rad_s: Annotated[float, Meta(gt=0.0, le=1000.0)]
     from_s: Annotated[float, Meta(ge=0.0)] = 0.0
 
-    def judge(self, subject: Subject) -> "TurningJudge":
-        return TurningJudge(self, subject)
+    def monitor(self, subject: Subject) -> "TurningMonitor":
+        return TurningMonitor(self, subject)
 
 
-class TurningJudge(Judge[TurnsAtMost]):
+class TurningMonitor(Monitor[TurnsAtMost]):
     """`fast`: it turned too fast a control period ago. It fails once each time, not once a period."""
 
     fast = False

@@ -30,7 +30,7 @@ from mirotwin.rerun import runner
 from mirotwin.shell.tracebacks import show_traceback
 from mirotwin.verify.checks.expect import Place, expectations_of
 from mirotwin.verify.checks.interface import Check, Expectation
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.steps.keys import Step
 from mirotwin.verify.steps.plan import check_symbols
 from mirotwin.verify.steps.player import Player

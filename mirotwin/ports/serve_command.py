@@ -37,7 +37,7 @@ from mirotwin.shell.times import Time, TimeType
 from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.expectations import expect_option, report_failures
 
 CASE = "case.stream"

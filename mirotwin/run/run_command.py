@@ -34,7 +34,7 @@ from mirotwin.shell.program import complain, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, TimeType
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.expectations import expect_option, report_failures, report_steps
 from mirotwin.verify.steps.plan import check_symbols
 from mirotwin.verify.steps.player import Player

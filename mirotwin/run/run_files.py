@@ -32,7 +32,7 @@ from mirotwin.rerun import runner
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 
 if TYPE_CHECKING:
     from mirotwin.camera.view import View

@@ -19,7 +19,7 @@ from mirotwin.report.foxglove.server import Server
 from mirotwin.rerun import runner
 from mirotwin.rerun.pacing import Pace
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 
 
 class LiveView:

@@ -13,7 +13,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_sim.world.world import World
 from mirotwin.testing.robot import is_up
 from mirotwin.verify.cases.trace import Trace
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.wanted import Wanted
 
 BOOT_PERIODS = 8

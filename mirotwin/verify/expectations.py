@@ -11,8 +11,8 @@ from miro_sim.scenario.settings import EXPECT as EXPECT_KEY
 from mirotwin.shell.command import Option
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain
 from mirotwin.verify.checks.interface import Expectation
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.checks.registry import ALWAYS_ON
-from mirotwin.verify.checks.watching import Checks
 
 if TYPE_CHECKING:
     from mirotwin.verify.steps.player import Player

@@ -7,17 +7,17 @@ from pathlib import Path
 from tests.host.distribution import install
 
 CHECKS = '''
-from mirotwin.verify.checks.interface import Check, Judge
+from mirotwin.verify.checks.interface import Check, Monitor
 
 
 class Raises(Check, frozen=True, kw_only=True, tag="raises"):
     KIND = "safety"
 
-    def judge(self, subject):
-        return RaisesJudge(self, subject)
+    def monitor(self, subject):
+        return RaisesMonitor(self, subject)
 
 
-class RaisesJudge(Judge):
+class RaisesMonitor(Monitor):
     def period(self, record, tick):
         self.helper()
 
@@ -28,47 +28,47 @@ class RaisesJudge(Judge):
 class GivesNone(Check, frozen=True, kw_only=True, tag="gives_none"):
     KIND = "safety"
 
-    def judge(self, subject):
-        RaisesJudge(self, subject)
+    def monitor(self, subject):
+        RaisesMonitor(self, subject)
 
 
 class Hears(Check, frozen=True, kw_only=True, tag="hears_wrong"):
     KIND = "safety"
 
-    def judge(self, subject):
-        return HearsJudge(self, subject)
+    def monitor(self, subject):
+        return HearsMonitor(self, subject)
 
 
-class HearsJudge(Judge):
-    HEARS = ("comand",)
+class HearsMonitor(Monitor):
+    EVENTS = ("comand",)
 
 
 class HearsText(Check, frozen=True, kw_only=True, tag="hears_text"):
     KIND = "safety"
 
-    def judge(self, subject):
-        return HearsTextJudge(self, subject)
+    def monitor(self, subject):
+        return HearsTextMonitor(self, subject)
 
 
-class HearsTextJudge(Judge):
-    HEARS = "command"
+class HearsTextMonitor(Monitor):
+    EVENTS = "command"
 
 
 class NoSuper(Check, frozen=True, kw_only=True, tag="no_super"):
     KIND = "safety"
 
-    def judge(self, subject):
-        return NoSuperJudge(self, subject)
+    def monitor(self, subject):
+        return NoSuperMonitor(self, subject)
 
 
-class NoSuperJudge(Judge):
+class NoSuperMonitor(Monitor):
     def __init__(self, check, subject):
         pass
 
 
 class NoKind(Check, frozen=True, kw_only=True, tag="no_kind"):
-    def judge(self, subject):
-        return RaisesJudge(self, subject)
+    def monitor(self, subject):
+        return RaisesMonitor(self, subject)
 
 
 class Objects(Check, frozen=True, kw_only=True, tag="objects"):
@@ -77,8 +77,8 @@ class Objects(Check, frozen=True, kw_only=True, tag="objects"):
     def problem(self, end_tick):
         return 1 // 0
 
-    def judge(self, subject):
-        return RaisesJudge(self, subject)
+    def monitor(self, subject):
+        return RaisesMonitor(self, subject)
 
 
 class Leaves(Check, frozen=True, kw_only=True, tag="leaves"):
@@ -87,18 +87,18 @@ class Leaves(Check, frozen=True, kw_only=True, tag="leaves"):
     def __post_init__(self):
         raise SystemExit(0)
 
-    def judge(self, subject):
-        return RaisesJudge(self, subject)
+    def monitor(self, subject):
+        return RaisesMonitor(self, subject)
 
 
 class FloatTick(Check, frozen=True, kw_only=True, tag="float_tick"):
     KIND = "safety"
 
-    def judge(self, subject):
-        return FloatTickJudge(self, subject)
+    def monitor(self, subject):
+        return FloatTickMonitor(self, subject)
 
 
-class FloatTickJudge(Judge):
+class FloatTickMonitor(Monitor):
     def period(self, record, tick):
         self.fail(tick / 2, "one thing", "another")
 
@@ -108,12 +108,12 @@ class Still(Check, frozen=True, kw_only=True, tag="stands_still"):
 
     KIND = "safety"
 
-    def judge(self, subject):
-        return StillJudge(self, subject)
+    def monitor(self, subject):
+        return StillMonitor(self, subject)
 
 
-class StillJudge(Judge):
-    HEARS = ("frame",)
+class StillMonitor(Monitor):
+    EVENTS = ("frame",)
 
     def event(self, event):
         self.judged += 1

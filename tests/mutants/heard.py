@@ -17,7 +17,7 @@ from miro_robot.lm629.options import DEFAULT_OPTIONS
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 
 FORMAT = downlink(3)
 LEAD = len(FORMAT.lead)

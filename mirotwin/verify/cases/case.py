@@ -33,7 +33,7 @@ from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world.world import World
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 
 SUFFIX = ".stream"
 
@@ -77,10 +77,10 @@ def _without_none(value: Any) -> Any:
 
 def expect_of_failure(checks: Checks, failure: Failure) -> dict[str, Any]:
     """The check that failed as a table `[expect]`."""
-    for judge in checks.judges:
-        place = (judge.subject.network, judge.subject.slot)
-        if judge.check.name == failure.check and place == (failure.network, failure.slot):
-            given = msgspec.to_builtins(judge.check)
+    for monitor in checks.monitors:
+        place = (monitor.subject.network, monitor.subject.slot)
+        if monitor.check.name == failure.check and place == (failure.network, failure.slot):
+            given = msgspec.to_builtins(monitor.check)
             given.pop("check")
             return {failure.check: _without_none(given) or True}
     raise ValueError(f"no check {failure.check!r} judges net{failure.network}/robot{failure.slot}")

@@ -16,7 +16,7 @@ from miro_sim.world.world import World
 from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.checks.watching import Checks, Expected
+from mirotwin.verify.checks.monitors import Checks, Expected
 from mirotwin.verify.wanted import silent_scenario
 
 

@@ -24,7 +24,7 @@ from miro_sim.radio.params import Radio
 from miro_sim.radio.probability import ONE
 from miro_sim.world.events import SIDES, Event
 from mirotwin.verify.checks.failsafe import ACTING_MS
-from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject, ms_ticks
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, ms_ticks
 from mirotwin.verify.checks.reception import words_of
 
 FRAMES = 5
@@ -46,8 +46,8 @@ class ActsAtAll(Check, frozen=True, kw_only=True, tag="acts_at_all"):
 
     KIND: ClassVar[Kind] = "liveness"
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return AliveJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return AliveMonitor(self, subject)
 
 
 def frames_needed(params: Radio, characters: int) -> int:
@@ -100,14 +100,14 @@ class _Wheel:
             self.undriven += 1
 
 
-class AliveJudge(Judge[ActsAtAll]):
+class AliveMonitor(Monitor[ActsAtAll]):
     """`waiting`: (end, air before, velocities) of frames that are not counted yet.
 
     `counted`: frames that asked for something; `shown`: frames to a robot that had just acted, which are not decoded:
     that would take a tenth of the loop.
     """
 
-    HEARS = ("sent",)
+    EVENTS = ("sent",)
 
     def __init__(self, check: ActsAtAll, subject: Subject) -> None:
         super().__init__(check, subject)

@@ -14,7 +14,7 @@ from miro_protocol.frames import ContentError, TelemetryFrame
 from miro_protocol.robot_rules import ANSWER_TICKS, TO_TI_TICKS, AnswerRule
 from miro_protocol.table import TICKS_PER_MS, FrameType
 from miro_sim.world.events import Event
-from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject, in_ms, ms_ticks
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms, ms_ticks
 
 
 class AnswersWithin(Check, frozen=True, kw_only=True, tag="answers_within_ms"):
@@ -25,8 +25,8 @@ class AnswersWithin(Check, frozen=True, kw_only=True, tag="answers_within_ms"):
 
     within_ms: Annotated[float, Meta(gt=0.0, le=60_000.0)] = ANSWER_TICKS / TICKS_PER_MS
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return WithinJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return WithinMonitor(self, subject)
 
 
 class AnswersOnlyInTurn(Check, frozen=True, kw_only=True, tag="answers_only_in_turn"):
@@ -34,14 +34,14 @@ class AnswersOnlyInTurn(Check, frozen=True, kw_only=True, tag="answers_only_in_t
 
     KIND: ClassVar[Kind] = "safety"
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return TurnJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return TurnMonitor(self, subject)
 
 
-class _AnswerJudge(Judge[Check]):
+class _AnswerMonitor(Monitor[Check]):
     """Knows questions and answers. `decoder`: of what the robot sends."""
 
-    HEARS = ("frame", "transmitted")
+    EVENTS = ("frame", "transmitted")
 
     def __init__(self, check: Check, subject: Subject, rule: AnswerRule) -> None:
         super().__init__(check, subject)
@@ -73,7 +73,7 @@ class _AnswerJudge(Judge[Check]):
         raise NotImplementedError
 
 
-class WithinJudge(_AnswerJudge):
+class WithinMonitor(_AnswerMonitor):
     """Fails where the question that waits is answered too late, or not at all."""
 
     def __init__(self, check: AnswersWithin, subject: Subject) -> None:
@@ -91,7 +91,7 @@ class WithinJudge(_AnswerJudge):
             self.fail(deadline, self.wanted, "none by then")
 
 
-class TurnJudge(_AnswerJudge):
+class TurnMonitor(_AnswerMonitor):
     """`babbling`: it has failed already for characters that follow each other."""
 
     def __init__(self, check: Check, subject: Subject) -> None:

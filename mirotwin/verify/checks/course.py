@@ -13,7 +13,7 @@ from msgspec import Meta
 from miro_exact.clock import TICKS_PER_SECOND, seconds, ticks
 from miro_sim.periods import RobotPeriod
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD, ErrorSample, error_of
-from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject
 
 LONGEST_S = 86_400.0
 LimitCm = Annotated[float, Meta(gt=0.0, le=1000.0)]
@@ -33,8 +33,8 @@ class TracksWithin(Check, frozen=True, kw_only=True, tag="tracks_within_cm"):
             return f"from_s: {self.from_s:g} s is not before the end of the run, {seconds(end_tick):g} s"
         return ""
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return TracksJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return TracksMonitor(self, subject)
 
 
 class SettlesWithin(Check, frozen=True, kw_only=True, tag="settles_within_s"):
@@ -54,8 +54,8 @@ class SettlesWithin(Check, frozen=True, kw_only=True, tag="settles_within_s"):
             return f"{self.within_s:g} s is not before the end of the run, {seconds(end_tick):g} s"
         return ""
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return SettlesJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return SettlesMonitor(self, subject)
 
 
 class InsidePitch(Check, frozen=True, kw_only=True, tag="inside_pitch"):
@@ -63,11 +63,11 @@ class InsidePitch(Check, frozen=True, kw_only=True, tag="inside_pitch"):
 
     KIND: ClassVar[Kind] = "safety"
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return PitchJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return PitchMonitor(self, subject)
 
 
-class _CourseJudge(Judge[Check]):
+class _CourseMonitor(Monitor[Check]):
     """Notes when the robot begins to be wrong. `first_tick`: from then on it is judged."""
 
     def __init__(self, check: Check, subject: Subject, first_tick: int) -> None:
@@ -92,7 +92,7 @@ class _CourseJudge(Judge[Check]):
         raise NotImplementedError
 
 
-class TracksJudge(_CourseJudge):
+class TracksMonitor(_CourseMonitor):
     def __init__(self, check: TracksWithin, subject: Subject) -> None:
         last_second = max(0, subject.end_tick - TICKS_PER_SECOND)
         super().__init__(check, subject, last_second if check.from_s is None else ticks(check.from_s))
@@ -105,7 +105,7 @@ class TracksJudge(_CourseJudge):
         return f"{error.position_cm:.3f} cm" if error.position_cm > self.limit_cm else ""
 
 
-class SettlesJudge(_CourseJudge):
+class SettlesMonitor(_CourseMonitor):
     def __init__(self, check: SettlesWithin, subject: Subject) -> None:
         super().__init__(check, subject, ticks(check.within_s))
         self.limits = check
@@ -121,7 +121,7 @@ class SettlesJudge(_CourseJudge):
         return f"{position_cm:.3f} cm and {heading_rad:.4f} rad"
 
 
-class PitchJudge(_CourseJudge):
+class PitchMonitor(_CourseMonitor):
     def __init__(self, check: InsidePitch, subject: Subject) -> None:
         super().__init__(check, subject, 0)
 

@@ -13,7 +13,7 @@ from msgspec import Meta
 from miro_protocol.robot_rules import ACTING_TICKS, SilenceRule
 from miro_protocol.table import TICKS_PER_MS
 from miro_sim.world.events import Event
-from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject, in_ms, ms_ticks
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms, ms_ticks
 from mirotwin.verify.checks.orders import Order, Orders
 
 ACTING_MS = ACTING_TICKS / TICKS_PER_MS
@@ -33,8 +33,8 @@ class SilenceCheck(Check, frozen=True, kw_only=True):
     after_ms: TimeMs = 110.0
     tolerance_ms: ToleranceMs = 0.5
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return SilenceJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return SilenceMonitor(self, subject)
 
     def fulfilled(self, order: Order) -> bool:
         """Whether a wheel under this order is as it has to be after that time."""
@@ -61,13 +61,13 @@ class MotorsOff(SilenceCheck, frozen=True, kw_only=True, tag="motors_off_ms"):
         return order.what == "off"
 
 
-class SilenceJudge(Judge[SilenceCheck]):
+class SilenceMonitor(Monitor[SilenceCheck]):
     """`in_time`: a wheel was told in time. A wheel that needed no order, because it stood, is no occasion to judge.
 
     `late`: (end of the last fresh frame, tick of the failure) of wheels that have not been told yet.
     """
 
-    HEARS = ("received", "frame", "command")
+    EVENTS = ("received", "frame", "command")
 
     def __init__(self, check: SilenceCheck, subject: Subject) -> None:
         super().__init__(check, subject)

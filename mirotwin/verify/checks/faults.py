@@ -10,7 +10,7 @@ from typing import ClassVar
 from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
 from miro_robot.lm629.signals import COMMAND_ERROR
 from miro_sim.periods import RobotPeriod
-from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject
 
 
 class FaultCheck(Check, frozen=True, kw_only=True):
@@ -20,8 +20,8 @@ class FaultCheck(Check, frozen=True, kw_only=True):
     KINDS: ClassVar[tuple[FaultKind, ...]] = ()
     WANTED: ClassVar[str] = ""
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return FaultJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return FaultMonitor(self, subject)
 
 
 class NoFault(FaultCheck, frozen=True, kw_only=True, tag="no_fault"):
@@ -39,8 +39,8 @@ class Lm629Protocol(FaultCheck, frozen=True, kw_only=True, tag="lm629_protocol")
     KINDS = (FaultKind.BUS_CONTENTION, FaultKind.LM629_BUSY, FaultKind.LM629_TIMING)
     WANTED = "the LM629s used as their data sheet says"
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return Lm629Judge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return Lm629Monitor(self, subject)
 
 
 class MainLoopAlive(FaultCheck, frozen=True, kw_only=True, tag="main_loop_alive"):
@@ -57,7 +57,7 @@ class StackClear(FaultCheck, frozen=True, kw_only=True, tag="stack_clear"):
     WANTED = "a stack clear of data"
 
 
-class FaultJudge(Judge[FaultCheck]):
+class FaultMonitor(Monitor[FaultCheck]):
     def __init__(self, check: FaultCheck, subject: Subject) -> None:
         super().__init__(check, subject)
         self.judged = 1
@@ -67,7 +67,7 @@ class FaultJudge(Judge[FaultCheck]):
             self.fail(fault.tick, self.check.WANTED, str(fault), fault=True)
 
 
-class Lm629Judge(FaultJudge):
+class Lm629Monitor(FaultMonitor):
     """`refused`: which chips' status bytes said "command error" the last time."""
 
     def __init__(self, check: FaultCheck, subject: Subject) -> None:

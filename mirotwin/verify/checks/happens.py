@@ -13,7 +13,7 @@ from msgspec import Meta
 from miro_exact.clock import NEVER_TICK
 from miro_sim.world.conditions import Condition, Recorded
 from miro_sim.world.events import PC, Event
-from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject, in_ms
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms
 
 Tick = Annotated[int, Meta(ge=-1, lt=NEVER_TICK)]
 
@@ -34,8 +34,8 @@ class ConditionCheck(Check, frozen=True, kw_only=True):
             return f"until_tick {self.until_tick} is after the end of the run, tick {end_tick}"
         return ""
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return ConditionJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return ConditionMonitor(self, subject)
 
 
 class Happens(ConditionCheck, frozen=True, kw_only=True, tag="happens"):
@@ -50,12 +50,12 @@ class NeverHappens(ConditionCheck, frozen=True, kw_only=True, tag="never_happens
     KIND: ClassVar[Kind] = "safety"
 
 
-class ConditionJudge(Judge[ConditionCheck]):
+class ConditionMonitor(Monitor[ConditionCheck]):
     """Judges at one robot: that of the condition, or for one of the PC the first of the network."""
 
     def __init__(self, check: ConditionCheck, subject: Subject) -> None:
         super().__init__(check, subject)
-        self.HEARS = (check.condition.what,)
+        self.EVENTS = (check.condition.what,)
         slot = check.condition.at_slot(subject.first_slot)
         place = (check.condition.network, subject.first_slot if slot == PC else slot)
         self.done = place != (subject.network, subject.slot)

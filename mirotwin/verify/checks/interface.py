@@ -1,9 +1,9 @@
 """What a check is given, what it answers, and what it must declare about itself.
 
 A check is two classes. Its parameters are a frozen struct whose tag is the check's name and its key in `[expect]`;
-their `judge` method makes a `Judge`, one for each robot. The judge is fed in the order of time:
+their `monitor` method makes a `Monitor`, one for each robot. The monitor is fed in the order of time:
 
-    logs of boards and PC ──► event(event)       of the kinds in HEARS
+    logs of boards and PC ──► event(event)       of the kinds in EVENTS
     resets, power ──────────► restarted(tick)
     firmware faults ────────► fault(fault)
     control periods ────────► period(record, tick)
@@ -32,14 +32,14 @@ from miro_sim.world.events import Event
 from miro_sim.world.robot import Robot
 
 Kind = Literal["safety", "liveness"]
-EVENTS = (
+EVENT_KINDS = (
     *("sent", "heard", "answer", "received", "transmitted", "frame", "damaged", "command", "fault"),
     *("reset", "power", "radio", "touch"),
 )
-"""What a judge can hear: the kinds that `HEARS` may name."""
+"""The kinds that `EVENTS` of a monitor may name."""
 TICKS_PER_MS = 24_000
 KEPT = 100
-"""Failures of a judge that are kept; the others are only counted."""
+"""Failures of a monitor that are kept; the others are only counted."""
 
 
 class Failure(msgspec.Struct, frozen=True):
@@ -84,7 +84,7 @@ class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Base of every check's parameters.
 
     Derive with `frozen=True, kw_only=True, tag="name_of_the_check"`, give each key its unit and its range
-    (`typing.Annotated` with `msgspec.Meta`), and define `KIND` and `judge`. `MAIN` is the parameter that a bare value
+    (`typing.Annotated` with `msgspec.Meta`), and define `KIND` and `monitor`. `MAIN` is the parameter that a bare value
     in `[expect]` stands for; a check without one is written `name = true`.
     """
 
@@ -99,20 +99,20 @@ class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """Why a run that ends at `end_tick` cannot be judged, or the empty string."""
         return ""
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        """A judge of one robot."""
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        """A monitor of one robot."""
         raise NotImplementedError
 
 
 C_co = TypeVar("C_co", bound=Check, covariant=True)
 
 
-class Judge(Generic[C_co]):
+class Monitor(Generic[C_co]):
     """Judges one robot by one check. `failures`: the first hundred; `failed`: how many there were."""
 
-    HEARS: tuple[str, ...] = ()
-    """Kinds of event that `event` gets, of `EVENTS`: of the robot and of its network's PC. `frame` is a valid frame at
-    the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
+    EVENTS: tuple[str, ...] = ()
+    """Kinds of event that `event` gets, of `EVENT_KINDS`: of the robot and of its network's PC. `frame` is a valid
+    frame at the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
 
     def __init__(self, check: C_co, subject: Subject) -> None:
         self.check = check
@@ -131,7 +131,7 @@ class Judge(Generic[C_co]):
             self.failures.append(Failure(self.check.name, *place, tick, wanted, found, fault))
 
     def event(self, event: Event) -> None:
-        """Something that happened, of the kinds in `HEARS`."""
+        """Something that happened, of the kinds in `EVENTS`."""
 
     def restarted(self, tick: int) -> None:
         """The robot's processor was reset, or its supply was switched: it remembers nothing of before."""

@@ -30,8 +30,8 @@ from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
 from mirotwin.verify.checks.expect import Place, expectations_of
 from mirotwin.verify.checks.hearing import receptions
-from mirotwin.verify.checks.interface import Check, Expectation, Failure, FirstFailure, Judge, Subject
-from mirotwin.verify.checks.judges import checked_judge
+from mirotwin.verify.checks.interface import Check, Expectation, Failure, FirstFailure, Monitor, Subject
+from mirotwin.verify.checks.plugin_problems import checked_monitor
 
 T = TypeVar("T")
 Expected = Mapping[Place, Sequence[Check]]
@@ -62,7 +62,7 @@ class Checks:
             expected = expectations_of(world.scenario, world.scenario.name)
         end_tick = world.periods * CONTROL_PERIOD_TICKS
         self.robots = [
-            _Watched(
+            _RobotMonitors(
                 world,
                 network,
                 robot,
@@ -94,13 +94,13 @@ class Checks:
                 watched.end(self.world.tick)
 
     @property
-    def judges(self) -> list[Judge[Any]]:
-        return [judge for watched in self.robots for judge in watched.judges]
+    def monitors(self) -> list[Monitor[Any]]:
+        return [monitor for watched in self.robots for monitor in watched.monitors]
 
     @property
     def failures(self) -> list[Failure]:
         """All that were kept, in the order of time."""
-        return sorted((one for judge in self.judges for one in judge.failures), key=_BY_TICK)
+        return sorted((one for monitor in self.monitors for one in monitor.failures), key=_BY_TICK)
 
     def check(self) -> None:
         """Raises ExpectationFailed if a check has failed."""
@@ -109,17 +109,17 @@ class Checks:
 
     def verdicts(self) -> tuple[Expectation, ...]:
         """One for each name, over all robots, in the order of names as they were expected."""
-        by_name: dict[str, list[Judge[Any]]] = {}
-        for judge in self.judges:
-            by_name.setdefault(judge.check.name, []).append(judge)
+        by_name: dict[str, list[Monitor[Any]]] = {}
+        for monitor in self.monitors:
+            by_name.setdefault(monitor.check.name, []).append(monitor)
         lost = any(watched.lost for watched in self.robots)
-        return tuple(_verdict(name, judges, lost) for name, judges in by_name.items())
+        return tuple(_verdict(name, monitors, lost) for name, monitors in by_name.items())
 
 
-class _Watched:
-    """One robot and its judges. `lost`: events that the log no longer held when they were asked for.
+class _RobotMonitors:
+    """One robot and its monitors. `lost`: events that the log no longer held when they were asked for.
 
-    A judge may be a user's own: whatever it raises becomes a PluginError with its name.
+    A monitor may be a user's own: whatever it raises becomes a PluginError with its name.
     """
 
     def __init__(
@@ -128,13 +128,13 @@ class _Watched:
         subject = Subject(robot, network.spec.robots, end_tick, network.robots[0].slot, network.downlink)
         self.network = network
         self.robot = robot
-        self.judges = [self._guarded(check, partial(checked_judge, check, subject)) for check in checks]
-        self.of_periods = [judge for judge in self.judges if type(judge).period is not Judge.period]
-        self.of_times = [judge for judge in self.judges if type(judge).until is not Judge.until]
-        self.of_events: dict[str, list[Judge[Any]]] = {}
-        for judge in self.judges:
-            for what in judge.HEARS:
-                self.of_events.setdefault(what, []).append(judge)
+        self.monitors = [self._guarded(check, partial(checked_monitor, check, subject)) for check in checks]
+        self.of_periods = [monitor for monitor in self.monitors if type(monitor).period is not Monitor.period]
+        self.of_times = [monitor for monitor in self.monitors if type(monitor).until is not Monitor.until]
+        self.of_events: dict[str, list[Monitor[Any]]] = {}
+        for monitor in self.monitors:
+            for what in monitor.EVENTS:
+                self.of_events.setdefault(what, []).append(monitor)
         self.receiver: RobotReceiver | None = None
         if any(what in self.of_events for what in _FROM_RECEIVED):
             self.receiver = RobotReceiver(network.spec.robots)
@@ -148,18 +148,18 @@ class _Watched:
         self.lost = 0
 
     def look(self, record: Any, begun_tick: int, tick: int) -> None:
-        """Tells the judges of the control period that began at `begun_tick` and of events before `tick`."""
+        """Tells the monitors of the control period that began at `begun_tick` and of events before `tick`."""
         self._tell_faults()
-        for judge in self.of_periods:
-            self._guarded(judge.check, partial(judge.period, record, begun_tick))
+        for monitor in self.of_periods:
+            self._guarded(monitor.check, partial(monitor.period, record, begun_tick))
         self._tell_events(tick)
 
     def _tell_faults(self) -> None:
         board = self.robot.board
         if len(board.faults) > self.faults:
             for fault in board.faults[self.faults :]:
-                for judge in self.judges:
-                    self._guarded(judge.check, partial(judge.fault, fault))
+                for monitor in self.monitors:
+                    self._guarded(monitor.check, partial(monitor.fault, fault))
             self.faults = len(board.faults)
 
     def _tell_events(self, tick: int) -> None:
@@ -201,25 +201,25 @@ class _Watched:
                 for heard in receptions(self.receiver, event):
                     self._tell_one(heard)
         del self.waiting[:told]
-        for judge in self.of_times:
-            self._guarded(judge.check, partial(judge.until, tick))
+        for monitor in self.of_times:
+            self._guarded(monitor.check, partial(monitor.until, tick))
 
     def _restart(self, tick: int) -> None:
         if self.receiver is not None:
             self.receiver = RobotReceiver(self.network.spec.robots)
-        for judge in self.judges:
-            self._guarded(judge.check, partial(judge.restarted, tick))
+        for monitor in self.monitors:
+            self._guarded(monitor.check, partial(monitor.restarted, tick))
 
     def _tell_one(self, event: Event) -> None:
-        for judge in self.of_events.get(event.what, ()):
-            self._guarded(judge.check, partial(judge.event, event))
+        for monitor in self.of_events.get(event.what, ()):
+            self._guarded(monitor.check, partial(monitor.event, event))
 
     def end(self, tick: int) -> None:
         """The run is over, perhaps within a control period."""
         self._tell_faults()
         self._tell_events(tick + 1)
-        for judge in self.judges:
-            self._guarded(judge.check, partial(judge.end, tick))
+        for monitor in self.monitors:
+            self._guarded(monitor.check, partial(monitor.end, tick))
 
     def _guarded(self, check: Check, call: Callable[[], T]) -> T:
         try:
@@ -233,18 +233,18 @@ class _Watched:
         return f"net{self.network.index}/robot{self.robot.slot}: check {check.name!r} cannot judge"
 
 
-def _verdict(name: str, judges: Sequence[Judge[Any]], lost: bool) -> Expectation:
-    failures = sorted((one for judge in judges for one in judge.failures), key=_BY_TICK)
+def _verdict(name: str, monitors: Sequence[Monitor[Any]], lost: bool) -> Expectation:
+    failures = sorted((one for monitor in monitors for one in monitor.failures), key=_BY_TICK)
     failed = 0
     judged = 0
-    for judge in judges:
-        failed += judge.failed
-        judged += judge.judged
-    open_ = judged == 0 or (lost and any(judge.HEARS for judge in judges))
+    for monitor in monitors:
+        failed += monitor.failed
+        judged += monitor.judged
+    open_ = judged == 0 or (lost and any(monitor.EVENTS for monitor in monitors))
     first = failures[0] if failures else None
     return Expectation(
         name=name,
-        kind=judges[0].check.KIND,
+        kind=monitors[0].check.KIND,
         verdict="failed" if failed else "not judged" if open_ else "passed",
         failures=failed,
         first=None

@@ -14,7 +14,7 @@ from miro_protocol.table import VELOCITY_SATURATION
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from mirotwin.verify.checks.failsafe import ACTING_MS
-from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject, in_ms, ms_ticks
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms, ms_ticks
 from mirotwin.verify.checks.orders import Orders
 
 WithinMs = Annotated[float, Meta(gt=0.0, le=60_000.0)]
@@ -28,12 +28,12 @@ class MovesOnlyWhenFresh(Check, frozen=True, kw_only=True, tag="moves_only_when_
 
     within_ms: WithinMs = ACTING_MS
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return MovesJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return MovesMonitor(self, subject)
 
 
-class MovesJudge(Judge[MovesOnlyWhenFresh]):
-    HEARS = ("frame", "command")
+class MovesMonitor(Monitor[MovesOnlyWhenFresh]):
+    EVENTS = ("frame", "command")
 
     def __init__(self, check: MovesOnlyWhenFresh, subject: Subject) -> None:
         super().__init__(check, subject)
@@ -71,14 +71,14 @@ class AcceptsOnlySent(Check, frozen=True, kw_only=True, tag="accepts_only_sent")
 
     within_ms: WithinMs = 1000.0
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return SentJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return SentMonitor(self, subject)
 
 
-class SentJudge(Judge[AcceptsOnlySent]):
+class SentMonitor(Monitor[AcceptsOnlySent]):
     """`ordered_tick`: of orders that are not judged yet, because one to the other wheel may come on the same tick."""
 
-    HEARS = ("sent", "command")
+    EVENTS = ("sent", "command")
 
     def __init__(self, check: AcceptsOnlySent, subject: Subject) -> None:
         super().__init__(check, subject)
@@ -133,8 +133,8 @@ class ActsCheck(Check, frozen=True, kw_only=True):
 
     within_ms: WithinMs = ACTING_MS
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return ActsJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return ActsMonitor(self, subject)
 
 
 class ActsWithin(ActsCheck, frozen=True, kw_only=True, tag="acts_within_ms"):
@@ -147,10 +147,10 @@ class BackInSync(ActsCheck, frozen=True, kw_only=True, tag="back_in_sync_within_
     AFTER_DAMAGE = True
 
 
-class ActsJudge(Judge[ActsCheck]):
+class ActsMonitor(Monitor[ActsCheck]):
     """`damaged`: characters that are no frame came since the last frame."""
 
-    HEARS = ("frame", "damaged", "command")
+    EVENTS = ("frame", "damaged", "command")
 
     def __init__(self, check: ActsCheck, subject: Subject) -> None:
         super().__init__(check, subject)
@@ -207,11 +207,11 @@ class FramesAccepted(Check, frozen=True, kw_only=True, tag="frames_accepted_min"
 
     frames: Annotated[int, Meta(ge=1, le=1 << 40)]
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return AcceptedJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return AcceptedMonitor(self, subject)
 
 
-class AcceptedJudge(Judge[FramesAccepted]):
+class AcceptedMonitor(Monitor[FramesAccepted]):
     """`counter`: the firmware's, which wraps at 2^16, `frames` does not."""
 
     def __init__(self, check: FramesAccepted, subject: Subject) -> None:

@@ -33,6 +33,6 @@ CHECKS: Registry[object] = Registry(
         "tracks_within_cm": "mirotwin.verify.checks.course:TracksWithin",
         "settles_within_s": "mirotwin.verify.checks.course:SettlesWithin",
         "inside_pitch": "mirotwin.verify.checks.course:InsidePitch",
-        "conforms_to": "mirotwin.verify.conform.judgement:ConformsTo",
+        "conforms_to": "mirotwin.verify.conform.rule_monitor:ConformsTo",
     },
 )

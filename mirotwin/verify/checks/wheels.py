@@ -9,7 +9,7 @@ from msgspec import Meta
 from miro_host.wheels import Wheels
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import SIDES, Event
-from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject
 from mirotwin.verify.checks.orders import Orders
 
 _NOMINAL = Wheels()
@@ -28,14 +28,14 @@ class WheelsWithin(Check, frozen=True, kw_only=True, tag="wheels_within_m_s"):
     limit_m_s: Annotated[float, Meta(gt=0.0, le=100.0)]
     overshoot_m_s: Annotated[float, Meta(ge=0.0, le=100.0)] = 0.1
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return WheelsJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return WheelsMonitor(self, subject)
 
 
-class WheelsJudge(Judge[WheelsWithin]):
+class WheelsMonitor(Monitor[WheelsWithin]):
     """`faster`: the sides that were too fast at the last look."""
 
-    HEARS = ("command",)
+    EVENTS = ("command",)
 
     def __init__(self, check: WheelsWithin, subject: Subject) -> None:
         super().__init__(check, subject)

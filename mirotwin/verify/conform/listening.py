@@ -6,8 +6,8 @@ from miro_robot.image import Image
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
 from miro_sim.world.world import World
-from mirotwin.verify.checks.interface import Check, Judge, Subject
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.interface import Check, Monitor, Subject
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.conform.seen import Seen
 from mirotwin.verify.conform.trial import Trial, run_trial
 
@@ -17,14 +17,14 @@ class Listening(Check, frozen=True, kw_only=True, tag="listening"):
 
     KIND = "safety"
 
-    def judge(self, subject: Subject) -> Judge[Check]:
+    def monitor(self, subject: Subject) -> Monitor[Check]:
         return Listener(self, subject)
 
 
-class Listener(Judge[Listening]):
+class Listener(Monitor[Listening]):
     """`events`: all of one robot and its host, in the order of time; `seen` has what rules ask about."""
 
-    HEARS = ("sent", "received", "frame", "command", "heard", "answer", "fault", "reset", "power")
+    EVENTS = ("sent", "received", "frame", "command", "heard", "answer", "fault", "reset", "power")
 
     def __init__(self, check: Listening, subject: Subject) -> None:
         super().__init__(check, subject)
@@ -53,4 +53,4 @@ def listen(trial: Trial, image: Image, seed: int) -> list[Listener]:
     checks = Checks(world, {place: [Listening()] for place in places})
     run_trial(world)
     checks.finish()
-    return [judge for judge in checks.judges if isinstance(judge, Listener)]
+    return [monitor for monitor in checks.monitors if isinstance(monitor, Listener)]

@@ -1,6 +1,6 @@
 """The check `conforms_to`: whether a robot keeps a rule, in the trial of that rule.
 
-The judge keeps what it is told and judges at the end, each expectation by itself, but those that are over later than
+The monitor keeps what it is told and judges at the end, each expectation by itself, but those that are over later than
 the run. In a run in which the hosts say anything else than in the rule's trial nothing is judged: the check is for
 trials alone.
 """
@@ -14,7 +14,7 @@ from miro_protocol.transmission import Transmission
 from miro_robot.faults import FirmwareFault
 from miro_sim.periods import RobotPeriod
 from miro_sim.world.events import Event
-from mirotwin.verify.checks.interface import Check, Judge, Kind, Subject
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject
 from mirotwin.verify.conform.rule import Rule
 from mirotwin.verify.conform.seen import Seen
 from mirotwin.verify.conform.trial import trial_of
@@ -40,14 +40,14 @@ class ConformsTo(Check, frozen=True, kw_only=True, tag="conforms_to"):
         except BadInput as error:
             raise ValueError(f"{error.what}; {error.remedy}") from None
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return RuleJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return RuleMonitor(self, subject)
 
 
-class RuleJudge(Judge[ConformsTo]):
+class RuleMonitor(Monitor[ConformsTo]):
     """`foreign`: the host of this network says something else than in the trial; `to_come`: what it has to say yet."""
 
-    HEARS = ("command", "heard", "answer", "sent")
+    EVENTS = ("command", "heard", "answer", "sent")
 
     def __init__(self, check: ConformsTo, subject: Subject) -> None:
         super().__init__(check, subject)

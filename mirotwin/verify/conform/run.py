@@ -19,10 +19,10 @@ from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.expect import Place
 from mirotwin.verify.checks.faults import NoFault
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.checks.watching import Checks
-from mirotwin.verify.conform.judgement import ConformsTo
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.conform.probe import why_lost
 from mirotwin.verify.conform.rule import Rule
+from mirotwin.verify.conform.rule_monitor import ConformsTo
 from mirotwin.verify.conform.table import presupposed
 from mirotwin.verify.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
 

@@ -58,7 +58,7 @@ class Seen:
         self.periods: list[tuple[int, RobotPeriod]] = []
         self.samples: list[tuple[int, int, int]] = []  # when looked at; next samples of left and right
 
-    # ---- told by the judge ---------------------------------------------------------------------------------
+    # ---- told by the monitor ------------------------------------------------------------------------------------
 
     def take(self, event: Event) -> None:
         """An event of the kinds command, heard and answer."""

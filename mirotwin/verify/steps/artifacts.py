@@ -13,7 +13,7 @@ from mirotwin.verify.cases.case import case_of_checks
 from mirotwin.verify.cases.rerun import case_of_expect
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.happens import expect_of
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.steps.keys import HoldStep, NeverStep, WaitStep
 from mirotwin.verify.steps.player import Player
 

@@ -24,7 +24,7 @@ from miro_sim.world.conditions import Answer, Condition, WheelSpeeds, When, answ
 from miro_sim.world.events import Event
 from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
 from miro_sim.world.world import World
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.steps.keys import (
     CheckStep,
     HoldStep,

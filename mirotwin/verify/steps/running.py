@@ -22,8 +22,8 @@ from mirotwin.verify.cases.artifacts import clear, leave, report_line
 from mirotwin.verify.cases.case import case_text
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.checks.registry import ALWAYS_ON
-from mirotwin.verify.checks.watching import Checks
 from mirotwin.verify.steps.artifacts import SCENARIO, case_of_run, case_of_step
 from mirotwin.verify.steps.plan import check_symbols
 from mirotwin.verify.steps.player import Player

@@ -83,14 +83,14 @@ def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
 
 
 BROKEN = """
-from mirotwin.verify.checks.interface import Check, Judge
+from mirotwin.verify.checks.interface import Check, Monitor
 
 class Broken(Check, frozen=True, kw_only=True, tag="broken"):
     KIND = "safety"
-    def judge(self, subject):
-        return BrokenJudge(self, subject)
+    def monitor(self, subject):
+        return BrokenMonitor(self, subject)
 
-class BrokenJudge(Judge):
+class BrokenMonitor(Monitor):
     def period(self, record, tick):
         raise RuntimeError("oh")
 """

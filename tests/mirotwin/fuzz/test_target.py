@@ -16,7 +16,7 @@ from miro_robot.image import load_hex
 from miro_sim.world.world import World
 from mirotwin.fuzz.oracle import expected_of
 from mirotwin.fuzz.target import target_for
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.wanted import silent_scenario
 from tests import children
 from tests.mirotwin.fuzz import target_digest

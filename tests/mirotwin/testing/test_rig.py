@@ -10,7 +10,7 @@ from miro_protocol.frames import ServiceFrame, TelemetryFrame, encode
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FaultKind
 from miro_sim.world.world import World
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from tests.mirotwin.testing.rigs import HERE, rig
 
 

@@ -11,22 +11,23 @@ from tests.mirotwin import plugins
 from tests.mirotwin.plugins import CHECKS, ESTIMATORS, LAWS, REFERENCES, line_of
 
 SHORT = ("--set", "duration_s=0.2")
-AT = f"site/plugged_checks.py:{line_of(CHECKS, 'oh')} in RaisesJudge.helper"
+AT = f"site/plugged_checks.py:{line_of(CHECKS, 'oh')} in RaisesMonitor.helper"
 RAISED = f"check 'raises' cannot judge: RuntimeError: oh ({AT})"
 CHECKS_TOLD = {
     "raises": f"{RAISED}; repair the check",
     "gives_none": (
-        f"check 'gives_none' cannot judge: `judge` returned None (site/plugged_checks.py:"
-        f"{line_of(CHECKS, 'gives_none') + 3} in GivesNone.judge); return an object of a class that derives from Judge"
+        f"check 'gives_none' cannot judge: `monitor` returned None (site/plugged_checks.py:"
+        f"{line_of(CHECKS, 'gives_none') + 3} in GivesNone.monitor); return an object of a class that derives "
+        "from Monitor"
     ),
     "hears_wrong": "which is no event (site/plugged_checks.py:",
-    "hears_text": "HEARS of HearsTextJudge is 'command' (site/plugged_checks.py:",
-    "no_super": "the constructor of NoSuperJudge does not call that of Judge (site/plugged_checks.py:",
+    "hears_text": "EVENTS of HearsTextMonitor is 'command' (site/plugged_checks.py:",
+    "no_super": "the constructor of NoSuperMonitor does not call that of Monitor (site/plugged_checks.py:",
     "no_kind": "plugged_checks.NoKind has no KIND",
     "objects": f"`problem` raised ZeroDivisionError: integer division or modulo by zero (site/plugged_checks.py:"
     f"{line_of(CHECKS, '1 // 0')} in Objects.problem)",
     "leaves": f"SystemExit: 0 (site/plugged_checks.py:{line_of(CHECKS, 'SystemExit')} in Leaves.__post_init__)",
-    "float_tick": f"(site/plugged_checks.py:{line_of(CHECKS, 'tick / 2')} in FloatTickJudge.period)",
+    "float_tick": f"(site/plugged_checks.py:{line_of(CHECKS, 'tick / 2')} in FloatTickMonitor.period)",
     "absent": "module 'plugged_checks' has no attribute 'Absent'; repair or uninstall plugged-checks 1.0",
     "syntax": "SyntaxError: invalid syntax (plugged_syntax.py, line 1) (site/plugged_syntax.py:1)",
 }
@@ -85,7 +86,7 @@ def test_a_part_that_is_wrong_is_told_with_its_file_by_run(mirotwin, setting):
 
 def test_a_wrong_event_in_hears_is_told_the_nearest_one_and_the_list(mirotwin):
     said = told(mirotwin("run", "fig6", *SHORT, "-q", "--no-figure", "--expect", "hears_wrong"))
-    assert "HEARS of HearsJudge names 'comand'" in said
+    assert "EVENTS of HearsMonitor names 'comand'" in said
     assert "; did you mean command? there are sent, heard, answer, received, " in said
 
 
@@ -114,8 +115,8 @@ def test_a_check_that_breaks_after_the_recording_is_told_by_replay_and_report(mi
         "run", "fig6", *SHORT, "-q", "--no-figure", "--out", "run", "--expect", "stands_still"
     )
     assert code == 1
-    judge = sys.modules["plugged_checks"].StillJudge
-    monkeypatch.setattr(judge, "event", lambda self, event: self.nothing)
+    monitor = sys.modules["plugged_checks"].StillMonitor
+    monkeypatch.setattr(monitor, "event", lambda self, event: self.nothing)
     for command in (("replay", "run/run.mcap", "-q"), ("report", "run/run.mcap", "--out", "page.html")):
         said = told(mirotwin(*command))
         assert "check 'stands_still' cannot judge: AttributeError: " in said

@@ -14,7 +14,7 @@ from miro_robot.image import Image, load_hex
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from tests.mutants.build import build
 from tests.mutants.draw import SOURCE, source_files
 from tests.mutants.planted import PLANTED

@@ -9,7 +9,7 @@ from miro_sim.radio.params import Radio
 from miro_sim.scenario.file import load, parse
 from miro_sim.world.world import World
 from mirotwin.verify.checks.alive import FRAMES, frames_needed
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from tests.mirotwin.verify.checks.rig import built, finish, needs_sdcc, own_image, send, silent_world, team
 from tests.mirotwin.verify.conform.images import BABBLES, HANGS, READS_BOTH, image_of
 

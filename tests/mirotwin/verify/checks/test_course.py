@@ -8,7 +8,7 @@ from miro_sim.scenario.file import load, parse
 from miro_sim.world.world import World
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD, Tracks
 from mirotwin.verify.checks.interface import Failure
-from mirotwin.verify.checks.watching import Checks
+from mirotwin.verify.checks.monitors import Checks
 from tests.mirotwin.verify.checks.rig import MS, own_image
 
 PERIODS = 60
@@ -109,11 +109,11 @@ network = [{ host = "silent", robot = [{ reference.kind = "line" }] }]
     world = World(parse(text, "pushed"), 0, own_image())
     checks = Checks(world)
     (watched,) = checks.robots
-    (judge,) = [one for one in watched.judges if one.check.name == "wheels_within_m_s"]
+    (monitor,) = [one for one in watched.monitors if one.check.name == "wheels_within_m_s"]
     record = world.step().robots[0]
     for tick, v_m_s, w_rad_s in ((0, 0.5, 0.0), (MS, 0.5, 2.0), (2 * MS, 0.5, 2.0), (3 * MS, -0.53, 0.0)):
-        judge.period(msgspec.structs.replace(record, v_m_s=v_m_s, w_rad_s=w_rad_s), tick)
-    assert [(one.tick, one.found) for one in judge.failures] == [
+        monitor.period(msgspec.structs.replace(record, v_m_s=v_m_s, w_rad_s=w_rad_s), tick)
+    assert [(one.tick, one.found) for one in monitor.failures] == [
         (MS, "0.5680 m/s of the right one"),
         (3 * MS, "-0.5300 m/s of the left one"),
     ]

@@ -160,7 +160,7 @@ def test_a_setting_is_named_as_it_was_given():
 
 
 OWN = '''
-from mirotwin.verify.checks.interface import Check, Judge
+from mirotwin.verify.checks.interface import Check, Monitor
 
 
 class Slow(Check, frozen=True, kw_only=True, tag="slow_below_m_s"):
@@ -171,11 +171,11 @@ class Slow(Check, frozen=True, kw_only=True, tag="slow_below_m_s"):
 
     limit_m_s: float
 
-    def judge(self, subject):
-        return SlowJudge(self, subject)
+    def monitor(self, subject):
+        return SlowMonitor(self, subject)
 
 
-class SlowJudge(Judge):
+class SlowMonitor(Monitor):
     pass
 
 
@@ -185,8 +185,8 @@ class Loud(Check, frozen=True, kw_only=True, tag="loud"):
     def __post_init__(self):
         raise RuntimeError("too loud")
 
-    def judge(self, subject):
-        return SlowJudge(self, subject)
+    def monitor(self, subject):
+        return SlowMonitor(self, subject)
 '''
 
 

@@ -11,8 +11,8 @@ from miro_sim.world import conditions
 from miro_sim.world.events import Event
 from miro_sim.world.world import World
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.checks.interface import Check, Judge, Subject
-from mirotwin.verify.checks.watching import Checks, ExpectationFailed
+from mirotwin.verify.checks.interface import Check, Monitor, Subject
+from mirotwin.verify.checks.monitors import Checks, ExpectationFailed
 from tests.mirotwin.verify.checks.rig import MS, finish, own_image, send, silent_world, team
 from tests.mirotwin.verify.checks.test_planted import ALL
 
@@ -122,12 +122,12 @@ def test_events_that_the_log_no_longer_holds_leave_nothing_judged():
 class Raising(Check, frozen=True, kw_only=True, tag="raising"):
     KIND = "safety"
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return RaisingJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return RaisingMonitor(self, subject)
 
 
-class RaisingJudge(Judge[Raising]):
-    HEARS = ("received",)
+class RaisingMonitor(Monitor[Raising]):
+    EVENTS = ("received",)
 
     def event(self, event: Event) -> None:
         raise KeyError("speed")
@@ -140,7 +140,7 @@ def test_what_a_check_raises_is_told_with_robot_and_name():
     send(world, [team(1, 10, 10)])
     with pytest.raises(
         PluginError,
-        match=r"^net0/robot1: check 'raising' cannot judge: KeyError: 'speed' \(.*:\d+ in RaisingJudge.event\)",
+        match=r"^net0/robot1: check 'raising' cannot judge: KeyError: 'speed' \(.*:\d+ in RaisingMonitor.event\)",
     ):
         world.run_to(10_000_000)
 
@@ -148,12 +148,12 @@ def test_what_a_check_raises_is_told_with_robot_and_name():
 class Listing(Check, frozen=True, kw_only=True, tag="listing"):
     KIND = "safety"
 
-    def judge(self, subject: Subject) -> Judge[Check]:
-        return ListingJudge(self, subject)
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return ListingMonitor(self, subject)
 
 
-class ListingJudge(Judge[Listing]):
-    HEARS = ("sent", "frame", "damaged", "command", "received", "transmitted", "answer")
+class ListingMonitor(Monitor[Listing]):
+    EVENTS = ("sent", "frame", "damaged", "command", "received", "transmitted", "answer")
 
     def __init__(self, check: Listing, subject: Subject) -> None:
         super().__init__(check, subject)
@@ -168,13 +168,13 @@ def test_a_judge_hears_every_event_once_in_the_order_of_ticks():
     checks = Checks(world, {(0, 1): [Listing()]})
     send(world, [team(seq, 100, -100, ask=True) for seq in range(1, 8)] + [team(7, 1, 1)])
     finish(world, checks)
-    (judge,) = checks.judges
-    ticks = [event.tick for event in judge.heard]
-    counts = {what: len([event for event in judge.heard if event.what == what]) for what in judge.HEARS}
+    (monitor,) = checks.monitors
+    ticks = [event.tick for event in monitor.heard]
+    counts = {what: len([event for event in monitor.heard if event.what == what]) for what in monitor.EVENTS}
     assert ticks == sorted(ticks)
     assert (counts["sent"], counts["frame"], counts["received"]) == (8, 8, 8 * 23)
     assert (counts["answer"], counts["transmitted"]) == (3, 3 * 19)
-    assert [event.value for event in judge.heard if event.what == "frame"] == [1] * 7 + [0]
+    assert [event.value for event in monitor.heard if event.what == "frame"] == [1] * 7 + [0]
 
 
 def test_a_robot_that_is_reset_owes_nothing_from_before():

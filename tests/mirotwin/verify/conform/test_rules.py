@@ -13,8 +13,8 @@ from miro_protocol.transmission import Transmission
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.world.world import World
-from mirotwin.verify.checks.watching import Checks
-from mirotwin.verify.conform.judgement import ConformsTo
+from mirotwin.verify.checks.monitors import Checks
+from mirotwin.verify.conform.rule_monitor import ConformsTo
 from mirotwin.verify.conform.run import try_rule
 from mirotwin.verify.conform.table import ALL, find
 from mirotwin.verify.conform.trial import trial_of
