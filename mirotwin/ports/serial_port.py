@@ -65,6 +65,11 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         """The world of the open port. Raises PortNotOpenError."""
         return self._there().world
 
+    @property
+    def virtual_tick(self) -> int | None:
+        """Where virtual time stands, for programs that keep time by it; None where it passes by the wall clock."""
+        return self._there().world.tick if self._polling else None
+
     # ---- opening -----------------------------------------------------------------------------------------
 
     def open(self) -> None:
