@@ -46,25 +46,25 @@ SLOWING_TICKS = CONTROL_PERIOD_TICKS * 8
 LIMITS_TICKS = (FAILSAFE_STOP_TICKS, FRESH_AGAIN_TICKS, FAILSAFE_OFF_TICKS)
 
 
-class Tolerance(msgspec.Struct, frozen=True):
+class AnswerTolerance(msgspec.Struct, frozen=True):
     """Positions may be `counts` apart and what time leaves open; answers may come `late_ticks` later than the first."""
 
     counts: int = WITHIN_COUNTS
     late_ticks: int = int(WITHIN_MS * TICKS_PER_MS)
 
 
-class Answer(msgspec.Struct, frozen=True):
+class TimedAnswer(msgspec.Struct, frozen=True):
     """What was said, and when the PC had heard all of it."""
 
     tick: int
     said: TelemetryFrame
 
 
-class Pair(msgspec.Struct, frozen=True):
+class AnswerPair(msgspec.Struct, frozen=True):
     """An answer of the robot and of its twin to the same question; None: there is none."""
 
-    port: Answer | None
-    twin: Answer | None
+    port: TimedAnswer | None
+    twin: TimedAnswer | None
 
     @property
     def tick(self) -> int:
@@ -73,25 +73,32 @@ class Pair(msgspec.Struct, frozen=True):
         return one.tick
 
 
-class Telemetry(msgspec.Struct, frozen=True):
-    """A robot beside its twin, answer by answer. `way_ticks`: the shortest delay; `unsure_ticks`: the longest beyond."""
+class MatchedAnswers(msgspec.Struct, frozen=True):
+    """Answers to the same question."""
+
+    port: TimedAnswer
+    twin: TimedAnswer
+
+
+class RobotBesideTwin(msgspec.Struct, frozen=True):
+    """A robot beside its twin, by answers. `way_ticks`: the shortest delay; `unsure_ticks`: the most beyond it."""
 
     slot: int
-    pairs: list[Pair]
+    pairs: list[AnswerPair]
     way_ticks: int = 0
     unsure_ticks: int = 0
 
 
-class Comparison(msgspec.Struct, frozen=True):
+class PortComparison(msgspec.Struct, frozen=True):
     """`silent`: slots of the twin's robots that do not answer at the port; `not_judged`: values that time left open."""
 
-    robots: list[Telemetry]
+    robots: list[RobotBesideTwin]
     differences: list[Difference]
     silent: tuple[int, ...] = ()
     not_judged: int = 0
 
 
-def answers(periods: Sequence[Period], network: int = 0) -> list[Answer]:
+def answers(periods: Sequence[Period], network: int = 0) -> list[TimedAnswer]:
     """The valid answers that the PC heard."""
     decoder, found = TelemetryDecoder(), []
     for one in _wire(periods, network):
@@ -104,13 +111,13 @@ def answers(periods: Sequence[Period], network: int = 0) -> list[Answer]:
                 except ContentError:
                     continue
                 if isinstance(said, TelemetryFrame):
-                    found.append(Answer(one.end_tick, said))
+                    found.append(TimedAnswer(one.end_tick, said))
     return found
 
 
 def compare(
-    port: Sequence[Period], twin: Sequence[Period], robots: int, tolerance: Tolerance, network: int = 0
-) -> Comparison:
+    port: Sequence[Period], twin: Sequence[Period], robots: int, tolerance: AnswerTolerance, network: int = 0
+) -> PortComparison:
     """The answers in a recording made at a port, and in that of the twin."""
     heard, computed = answers(port, network), answers(twin, network)
     there = {answer.said.slot for answer in heard}
@@ -126,28 +133,28 @@ def compare(
         telemetries.append(telemetry)
     silent = tuple(sorted({answer.said.slot for answer in computed} - there))
     found.sort(key=lambda one: one.tick)
-    return Comparison(telemetries, found, silent, open_values)
+    return PortComparison(telemetries, found, silent, open_values)
 
 
-def _side_by_side(slot: int, port: Sequence[Answer], twin: Sequence[Answer]) -> Telemetry:
+def _side_by_side(slot: int, port: Sequence[TimedAnswer], twin: Sequence[TimedAnswer]) -> RobotBesideTwin:
     """Pairs in the order of time; each answer stands in one."""
-    pairs: list[Pair] = []
+    pairs: list[AnswerPair] = []
     place = 0
     for answer in twin:
         match = _match(port, place, answer)
         if match is None:
-            pairs.append(Pair(None, answer))
+            pairs.append(AnswerPair(None, answer))
             continue
-        pairs += [Pair(extra, None) for extra in port[place:match]]
-        pairs.append(Pair(port[match], answer))
+        pairs += [AnswerPair(extra, None) for extra in port[place:match]]
+        pairs.append(AnswerPair(port[match], answer))
         place = match + 1
-    pairs += [Pair(extra, None) for extra in port[place:]]
+    pairs += [AnswerPair(extra, None) for extra in port[place:]]
     delays = [one.port.tick - one.twin.tick for one in pairs if one.port and one.twin]
     way = min(delays, default=0)
-    return Telemetry(slot, pairs, way, max(delays, default=0) - way)
+    return RobotBesideTwin(slot, pairs, way, max(delays, default=0) - way)
 
 
-def _match(port: Sequence[Answer], place: int, twin: Answer) -> int | None:
+def _match(port: Sequence[TimedAnswer], place: int, twin: TimedAnswer) -> int | None:
     """Where, from `place` on, the robot answers the question that the twin answers."""
     for at in range(place, len(port)):
         if port[at].tick - twin.tick >= TOGETHER_TICKS:
@@ -203,7 +210,9 @@ class _Sent:
 class _Judge:
     """Differences of one robot and its twin."""
 
-    def __init__(self, telemetry: Telemetry, sent: _Sent, tolerance: Tolerance, network: int) -> None:
+    def __init__(
+        self, telemetry: RobotBesideTwin, sent: _Sent, tolerance: AnswerTolerance, network: int
+    ) -> None:
         self.telemetry = telemetry
         self.sent = sent
         self.tolerance = tolerance
@@ -211,51 +220,51 @@ class _Judge:
         self.not_judged = 0
 
     def differences(self) -> Iterator[Difference]:
-        before: Pair | None = None
+        before: MatchedAnswers | None = None
         for pair in self.telemetry.pairs:
             if pair.port is None or pair.twin is None:
-                if before is not None:  # a robot may not take the first frame of a talk: its number may be known
-                    yield self._difference(pair, "answer", _seq(pair.port), _seq(pair.twin))
+                if (
+                    before is not None
+                ):  # a robot may not take the first frame of a talk: its number may be known
+                    yield self._difference(pair.tick, "answer", _seq(pair.port), _seq(pair.twin))
                 continue
-            late = self._unsure(pair)
+            both = MatchedAnswers(pair.port, pair.twin)
+            late = self._unsure(both)
             if late > self.tolerance.late_ticks:
                 text = f"{late / TICKS_PER_MS:.1f} ms late"
-                yield self._difference(pair, "answer", text, "in time")
+                yield self._difference(pair.tick, "answer", text, "in time")
             if before is not None:
-                yield from self._fields(before, pair)
-            before = pair
+                yield from self._fields(before, both)
+            before = both
 
-    def _fields(self, before: Pair, pair: Pair) -> Iterator[Difference]:
-        assert before.port and before.twin and pair.port and pair.twin
-        unsure = self._unsure(before) + self._unsure(pair)
-        timely = not self.sent.near_a_limit(before.twin.tick, pair.twin.tick, unsure)
+    def _fields(self, before: MatchedAnswers, both: MatchedAnswers) -> Iterator[Difference]:
+        unsure = self._unsure(before) + self._unsure(both)
+        timely = not self.sent.near_a_limit(before.twin.tick, both.twin.tick, unsure)
         for name, take, exact in _FIELDS:
-            mine, twins = take(before.port.said, pair.port.said), take(before.twin.said, pair.twin.said)
+            mine, twins = take(before.port.said, both.port.said), take(before.twin.said, both.twin.said)
             if mine == twins:
                 continue
             if not timely:
                 self.not_judged += 1
-            elif exact or abs(mine - twins) > self._counts(before, pair, unsure):
-                yield self._difference(pair, name, mine, twins)
+            elif exact or abs(mine - twins) > self._counts(before, both, unsure):
+                yield self._difference(both.twin.tick, name, mine, twins)
 
-    def _counts(self, before: Pair, pair: Pair, unsure_ticks: int) -> float:
+    def _counts(self, before: MatchedAnswers, both: MatchedAnswers, unsure_ticks: int) -> float:
         """How far positions may be apart: the tolerance, and how far the fastest wheel goes in the time left open."""
-        assert before.twin and pair.twin
-        word = self.sent.fastest(self.telemetry.slot, before.twin.tick, pair.twin.tick)
+        word = self.sent.fastest(self.telemetry.slot, before.twin.tick, both.twin.tick)
         return self.tolerance.counts + word * unsure_ticks / SAMPLE_TICKS / 256
 
-    def _unsure(self, pair: Pair) -> int:
-        assert pair.port and pair.twin
-        return pair.port.tick - pair.twin.tick - self.telemetry.way_ticks
+    def _unsure(self, both: MatchedAnswers) -> int:
+        return both.port.tick - both.twin.tick - self.telemetry.way_ticks
 
-    def _difference(self, pair: Pair, name: str, mine: int | str | None, twins: int | str | None) -> Difference:
-        tick = pair.tick
-        return Difference(
-            tick, tick // CONTROL_PERIOD_TICKS, self.network, self.telemetry.slot, name, mine, twins
-        )
+    def _difference(
+        self, tick: int, name: str, mine: int | str | None, twins: int | str | None
+    ) -> Difference:
+        index, slot = tick // CONTROL_PERIOD_TICKS, self.telemetry.slot
+        return Difference(tick, index, self.network, slot, name, mine, twins)
 
 
-def _seq(answer: Answer | None) -> str | None:
+def _seq(answer: TimedAnswer | None) -> str | None:
     return None if answer is None else f"to question {answer.said.seq}"
 
 

@@ -21,7 +21,7 @@ STOP_FRAMES = 3
 UNITS_PER_M_S = Wheels().units_per_m_s
 
 
-class Limits(msgspec.Struct, frozen=True):
+class MotionLimits(msgspec.Struct, frozen=True):
     """What the user allows. Without `motion` all velocities have to be 0, and no gains may be set."""
 
     motion: bool = False
@@ -31,7 +31,7 @@ class Limits(msgspec.Struct, frozen=True):
 class Guard:
     """Checks what is sent to the robots of one port. `layout`: robots of the network that was spoken to last."""
 
-    def __init__(self, limits: Limits, path: str = "") -> None:
+    def __init__(self, limits: MotionLimits, path: str = "") -> None:
         self.limits = limits
         self.path = path
         self.layout = 0

@@ -1,12 +1,12 @@
-"""Robots behind a serial port of this PC: characters go out at a tick, and come in with the tick at which they were there.
+"""Robots behind a serial port of this PC: characters go out at a tick, and come in with the tick of their arrival.
 
-    with RobotPort("/dev/ttyUSB0", Limits()) as port:
+    with RobotPort("/dev/ttyUSB0", MotionLimits()) as port:
         port.run_to(port.tick + 24_000)        waits, and reads what comes
         port.send(data)                        now; tick of the first start bit
         port.answers                           valid answers so far
                                                at the end, whatever happened: stop frames
 
-Ticks count from the opening: 24 in a microsecond of the wall clock. `miro://` without `realtime` has a clock of its own.
+Ticks count from the opening, 24 in a microsecond of the wall clock. `miro://` without `realtime` has its own clock.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from miro_exact.clock import HOST_CHARACTER_TICKS, TICKS_PER_SECOND
 from miro_protocol.decoder import TelemetryDecoder
 from miro_protocol.events import Event, Received
 from miro_protocol.transmission import DOWN, UP, Transmission, character_ticks
-from mirotwin.desk.guard import Guard, Limits
+from mirotwin.desk.guard import Guard, MotionLimits
 
 BAUD = 9600
 BLOCKED_S = 1.0
@@ -50,7 +50,7 @@ class PortError(BadInput):
     """A port that cannot be opened, or is there no more."""
 
 
-class Heard(NamedTuple):
+class TimedFrame(NamedTuple):
     """A valid answer, whole at `tick`."""
 
     tick: int
@@ -64,12 +64,12 @@ class RobotPort:
     each transmission of a schedule was.
     """
 
-    def __init__(self, url: str, limits: Limits, name: str = "") -> None:
+    def __init__(self, url: str, limits: MotionLimits, name: str = "") -> None:
         self.url = url
         self.guard = Guard(limits, name)
         self.sent: list[Transmission] = []
         self.received: list[Transmission] = []
-        self.answers: list[Heard] = []
+        self.answers: list[TimedFrame] = []
         self.late_ticks: list[int] = []
         self.free_tick = 0
         self.stopped = False
@@ -179,7 +179,7 @@ class RobotPort:
             tick = max(last, now - len(event.data) * character_ticks(UP))
             self.received.append(Transmission(tick, UP, event.data))
             if isinstance(event, Received):
-                self.answers.append(Heard(now, event))
+                self.answers.append(TimedFrame(now, event))
 
     def end(self) -> None:
         """What was heard of no whole answer is received too."""
@@ -200,9 +200,13 @@ class RobotPort:
 
 
 def _opened(url: str) -> Any:
-    more = {} if "://" in url else {"exclusive": True}
+    more: dict[str, Any] = {"write_timeout": BLOCKED_S}
+    if "://" not in url:
+        more["exclusive"] = True
+    elif url.lower().startswith("rfc2217:"):
+        more["write_timeout"] = None  # the only one that pyserial has there
     try:
-        return serial.serial_for_url(url, BAUD, timeout=0, write_timeout=BLOCKED_S, **more)
+        return serial.serial_for_url(url, BAUD, timeout=0, **more)
     except (serial.SerialException, OSError, ValueError) as error:
         number = getattr(error, "errno", None)
         if "exclusively lock" in f"{error}":

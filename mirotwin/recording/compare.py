@@ -5,6 +5,8 @@ bits       all that a robot did: counters, LM629s, PWM, motion, commands, answer
 bytes      the characters that the PC heard of the robots, and their order           in time
 commands   the commands of each LM629: opcode, data, order; not what they read       in time
 wheels     each LM629's positions and desired velocity once a control period         in counts
+
+`answers`, what robots at a port answer beside their twin, is compared in `mirotwin.desk.compare`.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from mirotwin.recording import fields, sequences
 from mirotwin.recording.difference import DIGEST, Difference
 from mirotwin.recording.sequences import LogEntry
 
-Kind = Literal["bits", "bytes", "commands", "wheels"]
+Kind = Literal["bits", "bytes", "commands", "wheels", "answers"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 WITHIN_TICKS = 12_000
 """Default tolerance in time, 0.5 ms: half of the failsafe's unit, five bits of the robot's serial port."""

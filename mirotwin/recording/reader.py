@@ -144,4 +144,5 @@ def _source(messages: Messages) -> RunSource:
         record=metadata.get("record", "default"),
         state=metadata.get("state", ""),
         resumed=attachments.get(RESUMED_ATTACHMENT, b""),
+        origin=metadata.get("source", ""),
     )

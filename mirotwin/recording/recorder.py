@@ -50,7 +50,8 @@ class AnyFault(Protocol):
 class RunSource(msgspec.Struct, frozen=True):
     """What a run was made from: scenario text, seed, firmware file, and its symbols (name -> address,
     space). `state`: the form of the states that its digests are of (`Flat.tables`), "" where it is not known.
-    `resumed`: the saved world that the run went on from, empty for a run from its start.
+    `resumed`: the saved world that the run went on from, empty for a run from its start. `origin`: "port" where robots
+    were real and what is in it is their twin's, else empty.
     """
 
     scenario_name: str
@@ -62,6 +63,7 @@ class RunSource(msgspec.Struct, frozen=True):
     record: str = "default"
     state: str = ""
     resumed: bytes = b""
+    origin: str = ""
 
 
 _Message = tuple[str, int, msgspec.Struct]
@@ -97,6 +99,7 @@ class Recorder:
                 "firmware_sha256": source.firmware_sha256,
                 "record": source.record,
                 **({"state": source.state} if source.state else {}),
+                **({"source": source.origin} if source.origin else {}),
             },
         )
         self._writer.add_attachment(SCENARIO_ATTACHMENT, "application/toml", source.scenario_text.encode())

@@ -9,6 +9,7 @@ import click
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
+from mirotwin.desk.compare import AnswerTolerance
 from mirotwin.recording.compare import (
     KINDS,
     WITHIN_COUNTS,
@@ -23,8 +24,8 @@ from mirotwin.shell.times import Time
 
 _TICKS_PER_MS = TICKS_PER_SECOND // 1000
 _APPLIES = {
-    "within_ms": ("bytes", "commands"),
-    "within_counts": ("wheels",),
+    "within_ms": ("bytes", "commands", "answers"),
+    "within_counts": ("wheels", "answers"),
     "within_counts_per_sample": ("wheels",),
 }
 """A tolerance, and the comparisons that have it."""
@@ -39,7 +40,8 @@ class CompareOptions(Options, frozen=True, kw_only=True):
             "--compare",
             type=click.Choice(KINDS),
             help="bits: all that robots did. bytes: the characters the PC heard. commands: the commands of each LM629."
-            " wheels: positions and desired velocities. The last three have tolerances.",
+            " wheels: positions and desired velocities. answers: what robots at a port answer, the only one there. All"
+            " but the first have tolerances.",
         ),
     ] = "bits"
     within_ms: Annotated[
@@ -47,7 +49,8 @@ class CompareOptions(Options, frozen=True, kw_only=True):
         Option(
             type=FiniteNumber(0, 1000),
             metavar="MS",
-            help=f"bytes, commands: how far apart in time. Default {WITHIN_TICKS / _TICKS_PER_MS:g}.",
+            help=f"bytes, commands, answers: how far apart in time. Default {WITHIN_TICKS / _TICKS_PER_MS:g},"
+            f" of answers {AnswerTolerance().late_ticks / _TICKS_PER_MS:g}.",
         ),
     ] = None
     within_counts: Annotated[
@@ -55,7 +58,7 @@ class CompareOptions(Options, frozen=True, kw_only=True):
         Option(
             type=Whole(0, 1 << 30),
             metavar="COUNTS",
-            help=f"wheels: how far apart in position. Default {WITHIN_COUNTS}.",
+            help=f"wheels, answers: how far apart in position. Default {WITHIN_COUNTS}.",
         ),
     ] = None
     within_counts_per_sample: Annotated[
@@ -89,13 +92,26 @@ class CompareOptions(Options, frozen=True, kw_only=True):
     def rule(self) -> CompareRule:
         """The comparison that was asked for."""
         ms, counts, per_sample = self.within_ms, self.within_counts, self.within_counts_per_sample
+        usual = AnswerTolerance().late_ticks if self.kind == "answers" else WITHIN_TICKS
         return CompareRule(
             kind=self.kind,
-            within_ticks=WITHIN_TICKS if ms is None else int(Fraction(ms) * _TICKS_PER_MS),
+            within_ticks=usual if ms is None else int(Fraction(ms) * _TICKS_PER_MS),
             within_counts=WITHIN_COUNTS if counts is None else counts,
             within_counts_per_sample=WITHIN_COUNTS_PER_SAMPLE if per_sample is None else per_sample,
             from_tick=0 if self.from_time is None else self.from_time.ticks(),
             to_tick=None if self.to_time is None else self.to_time.ticks(),
+        )
+
+    def tolerance(self, file: str) -> AnswerTolerance:
+        """Of robots at a port. Raises BadInput for a comparison that cannot be made there."""
+        rule = self.rule
+        other = self.given("from_time", "to_time") or (self.given("kind") if self.kind != "answers" else [])
+        if other:
+            raise BadInput(file, other[0], "is not for what was recorded at a port", "use --compare answers")
+        return (
+            AnswerTolerance(rule.within_counts, rule.within_ticks)
+            if self.kind == "answers"
+            else AnswerTolerance()
         )
 
     def described(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 import click
@@ -12,6 +13,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import Image
 from miro_sim.periods import Period
+from mirotwin.desk.options import HEADING, DeskOptions
 from mirotwin.firmware.sources_option import SourceFolders, checked_sources
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.recording.difference import Difference
@@ -20,6 +22,7 @@ from mirotwin.replay.differences import differences_as_json, print_differences, 
 from mirotwin.replay.firmwares import FirmwareDifference
 from mirotwin.replay.replay_case import replay_bare_case, replay_case
 from mirotwin.replay.replay_firmware import LinesFrom, annotated_of, firmwares_apart, load_images
+from mirotwin.replay.replay_port import compare_with_twin, record_at_port
 from mirotwin.replay.replay_tables import SHOWN, print_frames, print_response
 from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.job import Job, load_job, rerun_job
@@ -27,6 +30,8 @@ from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import (
     ALL,
+    FORCE,
+    OUT,
     QUIET,
     SEED,
     SET,
@@ -60,6 +65,12 @@ class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
         ),
     ] = ()
     compare: CompareOptions = CompareOptions()
+    desk: DeskOptions = DeskOptions()
+    out: Annotated[
+        Path | None,
+        OUT.saying("Folder of the recording. Default: runs/FILE-port.", heading=HEADING),
+    ] = None
+    force: Annotated[bool, FORCE.saying("Replace a recording in the folder.", heading=HEADING)] = False
     engine: Engine = None
     everything: Annotated[
         bool,
@@ -92,6 +103,10 @@ def replay(options: ReplayOptions) -> int:
     Where --expect is given, that decides: a difference is only told, and the exit code is 1 if a check fails, else 0.
     What the recorded scenario expects is judged too, but a difference goes before it.
 
+    With --port the bytes go to a real robot, at their times. What it answers is recorded, and compared with what its
+    twin answers to the same bytes at the same times (--compare answers). A recording made at a port is compared so,
+    too. Nothing that moves a robot is sent without --allow-motion.
+
     The list shows the host's frames as sent, before the radio, and the robots' answers as the PC heard them.
     """
     file, compare = file_in(options.file, (*RECORDINGS, *CASES)), options.compare
@@ -104,10 +119,25 @@ def replay(options: ReplayOptions) -> int:
     if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
     job, image = load_job(file, options.firmware, options.engine, settings, options.seed, options.stack_from)
-    if not job.recorded:
+    if not job.recorded and not options.desk.port:
         _refuse(file, "a text stream holds nothing to compare with", options.given(*_OF_A_RECORDING))
     images = load_images(options.lines_from, job.image)
     checked_sources(options.sources)
+    desk = options.desk
+    if desk.port:
+        recorded = record_at_port(
+            job, image, file, desk, desk.port, options.out, options.force, options.quiet
+        )
+        file = str(recorded)
+        job, image = load_job(file, None, options.engine)
+    if job.origin:
+        tolerance = compare.tolerance(file)
+        return compare_with_twin(
+            job, image, file, tolerance, options.everything, options.quiet, compare.as_json
+        )
+    if compare.kind == "answers":
+        what = "is for robots at a port, and this was recorded at none"
+        raise BadInput(file, "--compare answers", what, "give --port, or another comparison")
     if job.case.verdict:
         _refuse(file, "is not for a case, which ends where it failed", options.given("to_time", "as_json"))
         return replay_case(job, image, file, options.quiet)

@@ -61,6 +61,7 @@ class Job(msgspec.Struct, frozen=True):
 
     `image`: the one that was recorded, None where it is none. `state`: the form of the states whose digests were
     recorded, if a replay computes the same states, else empty: a controller's states are not computed again.
+    `origin`: "port" where the answers that were recorded are those of real robots. `firmware`: the recorded file.
     """
 
     scenario: Scenario
@@ -71,6 +72,8 @@ class Job(msgspec.Struct, frozen=True):
     state: str = ""
     case: Case = Case()
     resumed: bytes = b""
+    origin: str = ""
+    firmware: bytes = b""
 
     @property
     def periods(self) -> int:
@@ -202,7 +205,8 @@ def _job_of_recording(
     silent = all(network.host == "silent" for network in scenario.networks)
     state = source.state if as_it_was and silent else ""
     own = source.seed if seed is None else seed
-    return Job(scenario, own, script, recording.periods, image, state, resumed=source.resumed)
+    job = Job(scenario, own, script, recording.periods, image, state, resumed=source.resumed)
+    return msgspec.structs.replace(job, origin=source.origin, firmware=source.firmware)
 
 
 def _job_of_stream(given: stream.Stream, path: str, settings: Sequence[str], seed: int | None) -> Job:

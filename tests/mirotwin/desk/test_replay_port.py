@@ -1,0 +1,63 @@
+"""`mirotwin replay --port`: a stream goes to a robot, and its answers stand beside its twin's.
+
+The robot is another world behind `miro://`, whose clock is virtual: each test gives the same every time.
+"""
+
+import pytest
+
+from mirotwin.recording import reader
+from tests.mirotwin.desk.rig import ROBOT
+
+
+def test_an_equal_robot_answers_as_its_twin_does(mirotwin, drive):
+    code, out, err = mirotwin("replay", drive, "--port", ROBOT, "--allow-motion", "-q")
+    assert (code, "the robot answers as its twin does, 17 times" in out) == (0, True), out + err
+    assert "40 transmissions sent, 99 % less than 0.00 ms late" in err
+    assert "robot 0 of 3 answers" in err
+
+
+def test_nothing_is_sent_that_moves_unless_it_is_allowed(mirotwin, drive):
+    code, _, err = mirotwin("replay", drive, "--port", ROBOT)
+    assert code == 2
+    assert "tick 1000000: robot 0 told" in err
+    assert err.count("\n") == 1
+    assert not (drive.parent / "runs").exists()
+
+
+def test_too_fast_a_wheel_is_refused_before_anything_is_sent(mirotwin, drive):
+    code, _, err = mirotwin("replay", drive, "--port", ROBOT, "--allow-motion", "--max-speed", "0.15")
+    assert code == 2
+    assert "at most 0.15 m/s are allowed; raise --max-speed" in err
+    assert not (drive.parent / "runs").exists()
+
+
+def test_a_recording_made_at_a_port_is_one_like_any_other(mirotwin, drive):
+    mirotwin("replay", drive, "--port", ROBOT, "--allow-motion", "-q", "--out", "desk")
+    recording = reader.read("desk/run.mcap")
+    assert recording.source.origin == "port"
+    assert sum(len(period.wire) for period in recording.periods) > 60
+    for command in (("decode", "desk/run.mcap"), ("export", "desk/run.mcap", "--out", "desk.pcapng")):
+        code, _, err = mirotwin(*command)
+        assert code == 0, err
+    code, out, _ = mirotwin("replay", "desk", "-q")
+    assert (code, "the robot answers as its twin does, 17 times" in out) == (0, True)
+
+
+def test_a_run_is_sent_again_as_a_stream_is(mirotwin, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mirotwin("run", "fig6", "--set", "duration_s=1.5", "--out", "run", "-q")
+    code, out, err = mirotwin("replay", "run", "--port", ROBOT, "--allow-motion", "-q")
+    assert (code, "the robot answers as its twin does" in out) == (0, True), out + err
+
+
+@pytest.mark.parametrize("option", [("--compare", "wheels"), ("--from", "1s"), ("--to", "2s")])
+def test_what_no_port_shows_cannot_be_compared(mirotwin, drive, option):
+    mirotwin("replay", drive, "--port", ROBOT, "--allow-motion", "-q", "--out", "desk")
+    code, _, err = mirotwin("replay", "desk", *option)
+    assert code == 2
+    assert f"{option[0]}: is not for what was recorded at a port; use --compare answers" in err
+
+
+def test_answers_are_compared_at_ports_only(mirotwin, finished):
+    code, _, err = mirotwin("replay", finished, "--compare", "answers")
+    assert (code, "is for robots at a port" in err) == (2, True)
