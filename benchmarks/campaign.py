@@ -18,7 +18,8 @@ from pathlib import Path
 
 from miro_sim.world.world import World
 from mirotwin import campaign
-from mirotwin.campaign.single import image_of, prepared, run_single
+from mirotwin.campaign.single import prepared, run_single
+from mirotwin.shell.firmware_image import load_firmware
 
 TEXT = 'scenario = "fig6"\nseeds = "0-9999"\n'
 WARM = 8
@@ -28,6 +29,7 @@ import sys
 from benchmarks.campaign import TEXT
 from mirotwin import campaign
 from mirotwin.campaign.single import run_single
+from mirotwin.shell.firmware_image import load_firmware
 
 plan = campaign.parse(TEXT, "benchmark.toml")
 first, count = map(int, sys.argv[1:])
@@ -50,7 +52,7 @@ def run_ratio(runs: int) -> float:
         began_s = time.process_time()
         run_single(job)
         whole_s = time.process_time() - began_s
-        world = World(prepared(job.origin, job.text, job.settings).text.scenario, job.seed, image_of(""))
+        world = World(prepared(job.origin, job.text, job.settings).text.scenario, job.seed, load_firmware())
         began_s = time.process_time()
         while not world.finished:
             world.step()

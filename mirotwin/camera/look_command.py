@@ -12,13 +12,13 @@ from miro_exact.seed import MAX_SEED
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.rerun.faults import report_faults
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
     Place,
     Whole,
     choose_engine,
     engine_option,
     firmware_option,
-    load_image,
     plain_parameters,
     refuse_steps,
     set_option,
@@ -81,7 +81,7 @@ def look(
     out = out or Path(f"{name}-{seed}-net{network}-frame-{frame:06d}.png")
     check_new(out, "--out", force)
     check_not_input(out, "--out", scenario, firmware)
-    image = load_image(firmware)
+    image = load_firmware(firmware)
 
     from mirotwin.camera.view import view_of  # loads the pictures' library
 

@@ -14,16 +14,16 @@ import msgspec
 
 from miro_exact import engine
 from miro_exact.bad_input import BadInput
-from miro_robot.firmware import image_path
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, load
 from miro_sim.scenario.settings import EXPECT, OPTION, option_words
 from mirotwin.campaign.columns import CHECK, FIGURES, OWN
 from mirotwin.campaign.design import Design, Factor, Level, Value
 from mirotwin.campaign.file import CampaignFile, parse, read
-from mirotwin.campaign.single import image_of, prepared
+from mirotwin.campaign.single import prepared
 from mirotwin.campaign.versions import Versions, versions
 from mirotwin.campaign.worker import ImageFile, Work
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.steps.keys import CheckStep
 from mirotwin.verify.steps.plan import check_symbols
 
@@ -149,10 +149,8 @@ def _images(file: CampaignFile) -> dict[str, ImageFile]:
     found = {}
     for name, place in _named(file, file.firmware, "firmware"):
         path = "" if name == OWN_IMAGE else name
-        if not Path(path or image_path()).exists():
-            raise BadInput(file.path, place, f"there is no image {path}", "give the path of an .ihx file")
         try:
-            found[name] = ImageFile(path, image_of(path).sha256 or "")
+            found[name] = ImageFile(path, load_firmware(path).sha256 or "")
         except BadInput as error:
             raise BadInput(file.path, place, f"{error}") from None
     return found
@@ -190,7 +188,7 @@ class _Tried:
         job = self.plan._work(0, levels, drawn, self.plan.design.first_seed)
         try:
             ready = prepared(job.origin, job.text, job.settings)
-            check_symbols(ready.steps, image_of(job.firmware.path), job.origin)
+            check_symbols(ready.steps, load_firmware(job.firmware.path), job.origin)
         except BadInput as error:
             raise _placed(self.plan, levels, drawn, error) from error.__cause__
         for checks in ready.expected.values():

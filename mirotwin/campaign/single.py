@@ -13,8 +13,6 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText, of_text
 from miro_sim.world.world import World
@@ -27,6 +25,7 @@ from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import summarise
 from mirotwin.report.theory import gains_of
 from mirotwin.rerun import runner
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.tracebacks import show_traceback
 from mirotwin.verify.checks.expect import Place, expectations_of
 from mirotwin.verify.checks.interface import Check, Expectation
@@ -43,14 +42,6 @@ class Prepared(msgspec.Struct, frozen=True):
     text: ScenarioText
     expected: dict[Place, list[Check]]
     steps: list[Step]
-
-
-@lru_cache(maxsize=16)
-def image_of(path: str) -> Image:
-    """The image at a path, "" for the robot's own, with its symbols. Raises BadInput and OSError."""
-    found = load_hex(Path(path) if path else image_path())
-    _ = found.symbols.names
-    return found
 
 
 @lru_cache(maxsize=64)
@@ -74,7 +65,7 @@ def run_single(job: Work) -> RunOutcome:
 
 
 def _run(job: Work) -> RunOutcome:
-    image = image_of(job.firmware.path)
+    image = load_firmware(job.firmware.path)
     found = prepared(job.origin, job.text, job.settings)
     check_symbols(found.steps, image, job.origin)
     scenario = found.text.scenario

@@ -100,10 +100,10 @@ def _engine(name: str) -> str:
 @cache
 def _firmware(wanted: ImageFile) -> str:
     """Why an image cannot be run here; its content does not travel, so it has to be the same file."""
-    from mirotwin.campaign.single import image_of
+    from mirotwin.shell.firmware_image import load_firmware
 
     try:
-        found = image_of(wanted.path).sha256
+        found = load_firmware(wanted.path).sha256
     except (BadInput, OSError) as error:
         return f"no firmware {wanted.path or 'of its own'}: {error}"
     if found != wanted.sha256:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from miro_robot.firmware import image_path, source_folder
-from miro_robot.image import load_hex
+from miro_robot.firmware import source_folder
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.firmware.bare_options import BareRequest
@@ -14,6 +13,7 @@ from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.firmware.subject import Request, open_run
 from mirotwin.rerun.inspected_run import BareRun, RobotRun
 from mirotwin.shell.command import Option, Options
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import NAME, SEED, SET, Engine, Firmware, Whole
 
 
@@ -53,5 +53,5 @@ def open_subject(options: SubjectOptions) -> Session:
     assert isinstance(run, RobotRun | BareRun)
     image = with_debug_files(run.image)
     folder = source_folder()
-    own = [folder] if folder is not None and load_hex(image_path()).sha256 == run.image.sha256 else []
+    own = [folder] if folder is not None and load_firmware(named=False).sha256 == run.image.sha256 else []
     return Session(Timeline(run), Symbols(image, [*map(Path, options.sources), *own]), [])

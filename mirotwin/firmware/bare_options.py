@@ -18,7 +18,8 @@ from miro_robot.bare.machine import BareMachine, Ended
 from miro_robot.bare.pins import PinEvent, read_pins
 from miro_robot.image import Image
 from mirotwin.firmware.code_place import FLASH_BYTES, SPACE_BYTES, address_of, place_of
-from mirotwin.shell.options import STACK_FROM, STACK_FROM_HELP, Place, Whole, load_image
+from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.options import STACK_FROM, STACK_FROM_HELP, Place, Whole
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, LIMIT_REACHED, complain
 from mirotwin.shell.times import Time, TimeType
 
@@ -121,7 +122,7 @@ def load_bare_image(path: str, request: BareRequest, named: bool = True) -> Imag
             "", "--code-size", "program and data share 64 KB with --code-in-xram", "leave one of the two out"
         )
     limit = SPACE_BYTES if request.code_in_xram else request.code_size or FLASH_BYTES
-    return load_image(path, limit, named, request.stack_from)
+    return load_firmware(path, limit, named, request.stack_from)
 
 
 def target_of(path: str, image: Image, request: BareRequest) -> int | None:

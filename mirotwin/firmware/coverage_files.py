@@ -11,8 +11,8 @@ from rich.table import Table
 
 from miro_exact.bad_input import one_line
 from miro_exact.inputs import read_input
-from miro_robot.firmware import image_path, source_folder
-from miro_robot.image import Image, load_hex
+from miro_robot.firmware import source_folder
+from miro_robot.image import Image
 from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.inspect.coverage import (
     Counts,
@@ -26,6 +26,7 @@ from miro_robot.inspect.coverage import (
     missed,
 )
 from miro_robot.inspect.lcov import Tracefile, decode, encode
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.outputs import whole_file
 
 
@@ -42,7 +43,7 @@ def with_debug_files(image: Image) -> Image:
 
     if image.path.is_file():
         return image
-    own = load_hex(image_path())
+    own = load_firmware(named=False)
     return own if own.sha256 == image.sha256 else image
 
 

@@ -9,7 +9,8 @@ from miro_robot.inspect.listing import text_lines
 from miro_robot.inspect.symbol_names import SymbolNames
 from mirotwin.firmware.code_place import SPACE_BYTES, functions_at
 from mirotwin.firmware.sources_option import sources_of, sources_option
-from mirotwin.shell.options import Place, choose_engine, load_image
+from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.options import Place, choose_engine
 from mirotwin.shell.program import show_line
 
 
@@ -30,7 +31,7 @@ def disasm(image: str | None, symbols: tuple[str, ...], sources: tuple[str, ...]
     for both.
     """
     choose_engine(None)
-    loaded = load_image(image, SPACE_BYTES)
+    loaded = load_firmware(image, SPACE_BYTES)
 
     names = SymbolNames(loaded)
     path = image or str(loaded.path)

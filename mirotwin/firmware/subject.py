@@ -30,13 +30,13 @@ from mirotwin.firmware.bare_options import (
 from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.inspected_run import BareRun, RobotRun, Run, watch
 from mirotwin.rerun.job import load_job
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
     Place,
     Whole,
     choose_engine,
     engine_option,
     firmware_option,
-    load_image,
     plain_parameters,
     refuse_steps,
     set_option,
@@ -181,7 +181,7 @@ def _robot_run(request: Request) -> RobotRun:
         text = load(subject, request.settings)
         tell_notes(text.notes)
         refuse_steps(text.scenario, subject)
-        image = load_image(request.firmware)
+        image = load_firmware(request.firmware)
         with plain_parameters(subject):
             world = World(text.scenario, request.seed or 0, image)
     else:

@@ -7,11 +7,9 @@ for ever, 10 ms (at 24 MHz) after the last character.
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from miro_exact.bad_input import BadInput
-from miro_exact.inputs import check_regular
 from miro_host.raised import at_place, defined_at, raised_at
 from miro_host.raised import described as described_error
 from miro_protocol.actions import ScriptItem
@@ -21,10 +19,11 @@ from miro_robot.bare.machine import CRYSTAL_HZ
 from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
 from miro_robot.harness.program import INPUTS, Program
 from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareOracle
-from miro_robot.image import SPACE_BYTES, Image, load_hex
+from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.fuzz.harness_target import HarnessTarget, described
 from mirotwin.fuzz.protocols import protocol_named
 from mirotwin.fuzz.target import TargetFailure
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.bare.case import NEVER_SLEEPS, NO_FAULT
 from mirotwin.verify.bare.exchange import Exchange, NamedCheck, check_named
 from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
@@ -195,9 +194,8 @@ def frame_input(body: bytes, input: str) -> bytes:
 
 def bare_target(spec: TargetSpec) -> BareTarget:
     """The target of a specification; `parameters` may hold `crystal_hz` and `boot_ms`. Raises BadInput."""
-    check_regular(spec.image)
     return BareTarget(
-        load_hex(Path(spec.image), SPACE_BYTES),
+        load_firmware(spec.image, SPACE_BYTES, named=False),
         spec.input,
         protocol_named(spec.protocol) if spec.protocol else None,
         check_named(spec.check) if spec.check else None,

@@ -11,7 +11,8 @@ from click.core import ParameterSource
 
 from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.fuzz.spec import TargetSpec
-from mirotwin.shell.options import Whole, load_image
+from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.options import Whole
 
 Command = Callable[..., Any]
 _ROBOTS_OWN = ("robots", "slot", "checks")
@@ -69,7 +70,7 @@ def load_bare_firmware(path: str | None) -> Image:
     """The image of --bare, of any size that fits into a processor. Raises UsageError without one."""
     if path is None:
         raise click.UsageError(f"{_BARE} needs an IMAGE.ihx.")
-    return load_image(path, SPACE_BYTES)
+    return load_firmware(path, SPACE_BYTES)
 
 
 def bare_spec(image: str, kind: str, engine: Literal["compiled", "python"], asked: BareAsked) -> TargetSpec:

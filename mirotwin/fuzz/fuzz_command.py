@@ -33,7 +33,8 @@ from mirotwin.fuzz.oracle import oracle_of
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from mirotwin.fuzz.triage import MINIMISE_S, Crash, Triage
-from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, load_image
+from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.options import Place, Whole, choose_engine, engine_option
 from mirotwin.shell.program import Terminated, complain
 from mirotwin.shell.times import WallTime
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
@@ -145,7 +146,7 @@ def fuzz(
     """
     active = cast(Literal["compiled", "python"], choose_engine(engine))
     bare = take_bare_fuzz(given)
-    firmware = load_bare_firmware(image) if bare.bare else load_image(image)
+    firmware = load_bare_firmware(image) if bare.bare else load_firmware(image)
     if slot >= int(robots):
         raise click.UsageError(
             f"--slot {slot} does not exist among {robots} robots; give 0 to {int(robots) - 1}."

@@ -6,7 +6,6 @@ Nothing here imports a hot module: the process that reads a specification choose
 from __future__ import annotations
 
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 import msgspec
@@ -69,12 +68,10 @@ def spec_of(text: str) -> TargetSpec:
 
 def miro_target(spec: TargetSpec) -> Target:
     """The MIRO's board with the firmware of the specification."""
-    from miro_robot.firmware import image_path
-    from miro_robot.image import load_hex
     from mirotwin.fuzz.target import target_for
+    from mirotwin.shell.firmware_image import load_firmware
 
-    image = load_hex(Path(spec.image) if spec.image else image_path())
-    return target_for(image, spec.input, spec.robots, spec.slot)
+    return target_for(load_firmware(spec.image, named=False), spec.input, spec.robots, spec.slot)
 
 
 def _function(place: str) -> Any:

@@ -11,9 +11,6 @@ from typing import NoReturn
 from serial.serialutil import SerialException
 
 from miro_exact.bad_input import BadInput
-from miro_exact.inputs import check_regular
-from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from miro_sim.world.world import World
@@ -23,6 +20,7 @@ from mirotwin.recording.recorder import Recorder
 from mirotwin.recording.source import source_of
 from mirotwin.rerun import runner
 from mirotwin.rerun.pacing import Every
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder
 
 FLUSH_S = 0.2
@@ -87,23 +85,13 @@ class RecordedWorld:
             raise SerialException(str(told)) from None
 
 
-def _image(path: str) -> Image:
-    """The one that is named, or the robot's own."""
-    if not path:
-        return load_hex(image_path())
-    if not Path(path).exists():
-        raise BadInput(path, "", "there is no such file", "give the path of an .ihx or .hex file")
-    check_regular(path)
-    return load_hex(Path(path))
-
-
 def open_world(options: UrlOptions, at_exit: Callable[[], object]) -> RecordedWorld:
     """The world that `options` ask for. A program that records and ends without closing calls `at_exit`.
 
     Raises BadInput, or ValueError for a network that the scenario does not have.
     """
     text = live_scenario(options.scenario, options.settings)
-    image = _image(options.firmware)
+    image = load_firmware(options.firmware, named=False)
     world = World(text.scenario, options.seed, image)
     world.earliest_tick(options.network)  # refuses a network that is not there
     if not options.out:

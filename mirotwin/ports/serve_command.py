@@ -19,6 +19,7 @@ from mirotwin.report.live import LiveFigures
 from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.pacing import FASTEST, Pace
 from mirotwin.run.run_files import RunFiles
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
     Number,
     Place,
@@ -26,7 +27,6 @@ from mirotwin.shell.options import (
     choose_engine,
     engine_option,
     firmware_option,
-    load_image,
     plain_parameters,
     set_option,
 )
@@ -110,7 +110,7 @@ def serve(
     tell_notes(text.notes)
     default = Path("runs") / f"{text.scenario.name}-{seed}-live"
     folder = OutputFolder(out or default, force, (*FILES, CASE), ours=out is None)
-    image = load_image(firmware)
+    image = load_firmware(firmware)
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
     source = source_of(text, world)

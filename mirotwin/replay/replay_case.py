@@ -7,7 +7,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import SPACE_BYTES, Image
 from mirotwin.rerun.job import Job, rerun_job
 from mirotwin.shell.console import show
-from mirotwin.shell.options import load_image
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.program import DONE, complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.bare.case import replay_bare
@@ -35,7 +35,7 @@ def replay_bare_case(path: str, firmware: str | None, check: str | None) -> int:
     if firmware is None:
         remedy = "give --firmware IMAGE.ihx"
         raise BadInput(path, "", "is for a bare processor, which has no firmware of its own", remedy)
-    return _say(replay_bare(path, load_image(firmware, SPACE_BYTES), check))
+    return _say(replay_bare(path, load_firmware(firmware, SPACE_BYTES), check))
 
 
 def _say(verdict: CaseVerdict) -> int:

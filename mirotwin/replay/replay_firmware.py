@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Annotated
 
 from miro_exact.bad_input import BadInput
-from miro_robot.firmware import image_path, source_folder
-from miro_robot.image import Image, load_hex
+from miro_robot.firmware import source_folder
+from miro_robot.image import Image
 from miro_sim.world.world import World
 from mirotwin.firmware.coverage_files import with_debug_files
 from mirotwin.recording.difference import Difference
@@ -17,7 +17,8 @@ from mirotwin.replay.firmwares import FirmwareDifference, first_instruction
 from mirotwin.replay.lockstep import LOOK_TICKS
 from mirotwin.rerun.job import Job
 from mirotwin.shell.command import Option
-from mirotwin.shell.options import IMAGE, NAME, load_image, plain_parameters
+from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.options import IMAGE, NAME, plain_parameters
 
 LinesFrom = Annotated[
     tuple[str, ...],
@@ -34,7 +35,7 @@ LinesFrom = Annotated[
 def load_images(paths: Sequence[str], *recorded: Image | None) -> list[Image]:
     """The images of --lines-from. Raises BadInput for one that was not recorded."""
     codes = [image.code for image in recorded if image is not None]
-    images = [load_image(path) for path in paths]
+    images = [load_firmware(path) for path in paths]
     for path, image in zip(paths, images, strict=True):
         if image.code not in codes:
             raise BadInput(
@@ -47,7 +48,7 @@ def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) 
     """The image with its debug files: those beside one of `images`, or the robot's own; C files also in `sources`."""
     known = next((one for one in images if one.code == image.code), with_debug_files(image))
     folder = source_folder()
-    own = [] if folder is None or load_hex(image_path()).sha256 != image.sha256 else [folder]
+    own = [] if folder is None or load_firmware(named=False).sha256 != image.sha256 else [folder]
     return AnnotatedImage(known, [*own, *map(Path, sources)])
 
 

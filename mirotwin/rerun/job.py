@@ -35,7 +35,8 @@ from mirotwin.rerun.script import (
     script_of_stream,
 )
 from mirotwin.shell.command_line import command_line, operand
-from mirotwin.shell.options import choose_engine, load_image, plain_parameters
+from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.options import choose_engine, plain_parameters
 from mirotwin.shell.outputs import RECORDING
 from mirotwin.shell.program import complain
 from mirotwin.verify.cases.artifacts import image_beside
@@ -126,13 +127,13 @@ def load_job(
             raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
         image = image_of(recording, file) if firmware is None else image_if_any(recording, file)
         job = _job_of_recording(recording, file, settings, image, seed)
-        return job, image if firmware is None and image is not None else load_image(
+        return job, image if firmware is None and image is not None else load_firmware(
             firmware, stack_from=stack_from
         )
     _refuse_other_formats(data, file)
     given = stream.decode(data, file)
     header = given.header
-    image = load_image(firmware or image_beside(file, header.firmware_sha256), stack_from=stack_from)
+    image = load_firmware(firmware or image_beside(file, header.firmware_sha256), stack_from=stack_from)
     _check_firmware(header, image, file, firmware)
     reseeded = seed not in (None, header.seed or 0)
     other = header.firmware_sha256 not in (None, image.sha256) or bool(settings) or reseeded

@@ -18,13 +18,13 @@ from mirotwin.rerun.faults import report_faults
 from mirotwin.run.run_files import RunFiles, digest_in
 from mirotwin.run.run_live_options import live_options
 from mirotwin.run.run_stops import Stops
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
     Place,
     Whole,
     choose_engine,
     engine_option,
     firmware_option,
-    load_image,
     plain_parameters,
     set_option,
     stack_option,
@@ -161,7 +161,7 @@ def run(
     if live is None and (pace is not None or wait):
         raise click.UsageError("--pace and --live-wait need --live.")
     earlier = "" if out is not None else digest_in(folder.path)
-    image = load_image(firmware, stack_from=stack_from)
+    image = load_firmware(firmware, stack_from=stack_from)
     check_symbols(steps, image, text.origin)
 
     with plain_parameters(text.origin):

@@ -10,7 +10,8 @@ from rich.table import Table
 from miro_exact import engine as engines
 from miro_exact import hot_modules
 from mirotwin.shell.console import show
-from mirotwin.shell.options import choose_engine, engine_option, firmware_option, load_image
+from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.options import choose_engine, engine_option, firmware_option
 from mirotwin.shell.program import BAD_INPUT, DONE, complain
 
 PACKAGES = (
@@ -46,7 +47,7 @@ def info(engine: str | None, firmware: str | None) -> int:
     """Shows versions, the engine, and the firmware image with its hash."""
     active = choose_engine(engine)
     broken = _broken_modules(active)
-    image = load_image(firmware, named=False)
+    image = load_firmware(firmware, named=False)
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="bold")
     table.add_column(overflow="fold")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,17 +10,12 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import click
-import msgspec
 
 from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput, shortened
 from miro_exact.domain import DomainError
-from miro_exact.inputs import TEXT_BYTES, check_regular
 from miro_exact.seed import MAX_SEED
 from miro_host.plugins import PluginError
-from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
-from miro_robot.image.symbols import STACK
 from miro_sim.scenario.keys import Scenario
 from mirotwin.shell.command import Option
 from mirotwin.shell.times import TimeType
@@ -161,35 +155,6 @@ def choose_engine(engine: str | None) -> str:
     if engine is not None:
         engines.select(engine)
     return engines.active()
-
-
-def load_image(
-    path: str | Path | None, limit: int = 8192, named: bool = True, stack_from: int | None = None
-) -> Image:
-    """The firmware image at `path`, or the robot's own. Raises BadInput for what is no image or does not fit.
-
-    `named`: its symbols are needed; the files beside it are read at once, and BadInput is raised for wrong ones.
-    `stack_from`: first address of its stack, which only an image without a linker's map may be given.
-    """
-
-    if path is not None:
-        if not os.path.exists(path):
-            raise BadInput(path, "", "there is no such file", "give the path of an .ihx or .hex file")
-        check_regular(path)
-        if os.path.getsize(path) > TEXT_BYTES:
-            raise BadInput(path, "", f"holds more than {TEXT_BYTES >> 20} MiB", "give an .ihx or .hex file")
-    image = load_hex(image_path() if path is None else Path(path), limit=limit)
-    if named:
-        _ = image.symbols.names
-    return image if stack_from is None else _with_stack(image, stack_from)
-
-
-def _with_stack(image: Image, start: int) -> Image:
-    known = image.symbols.find(STACK)
-    if known is not None:
-        what = f"the .map beside the image begins its stack at {known.address:#04x}"
-        raise BadInput(image.path, "--stack-from", what, "leave the option out, or link with that stack")
-    return msgspec.structs.replace(image, symbols=image.symbols.with_stack(start))
 
 
 def refuse_steps(scenario: Scenario, origin: str) -> None:

@@ -9,7 +9,6 @@ a pause between 20 us and 80 us, two right receivers may differ.
 from __future__ import annotations
 
 import hashlib
-from functools import cache
 from typing import NoReturn
 
 import msgspec
@@ -24,8 +23,7 @@ from miro_protocol.stream import Entry, format_stream
 from miro_protocol.table import FRESH_AGAIN_TICKS, downlink
 from miro_protocol.transmission import DOWN, Transmission, of_symbols
 from miro_robot.board import Board
-from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from miro_robot.image import Image
 from miro_robot.mcs51.execute import WIRE_FULL
 from miro_robot.mcs51.line import Line
 from miro_robot.plant import Plant
@@ -33,6 +31,7 @@ from miro_robot.wiring import load_wiring
 from miro_sim.radio.downlink import Downlink
 from miro_sim.radio.params import Radio
 from miro_sim.radio.uplink import Uplink
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.testing.noisy_wire import NoisyWire, Trouble
 
 MS = TICKS_PER_SECOND // 1000
@@ -103,7 +102,7 @@ class Bench:
                 "radio: jitter and offsets leave the grid of bits that a bench works on; leave them 0"
             )
         self.seed = seed
-        self.image = image or own_image()
+        self.image = image or load_firmware()
         self.addresses = [_address(self.image, name) for name in COUNTERS]
         self.board = Board(load_wiring(), Plant(), slot, n)
         self.board.cpu.load(self.image.code, self.image.used)
@@ -279,12 +278,6 @@ class Bench:
 def _on_grid(tick: int) -> int:
     """The next tick at which a bit of slicer noise begins."""
     return -(-tick // HOST_BIT_TICKS) * HOST_BIT_TICKS
-
-
-@cache
-def own_image() -> Image:
-    """The robot's own firmware."""
-    return load_hex(image_path())
 
 
 def _address(image: Image, name: str) -> int:

@@ -8,12 +8,11 @@ that are always on.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image import SPACE_BYTES
 from mirotwin.rerun.job import load_stream, rerun_job
-from mirotwin.shell.options import load_image
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.bare.case import check_of_case, replay_bare
 from mirotwin.verify.cases.case import is_bare_case
 from mirotwin.verify.checks.registry import ALWAYS_ON
@@ -28,7 +27,6 @@ class CaseTests:
         self.engine = engine
         self.checks = checks
         self.unused = set(checks)
-        self._image = cache(load_image)
 
     def run(self, path: str) -> Outcome:
         """Runs one; a case that cannot be run is an outcome, too."""
@@ -45,7 +43,7 @@ class CaseTests:
         return next((text for text in self.checks if text.rpartition(":")[2] == name), None)
 
     def _run(self, path: str) -> Outcome:
-        job, image = load_stream(path, self.engine), self._image(self.firmware)
+        job, image = load_stream(path, self.engine), load_firmware(self.firmware)
         again = rerun_job(job, image, path, job.case.end_tick or None)
         failure = again.failure
         lines: tuple[str, ...] = () if failure is None else (f"expectation failed: {failure}",)
@@ -66,7 +64,7 @@ class CaseTests:
         if self.firmware is None:
             remedy = "give --firmware IMAGE.ihx"
             raise BadInput(path, "", "is for a bare processor, which has no firmware of its own", remedy)
-        image, check = self._image(self.firmware, SPACE_BYTES), self.check_of(path)
+        image, check = load_firmware(self.firmware, SPACE_BYTES), self.check_of(path)
         self.unused.discard(check or "")
         failure = replay_bare(path, image, check).failure
         return Outcome(

@@ -106,10 +106,10 @@ def _check_options(config: pytest.Config) -> None:
         raise pytest.UsageError(f"--mirotwin-artifacts: {artifacts} is no folder")
     firmware = _path(config, "firmware")
     if firmware is not None:
-        from mirotwin.verify.wanted import image_of
+        from mirotwin.shell.firmware_image import load_firmware
 
         try:
-            image_of(str(firmware))
+            load_firmware(firmware)
         except ValueError as error:
             raise pytest.UsageError(f"--mirotwin-firmware: {error}") from None
 

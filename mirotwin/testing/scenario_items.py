@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.testing.test_command import TestOptions
 from mirotwin.verify.steps.running import Outcome, run_test, stem_of
 
@@ -45,7 +43,7 @@ class ScenarioItem(pytest.Item):
             paths=(file,), seed=seed, firmware=None if firmware is None else str(firmware)
         ).command_line()
         try:
-            image = _image(str(firmware or image_path()))
+            image = load_firmware(firmware)
         except ValueError as error:
             raise ScenarioFailed(f"{error}") from None
         outcome = run_test(file, image, seed, artifacts=_path(self.config, "artifacts"), again=again)
@@ -100,10 +98,3 @@ def _path(config: pytest.Config, name: str) -> Path | None:
         return None
     from_option = config.getoption(f"--mirotwin-{name}", default=None) is not None
     return Path(config.invocation_params.dir if from_option else config.rootpath, given)
-
-
-@lru_cache(maxsize=4)
-def _image(path: str) -> Image:
-    image = load_hex(Path(path))
-    _ = image.symbols.names
-    return image

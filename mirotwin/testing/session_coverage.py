@@ -10,9 +10,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from miro_exact.inputs import check_regular
-from miro_robot.firmware import image_path, source_folder
-from miro_robot.image import Image, load_hex
+from miro_robot.firmware import source_folder
 from miro_robot.image.debug_info import Sources
 from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.coverage import Counts, counts_of, line_share, merged
@@ -20,6 +18,7 @@ from miro_robot.inspect.watcher import Inspector, attach
 from miro_robot.mcs51.cpu import Cpu, on_load
 from mirotwin.firmware import coverage_files as firmware_coverage
 from mirotwin.firmware.coverage_files import Report, table, write
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.outputs import check_file, check_not_input
 
 OUTPUT = "firmware_coverage"
@@ -38,7 +37,7 @@ class FirmwareCoverage:
         self.from_workers: list[Counts] = []
         self.counters = Counters()
         try:
-            self.image = _image(config.getoption("--firmware-image"))
+            self.image = load_firmware(config.getoption("--firmware-image"))
             check_file(self.out, "--firmware-coverage")
             check_not_input(self.out, "--firmware-coverage", self.image.path)
             _check_folders(config.getoption("--firmware-sources"))
@@ -102,16 +101,6 @@ class FirmwareCoverage:
 
         share = line_share(self._report.tracefile)
         return bool(share.total) and 100.0 * share.hit / share.total < self.wanted
-
-
-def _image(path: str | None) -> Image:
-    if path:
-        check_regular(path)
-    image = load_hex(path or image_path())
-    _ = (
-        image.symbols.names
-    )  # the listing needs them: what is wrong with their files is said before the tests run
-    return image
 
 
 def _check_folders(folders: list[str]) -> None:

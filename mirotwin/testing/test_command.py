@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
 from typing import Annotated
 
 from miro_exact.bad_input import BadInput
 from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import (
     ARTIFACTS,
@@ -21,7 +21,6 @@ from mirotwin.shell.options import (
     Firmware,
     Seed,
     choose_engine,
-    load_image,
 )
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, show_line, tell_notes
@@ -115,7 +114,7 @@ def test(options: TestOptions) -> int:
     outcomes: list[Outcome] = []
     times_s: list[float] = []
     cases = CaseTests(options.firmware, options.engine, options.checks)
-    lines, image_of = [], cache(load_image)
+    lines = []
     for file in chosen:
         began_s = time.perf_counter()
         if file.endswith(CASE_SUFFIX):
@@ -124,7 +123,7 @@ def test(options: TestOptions) -> int:
         else:
             again = options.line_for(file)
             outcome = run_test(
-                file, image_of(options.firmware), options.seed, settings, options.artifacts, again
+                file, load_firmware(options.firmware), options.seed, settings, options.artifacts, again
             )
         lines.append(again)
         times_s.append(time.perf_counter() - began_s)

@@ -20,12 +20,11 @@ from typing import Any
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.inputs import check_regular
 from miro_exact.seed import MAX_SEED
-from miro_robot.firmware import image_path
-from miro_robot.image import Image, load_hex
+from miro_robot.image import Image
 from miro_sim.scenario.file import load, parse
 from miro_sim.scenario.keys import Scenario
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check
 
@@ -110,7 +109,7 @@ def wanted(mark: Marked, folder: Path, firmware: str | Path | None, seed: int) -
         raise BadInput("", MARKER, what, "pytest collects *.scenario.toml files by themselves")
     if mark.firmware is not None:
         firmware = _near(mark.firmware, folder)
-    image = image_of(str(firmware) if firmware is not None else None)
+    image = load_firmware(firmware)
     if mark.expect:
         scenario = msgspec.structs.replace(scenario, expect={**scenario.expect, **mark.expect})
     boot = mark.boot if mark.boot is not None else all(one.host == "silent" for one in scenario.networks)
@@ -146,21 +145,3 @@ def _toml(value: Any) -> str:
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_toml, value)) + "]"
     return msgspec.json.encode(value).decode()
-
-
-_IMAGES: dict[tuple[str, int, int], Image] = {}
-"""Images of this process, by path and what tells that the file is the same."""
-
-
-def image_of(path: str | None) -> Image:
-    """The image in the file, None for the robot's own, with its symbols; read once a session. Raises BadInput."""
-    place = Path(path) if path is not None else image_path()
-    try:
-        check_regular(str(place))
-        status = place.stat()
-    except OSError:
-        return load_hex(place)  # says what is wrong
-    key = (str(place.resolve()), status.st_mtime_ns, status.st_size)
-    if key not in _IMAGES:
-        _IMAGES[key] = load_hex(place)
-    return _IMAGES[key]

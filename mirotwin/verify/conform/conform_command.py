@@ -14,6 +14,7 @@ from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import (
     ALL,
@@ -26,7 +27,6 @@ from mirotwin.shell.options import (
     Engine,
     StackFrom,
     choose_engine,
-    load_image,
 )
 from mirotwin.shell.outputs import check_file, check_not_input, whole_file
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, FIRMWARE_FAULT, complain, show_line
@@ -92,7 +92,7 @@ def conform(options: ConformOptions) -> int:
     if junit is not None:
         check_file(junit, "--junit")
         check_not_input(junit, "--junit", options.image)
-    firmware = load_image(options.image, named=False, stack_from=options.stack_from)
+    firmware = load_firmware(options.image, named=False, stack_from=options.stack_from)
     if options.explain is not None:
         return _explain(find(options.explain), firmware, options.seed)
     if artifacts is not None:

@@ -18,6 +18,7 @@ from miro_robot.image.symbols import Symbols
 FLASH_BYTES = 8192  # of an AT89C52
 SPACE_BYTES = 0x10000
 _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START_LINEAR = range(6)  # record types
+_GIVE = "build it, or give the path of an .ihx or .hex file"
 _REBUILD = "rebuild the image, or copy it again in full"
 
 
@@ -76,7 +77,7 @@ def load_hex(path: str | Path, limit: int = FLASH_BYTES) -> Image:
     try:
         content = read_input(path, IMAGE_BYTES)
     except FileNotFoundError:
-        raise ImageError(path, 0, "there is no such file", "build the firmware first") from None
+        raise ImageError(path, 0, "there is no such file", _GIVE) from None
     except InputError as error:
         raise ImageError(path, 0, error.what, error.remedy) from None
     except OSError as error:

@@ -7,14 +7,14 @@ from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.rerun.inspected_run import RobotRun
-from mirotwin.shell.options import load_image
+from mirotwin.shell.firmware_image import load_firmware
 
 SECOND = 24_000_000
 
 
 def robot_run(scenario="fig6", seed=3, firmware=None, index=0):
     """A run of a scenario at its first tick."""
-    return RobotRun(World(load(scenario, ()).scenario, seed, load_image(firmware)), 0, index)
+    return RobotRun(World(load(scenario, ()).scenario, seed, load_firmware(firmware)), 0, index)
 
 
 def debugger_of(run, everyone=False):

@@ -218,7 +218,10 @@ def test_the_shortest_duration_is_one_control_period(mirotwin, tmp_path):
         (["--seed", "abc"], "Invalid value for '--seed': 'abc' is not a whole number."),
         (["--out", ""], "Invalid value for '--out': the path is empty."),
         (["--firmware", ""], "Invalid value for '--firmware': the path is empty."),
-        (["--firmware", "no.ihx"], "no.ihx: there is no such file; give the path of an .ihx or .hex file"),
+        (
+            ["--firmware", "no.ihx"],
+            "no.ihx: there is no such file; build it, or give the path of an .ihx or .hex file",
+        ),
         (["--firmware", "/dev/null"], "/dev/null: is not a regular file; copy the content to a file first"),
     ],
 )

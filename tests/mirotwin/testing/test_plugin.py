@@ -75,7 +75,7 @@ def test_each_test_has_its_verdict(mixed):
         "E       mirotwin.testing.waiting.WaitFailed: no answer within 40 ms, from tick",
         "check failed: frames_accepted_min: net0/robot0: tick 1601600 (66.733 ms): wanted at least 9 frames accepted,",
         "test_mine.py::test_has_a_marker_with_a_mistake: @pytest.mark.mirotwin: there is no key 'scnario'; did you",
-        "test_mine.py::test_has_no_firmware: gone.ihx: there is no such file; build the firmware first",
+        "test_mine.py::test_has_no_firmware: gone.ihx: there is no such file; build it, or give the path",
         "last_lef: there is no such variable; did you mean last_left",
         "motion_stap: there is no such function; did you mean motion_stop",
         "the limit of virtual time was reached, duration_s = 60",

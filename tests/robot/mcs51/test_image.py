@@ -69,7 +69,7 @@ def test_a_damaged_image_is_refused_by_line(tmp_path, lines, line, reason):
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    with pytest.raises(ImageError, match="there is no such file; build the firmware first"):
+    with pytest.raises(ImageError, match="there is no such file; build it, or give the path"):
         load_hex(tmp_path / "none.ihx")
     with pytest.raises(ImageError, match="is a folder; name a file in it"):
         load_hex(tmp_path)

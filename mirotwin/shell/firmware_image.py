@@ -1,0 +1,60 @@
+"""Loads the firmware image that a command, a test, a campaign or a port is asked to run."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.inputs import check_regular
+from miro_robot.firmware import image_path
+from miro_robot.image import FLASH_BYTES, Image, load_hex
+from miro_robot.image.symbols import STACK
+
+_Stamp = tuple[tuple[int, int] | None, ...]
+"""Time and size of the image and of the symbol files beside it, None for one that is not there."""
+
+
+def load_firmware(
+    path: str | Path | None = None,
+    limit: int = FLASH_BYTES,
+    named: bool = True,
+    stack_from: int | None = None,
+) -> Image:
+    """The firmware image at `path`, or the robot's own; a process reads a file once, until it changes.
+
+    `named`: its symbols are needed; the files beside it are read at once, and BadInput is raised for wrong ones.
+    `stack_from`: first address of its stack, which only an image without a linker's map may be given.
+    Raises BadInput for what is no image, or does not fit `limit` bytes.
+    """
+    file = Path(path) if path else image_path()
+    check_regular(file)
+    image = _loaded(
+        file, limit, tuple(map(_stamp, (file, file.with_suffix(".map"), file.with_suffix(".cdb"))))
+    )
+    if named:
+        _ = image.symbols.names
+    return image if stack_from is None else _with_stack(image, stack_from)
+
+
+@lru_cache(maxsize=32)
+def _loaded(file: Path, limit: int, stamp: _Stamp) -> Image:
+    return load_hex(file, limit)
+
+
+def _stamp(file: Path) -> tuple[int, int] | None:
+    try:
+        status = file.stat()
+    except OSError:
+        return None
+    return status.st_mtime_ns, status.st_size
+
+
+def _with_stack(image: Image, start: int) -> Image:
+    known = image.symbols.find(STACK)
+    if known is not None:
+        what = f"the .map beside the image begins its stack at {known.address:#04x}"
+        raise BadInput(image.path, "--stack-from", what, "leave the option out, or link with that stack")
+    return msgspec.structs.replace(image, symbols=image.symbols.with_stack(start))
