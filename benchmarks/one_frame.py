@@ -26,7 +26,7 @@ from miro_robot.inspect.waveform import Waveform
 from miro_robot.mcs51.cpu import Cpu
 from miro_sim.periods import Period
 from miro_sim.scenario.file import load
-from miro_sim.world.events import Event, of_board
+from miro_sim.world.events import Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
@@ -102,7 +102,7 @@ class Way:
     def __init__(self) -> None:
         image = load_hex(image_path())
         world = World(load(SCENARIO).scenario, SEED, image)
-        self.robot, self.board_log = world.robot(), world.robot().board.log
+        self.robot = world.robot()
         view = view_of(world, 0, SCENARIO)
         while world.index < FRAME:
             world.step()
@@ -131,7 +131,7 @@ class Way:
         at_pc = [event for _, event in network.log.since(0) if event.tick >= self.answer.tick]
         self.sent = next(event for event in at_pc if event.what == "sent")
         self.key_up_tick = self.sent.tick - network.keyup_ticks
-        log = [event for _, event in of_board(self.board_log, 0, 0, 0) if event.tick > self.sent.tick]
+        log = [event for _, event in self.robot.log.since(0) if event.tick > self.sent.tick]
         self.received = [event for event in log if event.what == "received"][: len(self.sent.data)]
         last_tick = self.received[-1].tick
         self.commands = [event for event in log if event.what == "command" and event.tick > last_tick][:3]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_sim.world.actions import SETTLE_TICKS
+from miro_sim.world.events import Cursor
 from miro_sim.world.outbox import INJECTED
 from miro_sim.world.world import World
 
@@ -26,7 +27,7 @@ class RadioPort:
         self.world = world
         self.network = network
         self._parts = world.networks[network]
-        self._read = self._parts.log.end
+        self._cursor = Cursor(self._parts.log)
 
     @property
     def free_tick(self) -> int:
@@ -61,7 +62,4 @@ class RadioPort:
 
     def received(self) -> bytes:
         """What the PC has received since the last call; to be called before 4096 events at the PC have passed."""
-        log = self._parts.log
-        found = bytes(event.value for _, event in log.since(self._read) if event.what == "heard")
-        self._read = log.end
-        return found
+        return bytes(event.value for _, event in self._cursor.read() if event.what == "heard")

@@ -24,7 +24,7 @@ from miro_protocol.frames import (
 from miro_protocol.table import SEQ_MODULUS, Flags, FrameType
 from miro_sim.periods import Period
 from miro_sim.world.conditions import Answer, Condition, Heard
-from miro_sim.world.events import Event
+from miro_sim.world.events import Cursor, Event
 from miro_sim.world.waits import WaitExpired, Waits
 from miro_sim.world.world import World
 from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called, why_ended
@@ -56,7 +56,7 @@ class Link:
         self.answers: list[tuple[int, TelemetryFrame]] = []
         """(tick, answer) of all that were heard."""
         self._waits = Waits(world)
-        self._read = world.networks[network].log.end
+        self._cursor = Cursor(world.networks[network].log)
         self._open: list[tuple[int, TelemetryFrame]] = []
         self._characters: list[Event] = []
         world.observers.append(self._look)
@@ -209,11 +209,11 @@ class Link:
 
     def _gather(self) -> None:
         """Reads what the PC has heard by now."""
-        log = self.world.networks[self.network].log
-        for serial, event in log.since(self._read):
+        cursor = self._cursor
+        for serial, event in cursor.log.since(cursor.next):
             if event.what in ("heard", "answer") and event.tick > self.world.tick:
                 break
-            self._read = serial + 1
+            cursor.next = serial + 1
             if event.what == "heard":
                 self._characters.append(event)
             elif event.what == "answer" and event.frame is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from miro_sim.world.events import Event, of_board
+from miro_sim.world.events import Event
 from mirotwin.testing.booted import world_for
 from mirotwin.testing.link import Link
 from mirotwin.testing.robot import RobotUnderTest
@@ -60,9 +60,7 @@ class Rig:
         for network in self.world.networks:
             events += [event for _, event in network.log.since(network.log.end - LAST_EVENTS)]
             for robot in network.robots:
-                log = robot.board.log
-                place = (network.index, robot.slot)
-                events += [event for _, event in of_board(log, log.end - LAST_EVENTS, *place)]
+                events += [event for _, event in robot.log.since(robot.log.end - LAST_EVENTS)]
         end_tick = self.tick if self.tick >= 0 else self.world.tick
         events = sorted((event for event in events if event.tick <= end_tick), key=lambda event: event.tick)
         return in_words(events[-LAST_EVENTS:])[-LAST_LINES:]

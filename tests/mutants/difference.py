@@ -24,7 +24,7 @@ from miro_robot.image import load_hex
 from miro_robot.lm629.commands import BY_OPCODE
 from miro_sim.periods import Period
 from miro_sim.scenario.file import parse
-from miro_sim.world.events import Event, of_board
+from miro_sim.world.events import Cursor, Event
 from miro_sim.world.world import World
 from tests.mutants.build import build, shipped
 from tests.mutants.draw import mutants_of, source_files
@@ -74,13 +74,11 @@ def seen_of(image: Path, seconds: float, seed: int) -> list[list[Event]]:
     script = [sent for host in hosts for sent in host.transmissions(end_tick)]
     world = World(scenario, seed, load_hex(image), script)
     seen: list[list[Event]] = [[] for _ in hosts]
-    read = [0 for _ in hosts]
+    cursors = [Cursor(world.robot(index, slot).log) for index, (_, slot) in enumerate(NETWORKS)]
 
     def look(period: Period) -> None:
-        for index, (_, slot) in enumerate(NETWORKS):
-            log = world.robot(index, slot).board.log
-            seen[index] += [event for _, event in of_board(log, read[index], index, slot) if _counts(event)]
-            read[index] = log.end
+        for found, cursor in zip(seen, cursors, strict=True):
+            found += [event for _, event in cursor.read() if _counts(event)]
 
     world.observers.append(look)
     while not world.finished:

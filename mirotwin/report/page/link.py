@@ -22,9 +22,8 @@ from miro_protocol.robot_receiver import Reception, RobotReceiver
 from miro_protocol.robot_rules import TO_RI_TICKS
 from miro_protocol.table import TELEMETRY
 from miro_protocol.transmission import DOWN, Transmission
-from miro_robot.event_log import EventLog
 from miro_sim.periods import Period
-from miro_sim.world.events import Event, of_board
+from miro_sim.world.events import Cursor, Event
 from miro_sim.world.world import World
 
 OF_PC = ("answer", "reset", "power", "radio")
@@ -90,13 +89,13 @@ class LinkLog:
         self.world = world
         self.wire: list[Transmission] = []
         self._at_pc: dict[int, list[Event]] = {network.index: [] for network in world.networks}
-        self._pc_read = {network.index: network.log.end for network in world.networks}
-        self._board_read: dict[tuple[int, int], int] = {}
+        self._pc = {network.index: Cursor(network.log) for network in world.networks}
+        self._board: dict[tuple[int, int], Cursor] = {}
         self._arrivals: dict[tuple[int, int], Arrivals] = {}
         for network in world.networks:
             for robot in network.robots:
                 place = (network.index, robot.slot)
-                self._board_read[place] = robot.board.log.end
+                self._board[place] = Cursor(robot.log)
                 self._arrivals[place] = Arrivals(network.spec.robots)
         world.observers.append(self.look)
 
@@ -104,18 +103,15 @@ class LinkLog:
         """Takes over what the logs have that is new."""
         self.wire += period.wire
         for network in self.world.networks:
-            index, log = network.index, network.log
-            new = [event for _, event in log.since(self._pc_read[index]) if event.what in OF_PC]
-            self._pc_read[index] = log.end
+            index = network.index
+            new = [event for _, event in self._pc[index].read() if event.what in OF_PC]
             self._at_pc[index] += new
             for robot in network.robots:
                 restarts = [event for event in new if event.what in RESTARTS and event.slot == robot.slot]
-                self._look_at((index, robot.slot), robot.board.log, restarts)
+                self._look_at((index, robot.slot), restarts)
 
-    def _look_at(self, place: tuple[int, int], log: EventLog, restarts: Sequence[Event]) -> None:
-        events = [event for _, event in of_board(log, self._board_read[place], *place)]
-        self._board_read[place] = log.end
-        received = [event for event in events if event.what == "received"]
+    def _look_at(self, place: tuple[int, int], restarts: Sequence[Event]) -> None:
+        received = [event for _, event in self._board[place].read() if event.what == "received"]
         for event in sorted([*received, *restarts], key=lambda event: event.tick):
             if event.what in RESTARTS:
                 self._arrivals[place].restart()

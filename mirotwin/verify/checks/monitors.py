@@ -24,7 +24,7 @@ from miro_host.plugins import PluginError
 from miro_host.raised import raised
 from miro_protocol.robot_receiver import RobotReceiver
 from miro_sim.periods import Period
-from miro_sim.world.events import Event, of_board
+from miro_sim.world.events import Cursor, Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
 from miro_sim.world.world import World
@@ -141,8 +141,7 @@ class _RobotMonitors:
         self.hears_board = any(what not in _FROM_PC for what in self.of_events)
         self.hears_pc = bool(self.of_events)
         self.hears_characters = "heard" in self.of_events
-        self.read_board = robot.board.log.end
-        self.read_pc = network.log.end
+        self.of_board, self.of_pc = Cursor(robot.log), Cursor(network.log)
         self.faults = len(robot.board.faults)
         self.waiting: list[Event] = []
         self.lost = 0
@@ -169,18 +168,13 @@ class _RobotMonitors:
 
     def _gather(self) -> None:
         """What is new in the logs."""
-        log, pc = self.robot.board.log, self.network.log
         if self.hears_pc:
-            self.lost += max(0, pc.first - self.read_pc)
-            self.waiting += [
-                event for _, event in pc.since(self.read_pc, self.hears_characters) if self._concerns(event)
-            ]
-            self.read_pc = pc.end
+            self.lost += self.of_pc.lost
+            new = self.of_pc.read(self.hears_characters)
+            self.waiting += [event for _, event in new if self._concerns(event)]
         if self.hears_board:
-            self.lost += max(0, log.first - self.read_board)
-            place = (self.network.index, self.robot.slot)
-            self.waiting += [event for _, event in of_board(log, self.read_board, *place)]
-            self.read_board = log.end
+            self.lost += self.of_board.lost
+            self.waiting += [event for _, event in self.of_board.read()]
 
     def _concerns(self, event: Event) -> bool:
         if event.what in _RESTARTS:

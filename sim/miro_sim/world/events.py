@@ -136,11 +136,47 @@ def of_action(action: Action) -> Event:
     return Event(tick=action.tick, what=what, network=action.network, slot=action.slot, value=value)
 
 
-def of_board(log: EventLog, serial: int, network: int, slot: int) -> Iterator[tuple[int, Event]]:
-    """(serial number, event) of a board's events from `serial` on that are kept."""
-    for number in range(max(serial, log.first), log.end):
-        tick, kind, code, size, value = log.event(number)
-        yield number, _event(tick, kind, code, size, value, network, slot)
+class RobotLog:
+    """The events of a robot's board, read as those of a PC are."""
+
+    NOT_STATE = ("log", "network", "slot")
+
+    def __init__(self, log: EventLog, network: int, slot: int) -> None:
+        self.log = log
+        self.network = network
+        self.slot = slot
+
+    @property
+    def first(self) -> int:
+        return self.log.first
+
+    @property
+    def end(self) -> int:
+        return self.log.end
+
+    def since(self, serial: int, heard: bool = True) -> Iterator[tuple[int, Event]]:
+        """(serial number, event) of those from `serial` on that are kept."""
+        for number in range(max(serial, self.log.first), self.log.end):
+            yield number, _event(*self.log.event(number), self.network, self.slot)
+
+
+class Cursor:
+    """Who reads a log on, from now: `next` is the serial number of the first event that was not read."""
+
+    def __init__(self, log: HostLog | RobotLog) -> None:
+        self.log = log
+        self.next = log.end
+
+    @property
+    def lost(self) -> int:
+        """Events that were not read and are no longer kept."""
+        return max(0, self.log.first - self.next)
+
+    def read(self, heard: bool = True) -> list[tuple[int, Event]]:
+        """(serial number, event) of what is new; `heard`: with the characters that a PC received."""
+        found = list(self.log.since(self.next, heard))
+        self.next = self.log.end
+        return found
 
 
 def _event(tick: int, kind: int, code: int, size: int, value: int, network: int, slot: int) -> Event:

@@ -24,6 +24,7 @@ from miro_sim.periods import Axis, Control, RobotPeriod
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.scenario import keys as sc
 from miro_sim.scenario.build import dead_s, drive_for, pilot_for, reference_for
+from miro_sim.world.events import RobotLog
 
 COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
 
@@ -39,6 +40,7 @@ class Robot:
         "reference",
         "counter_addresses",
         "drive",  # the board saves it
+        "log",
         "marks",
         "asked",
     )
@@ -70,6 +72,7 @@ class Robot:
             raise DomainError(f"{name}: its drive parameters lead to a value that is not finite") from error
         strap = spec.slot if spec.strap is None else spec.strap
         self.board = Board(load_wiring(), self.drive, strap, robots, scenario.lm629, scenario.stop_on_fault)
+        self.log = RobotLog(self.board.log, network, spec.slot)
         self.board.load(image)
         self.marks: tuple[int, ...] = ()
         self.asked: list[tuple[Callable[[Robot], object], str]] = []

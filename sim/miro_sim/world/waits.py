@@ -14,7 +14,7 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Flat
 from miro_protocol.decoder import Decoder, Received
 from miro_sim.world.conditions import Condition
-from miro_sim.world.events import PC, Event, of_board
+from miro_sim.world.events import PC, Cursor, Event
 from miro_sim.world.watch import Watch
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class WaitExpired(TimeoutError):
 class Waits:
     """The waits of one world, and what happened since the last one ended.
 
-    `backlog`: events that no wait has consumed. `read`: by network and slot, up to where its log was read.
+    `backlog`: events that no wait has consumed. `cursors`: by network and slot, on its log.
     `reached`: the number of the instruction at which a wait ended before it was executed.
     """
 
@@ -59,14 +59,14 @@ class Waits:
     def forget(self) -> None:
         """The world was put somewhere else: nothing that happened before counts."""
         self.backlog: list[Entry] = []
-        self.read: dict[tuple[int, int], int] = {}
+        self.cursors: dict[tuple[int, int], Cursor] = {}
         self.reached: dict[tuple[int, int], int] = {}
         self.decoders: dict[tuple[int, int], Decoder] = {}  # made by the first wait
         self.states: dict[tuple[int, int], Flat] = {}
         for index, network in enumerate(self.world.networks):
-            self.read[index, PC] = network.log.end
+            self.cursors[index, PC] = Cursor(network.log)
             for robot in network.robots:
-                self.read[index, robot.spec.slot] = robot.board.log.end
+                self.cursors[index, robot.spec.slot] = Cursor(robot.log)
 
     def collect(self) -> None:
         """Takes over what the logs hold, which is not for ever: for who moves the world without a wait."""
@@ -172,19 +172,13 @@ class Waits:
 
     def _gather(self, watch: Watch) -> None:
         """Reads what is new in all logs."""
-        for index, network in enumerate(self.world.networks):
-            for serial, event in network.log.since(self.read[index, PC]):
-                self.backlog.append(((event.tick, index, PC, serial), event))
-            self.read[index, PC] = network.log.end
-            for robot in network.robots:
-                place = (index, robot.spec.slot)
-                for serial, event in of_board(robot.board.log, self.read[place], *place):
-                    if event.what == "reached" and self.reached.get(place) == event.value:
-                        continue  # a wait has ended before this instruction already
-                    self.backlog.append(((event.tick, *place, serial), event))
-                    if event.what == "received":
-                        self._decode(place, serial, event)
-                self.read[place] = robot.board.log.end
+        for source, cursor in self.cursors.items():
+            for serial, event in cursor.read():
+                if event.what == "reached" and self.reached.get(source) == event.value:
+                    continue  # a wait has ended before this instruction already
+                self.backlog.append(((event.tick, *source, serial), event))
+                if event.what == "received":
+                    self._decode(source, serial, event)
         self.backlog += watch.edges()
 
     def _decode(self, place: tuple[int, int], serial: int, event: Event) -> None:
@@ -200,7 +194,8 @@ class Waits:
 
     def _go_back(self, place: _Place) -> None:
         self.backlog = list(place.backlog)
-        self.read = dict(place.read)
+        for source, serial in place.read.items():
+            self.cursors[source].next = serial
         for key, state in place.states.items():
             self.states[key].load(state)
 
@@ -211,5 +206,5 @@ class _Place:
     def __init__(self, waits: Waits, watch: Watch) -> None:
         self.next_edge = watch.next_edge
         self.backlog = list(waits.backlog)
-        self.read = dict(waits.read)
+        self.read = {source: cursor.next for source, cursor in waits.cursors.items()}
         self.states = {place: state.save() for place, state in waits.states.items()}

@@ -1,0 +1,48 @@
+"""Logs of a PC and of a robot's board, and cursors that read them on."""
+
+from miro_robot.event_log import EventLog
+from miro_sim.world.events import KEPT, Cursor, Event, HostLog, RobotLog
+
+SENT = 1  # of a board's log, which keeps 2048 events
+CAPACITY = 2048
+
+
+def robot_log():
+    return RobotLog(EventLog(), 0, 2)
+
+
+def host_log():
+    return HostLog(0, lambda start_tick: start_tick + 7)
+
+
+def test_a_cursor_gives_what_was_noted_after_it_was_made_once():
+    log = robot_log()
+    log.log.note(SENT, 5, 0, 0x41)
+    cursor = Cursor(log)
+    log.log.note(SENT, 6, 0, 0x42)
+    assert cursor.read() == [(1, Event(tick=6, what="transmitted", slot=2, value=0x42))]
+    assert cursor.read() == []
+
+
+def test_a_cursor_on_a_pc_may_leave_out_characters():
+    log = host_log()
+    with_characters, without = Cursor(log), Cursor(log)
+    log.note_heard([(0x55, True, 10)])
+    log.note(Event(tick=11, what="answer"))
+    assert [(serial, event.what, event.tick) for serial, event in with_characters.read()] == [
+        (0, "heard", 17),
+        (1, "answer", 11),
+    ]
+    assert [event.what for _, event in without.read(heard=False)] == ["answer"]
+
+
+def test_a_cursor_counts_what_was_dropped_before_it_was_read():
+    robot, host = robot_log(), host_log()
+    on_robot, on_host = Cursor(robot), Cursor(host)
+    for tick in range(CAPACITY + 3):
+        robot.log.note(SENT, tick, 0, 0)
+    for tick in range(KEPT + 4):
+        host.note(Event(tick=tick, what="sent"))
+    assert (on_robot.lost, on_host.lost) == (3, 4)
+    assert [on_robot.read()[0][0], on_host.read()[0][0]] == [3, 4]
+    assert (on_robot.lost, on_host.lost) == (0, 0)
