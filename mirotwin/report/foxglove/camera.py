@@ -9,13 +9,19 @@ from __future__ import annotations
 from miro_exact.dmath import sincos
 from miro_host.eye.camera_parameters import HEIGHT, WIDTH, CameraParameters
 from mirotwin.report.foxglove.frames import PITCH, camera_frame
-from mirotwin.report.foxglove.messages import CameraCalibration, FrameTransform, Quaternion, Time, Vector3
+from mirotwin.report.foxglove.messages import (
+    CameraCalibration,
+    FrameTransform,
+    Quaternion,
+    Timestamp,
+    Vector3,
+)
 
 UPSIDE_DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
 """From right, up, backwards to right, down, ahead: half a turn about the first."""
 
 
-def transform(network: int, lens: CameraParameters, at: Time) -> FrameTransform:
+def transform(network: int, lens: CameraParameters, at: Timestamp) -> FrameTransform:
     """Where the camera hangs and where it looks: turned, tilted, and upside down."""
     turned = _about(lens.turn_rad, (0.0, 0.0, 1.0))
     tilted = _product(_about(lens.tilt_x_rad, (1.0, 0.0, 0.0)), _about(lens.tilt_y_rad, (0.0, 1.0, 0.0)))
@@ -24,7 +30,7 @@ def transform(network: int, lens: CameraParameters, at: Time) -> FrameTransform:
     return FrameTransform(at, PITCH, camera_frame(network), place, rotation)
 
 
-def calibration(network: int, lens: CameraParameters, at: Time) -> CameraCalibration:
+def calibration(network: int, lens: CameraParameters, at: Timestamp) -> CameraCalibration:
     """The true optics."""
     along, down = lens.focal_px, lens.focal_px * lens.pixel_aspect
     u, v = lens.centre_u_px - 0.5, lens.centre_v_px - 0.5

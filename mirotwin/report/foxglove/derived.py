@@ -22,7 +22,7 @@ from mirotwin.report.foxglove.messages import (
     Log,
     SceneEntity,
     SceneUpdate,
-    Time,
+    Timestamp,
     time_of,
 )
 from mirotwin.report.foxglove.shapes import Point
@@ -92,24 +92,24 @@ class Derived:
         for action in period.actions:
             yield Said(topics.LOG, action.tick, notes.of_action(action))
 
-    def _trail(self, robot: RobotPeriod, index: int, at: Time) -> Iterator[SceneEntity]:
+    def _trail(self, robot: RobotPeriod, index: int, at: Timestamp) -> Iterator[SceneEntity]:
         place = robot.network, robot.slot
         return self._trails.setdefault(place, paths.Trail()).add(robot, index, at)
 
-    def _transforms(self, period: Period, at: Time) -> FrameTransforms:
+    def _transforms(self, period: Period, at: Timestamp) -> FrameTransforms:
         found = [one for robot in period.robots for one in frames.of_robot(robot, at)]
         if self._lens is not None:
             found += [camera.transform(network, self._lens.lens, at) for network in _networks(period)]
         return FrameTransforms(tuple(found))
 
-    def _standing(self, period: Period, at: Time) -> Iterator[Said]:
+    def _standing(self, period: Period, at: Timestamp) -> Iterator[Said]:
         yield Said(topics.SCENE, period.tick, SceneUpdate((), tuple(self._scene(period, at))))
         if self._lens is not None:
             for network in _networks(period):
                 message = camera.calibration(network, self._lens.lens, at)
                 yield Said(topics.calibration_topic(network), period.tick, message)
 
-    def _scene(self, period: Period, at: Time) -> Iterator[SceneEntity]:
+    def _scene(self, period: Period, at: Timestamp) -> Iterator[SceneEntity]:
         yield pitch.pitch(at)
         if isinstance(self._lens, PixelCamera) and self._lens.ball is not None:
             yield pitch.ball(self._lens.ball, at)

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 from miro_host.posture import Posture
 from miro_sim.periods import RobotPeriod
-from mirotwin.report.foxglove.messages import FrameTransform, Time, Vector3
+from mirotwin.report.foxglove.messages import FrameTransform, Timestamp, Vector3
 from mirotwin.report.foxglove.shapes import heading
 
 PITCH = "pitch"
@@ -35,7 +35,7 @@ def camera_frame(network: int) -> str:
     return f"net{network}/camera"
 
 
-def of_robot(robot: RobotPeriod, at: Time) -> Iterator[FrameTransform]:
+def of_robot(robot: RobotPeriod, at: Timestamp) -> Iterator[FrameTransform]:
     """Truth, reference, and the measurement if there is one."""
     place = robot.network, robot.slot
     yield _on_floor(robot_frame(*place), robot.truth, at)
@@ -44,6 +44,6 @@ def of_robot(robot: RobotPeriod, at: Time) -> Iterator[FrameTransform]:
         yield _on_floor(measured_frame(*place), robot.measurement, at)
 
 
-def _on_floor(frame: str, posture: Posture, at: Time) -> FrameTransform:
+def _on_floor(frame: str, posture: Posture, at: Timestamp) -> FrameTransform:
     place = Vector3(posture.x_m, posture.y_m, 0.0)
     return FrameTransform(at, PITCH, frame, place, heading(posture.theta_rad))

@@ -12,20 +12,20 @@ from miro_exact.clock import nanoseconds
 SECOND_NS = 1_000_000_000
 
 
-class Time(msgspec.Struct, frozen=True):
+class Timestamp(msgspec.Struct, frozen=True):
     """A moment of simulated time, or a length of it."""
 
     sec: int
     nsec: int
 
 
-ALWAYS = Time(0, 0)
+ALWAYS = Timestamp(0, 0)
 """The lifetime of what stays until it is replaced."""
 
 
-def time_of(tick: int) -> Time:
+def time_of(tick: int) -> Timestamp:
     """Simulated time, rounded down to nanoseconds."""
-    return Time(*divmod(nanoseconds(tick), SECOND_NS))
+    return Timestamp(*divmod(nanoseconds(tick), SECOND_NS))
 
 
 class Vector3(msgspec.Struct, frozen=True):
@@ -56,7 +56,7 @@ class Color(msgspec.Struct, frozen=True):
 class FrameTransform(msgspec.Struct, frozen=True):
     """Where the child frame lies in the parent frame."""
 
-    timestamp: Time
+    timestamp: Timestamp
     parent_frame_id: str
     child_frame_id: str
     translation: Vector3
@@ -115,10 +115,10 @@ class TextPrimitive(msgspec.Struct, frozen=True):
 class SceneEntity(msgspec.Struct, frozen=True, kw_only=True):
     """Primitives in one frame. It replaces the entity of the same `id` on the same topic."""
 
-    timestamp: Time
+    timestamp: Timestamp
     frame_id: str
     id: str
-    lifetime: Time = ALWAYS
+    lifetime: Timestamp = ALWAYS
     frame_locked: bool = True
     metadata: tuple[()] = ()
     arrows: tuple[()] = ()
@@ -139,7 +139,7 @@ class SceneUpdate(msgspec.Struct, frozen=True):
 class CompressedImage(msgspec.Struct, frozen=True):
     """`data` in base64 as JSON."""
 
-    timestamp: Time
+    timestamp: Timestamp
     frame_id: str
     data: bytes
     format: str
@@ -148,7 +148,7 @@ class CompressedImage(msgspec.Struct, frozen=True):
 class CameraCalibration(msgspec.Struct, frozen=True):
     """Matrices row by row."""
 
-    timestamp: Time
+    timestamp: Timestamp
     frame_id: str
     width: int
     height: int
@@ -165,7 +165,7 @@ INFO, WARNING, ERROR = 2, 3, 4
 class Log(msgspec.Struct, frozen=True):
     """`level`: INFO, WARNING or ERROR. `name`: of whom it tells."""
 
-    timestamp: Time
+    timestamp: Timestamp
     level: int
     message: str
     name: str

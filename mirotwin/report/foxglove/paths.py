@@ -12,7 +12,7 @@ from miro_sim.scenario.build import reference_for
 from miro_sim.scenario.keys import Robot
 from mirotwin.report.foxglove import shapes
 from mirotwin.report.foxglove.frames import PITCH, robot_frame
-from mirotwin.report.foxglove.messages import SceneEntity, Time
+from mirotwin.report.foxglove.messages import SceneEntity, Timestamp
 from mirotwin.report.foxglove.robots import MEASURED, REFERENCE
 from mirotwin.report.foxglove.shapes import Point
 
@@ -34,7 +34,7 @@ class Trail:
         self._truth: deque[Point] = deque(maxlen=KEPT)
         self._seen: deque[Point] = deque(maxlen=KEPT)
 
-    def add(self, robot: RobotPeriod, index: int, at: Time) -> Iterator[SceneEntity]:
+    def add(self, robot: RobotPeriod, index: int, at: Timestamp) -> Iterator[SceneEntity]:
         """The trails up to control period `index`, which is added."""
         frame = robot_frame(robot.network, robot.slot)
         for name, kept, posture, color in (
@@ -58,7 +58,7 @@ def reference_points(robot: Robot, duration_s: float) -> tuple[Point, ...]:
     return tuple((at.x_m, at.y_m) for at in found)
 
 
-def reference(network: int, slot: int, points: Iterable[Point], at: Time) -> SceneEntity:
+def reference(network: int, slot: int, points: Iterable[Point], at: Timestamp) -> SceneEntity:
     """It as a line on the floor."""
     line = shapes.strip(points, PATH_Z_M, WIDE_M, REFERENCE)
     name = f"{robot_frame(network, slot)}/path"

@@ -27,7 +27,7 @@ from mirotwin.report.foxglove.messages import (
     CubePrimitive,
     LinePrimitive,
     SceneEntity,
-    Time,
+    Timestamp,
     TriangleListPrimitive,
     Vector3,
 )
@@ -45,7 +45,7 @@ CIRCLE_POINTS = 48
 _TURN_RAD = 6.283185307179586
 
 
-def pitch(at: Time) -> SceneEntity:
+def pitch(at: Timestamp) -> SceneEntity:
     """Everything but the ball."""
     return SceneEntity(
         timestamp=at,
@@ -57,7 +57,7 @@ def pitch(at: Time) -> SceneEntity:
     )
 
 
-def ball(found: Ball, at: Time) -> SceneEntity:
+def ball(found: Ball, at: Timestamp) -> SceneEntity:
     """The golf ball, which lies still."""
     place = (found.x_cm / 100.0, found.y_cm / 100.0, BALL_RADIUS_M)
     sphere = shapes.ball(place, BALL_RADIUS_M, shapes.paint("ball middle"))

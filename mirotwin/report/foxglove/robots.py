@@ -21,7 +21,7 @@ from mirotwin.report.foxglove.messages import (
     Pose,
     SceneEntity,
     TextPrimitive,
-    Time,
+    Timestamp,
     Vector3,
 )
 
@@ -35,7 +35,7 @@ REFERENCE = Color(0.2, 0.9, 0.3, 1.0)
 LABEL = Color(1.0, 1.0, 1.0, 1.0)
 
 
-def drawn(network: int, slot: int, pattern: PatternName | None, at: Time) -> Iterator[SceneEntity]:
+def drawn(network: int, slot: int, pattern: PatternName | None, at: Timestamp) -> Iterator[SceneEntity]:
     """A robot, its measurement and its reference; without a `pattern` its top is plain."""
     frame = robot_frame(network, slot)
     label = TextPrimitive(
@@ -66,7 +66,7 @@ def _patches(network: int, slot: int, pattern: PatternName) -> Iterator[CubePrim
             yield shapes.box(low, high, shapes.paint(names[number]))
 
 
-def _outline(frame: str, color: Color, at: Time) -> SceneEntity:
+def _outline(frame: str, color: Color, at: Timestamp) -> SceneEntity:
     """The square seen from above, and a line from its centre ahead; a little above the robot's top."""
     z_m = ROBOT_HEIGHT_M + 2.0 * TOP_M
     corners = ((HALF_M, HALF_M), (-HALF_M, HALF_M), (-HALF_M, -HALF_M), (HALF_M, -HALF_M))
