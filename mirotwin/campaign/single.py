@@ -23,7 +23,6 @@ from mirotwin.recording.recorder import Recorder
 from mirotwin.recording.source import source_of
 from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import summarise
-from mirotwin.report.theory import gains_of
 from mirotwin.rerun import runner
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.tracebacks import show_traceback
@@ -78,17 +77,7 @@ def _run(job: Work) -> RunOutcome:
         _move(world, player, tracks, recorder)
     wall_s = now_s() - began_s
     checks.finish()
-    summary = summarise(
-        scenario=scenario.name,
-        seed=job.seed,
-        engine=job.engine,
-        tracks=tracks,
-        simulated_ticks=world.tick,
-        wall_s=wall_s,
-        counters=world.counters(),
-        firmware_sha256=image.sha256 or "",
-        gains=gains_of(scenario),
-    )
+    summary = summarise(world, tracks, job.engine, wall_s)
     verdicts = _verdicts(checks, player)
     failure = _failure(checks, player)
     return RunOutcome(

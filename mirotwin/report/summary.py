@@ -1,18 +1,23 @@
 """What a run amounts to, as numbers: `summary.json` and the table on the screen."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
-from mirotwin.recording.track import ErrorSample, RobotId, Tracks
+from mirotwin.recording.track import ErrorSample, Tracks
 from mirotwin.report.learnt_calibration import LearntCalibration
 from mirotwin.report.learnt_wheels import LearntWheels
 from mirotwin.report.live import LiveFigures
-from mirotwin.report.theory import SlidingGains, Theory, theory_of
+from mirotwin.report.theory import SlidingGains, Theory, gains_of, theory_of
 from mirotwin.verify.checks.interface import Expectation
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World  # a hot module: not before the engine was chosen
 
 
 class Tracking(msgspec.Struct, frozen=True):
@@ -180,55 +185,29 @@ def settling_text(samples: Sequence[ErrorSample]) -> str:
     return f"settled at {settling_s:.2f} s"
 
 
-def summarise(
-    *,
-    scenario: str,
-    seed: int,
-    engine: str,
-    tracks: Tracks,
-    simulated_ticks: int,
-    resumed_ticks: int = 0,
-    wall_s: float,
-    counters: Mapping[str, Mapping[str, Any]],
-    firmware_sha256: str,
-    complete: bool = True,
-    reason: str = "",
-    settings: tuple[str, ...] = (),
-    calibrations: tuple[LearntCalibration, ...] = (),
-    wheels: tuple[LearntWheels, ...] = (),
-    gains: Mapping[RobotId, SlidingGains] = {},
-    expectations: tuple[Expectation, ...] = (),
-    steps: StepResults | None = None,
-) -> Summary:
-    """The summary of a run; `counters` as `World.counters()` gives them, `gains` as `theory.gains_of`."""
+def summarise(world: World, tracks: Tracks, engine: str, wall_s: float, begin_tick: int = 0) -> Summary:
+    """The summary of a run of `world` from `begin_tick`, without what only some runs have."""
+    gains = gains_of(world.scenario)
+    counters: Mapping[str, Mapping[str, Any]] = world.counters()
     everyone = tuple(
-        RobotTracking(
-            *place, tracking_of(track.errors), theory_of(track.theory, gains.get(place, SlidingGains()))
-        )
-        for place, track in tracks.robots.items()
+        RobotTracking(*id, tracking_of(track.errors), theory_of(track.theory, gains.get(id, SlidingGains())))
+        for id, track in tracks.robots.items()
     )
     return Summary(
-        scenario=scenario,
-        seed=seed,
+        scenario=world.scenario.name,
+        seed=world.seed,
         engine=engine,
         digest=tracks.digest,
-        simulated_s=seconds(simulated_ticks),
+        simulated_s=seconds(world.tick),
         wall_s=wall_s,
-        realtime_factor=seconds(simulated_ticks - resumed_ticks) / wall_s if wall_s > 0.0 else 0.0,
+        realtime_factor=seconds(world.tick - begin_tick) / wall_s if wall_s > 0.0 else 0.0,
         tracking=everyone[0].tracking if everyone else tracking_of([]),
         link=LinkCounts(**counters["link"]),
-        firmware=FirmwareCounts(sha256=firmware_sha256, **counters["firmware"]),
+        firmware=FirmwareCounts(sha256=world.image.sha256 or "", **counters["firmware"]),
         vision=VisionCounts(**counters["vision"]) if counters["vision"] else None,
-        calibrations=calibrations,
-        wheels=wheels,
         theory=everyone[0].theory if everyone else None,
         robots=everyone if len(everyone) > 1 else (),
-        complete=complete,
-        reason=reason,
-        resumed_s=seconds(resumed_ticks) if resumed_ticks else None,
-        set=settings,
-        expectations=expectations,
-        steps=steps,
+        resumed_s=seconds(begin_tick) if begin_tick else None,
     )
 
 

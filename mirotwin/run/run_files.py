@@ -27,7 +27,6 @@ from mirotwin.report.learnt_calibration import learnt_calibrations
 from mirotwin.report.learnt_wheels import learnt_wheels
 from mirotwin.report.live import LiveFigures
 from mirotwin.report.summary import StepResults, Summary, summarise, to_json
-from mirotwin.report.theory import gains_of
 from mirotwin.rerun import runner
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.shell.program import complain
@@ -167,26 +166,18 @@ class RunFiles:
         self.player.finish()
 
     def _summary(self, complete: bool, reason: str = "") -> Summary:
-        summary = summarise(
-            scenario=self.source.scenario_name,
-            seed=self.source.seed,
-            engine=self.engine,
-            tracks=self.tracks,
-            simulated_ticks=self.world.tick,
-            resumed_ticks=0 if self.stops is None else self.stops.begin_tick,
-            wall_s=self._wall_s,
-            counters=self.world.counters(),
-            firmware_sha256=self.source.firmware_sha256,
+        begin_tick = 0 if self.stops is None else self.stops.begin_tick
+        return replace(
+            summarise(self.world, self.tracks, self.engine, self._wall_s, begin_tick),
             complete=complete,
             reason=reason,
-            settings=self.settings,
+            set=self.settings,
             calibrations=learnt_calibrations(self.world.networks),
             wheels=learnt_wheels(self.world.networks),
-            gains=gains_of(self.world.scenario),
             expectations=self.checks.verdicts(),
             steps=None if self.player is None else self._steps(self.player),
+            live=None if self.session is None else self.session.live(),
         )
-        return summary if self.session is None else replace(summary, live=self.session.live())
 
     def _steps(self, player: Player) -> StepResults:
         verdicts = [verdict for checks in player.checks for verdict in checks.verdicts()]

@@ -3,6 +3,7 @@
 import json
 import math
 import tracemalloc
+from types import SimpleNamespace
 
 import msgspec
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_sim.periods import Period
+from miro_sim.scenario.file import load
 from mirotwin.recording.track import ErrorSample, Tracks, error_of, wrapped
 from mirotwin.report.summary import (
     Summary,
@@ -45,16 +47,14 @@ KEYS = {
 
 
 def summary_of(run: list[Period]) -> Summary:
-    return summarise(
-        scenario="fig6",
+    world = SimpleNamespace(
+        scenario=load("fig6").scenario,
         seed=7,
-        engine="compiled",
-        tracks=Tracks(run),
-        simulated_ticks=len(run) * CONTROL_PERIOD_TICKS,
-        wall_s=0.5,
-        counters=COUNTERS,
-        firmware_sha256="ab" * 32,
+        image=SimpleNamespace(sha256="ab" * 32),
+        tick=len(run) * CONTROL_PERIOD_TICKS,
+        counters=lambda: COUNTERS,
     )
+    return summarise(world, Tracks(run), "compiled", 0.5)
 
 
 def samples(*errors: tuple[float, float, float]) -> list[ErrorSample]:
