@@ -23,11 +23,10 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from mirotwin.campaign.design import Level
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import plan_of_levels
-from mirotwin.campaign.processes import cores
 from mirotwin.campaign.seeds import seeds_of
 from mirotwin.campaign.single import run_single
 from mirotwin.campaign.worker import RunOutcome
-from mirotwin.campaign.workers import Processes
+from mirotwin.campaign.workers import Processes, cores
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 RMS = ("rms_position_cm", "rms_x_cm", "rms_y_cm", "rms_theta_deg")

@@ -40,9 +40,9 @@ from miro_robot.firmware import image_path
 from miro_robot.image import Image, load_hex
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
-from mirotwin.campaign.processes import cores, processes
 from mirotwin.campaign.reproduce.claims import number as shown
 from mirotwin.campaign.reproduce.plan import STARTS, Start
+from mirotwin.campaign.workers import cores, processes
 from mirotwin.recording.track import SETTLED_CM, SETTLED_RAD
 
 SEED = 1999

@@ -19,8 +19,7 @@ from miro_sim.world.world import World
 from mirotwin.campaign.columns import figures_of
 from mirotwin.campaign.wall import now_s
 from mirotwin.campaign.worker import RunOutcome, Work
-from mirotwin.recording.recorder import Recorder
-from mirotwin.recording.source import source_of
+from mirotwin.recording.recorder import Recorder, source_of
 from mirotwin.recording.track import Tracks
 from mirotwin.report.summary import summarise
 from mirotwin.rerun import runner

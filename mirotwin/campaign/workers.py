@@ -1,10 +1,70 @@
-"""The workers of a campaign: processes of this machine, or an executor of the caller."""
+"""The workers of a campaign: processes of this machine, each with the engine of the first one, or a caller's executor.
+
+Nothing here imports a hot module: a new process reads this file before its engine is chosen.
+"""
 
 from __future__ import annotations
 
-from concurrent.futures import CancelledError, Executor
+import os
+import signal
+from collections.abc import Iterator
+from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
 
-from mirotwin.campaign.processes import cores, processes
+from miro_exact import engine
+from mirotwin.campaign.wall import end_with_parent
+from mirotwin.shell.children import safe_path
+
+
+def processes(count: int) -> ProcessPoolExecutor:
+    """Processes with the engine of this one, which have begun.
+
+    Ctrl-C goes to all processes of a terminal; the first one tells the others to end. They ignore it from their first
+    instruction on: what a process ignores, those that it starts ignore too.
+    """
+    with _ignoring_interrupts(), safe_path():
+        found = ProcessPoolExecutor(
+            max_workers=count,
+            mp_context=get_context("spawn"),
+            initializer=_begin,
+            initargs=(engine.active(),),
+        )
+        for _ in range(count):  # each of which starts a process, as long as none is idle
+            found.submit(_nothing)
+    return found
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _begin(chosen: str) -> None:
+    """In a new process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
+    engine.select(chosen)
+
+
+def _nothing() -> None:
+    """A job that only needs a process."""
+
+
+@contextmanager
+def _ignoring_interrupts() -> Iterator[None]:
+    try:
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    except ValueError:  # not the thread that signals come to
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
 
 AHEAD = 4
 """Jobs for each worker that are handed over: enough to keep it busy, few enough to stop soon."""

@@ -14,7 +14,7 @@ import msgspec
 
 from mirotwin.ports.byte_fifo import ByteFifo
 from mirotwin.ports.radio_port import RadioPort
-from mirotwin.report.live import Plug
+from mirotwin.report.summary import Plug
 
 CHUNK_BYTES = 4096
 Tell = Callable[[str], object]

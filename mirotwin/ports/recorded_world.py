@@ -16,8 +16,7 @@ from miro_sim.scenario.file import ScenarioText
 from miro_sim.world.world import World
 from mirotwin.ports.live import live_scenario
 from mirotwin.ports.url import UrlOptions
-from mirotwin.recording.recorder import Recorder
-from mirotwin.recording.source import source_of
+from mirotwin.recording.recorder import Recorder, source_of
 from mirotwin.rerun import runner
 from mirotwin.rerun.pacing import Every
 from mirotwin.shell.firmware_image import load_firmware

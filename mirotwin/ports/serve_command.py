@@ -14,8 +14,8 @@ from mirotwin.firmware.held_signals import held_signals
 from mirotwin.ports.live import LONGEST_S, live_scenario
 from mirotwin.ports.serve_ports import PortOptions, open_ports, ports_option
 from mirotwin.ports.session import Session
-from mirotwin.recording.source import source_of
-from mirotwin.report.live import LiveFigures
+from mirotwin.recording.recorder import source_of
+from mirotwin.report.summary import LiveFigures
 from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.pacing import FASTEST, Pace
 from mirotwin.run.run_files import RunFiles

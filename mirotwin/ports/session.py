@@ -16,7 +16,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds, ticks
 from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import Endpoint, Tell
-from mirotwin.report.live import LiveFigures
+from mirotwin.report.summary import LiveFigures
 from mirotwin.rerun.pacing import Pace
 
 SLICE_S = 0.002

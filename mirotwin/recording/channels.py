@@ -20,7 +20,23 @@ from miro_protocol.stream import MAX_TICK
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
 from mirotwin.recording import images, topics
-from mirotwin.recording.derived import TheoryMessage
+
+
+class TheoryMessage(msgspec.Struct, frozen=True):
+    """`theory`: terms of the paper's theory.
+
+    f of equation (15) over the period that ends at `tick` (null where nothing was commanded), rho_c, the distance of
+    the heading from across (equation 12, negative where the cosine is), and which assumptions hold (`report.theory`).
+    """
+
+    tick: int
+    f1_m_s2: float | None
+    f2_rad_s2: float | None
+    rho_c_m: float
+    across_rad: float
+    holds_1: bool
+    holds_2: bool
+    holds_3: bool
 
 
 class PostureMessage(msgspec.Struct, frozen=True):

@@ -4,20 +4,27 @@ Two runs of one scenario, seed and firmware give the same bytes: no wall clock, 
 log time is the tick in nanoseconds, rounded down.
 """
 
+from __future__ import annotations
+
+import hashlib
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from types import TracebackType
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import nanoseconds
 from miro_sim.periods import Period
+from miro_sim.scenario.file import ScenarioText
 from mirotwin.recording import channels, schemas, topics
-from mirotwin.recording.derived import TheoryMessage
+from mirotwin.recording.channels import TheoryMessage
 from mirotwin.recording.images import image_message
 from mirotwin.recording.writer import McapWriter, Writable
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
 
 METADATA = "mirotwin"
 FORMAT = "4"
@@ -66,6 +73,25 @@ class RunSource(msgspec.Struct, frozen=True):
     origin: str = ""
 
 
+def source_of(text: ScenarioText, world: World, record: str = "default", resumed: bytes = b"") -> RunSource:
+    """Of a run of `world`, which is made of `text`. Raises BadInput for an image whose file is another now."""
+    image = world.image
+    firmware = image.path.read_bytes()
+    if hashlib.sha256(firmware).hexdigest() != image.sha256:
+        raise BadInput(image.path, "", "changed while it was read", "start again once it is built")
+    return RunSource(
+        scenario_name=text.scenario.name,
+        scenario_text=text.text,
+        seed=world.seed,
+        firmware=firmware,
+        firmware_sha256=image.sha256,
+        symbols={name: (at.address, at.space) for name, at in image.symbols.names.items()},
+        record=record,
+        state=world.state.tables(),
+        resumed=resumed,
+    )
+
+
 _Message = tuple[str, int, msgspec.Struct]
 """Topic, tick and content of what does not come out of a control period."""
 
@@ -109,7 +135,7 @@ class Recorder:
         if source.resumed:
             self._writer.add_attachment(RESUMED_ATTACHMENT, "application/octet-stream", source.resumed)
 
-    def __enter__(self) -> "Recorder":
+    def __enter__(self) -> Recorder:
         return self
 
     def __exit__(

@@ -19,8 +19,8 @@ from miro_host.posture import Posture
 from miro_host.theory.assumptions import ALPHA_RAD, across, radius
 from miro_host.theory.computed_torque import disturbance
 from miro_sim.periods import RobotPeriod
+from mirotwin.recording.channels import TheoryMessage
 from mirotwin.recording.chattering import Chattering
-from mirotwin.recording.derived import TheoryMessage
 
 PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 PI = 3.141592653589793

@@ -20,7 +20,7 @@ from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
 from miro_sim.periods import Period, RobotPeriod
 from miro_sim.pitch import ground as pitch
-from mirotwin.recording.derived import TheoryMessage
+from mirotwin.recording.channels import TheoryMessage
 from mirotwin.recording.theory_track import TheoryTrack
 
 TWO_PI = 6.283185307179586

@@ -10,9 +10,7 @@ import msgspec
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.track import ErrorSample, Tracks
-from mirotwin.report.learnt_calibration import LearntCalibration
-from mirotwin.report.learnt_wheels import LearntWheels
-from mirotwin.report.live import LiveFigures
+from mirotwin.report.learnt import LearntCalibration, LearntWheels
 from mirotwin.report.theory import SlidingGains, Theory, gains_of, theory_of
 from mirotwin.verify.checks.interface import Expectation
 
@@ -96,6 +94,29 @@ class StepResults(msgspec.Struct, frozen=True, omit_defaults=True):
     count: int
     failed: str = ""
     expectations: tuple[Expectation, ...] = ()
+
+
+class Plug(msgspec.Struct, frozen=True):
+    """A port: how many clients were there and were refused, bytes from and to them, and those that none had read."""
+
+    name: str
+    clients: int
+    refused: int
+    bytes_in: int
+    bytes_out: int
+    dropped: int
+
+
+class LiveFigures(msgspec.Struct, frozen=True):
+    """A session: virtual seconds in a second of the wall clock, and how far the world was behind it.
+
+    `late_max_ms` in virtual time at most; `late_s`: how much of it was passed 20 ms or more behind.
+    """
+
+    realtime: float
+    late_max_ms: float
+    late_s: float
+    plugs: tuple[Plug, ...]
 
 
 class Summary(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -23,10 +23,8 @@ from miro_sim.world.world import World
 from mirotwin.firmware.held_signals import Hold
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.track import Tracks
-from mirotwin.report.learnt_calibration import learnt_calibrations
-from mirotwin.report.learnt_wheels import learnt_wheels
-from mirotwin.report.live import LiveFigures
-from mirotwin.report.summary import StepResults, Summary, summarise, to_json
+from mirotwin.report.learnt import learnt_calibrations, learnt_wheels
+from mirotwin.report.summary import LiveFigures, StepResults, Summary, summarise, to_json
 from mirotwin.rerun import runner
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.shell.program import complain

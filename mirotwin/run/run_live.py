@@ -11,7 +11,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_sim.periods import Period
 from miro_sim.world.world import World
 from mirotwin.recording import channels, topics
-from mirotwin.recording.derived import TheoryMessage
+from mirotwin.recording.channels import TheoryMessage
 from mirotwin.report.foxglove import derived, notes
 from mirotwin.report.foxglove.derived import Derived, Said
 from mirotwin.report.foxglove.messages import ALWAYS, INFO, Log

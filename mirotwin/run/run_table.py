@@ -7,8 +7,7 @@ from pathlib import Path
 from rich.table import Table
 
 from mirotwin.recording.track import Tracks
-from mirotwin.report.learnt_calibration import calibration_text
-from mirotwin.report.learnt_wheels import wheels_text
+from mirotwin.report.learnt import calibration_text, wheels_text
 from mirotwin.report.summary import Summary, off_pitch_text, rms_name, settling_text, vision_text
 from mirotwin.report.theory import theory_text
 from mirotwin.shell.console import show

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import msgspec
 
-from mirotwin.campaign.processes import cores, processes
+from mirotwin.campaign.workers import cores, processes
 from tests.mutants.build import CACHE, build, shipped
 from tests.mutants.draw import COUNT, SEED, drawn, mutants_of, source_files
 from tests.mutants.planted import PLANTED

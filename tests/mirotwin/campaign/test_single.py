@@ -15,11 +15,10 @@ from hypothesis import strategies as st
 from mirotwin.campaign.design import Level
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import plan_of_levels
-from mirotwin.campaign.processes import processes
 from mirotwin.campaign.seeds import seeds_of
 from mirotwin.campaign.single import run_single
 from mirotwin.campaign.worker import RunOutcome
-from mirotwin.campaign.workers import Processes, Workers
+from mirotwin.campaign.workers import Processes, Workers, processes
 from mirotwin.recording.reader import read
 
 SHORT = "duration_s=1.0"

@@ -103,7 +103,7 @@ def test_a_worker_with_another_version_or_firmware_is_refused_by_name(monkeypatc
 
 def test_a_worker_loads_no_hot_module_before_its_engine_is_chosen():
     script = (
-        "import sys, mirotwin.campaign.worker, mirotwin.campaign.processes\n"
+        "import sys, mirotwin.campaign.worker, mirotwin.campaign.workers\n"
         "from miro_exact import engine\n"
         "print(sorted(set(engine.install().sources) & set(sys.modules)))"
     )

@@ -11,8 +11,7 @@ from miro_robot.firmware import image_path
 from miro_sim.periods import Period
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
-from mirotwin.recording.recorder import Recorder
-from mirotwin.recording.source import source_of
+from mirotwin.recording.recorder import Recorder, source_of
 from tests.mirotwin.conftest import SHORT
 from tests.mirotwin.replay.rig import STOP_AT, Planted
 from tests.mirotwin.replay.test_replay_command import rewritten

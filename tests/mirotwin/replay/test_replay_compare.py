@@ -14,8 +14,7 @@ from miro_sim.periods import Period
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording import recorder as recording_recorder
-from mirotwin.recording.recorder import Recorder
-from mirotwin.recording.source import source_of
+from mirotwin.recording.recorder import Recorder, source_of
 from tests.mirotwin.conftest import SHORT, hex_file
 from tests.mirotwin.replay.rig import built
 from tests.mirotwin.replay.test_replay_command import IDLE_FOR_EVER, rewritten
