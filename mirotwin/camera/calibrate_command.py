@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import click
-from click.core import ParameterSource
 from rich.table import Table
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import check_regular
-from miro_exact.seed import MAX_SEED
 from miro_host.eye import calibration as calibrations
 from miro_host.eye import calibration_kinds as kinds
 from miro_host.eye.calibration import Calibration
@@ -23,14 +21,14 @@ from miro_host.eye.sample_file import read_samples
 from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.file import load
+from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.console import show
-from mirotwin.shell.options import Number, Place, Whole, choose_engine, engine_option, set_option
+from mirotwin.shell.options import FORCE, OUT, PATH, SEED, SET, Engine, FiniteNumber, choose_engine
 from mirotwin.shell.outputs import OutputError, check_new, check_not_input, whole_file
 from mirotwin.shell.program import tell_notes
 
 SHOWN = 20
 """Points in the table; the file has them all."""
-ONLY_SCENARIO = ("seed", "noise_px", "settings", "points_out")
 
 
 class _Found(NamedTuple):
@@ -43,58 +41,67 @@ class _Found(NamedTuple):
     worst_m: float | None = None
 
 
-@click.command(short_help="Finds a camera's parameters from control points.")
-@click.option(
-    "--points", type=Place(path_type=Path), help="CSV file: x_cm, y_cm, height_cm, u_px, v_px of each point."
-)
-@click.option("--scenario", help="Take the points from the camera of this scenario instead.")
-@click.option("--out", type=Place(path_type=Path), required=True, help="TOML file for the calibration.")
-@click.option(
-    "--start",
-    type=Place(path_type=Path),
-    help="Calibration file to begin with, for what the points cannot tell. Default: 2 m above the middle of the pitch;"
-    " with --scenario its camera, without tilt and distortion.",
-)
-@click.option("--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Of the points' noise.")
-@click.option(
-    "--noise-px",
-    type=Number(0.0, 10.0),
-    default=0.3,
-    show_default=True,
-    help="Standard deviation of a point's u, and of its v: how well somebody finds a mark in the picture.",
-)
-@set_option("A key of the scenario, as for `run`; may be repeated.")
-@click.option(
-    "--points-out", type=Place(path_type=Path), help="CSV file for the points of the scenario's camera."
-)
-@click.option(
-    "--samples",
-    type=Place(path_type=Path),
-    help="With --points: CSV file of pixels sampled from one's own pictures: colour, r, g, b (or y, cb, cr).",
-)
-@click.option(
-    "--colours-out",
-    type=Place(path_type=Path),
-    help="TOML file for the colour classes of --samples, or sampled from pictures of the scenario's camera.",
-)
-@click.option("--force", is_flag=True, help="Replace files that are there.")
-@engine_option
-@click.pass_context
-def calibrate(
-    context: click.Context,
-    points: Path | None,
-    scenario: str | None,
-    out: Path,
-    start: Path | None,
-    seed: int,
-    noise_px: float,
-    settings: tuple[str, ...],
-    points_out: Path | None,
-    samples: Path | None,
-    colours_out: Path | None,
-    force: bool,
-    engine: str | None,
-) -> None:
+class CalibrateOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "camera calibrate"
+    points: Annotated[
+        Path | None,
+        Option(
+            type=PATH,
+            help="CSV file: x_cm, y_cm, height_cm, u_px, v_px of each point.",
+            apart="scenario",
+        ),
+    ] = None
+    scenario: Annotated[
+        str | None, Option(help="Take the points from the camera of this scenario instead.")
+    ] = None
+    out: Annotated[Path, OUT.saying("TOML file for the calibration.")]
+    initial: Annotated[
+        Path | None,
+        Option(
+            type=PATH,
+            help="Calibration file to begin with, for what the points cannot tell. Default: 2 m above the middle of the"
+            " pitch; with --scenario its camera, without tilt and distortion.",
+        ),
+    ] = None
+    seed: Annotated[int, SEED.saying("Of the points' noise.", needs="scenario")] = 0
+    noise_px: Annotated[
+        float,
+        Option(
+            type=FiniteNumber(0.0, 10.0),
+            help="Standard deviation of a point's u, and of its v: how well somebody finds a mark in the picture.",
+            needs="scenario",
+        ),
+    ] = 0.3
+    settings: Annotated[tuple[str, ...], SET.saying(SET.help, needs="scenario")] = ()
+    points_out: Annotated[
+        Path | None,
+        Option(type=PATH, help="CSV file for the points of the scenario's camera.", needs="scenario"),
+    ] = None
+    samples: Annotated[
+        Path | None,
+        Option(
+            type=PATH,
+            help="CSV file of pixels sampled from one's own pictures: colour, r, g, b (or y, cb, cr).",
+            needs="points",
+        ),
+    ] = None
+    colours_out: Annotated[
+        Path | None,
+        Option(
+            type=PATH,
+            help="TOML file for the colour classes of --samples, or sampled from pictures of the scenario's camera.",
+        ),
+    ] = None
+    force: Annotated[bool, FORCE.saying("Replace files that are there.")] = False
+    engine: Engine = None
+
+    @property
+    def outputs(self) -> dict[str, Path | None]:
+        return {"--out": self.out, "--points-out": self.points_out, "--colours-out": self.colours_out}
+
+
+@command_of(CalibrateOptions)
+def calibrate(options: CalibrateOptions) -> None:
     """Finds the camera that draws control points nearest to where they were measured, and writes it as a calibration.
 
     A control point is a place on the pitch (cm, in the axes of the scenarios) and its height, and the pixel that shows
@@ -110,23 +117,16 @@ def calibrate(
 
     Prints what remains between measured and drawn pixels. `track` takes the files of --out and --colours-out.
     """
-    choose_engine(engine)
-    if (points is None) == (scenario is None):
+    choose_engine(options.engine)
+    points, scenario, samples = options.points, options.scenario, options.samples
+    if points is None and scenario is None:
         raise click.UsageError("Give either --points or --scenario.")
-    if scenario is None:
-        for name in ONLY_SCENARIO:
-            if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
-                option = "set" if name == "settings" else name.replace("_", "-")
-                raise click.UsageError(f"--{option} needs --scenario.")
-    if samples is not None and scenario is not None:
-        raise click.UsageError("--samples needs --points; the scenario's camera is sampled by itself.")
-    if scenario is None and (samples is None) != (colours_out is None):
+    if points is not None and (samples is None) != (options.colours_out is None):
         raise click.UsageError("With --points, give both --samples and --colours-out or neither.")
-    outputs = {"--out": out, "--points-out": points_out, "--colours-out": colours_out}
-    _check_outputs(outputs, force, (points, start, scenario, samples))
-    first = None if start is None else _start(start)
+    _check_outputs(options)
+    first = None if options.initial is None else _initial(options.initial)
     if scenario is not None:
-        found = _of_scenario(scenario, settings, first, noise_px, seed, colours_out is not None)
+        found = _of_scenario(scenario, first, options)
     else:
         assert points is not None
         check_regular(points)
@@ -134,21 +134,22 @@ def calibrate(
         calibration = fit(measured, first or CameraParameters(), f"{points}")
         found = _Found(measured, calibration, colours_text="" if samples is None else _classes(samples))
     texts = (found.calibration.text(), found.points_text, found.colours_text)
-    for (option, path), text in zip(outputs.items(), texts, strict=True):
+    for (option, path), text in zip(options.outputs.items(), texts, strict=True):
         if path is not None:
             with whole_file(path, option) as staging:
                 staging.write_text(text, encoding="utf-8")
-    _print(found, [path for path in outputs.values() if path is not None])
+    _print(found, [path for path in options.outputs.values() if path is not None])
 
 
-def _check_outputs(outputs: dict[str, Path | None], force: bool, inputs: Sequence[str | Path | None]) -> None:
+def _check_outputs(options: CalibrateOptions) -> None:
     """Raises OutputError for files that cannot be written, or that are the same."""
+    inputs = (options.points, options.initial, options.scenario, options.samples)
     seen: dict[Path, str] = {}
-    for option, path in outputs.items():
+    for option, path in options.outputs.items():
         if path is None:
             continue
         check_not_input(path, option, *inputs)
-        check_new(path, option, force)
+        check_new(path, option, options.force)
         other = seen.setdefault(path.resolve(), option)
         if other != option:
             raise OutputError(path, f"is the file of {other} and of {option}", "give two files")
@@ -159,21 +160,15 @@ def _classes(samples: Path) -> str:
     return classes_of(read_samples(samples), f"{samples}").text()
 
 
-def _start(path: Path) -> CameraParameters:
+def _initial(path: Path) -> CameraParameters:
     check_regular(path)
     return calibrations.read(path).camera
 
 
-def _of_scenario(
-    name: str,
-    settings: tuple[str, ...],
-    start: CameraParameters | None,
-    noise_px: float,
-    seed: int,
-    colours: bool,
-) -> _Found:
+def _of_scenario(name: str, initial: CameraParameters | None, options: CalibrateOptions) -> _Found:
     """Points, calibration and perhaps colours of a scenario's camera. Raises BadInput for one that sees nothing."""
-    text = load(name, settings)
+    colours = options.colours_out is not None
+    text = load(name, options.settings)
     tell_notes(text.notes)
     camera = text.scenario.camera
     if not isinstance(camera, SeeingCamera):
@@ -184,9 +179,9 @@ def _of_scenario(
         raise BadInput(text.origin, "camera.kind", "this camera renders no pixels, so no colours", remedy)
     from mirotwin.camera import marks
 
-    points_text = marks.text(camera.lens, noise_px, seed)
+    points_text = marks.text(camera.lens, options.noise_px, options.seed)
     points = parse_points(points_text, text.origin)
-    calibration = fit(points, start or kinds.none(camera.lens).camera, text.origin)
+    calibration = fit(points, initial or kinds.none(camera.lens).camera, text.origin)
     worst_m = kinds.worst_error_m(camera.lens, calibration)
     classes = ""
     if colours and isinstance(camera, PixelCamera):

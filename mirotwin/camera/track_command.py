@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, get_args
+from typing import Annotated, Any, get_args
 
 import click
 import msgspec
@@ -15,20 +15,24 @@ from miro_host.eye.colours import ColourClasses
 from miro_host.eye.eye_file import EyeError
 from miro_host.eye.patterns import IDENTITIES, PATTERNS, TEAMS, PatternName
 from miro_host.eye.tracker import CentroidKind, Sighting, Tracker
-from mirotwin.shell.options import Place, Whole, choose_engine, engine_option
+from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.options import JSON, NETWORK, PATH, Engine, choose_engine
 from mirotwin.shell.program import complain, show_line
 
 _DEGREES = 57.29577951308232
 _MOST = len(IDENTITIES) - 1
+DEFAULT_NUMBERS = (0, 1, 2)
 HEADING = f"{'frame':>6} {'robot':>6} {'x_cm':>9} {'y_cm':>9} {'heading_deg':>12} {'confidence':>11}  picture"
 
 
-class Robots(click.types.StringParamType):
+class RobotNumbers(click.types.StringParamType):
     """Numbers of robots, separated by commas."""
 
     name = "numbers"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, tuple):
+            return value
         words = [word.strip() for word in f"{value}".split(",")]
         for word in words:
             if word not in [str(number) for number in range(_MOST + 1)]:
@@ -36,6 +40,9 @@ class Robots(click.types.StringParamType):
             if words.count(word) > 1:
                 self.fail(f"two robots have the number {word}; name each once.", param, ctx)
         return tuple(map(int, words))
+
+    def written(self, value: tuple[int, ...]) -> str:
+        return ",".join(map(str, value))
 
 
 class TrackLine(msgspec.Struct):
@@ -52,49 +59,34 @@ class TrackLine(msgspec.Struct):
     confidence: float | None = None
 
 
-@click.command(short_help="Finds robots in pictures of your own, or in recorded ones.")
-@click.argument("path", type=Place(path_type=Path))
-@click.option("--calibration", type=Place(path_type=Path), required=True, help="TOML file: the camera.")
-@click.option("--colours", type=Place(path_type=Path), required=True, help="TOML file: the colour classes.")
-@click.option(
-    "--team", type=click.Choice(TEAMS), default=TEAMS[0], show_default=True, help="Colour of the team patch."
-)
-@click.option("--robots", type=Robots(), default="0,1,2", show_default=True, help="Numbers to look for.")
-@click.option(
-    "--pattern",
-    type=click.Choice(list(PATTERNS)),
-    default="diagonal",
-    show_default=True,
-    help="Of the patches.",
-)
-@click.option(
-    "--centroid",
-    type=click.Choice(get_args(CentroidKind)),
-    default="binary",
-    show_default=True,
-    help="Of a patch: each of its pixels counts the same, or by its chroma.",
-)
-@click.option(
-    "--network",
-    type=Whole(0, 0xFFFF),
-    default=0,
-    show_default=True,
-    help="Whose camera, in a recording or among files called netN-frame-..",
-)
-@click.option("--json", "as_json", is_flag=True, help="JSON lines, in m and rad, instead of a table.")
-@engine_option
-def track(
-    path: Path,
-    calibration: Path,
-    colours: Path,
-    team: str,
-    robots: tuple[int, ...],
-    pattern: PatternName,
-    centroid: CentroidKind,
-    network: int,
-    as_json: bool,
-    engine: str | None,
-) -> None:
+class TrackOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "camera track"
+    path: Annotated[Path, Argument("PATH", PATH)]
+    calibration: Annotated[Path, Option(type=PATH, help="TOML file: the camera.")]
+    colours: Annotated[Path, Option(type=PATH, help="TOML file: the colour classes.")]
+    team: Annotated[str, Option(type=click.Choice(TEAMS), help="Colour of the team patch.")] = TEAMS[0]
+    numbers: Annotated[
+        tuple[int, ...] | None, Option(type=RobotNumbers(), help="Robots to look for. Default: 0,1,2.")
+    ] = None
+    pattern: Annotated[PatternName, Option(type=click.Choice(list(PATTERNS)), help="Of the patches.")] = (
+        "diagonal"
+    )
+    centroid: Annotated[
+        CentroidKind,
+        Option(
+            type=click.Choice(get_args(CentroidKind)),
+            help="Of a patch: each of its pixels counts the same, or by its chroma.",
+        ),
+    ] = "binary"
+    network: Annotated[
+        int, NETWORK.saying("Whose camera, in a recording or among files called netN-frame-..")
+    ] = 0
+    as_json: Annotated[bool, JSON.saying("JSON lines, in m and rad, instead of a table.")] = False
+    engine: Engine = None
+
+
+@command_of(TrackOptions)
+def track(options: TrackOptions) -> None:
     """Prints where the tracker finds each robot in each picture of PATH, or that it is lost there.
 
     PATH is a folder of PNG or PPM files of 320 x 240 pixels, taken in the order of their names at 30000/1001 a second;
@@ -104,15 +96,16 @@ def track(
     \b
         mirotwin run fig6 --frames frames --plain-frames
         mirotwin camera calibrate --scenario fig6 --out camera.toml --colours-out colours.toml
-        mirotwin camera track frames --calibration camera.toml --colours colours.toml --robots 0
+        mirotwin camera track frames --calibration camera.toml --colours colours.toml --numbers 0
     """
-    choose_engine(engine)
-    tracker = _tracker(calibration, colours, team, robots, pattern, centroid)
+    choose_engine(options.engine)
+    robots, as_json = options.numbers or DEFAULT_NUMBERS, options.as_json
+    tracker = _tracker(options, robots)
     from mirotwin.camera.stills import stills  # loads the pictures' library
 
     found = dict.fromkeys(robots, 0)
     frames = 0
-    for frame, still in enumerate(stills(path, network, complain)):
+    for frame, still in enumerate(stills(options.path, options.network, complain)):
         if not frame and not as_json:
             click.echo(HEADING)
         for robot, seen in zip(robots, tracker.track(still.picture, still.tick), strict=True):
@@ -125,23 +118,16 @@ def track(
         click.echo(f"{frames} pictures: {counts}")
 
 
-def _tracker(
-    calibration: Path,
-    colours: Path,
-    team: str,
-    robots: tuple[int, ...],
-    pattern: PatternName,
-    centroid: CentroidKind,
-) -> Tracker:
+def _tracker(options: TrackOptions, robots: tuple[int, ...]) -> Tracker:
     """Raises BadInput for files that make none."""
-    for path in (calibration, colours):
+    for path in (options.calibration, options.colours):
         check_regular(path)
-    believed = calibrations.read(calibration)
-    classes = eye_file.read(colours, ColourClasses)
+    believed = calibrations.read(options.calibration)
+    classes = eye_file.read(options.colours, ColourClasses)
     try:
-        return Tracker(team, robots, pattern, believed, classes, centroid)
+        return Tracker(options.team, robots, options.pattern, believed, classes, options.centroid)
     except EyeError as error:  # a colour that these robots need has no class
-        raise EyeError(colours, error.place, error.what, error.remedy) from None
+        raise EyeError(options.colours, error.place, error.what, error.remedy) from None
 
 
 def _utf8(name: str) -> str:

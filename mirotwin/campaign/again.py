@@ -9,10 +9,10 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
-from miro_sim.scenario.settings import option_words
+from miro_sim.scenario.settings import EXPECT
 from mirotwin.campaign.inline import inline
 from mirotwin.campaign.results import ResultsInfo
-from mirotwin.shell.command_line import command_line, operand
+from mirotwin.run.run_options import RunOptions
 
 
 def arm_line(about: ResultsInfo, levels: Mapping[str, Any]) -> str:
@@ -26,10 +26,13 @@ def arm_line(about: ResultsInfo, levels: Mapping[str, Any]) -> str:
             return ""
         scenario, firmware = level.scenario or scenario, level.firmware or firmware
         settings += level.settings
-    image = ["--firmware", operand(firmware)] if firmware else []
-    return command_line(
-        "run", operand(scenario), *image, *(word for one in settings for word in option_words(one))
-    )
+    expected = [one for one in settings if one.startswith(EXPECT)]
+    return RunOptions(
+        scenario=scenario,
+        firmware=firmware or None,
+        settings=tuple(one for one in settings if one not in expected),
+        expected=tuple(one.removeprefix(EXPECT) for one in expected),
+    ).command_line()
 
 
 def drawn_words(about: ResultsInfo, row: Mapping[str, Any]) -> str:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-import click
 import msgspec
 
 from mirotwin.campaign import running
@@ -16,10 +15,11 @@ from mirotwin.campaign.journal import journal_path
 from mirotwin.campaign.plan import Plan, load_plan
 from mirotwin.campaign.results import counted, require_arrow
 from mirotwin.campaign.running import Tally
-from mirotwin.campaign.seeds import seeds_of
+from mirotwin.campaign.seed_range import SEEDS, SeedRange
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes, Workers
-from mirotwin.shell.options import Place, Whole, choose_engine, engine_option, set_option
+from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, SET, Engine, choose_engine
 from mirotwin.shell.program import (
     BAD_INPUT,
     DONE,
@@ -30,49 +30,42 @@ from mirotwin.shell.program import (
     tell_notes,
 )
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.verify.expectations import expect_option
+from mirotwin.verify.expectations import Expected, as_settings
 
 LINES = 5
 """Runs that went wrong are named, so many at most."""
 
 
-class SeedRange(click.ParamType[range]):
-    """Seeds from a first one to a last one: 0-49, or one alone."""
+class CampaignOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "campaign run"
+    file: Annotated[Path, Argument("FILE.toml", PATH)]
+    out: Annotated[Path | None, OUT.saying("Results. Default: runs/FILE.parquet.")] = None
+    seeds: Annotated[
+        range | None,
+        SEEDS.saying("First and last seed, instead of those of the file.", type=SeedRange(MOST_RUNS)),
+    ] = None
+    settings: Annotated[
+        tuple[str, ...],
+        SET.saying("A key of the scenario, for all runs, as `mirotwin run` has it; may be repeated."),
+    ] = ()
+    expected: Expected = ()
+    jobs: Annotated[int | None, JOBS] = None
+    cluster: Annotated[
+        str | None,
+        Option(
+            metavar="ADDRESS",
+            help="A Dask scheduler whose workers run it: tcp://host:8786.",
+            apart="jobs",
+        ),
+    ] = None
+    engine: Engine = None
+    force: Annotated[bool, FORCE.saying("Replace results that are there, or parts of them.")] = False
+    yes: Annotated[bool, Option(help=f"More than {running.MANY_RUNS} runs are meant.")] = False
+    quiet: Annotated[bool, QUIET] = False
 
-    name = "seeds"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
-        try:
-            return seeds_of(str(value), MOST_RUNS)
-        except ValueError as error:
-            self.fail(str(error), param, ctx)
-
-
-@click.command(short_help="Makes the runs of FILE.toml; `campaign FILE.toml` is short for it.")
-@click.argument("file", metavar="FILE.toml", type=Place(path_type=Path))
-@click.option("--out", type=Place(path_type=Path), help="Results. Default: runs/FILE.parquet.")
-@click.option("--seeds", type=SeedRange(), help="First and last seed, instead of those of the file.")
-@set_option("A key of the scenario, for all runs, as `mirotwin run` has it; may be repeated.")
-@expect_option
-@click.option("--jobs", type=Whole(1, 256), help="Processes. Default: one for each core.")
-@click.option("--cluster", metavar="ADDRESS", help="A Dask scheduler whose workers run it: tcp://host:8786.")
-@engine_option
-@click.option("--force", is_flag=True, help="Replace results that are there, or parts of them.")
-@click.option("--yes", is_flag=True, help=f"More than {running.MANY_RUNS} runs are meant.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress bar, no last line.")
-def run(
-    file: Path,
-    out: Path | None,
-    seeds: range | None,
-    settings: tuple[str, ...],
-    expected: tuple[str, ...],
-    jobs: int | None,
-    cluster: str | None,
-    engine: str | None,
-    force: bool,
-    yes: bool,
-    quiet: bool,
-) -> int:
+@command_of(CampaignOptions)
+def run(options: CampaignOptions) -> int:
     """Makes the runs of FILE.toml, or of the built-in campaign `bench1`, and writes a row for each to a Parquet file.
 
     A campaign that is broken off goes on when the same command is given again; nothing but the runs under way is lost
@@ -82,26 +75,24 @@ def run(
     Exit code 2: a run has an error; 3: the firmware did what it must not; 1: more runs than allowed_failed_share failed
     a check. The rows say which.
     """
-    choose_engine(engine)
-    if jobs is not None and cluster is not None:
-        raise click.UsageError("--jobs and --cluster do not go together.")
+    choose_engine(options.engine)
     require_arrow()
-    plan = load_plan(file, (*settings, *expected))
+    plan = load_plan(options.file, (*options.settings, *as_settings(options.expected)))
     tell_notes(plan.notes)
-    if seeds is not None:
-        plan = _with_seeds(plan, seeds)
-    results = out or Path("runs") / f"{file.stem}.parquet"
-    running.refuse_many(plan, yes)
-    if not force and running.complete(results, running.head_of(plan)):
-        if not quiet:
+    if options.seeds is not None:
+        plan = _with_seeds(plan, options.seeds)
+    results = options.out or Path("runs") / f"{options.file.stem}.parquet"
+    running.refuse_many(plan, options.yes)
+    if not options.force and running.complete(results, running.head_of(plan)):
+        if not options.quiet:
             show_line(f"{results} has all {plan.runs} runs already")
         return _judge(plan, results)
-    workers = _workers(jobs, cluster)
+    workers = _workers(options.jobs, options.cluster)
     try:
-        tally, wall_s = _run(plan, results, workers, force, quiet)
+        tally, wall_s = _run(plan, results, workers, options.force, options.quiet)
     finally:
         workers.close()
-    if not quiet:
+    if not options.quiet:
         rate = f"{tally.new / wall_s:.1f} runs/s" if tally.new else "all there before"
         show_line(f"{tally.runs} runs ({tally.new} of them now, in {wall_s:.1f} s, {rate}): {results}")
     return _judge(plan, results)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import click
 import msgspec
@@ -17,8 +17,9 @@ from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, MetricDifferenc
 from mirotwin.campaign.design import Value
 from mirotwin.campaign.rows import UNSETTLED, VERDICTS, ResultRows, paired, paired_levels
 from mirotwin.campaign.statistics import Figures, Interval, figures
+from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show as show_table
-from mirotwin.shell.options import Number, Place
+from mirotwin.shell.options import JSON, PATH, FiniteNumber
 from mirotwin.shell.program import DONE, EXPECTATION_FAILED, complain, show_line
 
 SHOWN = ("rms_position_cm", "rms_theta_deg", "settling_s")
@@ -35,63 +36,63 @@ class GroupFigures(msgspec.Struct, frozen=True):
     metrics: dict[str, Figures | None]
 
 
-@click.command(short_help="Statistics of RESULTS.parquet, alone or against a baseline.")
-@click.argument("results", type=Place(path_type=Path))
-@click.option(
-    "--metric",
-    "metrics",
-    metavar="NAME",
-    multiple=True,
-    help="A figure of the results, or failed, fault, error, unsettled, check.NAME; may be repeated."
-    f" Default: {', '.join(SHOWN)}; in comparisons {', '.join(GATED)}.",
-)
-@click.option(
-    "--by", metavar="FACTOR", multiple=True, help="Runs with the same levels stand together; may be repeated."
-)
-@click.option("--compare", metavar="FACTOR=A,B", help="Two levels of a factor, paired on the same seeds.")
-@click.option(
-    "--against",
-    metavar="BASELINE.parquet",
-    type=Place(path_type=Path),
-    help="Exit code 1 if worse than these.",
-)
-@click.option(
-    "--tolerance",
-    type=Number(0.0, 1000.0),
-    default=0.0,
-    show_default=True,
-    help="Per cent by which a mean may be worse than the baseline's.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of tables.")
-def show(
-    results: Path,
-    metrics: tuple[str, ...],
-    by: tuple[str, ...],
-    compare: str | None,
-    against: Path | None,
-    tolerance: float,
-    as_json: bool,
-) -> int:
+class ShowOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "campaign show"
+    results: Annotated[Path, Argument("RESULTS", PATH)]
+    metrics: Annotated[
+        tuple[str, ...],
+        Option(
+            "--metric",
+            metavar="NAME",
+            help="A figure of the results, or failed, fault, error, unsettled, check.NAME; may be repeated."
+            f" Default: {', '.join(SHOWN)}; in comparisons {', '.join(GATED)}.",
+        ),
+    ] = ()
+    by: Annotated[
+        tuple[str, ...],
+        Option(metavar="FACTOR", help="Runs with the same levels stand together; may be repeated."),
+    ] = ()
+    between: Annotated[
+        str | None,
+        Option(metavar="FACTOR=A,B", help="Compare two levels of a factor, paired on the same seeds."),
+    ] = None
+    against: Annotated[
+        Path | None,
+        Option(
+            metavar="BASELINE.parquet", type=PATH, help="Exit code 1 if worse than these.", apart="between"
+        ),
+    ] = None
+    tolerance: Annotated[
+        float,
+        Option(
+            type=FiniteNumber(0.0, 1000.0),
+            help="Per cent by which a mean may be worse than the baseline's.",
+        ),
+    ] = 0.0
+    as_json: Annotated[bool, JSON] = False
+
+
+@command_of(ShowOptions)
+def show(options: ShowOptions) -> int:
     """Shows medians with their 95 % intervals, and the spread, of each combination of factors.
 
-    --compare and --against pair runs with the same seed, and the same values of all else. A metric has got worse when
+    --between and --against pair runs with the same seed, and the same values of all else. A metric has got worse when
     the 95 % interval of its mean difference lies on the bad side of 0 as a whole; of errors and firmware faults one
     more is worse.
 
     Exit code 1: something is worse than --against, a line each says what, by how much, and with which interval.
     """
-    if compare is not None and against is not None:
-        raise click.UsageError("--compare and --against do not go together.")
+    results, metrics, against, as_json = options.results, options.metrics, options.against, options.as_json
     rows = ResultRows(results)
     for name in metrics:
         rows.check_metric(name)
     if not rows.count:
         raise BadInput(results, "", "holds no runs", "give the results of a campaign")
-    if compare is not None:
-        return _compare(rows, compare, metrics or GATED, as_json)
+    if options.between is not None:
+        return _compare(rows, options.between, metrics or GATED, as_json)
     if against is not None:
-        return _against(rows, against, metrics or GATED, tolerance / 100.0, as_json)
-    _show(rows, metrics or SHOWN, by or rows.about.factors, as_json)
+        return _against(rows, against, metrics or GATED, options.tolerance / 100.0, as_json)
+    _show(rows, metrics or SHOWN, options.by or rows.about.factors, as_json)
     return DONE
 
 
@@ -157,7 +158,7 @@ def _compare(rows: ResultRows, text: str, metrics: Sequence[str], as_json: bool)
     pairs = paired_levels(rows, name, first, second)
     if not pairs:
         what = f"no run with {first} has a twin with {second}"
-        raise BadInput(rows.path, "--compare", what, "the campaign has to be complete")
+        raise BadInput(rows.path, "--between", what, "the campaign has to be complete")
     found = _differences(rows, rows, pairs, metrics)
     if as_json:
         _print_json({"factor": name, "first": first, "second": second, "differences": found})

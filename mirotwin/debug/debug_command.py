@@ -8,17 +8,14 @@ from typing import Annotated
 from miro_exact.bad_input import BadInput
 from mirotwin.debug.console import PROMPT, Console
 from mirotwin.debug.debugger import Debugger
-from mirotwin.debug.subject import SubjectOptions, open_subject
-from mirotwin.shell.command import Argument, Option, command_of
-from mirotwin.shell.options import NAME
+from mirotwin.debug.subject import DebugSubject, open_subject
+from mirotwin.shell.command import Option, command_of
 from mirotwin.shell.program import BAD_INPUT, DONE, complain, show_line
 from mirotwin.shell.times import Time, TimeType
 
 
-class DebugOptions(SubjectOptions, frozen=True, kw_only=True):
+class DebugOptions(DebugSubject, frozen=True, kw_only=True):
     COMMAND = "debug"
-
-    subject: Annotated[str, Argument("SUBJECT", NAME)]
     at: Annotated[Time | None, Option(type=TimeType(), help="Stand there first: 1.5s, 20ms or 48000t.")] = (
         None
     )

@@ -8,9 +8,17 @@ from difflib import get_close_matches
 from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
 from miro_robot.inspect.symbol_names import SymbolNames
+from mirotwin.shell.command import Option
 
 FLASH_BYTES = 8192
 SPACE_BYTES = 65536
+
+
+SYMBOL = Option(
+    "--symbol",
+    metavar="SYMBOL|ADDRESS",
+    help="Only the function at this symbol or address; may be repeated.",
+)
 
 
 def address_of(text: str, image: Image, path: str, option: str) -> int:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-
-import click
+from typing import Annotated
 
 from miro_exact.bad_input import BadInput
 from miro_robot.inspect.counters import Counters
@@ -20,43 +19,44 @@ from mirotwin.firmware.coverage_files import (
     with_debug_files,
     write,
 )
-from mirotwin.firmware.sources_option import sources_of, sources_option
-from mirotwin.firmware.subject import Request, look, open_run, subject_options
+from mirotwin.firmware.sources_option import SourceFolders, sources_of
+from mirotwin.firmware.subject import WindowOptions, look, open_window
+from mirotwin.shell.command import Option, command_of
 from mirotwin.shell.console import show
-from mirotwin.shell.options import Place
+from mirotwin.shell.options import FORCE, OUT
 from mirotwin.shell.outputs import check_new, check_not_input
 
 
-@click.command(short_help="Shows which lines of the firmware ran.")
-@subject_options
-@click.option(
-    "--out",
-    type=Place(path_type=Path),
-    metavar="FILE.info",
-    help="Write an lcov tracefile (genhtml, CI services).",
-)
-@click.option("--append", is_flag=True, help="Add the counts to the file at --out.")
-@click.option("--force", is_flag=True, help="Replace the file at --out, and its listing.")
-@sources_option
-def coverage(request: Request, out: Path | None, append: bool, force: bool, sources: tuple[str, ...]) -> int:
+class CoverageOptions(WindowOptions, frozen=True, kw_only=True):
+    COMMAND = "fw coverage"
+    out: Annotated[
+        Path | None,
+        OUT.saying("Write an lcov tracefile (genhtml, CI services).", metavar="FILE.info"),
+    ] = None
+    append: Annotated[bool, Option(help="Add the counts to the file at --out.", apart="force")] = False
+    force: Annotated[bool, FORCE.saying("Replace the file at --out, and its listing.")] = False
+    sources: SourceFolders = ()
+
+
+@command_of(CoverageOptions)
+def coverage(options: CoverageOptions) -> int:
     """Shows which C lines, branches and instructions ran in SUBJECT, and writes them as an lcov tracefile.
 
     For an image without debug files the lines are those of its listing, written beside FILE.info as FILE.info.lst.
     """
-    if append and force:
-        raise BadInput("", "", "--append adds to the file, --force replaces it", "give one of the two")
+    out, append = options.out, options.append
     total: Tracefile = {}
     if out is not None:
-        _check(out, request, append or force)
+        _check(out, options, append or options.force)
         total = read_tracefile(out) if append else {}
-    run = open_run(request)
+    run = open_window(options)
 
     image = with_debug_files(run.image)
     if out is not None and has_listing(image):
-        _check(listing_path(out), request, append or force)
+        _check(listing_path(out), options, append or options.force)
     counters = Counters()
-    folders = sources_of(image, sources)
-    code = look(run, request, counters)
+    folders = sources_of(image, options.sources)
+    code = look(run, options, counters)
     report = collect(image, counts_of(counters), folders, out)
     if append and out is not None and is_of_another_image(report, out):
         raise BadInput(
@@ -73,6 +73,6 @@ def coverage(request: Request, out: Path | None, append: bool, force: bool, sour
     return code
 
 
-def _check(path: Path, request: Request, may_be_there: bool) -> None:
-    check_not_input(path, "--out", *request.files)
+def _check(path: Path, options: WindowOptions, may_be_there: bool) -> None:
+    check_not_input(path, "--out", *options.files)
     check_new(path, "--out", may_be_there, more="add to it with --append, ")

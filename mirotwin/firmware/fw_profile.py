@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import click
 import msgspec
 from rich.table import Table
@@ -11,27 +13,32 @@ from miro_robot.inspect.counters import Counters
 from miro_robot.inspect.profile import Profile
 from miro_robot.inspect.profile import profile as profile_of
 from mirotwin.firmware.coverage_files import with_debug_files
-from mirotwin.firmware.subject import Request, image_name, look, open_run, subject_options
+from mirotwin.firmware.subject import WindowOptions, image_name, look, open_window
+from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
+from mirotwin.shell.options import JSON
 
 
-@click.command(short_help="Shows where the processor spends its time.")
-@subject_options
-@click.option("--json", "as_json", is_flag=True, help="As JSON, for programs.")
-def profile(request: Request, as_json: bool) -> int:
+class ProfileOptions(WindowOptions, frozen=True, kw_only=True):
+    COMMAND = "fw profile"
+    as_json: Annotated[bool, JSON.saying("As JSON, for programs.")] = False
+
+
+@command_of(ProfileOptions)
+def profile(options: ProfileOptions) -> int:
     """Shows cycles by function, interrupts with their worst cases, the share of idling, and the depth of the stack.
 
     A machine cycle is 12 periods of the crystal: 0.5 us at 24 MHz. A function's cycles are its own, without those of
     what it calls. The latency of an interrupt is counted from the cycle in which its flag is latched to the first one
     of its routine: 3 at least.
     """
-    run = open_run(request)
+    run = open_window(options)
 
     image = with_debug_files(run.image)
     counters, activity = Counters(), Activity()
-    code = look(run, request, counters, activity)
+    code = look(run, options, counters, activity)
     result = profile_of(image, counters, activity)
-    if as_json:
+    if options.as_json:
         click.echo(msgspec.json.format(msgspec.json.encode(result), indent=2))
     else:
         _print(result, image_name(run))

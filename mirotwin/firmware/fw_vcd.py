@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-
-import click
+from typing import Annotated
 
 from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import PWM_PERIOD_TICKS
 from miro_robot.inspect.gtkw import write_save_file
 from miro_robot.inspect.waveform import SETTLING_TICKS, Waveform
-from mirotwin.firmware.subject import Request, look, open_run, subject_options
+from mirotwin.firmware.subject import WindowOptions, look, open_window
+from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
-from mirotwin.shell.options import Place
+from mirotwin.shell.options import FORCE, OUT
 from mirotwin.shell.outputs import check_new, check_not_input, whole_file
 
 SAVE_SUFFIX = ".gtkw"
@@ -20,27 +20,25 @@ LATE_TICKS = 2 * PWM_PERIOD_TICKS
 """Encoder edges are known a step of the drive later."""
 
 
-@click.command(short_help="Writes the wires as a VCD file.")
-@subject_options
-@click.option(
-    "--out",
-    type=Place(path_type=Path),
-    required=True,
-    metavar="FILE.vcd",
-    help="FILE.gtkw is written beside it.",
-)
-@click.option("--force", is_flag=True, help="Replace both files if they are there.")
-def vcd(request: Request, out: Path, force: bool) -> int:
+class VcdOptions(WindowOptions, frozen=True, kw_only=True):
+    COMMAND = "fw vcd"
+    out: Annotated[Path, OUT.saying("FILE.gtkw is written beside it.", metavar="FILE.vcd")]
+    force: Annotated[bool, FORCE.saying("Replace both files if they are there.")] = False
+
+
+@command_of(VcdOptions)
+def vcd(options: VcdOptions) -> int:
     """Writes what happened on the wires in SUBJECT as a VCD file, with a save file for GTKWave beside it.
 
     The wires: RXD and TXD; on the robot, the bus and the pins of both LM629 and the encoders; interrupt routines in
     service, sleep, port pins. Every one is a 1-bit wire; the save file puts buses together. A last stretch of less
     than 0.1 ms may be missing at the end of a run, where its encoder edges are not known yet.
     """
+    out = options.out
     save = out.with_suffix(SAVE_SUFFIX)
     for path in (out, save):
-        check_not_input(path, "--out", *request.files)
-        check_new(path, "--out", force)
+        check_not_input(path, "--out", *options.files)
+        check_new(path, "--out", options.force)
     if save == out:
         raise BadInput(
             "",
@@ -48,19 +46,19 @@ def vcd(request: Request, out: Path, force: bool) -> int:
             "this is the name of the GTKWave save file",
             "give the VCD file another ending, .vcd",
         )
-    run = open_run(request)
+    run = open_window(options)
 
     with whole_file(save, "--out") as save_staging, whole_file(out, "--out") as staging:
         with staging.open("w", encoding="ascii", newline="\n") as stream:
-            waveform = Waveform(stream, run.board, request.from_tick, request.to_tick, run.tick_hz)
+            waveform = Waveform(stream, run.board, options.from_tick, options.to_tick, run.tick_hz)
             run.tell_pins(waveform.pin_moved)
             early_ticks = 2 * SETTLING_TICKS
-            code = look(run, request, waveform.tap, early_ticks=early_ticks, late_ticks=LATE_TICKS)
+            code = look(run, options, waveform.tap, early_ticks=early_ticks, late_ticks=LATE_TICKS)
             try:
                 waveform.close()
             except ValueError as error:
                 raise BadInput(
-                    request.subject, f"--from {request.from_tick}t", f"{error}", "look earlier"
+                    options.subject, f"--from {options.from_tick}t", f"{error}", "look earlier"
                 ) from None
         with save_staging.open("w", encoding="utf-8", newline="\n") as stream:
             write_save_file(stream, one_line(out.name), waveform.signals)

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 
 from miro_exact.bad_input import BadInput
 from miro_robot.bare.machine import BareMachine, Ended
-from mirotwin.firmware.bare_options import STDIN, BareRequest
+from mirotwin.firmware.bare_options import STDIN, BareOptions
 from mirotwin.firmware.code_place import place_of
 from mirotwin.shell.program import complain
 
@@ -28,13 +28,13 @@ LATEST_S = 0.1  # a machine that is later than this is not sped up to catch up
 READ_BYTES = 1024
 
 
-def check_terminal(request: BareRequest) -> None:
+def check_terminal(options: BareOptions) -> None:
     """Raises BadInput where there is no terminal to be live on."""
     if vars(sys)["stdin"] is None or not sys.stdin.isatty():
         raise BadInput(
             "", "--terminal", "standard input is no terminal", "run it in one, or give input with --stdin"
         )
-    if STDIN in request.stdin:
+    if STDIN in options.stdin:
         raise BadInput("", "--stdin", "- is the keyboard, which --terminal uses already", "name a file")
     try:
         import termios  # noqa: F401
@@ -44,17 +44,17 @@ def check_terminal(request: BareRequest) -> None:
         ) from None
 
 
-def run_terminal(machine: BareMachine, target: int | None, request: BareRequest) -> Ended:
+def run_terminal(machine: BareMachine, target: int | None, options: BareOptions) -> Ended:
     """Runs `machine`, which must be live, in the time of its crystal until it ends or Ctrl-] is typed."""
 
-    hertz = request.crystal_hz / 12
+    hertz = options.crystal_hz / 12
     slice_cycles = max(1, int(hertz * SLICE_S))
     keyboard = sys.stdin.fileno()
     left = False
     with _raw(keyboard):
         due_s = time.monotonic()
         while True:
-            ended = machine.run(target, request.max_cycles, pause=machine.cpu.cycles + slice_cycles)
+            ended = machine.run(target, options.max_cycles, pause=machine.cpu.cycles + slice_cycles)
             sys.stdout.buffer.flush()
             if ended is not Ended.PAUSED:
                 break

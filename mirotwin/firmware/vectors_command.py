@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-
-import click
+from typing import Annotated
 
 from miro_exact.rng import Stream
-from miro_exact.seed import MAX_SEED
 from miro_robot.mcs51.vector_draw import draw_vectors
 from miro_robot.mcs51.vectors import encode
 from mirotwin.firmware.held_signals import held_signals
-from mirotwin.shell.options import Place, Whole, choose_engine, engine_option
+from mirotwin.shell.command import Option, Options, command_of
+from mirotwin.shell.options import FORCE, OUT, SEED, Engine, Whole, choose_engine
 from mirotwin.shell.outputs import OutputFolder
 from mirotwin.shell.progress import ProgressBar
 
@@ -21,31 +20,29 @@ NAMES = tuple(f"{opcode:02x}.json" for opcode in range(OPCODES))
 """The files written, all that `--force` replaces."""
 
 
-@click.command(short_help="Writes single-step test vectors of the processor.")
-@click.option("--out", type=Place(path_type=Path), required=True, help="Folder for the 256 files.")
-@click.option(
-    "--per-opcode",
-    type=Whole(1, 1_000_000),
-    default=8,
-    show_default=True,
-    help="Vectors per opcode.",
-)
-@click.option("--seed", type=Whole(0, MAX_SEED), default=1, show_default=True, help="Of the states.")
-@click.option("--force", is_flag=True, help="Replace files of these names in the folder.")
-@engine_option
-def vectors(out: Path, per_opcode: int, seed: int, force: bool, engine: str | None) -> None:
+class VectorsOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "fw vectors"
+    out: Annotated[Path, OUT.saying("Folder for the 256 files.")]
+    per_opcode: Annotated[int, Option(type=Whole(1, 1_000_000), help="Vectors per opcode.")] = 8
+    seed: Annotated[int, SEED.saying("Of the states.")] = 1
+    force: Annotated[bool, FORCE.saying("Replace files of these names in the folder.")] = False
+    engine: Engine = None
+
+
+@command_of(VectorsOptions)
+def vectors(options: VectorsOptions) -> None:
     """Writes one JSON file per opcode, in the form of the SingleStepTests: state before, state after, and the
     accesses of each machine cycle. The same seed writes the same bytes; more vectors per opcode only add to
     them. tests/vectors/README.md describes the format.
     """
-    folder = OutputFolder(out, force, NAMES)
-    choose_engine(engine)
+    folder = OutputFolder(options.out, options.force, NAMES)
+    choose_engine(options.engine)
 
     with held_signals() as hold, folder, ProgressBar("drawing", OPCODES) as bar:
         for opcode, name in enumerate(NAMES):
-            draw = drawing(Stream(seed, f"vectors/mcs51/{opcode:02x}"))
+            draw = drawing(Stream(options.seed, f"vectors/mcs51/{opcode:02x}"))
             with hold.released():
-                drawn = encode(draw_vectors(opcode, per_opcode, draw))
+                drawn = encode(draw_vectors(opcode, options.per_opcode, draw))
             folder.part(name).write_bytes(drawn)
             bar.to(opcode + 1)
 

@@ -5,30 +5,33 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 from selectors import DefaultSelector
+from typing import Annotated
 
-import click
-
-from miro_exact.seed import MAX_SEED
+from miro_exact.clock import ticks
 from miro_sim.world.world import World
 from mirotwin.firmware.held_signals import held_signals
 from mirotwin.ports.live import LONGEST_S, live_scenario
-from mirotwin.ports.serve_ports import PortOptions, open_ports, ports_option
+from mirotwin.ports.serve_ports import PortOptions, open_ports
 from mirotwin.ports.session import Session
 from mirotwin.recording.recorder import source_of
 from mirotwin.report.summary import LiveFigures
 from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.pacing import FASTEST, Pace
 from mirotwin.run.run_files import RunFiles
+from mirotwin.run.run_options import PACE
+from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
-    Number,
-    Place,
-    Whole,
+    OUT,
+    QUIET,
+    Engine,
+    FiniteNumber,
+    Firmware,
+    ScenarioArgument,
+    Seed,
+    Settings,
     choose_engine,
-    engine_option,
-    firmware_option,
     plain_parameters,
-    set_option,
 )
 from mirotwin.shell.outputs import FILES, KEPT, RECORDING, OutputFolder
 from mirotwin.shell.program import complain, show_line, tell_notes
@@ -38,62 +41,40 @@ from mirotwin.verify.cases.case import case_of_checks, case_text
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.expectations import expect_option, report_failures
+from mirotwin.verify.expectations import Expected, as_settings, report_failures
 
 CASE = "case.stream"
 
 
-@click.command(short_help="Offers the robot's radio as PTY, TCP and RFC 2217 ports.")
-@click.argument("scenario")
-@ports_option
-@click.option(
-    "--realtime",
-    type=Number(0.0, FASTEST, min_open=True),
-    default=1.0,
-    show_default=True,
-    help="Virtual seconds in a second of the wall clock.",
-)
-@click.option(
-    "--duration",
-    type=TimeType(positive=True, longest_s=LONGEST_S),
-    default=f"{LONGEST_S:.0f}s",
-    help="Ends after so much virtual time, such as 30s. Default: a day.",
-)
-@click.option("--once", is_flag=True, help="Ends when a client was there and none is left.")
-@click.option(
-    "--out", type=Place(path_type=Path), help="Folder for the files. Default: runs/SCENARIO-SEED-live."
-)
-@click.option(
-    "--seed", type=Whole(0, MAX_SEED), default=0, show_default=True, help="Master seed of all noise."
-)
-@set_option("A key to set in the scenario, as for `run`.")
-@expect_option
-@firmware_option("Image to run instead of the robot's own.")
-@engine_option
-@click.option(
-    "--force", is_flag=True, help="Replace the files of an earlier session in the folder, and its link."
-)
-@click.option(
-    "-q", "--quiet", is_flag=True, help="Do not tell who comes and goes, and how late the world is."
-)
-def serve(
-    scenario: str,
-    pty: tuple[tuple[str, int], ...],
-    tcp: tuple[tuple[int, int], ...],
-    rfc2217: tuple[tuple[int, int], ...],
-    host: str,
-    realtime: float,
-    duration: Time,
-    once: bool,
-    out: Path | None,
-    seed: int,
-    settings: tuple[str, ...],
-    expected: tuple[str, ...],
-    firmware: str | None,
-    engine: str | None,
-    force: bool,
-    quiet: bool,
-) -> int:
+class ServeOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "serve"
+    scenario: ScenarioArgument
+    ports: PortOptions = PortOptions()
+    pace: Annotated[
+        float,
+        PACE.saying(
+            "Virtual seconds in a second of the wall clock.", type=FiniteNumber(0.0, FASTEST, min_open=True)
+        ),
+    ] = 1.0
+    duration: Annotated[
+        Time | None,
+        Option(
+            type=TimeType(positive=True, longest_s=LONGEST_S),
+            help="Ends after so much virtual time, such as 30s. Default: a day.",
+        ),
+    ] = None
+    once: Annotated[bool, Option(help="Ends when a client was there and none is left.")] = False
+    out: Annotated[Path | None, OUT.saying("Folder for the files. Default: runs/SCENARIO-SEED-live.")] = None
+    seed: Seed = 0
+    settings: Settings = ()
+    expected: Expected = ()
+    firmware: Firmware = None
+    engine: Engine = None
+    quiet: Annotated[bool, QUIET.saying("Do not tell who comes and goes, and how late the world is.")] = False
+
+
+@command_of(ServeOptions)
+def serve(options: ServeOptions) -> int:
     """Runs SCENARIO by the wall clock; programs are its PC. Each port is the serial port of the PC's radio.
 
     A line on stdout names each port, and `serving` follows. All ports may be used at once, each by one client: all hear
@@ -105,20 +86,22 @@ def serve(
 
     Exit code 1: a check failed; 3: the firmware did what it must not.
     """
-    active = choose_engine(engine)
-    text = live_scenario(scenario, (*settings, *expected), expectations_of)
+    active, seed = choose_engine(options.engine), options.seed
+    settings = (*options.settings, *as_settings(options.expected))
+    text = live_scenario(options.scenario, settings, expectations_of)
     tell_notes(text.notes)
     default = Path("runs") / f"{text.scenario.name}-{seed}-live"
-    folder = OutputFolder(out or default, force, (*FILES, CASE), ours=out is None)
-    image = load_firmware(firmware)
+    folder = OutputFolder(
+        options.out or default, options.ports.force, (*FILES, CASE), ours=options.out is None
+    )
+    image = load_firmware(options.firmware)
     with plain_parameters(text.origin):
         world = World(text.scenario, seed, image)
     source = source_of(text, world)
     trace, checks = Trace(world), Checks(world, expectations_of(text.scenario, text.origin))
-    options = PortOptions(pty, tcp, rfc2217, host, force)
 
     def tell(line: str) -> None:
-        if not quiet:
+        if not options.quiet:
             complain(line)
 
     with (
@@ -126,12 +109,14 @@ def serve(
         held_signals() as hold,
         folder,
         DefaultSelector() as selector,
-        open_ports(options, world, selector, tell) as ports,
+        open_ports(options.ports, world, selector, tell) as ports,
     ):
         for port in ports:
             show_line(f"{port.kind} {port.where}")
         show_line("serving")
-        session = Session(world, Pace(realtime), selector, ports, tell, duration.ticks(), once)
+        session = Session(
+            world, Pace(options.pace), selector, ports, tell, _end_tick(options.duration), options.once
+        )
         run_files = RunFiles(folder, source, world, active, hold, checks, text.settings, session=session)
         try:
             summary = run_files.fill(ProgressBar("serving", None, quiet=True), None)
@@ -148,6 +133,10 @@ def serve(
     tell(f"{summary.simulated_s:.2f} s are in {folder.path / RECORDING}")
     failed = report_failures(checks)
     return report_faults(world) or failed
+
+
+def _end_tick(duration: Time | None) -> int:
+    return ticks(LONGEST_S) if duration is None else duration.ticks()
 
 
 def _leave_case(folder: OutputFolder, world: World, trace: Trace, checks: Checks) -> None:

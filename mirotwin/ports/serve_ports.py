@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from selectors import BaseSelector
-from typing import Any, TypeVar
+from typing import Annotated, Any
 
 import click
-import msgspec
 
 from miro_exact.bad_input import BadInput, shortened
 from miro_sim.world.world import World
@@ -19,8 +18,9 @@ from mirotwin.ports.radio_port import RadioPort
 from mirotwin.ports.rfc2217 import Rfc2217Endpoint
 from mirotwin.ports.sockets import TcpEndpoint
 from mirotwin.ports.terminal import PtyEndpoint
+from mirotwin.shell.command import Option, Options
+from mirotwin.shell.options import FORCE
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 HIGHEST_PORT = 65_535
 LONGEST_NUMBER = 5
 HERE = "127.0.0.1"
@@ -41,6 +41,9 @@ class PortNumberType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
             self.fail(what, param, ctx)
         return int(number), int(network or 0)
 
+    def written(self, value: tuple[int, int]) -> str:
+        return _at(f"{value[0]}", value[1])
+
 
 class LinkType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     """A path, or PATH@NETWORK; "" or @NETWORK for none."""
@@ -52,6 +55,9 @@ class LinkType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     ) -> tuple[str, int]:
         path, at, network = str(value).rpartition("@")
         return (path, int(network)) if at and _is_number(network) else (str(value), 0)
+
+    def written(self, value: tuple[str, int]) -> str:
+        return _at(*value)
 
 
 class AddressType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
@@ -67,56 +73,46 @@ class AddressType(click.ParamType):  # type: ignore[type-arg, unused-ignore]
         return str(value)
 
 
+def _at(port: str, network: int) -> str:
+    return f"{port}@{network}" if network else port
+
+
 def _is_number(text: str) -> bool:
     return text.isascii() and text.isdecimal() and len(text) <= LONGEST_NUMBER
 
 
-class PortOptions(msgspec.Struct, frozen=True):
+class PortOptions(Options, frozen=True, kw_only=True):
     """The ports to open: links and port numbers, each with its network."""
 
-    pty: Sequence[tuple[str, int]]
-    tcp: Sequence[tuple[int, int]]
-    rfc2217: Sequence[tuple[int, int]]
-    host: str
-    force: bool
-
-
-def ports_option(command: Command) -> Command:
-    """`--pty`, `--tcp`, `--rfc2217`, `--host`."""
-    for option in (
-        click.option(
-            "--host",
-            type=AddressType(),
-            default=HERE,
-            show_default=True,
-            help="Address on which TCP ports are opened.",
+    pty: Annotated[
+        tuple[tuple[str, int], ...],
+        Option(
+            type=LinkType(),
+            metavar="[LINK]",
+            alone="",
+            help="A pseudo-terminal, and a symbolic link to it. The default where no port is asked for.",
         ),
-        click.option(
-            "--rfc2217",
+    ] = ()
+    tcp: Annotated[
+        tuple[tuple[int, int], ...],
+        Option(
             type=PortNumberType(),
-            multiple=True,
-            metavar="PORT",
-            help="TCP with telnet negotiation, `rfc2217://` of pyserial. 0: any free port.",
-        ),
-        click.option(
-            "--tcp",
-            type=PortNumberType(),
-            multiple=True,
             metavar="PORT",
             help="TCP with the bytes as they are, `socket://` of pyserial. 0: any free port.",
         ),
-        click.option(
-            "--pty",
-            type=LinkType(),
-            multiple=True,
-            is_flag=False,
-            flag_value="",
-            metavar="[LINK]",
-            help="A pseudo-terminal, and a symbolic link to it. The default where no port is asked for.",
+    ] = ()
+    rfc2217: Annotated[
+        tuple[tuple[int, int], ...],
+        Option(
+            type=PortNumberType(),
+            metavar="PORT",
+            help="TCP with telnet negotiation, `rfc2217://` of pyserial. 0: any free port.",
         ),
-    ):
-        command = option(command)
-    return command
+    ] = ()
+    host: Annotated[str, Option(type=AddressType(), help="Address on which TCP ports are opened.")] = HERE
+    force: Annotated[
+        bool, FORCE.saying("Replace the files of an earlier session in the folder, and its link.")
+    ] = False
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator
+from typing import Annotated
 
 import click
 
@@ -16,7 +17,8 @@ from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.layout import Layouts, look
 from mirotwin.recording.capture.rows import DecodedRow, rows
 from mirotwin.recording.capture.source import READ_ERRORS, Source, open_source
-from mirotwin.shell.options import Place, choose_engine, engine_option
+from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.options import JSON, NAME, QUIET, Engine, choose_engine
 from mirotwin.shell.program import DONE, complain
 from mirotwin.shell.progress import ProgressBar
 
@@ -24,54 +26,59 @@ DIRECTIONS = {"down": DOWN, "up": UP}
 PROGRESS_BYTES = 1 << 16
 
 
-@click.command(short_help="Decodes captured bytes to frames and damage.")
-@click.argument("file", metavar="FILE|-", type=Place())
-@click.option(
+FORMAT = Option(
     "--format",
-    "format",
     type=click.Choice(FORMATS),
     help="Format of FILE. Default: recognized by its first bytes.",
 )
-@click.option(
+ROBOTS = Option(
     "--robots",
     type=click.Choice([str(count) for count in ROBOT_COUNTS]),
     help="Robots in the network. Default: as FILE says, else the number with which more frames can be decoded.",
 )
-@click.option(
-    "--direction",
-    type=click.Choice([*DIRECTIONS]),
-    help="Direction of raw bytes and hex text: down to the robots (default, unless they decode as telemetry), or up.",
-)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object per line, for programs.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress bar.")
-@engine_option
-def decode(
-    file: str,
-    format: str | None,
-    robots: str | None,
-    direction: str | None,
-    as_json: bool,
-    quiet: bool,
-    engine: str | None,
-) -> int:
+
+
+class DecodeOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "decode"
+    file: Annotated[str, Argument("FILE|-", NAME)]
+    format: Annotated[str | None, FORMAT] = None
+    robots: Annotated[str | None, ROBOTS] = None
+    direction: Annotated[
+        str | None,
+        Option(
+            type=click.Choice([*DIRECTIONS]),
+            help="Direction of raw bytes and hex text: down to the robots (default, unless they decode as telemetry),"
+            " or up.",
+        ),
+    ] = None
+    as_json: Annotated[bool, JSON.saying("One JSON object per line, for programs.")] = False
+    quiet: Annotated[bool, QUIET.saying("No progress bar.")] = False
+    engine: Engine = None
+
+
+@command_of(DecodeOptions)
+def decode(options: DecodeOptions) -> int:
     """Decodes FILE (standard input for -) and prints one line a frame or damaged run of bytes.
 
     FILE may be hex text, raw bytes, a pcapng capture of a serial line, a recording (run.mcap) or a stream file; its
     first bytes tell which, and the first line printed says so. Any bytes can be decoded. A capture that is cut
     short or damaged is reported with the offset, after everything before it, and the exit code is 2.
     """
-    choose_engine(engine)
-    with Input(file) as given:
+    choose_engine(options.engine)
+    format, robots, direction = options.format, options.robots, options.direction
+    with Input(options.file) as given:
         if format is None:
             format, note = detect(given.peek())
             if note:
                 complain(f"{given.label}: {note} (--format says otherwise)")
         source = open_source(given, format, complain, DIRECTIONS[direction or "down"])
         layouts = look(source, None if robots is None else int(robots), complain, direction is None)
-        with ProgressBar("decoding", given.size, quiet or sys.stdout.isatty()) as bar:
+        with ProgressBar("decoding", given.size, options.quiet or sys.stdout.isatty()) as bar:
             found = rows(_counted(source.sent, given, bar), layouts.of)
             return (
-                _print_json(given, source, found) if as_json else _print_table(given, source, layouts, found)
+                _print_json(given, source, found)
+                if options.as_json
+                else _print_table(given, source, layouts, found)
             )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Annotated
 
 import click
 
@@ -15,9 +16,11 @@ from mirotwin.recording.capture.detect import NAMES, TIMED, detect
 from mirotwin.recording.capture.input import STDIN, Input
 from mirotwin.recording.capture.layout import look
 from mirotwin.recording.capture.source import READ_ERRORS, open_source
+from mirotwin.recording.decode_command import FORMAT
 from mirotwin.report.export_foxglove import export_foxglove
+from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
-from mirotwin.shell.options import Place, Whole, choose_engine, engine_option
+from mirotwin.shell.options import FORCE, NAME, NETWORK, OUT, QUIET, Engine, choose_engine
 from mirotwin.shell.outputs import check_new, check_not_input, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, complain
 from mirotwin.shell.progress import ProgressBar
@@ -58,31 +61,27 @@ class Exported:
             self.failure = error
 
 
-@click.command(short_help="Writes a run for Foxglove, Wireshark, or as a stream file.")
-@click.argument("file", metavar="FILE|-", type=Place())
-@click.option("--out", required=True, type=Place(), help="File to write, or - for standard output.")
-@click.option(
-    "--to",
-    type=click.Choice(TARGETS),
-    help="What to write. Default: stream for *.stream and *.txt, foxglove for *.mcap, else pcapng.",
-)
-@click.option(
-    "--format", type=click.Choice(TIMED), help="Format of FILE. Default: recognized by its first bytes."
-)
-@click.option("--network", type=Whole(0, 0xFFFF), help="Only this network. Default: all.")
-@click.option("--force", is_flag=True, help="Replace the file at --out.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no closing line.")
-@engine_option
-def export(
-    file: str,
-    out: str,
-    to: str | None,
-    format: str | None,
-    network: int | None,
-    force: bool,
-    quiet: bool,
-    engine: str | None,
-) -> int:
+class ExportOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "export"
+    file: Annotated[str, Argument("FILE|-", NAME)]
+    out: Annotated[str, OUT.saying("File to write, or - for standard output.", type=NAME)]
+    target: Annotated[
+        str | None,
+        Option(
+            "--as",
+            type=click.Choice(TARGETS),
+            help="What to write. Default: stream for *.stream and *.txt, foxglove for *.mcap, else pcapng.",
+        ),
+    ] = None
+    format: Annotated[str | None, FORMAT.saying(FORMAT.help, type=click.Choice(TIMED))] = None
+    network: Annotated[int | None, NETWORK.saying("Only this network. Default: all.")] = None
+    force: Annotated[bool, FORCE] = False
+    quiet: Annotated[bool, QUIET.saying("No progress bar and no closing line.")] = False
+    engine: Engine = None
+
+
+@command_of(ExportOptions)
+def export(options: ExportOptions) -> int:
     """Writes the characters in FILE (a recording, a stream file or a pcapng capture) as pcapng or as a stream file, or
     a recording for Foxglove.
 
@@ -104,15 +103,16 @@ def export(
     \b
         mirotwin export run.mcap --out foxglove.mcap
     """
+    out, network, quiet = options.out, options.network, options.quiet
     if out != STDIN:
-        check_new(Path(out), "--out", force)
-        check_not_input(Path(out), "--out", file)
-    choose_engine(engine)
-    to = to or DEFAULTS.get(Path(out).suffix, "pcapng")
+        check_new(Path(out), "--out", options.force)
+        check_not_input(Path(out), "--out", options.file)
+    choose_engine(options.engine)
+    to = options.target or DEFAULTS.get(Path(out).suffix, "pcapng")
     if to == "foxglove" and network is not None:
-        raise click.UsageError("--network does not go with --to foxglove, which writes all networks.")
-    with Input(file) as given, ProgressBar("exporting", given.size, quiet) as bar:
-        format = format or detect(given.peek())[0]
+        raise click.UsageError("--network does not go with --as foxglove, which writes all networks.")
+    with Input(options.file) as given, ProgressBar("exporting", given.size, quiet) as bar:
+        format = options.format or detect(given.peek())[0]
         if to == "foxglove":
             return export_foxglove(given, format, out, quiet)
         if format not in TIMED:

@@ -1,4 +1,4 @@
-"""`mirotwin export run.mcap --to foxglove`: a recording with the topics that Foxglove draws."""
+"""`mirotwin export run.mcap --as foxglove`: a recording with the topics that Foxglove draws."""
 
 from __future__ import annotations
 

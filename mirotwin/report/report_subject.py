@@ -32,8 +32,8 @@ SUMMARIES = ("summary.json", "summary.part.json")
 PARQUET = b"PAR1"
 
 
-class Wanted(msgspec.Struct, frozen=True):
-    """The command line. `to_tick` None: to the end."""
+class PageSubject(msgspec.Struct, frozen=True):
+    """What the page is about. `to_tick` None: to the end."""
 
     subject: str
     from_tick: int
@@ -59,7 +59,7 @@ def is_campaign(subject: str) -> bool:
         return file.read(len(PARQUET)) == PARQUET
 
 
-def material_of(wanted: Wanted) -> Material:
+def material_of(wanted: PageSubject) -> Material:
     """All that the page is made from. Raises BadInput, and OSError as `open` does."""
     if wanted.to_tick is not None and wanted.to_tick <= wanted.from_tick:
         place = f"--from {wanted.from_tick}t --to {wanted.to_tick}t"
@@ -77,7 +77,7 @@ def material_of(wanted: Wanted) -> Material:
 def page_of_failure(folder: str) -> bytes:
     """The page of what a failure left in `folder`. Raises BadInput, also where the library of pages is missing."""
     require_bokeh()
-    wanted = Wanted(folder, 0, None, True, None, (), None, True)
+    wanted = PageSubject(folder, 0, None, True, None, (), None, True)
     return run_page(material_of(wanted))
 
 
@@ -90,7 +90,9 @@ def _file_of(subject: str) -> str:
     raise BadInput(subject, "", what, "give a run's folder, or that of one failed test")
 
 
-def _reproduced(wanted: Wanted, file: str, job: Job, image: Image, until_tick: int | None) -> Reproduction:
+def _reproduced(
+    wanted: PageSubject, file: str, job: Job, image: Image, until_tick: int | None
+) -> Reproduction:
     with plain_parameters(file, "replayed"):
         world = job.world(image)
     total = until_tick or job.periods * CONTROL_PERIOD_TICKS
@@ -98,7 +100,7 @@ def _reproduced(wanted: Wanted, file: str, job: Job, image: Image, until_tick: i
         return reproduce(world, until_tick, expectations_of(job.scenario, file), bar.to)
 
 
-def _of_recording(wanted: Wanted, file: str, job: Job, image: Image) -> Material:
+def _of_recording(wanted: PageSubject, file: str, job: Job, image: Image) -> Material:
     recorded = [period for period in job.recorded if period.index in wanted.shown]
     if not recorded:
         first, last = job.recorded[0].tick, (job.recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
@@ -135,7 +137,7 @@ def _of_recording(wanted: Wanted, file: str, job: Job, image: Image) -> Material
     )
 
 
-def _of_case(wanted: Wanted, file: str, job: Job, image: Image) -> Material:
+def _of_case(wanted: PageSubject, file: str, job: Job, image: Image) -> Material:
     ends = [tick for tick in (job.case.end_tick, wanted.to_tick) if tick]
     again = _reproduced(wanted, file, job, image, min(ends, default=None))
     report = Path(file).with_name(REPORT)
@@ -188,7 +190,7 @@ def _about(kind: str, file: str, job: Job, image: Image, notes: Sequence[str], a
     )
 
 
-def _command(wanted: Wanted, file: str) -> str:
+def _command(wanted: PageSubject, file: str) -> str:
     return replay_line(Path(file).name, Path(wanted.firmware).name if wanted.firmware else None)
 
 

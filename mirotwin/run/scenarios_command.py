@@ -1,7 +1,7 @@
 """`mirotwin scenarios`: the built-in ones, and their files to copy from."""
 
 import json
-from typing import Any
+from typing import Annotated, Any
 
 import click
 from rich.table import Table
@@ -11,8 +11,9 @@ from miro_host.plugins import PluginError
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as radio_profiles
 from miro_sim.scenario import variants as scenario_variants
+from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.console import show as print_result
-from mirotwin.shell.options import set_option
+from mirotwin.shell.options import SET, ScenarioName
 from mirotwin.shell.program import LazyGroup
 from mirotwin.verify.checks.expect import struct_of
 from mirotwin.verify.checks.registry import CHECKS
@@ -52,12 +53,20 @@ def scenarios(context: click.Context) -> None:
     print_result("write one out, to start from: mirotwin scenarios show NAME")
 
 
-@scenarios.command()
-@click.argument("name")
-@set_option(
-    "A key to set in it, as for `run`; may be repeated. The file is then checked, and its comments are left out."
-)
-def show(name: str, settings: tuple[str, ...]) -> None:
+class ScenarioOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "scenarios show"
+    name: Annotated[str, Argument("NAME", ScenarioName())]
+    settings: Annotated[
+        tuple[str, ...],
+        SET.saying(
+            "A key to set in it, as for `run`; may be repeated. The file is then checked, and its comments are left"
+            " out."
+        ),
+    ] = ()
+
+
+@command_of(ScenarioOptions)
+def show(options: ScenarioOptions) -> None:
     """Prints the file of the built-in scenario NAME, to read or to start one's own from. NAME may be a file, too.
 
     A file of three lines is that scenario with single keys changed:
@@ -67,8 +76,12 @@ def show(name: str, settings: tuple[str, ...]) -> None:
         name = "mine"
         set = { network.robot.controller.q1_per_s = 0.3 }
     """
+    name, settings = options.name, options.settings
     text = scenario_file.load(name, settings).text if settings else scenario_file.source_text(name)
     click.echo(text, nl=False)
+
+
+scenarios.add_command(show)
 
 
 @scenarios.command()

@@ -3,15 +3,16 @@
 import importlib
 import platform
 from importlib import metadata
+from typing import Annotated
 
-import click
 from rich.table import Table
 
 from miro_exact import engine as engines
 from miro_exact import hot_modules
+from mirotwin.shell.command import Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import choose_engine, engine_option, firmware_option
+from mirotwin.shell.options import FIRMWARE, Engine, choose_engine
 from mirotwin.shell.program import BAD_INPUT, DONE, complain
 
 PACKAGES = (
@@ -40,14 +41,20 @@ def version_of(package: str) -> str:
         return "not installed"
 
 
-@click.command(short_help="Shows versions, engine and firmware.")
-@engine_option
-@firmware_option("Image to describe instead of the robot's own.")
-def info(engine: str | None, firmware: str | None) -> int:
+class InfoOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "info"
+    firmware: Annotated[
+        str | None, FIRMWARE.saying("Image to describe instead of the robot's own.", heading="")
+    ] = None
+    engine: Engine = None
+
+
+@command_of(InfoOptions)
+def info(options: InfoOptions) -> int:
     """Shows versions, the engine, and the firmware image with its hash."""
-    active = choose_engine(engine)
+    active = choose_engine(options.engine)
     broken = _broken_modules(active)
-    image = load_firmware(firmware, named=False)
+    image = load_firmware(options.firmware, named=False)
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(style="bold")
     table.add_column(overflow="fold")

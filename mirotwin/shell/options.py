@@ -10,14 +10,16 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
 from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput, shortened
 from miro_exact.domain import DomainError
 from miro_exact.seed import MAX_SEED
 from miro_host.plugins import PluginError
+from miro_sim.scenario.file import builtin_names
 from miro_sim.scenario.keys import Scenario
-from mirotwin.shell.command import Option
+from mirotwin.shell.command import Argument, Option
 from mirotwin.shell.times import TimeType
 
 
@@ -60,6 +62,18 @@ class PathType(click.Path):
         return super().convert(value, param, ctx)
 
 
+class ScenarioName(click.ParamType):  # type: ignore[type-arg, unused-ignore]
+    """A built-in scenario, or a file; a shell completes the names of both."""
+
+    name = "scenario"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        names = [name for name in builtin_names() if name.startswith(incomplete)]
+        return [*map(CompletionItem, names), CompletionItem(incomplete, type="file")]
+
+
 class IramAddress(click.ParamType):  # type: ignore[type-arg, unused-ignore]
     """An address of internal RAM as 0x07 to 0xff."""
 
@@ -100,10 +114,14 @@ QUIET = Option("-q", "--quiet", help="No progress bar, no last line.")
 JSON = Option("--json", help="Print one JSON document instead of tables.")
 JUNIT = Option("--junit", metavar="FILE.xml", type=PATH, help="Write JUnit XML, replacing the file.")
 ARTIFACTS = Option("--artifacts", metavar="DIR", type=PATH, help="Folder for what failures leave.")
+NETWORK = Option("--network", type=Whole(0, 0xFFFF), help="Number of the network.")
+SLOT = Option("--slot", type=Whole(0, 4), help="Slot of the robot.")
+JOBS = Option("--jobs", type=Whole(1, 256), help="Processes. Default: one for each core.")
 ALL = Option("--all", help="List everything, not only what comes first.")
 FROM = Option("--from", type=TimeType(), help="Begin there, such as 1.5s, 20ms or 48000t.")
 TO = Option("--to", type=TimeType(), help="End there.")
 
+ScenarioArgument = Annotated[str, Argument("SCENARIO", ScenarioName())]
 Seed = Annotated[int, SEED]
 Settings = Annotated[tuple[str, ...], SET]
 Firmware = Annotated[str | None, FIRMWARE]

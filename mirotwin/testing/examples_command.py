@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import click
 
 from miro_exact.bad_input import BadInput
-from mirotwin.shell.options import Place
+from mirotwin.shell.command import Argument, Options, command_of
+from mirotwin.shell.options import FORCE, PATH
 from mirotwin.testing.starter.examples import EXAMPLES, files
 from mirotwin.testing.starter.writing import write
 
 
-@click.command(short_help="Lists the examples, or writes one into a folder.")
-@click.argument("name", required=False)
-@click.argument("folder", type=Place(path_type=Path), default=".")
-@click.option("--force", is_flag=True, help="Replace files of these names.")
-def examples(name: str | None, folder: Path, force: bool) -> None:
+class ExamplesOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "examples"
+    name: Annotated[str | None, Argument("[NAME]")] = None
+    folder: Annotated[Path, Argument("[FOLDER]", PATH)] = Path()
+    force: Annotated[bool, FORCE.saying("Replace files of these names.")] = False
+
+
+@command_of(ExamplesOptions)
+def examples(options: ExamplesOptions) -> None:
     """Lists the examples, or writes the one called NAME into FOLDER (here, if none is named).
 
     The pages of the documentation use these files. One that is there already with other content is replaced only
@@ -25,6 +31,7 @@ def examples(name: str | None, folder: Path, force: bool) -> None:
 
     A whole project, with sources, tests and CI, is begun by `mirotwin init`.
     """
+    name, folder = options.name, options.folder
     if name is None:
         width = max(map(len, EXAMPLES))
         for one, about in EXAMPLES.items():
@@ -32,7 +39,7 @@ def examples(name: str | None, folder: Path, force: bool) -> None:
         click.echo("write one here: mirotwin examples NAME")
         return
     try:
-        names = write(folder, files(name), "name another folder, or replace with --force", force)
+        names = write(folder, files(name), "name another folder, or replace with --force", options.force)
     except OSError as error:
         what = error.strerror or type(error).__name__
         raise BadInput(error.filename or folder, "", what, "choose another folder") from None

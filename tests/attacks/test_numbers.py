@@ -47,7 +47,7 @@ def test_options_take_numbers_by_our_types(words, option):
 @pytest.mark.parametrize(
     "words",
     [
-        ("serve", "fig6", "--realtime", "nan"),
+        ("serve", "fig6", "--pace", "nan"),
         ("serve", "fig6", "--duration", "nan"),
         ("serve", "fig6", "--tcp", "9" * 5000),
         ("serve", "fig6", "--tcp", "7000@" + "9" * 5000),

@@ -85,7 +85,7 @@ FILES = {
     "a calibration": (
         "big.toml",
         b"#",
-        ["camera", "calibrate", "--scenario", "fig6", "--start", "big.toml", "--out", "x"],
+        ["camera", "calibrate", "--scenario", "fig6", "--initial", "big.toml", "--out", "x"],
     ),
     "points": ("big.toml", b"#", ["camera", "calibrate", "--points", "big.toml", "--out", "x.toml"]),
 }

@@ -180,7 +180,7 @@ class Seeds:
         self._run("run", "short.toml", "--out", "seen", *brief, "--record-frames")
         files = ["--points-out", "points.csv", "--colours-out", "colours.toml"]
         self._run("camera", "calibrate", "--scenario", "short.toml", "--out", "camera.toml", *files)
-        track = ["--calibration", "camera.toml", "--colours", "colours.toml", "--robots", "0"]
+        track = ["--calibration", "camera.toml", "--colours", "colours.toml", "--numbers", "0"]
         calibrate = [["camera", "calibrate", "--points", "@", "--out", "new.toml", "--force"]]
         reads = {
             "control points": ("points.csv", calibrate),

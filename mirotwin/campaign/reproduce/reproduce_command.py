@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import click
 import msgspec
@@ -32,11 +32,12 @@ from mirotwin.campaign.reproduce.plan import (
 )
 from mirotwin.campaign.reproduce.rows import RunRow, by_label, middle_seeds, row_of
 from mirotwin.campaign.results import require_arrow
-from mirotwin.campaign.seeds import seeds_of
+from mirotwin.campaign.seed_range import SEEDS
 from mirotwin.campaign.worker import Work
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.firmware.held_signals import Hold, held_signals
-from mirotwin.shell.options import Place, Whole, choose_engine, engine_option
+from mirotwin.shell.command import Option, Options, command_of
+from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, Engine, choose_engine
 from mirotwin.shell.outputs import OutputFolder, check_new, told_when_full, whole_file
 from mirotwin.shell.program import BAD_INPUT, DONE, FIRMWARE_FAULT, complain, show_line
 from mirotwin.shell.progress import ProgressBar
@@ -47,53 +48,37 @@ ROWS = "rows.csv"
 TABLE = "rows.parquet"
 
 
-class Seeds(click.ParamType[range]):
-    """Seeds from a first one to a last one: 0-49, or one alone."""
+class ReproduceOptions(Options, frozen=True, kw_only=True):
+    COMMAND = "reproduce"
+    out: Annotated[Path | None, OUT.saying(f"Folder for {PAGE} and {FOLDER}/. Default: here.")] = None
+    deposit: Annotated[
+        Path | None,
+        Option(
+            metavar="DIR",
+            type=PATH,
+            help="Instead of --out: a folder for an archive, with all runs as Parquet and a description as RO-Crate"
+            " 1.1.",
+            apart="out",
+        ),
+    ] = None
+    date: Annotated[
+        datetime | None,
+        Option(
+            metavar="YYYY-MM-DD",
+            type=click.DateTime(["%Y-%m-%d"]),
+            help="Date of publication in that description. Default: today.",
+            needs="deposit",
+        ),
+    ] = None
+    seeds: Annotated[range, SEEDS] = range(50)
+    jobs: Annotated[int | None, JOBS] = None
+    engine: Engine = None
+    force: Annotated[bool, FORCE.saying("Replace the files of an earlier reproduction.")] = False
+    quiet: Annotated[bool, QUIET] = False
 
-    name = "seeds"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
-        if isinstance(value, range):
-            return value
-        try:
-            return seeds_of(str(value))
-        except ValueError as error:
-            self.fail(str(error), param, ctx)
-
-
-@click.command(short_help="Runs the paper's figures again and writes one page about them.")
-@click.option(
-    "--out",
-    type=Place(path_type=Path),
-    help=f"Folder for {PAGE} and {FOLDER}/. Default: here.",
-)
-@click.option(
-    "--deposit",
-    metavar="DIR",
-    type=Place(path_type=Path),
-    help="Instead of --out: a folder for an archive, with all runs as Parquet and a description as RO-Crate 1.1.",
-)
-@click.option(
-    "--date",
-    metavar="YYYY-MM-DD",
-    type=click.DateTime(["%Y-%m-%d"]),
-    help="Date of publication in that description. Default: today.",
-)
-@click.option("--seeds", type=Seeds(), default="0-49", show_default=True, help="First and last seed.")
-@click.option("--jobs", "count", type=Whole(1, 256), help="Processes. Default: one for each core.")
-@engine_option
-@click.option("--force", is_flag=True, help="Replace the files of an earlier reproduction.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress bar, no last line.")
-def reproduce(
-    out: Path | None,
-    deposit: Path | None,
-    date: datetime | None,
-    seeds: range,
-    count: int | None,
-    engine: str | None,
-    force: bool,
-    quiet: bool,
-) -> int:
+@command_of(ReproduceOptions)
+def reproduce(options: ReproduceOptions) -> int:
     """Runs Figs. 6 to 10 of the paper, and the comparison of its controllers, over all seeds.
 
     Writes reproduction.md (each claim beside what was measured), and in the folder reproduction: five pictures, a row
@@ -103,16 +88,13 @@ def reproduce(
     --deposit writes all of it into one new folder, for an archive: with the rows as Parquet, and size and SHA-256 of
     each file in ro-crate-metadata.json. The same bytes again, for the same --date.
     """
-    choose_engine(engine)
-    if out is not None and deposit is not None:
-        raise click.UsageError("--out and --deposit do not go together.")
-    if date is not None and deposit is None:
-        raise click.UsageError("--date is of a --deposit.")
+    choose_engine(options.engine)
+    deposit, seeds, force, quiet = options.deposit, options.seeds, options.force, options.quiet
     if deposit is not None:
         require_arrow()
         _check_deposit(deposit, force)
-    out = deposit or out or Path(".")
-    day = (date or datetime.now()).date().isoformat()
+    out = deposit or options.out or Path(".")
+    day = (options.date or datetime.now()).date().isoformat()
     began_s = time.monotonic()
     names = [*_pictures(), ROWS, *(group.recording for group in GROUPS), *([TABLE] if deposit else [])]
     if deposit is not None:
@@ -120,7 +102,7 @@ def reproduce(
     folder = OutputFolder(out / FOLDER, force, names)
     if (out / FOLDER).is_dir() or (out / PAGE).exists():
         check_new(out / PAGE, "--out", force)
-    plan, workers = plan_of(seeds), Processes(count)
+    plan, workers = plan_of(seeds), Processes(options.jobs)
     with (
         held_signals() as hold,
         folder,

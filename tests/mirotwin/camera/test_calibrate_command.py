@@ -105,7 +105,7 @@ def test_what_the_points_cannot_tell_is_taken_from_the_start(mirotwin, short, tm
     given = ("--scenario", short, *settings(*LENS, "camera.lens.height_m=2.1"), "--noise-px", 0)
     assert mirotwin("camera", "calibrate", *given, "--points-out", points, "--out", start)[0] == 0
     flat.write_text(HEADER + "".join(line for line in points.open() if line.split(",")[2] == "0"))
-    assert mirotwin("camera", "calibrate", "--points", flat, "--start", start, "--out", out)[0] == 0
+    assert mirotwin("camera", "calibrate", "--points", flat, "--initial", start, "--out", out)[0] == 0
     found = calibration.read(out)
     assert "height_m" not in found.free
     assert found.camera.height_m == calibration.read(start).camera.height_m
@@ -160,7 +160,7 @@ def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
     ("options", "expected"),
     [
         ((), "Give either --points or --scenario."),
-        (("--points", "p.csv", "--scenario", "fig6"), "Give either --points or --scenario."),
+        (("--points", "p.csv", "--scenario", "fig6"), "--points does not go with --scenario."),
         (("--points", "p.csv", "--seed", 1), "--seed needs --scenario."),
         (("--points", "p.csv", "--set", "duration_s=1"), "--set needs --scenario."),
         (
@@ -170,7 +170,7 @@ def test_points_that_tell_no_camera_are_refused_with_file_place_and_remedy(
         (("--points", "absent.csv"), "absent.csv: cannot be read: No such file or directory"),
         (("--points", "."), ".: is a folder"),
         (("--points", "bytes"), "bytes: not UTF-8 text; give a text file"),
-        (("--points", "p.csv", "--start", "p.csv"), "p.csv: not TOML: "),
+        (("--points", "p.csv", "--initial", "p.csv"), "p.csv: not TOML: "),
         (("--points", "out.toml"), "out.toml: is the input itself; choose another file with --out"),
         (("--scenario", "fig5"), "fig5: no such scenario"),
         (

@@ -83,7 +83,7 @@ def test_both_engines_trace_and_profile_alike(short):
 
 
 def test_a_profile_adds_up(mirotwin, short):
-    code, out, _ = mirotwin("fw", "profile", short, "--json", "--robot", 2)
+    code, out, _ = mirotwin("fw", "profile", short, "--json", "--slot", 2)
     found = json.loads(out)
     assert code == 0
     entries = 2 * sum(interrupt["count"] for interrupt in found["interrupts"])
@@ -169,7 +169,7 @@ def test_looking_changes_no_bit_of_the_world(short):
         (("fig6", "--from", "2s", "--to", "1s"), "the window is empty; --to must be later"),
         (("fig6", "--from", "7s"), "the run ends at tick"),
         (("fig6", "--from", "7 sec"), "is not a time; write 2s, 20ms, 341us or 5min, or 48000t for ticks"),
-        (("fig6", "--robot", "1"), "no robot in that slot; there is 0"),
+        (("fig6", "--slot", "1"), "no robot in that slot; there is 0"),
         (("fig6", "--network", "1"), "there are 1, numbered from 0"),
         (("fig6", "--until", "main"), "--until does not apply to it"),
         (("fig5",), "no such scenario"),

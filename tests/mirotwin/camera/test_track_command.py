@@ -59,7 +59,7 @@ def measured(seen: Path) -> dict[tuple[int, int], tuple[float, float, float]]:
 @pytest.mark.parametrize("path", ["frames", "run/run.mcap"])
 def test_frames_of_a_run_give_the_postures_that_its_recording_has(mirotwin, seen, path):
     """Rounding to red, green and blue moves a few pixels over the border of a class."""
-    code, out, err = mirotwin("camera", "track", seen / path, *files(seen), "--robots", "0,2", "--json")
+    code, out, err = mirotwin("camera", "track", seen / path, *files(seen), "--numbers", "0,2", "--json")
     assert (code, err) == (0, "")
     lines = [json.loads(line) for line in out.splitlines()]
     expected = measured(seen)
@@ -74,7 +74,7 @@ def test_frames_of_a_run_give_the_postures_that_its_recording_has(mirotwin, seen
 
 
 def test_the_table_has_a_row_a_robot_and_frame_and_says_who_is_lost(mirotwin, seen):
-    code, out, err = mirotwin("camera", "track", seen / "frames", *files(seen), "--robots", "2,1")
+    code, out, err = mirotwin("camera", "track", seen / "frames", *files(seen), "--numbers", "2,1")
     assert (code, err) == (0, "")
     head, *rows, last = [line.split() for line in out.splitlines()]
     assert head == ["frame", "robot", "x_cm", "y_cm", "heading_deg", "confidence", "picture"]
@@ -87,7 +87,7 @@ def test_the_table_has_a_row_a_robot_and_frame_and_says_who_is_lost(mirotwin, se
 
 def test_a_lost_robot_has_no_numbers_in_json(mirotwin, seen):
     _, out, _ = mirotwin(
-        "camera", "track", seen / "frames", *files(seen), "--team", "blue", "--robots", "0", "--json"
+        "camera", "track", seen / "frames", *files(seen), "--team", "blue", "--numbers", "0", "--json"
     )
     lost = {"lost": True, "x_m": None, "y_m": None, "theta_rad": None, "confidence": None}
     for frame, line in enumerate(out.splitlines()):
@@ -100,7 +100,7 @@ def test_ppm_files_say_the_same_and_other_files_are_passed_over(mirotwin, seen, 
         with Image.open(seen / "frames" / f"frame-{number:06d}.png") as image:
             image.save(tmp_path / f"{number}.PPM", "PPM")
     (tmp_path / "notes.txt").write_text("mine")
-    given = (*files(seen), "--robots", "0,2", "--json", "--centroid", "weighted")
+    given = (*files(seen), "--numbers", "0,2", "--json", "--centroid", "weighted")
     one = mirotwin("camera", "track", seen / "frames", *given)[1].splitlines()
     other = mirotwin("camera", "track", tmp_path, *given)[1].splitlines()
     without: Callable[[str], dict[str, Any]] = lambda line: {**json.loads(line), "picture": ""}  # noqa: E731
@@ -112,7 +112,7 @@ def test_of_several_networks_one_is_taken(mirotwin, seen, tmp_path):
         for network in (0, 3):
             name = f"net{network}-frame-{number:06d}.png"
             shutil.copy(seen / "frames" / f"frame-{number:06d}.png", tmp_path / name)
-    _, out, _ = mirotwin("camera", "track", tmp_path, *files(seen), "--network", 3, "--robots", "0")
+    _, out, _ = mirotwin("camera", "track", tmp_path, *files(seen), "--network", 3, "--numbers", "0")
     assert [line.split()[-1] for line in out.splitlines()[1:3]] == [
         "net3-frame-000000.png",
         "net3-frame-000001.png",
@@ -149,7 +149,7 @@ def test_a_recording_that_was_broken_off_is_tracked_as_far_as_it_goes(mirotwin, 
     part = tmp_path / "run.part.mcap"
     data = (seen / "run" / "run.mcap").read_bytes()
     part.write_bytes(data[: len(data) // 2])
-    code, out, err = mirotwin("camera", "track", part, *files(seen), "--robots", "0")
+    code, out, err = mirotwin("camera", "track", part, *files(seen), "--numbers", "0")
     assert code in (0, 2)
     assert str(part) in err
     assert len(out.splitlines()) < FRAMES + 2
@@ -235,11 +235,11 @@ def test_colours_that_cannot_be_used_are_named_with_file_and_key(
     ("options", "expected"),
     [
         (
-            ("--robots", "0,1,0"),
-            "Invalid value for '--robots': two robots have the number 0; name each once.",
+            ("--numbers", "0,1,0"),
+            "Invalid value for '--numbers': two robots have the number 0; name each once.",
         ),
-        (("--robots", "5"), "Invalid value for '--robots': '5' is no robot's number: 0 to 4"),
-        (("--robots", ""), "Invalid value for '--robots': '' is no robot's number"),
+        (("--numbers", "5"), "Invalid value for '--numbers': '5' is no robot's number: 0 to 4"),
+        (("--numbers", ""), "Invalid value for '--numbers': '' is no robot's number"),
         (("--team", "red"), "Invalid value for '--team': 'red' is not one of 'yellow', 'blue'."),
         (("--calibration", "absent"), "absent: "),
         (("--calibration", "."), ".: is a folder"),

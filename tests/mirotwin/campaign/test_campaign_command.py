@@ -114,7 +114,7 @@ def test_what_is_wrong_in_a_file_is_told_with_its_place_before_anything_runs(her
         (["short.toml", "--seeds", "0-9999999"], "has 20000000 runs, more than 100000"),
         (["nothing.toml"], "nothing.toml: there is no such file"),
         (["short.toml", "--out", "short.csv"], "results are a .parquet file"),
-        (["short.toml", "--jobs", "2", "--cluster", "tcp://x:1"], "--jobs and --cluster"),
+        (["short.toml", "--jobs", "2", "--cluster", "tcp://x:1"], "--cluster does not go with --jobs"),
         (["show", "nothing.parquet"], "nothing.parquet: there is no such file"),
         (["show", "short.toml"], "short.toml: is no Parquet file"),
     ],
@@ -229,16 +229,16 @@ def test_a_metric_of_0_and_1_says_what_1_is(results, metric, label):
 
 
 def test_two_levels_are_compared_on_the_same_seeds(results):
-    document = json.loads(called("show", results, "--compare", "start=near,far", "--json").output)
+    document = json.loads(called("show", results, "--between", "start=near,far", "--json").output)
     (found,) = [one for one in document["differences"] if one["metric"] == "rms_position_cm"]
     values = {(row["start"], row["seed"]): row["rms_position_cm"] for row in rows(results)}
     apart = sorted(values["far", seed] - values["near", seed] for seed in range(20))
     assert (found["pairs"], found["seeds"], found["without"]) == (20, 20, 0)
     assert found["median"] == apart[9] + (apart[10] - apart[9]) * 0.5
     assert found["interval"]["low"] <= found["difference"] <= found["interval"]["high"]
-    assert called("show", results, "--compare", "start").exit_code == 0
+    assert called("show", results, "--between", "start").exit_code == 0
     for wrong in ("start=near", "start=near,nowhere", "begin=near,far"):
-        assert called("show", results, "--compare", wrong).exit_code == 2
+        assert called("show", results, "--between", wrong).exit_code == 2
 
 
 def test_nothing_is_worse_than_the_same_results(results):

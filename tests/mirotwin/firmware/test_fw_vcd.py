@@ -150,7 +150,7 @@ def test_a_save_file_shows_every_wire_of_the_waveform(mirotwin, short, tmp_path)
 def test_a_window_is_the_part_of_the_whole_and_both_engines_write_the_same(short, tmp_path):
     def written(name: str, *options: str) -> bytes:
         out = tmp_path / f"{name}.vcd"
-        command = [MIROTWIN, "fw", "vcd", short, "--robot", "0", "--out", out, *options]
+        command = [MIROTWIN, "fw", "vcd", short, "--slot", "0", "--out", out, *options]
         children.run(command, check=True, capture_output=True)
         return out.read_bytes()
 

@@ -67,7 +67,7 @@ def test_importing_pyserial_loads_nothing_of_ours(site):
 @pytest.mark.parametrize("kind", ["pty", "tcp", "rfc2217"])
 def test_the_same_program_talks_to_a_served_robot(kind, tmp_path):
     option = ("--pty", tmp_path / "radio") if kind == "pty" else (f"--{kind}", 0)
-    with served("fig6", *option, *SETTINGS, "--once", "--realtime", 2, "--out", tmp_path / "out") as session:
+    with served("fig6", *option, *SETTINGS, "--once", "--pace", 2, "--out", tmp_path / "out") as session:
         done = python(A_PROGRAM, session.ports[kind][0], *questions())
         assert (done.returncode, done.stdout, done.stderr) == (0, ANSWERED, "")
         session.wait()

@@ -84,7 +84,7 @@ def test_a_full_disk_ends_it_with_what_was_recorded(tmp_path):
     def limited() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
-    command = ("fig6", "--tcp", 0, *SETTINGS, "--realtime", 5, "--out", tmp_path / "out")
+    command = ("fig6", "--tcp", 0, *SETTINGS, "--pace", 5, "--out", tmp_path / "out")
     with served(*command, preexec_fn=limited) as session:
         client = talk(session)
         session.wait()
@@ -95,7 +95,7 @@ def test_a_full_disk_ends_it_with_what_was_recorded(tmp_path):
 
 
 def test_clients_that_vanish_are_followed_by_others_and_what_they_sent_was_sent(tmp_path):
-    with served("fig6", "--tcp", 0, *SETTINGS, "--realtime", 2, "--out", tmp_path / "out") as session:
+    with served("fig6", "--tcp", 0, *SETTINGS, "--pace", 2, "--out", tmp_path / "out") as session:
         for seq in (0, 3, 6):
             client = talk(session, seq)
             client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
@@ -122,7 +122,7 @@ def test_a_second_client_is_refused_with_a_line(tmp_path):
 
 
 def test_a_duration_ends_it_whoever_is_there(tmp_path):
-    with served("fig6", "--duration", "0.5s", "--realtime", 4, "--out", tmp_path / "out") as session:
+    with served("fig6", "--duration", "0.5s", "--pace", 4, "--out", tmp_path / "out") as session:
         session.wait()
     assert session.code == 0
     assert replays(tmp_path / "out/run.mcap") == 15
@@ -152,7 +152,7 @@ def test_the_command_line_replays_a_session(mirotwin, tmp_path):
         (["fig6", "--tcp", "70000"], "'70000' is no port, such as 7000, or 7000@1 for network 1."),
         (["fig6", "--tcp", "0@1"], "--tcp: there is no network 1; there are 1, from 0 on"),
         (["fig6", "--host", "203.0.113.9", "--tcp", "0"], "--tcp 0: 203.0.113.9: "),
-        (["fig6", "--realtime", "0"], "--realtime"),
+        (["fig6", "--pace", "0"], "--pace"),
         (["fig6", "--duration", "1000000000s"], "--duration"),
         (["fig6", "--pty", "/no/such/folder/radio"], "/no/such/folder/radio: No such file or directory"),
     ],

@@ -73,7 +73,7 @@ def test_damage_is_called_so_in_the_comment(mirotwin, tmp_path):
     (tmp_path / "a").write_bytes(
         render([Transmission(5, ">", b"xx" + FRAMES[1]), Transmission(800_800, "<", b"abc")])
     )
-    assert mirotwin("export", tmp_path / "a", "--to", "stream", "--out", tmp_path / "b")[0] == 0
+    assert mirotwin("export", tmp_path / "a", "--as", "stream", "--out", tmp_path / "b")[0] == 0
     comments = [entry.comment for entry in stream.read(tmp_path / "b").entries]
     assert comments == ["2 bytes, no sync; team seq=1", "3 bytes, no sync"]
 

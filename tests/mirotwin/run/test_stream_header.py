@@ -159,7 +159,7 @@ def test_another_image_may_be_named(mirotwin, tmp_path):
     assert "the stream is for firmware 0123456789ab.., this is" in err
 
 
-@pytest.mark.parametrize("command", [["decode"], ["export", "--out", "-", "--to", "pcapng"]])
+@pytest.mark.parametrize("command", [["decode"], ["export", "--out", "-", "--as", "pcapng"]])
 def test_decoding_and_exporting_refuse_an_event_after_what_came_before(mirotwin, tmp_path, command):
     path = tmp_path / "a.stream"
     path.write_text(f"{V2}5 > 55\n9 *@0 radio down\n99999 > 55\n")

@@ -62,8 +62,8 @@ def test_the_same_files_and_the_same_date_give_the_same_bytes(tmp_path):
     [
         (("--deposit", "full"), "the folder is not empty (mine.txt); choose another one, or replace"),
         (("--deposit", "full/mine.txt"), "exists and is not a folder"),
-        (("--deposit", "new", "--out", "full"), "--out and --deposit do not go together"),
-        (("--date", DAY), "--date is of a --deposit"),
+        (("--deposit", "new", "--out", "full"), "--deposit does not go with --out"),
+        (("--date", DAY), "--date needs --deposit"),
         (("--deposit", "new", "--date", "yesterday"), "--date"),
     ],
 )

@@ -298,7 +298,7 @@ def test_the_command_writes_the_file_and_replaces_one_only_when_told(mirotwin, r
             "{given}: stream file, which holds no postures; give a run.mcap that `mirotwin run` wrote",
         ),
         (b"\x89MCAP0\r\n", (), "{given}: offset 8: "),
-        (b"", ("--network", "0"), "--network does not go with --to foxglove, which writes all networks."),
+        (b"", ("--network", "0"), "--network does not go with --as foxglove, which writes all networks."),
     ],
 )
 def test_what_is_no_recording_is_refused_in_one_line(

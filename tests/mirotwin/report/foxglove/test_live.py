@@ -150,8 +150,8 @@ def test_without_the_library_one_line_says_what_to_install(mirotwin, short, tmp_
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (("--pace", "2"), "--pace and --live-wait need --live."),
-        (("--live-wait",), "--pace and --live-wait need --live."),
+        (("--pace", "2"), "--pace needs --live."),
+        (("--live-wait",), "--live-wait needs --live."),
         (
             ("--live", "fig6"),
             "Invalid value for '--live': 'fig6' is no HOST:PORT; write --live=127.0.0.1:8765, or",
