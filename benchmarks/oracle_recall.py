@@ -27,7 +27,7 @@ from mirotwin.fuzz.inputs import SILENCE, input_of
 from mirotwin.fuzz.oracle import AFTER_TICKS, expected_of
 from mirotwin.fuzz.seeds import seeds
 from mirotwin.fuzz.target import RobotTarget, target_for
-from mirotwin.verify.checks.monitors import Checks
+from mirotwin.verify.cases.rerun import rerun
 from mirotwin.verify.checks.registry import CHECKS
 from mirotwin.verify.wanted import silent_scenario
 from tests.mutants.build import build
@@ -117,10 +117,7 @@ def failed(image: Image, target: RobotTarget, data: bytes) -> tuple[str, ...]:
     )
     scenario = msgspec.structs.replace(scenario, expect=_EXPECT)
     world = World(scenario, 0, image, target.script(data))
-    checks = Checks(world)
-    world.run_to(end_tick)
-    checks.finish()
-    return tuple(failure.check for failure in checks.failures)
+    return tuple(failure.check for failure in rerun(world, end_tick).failures)
 
 
 def judged(mistake: str, image: Image, given: Sequence[bytes]) -> Row:

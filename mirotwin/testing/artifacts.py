@@ -1,4 +1,4 @@
-"""What a failed test leaves behind: the lines of its report, and a folder of its own with them as files."""
+"""What a failed test leaves: the lines of its report, and a folder of its own with them, its case and its page."""
 
 from __future__ import annotations
 
@@ -9,11 +9,21 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+import msgspec
+import tomli_w
+
+from miro_sim.world.world import World
+from mirotwin.firmware.coverage_files import source_folders
+from mirotwin.report.page.bokeh_page import has_bokeh
+from mirotwin.report.page.document import MOST_BYTES
+from mirotwin.report.page.reproduction import reproduce
+from mirotwin.report.page.run_page import Material, PageHeader, run_page
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed, at
 from mirotwin.verify.cases.artifacts import leave
-from mirotwin.verify.cases.case import case_of_checks, case_text
+from mirotwin.verify.cases.case import case_of_checks, case_text, tables_of
 from mirotwin.verify.cases.rerun import case_of_expect
+from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Failure
 
 SUMMARY = "summary.json"
@@ -70,3 +80,51 @@ def leave_test(folder: Path, rig: Rig, failures: Sequence[Failure], text: str, c
     summary = {**rig.facts(), "tick": rig.tick, "checks_failed": [str(one) for one in failures]}
     others = {SUMMARY: json.dumps(summary, indent=2) + "\n"}
     leave(folder, text + "\n", case, sent, rig.wanted.image, others)
+
+
+def page_of(
+    rig: Rig, name: str, caught: BaseException | None, text: str, again: Sequence[str]
+) -> bytes | None:
+    """The page of the run, made again from its input. `text`: the story of the failure, `again`: commands.
+
+    None where Bokeh is not installed, where the test wrote into a robot's memory, and where the run cannot be made
+    again: a report of a failure does not fail.
+    """
+    if rig.written or not has_bokeh():
+        return None
+    try:
+        page = run_page(_material(rig, name, caught, text, again))
+    except ValueError:  # what its own parts raise, too
+        return None
+    return page if len(page) <= MOST_BYTES else None
+
+
+def _material(rig: Rig, name: str, caught: BaseException | None, text: str, again: Sequence[str]) -> Material:
+    wanted = rig.wanted
+    scenario = wanted.scenario
+    expected = dict(wanted.expected)
+    if isinstance(caught, WaitFailed) and caught.expect is not None:
+        waited = msgspec.structs.replace(scenario, expect=dict(caught.expect))
+        for place, checks in expectations_of(waited, scenario.name).items():
+            known = [check.name for check in expected.get(place, ())]
+            expected[place] = [*expected.get(place, ()), *(one for one in checks if one.name not in known)]
+    world = World(scenario, wanted.seed, wanted.image, rig.trace.script())
+    done = reproduce(world, rig.tick, expected)
+    return Material(
+        about=PageHeader(
+            kind="failed test",
+            file=name,
+            name=name,
+            seed=wanted.seed,
+            firmware=wanted.image.path.name,
+            firmware_sha256=wanted.image.sha256 or "",
+            report=text,
+            again=again,
+            verdict="failed",
+        ),
+        scenario=scenario,
+        scenario_text=tomli_w.dumps(tables_of(scenario)),
+        periods=done.periods,
+        again=done,
+        sources=source_folders(wanted.image),
+    )

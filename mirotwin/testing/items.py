@@ -11,8 +11,7 @@ import pytest
 
 from miro_exact.bad_input import BadInput
 from miro_sim.world.waits import WaitExpired
-from mirotwin.testing.artifacts import SUMMARY, case_of, folder_of, leave_test, story, test_line
-from mirotwin.testing.report_page import page_of
+from mirotwin.testing.artifacts import SUMMARY, case_of, folder_of, leave_test, page_of, story, test_line
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.cases.artifacts import PAGE, case_line, clear, report_line

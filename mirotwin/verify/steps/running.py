@@ -19,17 +19,21 @@ from miro_sim.world.world import World
 from mirotwin.shell.outputs import whole_file
 from mirotwin.shell.tracebacks import show_traceback
 from mirotwin.verify.cases.artifacts import clear, leave, report_line
-from mirotwin.verify.cases.case import case_text
+from mirotwin.verify.cases.case import case_of_checks, case_text
+from mirotwin.verify.cases.rerun import case_of_expect
 from mirotwin.verify.cases.trace import Trace
 from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.checks.registry import ALWAYS_ON
-from mirotwin.verify.steps.artifacts import SCENARIO, case_of_run, case_of_step
+from mirotwin.verify.steps.keys import HoldStep, NeverStep, WaitStep
 from mirotwin.verify.steps.plan import check_symbols
 from mirotwin.verify.steps.player import Player
 from mirotwin.verify.steps.reading import steps_of
 
 Verdict = Literal["passed", "failed", "fault", "error"]
+SCENARIO = "scenario.toml"
+"""The whole scenario with all that was set, in the folder of a file that failed."""
 LINES = 5
 """Failures of one check that are listed."""
 
@@ -120,7 +124,7 @@ def _run(
         keep_saved(player, folder)
         if lines:
             report = "".join(f"{line}\n" for line in (path, *lines, *notes, report_line(str(folder)), again))
-            case = case or case_of_run(world, trace, checks)
+            case = case or (case_of_checks(world, trace, checks) if checks.failures else None)
             leave(folder, report, case, case_text(world, trace, {}, ""), image, {SCENARIO: text.text})
     return Outcome(
         path=path,
@@ -177,3 +181,19 @@ def keep_saved(player: Player, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         with whole_file(folder / name, "--artifacts") as part:
             part.write_bytes(content)
+
+
+def case_of_step(player: Player, trace: Trace) -> str | None:
+    """The case of the step that has just failed; None where no check can judge it."""
+    failure = player.failure
+    if failure is None or failure.tick <= failure.begun_tick:
+        return None
+    step = player.steps[failure.number - 1]
+    if isinstance(step, HoldStep) or not isinstance(step, WaitStep | NeverStep):
+        return None
+    if isinstance(step, WaitStep) and not failure.timed_out:
+        return None
+    name = "happens" if isinstance(step, WaitStep) else "never_happens"
+    until_tick = max(failure.tick, player.world.tick)
+    expect = expect_of(name, step.condition, failure.begun_tick, until_tick)
+    return None if expect is None else case_of_expect(player.world, trace, expect)
