@@ -21,7 +21,7 @@ from miro_protocol.frames import (
     TelemetryFrame,
     encode,
 )
-from miro_protocol.table import SEQ_MODULUS, Flags, FrameType
+from miro_protocol.table import Flags
 from miro_sim.periods import Period
 from miro_sim.world.conditions import Answer, Condition, Heard
 from miro_sim.world.events import Cursor, Event
@@ -29,6 +29,7 @@ from miro_sim.world.waits import WaitExpired, Waits
 from miro_sim.world.world import World
 from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called, why_ended
 from mirotwin.verify.checks.happens import expect_of
+from mirotwin.verify.frame_sender import FrameSender
 
 _CHARACTERS_KEPT = 4096
 Velocities = Mapping[int, tuple[int, int]]
@@ -44,15 +45,11 @@ class SentFrame(msgspec.Struct, frozen=True):
     data: bytes
 
 
-class Link:
+class Link(FrameSender):
     """The host's end of `network`. Sequence numbers count by themselves; `velocities` are those that were sent last."""
 
     def __init__(self, world: World, network: int = 0) -> None:
-        self.world = world
-        self.network = network
-        self.robots: int = world.networks[network].spec.robots
-        self.seq = -1
-        self.velocities: dict[int, tuple[int, int]] = {}
+        super().__init__(world, network, -1)
         self.answers: list[tuple[int, TelemetryFrame]] = []
         """(tick, answer) of all that were heard."""
         self._waits = Waits(world)
@@ -84,37 +81,34 @@ class Link:
         number: int | None = None
         if isinstance(frame, bytes | bytearray):
             data = bytes(frame)
+            tick = self.world.inject(data, self.network, at_tick, tuple(bad_stop))
         else:
-            message = frame if frame is not None else self._team(velocities, ask, seq)
-            data = encode(message, self.robots)
-            number = self.seq = message.seq
-            if isinstance(message, TeamFrame):
-                self.velocities = dict(enumerate(message.velocities))
-        tick = self.world.inject(data, self.network, at_tick, tuple(bad_stop))
+            message = self._of_slots(velocities, ask, seq) if frame is None else frame
+            number, data = message.seq, encode(message, self.robots)
+            tick = self.put(message, at_tick, bad_stop)
         sent = SentFrame(tick, tick + len(data) * HOST_CHARACTER_TICKS, number, data)
         if wait:
             self.world.run_to(sent.end_tick)
         return sent
 
-    def _team(self, velocities: Velocities | None, ask: bool, seq: int | None) -> TeamFrame:
+    def _of_slots(self, velocities: Velocities | None, ask: bool, seq: int | None) -> TeamFrame:
         if velocities is None:
             raise ValueError("nothing to send: give a frame, bytes, or velocities={slot: (left, right)}")
         wrong = [slot for slot in velocities if slot not in range(self.robots)]
         if wrong:
             raise ValueError(f"slot {wrong[0]!r} does not exist on a network of {self.robots} robots")
-        kind = FrameType.TEAM_ASK if ask else FrameType.TEAM
-        pairs = tuple(velocities.get(slot, (0, 0)) for slot in range(self.robots))
-        return TeamFrame(kind, (self.seq + 1) % SEQ_MODULUS if seq is None else seq, pairs)
+        return self.team(ask, seq, [velocities.get(slot, (0, 0)) for slot in range(self.robots)])
 
     @shown_where_it_was_called
     def poll(self, slot: int = 0, *, velocities: Velocities | None = None, wait: bool = True) -> SentFrame:
-        """Asks the robot in `slot`: a team frame with the next number at its turn, and the velocities sent last."""
+        """Asks the robot in `slot`: a team frame with the next number at its turn, and the velocities sent last.
+
+        Raises ValueError where that number would not be fresh: 64 is not a multiple of the number of robots.
+        """
         if slot not in range(self.robots):
             raise ValueError(f"slot {slot!r} does not exist on a network of {self.robots} robots")
-        seq = (self.seq + 1) % SEQ_MODULUS
-        while seq % self.robots != slot:
-            seq = (seq + 1) % SEQ_MODULUS
-        return self.send(velocities=velocities or self.velocities, ask=True, seq=seq, wait=wait)
+        velocities = velocities or dict(enumerate(self.velocities))
+        return self.send(velocities=velocities, ask=True, seq=self.asking_seq(slot), wait=wait)
 
     @shown_where_it_was_called
     def drive(self, velocities: Velocities, for_ticks: int) -> None:
@@ -127,14 +121,14 @@ class Link:
 
     def ping(self, slot: int = 0) -> SentFrame:
         """A service frame that changes nothing."""
-        return self.send(ServiceFrame.ping((self.seq + 1) % SEQ_MODULUS, slot))
+        return self.send(ServiceFrame.ping(self.next_seq(), slot))
 
     def set_acceleration(self, slot: int, value: int) -> SentFrame:
         """In 1/65536 count per sample^2."""
-        return self.send(ServiceFrame.acceleration((self.seq + 1) % SEQ_MODULUS, slot, value))
+        return self.send(ServiceFrame.acceleration(self.next_seq(), slot, value))
 
     def set_filter(self, slot: int, kp: int, ki: int, kd: int, il: int) -> SentFrame:
-        return self.send(ServiceFrame.filter((self.seq + 1) % SEQ_MODULUS, slot, kp, ki, kd, il))
+        return self.send(ServiceFrame.filter(self.next_seq(), slot, kp, ki, kd, il))
 
     def radio(self, state: Literal["up", "down", "noise"]) -> None:
         """Lets the radio of the network work, be off, or give noise, from now on."""

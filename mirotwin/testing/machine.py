@@ -16,7 +16,7 @@ from typing import ClassVar
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
-from miro_protocol.frames import ServiceFrame, TeamFrame, encode
+from miro_protocol.frames import ServiceFrame, TeamFrame, asking_step, encode
 from miro_protocol.strategies import numbers
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_DATA, VELOCITY, FrameType, Opcode
 from miro_robot.image import Image
@@ -69,9 +69,7 @@ class LinkMachine(RuleBasedStateMachine):
     @rule()
     def poll_the_robot(self) -> None:
         """The next number at which it is this robot's turn."""
-        step = 1
-        while (self.seq + step) % SEQ_MODULUS % self.bench.n != self.bench.slot:
-            step += 1
+        step = asking_step(self.seq, self.bench.slot, self.bench.n)
         stopped = ((0, 0),) * self.bench.n
         self._do(lambda: self.bench.send(TeamFrame(FrameType.TEAM_ASK, self._next(step), stopped)))
 

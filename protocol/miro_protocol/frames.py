@@ -229,6 +229,11 @@ def decode_fields(body: bytes, n: int) -> Message:
     return message
 
 
+def asking_step(seq: int, slot: int, n: int) -> int:
+    """How many numbers after `seq` is the next with which a frame of type 3 asks the robot in `slot` of `n`."""
+    return next(step for step in range(1, SEQ_MODULUS) if (seq + step) % SEQ_MODULUS % n == slot)
+
+
 def describe(message: Message) -> str:
     """One line for people, the comment in a stream file: `team seq=3`."""
     if isinstance(message, TeamFrame):

@@ -20,7 +20,7 @@ from typing import TypedDict, Unpack
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
 from miro_protocol.actions import Action, Power, Reset
-from miro_protocol.frames import seal
+from miro_protocol.frames import asking_step, seal
 from miro_protocol.robot_rules import ACTING_TICKS
 from miro_protocol.table import (
     FAILSAFE_STOP_TICKS,
@@ -166,7 +166,7 @@ class TrialScript:
 
     def ask(self, slot: int, what: str = "", **how: Unpack[How]) -> Frame:
         """A question to the robot in `slot`, with the next number that asks it."""
-        step = next(step for step in range(1, 9) if (self.seq + step) % SEQ_MODULUS % self.n == slot)
+        step = asking_step(self.seq, slot, self.n)
         return self.team(ask=True, step=step, what=what or f"question to robot {slot}", **how)
 
     def service(self, slot: int, opcode: int, data: bytes = b"", what: str = "", **how: Unpack[How]) -> Frame:

@@ -1,8 +1,7 @@
-"""The hosts of a run with steps: what they send, under which numbers, and the stream of frames that goes on by itself.
+"""The hosts of a run with steps: what a step sends, and the stream of frames that goes on by itself.
 
-Numbers: each frame takes the next of 64; a poll the next whose turn is the robot's that is asked. A stream announces
-each frame just before it goes out, so that a step can change or end it at any time; a frame that finds the transmitter
-busy follows.
+A stream announces each frame just before it goes out, so that a step can change or end it at any time; a frame that
+finds the transmitter busy follows.
 """
 
 from __future__ import annotations
@@ -11,9 +10,9 @@ import msgspec
 
 from miro_exact.clock import NEVER_TICK
 from miro_host.wheels import Wheels
-from miro_protocol.frames import ServiceFrame, TeamFrame, encode
-from miro_protocol.table import FRESH_STEPS, SEQ_MODULUS, FrameType
+from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_sim.world.world import World
+from mirotwin.verify.frame_sender import FrameSender
 from mirotwin.verify.steps.keys import StreamStep
 from mirotwin.verify.steps.sends import Send, SendBytes, SendFrame, SendPoll, SendService, SendTeam
 
@@ -30,17 +29,12 @@ class Stream(msgspec.Struct):
     left: int | None
 
 
-class Host:
-    """That of one network. `told`: the velocities of all slots, `last_seq`: the number that was sent last."""
+class Host(FrameSender):
+    """That of one network; its first frame has number 1."""
 
     def __init__(self, world: World, network: int) -> None:
-        self.world = world
-        self.network = network
-        spec = world.scenario.networks[network]
-        self.robots = spec.robots
-        self.first_slot = min(robot.slot for robot in spec.robot)
-        self.told = [(0, 0)] * self.robots
-        self.last_seq = 0
+        super().__init__(world, network, 0)
+        self.first_slot = min(robot.slot for robot in world.scenario.networks[network].robot)
         self.stream: Stream | None = None
 
     def send(self, what: Send) -> None:
@@ -50,53 +44,34 @@ class Host:
             self.world.inject(data, self.network, bad_stop=bad_stop)
             return
         assert isinstance(what, SendFrame)
-        data = what.damaged(encode(self._frame(what), self.robots), self.robots)
-        self.world.inject(data, self.network, bad_stop=what.bad_stop)
+        self.put(self._frame(what), bad_stop=what.bad_stop, wrong_bits=what.wrong_bits)
 
     def _frame(self, what: SendFrame) -> TeamFrame | ServiceFrame:
-        seq, slot = what.seq, getattr(what, "slot", None)
-        if slot is None:
-            slot = self.first_slot
-        if isinstance(what, SendPoll):
-            seq = self._turn_of(slot) if seq is None else seq
-        self.last_seq = seq = self._next() if seq is None else seq
+        slot = getattr(what, "slot", None)
+        slot = self.first_slot if slot is None else slot
         if isinstance(what, SendService):
-            return what.frame(seq, slot)
-        ask = isinstance(what, SendPoll)
-        if isinstance(what, SendTeam):
-            ask = what.ask
-            self.tell(slot, what.left_m_s, what.right_m_s)
-            for at, (left, right) in enumerate(what.team_m_s or ()):
-                self.tell(at, left, right)
-        return self._team(seq, ask)
+            return what.frame(self.next_seq() if what.seq is None else what.seq, slot)
+        if isinstance(what, SendPoll):
+            return self.team(True, self.asking_seq(slot) if what.seq is None else what.seq)
+        assert isinstance(what, SendTeam)
+        self.command(slot, what.left_m_s, what.right_m_s)
+        for at, (left, right) in enumerate(what.team_m_s or ()):
+            self.command(at, left, right)
+        return self.team(what.ask, what.seq)
 
-    def _team(self, seq: int, ask: bool) -> TeamFrame:
-        return TeamFrame(FrameType.TEAM_ASK if ask else FrameType.TEAM, seq, tuple(self.told))
-
-    def tell(self, slot: int, left_m_s: float | None, right_m_s: float | None) -> None:
+    def command(self, slot: int, left_m_s: float | None, right_m_s: float | None) -> None:
         """New velocities of one robot; None: as before."""
-        left, right = self.told[slot]
+        left, right = self.velocities[slot]
         left = left if left_m_s is None else WHEELS.counts(left_m_s)
         right = right if right_m_s is None else WHEELS.counts(right_m_s)
-        self.told[slot] = (left, right)
-
-    def _next(self) -> int:
-        return (self.last_seq + 1) % SEQ_MODULUS
-
-    def _turn_of(self, slot: int) -> int:
-        for step in range(1, FRESH_STEPS + 1):
-            seq = (self.last_seq + step) % SEQ_MODULUS
-            if seq % self.robots == slot:
-                return seq
-        what = f"no number that is fresh after {self.last_seq} asks robot {slot}"
-        raise ValueError(f"{what}: 64 is no multiple of {self.robots}; send a team frame before")
+        self.velocities[slot] = (left, right)
 
     # The stream
 
     def begin(self, step: StreamStep) -> None:
         """Frames from now on."""
         slot = self.first_slot if step.slot is None else step.slot
-        self.tell(slot, step.left_m_s, step.right_m_s)
+        self.command(slot, step.left_m_s, step.right_m_s)
         now = self.world.tick
         due_tick = self.world.earliest_tick(self.network)
         self.stream = Stream(due_tick, step.every_ticks, due_tick - now, step.ask, step.frames)
@@ -109,8 +84,8 @@ class Host:
     def top_up(self) -> None:
         """Announces the frames that are due."""
         while self.stream is not None and self.next_tick <= self.world.tick:
-            stream, self.last_seq = self.stream, self._next()
-            self.world.inject(encode(self._team(self.last_seq, stream.ask), self.robots), self.network)
+            stream = self.stream
+            self.put(self.team(stream.ask))
             stream.due_tick += stream.every_ticks
             if stream.left is not None:
                 stream.left -= 1

@@ -68,14 +68,6 @@ class SendFrame(Send, frozen=True, kw_only=True):
             before = place
         return super().problem(robots)
 
-    def damaged(self, data: bytes, robots: int) -> bytes:
-        """The frame's characters with the wrong bits in them."""
-        form, wrong = DOWNLINK[robots], bytearray(data)
-        first = len(form.lead) + len(form.sync)
-        for bit in self.wrong_bits:
-            wrong[first + bit // 8] ^= 1 << bit % 8
-        return bytes(wrong)
-
 
 class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
     """Velocities. A wheel that is not given keeps what it was told last; at first that is 0.

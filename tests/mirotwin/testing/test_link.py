@@ -30,7 +30,7 @@ def test_a_frame_of_ones_own_brings_its_number_and_the_next_one_follows_it():
     link = rig().links[0]
     link.send(TeamFrame(0, 62, ((1, 2), (3, 4), (5, 6))))
     assert [link.ping().seq, link.poll(2).seq, link.send(velocities={}, seq=9).seq] == [63, 2, 9]
-    assert link.velocities == {0: (0, 0), 1: (0, 0), 2: (0, 0)}
+    assert link.velocities == [(0, 0), (0, 0), (0, 0)]
 
 
 def test_a_poll_asks_the_robot_in_its_turn_and_keeps_the_velocities():
@@ -41,6 +41,13 @@ def test_a_poll_asks_the_robot_in_its_turn_and_keeps_the_velocities():
     assert link.expect(within=ms(40), slot=4).seq == 4
     assert one.robots[0].wheels.commanded == (300, 300)
     assert link.poll(4).seq == 9
+
+
+def test_a_poll_that_the_robot_would_take_for_an_old_frame_is_refused():
+    link = rig(settings=["network.robots=5", "network.robot.slot=4"]).links[0]
+    link.send(velocities={}, seq=59)
+    with pytest.raises(ValueError, match="no number that is fresh after 59 asks robot 4"):
+        link.poll(4)
 
 
 def test_a_character_with_a_bad_stop_bit_spoils_its_frame():

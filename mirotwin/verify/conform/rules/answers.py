@@ -9,10 +9,10 @@ from collections.abc import Callable
 from functools import partial
 
 from miro_exact.clock import TICKS_PER_SECOND
+from miro_protocol.frames import asking_step
 from miro_protocol.table import (
     BITS_PER_CHARACTER,
     ROBOT_BIT_TICKS,
-    SEQ_MODULUS,
     SYNC,
     TELEMETRY,
     Flags,
@@ -274,7 +274,7 @@ def positions(script: TrialScript) -> None:
         question = script.team(
             script.same(slot, 13000, -12000),
             ask=True,
-            step=_step_to(script, slot),
+            step=asking_step(script.seq, slot, script.n),
             what="question at speed",
             gap_ms=36.0,
         )
@@ -293,15 +293,11 @@ def _stands(script: TrialScript, slot: int) -> None:
     question = script.team(
         script.same(slot, 0, 0),
         ask=True,
-        step=_step_to(script, slot),
+        step=asking_step(script.seq, slot, script.n),
         what=f"question to robot {slot}",
         gap_ms=70.0,
     )
     script.answered(question, slot, f"the real positions in the answer to {question.what}", _positions)
-
-
-def _step_to(script: TrialScript, slot: int) -> int:
-    return next(step for step in range(1, 9) if (script.seq + step) % SEQ_MODULUS % script.n == slot)
 
 
 def _positions(answer: Answer, seen: Seen) -> str:

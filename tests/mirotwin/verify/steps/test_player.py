@@ -186,7 +186,7 @@ def test_numbers_are_fresh_and_a_poll_has_that_of_its_robot():
 
 def test_a_poll_whose_turn_does_not_come_in_eight_numbers_is_told_so():
     head = "duration_s = 1.0\nset = { network.robots = 5 }"
-    what = "step 2: no number that is fresh after 59 asks robot 4: 64 is no multiple of 5; send a team frame before"
+    what = "step 2: no number that is fresh after 59 asks robot 4: 64 is not a multiple of 5; send a team frame before"
     with pytest.raises(ScenarioError, match=what):
         play('{ send = "team", seq = 59 }, { send = "poll", slot = 4 }', head)
 
