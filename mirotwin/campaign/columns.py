@@ -6,12 +6,16 @@
     the figures of `summary.json`; those of the first robot, as there
     check.NAME                             verdict of that check
 
+To add a column, add a line to `COLUMNS`. A number that is added to a struct of `summary.json` (`_PARTS`) becomes one by
+itself. Statistics, pages and the table of docs/formats/parquet.md follow from here.
+
 Wall times are in a file of their own (`results`), because all the rest is the same on every machine.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
 from typing import Any, get_args, get_type_hints
 
 from miro_exact.clock import TICKS_PER_SECOND
@@ -46,46 +50,57 @@ def _kinds(struct: type) -> Iterator[tuple[str, type]]:
             yield name, kinds[0]
 
 
-FIGURES: Mapping[str, type] = {
-    "simulated_s": float,
-    "settled": bool,
-    "worst_rms_position_cm": float,
-    **dict.fromkeys(SEEN, float),
-    **{prefix + name: kind for prefix, _, struct in _PARTS for name, kind in _kinds(struct)},
+class _Run:
+    """What the columns of one run are made from."""
+
+    def __init__(self, summary: Summary, tracks: Tracks) -> None:
+        self.summary = summary
+        self.first = next(iter(tracks.robots.values()), None)
+
+    @cached_property
+    def seen(self) -> Tracking:
+        """The first robot's measurements of the last second."""
+        if self.first is None:
+            return tracking_of([])
+        after_tick = self.first.errors[-1].tick - TICKS_PER_SECOND
+        return tracking_of([sample for sample in self.first.measured_errors if sample.tick > after_tick])
+
+    def worst_rms_position_cm(self) -> float | None:
+        everyone = [one.tracking for one in self.summary.robots] or [self.summary.tracking]
+        return max((one.rms_position_cm for one in everyone if one.rms_position_cm is not None), default=None)
+
+
+def _in_summary(way: tuple[str, ...], name: str) -> Callable[[_Run], Any]:
+    def value(run: _Run) -> Any:
+        at: Any = run.summary
+        for part in way:
+            at = getattr(at, part) if at is not None else None
+        return None if at is None else getattr(at, name)
+
+    return value
+
+
+def _seen(name: str) -> Callable[[_Run], Any]:
+    return lambda run: getattr(run.seen, name)
+
+
+COLUMNS: Mapping[str, tuple[type, Callable[[_Run], Any]]] = {
+    "simulated_s": (float, lambda run: run.summary.simulated_s),
+    "settled": (bool, lambda run: None if run.first is None else run.first.errors[-1].settled),
+    "worst_rms_position_cm": (float, _Run.worst_rms_position_cm),
+    **{name: (float, _seen(name.replace("seen_", "rms_"))) for name in SEEN},
+    **{
+        prefix + name: (kind, _in_summary(way, name))
+        for prefix, way, struct in _PARTS
+        for name, kind in _kinds(struct)
+    },
 }
-"""Column -> int, float or bool. `settled`: the first robot is within 3 cm and 0.15 rad at the end.
-`worst_rms_position_cm`: the largest `rms_position_cm` of all robots."""
+"""Name -> int, float or bool, and the value in one run: None where it has none. `settled`: the first robot is within
+3 cm and 0.15 rad at the end. `worst_rms_position_cm`: the largest `rms_position_cm` of all robots."""
+FIGURES: Mapping[str, type] = {name: kind for name, (kind, _) in COLUMNS.items()}
 
 
 def figures_of(summary: Summary, tracks: Tracks) -> dict[str, Any]:
-    """The figures of one run; None for what it does not have."""
-    found: dict[str, Any] = {
-        "simulated_s": summary.simulated_s,
-        **_over_robots(tracks),
-        **_seen(tracks),
-    }
-    for prefix, place, struct in _PARTS:
-        at: Any = summary
-        for name in place:
-            at = getattr(at, name) if at is not None else None
-        for name, _ in _kinds(struct):
-            found[prefix + name] = None if at is None else getattr(at, name)
-    return found
-
-
-def _seen(tracks: Tracks) -> dict[str, float | None]:
-    """Of the first robot's measurements in the last second."""
-    first = next(iter(tracks.robots.values()), None)
-    if first is None:
-        return dict.fromkeys(SEEN)
-    after_tick = first.errors[-1].tick - TICKS_PER_SECOND
-    found = tracking_of([sample for sample in first.measured_errors if sample.tick > after_tick])
-    return {name: getattr(found, f"rms_{name.removeprefix('seen_')}") for name in SEEN}
-
-
-def _over_robots(tracks: Tracks) -> dict[str, Any]:
-    everyone = [track.errors for track in tracks.robots.values() if len(track.errors)]
-    if not everyone:
-        return {"settled": None, "worst_rms_position_cm": None}
-    rms = [value for errors in everyone if (value := tracking_of(errors).rms_position_cm) is not None]
-    return {"settled": everyone[0][-1].settled, "worst_rms_position_cm": max(rms)}
+    """The figures of one run."""
+    run = _Run(summary, tracks)
+    return {name: value(run) for name, (_, value) in COLUMNS.items()}
