@@ -19,7 +19,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CYCLE_TICKS, TICKS_PER_SECOND
 from miro_robot.inspect.frames import Frame
 from miro_robot.mcs51.opcodes import LENGTH, disassemble
-from miro_sim.world import conditions
+from miro_sim.world.conditions import CONDITIONS
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.expression import Value, children, content, expression
 from mirotwin.rerun.inspected_run import RobotRun
@@ -28,13 +28,6 @@ from mirotwin.shell.times import TimeType
 
 PROMPT = "(mirotwin) "
 LINES_AROUND = 5
-_CONDITIONS = {
-    one.__name__.lower(): one
-    for one in vars(conditions).values()
-    if isinstance(one, type)
-    and issubclass(one, conditions.Condition)
-    and one.__name__ not in ("Condition", "When")
-}
 
 
 class Console:
@@ -117,7 +110,7 @@ class Console:
             "stepi": (step("into", False, True), "one instruction"),
             "until": (
                 self._until,
-                f"until CONDITION [KEY=VALUE ..]: on to an event: {', '.join(_CONDITIONS)}",
+                f"until CONDITION [KEY=VALUE ..]: on to an event: {', '.join(CONDITIONS)}",
             ),
             "watch": (self._watch, "watch VAR [if EXPR]: stop before an instruction that writes it"),
             "where": (self._where, "the functions under way; where N: `print` means the names of frame N"),
@@ -147,8 +140,8 @@ class Console:
 
     def _until(self, rest: str) -> None:
         name, *keys = shlex.split(rest) or [""]
-        if name not in _CONDITIONS:
-            raise BadInput("", name, "is no condition", f"there are {', '.join(_CONDITIONS)}")
+        if name not in CONDITIONS:
+            raise BadInput("", name, "is no condition", f"there are {', '.join(CONDITIONS)}")
         run = self.debugger.timeline.run
         if not isinstance(run, RobotRun):
             raise BadInput(
@@ -160,11 +153,11 @@ class Console:
         robot = run.world.networks[run.network].robots[run.index]
         places = (
             {"network": run.network, "slot": robot.slot}
-            if "slot" in _CONDITIONS[name].__struct_fields__
+            if "slot" in CONDITIONS[name].__struct_fields__
             else {}
         )
         try:
-            condition = msgspec.convert({**places, **given}, _CONDITIONS[name], strict=False)
+            condition = msgspec.convert({**places, **given}, CONDITIONS[name], strict=False)
             event = self.debugger.timeline.until(condition)
         except (msgspec.ValidationError, ValueError) as error:
             raise BadInput("", rest, str(error)) from None

@@ -19,7 +19,7 @@ from miro_protocol.freshness import Freshness
 from miro_protocol.table import downlink
 from miro_robot.lm629.commands import BY_NAME
 from miro_sim.periods import Axis, RobotPeriod
-from miro_sim.radio.condition import UP
+from miro_sim.radio.link_state import UP
 from miro_sim.radio.params import Radio
 from miro_sim.radio.probability import ONE
 from miro_sim.world.events import SIDES, Event
@@ -135,7 +135,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
         if radio is None or not board.powered or board.held:
             return ()
         listener = radio.listeners[self.subject.slot]
-        return (listener.bit_errors,) if listener.condition == UP else ()
+        return (listener.bit_errors,) if listener.link_state == UP else ()
 
     def restarted(self, tick: int) -> None:
         self.begun_tick = tick

@@ -18,7 +18,7 @@ cdef class Band:
     cdef readonly object params, seed
     cdef readonly str name
     cdef Stream errors, noise
-    cdef public int condition
+    cdef public int link_state
     cdef long long latency
     cdef unsigned long long threshold, burst_threshold
     cdef bint slotted

@@ -19,7 +19,7 @@ from miro_exact.clock import HOST_BIT_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK
 from miro_exact.rng import Stream
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
-from miro_sim.radio.condition import DOWN, NOISE, UP
+from miro_sim.radio.link_state import DOWN, NOISE, UP
 from miro_sim.radio.params import Radio
 
 _NEVER = NEVER_TICK
@@ -48,7 +48,7 @@ class Transmitter:
 class Band:
     """The mixed level. Ticks are the receiver's; queries come in ascending order, below `limit`."""
 
-    STATE = {"condition": ("i", 0, NOISE), "transmitters": [Transmitter]}
+    STATE = {"link_state": ("i", 0, NOISE), "transmitters": [Transmitter]}
     NOT_STATE = (
         "burst_threshold",
         "errors",
@@ -67,7 +67,7 @@ class Band:
         self.name = name
         self.errors = Stream(seed, f"{name}/errors")
         self.noise = Stream(seed, f"{name}/noise")
-        self.condition = UP
+        self.link_state = UP
         self.latency = params.latency_ticks
         self.threshold = params.error_threshold
         self.burst_threshold = params.burst_threshold
@@ -106,9 +106,9 @@ class Band:
                 threshold = self.burst_threshold
             carrier = 1
             level &= transmitter.line.level_at(sent)
-        if self.condition == _NOISE:
+        if self.link_state == _NOISE:
             return self.noise.bit(tick // _BIT)
-        if self.condition == _DOWN:
+        if self.link_state == _DOWN:
             return 1
         if carrier and self.errors.below(slot, threshold):
             return (level ^ 1) | 2
@@ -124,7 +124,7 @@ class Band:
                 change = min(change, transmitter.last_edge + _HOLD)
                 if self.slotted:
                     change = min(change, (sent // _BIT + 1) * _BIT)
-        if self.condition == _NOISE:
+        if self.link_state == _NOISE:
             change = min(change, (tick // _BIT + 1) * _BIT - self.latency)
         if change == _NEVER:
             return _NEVER

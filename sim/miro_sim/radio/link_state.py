@@ -7,7 +7,7 @@ noise   a stronger transmitter sends noise: receivers hear a fair random bit in 
 
 from typing import Literal
 
-Condition = Literal["up", "down", "noise"]
+LinkState = Literal["up", "down", "noise"]
 UP, DOWN, NOISE = 0, 1, 2
-CONDITIONS: tuple[Condition, ...] = ("up", "down", "noise")
+LINK_STATES: tuple[LinkState, ...] = ("up", "down", "noise")
 """Names, in the order of the numbers."""

@@ -13,7 +13,7 @@ cdef int _DOWN, _NOISE
 
 cdef class Listener:
     cdef readonly Line line
-    cdef public int condition
+    cdef public int link_state
     cdef readonly long long bit_errors
     cdef readonly Slicer slicer
     cdef Stream errors, noise, idle, lost, collision

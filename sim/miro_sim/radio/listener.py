@@ -22,7 +22,7 @@ from miro_exact.rng import Stream
 from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
-from miro_sim.radio.condition import DOWN, NOISE, UP
+from miro_sim.radio.link_state import DOWN, NOISE, UP
 from miro_sim.radio.params import Radio
 from miro_sim.radio.sender import Sender
 from miro_sim.radio.slicer import Slicer
@@ -40,7 +40,7 @@ class Listener:
     Characters that its module lost are not counted, nor what it heard of other networks.
     """
 
-    STATE = {"condition": ("i", 0, NOISE), "bit_errors": TICK, "slicer": Slicer}
+    STATE = {"link_state": ("i", 0, NOISE), "bit_errors": TICK, "slicer": Slicer}
     NOT_STATE = (
         "burst_threshold",
         "bursts",
@@ -77,7 +77,7 @@ class Listener:
             self.slicer = Slicer(params.slicer, params.eb_n0_db)
         parts = (self.bursts, self.dropouts, self.slicer)
         self.perfect_idle = not self.false_start and all(part is None for part in parts)
-        self.condition = UP
+        self.link_state = UP
         self.bit_errors = 0
 
     def __repr__(self) -> str:
@@ -88,10 +88,10 @@ class Listener:
 
         The others are heard in its pauses, and spoil its bits (`mixed`).
         """
-        if self.condition == _NOISE:
+        if self.link_state == _NOISE:
             self.hear_noise(tick, until)
             return
-        if rank == len(senders) or self.condition == _DOWN:
+        if rank == len(senders) or self.link_state == _DOWN:
             self.hear_nothing(tick, until)
             return
         sender = senders[rank]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
 from miro_protocol.actions import Action, Power, RadioState, Reset
-from miro_sim.radio.condition import CONDITIONS
+from miro_sim.radio.link_state import LINK_STATES
 
 if TYPE_CHECKING:
     from miro_sim.world.network import Network
@@ -25,7 +25,7 @@ _MOST_WAITING = 1 << 16
 
 
 class Waiting(NamedTuple):
-    """An action that waits for `tick`. `slot`: 0 for the radio's; `value`: a level, or the number of a condition."""
+    """An action that waits for `tick`. `slot`: 0 for the radio's; `value`: a level, or the number of a link's state."""
 
     tick: int
     what: int
@@ -74,7 +74,7 @@ class Actions:
         if len(self.waiting) + 2 > _MOST_WAITING:
             raise ValueError(f"net{self.network}: {len(self.waiting)} actions wait; at most {_MOST_WAITING}")
         if isinstance(action, RadioState):
-            value = CONDITIONS.index(action.state)
+            value = LINK_STATES.index(action.state)
             self.waiting.append(Waiting(action.tick - SETTLE_TICKS, RADIO_DOWN, 0, value))
             self.waiting.append(Waiting(action.tick, RADIO_UP, 0, value))
         elif isinstance(action, Reset):
@@ -97,11 +97,11 @@ class Actions:
     def _do(self, network: Network, one: Waiting) -> Action | None:
         if one.what == RADIO_DOWN:
             for listener in network.downlink.listeners.values():
-                listener.condition = one.value
+                listener.link_state = one.value
             return None
         if one.what == RADIO_UP:
-            network.uplink.band.condition = one.value
-            return RadioState(one.tick, self.network, CONDITIONS[one.value])
+            network.uplink.band.link_state = one.value
+            return RadioState(one.tick, self.network, LINK_STATES[one.value])
         board = network.robot(one.slot).board
         if one.what == RESET:
             board.set_reset(one.value)

@@ -14,7 +14,7 @@ edge        a pin changes                                                 pin, v
 true        a predicate is true                                           -
 reset       the level at a robot's reset pin is set                       value, slot
 power       a robot's supply is switched                                  value (1: on), slot
-radio       a network's radio works, is off, or gives noise               value (of `radio.condition`)
+radio       a network's radio works, is off, or gives noise               value (of `radio.link_state`)
 touch       two robots have begun to touch, seen every millisecond        value (slot), other (network, slot)
 """
 
@@ -30,7 +30,7 @@ from miro_protocol.events import Received
 from miro_robot import event_log
 from miro_robot.event_log import EventLog
 from miro_robot.lm629.commands import BY_OPCODE
-from miro_sim.radio.condition import CONDITIONS
+from miro_sim.radio.link_state import LINK_STATES
 
 PC = -1
 """Slot of what happens at the PC."""
@@ -75,7 +75,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True):
         if self.what in ("reset", "power"):
             return f" {self.value}"
         if self.what == "radio":
-            return f" {CONDITIONS[self.value]}"
+            return f" {LINK_STATES[self.value]}"
         if self.what == "sent":
             return f" {len(self.data)} characters"
         return ""
@@ -130,7 +130,7 @@ class HostLog:
 def of_action(action: Action) -> Event:
     """The event that an action is, at its tick."""
     if isinstance(action, RadioState):
-        value = CONDITIONS.index(action.state)
+        value = LINK_STATES.index(action.state)
         return Event(tick=action.tick, what="radio", network=action.network, value=value)
     what, value = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)
     return Event(tick=action.tick, what=what, network=action.network, slot=action.slot, value=value)

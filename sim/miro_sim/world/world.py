@@ -28,7 +28,7 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
 from miro_sim.periods import Period
-from miro_sim.radio.condition import CONDITIONS, Condition
+from miro_sim.radio.link_state import LINK_STATES, LinkState
 from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world import conditions as waiting
 from miro_sim.world.actions import SETTLE_TICKS
@@ -243,7 +243,7 @@ class World:
         """Switches a robot's supply on (1) or off (0) as soon as possible; returns the tick. `slot` as above."""
         return self._do_now(Power(self.earliest_action_tick, network, self._slot(network, slot), on))
 
-    def set_radio(self, state: Condition, network: int = 0) -> int:
+    def set_radio(self, state: LinkState, network: int = 0) -> int:
         """Lets a radio work ("up"), be off ("down") or give "noise", as soon as possible; returns the tick."""
         return self._do_now(RadioState(self.earliest_action_tick, network, state))
 
@@ -262,9 +262,9 @@ class World:
                 f"net{action.network}: tick {action.tick} of an action; the earliest is {earliest_tick}"
             )
         if isinstance(action, RadioState):
-            if action.state not in CONDITIONS:
+            if action.state not in LINK_STATES:
                 raise ValueError(
-                    f"net{action.network}: a radio {action.state!r}; give {', '.join(CONDITIONS)}"
+                    f"net{action.network}: a radio {action.state!r}; give {', '.join(LINK_STATES)}"
                 )
         else:
             network.robot(action.slot)
