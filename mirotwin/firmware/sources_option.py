@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
-
-import click
+from typing import Annotated
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image import Image
 from miro_robot.image.debug_info import Sources
 from mirotwin.firmware.coverage_files import source_folders
 from mirotwin.shell.command import Option
-from mirotwin.shell.options import IMAGE, NAME, Place
-
-
-def sources_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    return click.option(
-        "--sources",
-        multiple=True,
-        metavar="FOLDER",
-        type=Place(),
-        help="Folder of the C files; may be repeated. Default: the image's folder.",
-    )(command)
-
+from mirotwin.shell.options import IMAGE, NAME
 
 SOURCES = Option(
     "--sources",

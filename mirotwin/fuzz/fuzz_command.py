@@ -1,6 +1,6 @@
 """`mirotwin fuzz`: inputs that make firmware fail, found by an engine that is guided by what the firmware executes.
 
-Long because the command has an option for each thing that a campaign may be asked.
+Long because the command has an option for each thing that a campaign may be options.
 """
 
 from __future__ import annotations
@@ -11,127 +11,42 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 import click
-import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
-from miro_exact.seed import MAX_SEED
 from miro_host.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import Image
 from miro_sim.scenario.file import changed
-from mirotwin.firmware.sources_option import sources_of, sources_option
+from mirotwin.firmware.sources_option import sources_of
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, NoEngine, engine_for
 from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
-from mirotwin.fuzz.fuzz_bare import bare_fuzz_options, bare_spec, load_bare_firmware, take_bare_fuzz
+from mirotwin.fuzz.fuzz_options import FuzzOptions, bare_spec, load_bare_firmware
 from mirotwin.fuzz.fuzz_progress import FuzzProgress
 from mirotwin.fuzz.fuzz_summary import CampaignEnd, report
 from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.oracle import oracle_of
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
-from mirotwin.fuzz.triage import MINIMISE_S, Crash, Triage
+from mirotwin.fuzz.triage import Crash, Triage
+from mirotwin.shell.command import command_of
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import Place, Whole, choose_engine, engine_option
+from mirotwin.shell.options import choose_engine
 from mirotwin.shell.program import Terminated, complain
-from mirotwin.shell.times import WallTime
 from mirotwin.verify.bare.exchange import NamedCheck, check_named
 from mirotwin.verify.checks.expect import expectations_of
-from mirotwin.verify.expectations import as_setting, refuse_files
+from mirotwin.verify.expectations import as_settings
 from mirotwin.verify.wanted import silent_scenario
 
-LONGEST_S = 1e7
 AWAKE_MS = 1000 * AWAKE_TICKS // TICKS_PER_SECOND
 INTERRUPTED_S = 5.0
 """How long inputs are still looked at after a Ctrl-C."""
 
 
-class Asked(msgspec.Struct, frozen=True, kw_only=True):
-    """What a campaign was asked for; names as the options'."""
-
-    time_s: float
-    jobs: int | None
-    corpus: Path | None
-    checks: tuple[str, ...]
-    covering: str | None
-    out: Path
-    seed: int | None
-    minimise_s: float
-    force: bool
-    quiet: bool
-    sources: tuple[str, ...]
-
-
-@click.command(short_help="Looks for inputs that make a firmware image fail.")
-@click.argument("image", metavar="[IMAGE.ihx]", type=Place(), required=False)
-@click.option(
-    "--time",
-    "time_s",
-    type=WallTime(LONGEST_S),
-    default="1min",
-    show_default=True,
-    help="How long: 30s, 5min, 2h.",
-)
-@click.option("--jobs", type=Whole(1), help="Processes of the engine. Default: the processors but one.")
-@click.option(
-    "--input",
-    "kind",
-    type=click.Choice(["bytes", "frames", "session"]),
-    default="session",
-    show_default=True,
-    help="What an input is: characters; frames, whose CRC is made right; frames, pauses, damage, resets.",
-)
-@click.option(
-    "--corpus",
-    type=Place(path_type=Path),
-    metavar="DIR",
-    help="Folder of recordings, stream files, captures and inputs of earlier campaigns to begin with.",
-)
-@click.option(
-    "--expect",
-    "checks",
-    metavar="KEY[=VALUE]",
-    multiple=True,
-    help="A check that judges each input that found something new, as for `run`; may be repeated.",
-)
-@click.option(
-    "--covering", metavar="SYMBOL", help="Look for an input that reaches this function, and end with it."
-)
-@click.option(
-    "--robots", type=click.Choice(["3", "5"]), default="3", show_default=True, help="Slots of the network."
-)
-@click.option("--slot", type=Whole(0, 4), default=0, show_default=True, help="Slot of the robot.")
-@click.option("--seed", type=Whole(0, MAX_SEED), help="Seed of the engine. Default: from the system.")
-@click.option(
-    "--out",
-    type=Place(path_type=Path),
-    metavar="DIR",
-    help="Folder for what it leaves. Default: runs/fuzz-IMAGE, with -2, -3, .. after an earlier campaign.",
-)
-@click.option("--force", is_flag=True, help="Replace an earlier campaign in --out.")
-@click.option(
-    "--minimise",
-    "minimise_s",
-    type=WallTime(LONGEST_S),
-    default=f"{MINIMISE_S:.0f}s",
-    show_default=True,
-    help="Longest time for making a crash small.",
-)
-@bare_fuzz_options
-@sources_option
-@engine_option
-@click.option("-q", "--quiet", is_flag=True, help="No progress, and of the results only what failed.")
-def fuzz(
-    image: str | None,
-    kind: str,
-    robots: str,
-    slot: int,
-    out: Path | None,
-    engine: str | None,
-    **given: Any,
-) -> int:
+@command_of(FuzzOptions)
+def fuzz(options: FuzzOptions) -> int:
     """Looks for inputs that make IMAGE.ihx (default: the robot's own firmware) fail, on the robot's board.
 
     Each input is played from the moment at which the firmware is up. Faults and the promises of the protocol are judged
@@ -144,38 +59,37 @@ def fuzz(
 
     Exit code 1: something was found and confirmed, or --covering was not reached.
     """
-    active = cast(Literal["compiled", "python"], choose_engine(engine))
-    bare = take_bare_fuzz(given)
-    firmware = load_bare_firmware(image) if bare.bare else load_firmware(image)
-    if slot >= int(robots):
-        raise click.UsageError(
-            f"--slot {slot} does not exist among {robots} robots; give 0 to {int(robots) - 1}."
+    active = cast(Literal["compiled", "python"], choose_engine(options.engine))
+    firmware = load_bare_firmware(options.image) if options.bare else load_firmware(options.image)
+    robots, slot = int(options.robots), options.slot
+    if slot >= robots:
+        raise click.UsageError(f"--slot {slot} does not exist among {robots} robots; give 0 to {robots - 1}.")
+    if not options.bare:
+        spec = TargetSpec(
+            image=options.image or "", input=options.kind, robots=robots, slot=slot, engine=active
         )
-    default = Path("runs") / f"fuzz-{firmware.path.stem}"
-    asked = Asked(out=out or (default if given["force"] else unused(default)), **given)
-    if not bare.bare:
-        spec = TargetSpec(image=image or "", input=kind, robots=int(robots), slot=slot, engine=active)
-        return _campaign(spec, firmware, asked, None, _expected(asked.checks))
-    check = None if bare.check is None else check_named(bare.check)
+        return _campaign(spec, firmware, options, None, _expected(options.expected))
+    check = None if options.check is None else check_named(options.check)
     expected = {} if check is None else {check.name: True}
-    return _campaign(bare_spec(image or "", kind, active, bare), firmware, asked, check, expected)
+    return _campaign(bare_spec(options, active), firmware, options, check, expected)
 
 
 def _campaign(
     spec: TargetSpec,
     image: Image,
-    asked: Asked,
+    options: FuzzOptions,
     check: NamedCheck | None,
     expected: dict[str, Any],
 ) -> int:
-    folder = CampaignFolder(asked.out, asked.force)
-    check_outside(asked.out, asked.corpus)
-    covering = _covering(asked.covering, image)
+    default = Path("runs") / f"fuzz-{image.path.stem}"
+    folder = CampaignFolder(options.out or (default if options.force else unused(default)), options.force)
+    check_outside(folder.path, options.corpus)
+    covering = _covering(options.covering, image)
     target = spec.make()
     oracle = oracle_of(target, check)
     inputs = target.seeds()
-    if asked.corpus is not None:
-        corpus = read_corpus(asked.corpus, spec.input, spec.robots)
+    if options.corpus is not None:
+        corpus = read_corpus(options.corpus, spec.input, spec.robots)
         inputs = list(dict.fromkeys((*inputs, *corpus.inputs)))
         for note in corpus.notes:
             complain(note)
@@ -185,34 +99,42 @@ def _campaign(
         what = f"{covering.name} runs while the firmware starts, before any input"
         raise BadInput("", "--covering", what, "name a function that an input has to reach")
     folder.make()
-    triage = Triage(reached, oracle, folder, sources_of(image, asked.sources), asked.minimise_s)
+    triage = Triage(reached, oracle, folder, sources_of(image, options.sources), options.minimise_s)
     with folder.filled():
-        campaign, asked = _begun(spec, asked, triage, folder, expected, covering, _sorted_out(target, inputs))
-        return _run(campaign, image, asked, check.text if check is not None and check.from_file else None)
+        sorted_inputs = _sorted_out(target, inputs)
+        campaign = _begun(spec, options, triage, folder, expected, covering, sorted_inputs)
+        time_s = options.time_s if sorted_inputs[1] else 0.0
+        return _run(
+            campaign,
+            image,
+            folder.path,
+            time_s,
+            options,
+            check.text if check is not None and check.from_file else None,
+        )
 
 
 def _begun(
     spec: TargetSpec,
-    asked: Asked,
+    options: FuzzOptions,
     triage: Triage,
     folder: CampaignFolder,
     expected: dict[str, Any],
     covering: Covering | None,
     inputs: tuple[list[bytes], list[bytes], list[bytes]],
-) -> tuple[Campaign, Asked]:
-    """A campaign that has looked at the inputs that fail, pass and execute no branch; how long it may go on."""
+) -> Campaign:
+    """A campaign that has looked at the inputs that fail, pass and execute no branch."""
     failing, passing, silent = inputs
     engine: Engine = NoEngine()
     if passing:
-        engine, notes = engine_for(spec, passing, folder, spec.make(), _jobs(asked.jobs), asked.seed)
+        engine, notes = engine_for(spec, passing, folder, spec.make(), _jobs(options.jobs), options.seed)
         for note in notes:
             complain(note)
     else:
         complain("every input fails or executes no branch: there is nothing to go on from")
-        asked = msgspec.structs.replace(asked, time_s=0.0)
-    campaign = Campaign(engine, triage, folder, expected, covering, _teller(asked.quiet))
+    campaign = Campaign(engine, triage, folder, expected, covering, _teller(options.quiet))
     campaign.begin_with(failing, (*passing, *silent))
-    return campaign, asked
+    return campaign
 
 
 def _sorted_out(target: Target, inputs: list[bytes]) -> tuple[list[bytes], list[bytes], list[bytes]]:
@@ -231,13 +153,20 @@ def _sorted_out(target: Target, inputs: list[bytes]) -> tuple[list[bytes], list[
     return failing, passing, silent
 
 
-def _run(campaign: Campaign, image: Image, asked: Asked, check_in_file: str | None) -> int:
+def _run(
+    campaign: Campaign,
+    image: Image,
+    out: Path,
+    time_s: float,
+    options: FuzzOptions,
+    check_in_file: str | None,
+) -> int:
     """The campaign to its end, whatever ends it; the exit code."""
     stopped: BaseException | None = None
     left = 0
-    with FuzzProgress(image.path.name, asked.time_s, asked.quiet) as progress:
+    with FuzzProgress(image.path.name, time_s, options.quiet) as progress:
         try:
-            campaign.run(asked.time_s, progress.show)
+            campaign.run(time_s, progress.show)
             left = campaign.finish(progress.show, AFTER_S)
         except (KeyboardInterrupt, Terminated) as error:
             stopped = error
@@ -254,7 +183,7 @@ def _run(campaign: Campaign, image: Image, asked: Asked, check_in_file: str | No
             with suppress(BadInput, PluginError):
                 left = campaign.finish(progress.show, INTERRUPTED_S)
     ended = CampaignEnd(left=left, complete=stopped is None, check=check_in_file)
-    code = report(campaign, image, asked.out, asked.covering, ended, asked.quiet)
+    code = report(campaign, image, out, options.covering, ended, options.quiet)
     if stopped is not None:
         raise stopped
     return code
@@ -272,9 +201,7 @@ def _expected(checks: tuple[str, ...]) -> dict[str, Any]:
     """The checks of --expect as a table. Raises BadInput for one that there is not, or with wrong parameters."""
     if not checks:
         return {}
-    refuse_files(checks)
-    settings = [as_setting(text) for text in checks]
-    return dict(changed(silent_scenario(()), "fuzz", settings, expectations_of).expect)
+    return dict(changed(silent_scenario(()), "fuzz", as_settings(checks), expectations_of).expect)
 
 
 def _covering(symbol: str | None, image: Image) -> Covering | None:

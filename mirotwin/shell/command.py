@@ -219,6 +219,12 @@ class _HeadedOption(click.Option):
         super().__init__(*args, **named)
         self.heading = heading
 
+    def get_help_extra(self, ctx: click.Context) -> Any:
+        extra = super().get_help_extra(ctx)
+        if "default" in extra and hasattr(self.type, "written"):
+            extra["default"] = self.type.written(self.default)
+        return extra
+
 
 class _Command(click.Command):
     """A command whose help shows options that have a heading below that."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -140,32 +140,6 @@ Engine = Annotated[
         help="How the hot modules run; both give the same bits. Default: compiled if they were built.",
     ),
 ]
-
-# Until every command takes a record:
-Command = TypeVar("Command", bound=Callable[..., Any])
-Place, Number = PathType, FiniteNumber
-STACK_FROM: dict[str, Any] = {"metavar": "ADDRESS", "type": IramAddress()}
-STACK_FROM_HELP = "Where the stack begins (0x..; it ends at 0xff), for an image without a .map."
-
-
-def engine_option(command: Command) -> Command:
-    return click.option(
-        "--engine",
-        type=click.Choice(engines.ENGINES),
-        help="How the hot modules run; both give the same bits. Default: compiled if they were built.",
-    )(command)
-
-
-def firmware_option(text: str) -> Callable[[Command], Command]:
-    return click.option("--firmware", "firmware", metavar="IMAGE.ihx", type=Place(), help=text)
-
-
-def stack_option(command: Command) -> Command:
-    return click.option("--stack-from", **STACK_FROM, help=STACK_FROM_HELP)(command)
-
-
-def set_option(text: str) -> Callable[[Command], Command]:
-    return click.option("--set", "settings", metavar="KEY=VALUE", multiple=True, help=text)
 
 
 def choose_engine(engine: str | None) -> str:

@@ -88,3 +88,6 @@ class WallTime(TimeType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         return value if isinstance(value, float) else super().convert(value, param, ctx).seconds()
+
+    def written(self, value: float) -> str:
+        return f"{value:g}s"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
@@ -17,7 +17,6 @@ from mirotwin.verify.checks.registry import ALWAYS_ON
 if TYPE_CHECKING:
     from mirotwin.verify.steps.player import Player
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 LINES = 5
 """Failures of one check that are listed."""
 
@@ -43,24 +42,6 @@ def refuse_files(given: Sequence[str]) -> None:
 def as_setting(text: str) -> str:
     """`--expect KEY=VALUE` as the setting that it stands for; a KEY alone is a check with its defaults."""
     return f"{EXPECT_KEY}{text}" if "=" in text else f"{EXPECT_KEY}{text}=true"
-
-
-def _as_settings(ctx: click.Context, param: click.Parameter, given: Sequence[str]) -> tuple[str, ...]:
-    refuse_files(given)
-    return tuple(map(as_setting, given))
-
-
-def expect_option(command: Command) -> Command:
-    """Gives the command the expectations as settings."""
-    return click.option(
-        "--expect",
-        "expected",
-        metavar="KEY[=VALUE]",
-        multiple=True,
-        callback=_as_settings,
-        help="A check of the run: a key of the scenario's [expect], such as tracks_within_cm=3; may be repeated. Exit"
-        " code 1 when one fails.",
-    )(command)
 
 
 EXPECT = Option(
