@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
-from miro_exact.rng import Stream
 from miro_host.estimators.interface import EstimatorParameters
-from miro_host.eye import calibration_kinds as kinds
-from miro_host.eye.calibration import Calibration
 from miro_host.integrator import integrator_of
 from miro_host.laws.interface import LawParameters
 from miro_host.pilot import Pilot
@@ -26,9 +21,6 @@ from miro_host.wheels import Wheels
 from miro_protocol.table import DOWNLINK
 from miro_sim.plant.params import DriveParams
 from miro_sim.scenario import keys as sc
-from miro_sim.scenario.camera_keys import SeeingCamera
-
-DEGREE = 0.017453292519943295
 
 
 def reference_for(robot: sc.Robot, duration_s: float) -> Trajectory:
@@ -91,39 +83,6 @@ def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
     except (Exception, SystemExit) as error:
         what = f"{word} {name!r} cannot be made: {raised(error)}"
         raise PluginError(what, f"mend the {word} or its parameters") from error
-
-
-@lru_cache(maxsize=16)
-def calibration_for(camera: SeeingCamera, network: int, seed: int) -> tuple[Calibration, float]:
-    """What a host believes about its camera, and by how much that is wrong at worst over the pitch, in m.
-
-    Finding the errors of 1997 takes longer than the rest of a world: a seed's calibration is kept.
-    """
-    try:
-        calibration = _calibration(camera, network, seed)
-        return calibration, kinds.worst_error_m(camera.lens, calibration)
-    except ValueError as error:
-        what = f"no calibration of this camera can be so wrong: {error}"
-        raise BadInput("", "camera.calibration_errors", what, "make the errors smaller") from None
-
-
-def _calibration(camera: SeeingCamera, network: int, seed: int) -> Calibration:
-    errors = camera.calibration_errors
-    if str(camera.calibration) == "1997":
-        found = kinds.drawn_1997(
-            camera.lens,
-            Stream(seed, f"net{network}/calibration"),
-            errors.centre_px,
-            errors.focal_share,
-            errors.tilt_deg * DEGREE,
-            errors.worst_cm / 100.0,
-        )
-    else:
-        found = kinds.none(camera.lens) if camera.calibration == "none" else kinds.exact(camera.lens)
-    ignored = kinds.CalibrationErrors(
-        ignore_height=errors.ignore_height or found.ignore_height, ignore_distortion=errors.ignore_distortion
-    )
-    return kinds.wrong(found.camera, ignored)
 
 
 def drive_for(robot: sc.Robot, left: float, right: float) -> DriveParams:

@@ -11,10 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Protocol
 
+from miro_exact.bad_input import BadInput
 from miro_exact.rng import Stream
 from miro_exact.state import TICK
+from miro_host.eye import calibration_kinds as kinds
+from miro_host.eye.calibration import Calibration
 from miro_host.eye.grabber import Grabber, Sightings
 from miro_host.eye.patterns import PATTERNS, TEAMS
 from miro_host.eye.track import Sighting
@@ -26,7 +30,6 @@ from miro_sim.pitch.colour_samples import colours_of
 from miro_sim.pitch.static_field import StaticField
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.scenario import camera_keys as keys
-from miro_sim.scenario.build import calibration_for
 
 _DEGREE = 0.017453292519943295
 _FRAMES = ("q", 0, 1 << 24)
@@ -231,6 +234,39 @@ class PixelSight(SeeingSight):
             self.eye.robot(body.network, body.slot, x_m, y_m, theta_rad, v_m_s, w_rad_s)
         self.eye.begin(frame, tick)
         return self.eye
+
+
+@lru_cache(maxsize=16)
+def calibration_for(camera: keys.SeeingCamera, network: int, seed: int) -> tuple[Calibration, float]:
+    """What a host believes about its camera, and by how much that is wrong at worst over the pitch, in m.
+
+    Finding the errors of 1997 takes longer than the rest of a world: a seed's calibration is kept.
+    """
+    try:
+        calibration = _calibration(camera, network, seed)
+        return calibration, kinds.worst_error_m(camera.lens, calibration)
+    except ValueError as error:
+        what = f"no calibration of this camera can be so wrong: {error}"
+        raise BadInput("", "camera.calibration_errors", what, "make the errors smaller") from None
+
+
+def _calibration(camera: keys.SeeingCamera, network: int, seed: int) -> Calibration:
+    errors = camera.calibration_errors
+    if str(camera.calibration) == "1997":
+        found = kinds.drawn_1997(
+            camera.lens,
+            Stream(seed, f"net{network}/calibration"),
+            errors.centre_px,
+            errors.focal_share,
+            errors.tilt_deg * _DEGREE,
+            errors.worst_cm / 100.0,
+        )
+    else:
+        found = kinds.none(camera.lens) if camera.calibration == "none" else kinds.exact(camera.lens)
+    ignored = kinds.CalibrationErrors(
+        ignore_height=errors.ignore_height or found.ignore_height, ignore_distortion=errors.ignore_distortion
+    )
+    return kinds.wrong(found.camera, ignored)
 
 
 def _distance_m(drive: DifferentialDrive, tick: int, seen: Posture) -> float:

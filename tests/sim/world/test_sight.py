@@ -12,9 +12,9 @@ from miro_host.eye.grabber import Grabber
 from miro_host.eye.track import Sighting
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
-from miro_sim.scenario.build import calibration_for
 from miro_sim.scenario.camera_keys import CalibrationErrorSizes, GeometricCamera
 from miro_sim.scenario.file import ScenarioError, parse
+from miro_sim.world.sight import calibration_for
 from miro_sim.world.world import World
 
 IMAGE = load_hex(image_path())
