@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from hypothesis import strategies as st
 
 from miro_protocol.frames import encode
-from miro_protocol.strategies import host_frames
+from miro_protocol.hypothesis_frames import host_frames
 from miro_protocol.table import SERVICE_DATA, VELOCITY, VELOCITY_SATURATION, Opcode, downlink
 from miro_robot.harness.program import OPERATIONS
 

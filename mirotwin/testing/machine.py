@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
 from miro_protocol.frames import ServiceFrame, TeamFrame, asking_step, encode
-from miro_protocol.strategies import numbers
+from miro_protocol.hypothesis_frames import numbers
 from miro_protocol.table import ROBOT_COUNTS, SEQ_MODULUS, SERVICE_DATA, VELOCITY, FrameType, Opcode
 from miro_robot.image import Image
 from miro_sim.radio.params import Radio

@@ -11,7 +11,7 @@ from benchmarks.line import decode_lines, line_bits, random_frames, receive
 from benchmarks.weights import covered_bits, syndromes
 from miro_protocol.decoder import Received, WindowDecoder
 from miro_protocol.frames import ServiceFrame, TeamFrame, TelemetryFrame, encode
-from miro_protocol.strategies import host_frames, telemetry_frames
+from miro_protocol.hypothesis_frames import host_frames, telemetry_frames
 from miro_protocol.table import DOWNLINK, TELEMETRY, downlink
 
 FORMATS = (*DOWNLINK.values(), TELEMETRY)

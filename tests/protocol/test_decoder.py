@@ -11,7 +11,7 @@ from miro_protocol import decoder as module
 from miro_protocol import table
 from miro_protocol.decoder import Damaged, Decoder, Reason, Received, WindowDecoder
 from miro_protocol.frames import TeamFrame, encode
-from miro_protocol.strategies import Heard, damaged_streams, team_frames, valid_streams
+from miro_protocol.hypothesis_frames import Heard, damaged_streams, team_frames, valid_streams
 from miro_protocol.whitening import whiten
 from tests.naive.decoder import NaiveDecoder
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from miro_protocol import frames, table
 from miro_protocol.frames import ContentError, EncodeError, ServiceFrame, TeamFrame, TelemetryFrame, encode
-from miro_protocol.strategies import host_frames, robot_counts, telemetry_frames
+from miro_protocol.hypothesis_frames import host_frames, robot_counts, telemetry_frames
 from miro_protocol.whitening import whiten
 
 STOPPED = ((0, 0),) * 3

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from miro_exact.state import snapshot
 from miro_protocol import decoder, table
 from miro_protocol.frames import TeamFrame, encode
+from miro_protocol.hypothesis_frames import damaged_streams
 from miro_protocol.scan import TICK_LIMIT, Scanner
-from miro_protocol.strategies import damaged_streams
 
 
 def uncompiled():

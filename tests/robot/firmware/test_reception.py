@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_protocol.strategies import damaged_streams
+from miro_protocol.hypothesis_frames import damaged_streams
 from tests.robot.firmware.differential import compare, drawn_stream, frame
 from tests.robot.firmware.rig import BIT, CHARACTER, MS, US, Rig
 

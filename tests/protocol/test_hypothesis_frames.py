@@ -8,7 +8,13 @@ from hypothesis import strategies as st
 
 from miro_protocol import stream
 from miro_protocol.decoder import Damaged, Decoder, Reason, Received
-from miro_protocol.strategies import FAR_TICKS, NEAR_TICKS, damaged_streams, robot_counts, transmissions
+from miro_protocol.hypothesis_frames import (
+    FAR_TICKS,
+    NEAR_TICKS,
+    damaged_streams,
+    robot_counts,
+    transmissions,
+)
 
 ANY = settings(
     phases=[Phase.generate], max_examples=2000, deadline=None, database=None
