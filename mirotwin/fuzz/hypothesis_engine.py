@@ -29,7 +29,7 @@ def missing() -> str | None:
     """What of Hypothesis is missing and how to get it; None where it is there."""
     if find_spec("hypothesis") is not None:
         return None
-    return "Hypothesis is not installed; install it with `pip install 'mirotwin[strategies]'`"
+    return "Hypothesis is not installed; install it with `pip install 'mirotwin[hypothesis]'`"
 
 
 class HypothesisRun:

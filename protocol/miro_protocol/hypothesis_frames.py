@@ -1,6 +1,6 @@
 """Hypothesis strategies for frames and for what a receiver hears, drawn from the same table as the codec.
 
-Needs the extra `strategies` (`pip install mirotwin[strategies]`). What belongs here: inputs for tests
+Needs the extra `hypothesis` (`pip install mirotwin[hypothesis]`). What belongs here: inputs for tests
 of any sender or receiver of this wire. What does not: assertions, the radio and the robot
 (`mirotwin.testing`).
 
@@ -81,7 +81,7 @@ def host_frames(n: int) -> st.SearchStrategy[Message]:
 
 
 @dataclass(frozen=True)
-class Heard:
+class ReceivedStream:
     """What a receiver hears: characters with stop bit and time, and the messages that were sent undamaged."""
 
     n: int
@@ -155,7 +155,7 @@ def _noise(draw: st.DrawFn) -> _Piece:
 
 
 @st.composite
-def _heard(draw: st.DrawFn, damaged: bool, telemetry: bool) -> Heard:
+def _heard(draw: st.DrawFn, damaged: bool, telemetry: bool) -> ReceivedStream:
     n = draw(robot_counts())
     message = telemetry_frames(n) if telemetry else host_frames(n)
     step = (TELEMETRY if telemetry else downlink(n)).character_ticks
@@ -174,15 +174,15 @@ def _heard(draw: st.DrawFn, damaged: bool, telemetry: bool) -> Heard:
             tick += step
         if part.message is not None:
             sent.append(part.message)
-    return Heard(n, tuple(symbols), tuple(sent))
+    return ReceivedStream(n, tuple(symbols), tuple(sent))
 
 
-def valid_streams(telemetry: bool = False) -> st.SearchStrategy[Heard]:
+def valid_streams(telemetry: bool = False) -> st.SearchStrategy[ReceivedStream]:
     """Undamaged frames with pauses between them: all of `sent` must come out, in order."""
     return _heard(damaged=False, telemetry=telemetry)
 
 
-def damaged_streams(telemetry: bool = False) -> st.SearchStrategy[Heard]:
+def damaged_streams(telemetry: bool = False) -> st.SearchStrategy[ReceivedStream]:
     """Whole, damaged and slipped frames and noise in any order. Pauses are at most 20 us or at least 80 us."""
     return _heard(damaged=True, telemetry=telemetry)
 

@@ -65,5 +65,5 @@ def test_a_file_is_there_only_when_the_reader_has_come_to_it(page):
 def test_the_extras_that_are_installed_are_those_of_the_page_for_beginners():
     found = first_use.EXTRAS.search((sandbox.ROOT / "docs/start.md").read_text("utf-8"))
     assert found
-    assert found[1] == "[report,campaign,strategies]"
+    assert found[1] == "[report,campaign,hypothesis]"
     assert found[0] in (sandbox.ROOT / "README.md").read_text("utf-8")

@@ -30,9 +30,9 @@ from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.radio.link_state import LINK_STATES, LinkState
 from miro_sim.scenario.keys import Scenario, without_expectations
-from miro_sim.world import conditions as waiting
 from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.bodies import Bodies, Pair
+from miro_sim.world.conditions import Condition
 from miro_sim.world.events import Event
 from miro_sim.world.network import Network
 from miro_sim.world.robot import Robot
@@ -175,9 +175,7 @@ class World:
             raise ValueError(f"ticks = {ticks}: time does not go back")
         self.run_to(self.tick + ticks)
 
-    def run_until(
-        self, condition: waiting.Condition | Sequence[waiting.Condition], within: int | None = None
-    ) -> Event:
+    def run_until(self, condition: Condition | Sequence[Condition], within: int | None = None) -> Event:
         """Moves everything on to the first tick at which `condition`, or one of several, is true.
 
         Returns the event; the world stands at its tick, or one behind it where the event belongs to the machine cycle
@@ -189,7 +187,7 @@ class World:
 
             world.run_until(conditions.Answer(slot=0), within=ticks(0.040))
         """
-        conditions = [condition] if isinstance(condition, waiting.Condition) else list(condition)
+        conditions = [condition] if isinstance(condition, Condition) else list(condition)
         return self.waits.until(conditions, None if within is None else _whole(within))
 
     def inject(
