@@ -1,5 +1,6 @@
 """The error of input that cannot be used: one line `FILE: PLACE: what; remedy`."""
 
+from collections.abc import Iterable
 from os import PathLike
 from typing import Any
 
@@ -35,6 +36,14 @@ class BadInput(ValueError):
     def __reduce__(self) -> tuple[Any, ...]:
         """What a process hands to another: a base class, because a derived one may be made of other parts."""
         return BadInput, (self.path, self.place, self.what, self.remedy)
+
+
+def did_you_mean(word: str, known: Iterable[str], remedy: str = "") -> str:
+    """The remedy for a word that is not among the known ones: the nearest of them, if one is near, and `remedy`."""
+    from difflib import get_close_matches  # only an error needs it
+
+    close = get_close_matches(word[:LONGEST_END], list(known), n=1)
+    return " ".join([*(f"did you mean {one}?" for one in close), *([remedy] if remedy else [])])
 
 
 def one_line(text: str) -> str:

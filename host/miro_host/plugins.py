@@ -11,11 +11,10 @@ distributions takes tens of milliseconds. For the same reason a name in our tabl
 """
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 from importlib import import_module
 from typing import Any, Generic, TypeVar
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_host.raised import raised
 
 Plugin = TypeVar("Plugin")
@@ -87,10 +86,9 @@ class Registry(Generic[Plugin]):
 
     def _choices(self, name: str) -> str:
         names = self.names()
-        close = get_close_matches(name, names, n=1)
         *others, last = names
         choices = f"use {', '.join(others)} or {last}" if others else f"use {last}"
-        return f"did you mean {close[0]}? {choices}" if close else choices
+        return did_you_mean(name, names, choices)
 
     def _checked(self, found: Any, name: str, place: str) -> type[Plugin]:
         """`found` if it is a struct of parameters as this kind of plug-in needs it."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image import Image
 from miro_robot.image.c_types import CType
@@ -188,8 +187,7 @@ class Moment:
             return Value(
                 _BIT if symbol.space == "bit" else _BYTE, symbol.space, symbol.address, note="of unknown type"
             )
-        close = get_close_matches(name, self.symbols.known_names(), n=2)
-        raise NoValue(f"there is no {name} here", f"did you mean {' or '.join(close)}?" if close else "")
+        raise NoValue(f"there is no {name} here", did_you_mean(name, self.symbols.known_names()))
 
     def _variable(self, name: str, module: str) -> Variable | None:
         there = self.symbols.variables.by_name.get(name, ())

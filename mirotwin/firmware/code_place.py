@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_robot.image import Image
 from miro_robot.inspect.symbol_names import SymbolNames
 from mirotwin.shell.command import Option
@@ -42,12 +41,10 @@ def address_of(text: str, image: Image, path: str, option: str) -> int:
         if found is not None and found.space == "code":
             return found.address
     names = [name for name, symbol in image.symbols.names.items() if symbol.space == "code"]
-    close = get_close_matches(text, names, n=1) or get_close_matches(f"_{text}", names, n=1)
-    if close:
-        remedy = f"did you mean {close[0]}?"
-    elif names:
+    remedy = did_you_mean(text, names) or did_you_mean(f"_{text}", names)
+    if not remedy and names:
         remedy = "see the map beside the image"
-    else:
+    elif not names:
         remedy = "put its .map or .cdb beside it, or give an address as 0x.."
     raise BadInput(path, option, f"no symbol {text} in the code", remedy)
 

@@ -12,7 +12,7 @@ from typing import Any, Literal, cast
 
 import click
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_host.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
@@ -213,11 +213,8 @@ def _covering(symbol: str | None, image: Image) -> Covering | None:
         if not image.symbols.names:
             remedy = "put the .map or .cdb that the linker wrote beside the image"
             raise BadInput(image.path, f"--covering {symbol}", "the image has no symbols", remedy)
-        from difflib import get_close_matches
-
         functions = [name for name, one in image.symbols.names.items() if one.space == "code"]
-        close = get_close_matches(symbol, functions, n=1)
-        remedy = f"did you mean {close[0]}?" if close else "`mirotwin fw disasm` lists the functions"
+        remedy = did_you_mean(symbol, functions) or "`mirotwin fw disasm` lists the functions"
         raise BadInput(image.path, f"--covering {symbol}", "there is no such function", remedy)
     return Covering(symbol, found.address)
 

@@ -10,7 +10,6 @@ import threading
 import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from difflib import get_close_matches
 from importlib import import_module
 from io import TextIOWrapper
 from itertools import pairwise
@@ -19,7 +18,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import click
 
-from miro_exact.bad_input import BadInput, one_line, shortened
+from miro_exact.bad_input import BadInput, did_you_mean, one_line, shortened
 from miro_exact.engine import EngineError, select
 
 DONE = 0
@@ -80,6 +79,16 @@ def _report(error: Exception) -> None:
     text = f"{type(error).__name__}: {error}".rstrip(": ")
     ask = "please report this line with the command (MIROTWIN_TRACEBACK=1 shows the place)"
     complain(f"internal error: {text}; {ask}")
+
+
+def _said(error: click.UsageError) -> str:
+    """What is wrong, in the house's words where an option's name is."""
+    if not isinstance(error, click.NoSuchOption) or error.ctx is None:
+        return error.format_message()
+    names = [name for one in error.ctx.command.get_params(error.ctx) for name in one.opts]
+    hint = did_you_mean(error.option_name, [name for name in names if name.startswith("--")])
+    what = f"No such option {shortened(repr(error.option_name))}"
+    return f"{what}; {hint}" if hint else f"{what}."
 
 
 @contextmanager
@@ -148,10 +157,8 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
         if self.get_command(ctx, name) is None and not name.startswith("-"):
-            close = get_close_matches(name, self.list_commands(ctx), n=1)
-            hint = (
-                f"did you mean {close[0]}?" if close else f"there are {', '.join(self.list_commands(ctx))}."
-            )
+            names = self.list_commands(ctx)
+            hint = did_you_mean(name, names) or f"there are {', '.join(names)}."
             ctx.fail(f"No such command {shortened(repr(name))}; {hint}")
         return super().resolve_command(ctx, args)
 
@@ -215,7 +222,7 @@ class Program(LazyGroup):
             return BAD_INPUT
         except click.UsageError as error:
             path = error.ctx.command_path if error.ctx else prog_name
-            complain(f"error: {error.format_message()} See `{path} --help`.")
+            complain(f"error: {_said(error)} See `{path} --help`.")
             return BAD_INPUT
         except click.ClickException as error:
             complain(f"error: {error.format_message()}")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from typing import Any, Literal
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.clock import ms
 from miro_robot.faults import FirmwareFault
 from miro_robot.inspect.values import read_value, write_value
@@ -163,8 +162,7 @@ class RobotUnderTest:
         if symbol is not None and symbol.space == "code":
             return
         code = [one.removeprefix("_") for one, there in symbols.names.items() if there.space == "code"]
-        close = get_close_matches(name, code, n=3)
-        remedy = f"did you mean {', '.join(close)}?" if close else "give a function's name, or an address"
+        remedy = did_you_mean(name, code) or "give a function's name, or an address"
         what = "there is no such function" if symbol is None else "is no code"
         raise BadInput(self.world.image.path, name, what, remedy)
 

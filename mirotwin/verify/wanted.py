@@ -11,7 +11,6 @@ how the printed line repeats a test.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -19,7 +18,7 @@ from typing import Any
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.seed import MAX_SEED
 from miro_robot.image import Image
 from miro_sim.scenario.file import load, parse
@@ -87,9 +86,8 @@ _TYPES: dict[str, tuple[tuple[type, ...], str]] = {
 
 def _check_key(key: str, value: Any) -> None:
     if key not in KEYS:
-        close = get_close_matches(key, KEYS, n=1)
-        remedy = f"did you mean {close[0]}? " if close else ""
-        raise BadInput("", MARKER, f"there is no key {key!r}", f"{remedy}there are {', '.join(KEYS)}")
+        remedy = did_you_mean(key, KEYS, f"there are {', '.join(KEYS)}")
+        raise BadInput("", MARKER, f"there is no key {key!r}", remedy)
     types, what = _TYPES[key]
     if not isinstance(value, types) or (key == "seed" and isinstance(value, bool)):
         raise BadInput("", MARKER, f"{key}={value!r}", f"give {what}")

@@ -11,12 +11,12 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Sequence
-from difflib import get_close_matches
 from typing import Annotated, Any, NoReturn
 
 import msgspec
 from msgspec import Meta
 
+from miro_exact.bad_input import did_you_mean
 from miro_exact.seed import MAX_SEED
 from miro_protocol.stream_error import StreamError
 from miro_protocol.toml_text import KEY_PARTS, TEXT_KIB, long_key_line, too_long
@@ -83,11 +83,8 @@ class _Document:
         raw = self._loads(text)
         for key in raw:
             if key not in KEYS:
-                close = get_close_matches(key, KEYS, n=1)
-                hint = f"did you mean {close[0]}? " if close else ""
-                self._fail(
-                    *self._place(key), f"unknown key {key[:40]!r}", f"{hint}a header has {', '.join(KEYS)}"
-                )
+                remedy = did_you_mean(key, KEYS, f"a header has {', '.join(KEYS)}")
+                self._fail(*self._place(key), f"unknown key {key[:40]!r}", remedy)
         found = {key: self._value(key, value) for key, value in raw.items()}
         return Header(text=text, **found)
 

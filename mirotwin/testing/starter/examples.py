@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from difflib import get_close_matches
 from pathlib import Path
 
-from miro_exact.bad_input import BadInput, shortened
+from miro_exact.bad_input import BadInput, did_you_mean, shortened
 from miro_robot.firmware import image_path
 from mirotwin.testing.starter.writing import all_files
 
@@ -41,8 +40,7 @@ def folder() -> Path:
 def files(name: str) -> Iterator[tuple[str, Path]]:
     """(name to write, file) of an example. Raises BadInput for a name that is not one."""
     if name not in EXAMPLES:
-        close = get_close_matches(name, EXAMPLES, n=1)
-        hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(EXAMPLES)}"
+        hint = did_you_mean(name, EXAMPLES) or f"there are {', '.join(EXAMPLES)}"
         raise BadInput("", "", f"no such example {shortened(repr(name))}", hint)
     if name == "firmware":
         yield from _images()

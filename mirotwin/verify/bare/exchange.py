@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
-from difflib import get_close_matches
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
@@ -25,7 +24,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_host.raised import at_place, defined_at, raised
 from miro_robot.faults import FirmwareFault
 from miro_robot.harness.recording_bus import RecordingBus
@@ -159,7 +158,7 @@ def installed_check(name: str) -> NamedCheck:
     entries = list(entry_points(group=GROUP, name=name))
     if not entries:
         names = sorted(entry.name for entry in entry_points(group=GROUP))
-        remedy = f"{_nearest(name, names)}give FILE.py:FUNCTION{''.join(f', {one}' for one in names)}"
+        remedy = did_you_mean(name, names, f"give FILE.py:FUNCTION{''.join(f', {one}' for one in names)}")
         raise BadInput("", OPTION, f"there is no check {name!r} for a bare processor", remedy)
     try:
         found = entries[0].load()
@@ -185,11 +184,6 @@ def _module(path: str, text: str) -> ModuleType:
     return module
 
 
-def _nearest(name: str, names: list[str]) -> str:
-    close = get_close_matches(name, names, n=1)
-    return f"did you mean {close[0]}? " if close else ""
-
-
 def _callable(module: ModuleType, name: str, text: str) -> Check:
     found: Check | None = getattr(module, name, None)
     if callable(found):
@@ -197,5 +191,5 @@ def _callable(module: ModuleType, name: str, text: str) -> Check:
     names = [
         key for key, value in vars(module).items() if callable(value) and value.__module__ == module.__name__
     ]
-    choices = f"{_nearest(name, names)}it has {', '.join(names)}" if names else "it has none"
+    choices = did_you_mean(name, names, f"it has {', '.join(names) or 'none'}")
     raise BadInput(text.rpartition(":")[0], OPTION, f"there is no function {name!r}", choices)

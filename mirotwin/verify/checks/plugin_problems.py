@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from typing import Any, get_args
 
+from miro_exact.bad_input import did_you_mean
 from miro_host.plugins import PluginError
 from miro_host.raised import at_place, defined_at
 from mirotwin.verify.checks.interface import EVENT_KINDS, Check, Kind, Monitor, Subject
@@ -43,7 +43,7 @@ def _check_events(monitor: Monitor[Any], place: str) -> None:
         raise PluginError(at_place(f"{name} is {events!r:.40}", place), f"write ({events!r:.40},)")
     for what in events:
         if what not in EVENT_KINDS:
-            close = get_close_matches(str(what), EVENT_KINDS, n=1)
-            mean = f"did you mean {close[0]}? " if close else ""
             said = at_place(f"{name} names {what!r:.40}, which is no event", place)
-            raise PluginError(said, f"{mean}there are {', '.join(EVENT_KINDS)}")
+            raise PluginError(
+                said, did_you_mean(str(what), EVENT_KINDS, f"there are {', '.join(EVENT_KINDS)}")
+            )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from functools import cache
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from mirotwin.verify.conform.rule import Chapter, Rule
 from mirotwin.verify.conform.rules import (
     answers,
@@ -60,7 +59,5 @@ def find(id: str) -> Rule:
     found = _BY_ID.get(id.upper())
     if found is not None:
         return found
-    close = get_close_matches(id.upper(), _BY_ID, n=1)
-    hint = f"did you mean {close[0]}? " if close else ""
-    remedy = f"{hint}`mirotwin conform --list` shows {ALL[0].id} to {ALL[-1].id}"
-    raise BadInput("", "", f"there is no rule {id[:40]!r}", remedy)
+    remedy = f"`mirotwin conform --list` shows {ALL[0].id} to {ALL[-1].id}"
+    raise BadInput("", "", f"there is no rule {id[:40]!r}", did_you_mean(id.upper(), _BY_ID, remedy))

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from difflib import get_close_matches
 from functools import lru_cache
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_robot.image.c_types import MOST_BYTES, CType, Field, type_named, type_of, values_in
 from miro_robot.image.debug_info import listings
 from miro_robot.image.hex import Image
@@ -175,10 +174,8 @@ def _named(image: Image, variables: Variables, scope: str, plain: str, as_type: 
         if each[0].space not in ("sfr", "bit") or each[0].scope
     ]
     names += [name.removeprefix("_") for name, one in image.symbols.names.items() if one.space == "iram"]
-    close = get_close_matches(plain, dict.fromkeys(names), n=3) or get_close_matches(
-        plain, variables.by_name, n=3
-    )
-    remedy = f"did you mean {', '.join(close)}?" if close else "its .map and .cdb list the names"
+    near = did_you_mean(plain, names) or did_you_mean(plain, variables.by_name)
+    remedy = near or "its .map and .cdb list the names"
     where = f"{scope}:{plain}" if scope else plain
     raise BadInput(image.path, where, "there is no such variable", remedy)
 

@@ -1,12 +1,11 @@
 """What is wrong with a scenario, in one line: file, key path, what, and what to write instead."""
 
 import re
-from difflib import get_close_matches
 from typing import Any
 
 import msgspec
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_host.plugins import PluginError
 from miro_sim.scenario.keys import Scenario
 from miro_sim.scenario.plugins import REGISTRIES, struct_of
@@ -142,10 +141,8 @@ def remedy_for_key(key: str, known: list[str]) -> str:
     for candidate in known:
         if _stem(candidate) == stem and candidate != key and unit_name(candidate):
             return f"use {candidate}, in {unit_name(candidate)}"
-    close = get_close_matches(key, known, n=1)
-    if close:
-        return f"did you mean {close[0]}?"
-    return f"keys here: {', '.join(known)}" if known else "remove it"
+    others = f"keys here: {', '.join(known)}" if known else "remove it"
+    return did_you_mean(key, known) or others
 
 
 def unit_name(key: str) -> str:

@@ -6,12 +6,12 @@ Nothing but `ScenarioError` leaves these functions, whatever the text.
 import re
 import tomllib
 from collections.abc import Callable, Sequence
-from difflib import get_close_matches
 from importlib import resources
 from typing import Any
 
 import msgspec
 
+from miro_exact.bad_input import did_you_mean
 from miro_exact.inputs import InputError, read_input
 from miro_protocol.toml_text import TEXT_KIB, not_finite, without_none
 from miro_sim.scenario.base import with_base
@@ -61,10 +61,8 @@ def builtin_text(name: str) -> str:
     """The file of a built-in scenario. Raises ScenarioError for a name that is not one."""
     names = builtin_names()
     if name not in names:
-        close = get_close_matches(name, names, n=1)
-        hint = f"did you mean {close[0]}? " if close else ""
-        remedy = f"{hint}built-in scenarios: {', '.join(names)}; a file needs a path that ends in .toml"
-        raise ScenarioError(name, "", "no such scenario", remedy)
+        remedy = f"built-in scenarios: {', '.join(names)}; a file needs a path that ends in .toml"
+        raise ScenarioError(name, "", "no such scenario", did_you_mean(name, names, remedy))
     return (resources.files("miro_sim.scenario") / "builtin" / f"{name}.toml").read_text(encoding="utf-8")
 
 

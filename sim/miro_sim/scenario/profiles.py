@@ -2,12 +2,11 @@
 
 import tomllib
 from collections.abc import Mapping
-from difflib import get_close_matches
 from functools import cache
 from importlib import resources
 from typing import Any
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 
 ERROR_KEYS = ("bit_error_rate", "eb_n0_db")
 """Two ways to say one thing: a table that has one of them takes the other one away."""
@@ -32,9 +31,8 @@ def profiles() -> Mapping[str, Mapping[str, Any]]:
 def keys_of(name: str) -> Table:
     """The keys that a profile sets. Raises ProfileError."""
     if name not in profiles():
-        close = get_close_matches(name, profiles(), n=1)
-        hint = f"did you mean {close[0]}? " if close else ""
-        raise ProfileError(f"{name!r} is no profile", f"{hint}profiles: {', '.join(profiles())}")
+        remedy = did_you_mean(name, profiles(), f"profiles: {', '.join(profiles())}")
+        raise ProfileError(f"{name!r} is no profile", remedy)
     return {key: value for key, value in profiles()[name].items() if key != "about"}
 
 

@@ -7,12 +7,11 @@ it. In a file (`variant = "ideal"`) it is a default: keys that the file gives wi
 
 import tomllib
 from collections.abc import Iterator, Mapping
-from difflib import get_close_matches
 from functools import cache
 from importlib import resources
 from typing import Any
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, did_you_mean
 from miro_sim.scenario.profiles import overridden
 
 Table = dict[str, Any]
@@ -108,9 +107,8 @@ def _filled(given: Any, default: Table) -> Any:
 
 def _named(name: object) -> Mapping[str, Any]:
     if not isinstance(name, str) or name not in variants():
-        close = get_close_matches(str(name), variants(), n=1)
-        hint = f"did you mean {close[0]}? " if close else ""
-        raise VariantError(f"{name!r} is no variant", f"{hint}variants: {', '.join(variants())}")
+        remedy = did_you_mean(str(name), variants(), f"variants: {', '.join(variants())}")
+        raise VariantError(f"{name!r} is no variant", remedy)
     return variants()[name]
 
 
