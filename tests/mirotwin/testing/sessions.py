@@ -1,12 +1,19 @@
-"""pytest sessions as a user runs them: a folder with tests of its own, and pytest in another process."""
+"""pytest sessions as a user runs them: a folder with tests of its own, and pytest there."""
 
 from __future__ import annotations
 
+import contextlib
+import io
+import os
 import shlex
-import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
+import pytest
+from click.testing import CliRunner
+
+from mirotwin.commands import main
 from tests import children
 
 HEAD = """
@@ -15,19 +22,52 @@ from mirotwin import ServiceFrame, TeamFrame, Telemetry, conditions, ms, us
 """
 
 
-def session(folder: Path, *arguments: object, tests: str = "") -> subprocess.CompletedProcess[str]:
-    """`tests`: the content of `test_mine.py`, whose imports are there already; "" for what stands there."""
+class Done(NamedTuple):
+    """What came of a command."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def session(folder: Path, *arguments: object, tests: str = "", child: bool = False) -> Done:
+    """`tests`: the content of `test_mine.py`, whose imports are there already; "" for what stands there.
+
+    It runs in this process, or with `child` in one of its own: where its modules or its workers matter.
+    """
     if tests:
         (folder / "test_mine.py").write_text(HEAD + tests)
     if not (folder / "pytest.ini").exists():
-        (folder / "pytest.ini").write_text("[pytest]\n")
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *map(str, arguments)]
-    return children.run(command, cwd=folder, capture_output=True, text=True)
+        (folder / "pytest.ini").write_text("[pytest]\naddopts = -p no:cacheprovider\n")
+    words = [*map(str, arguments)]
+    if not child:
+        return _in_this_process(folder, words)
+    done = children.run([sys.executable, "-m", "pytest", *words], cwd=folder, capture_output=True, text=True)
+    return Done(done.returncode, done.stdout, done.stderr)
 
 
-def run(folder: Path, line: str) -> subprocess.CompletedProcess[str]:
+def _in_this_process(folder: Path, words: list[str]) -> Done:
+    """The modules of the folder are forgotten afterwards."""
+    out, err = io.StringIO(), io.StringIO()
+    path, environment = list(sys.path), dict(os.environ)
+    with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = pytest.main(["-W", "ignore::pytest.PytestAssertRewriteWarning", *words])
+    sys.path[:] = path
+    os.environ.update(environment)
+    for name, module in list(sys.modules.items()):
+        if f"{getattr(module, '__file__', None)}".startswith(f"{folder}{os.sep}"):
+            del sys.modules[name]
+    return Done(int(code), out.getvalue(), err.getvalue())
+
+
+def run(folder: Path, line: str) -> Done:
     """A line that a report printed, in the same folder."""
     program, *words = shlex.split(line)
-    starts = {"pytest": ["-m", "pytest"], "mirotwin": ["-c", "from mirotwin.entry import main; main()"]}
-    command = [sys.executable, *starts[program], *words]
-    return children.run(command, cwd=folder, capture_output=True, text=True)
+    if program == "pytest":
+        return _in_this_process(folder, words)
+    assert program == "mirotwin"
+    with contextlib.chdir(folder):
+        result = CliRunner().invoke(main, words)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return Done(result.exit_code, result.stdout, result.stderr)

@@ -56,7 +56,7 @@ def test_needs_no_world():
 def mixed(tmp_path_factory):
     """The folder of a session with tests of all kinds: `out.txt`, `junit.xml`, `left/`."""
     folder = tmp_path_factory.mktemp("mixed")
-    done = session(folder, "--mirotwin-artifacts=left", "--junitxml=junit.xml", tests=MIXED)
+    done = session(folder, "--mirotwin-artifacts=left", "--junitxml=junit.xml", tests=MIXED, child=True)
     (folder / "out.txt").write_text(done.stdout)
     assert done.returncode == 1, done.stdout + done.stderr
     return folder

@@ -36,7 +36,7 @@ def test_repeated_tests_show_their_seeds_and_workers_clobber_nothing(tmp_path):
     assert "pytest 'test_mine.py::test_noise[1]' --mirotwin-seed 12\n" in alone.stdout
     files = {path.relative_to(tmp_path): path.read_bytes() for path in (tmp_path / "left").rglob("*.json")}
     assert len(files) == 2
-    spread = session(tmp_path, *options, "-n", "2")
+    spread = session(tmp_path, *options, "-n", "2", child=True)
     assert "2 failed, 7 passed" in spread.stdout
     assert digests(spread.stdout) == digests(alone.stdout)
     assert len(digests(alone.stdout)) == len(set(digests(alone.stdout))) == 8
@@ -92,7 +92,7 @@ def test_a_session_without_worlds_imports_nothing_else_of_ours(tmp_path):
     )
     tests = "import sys\ndef test_one(tmp_path):\n    pass\n"
     (tmp_path / "test_mine.py").write_text(tests)
-    out = session(tmp_path, "-s").stdout
+    out = session(tmp_path, "-s", child=True).stdout
     assert "LOADED ['mirotwin', 'mirotwin.testing', 'mirotwin.testing.pytest_plugin']" in out
 
 
@@ -150,7 +150,7 @@ def test_coverage_counts_the_same_however_the_tests_are_spread(tmp_path):
     tests = "@pytest.mark.parametrize('n', range(3))\ndef test_one(link, n):\n    link.poll(0)\n"
     counts = []
     for spread in ([], ["-n", "2"]):
-        done = session(tmp_path, "--firmware-coverage=fw.info", *spread, tests=tests)
+        done = session(tmp_path, "--firmware-coverage=fw.info", *spread, tests=tests, child=bool(spread))
         assert done.returncode == 0, done.stdout
         counts.append((tmp_path / "fw.info").read_text())
     assert counts[0] == counts[1]

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
-from tests import children
+from tests.mirotwin.testing.sessions import session
 
 HEAD = 'scenario = "silent"\nduration_s = 0.3\n'
 GOOD = HEAD + 'step = [{ pause_ms = 5 }, { send = "poll" }, { expect = "answer", within_ms = 60 }]\n'
@@ -23,11 +20,6 @@ def folder(tmp_path_factory):
     (folder / "late.scenario.toml").write_text(GOOD.replace("60", "20"))
     (folder / "wrong.scenario.toml").write_text(GOOD.replace("within_ms", "within_s"))
     return folder
-
-
-def session(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "pytest", "-q", *arguments]
-    return children.run(command, cwd=folder, capture_output=True, text=True)
 
 
 def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(folder):
@@ -50,7 +42,7 @@ def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(folde
 
 
 def test_tests_are_chosen_spread_over_processes_and_begun_again_with_the_last_failed(folder):
-    assert "1 passed" in session(folder, "-k", "good", "-n", "2").stdout
+    assert "1 passed" in session(folder, "-k", "good", "-n", "2", child=True).stdout
     assert session(folder, "-p", "no:xdist").returncode == 1
     assert "2 failed" in session(folder, "--lf", "-p", "no:xdist").stdout
-    assert "good.scenario.toml::good" in session(folder, "--collect-only", "-p", "no:xdist").stdout
+    assert "good.scenario.toml::good" in session(folder, "-q", "--collect-only", "-p", "no:xdist").stdout
