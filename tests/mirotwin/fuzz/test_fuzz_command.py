@@ -34,7 +34,7 @@ def started(tmp_path, *arguments):
 @needs_sdcc
 def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin, engines, built, tmp_path):
     image = built(MISTAKE)
-    code, out, err = mirotwin("fuzz", image, "--time", "6s", "--minimise", "1s", "--out", tmp_path / "out")
+    code, out, err = mirotwin("fuzz", image, "--time", "3s", "--minimise", "1s", "--out", tmp_path / "out")
     assert code == 1
     assert engines[0].stopped
     assert "mirotwin: found: " in err
@@ -53,7 +53,7 @@ def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin
 
 @pytest.mark.parametrize("kind", ["frames", "session"])
 def test_shipped_firmware_passes_and_coverage_is_told(mirotwin, engines, tmp_path, kind):
-    code, out, err = mirotwin("fuzz", "--time", "2s", "--input", kind, "--out", tmp_path / "out")
+    code, out, err = mirotwin("fuzz", "--time", "1s", "--input", kind, "--out", tmp_path / "out")
     assert (code, err) == (0, "")
     assert out.startswith("miro.ihx: ")
     assert "never reached: " in out
@@ -76,7 +76,7 @@ def test_a_function_that_no_input_reaches_is_said(mirotwin, engines, tmp_path):
 
 def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):
     arguments = ("--expect", "wheels_within_m_s={limit_m_s=0.01, overshoot_m_s=0.0}", "--minimise", "1s")
-    code, out, _ = mirotwin("fuzz", "--time", "3s", *arguments, "--out", tmp_path / "out")
+    code, out, _ = mirotwin("fuzz", "--time", "1s", *arguments, "--out", tmp_path / "out")
     assert code == 1
     assert "wheels_within_m_s: judged " in out
     assert list((tmp_path / "out" / "crashes").glob("wheels_within_m_s-*.stream"))
@@ -128,7 +128,7 @@ def test_ctrl_c_ends_it_with_what_was_found(tmp_path):
 
 
 def test_plain_lines_where_stderr_is_no_terminal(tmp_path):
-    process = started(tmp_path, "--time", "3s")
+    process = started(tmp_path, "--time", "2s")
     _, err = process.communicate(timeout=120)
     assert process.returncode == 0
     line = next(line for line in err.splitlines() if line.startswith("mirotwin: fuzzing miro.ihx: 0:0"))

@@ -42,7 +42,7 @@ def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(folde
 
 
 def test_tests_are_chosen_spread_over_processes_and_begun_again_with_the_last_failed(folder):
-    assert "1 passed" in session(folder, "-k", "good", "-n", "2", child=True).stdout
+    assert "1 passed" in session(folder, "-k", "good", "-n", "1", child=True).stdout
     assert session(folder, "-p", "no:xdist").returncode == 1
     assert "2 failed" in session(folder, "--lf", "-p", "no:xdist").stdout
     assert "good.scenario.toml::good" in session(folder, "-q", "--collect-only", "-p", "no:xdist").stdout
