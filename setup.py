@@ -147,6 +147,8 @@ class BuildHot(build_ext):
             sources[shared] = [self._shared(folder)]
         for extension in self.extensions:
             extension.sources = sources[extension.name]
+            for source in map(Path, extension.sources):
+                self._write(source, from_file("constants").constants(source.read_text(encoding="utf-8")))
             if self.compiler.compiler_type == "unix":
                 extension.sources = [self._thread(Path(source)) for source in extension.sources]
             hottest = HOTTEST.fullmatch(extension.name)
@@ -170,9 +172,13 @@ class BuildHot(build_ext):
         if shaped == c:
             return str(source)
         target = source.with_suffix(".threaded.c")
-        if not target.exists() or target.read_text(encoding="utf-8") != shaped:
-            target.write_text(shaped, encoding="utf-8")
+        self._write(target, shaped)
         return str(target)
+
+    def _write(self, target, text):
+        """Writes a file that is to hold this; an unchanged one keeps its time, and is not compiled again."""
+        if not target.exists() or target.read_text(encoding="utf-8") != text:
+            target.write_text(text, encoding="utf-8")
 
     def _stamp(self, target):
         """Copies packages to `target` , hot modules with their stamp; unchanged files keep their time."""
@@ -191,8 +197,7 @@ class BuildHot(build_ext):
                     text += places(path) + STAMP.format(sha=hashes[name])
                     hot[name] = copy
                 copy.parent.mkdir(parents=True, exist_ok=True)
-                if not copy.exists() or copy.read_text(encoding="utf-8") != text:
-                    copy.write_text(text, encoding="utf-8")
+                self._write(copy, text)
         return hot
 
 

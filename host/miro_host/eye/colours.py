@@ -17,7 +17,6 @@ from msgspec import Meta
 
 from miro_host.eye.eye_file import EyeError, text
 from miro_host.eye.patterns import COLOURS
-from miro_host.eye.regions import TABLE_SIZE
 
 CLASS_OF = {name: number for number, name in enumerate(COLOURS, start=1)}
 """Number of a colour's class."""
@@ -77,29 +76,30 @@ class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     @cached_property
     def table(self) -> bytes:
         """Class by Y >> 4, Cb >> 2, Cr >> 2, as `Regions` takes it: decided in the middle of each cell."""
-        classes = []
-        for name, mean in self.colours.items():
-            cb, cr = mean.chroma()
-            classes.append((CLASS_OF[name], float(cb), float(cr), math.sqrt(float(cb * cb + cr * cr))))
-        least_y = {CLASS_OF[name]: self.least_luma * mean.y for name, mean in self.colours.items()}
-        found = bytearray(TABLE_SIZE)
-        for cell in range(4096):
-            number = self._of_chroma(64.0 * (cell >> 6) - 2016.0, 64.0 * (cell & 63) - 2016.0, classes)
-            for luma in range(16):
-                if number and 16.0 * luma + 8.0 >= least_y[number]:
-                    found[luma << 12 | cell] = number
+        cells = self._by_chroma()
+        found = bytearray()
+        for luma in range(16):
+            numbers = bytearray(range(256))  # of a class, and what a pixel of this luma is then
+            for name, mean in self.colours.items():
+                if 16.0 * luma + 8.0 < self.least_luma * mean.y:
+                    numbers[CLASS_OF[name]] = 0
+            found += cells.translate(numbers)
         return bytes(found)
 
-    def _of_chroma(self, cb: float, cr: float, classes: Sequence[tuple[int, float, float, float]]) -> int:
-        """Class of a chroma in 1/16 level around grey, 0 for none. `classes`: number, mean Cb, Cr, their length."""
-        number, nearest = 0, 0.0
-        for candidate, mean_cb, mean_cr, length in classes:
-            along = (
-                cb * mean_cb + cr * mean_cr
-            ) / length  # cosine to the class's hue, times the pixel's chroma
-            if along > nearest:
-                number, nearest = (candidate if along >= self.least_chroma * length else 0), along
-        return number
+    def _by_chroma(self) -> bytearray:
+        """Class by Cb >> 2, Cr >> 2 of what is light enough: that of the nearest hue, 0 for too little of it."""
+        middles = [64.0 * cell - 2016.0 for cell in range(64)]  # in 1/16 level around grey
+        numbers, nearest = bytearray(4096), [0.0] * 4096
+        for name, mean in self.colours.items():
+            cb, cr = mean.chroma()
+            length = math.sqrt(float(cb * cb + cr * cr))
+            number, least = CLASS_OF[name], self.least_chroma * length
+            along_cr = [middle * float(cr) for middle in middles]
+            cells = ((middle * float(cb) + part) / length for middle in middles for part in along_cr)
+            for cell, along in enumerate(cells):  # cosine to the class's hue, times the pixel's chroma
+                if along > nearest[cell]:
+                    numbers[cell], nearest[cell] = (number if along >= least else 0), along
+        return numbers
 
 
 def classes_of(

@@ -3,12 +3,12 @@ from miro_exact cimport dmath
 from miro_sim.pitch cimport rays, scene, sensor
 
 cdef int _SETS, _OUT, _UNSURE, _MIXED, _UNKNOWN, _WIDTH, _HEIGHT, _CORNERS
-cdef long long _HALF_UM, _TOP_UM, _CORNER_UM, _MIDDLE_X_UM, _MIDDLE_Y_UM
+cdef long long _HALF_UM, _TOP_UM, _CORNER_UM, _NEAR_UM, _MOST_MARGIN_UM, _MIDDLE_X_UM, _MIDDLE_Y_UM
 cdef double _FAR_SQUARE
 
 @cython.locals(p=int, q=int, left='long long', right='long long')
 cdef long long _between(int* corners, int first, int sample) noexcept
-@cython.locals(middle_u='long long', middle_v='long long', long_u='long long', long_v='long long')
+@cython.locals(most='long long')
 cdef bint _enters(long long u, long long v, long long fall_u, long long fall_v, long long half) noexcept
 @cython.locals(latest='long long')
 cdef long long _entry(long long u, long long v, long long fall_u, long long fall_v) noexcept
@@ -35,6 +35,7 @@ cdef class Camera:
     cdef int most_x[10]
     cdef int least_y[10]
     cdef int most_y[10]
+    cdef int margin_um[10]
     cdef int seen[16]
     cdef int height_um[16]
     cdef int corner_u[40]
@@ -50,21 +51,23 @@ cdef class Camera:
     cdef _draw(self, int left, int top, int width, int height, unsigned char[::1] out)
     @cython.locals(x='long long', y='long long', lost='long long')
     cdef long long _light(self, int pixel) noexcept
-    @cython.locals(first=int, place=int)
+    @cython.locals(first=int, place=int, middle=int, drift='long long', way='long long', turn='long long',
+                   margin='long long')
     cdef void _bound(self, int body) noexcept
     @cython.locals(pixel=int, body=int, reach='long long', x='long long', y='long long', far='long long')
     cdef void _gather(self, int left, int top, int width, int height) noexcept
-    @cython.locals(scene=scene.Scene, seen=bint, index=int, body=int, passes=bint, at=int, code=int, total='long long')
+    @cython.locals(scene=scene.Scene, seen=bint, index=int, body=int, margin=int, common=int, at=int,
+                   code=int, total='long long')
     cdef long long _total(self, int pixel) noexcept
     @cython.locals(samples=int, paint=int, index=int, code=int)
     cdef long long _instant(self, int pixel, int at) noexcept
     @cython.locals(far='long long', top='long long', end='long long')
     cdef bint _passes(self, int pixel, int body) noexcept
-    @cython.locals(place=int, x='long long', y='long long', u='long long', v='long long', spread='long long',
-                   away='long long', fall_u='long long', fall_v='long long')
-    cdef int _code(self, int body, int at, int pixel) noexcept
-    @cython.locals(spread='long long', away='long long', other='long long')
-    cdef int _sure_top(self, int body, long long u, long long v) noexcept
+    @cython.locals(place=int, x='long long', y='long long', u='long long', v='long long', away='long long',
+                   fall_u='long long', fall_v='long long')
+    cdef int _code(self, int body, int at, int pixel, long long spread) noexcept
+    @cython.locals(away='long long', other='long long')
+    cdef int _sure_top(self, int body, long long u, long long v, long long spread) noexcept
     cdef int _top(self, int body, long long u, long long v) noexcept
     @cython.locals(scene=scene.Scene, first=int, end=int, sample=int, index=int, slot=int, behind=int, ball_seen=bint,
                    paint=int, ball=int, total='long long')
@@ -74,7 +77,8 @@ cdef class Camera:
     cdef void _turn(self, int body, int at, int pixel) noexcept
     @cython.locals(body=int, fall_u='long long', fall_v='long long', top='long long', side='long long', team='long long',
                    identity='long long', total='long long', row=int, q=int, u=int, v=int, step_u=int, step_v=int,
-                   at_u=int, at_v=int, _=int)
+                   at_u=int, at_v=int, _=int, least_u=int, most_u=int, least_v=int, most_v=int,
+                   most='long long', team_u=int, team_v=int, identity_u=int, identity_v=int, patch=int)
     cdef long long _alone(self, long long behind, int first, int end) noexcept
     @cython.locals(body=int, fall_u='long long', fall_v='long long', sample=int, u='long long', v='long long',
                    height='long long')

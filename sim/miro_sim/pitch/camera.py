@@ -11,7 +11,8 @@ Of several sides the highest is seen; where robots stand in
 each other, the first one is. All in um and integers. `fall` is taken at the middle of the pixel.
 
 A pixel whose samples are sure to see one paint is not sampled: if its middle sees that paint, and would still do so if
-all edges were nearer by `Rays.spread_um`. So any pixel gives the same bits in any window.
+all edges were nearer by `Rays.spread_um`. So any pixel gives the same bits in any window. One test does for all
+instants of the exposure if its edges are nearer by as much more as the robot moves between them (`margin_um`).
 
 Long because the kinds of surface share one coordinate frame and one way of being sure.
 """
@@ -36,6 +37,10 @@ _SETS = 6  # at most: two fields of three instants
 _HALF_UM = 37_500
 _TOP_UM = 75_000
 _CORNER_UM = 53_034  # from the middle of a robot's top to its corner, rounded up
+_NEAR_UM = (
+    75_000  # no place within the square of a robot, widened by the largest margin, is further along an axis
+)
+_MOST_MARGIN_UM = 12_500
 _OUT = -1
 _UNSURE = -2
 _MIXED = 255
@@ -86,6 +91,7 @@ class Camera:
             "most_x",
             "least_y",
             "most_y",
+            "margin_um",
             "count",
             "corner_u",
             "corner_v",
@@ -128,6 +134,7 @@ class Camera:
         self.most_x = [0] * 10
         self.least_y = [0] * 10
         self.most_y = [0] * 10
+        self.margin_um = [0] * 10
         self.seen = [0] * 16
         self.height_um = [0] * 16
         self.corner_u = [0] * 40
@@ -190,7 +197,11 @@ class Camera:
         self.robots = body + 1
 
     def _bound(self, body: int) -> None:
-        """The least and the largest place of a robot over all instants."""
+        """The least and the largest place of a robot over all instants, and what margin does for all of them.
+
+        A place within the square lies elsewhere in it at another instant, but by no more than the robot's way, plus
+        its turn times the distance from the middle, plus 4 um for what is rounded. No margin (0) if that is too much.
+        """
         first = body * _SETS
         self.least_x[body] = self.most_x[body] = self.x[first]
         self.least_y[body] = self.most_y[body] = self.y[first]
@@ -199,6 +210,14 @@ class Camera:
             self.most_x[body] = max(self.most_x[body], self.x[place])
             self.least_y[body] = min(self.least_y[body], self.y[place])
             self.most_y[body] = max(self.most_y[body], self.y[place])
+        middle = first + self.sets // 2
+        drift = 0
+        for place in range(first, first + self.sets):
+            way = abs(self.x[place] - self.x[middle]) + abs(self.y[place] - self.y[middle])
+            turn = abs(self.cos[place] - self.cos[middle]) + abs(self.sin[place] - self.sin[middle])
+            drift = max(drift, way + (_NEAR_UM * turn >> 15))
+        margin = self.rays.spread_um + drift + 4
+        self.margin_um[body] = margin if margin <= _MOST_MARGIN_UM else 0
 
     def begin(self, frame: int, tick: int) -> None:
         """Takes frame number `frame` (below 2^24) of what stands there now; `tick`: the middle of the exposure."""
@@ -253,9 +272,12 @@ class Camera:
         seen = False
         for index in range(self.near_count):
             body = self.near[index]
-            passes = self._passes(pixel, body)
+            common = _OUT
+            if self._passes(pixel, body):
+                margin = self.margin_um[body]
+                common = self._code(body, self.sets // 2, pixel, margin) if margin else _UNSURE
             for at in range(self.sets):
-                code = self._code(body, at, pixel) if passes else _OUT
+                code = common if common != _UNSURE else self._code(body, at, pixel, self.rays.spread_um)
                 self.code[index * _SETS + at] = code
                 if code != _OUT:
                     seen = True
@@ -293,17 +315,16 @@ class Camera:
         end = top + self.rays.fall_y[pixel]
         return max(top, end) >= self.least_y[body] - far and min(top, end) <= self.most_y[body] + far
 
-    def _code(self, body: int, at: int, pixel: int) -> int:
-        """The one paint of a robot that all samples of a pixel see, or _OUT, or _UNSURE."""
+    def _code(self, body: int, at: int, pixel: int, spread: int) -> int:
+        """The one paint of a robot seen from a pixel's middle and `spread` around it, or _OUT, or _UNSURE."""
         place = body * _SETS + at
         x = self.rays.middle_x[pixel] - self.x[place]
         y = self.rays.middle_y[pixel] - self.y[place]
         u = (x * self.cos[place] + y * self.sin[place]) >> 15
         v = (y * self.cos[place] - x * self.sin[place]) >> 15
-        spread = self.rays.spread_um
         away = max(abs(u), abs(v))
         if away <= _HALF_UM - spread:
-            return self._sure_top(body, u, v)
+            return self._sure_top(body, u, v, spread)
         x = self.rays.fall_x[pixel]
         y = self.rays.fall_y[pixel]
         fall_u = (x * self.cos[place] + y * self.sin[place]) >> 15
@@ -314,9 +335,8 @@ class Camera:
             return self.side
         return _UNSURE
 
-    def _sure_top(self, body: int, u: int, v: int) -> int:
+    def _sure_top(self, body: int, u: int, v: int, spread: int) -> int:
         """The one paint around a place on the top, or _UNSURE."""
-        spread = self.rays.spread_um
         away = max(abs(u - self.team_u), abs(v - self.team_v)) - self.patch_um
         if away <= 0 - spread:
             return self.team_paint[body]
@@ -391,6 +411,12 @@ class Camera:
         top, side = self.scene.packed[self.black], self.scene.packed[self.side]
         team = self.scene.packed[self.team_paint[body]]
         identity = self.scene.packed[self.identity_paint[body]]
+        # `_enters`, with what is the same for all samples worked out before
+        least_u, most_u = -_HALF_UM - max(fall_u, 0), _HALF_UM - min(fall_u, 0)
+        least_v, most_v = -_HALF_UM - max(fall_v, 0), _HALF_UM - min(fall_v, 0)
+        most = _HALF_UM * (abs(fall_u) + abs(fall_v))
+        team_u, team_v, identity_u, identity_v = self.team_u, self.team_v, self.identity_u, self.identity_v
+        patch = self.patch_um
         total = 0
         for row in range(first >> 2, end >> 2):
             q = 2 * row + 1
@@ -403,22 +429,21 @@ class Camera:
             for _ in range(4):
                 at_u = u >> 6
                 at_v = v >> 6
+                u += 2 * step_u
+                v += 2 * step_v
                 if -_HALF_UM <= at_u <= _HALF_UM and -_HALF_UM <= at_v <= _HALF_UM:
-                    if abs(at_u - self.team_u) <= self.patch_um and abs(at_v - self.team_v) <= self.patch_um:
+                    if -patch <= at_u - team_u <= patch and -patch <= at_v - team_v <= patch:
                         total += team
-                    elif (
-                        abs(at_u - self.identity_u) <= self.patch_um
-                        and abs(at_v - self.identity_v) <= self.patch_um
-                    ):
+                    elif -patch <= at_u - identity_u <= patch and -patch <= at_v - identity_v <= patch:
                         total += identity
                     else:
                         total += top
-                elif _enters(at_u, at_v, fall_u, fall_v, _HALF_UM):
+                elif at_u < least_u or at_u > most_u or at_v < least_v or at_v > most_v:
+                    total += behind
+                elif -most <= at_u * fall_v - at_v * fall_u <= most:
                     total += side
                 else:
                     total += behind
-                u += 2 * step_u
-                v += 2 * step_v
         return total
 
     def _see(self, slot: int, first: int, end: int) -> None:
@@ -455,13 +480,12 @@ def _um(metres: float) -> int:
 
 def _enters(u: int, v: int, fall_u: int, fall_v: int, half: int) -> bool:
     """Whether the line from (u, v) on by the fall meets the square of `half` around the origin (separating axes)."""
-    middle_u = 2 * u + fall_u
-    middle_v = 2 * v + fall_v
-    long_u = abs(fall_u)
-    long_v = abs(fall_v)
-    if abs(middle_u) > 2 * half + long_u or abs(middle_v) > 2 * half + long_v:
+    if (u < -half and u + fall_u < -half) or (u > half and u + fall_u > half):
+        return False  # both ends are beyond one side
+    if (v < -half and v + fall_v < -half) or (v > half and v + fall_v > half):
         return False
-    return abs(middle_u * fall_v - middle_v * fall_u) <= 2 * half * (long_u + long_v)
+    most = half * (abs(fall_u) + abs(fall_v))
+    return -most <= u * fall_v - v * fall_u <= most
 
 
 def _entry(u: int, v: int, fall_u: int, fall_v: int) -> int:

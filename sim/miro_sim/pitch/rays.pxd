@@ -17,7 +17,8 @@ cdef class Rays:
     cdef int fall_y[76800]
     cdef readonly long long x_um, y_um, height_um, spread_um, longest_fall_um
 
-    @cython.locals(drop='long long', x='long long', y='long long', i=int, j=int, corner=int)
+    @cython.locals(drop='long long', x='long long', y='long long', exact_x=double, exact_y=double, i=int, j=int,
+                   corner=int)
     cdef _cast(self, lens.Lens lens)
     @cython.locals(x='long long', y='long long', i=int, j=int, a=int, c=int, pixel=int)
     cdef _gather(self)

@@ -64,10 +64,16 @@ class Rays:
         for j in range(_HEIGHT + 1):
             for i in range(_WIDTH + 1):
                 lens.slopes(float(i), float(j))
-                x = math.floor(lens.out_x * 4194304.0 + 0.5)
-                y = math.floor(lens.out_y * 4194304.0 + 0.5)
-                if not (-_MOST < x < _MOST and -_MOST < y < _MOST):
+                exact_x = lens.out_x * 4194304.0 + 0.5
+                exact_y = lens.out_y * 4194304.0 + 0.5
+                if not (-_MOST < exact_x < _MOST and -_MOST < exact_y < _MOST):
                     raise ValueError(f"pixel ({i}, {j}) looks too near to the horizon")
+                x = int(exact_x)
+                if x > exact_x:
+                    x -= 1  # rounded down
+                y = int(exact_y)
+                if y > exact_y:
+                    y -= 1
                 corner = j * _CORNERS + i
                 self.slope_x[corner] = x
                 self.slope_y[corner] = y

@@ -19,6 +19,8 @@ cdef class Sensor:
     cdef int y[320]
     cdef int cb[320]
     cdef int cr[320]
+    cdef int soft_cb[320]
+    cdef int soft_cr[320]
 
     cpdef begin(self, long long frame, long long tick, int samples)
     @cython.locals(red=int, green=int, blue=int)
@@ -27,8 +29,11 @@ cdef class Sensor:
     cdef int _shown(self, long long total, long long light) noexcept
     @cython.locals(first='long long', column=int, part=int, word='unsigned int', last='unsigned int', y=int, cb=int, cr=int)
     cdef void write(self, int row, int left, int width, unsigned char[::1] out, int at) noexcept
-    @cython.locals(total='long long', step=int, low=int, high=int)
-    cdef int _limited(self, int* values, int column) noexcept
+    @cython.locals(inner='long long', inner_end='long long', end='long long', column='long long', total=int,
+                   step='long long')
+    cdef void _soften(self, int* values, int* soft, long long left, long long width) noexcept
+    @cython.locals(total=int, step=int, low=int, high=int)
+    cdef int _at_border(self, int* values, int column) noexcept
     cdef int _byte(self, int value) noexcept
     @cython.locals(first='long long', word='unsigned long long', by='long long', begin=int, last=int)
     cdef void _shake(self, int row, int left, int width) noexcept

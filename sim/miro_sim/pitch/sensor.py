@@ -79,7 +79,7 @@ class Sensor:
 
     NOT_STATE = (
         *("settings", "stream", "frame", "scale", "offset", "reach", "side", "taps", "shift", "half"),
-        *("jitter", "gamma", "luma_noise", "chroma_noise", "y", "cb", "cr"),
+        *("jitter", "gamma", "luma_noise", "chroma_noise", "y", "cb", "cr", "soft_cb", "soft_cr"),
     )
 
     def __init__(self, settings: PictureSettings, stream: Stream) -> None:
@@ -108,6 +108,8 @@ class Sensor:
         self.y = [0] * 320
         self.cb = [0] * 320
         self.cr = [0] * 320
+        self.soft_cb = [0] * 320
+        self.soft_cr = [0] * 320
 
     def __repr__(self) -> str:
         return f"Sensor({self.settings!r}, {self.stream!r}, frame={self.frame})"
@@ -146,30 +148,46 @@ class Sensor:
         if self.jitter:
             self._shake(row, left, width)
         first = self.frame * _FRAME_BLOCKS + row * _LINE_BLOCKS
+        self._soften(self.cb, self.soft_cb, left, width)
+        self._soften(self.cr, self.soft_cr, left, width)
+        part = left % 3
+        self.stream.load(first + left // 3)
         for column in range(left, left + width):
-            self.stream.load(first + column // 3)
-            part = column % 3
+            if part == 3:
+                part = 0
+                self.stream.load(first + column // 3)
             word = self.stream.w0 if part == 0 else (self.stream.w1 if part == 1 else self.stream.w2)
             last = word >> 24 | (self.stream.w3 >> 4 * part & 15) << 8
             y = self.y[column] + self.luma_noise[word & 4095]
-            cb = self._limited(self.cb, column) + self.chroma_noise[word >> 12 & 4095]
-            cr = self._limited(self.cr, column) + self.chroma_noise[last]
+            cb = self.soft_cb[column] + self.chroma_noise[word >> 12 & 4095]
+            cr = self.soft_cr[column] + self.chroma_noise[last]
+            part += 1
             out[at] = self._byte(y)
             out[at + 1] = self._byte(cb)
             out[at + 2] = self._byte(cr)
             at += 3
 
-    def _limited(self, values: list[int], column: int) -> int:
-        """Chroma after the low-pass; beyond the picture it goes on as at its border."""
-        total = values[column] * self.taps[0]
-        if column >= self.reach and column + self.reach < _WIDTH:
+    def _soften(self, values: list[int], soft: list[int], left: int, width: int) -> None:
+        """Chroma after the low-pass, of a part of the line; beyond the picture it goes on as at its border."""
+        inner = max(left, self.reach)
+        end = left + width
+        inner_end = min(end, _WIDTH - self.reach)
+        for column in range(inner, inner_end):
+            total = values[column] * self.taps[0]
             for step in range(1, self.reach + 1):
                 total += (values[column - step] + values[column + step]) * self.taps[step]
-        else:
-            for step in range(1, self.reach + 1):
-                low = column - step if column >= step else 0
-                high = column + step if column + step < _WIDTH else _WIDTH - 1
-                total += (values[low] + values[high]) * self.taps[step]
+            soft[column] = total >> 16
+        for column in range(left, min(end, inner)):
+            soft[column] = self._at_border(values, column)
+        for column in range(max(left, inner_end), end):
+            soft[column] = self._at_border(values, column)
+
+    def _at_border(self, values: list[int], column: int) -> int:
+        total = values[column] * self.taps[0]
+        for step in range(1, self.reach + 1):
+            low = column - step if column >= step else 0
+            high = column + step if column + step < _WIDTH else _WIDTH - 1
+            total += (values[low] + values[high]) * self.taps[step]
         return total >> 16
 
     def _byte(self, value: int) -> int:
