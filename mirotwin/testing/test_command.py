@@ -28,9 +28,9 @@ from mirotwin.testing.case_test import CaseTests
 from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, PAGE, case_line, report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.replay_line import replay_line
+from mirotwin.verify.checks.interface import in_ms
 from mirotwin.verify.expectations import CHECK, Expected, as_settings
 from mirotwin.verify.steps.collecting import KINDS, collect
-from mirotwin.verify.steps.keys import end_ms
 from mirotwin.verify.steps.running import Outcome, Verdict, run_test, stem_of
 
 WORDS = {"passed": "passed", "failed": "FAILED", "fault": "FAULT", "error": "ERROR"}
@@ -156,7 +156,7 @@ def _show(outcome: Outcome, quiet: bool, again: str) -> None:
     how = (
         ""
         if outcome.verdict == "error" or not outcome.digest  # of a bare processor
-        else f" ({steps}{end_ms(outcome.tick)}, digest {outcome.digest[:12]})"
+        else f" ({steps}{in_ms(outcome.tick)}, digest {outcome.digest[:12]})"
     )
     show_line(f"{WORDS[outcome.verdict]}  {outcome.path}{how}")
     for line in (*outcome.lines, *outcome.notes):

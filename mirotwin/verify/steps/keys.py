@@ -1,29 +1,32 @@
 """The steps that a scenario may have: one frozen struct a kind, each an action or a wait.
 
-A table of a step has one key that says what it is, its verb: `VERBS`. The others are the verb's own.
+A table of a step has one key that says what it is, its verb: `VERBS`. The others are the verb's own. A new kind is a
+class here with `do`, in the table `PLAIN`, and a row on the page of the steps.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+import re
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds, ticks
+from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS
+from miro_protocol.table import DOWNLINK
 from miro_sim.world.conditions import Condition, Network, Slot, SpeedMS, WheelSpeeds
-from mirotwin.verify.checks.interface import Check
-from mirotwin.verify.steps.sends import Send
+from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
+from mirotwin.verify.steps.sends import Send, SendFrame, beyond
 
+if TYPE_CHECKING:
+    from miro_sim.scenario.keys import Network as ScenarioNetwork
+    from mirotwin.verify.steps.player import Player
+
+FILE = re.compile(r"[A-Za-z0-9_-]{1,64}\.world")
 LONGEST_MS = 86_400_000.0
 PauseMs = Annotated[float, Meta(gt=0.0, le=LONGEST_MS)]
 WithinMs = Annotated[float, Meta(ge=0.0, le=LONGEST_MS)]
 Verb = Literal["wait_for", "expect"]
-
-
-def ms_ticks(time_ms: float) -> int:
-    """Ticks of so many milliseconds, which need not be whole."""
-    return ticks(time_ms / 1000.0)
 
 
 class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -37,6 +40,15 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     @property
     def network(self) -> int:
         return 0
+
+    def problem(self, network: ScenarioNetwork) -> str:
+        """Why it cannot be done in this network, as `key: what; remedy`, or the empty string."""
+        slot = getattr(self, "slot", None)
+        return "" if slot is None else absent(slot, network)
+
+    def do(self, player: Player) -> None:
+        """Does it, and lets time pass as far as it says."""
+        raise NotImplementedError
 
     def lasts_ticks(self) -> int:
         """How long it takes at least."""
@@ -69,6 +81,15 @@ class SendStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return f"send {self.what.name}"
 
+    def problem(self, network: ScenarioNetwork) -> str:
+        what = self.what
+        if isinstance(what, SendFrame) and what.seq is None and network.host != "silent":
+            return 'seq: this network\'s host counts its frames itself; give seq, or write host = "silent"'
+        return what.problem(network.robots)
+
+    def do(self, player: Player) -> None:
+        player.hosts[self.network].send(self.what)
+
 
 class StreamStep(Step, frozen=True, kw_only=True):
     """`stream = "on"`: from now on team frames go out by themselves, as a station's do, with the velocities told last.
@@ -99,6 +120,23 @@ class StreamStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return f"stream {self.stream}"
 
+    def problem(self, network: ScenarioNetwork) -> str:
+        if self.stream == "off":
+            return ""
+        if network.host != "silent":
+            return 'stream: this network\'s host sends by itself; write host = "silent" for the network'
+        shortest_ticks = DOWNLINK[network.robots].wire_size * HOST_CHARACTER_TICKS
+        if self.every_ticks < shortest_ticks:
+            return f"every_ms: {self.every_ms:g} is too short; a frame takes {in_ms(shortest_ticks)}"
+        return "" if self.slot is None else beyond(self.slot, network.robots)
+
+    def do(self, player: Player) -> None:
+        host = player.hosts[self.network]
+        host.stream = None
+        if self.stream == "on":
+            host.command(player.slot(self.slot, self.network), self.left_m_s, self.right_m_s)
+            host.begin(self.every_ticks, self.frames, self.ask)
+
 
 class WaitStep(Step, frozen=True, kw_only=True):
     """`wait_for`: goes on to the first event that fits. `expect`: the next event of the kind has to fit.
@@ -121,10 +159,12 @@ class WaitStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return f"{self.verb} {self.condition.what}"
 
-    @property
-    def wanted(self) -> str:
-        within = "" if self.within_ms is None else f" within {self.within_ms:g} ms"
-        return f"{self.condition}{within}"
+    def problem(self, network: ScenarioNetwork) -> str:
+        return problem_of_condition(self.condition, network)
+
+    def do(self, player: Player) -> None:
+        kind = self.condition.any_of_its_kind() if self.verb == "expect" else self.condition
+        player.wait_for(self.condition, kind, self.within_ms, self.from_now)
 
 
 class NeverStep(Step, frozen=True, kw_only=True):
@@ -145,6 +185,12 @@ class NeverStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return f"never {self.condition.what}"
 
+    def problem(self, network: ScenarioNetwork) -> str:
+        return problem_of_condition(self.condition, network)
+
+    def do(self, player: Player) -> None:
+        player.never(self.condition, self.for_ms)
+
 
 class HoldStep(Step, frozen=True, kw_only=True):
     """`hold = "wheels"`: they turn as fast as this, for so long from now on."""
@@ -164,6 +210,12 @@ class HoldStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return "hold wheels"
 
+    def problem(self, network: ScenarioNetwork) -> str:
+        return problem_of_condition(self.condition, network)
+
+    def do(self, player: Player) -> None:
+        player.hold(self.condition, self.for_ms)
+
 
 class PauseStep(Step, frozen=True, kw_only=True):
     """`pause_ms`: time passes. What happens meanwhile is there for the next wait."""
@@ -174,6 +226,9 @@ class PauseStep(Step, frozen=True, kw_only=True):
 
     def lasts_ticks(self) -> int:
         return ms_ticks(self.pause_ms)
+
+    def do(self, player: Player) -> None:
+        player.pause(self.pause_ms)
 
 
 class CheckStep(Step, frozen=True, kw_only=True):
@@ -193,6 +248,14 @@ class CheckStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return f"check {', '.join(self.check)}"
 
+    def problem(self, network: ScenarioNetwork) -> str:
+        if not self.check:
+            return "check: there is no check; give it keys as [expect] has them"
+        return super().problem(network)
+
+    def do(self, player: Player) -> None:
+        player.begin_checks(self.checks, self.network_, self.slot)
+
 
 class RadioStep(Step, frozen=True, kw_only=True):
     """`radio`: of a network: `up`, `down` (no carrier) or `noise` (the receiver hears noise)."""
@@ -208,6 +271,9 @@ class RadioStep(Step, frozen=True, kw_only=True):
 
     def said(self) -> str:
         return f"radio {self.radio}"
+
+    def do(self, player: Player) -> None:
+        player.world.set_radio(self.radio, self.network)
 
 
 class ResetStep(Step, frozen=True, kw_only=True):
@@ -226,6 +292,9 @@ class ResetStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return f"reset {self.reset}"
 
+    def do(self, player: Player) -> None:
+        player.world.set_reset(self.reset, self.network, player.slot(self.slot, self.network))
+
 
 class PowerStep(Step, frozen=True, kw_only=True):
     """`power`: a robot is switched off, or on."""
@@ -243,6 +312,10 @@ class PowerStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return f"power {self.power}"
 
+    def do(self, player: Player) -> None:
+        level = int(self.power == "on")
+        player.world.set_power(level, self.network, player.slot(self.slot, self.network))
+
 
 class SaveStep(Step, frozen=True, kw_only=True):
     """`save`: the world's state, as `World.save` gives it, into a file of this name (`NAME.world`)."""
@@ -254,15 +327,33 @@ class SaveStep(Step, frozen=True, kw_only=True):
     def said(self) -> str:
         return f"save {self.save}"
 
+    def problem(self, network: ScenarioNetwork) -> str:
+        if FILE.fullmatch(self.save):
+            return ""
+        return (
+            f"save: {self.save!r} is not the name of a file here; write letters, digits, - and _, then .world"
+        )
+
+    def do(self, player: Player) -> None:
+        player.saved[self.save] = player.world.save()
+
 
 PLAIN: dict[str, type[Step]] = {
     struct.VERB: struct
     for struct in (StreamStep, PauseStep, CheckStep, RadioStep, ResetStep, PowerStep, SaveStep)
 }
 """Those whose table is read as it stands."""
-VERBS = ("send", "stream", "wait_for", "expect", "never", "silence_for_ms", "hold", *list(PLAIN)[1:])
+VERBS = ("send", "wait_for", "expect", "never", "silence_for_ms", "hold", *PLAIN)
 
 
-def end_ms(tick: int) -> str:
-    """A time of a run for people."""
-    return f"{1000.0 * seconds(tick):.3f} ms"
+def problem_of_condition(condition: Condition, network: ScenarioNetwork) -> str:
+    """Whether its robot is there."""
+    slot = getattr(condition, "slot", None)
+    return "" if slot is None else absent(slot, network)
+
+
+def absent(slot: int, network: ScenarioNetwork) -> str:
+    slots = sorted(robot.slot for robot in network.robot)
+    if slot in slots:
+        return ""
+    return f"slot: there is no robot in slot {slot}; there is {', '.join(map(str, slots))}"

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, ticks
-from miro_protocol.table import DOWNLINK
+from miro_exact.clock import CONTROL_PERIOD_TICKS, ticks
 from miro_robot.image import Image
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.keys import Network, Scenario
-from miro_sim.world.conditions import Condition, Reached
-from mirotwin.verify.steps.keys import (
-    CheckStep,
-    HoldStep,
-    NeverStep,
-    PowerStep,
-    ResetStep,
-    SaveStep,
-    SendStep,
-    Step,
-    StreamStep,
-    WaitStep,
-    end_ms,
-)
-from mirotwin.verify.steps.sends import SendFrame
-
-FILE = re.compile(r"[A-Za-z0-9_-]{1,64}\.world")
+from miro_sim.scenario.keys import Scenario
+from miro_sim.world.conditions import Reached
+from mirotwin.verify.checks.interface import in_ms
+from mirotwin.verify.steps.keys import SaveStep, Step
 
 
 def end_tick(scenario: Scenario) -> int:
@@ -40,58 +24,7 @@ def problem(step: Step, scenario: Scenario) -> str:
     if step.network >= len(networks):
         there = "there is one" if len(networks) == 1 else f"there are {len(networks)}, from 0 on"
         return f"network: there is no network {step.network}; {there}"
-    network = networks[step.network]
-    if isinstance(step, SendStep):
-        return _of_send(step, network)
-    if isinstance(step, StreamStep):
-        if step.stream == "off":
-            return ""
-        if network.host != "silent":
-            return 'stream: this network\'s host sends by itself; write host = "silent" for the network'
-        shortest_ticks = DOWNLINK[network.robots].wire_size * HOST_CHARACTER_TICKS
-        if step.every_ticks < shortest_ticks:
-            return f"every_ms: {step.every_ms:g} is too short; a frame takes {end_ms(shortest_ticks)}"
-        return _beyond(step.slot, network)
-    condition = condition_of(step)
-    if condition is not None:
-        slot = getattr(condition, "slot", None)
-        return "" if slot is None else _absent(slot, network)
-    if isinstance(step, CheckStep):
-        if not step.check:
-            return "check: there is no check; give it keys as [expect] has them"
-        return "" if step.slot is None else _absent(step.slot, network)
-    if isinstance(step, ResetStep | PowerStep) and step.slot is not None:
-        return _absent(step.slot, network)
-    if isinstance(step, SaveStep) and not FILE.fullmatch(step.save):
-        return f"save: {step.save!r} is no name of a file here; write letters, digits, - and _, and .world behind"
-    return ""
-
-
-def condition_of(step: Step) -> Condition | None:
-    """What a step waits for, if it does."""
-    return step.condition if isinstance(step, WaitStep | NeverStep | HoldStep) else None
-
-
-def _of_send(step: SendStep, network: Network) -> str:
-    what = step.what
-    if isinstance(what, SendFrame) and what.seq is None and network.host != "silent":
-        return 'seq: this network\'s host counts its frames itself; give seq, or write host = "silent"'
-    return what.problem(network.robots)
-
-
-def _absent(slot: int, network: Network) -> str:
-    slots = sorted(robot.slot for robot in network.robot)
-    if slot in slots:
-        return ""
-    return f"slot: there is no robot in slot {slot}; there is {', '.join(map(str, slots))}"
-
-
-def _beyond(slot: int | None, network: Network) -> str:
-    if slot is None or slot < network.robots:
-        return ""
-    return (
-        f"slot: {slot} does not exist on a network of {network.robots} robots; use 0 to {network.robots - 1}"
-    )
+    return step.problem(networks[step.network])
 
 
 def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:
@@ -106,8 +39,8 @@ def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:
         place = f"step {step.number}"
         last = begins + step.needs_ticks()
         if begins >= end or last > end:
-            goes = f" and goes on to {end_ms(last)}" if last > begins else ""
-            what = f"begins after {end_ms(begins)} or later{goes}, but the run ends after {end_ms(end)}"
+            goes = f" and goes on to {in_ms(last)}" if last > begins else ""
+            what = f"begins after {in_ms(begins)} or later{goes}, but the run ends after {in_ms(end)}"
             raise ScenarioError(origin, place, what, "give a longer duration_s, or shorter times")
         begins += step.lasts_ticks()
         if isinstance(step, SaveStep):
@@ -120,7 +53,7 @@ def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:
 def check_symbols(steps: Sequence[Step], image: Image, origin: str) -> None:
     """Raises ScenarioError for a step that waits for a symbol which the image does not have."""
     for step in steps:
-        condition = condition_of(step)
+        condition = getattr(step, "condition", None)
         if not isinstance(condition, Reached) or condition.symbol is None:
             continue
         place = f"step {step.number}.symbol"

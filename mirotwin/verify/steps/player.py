@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import Protocol
 
 import msgspec
 
@@ -24,23 +25,18 @@ from miro_sim.world.conditions import Answer, Condition, WheelSpeeds, When, answ
 from miro_sim.world.events import Event
 from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
 from miro_sim.world.world import World
+from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
 from mirotwin.verify.checks.monitors import Checks
-from mirotwin.verify.steps.keys import (
-    CheckStep,
-    HoldStep,
-    NeverStep,
-    PauseStep,
-    PowerStep,
-    RadioStep,
-    ResetStep,
-    SaveStep,
-    SendStep,
-    Step,
-    StreamStep,
-    WaitStep,
-    end_ms,
-)
 from mirotwin.verify.steps.sender import Host
+
+
+class Playable(Protocol):
+    """A step, as a player needs it."""
+
+    @property
+    def number(self) -> int: ...
+
+    def do(self, player: Player) -> None: ...
 
 
 class StepFailure(msgspec.Struct, frozen=True):
@@ -58,9 +54,7 @@ class StepFailure(msgspec.Struct, frozen=True):
     timed_out: bool = False
 
     def __str__(self) -> str:
-        return (
-            f"{self.step}: tick {self.tick} ({end_ms(self.tick)}): wanted {self.wanted}, found {self.found}"
-        )
+        return f"{self.step}: tick {self.tick} ({in_ms(self.tick)}): wanted {self.wanted}, found {self.found}"
 
 
 class _Failed(Exception):
@@ -77,7 +71,7 @@ class _Failed(Exception):
 class Player:
     """`done`: so many steps were. `saved`: by name, what `save` steps kept. `checks`: those that steps began."""
 
-    def __init__(self, world: World, steps: Sequence[Step], origin: str = "") -> None:
+    def __init__(self, world: World, steps: Sequence[Playable], origin: str = "") -> None:
         self.world = world
         self.steps = list(steps)
         self.origin = origin
@@ -94,7 +88,7 @@ class Player:
             try:
                 if self.world.finished:
                     raise _Failed(begun_tick, "to be done", self._end())
-                self._do(step)
+                step.do(self)
             except _Failed as failed:
                 self.failure = StepFailure(
                     f"{step}",
@@ -122,67 +116,53 @@ class Player:
         for checks in self.checks:
             checks.finish()
 
-    def _do(self, step: Step) -> None:
-        world = self.world
-        match step:
-            case SendStep():
-                self.hosts[step.network].send(step.what)
-            case StreamStep():
-                host = self.hosts[step.network]
-                host.stream = None
-                if step.stream == "on":
-                    host.begin(step)
-                    host.top_up()
-            case WaitStep():
-                self._wait_for(step)
-            case NeverStep():
-                self._never(step, step.condition, step.condition)
-            case HoldStep():
-                self._never(step, step.condition, _opposite(step.condition))
-            case PauseStep():
-                self._pause(world.tick + step.lasts_ticks())
-            case CheckStep():
-                self._begin_checks(step)
-            case RadioStep():
-                world.set_radio(step.radio, step.network)
-            case ResetStep():
-                world.set_reset(step.reset, step.network, self._slot(step.slot, step.network))
-            case PowerStep():
-                world.set_power(int(step.power == "on"), step.network, self._slot(step.slot, step.network))
-            case SaveStep():
-                self.saved[step.save] = world.save()
-
-    def _slot(self, slot: int | None, network: int) -> int:
+    def slot(self, slot: int | None, network: int) -> int:
+        """The slot, or that of the network's first robot."""
         return self.hosts[network].first_slot if slot is None else slot
 
     # Waiting
 
-    def _wait_for(self, step: WaitStep) -> None:
-        world, wanted = self.world, step.condition
-        begun_tick = world.tick
-        if step.from_now:
-            world.waits.collect()
-            world.waits.pass_over()
-        until_tick = NEVER_TICK if step.within_ms is None else begun_tick + step.needs_ticks()
+    def wait_for(
+        self, wanted: Condition, kind: Condition, within_ms: float | None, from_now: bool = False
+    ) -> None:
+        """On to the first event of `kind`, which has to be the one that is wanted; both may be the same."""
+        world = self.world
+        if from_now:
+            self._forget()
+        until_tick = NEVER_TICK if within_ms is None else world.tick + ms_ticks(within_ms)
+        said = f"{wanted}" if within_ms is None else f"{wanted} within {within_ms:g} ms"
         seen: list[Event] = []
-        kind = wanted.any_of_its_kind() if step.verb == "expect" else wanted
         event = self._next(kind, until_tick, seen)
         if event is None:
-            raise _Failed(world.tick, step.wanted, self._nothing(wanted, seen), timed_out=True)
+            raise _Failed(world.tick, said, self._nothing(wanted, seen), timed_out=True)
         if kind != wanted and not wanted.met_by(event):
-            raise _Failed(event.tick, step.wanted, self._other(wanted, event))
+            raise _Failed(event.tick, said, self._other(wanted, event))
 
-    def _never(self, step: NeverStep | HoldStep, condition: Condition, forbidden: Condition) -> None:
+    def never(self, condition: Condition, for_ms: float) -> None:
+        """So long from now on, in which the condition must not become true."""
+        self._without(condition, for_ms, f"no {condition}", condition)
+
+    def hold(self, speeds: WheelSpeeds, for_ms: float) -> None:
+        """So long from now on, in which the wheels have to turn so fast."""
+        other = When(
+            network=speeds.network, slot=speeds.slot, predicate=lambda robot: not speeds.predicate(robot)
+        )
+        self._without(other, for_ms, f"{speeds}", speeds)
+
+    def _without(self, forbidden: Condition, for_ms: float, said: str, condition: Condition) -> None:
         world = self.world
-        world.waits.collect()
-        world.waits.pass_over()
-        until_tick = world.tick + step.lasts_ticks()
+        self._forget()
+        until_tick = world.tick + ms_ticks(for_ms)
         event = self._next(forbidden, until_tick, [])
         if event is not None:
-            wanted = f"{'no ' if condition is forbidden else ''}{condition} for {step.for_ms:g} ms"
-            raise _Failed(event.tick, wanted, self._other(condition, event))
+            raise _Failed(event.tick, f"{said} for {for_ms:g} ms", self._other(condition, event))
         if world.tick < until_tick:
-            raise _Failed(world.tick, f"{step.for_ms:g} ms of it", self._end())
+            raise _Failed(world.tick, f"{for_ms:g} ms of it", self._end())
+
+    def _forget(self) -> None:
+        """What has happened before now does not count."""
+        self.world.waits.collect()
+        self.world.waits.pass_over()
 
     def _next(self, condition: Condition, until_tick: int, seen: list[Event]) -> Event | None:
         """The next event for which `condition` is true, up to `until_tick`; `seen` gets those before it."""
@@ -199,8 +179,9 @@ class Player:
                 return None
             self._top_up()
 
-    def _pause(self, until_tick: int) -> None:
-        world = self.world
+    def pause(self, for_ms: float) -> None:
+        """Lets time pass; what happens is kept for the next wait."""
+        world, until_tick = self.world, self.world.tick + ms_ticks(for_ms)
         while world.tick < until_tick and not world.finished:
             longest_tick = world.tick + CONTROL_PERIOD_TICKS
             world.run_to(min(until_tick, longest_tick, self._next_tick()))
@@ -216,14 +197,15 @@ class Player:
         for host in self.hosts:
             host.top_up()
 
-    def _begin_checks(self, step: CheckStep) -> None:
+    def begin_checks(self, checks: Sequence[Check], network: int | None, slot: int | None) -> None:
+        """Checks from now on, of the robots in that network and slot; None: of all."""
         places = [
-            (network.index, robot.slot)
-            for network in self.world.networks
-            for robot in network.robots
-            if step.network_ in (None, network.index) and step.slot in (None, robot.slot)
+            (one.index, robot.slot)
+            for one in self.world.networks
+            for robot in one.robots
+            if network in (None, one.index) and slot in (None, robot.slot)
         ]
-        self.checks.append(Checks(self.world, dict.fromkeys(places, step.checks)))
+        self.checks.append(Checks(self.world, dict.fromkeys(places, checks)))
 
     # What was found
 
@@ -254,14 +236,9 @@ class Player:
         return said
 
     def _speeds(self, wanted: WheelSpeeds) -> str:
-        robot = self.world.robot(wanted.network, self._slot(wanted.slot, wanted.network))
+        robot = self.world.robot(wanted.network, self.slot(wanted.slot, wanted.network))
         left, right = speeds_of(robot)
         return f"left_m_s = {left:.4f}, right_m_s = {right:.4f}"
-
-
-def _opposite(speeds: WheelSpeeds) -> Condition:
-    """True as soon as the wheels turn otherwise."""
-    return When(network=speeds.network, slot=speeds.slot, predicate=lambda robot: not speeds.predicate(robot))
 
 
 def _meanwhile(seen: Sequence[Event]) -> str:

@@ -13,7 +13,6 @@ from miro_host.wheels import Wheels
 from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_sim.world.world import World
 from mirotwin.verify.frame_sender import FrameSender
-from mirotwin.verify.steps.keys import StreamStep
 from mirotwin.verify.steps.sends import Send, SendBytes, SendFrame, SendPoll, SendService, SendTeam
 
 WHEELS = Wheels()
@@ -68,13 +67,12 @@ class Host(FrameSender):
 
     # The stream
 
-    def begin(self, step: StreamStep) -> None:
-        """Frames from now on."""
-        slot = self.first_slot if step.slot is None else step.slot
-        self.command(slot, step.left_m_s, step.right_m_s)
+    def begin(self, every_ticks: int, frames: int | None, ask: bool) -> None:
+        """Frames from now on, with the velocities that were sent or commanded last."""
         now = self.world.tick
         due_tick = self.world.earliest_tick(self.network)
-        self.stream = Stream(due_tick, step.every_ticks, due_tick - now, step.ask, step.frames)
+        self.stream = Stream(due_tick, every_ticks, due_tick - now, ask, frames)
+        self.top_up()
 
     @property
     def next_tick(self) -> int:

@@ -38,9 +38,14 @@ class Send(
     def problem(self, robots: int) -> str:
         """What is wrong with its keys on a network of `robots` slots: `what; remedy`, or the empty string."""
         slot = getattr(self, "slot", None)
-        if slot is not None and slot >= robots:
-            return f"slot: {slot} does not exist on a network of {robots} robots; use 0 to {robots - 1}"
+        return "" if slot is None else beyond(slot, robots)
+
+
+def beyond(slot: int, robots: int) -> str:
+    """What is wrong with a slot that a network of so many does not have, or the empty string."""
+    if slot < robots:
         return ""
+    return f"slot: {slot} does not exist on a network of {robots} robots; use 0 to {robots - 1}"
 
 
 class SendFrame(Send, frozen=True, kw_only=True):

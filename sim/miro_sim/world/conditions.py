@@ -300,4 +300,4 @@ CONDITIONS: dict[str, type[Condition]] = {
         *(Received, Transmitted, Sent, Fault, Touch),
     )
 }
-"""By the name that a file gives them."""
+"""By the name that a file gives them: each has a row on the page of the steps, too."""

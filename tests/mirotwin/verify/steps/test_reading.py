@@ -18,7 +18,7 @@ from mirotwin.verify.steps.sends import SENDS, SendBytes, SendTeam, acceleration
 from tests.mirotwin.verify.steps.rig import ORIGIN, own_image, read, scenario_of
 
 WRONG = {
-    "{}": "step 1: does nothing; give it one of send, stream, wait_for, expect, never, silence_for_ms",
+    "{}": "step 1: does nothing; give it one of send, wait_for, expect, never, silence_for_ms, hold, stream",
     '{ snd = "team" }': "step 1: does nothing; did you mean send?",
     "{ pause_s = 1 }": "step 1: does nothing; use pause_ms, in milliseconds",
     '{ send = "team", pause_ms = 3 }': "step 1: has both send and pause_ms; one action or one wait a step",
@@ -62,7 +62,7 @@ WRONG = {
     '{ radio = "off" }': "step 1.radio: 'off' is not one of the choices",
     "{ reset = 2 }": "step 1.reset: 2 is not one of the choices",
     '{ power = "on", slot = 4 }': "step 1.slot: there is no robot in slot 4; there is 0",
-    '{ save = "../x.world" }': "step 1.save: '../x.world' is no name of a file here; write letters, digits,",
+    '{ save = "../x.world" }': "step 1.save: '../x.world' is not the name of a file here; write letters, digits,",
     '{ save = "a.world" }, { save = "a.world" }': "step 2.save: step 1 saves a.world, too; give each its own name",
     "{ pause_ms = 1, number = 3 }": "step 1.number: unknown key; keys here: note, pause_ms",
     "{ pause_ms = 1, note = 3 }": "step 1.note: expected a string, got a whole number (3)",
