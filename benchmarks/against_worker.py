@@ -77,7 +77,8 @@ class Tasks:
 
     def _recorded(self, text: Any) -> tuple[float, str]:
         recording, world = self.parts["recording"], self.new_world(text)
-        source = recording.Source(SCENARIO, text.text, 0, self.image.path.read_bytes(), self.image.sha256)
+        make = getattr(recording, "RunSource", None) or recording.Source
+        source = make(SCENARIO, text.text, 0, self.image.path.read_bytes(), self.image.sha256)
         with recording.Recorder(io.BytesIO(), source) as recorder:
             return _timed(lambda: self.parts["runner"].run(world, recorder)), _ended(world)
 

@@ -20,7 +20,7 @@ class Plant:
     The board calls `advance` at every tick at which one of its own outputs may change (PWM edges, samples)
     and at `next_tick`, then `set_bridge` for what has changed: the grid of steps is fixed by the robot
     alone, so the bits do not depend on who looks when. A plant calls `left.set_encoder(tick, a, b)` and
-    `right.set_encoder(tick, a, b)` for every encoder edge, in tick order, left before right on one tick.
+    `right.set_encoder(tick, a, b)` for every encoder edge, of each side in tick order.
     """
 
     STATE: dict[str, object] = {"next_tick": TICK}

@@ -22,6 +22,6 @@ cdef class Winding:
     cpdef double step(self, int ticks, double emf_v) except? -7.5
     @cython.locals(start=double, positive=cython.bint, voltage=double, ohm=double, tau=double, decay=double,
                    final=double, end=double, crossing=double)
-    cdef double _flow(self, int ticks, double emf_v) except? -7.5
+    cdef inline double _flow(self, int ticks, double emf_v) except? -7.5
     @cython.locals(voltage=double, driven=cython.bint, ohm=double, tau=double, final=double)
     cdef double _onward(self, double ticks, double emf_v) except? -7.5

@@ -7,7 +7,7 @@ from miro_sim.plant.circuit cimport Winding
 from miro_sim.plant.encoder cimport Quadrature
 from miro_sim.plant.rough cimport RoughBody
 
-cdef long long LONGEST_STEP, _NEVER
+cdef long long LONGEST_STEP
 cdef double TICK_S
 
 cdef class DifferentialDrive(Plant):
@@ -26,10 +26,5 @@ cdef class DifferentialDrive(Plant):
     @cython.final
     @cython.locals(constant=double, start_tick=cython.longlong, left_charge=double, right_charge=double)
     cdef inline int _step(self, int ticks) except -1
-    @cython.final
-    @cython.locals(left=Quadrature, right=Quadrature)
-    cdef inline void _report(self) noexcept
-    @cython.final
-    cdef inline void _show(self, Quadrature encoder, Lm629 chip) noexcept
     @cython.final
     cdef void _show_index(self, Lm629 chip, Quadrature encoder, long long tick) noexcept

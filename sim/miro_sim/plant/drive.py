@@ -14,7 +14,6 @@ makes energy only to second order, (kM charge)2 / 2J: by Cauchy-Schwarz less tha
 
 from __future__ import annotations
 
-from miro_exact.clock import NEVER_TICK
 from miro_exact.rng import Stream
 from miro_exact.state import TICK
 from miro_robot.lm629.chip import Lm629
@@ -26,7 +25,6 @@ from miro_sim.plant.params import DriveParams
 from miro_sim.plant.rough import RoughBody
 
 LONGEST_STEP = 2048
-_NEVER = NEVER_TICK
 TICK_S = 1.0 / 24e6
 
 
@@ -91,25 +89,8 @@ class DifferentialDrive(Plant):
         right_charge = self.right_winding.step(ticks, constant * self.body.right_rad_s)
         self.body.push(constant * TICK_S * left_charge, constant * TICK_S * right_charge, ticks)
         self.tick = start_tick + ticks
-        self.left_encoder.turn(self.body.turned_left_rad, start_tick, ticks)
-        self.right_encoder.turn(self.body.turned_right_rad, start_tick, ticks)
-        self._report()
-
-    def _report(self) -> None:
-        """Hands the edges of this step to the two LM629 in tick order, left first on one tick."""
-        left = self.left_encoder
-        right = self.right_encoder
-        while left.edge_tick != _NEVER or right.edge_tick != _NEVER:
-            if left.edge_tick <= right.edge_tick:
-                self._show(left, self.left)
-            else:
-                self._show(right, self.right)
-
-    def _show(self, encoder: Quadrature, chip: Lm629 | None) -> None:
-        if chip is None:
-            encoder.show()
-        else:
-            encoder.report(chip)
+        self.left_encoder.turn(self.body.turned_left_rad, start_tick, ticks, self.left)
+        self.right_encoder.turn(self.body.turned_right_rad, start_tick, ticks, self.right)
 
     def _show_index(self, chip: Lm629, encoder: Quadrature, tick: int) -> None:
         """The index channel changes with A and B."""
