@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 from miro_exact.bad_input import BadInput
 from mirotwin.fuzz.afl.cores import cores_for, shared_cores
+from mirotwin.fuzz.afl.edges import EdgeUnion
 from mirotwin.fuzz.afl.job import AflJob
 from mirotwin.fuzz.afl.settings import LONGEST_BYTES, Call, environment, job_name, missing
-from mirotwin.fuzz.edges import EdgeUnion
 from mirotwin.fuzz.engine import EngineProgress
 
 if TYPE_CHECKING:
