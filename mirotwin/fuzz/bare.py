@@ -24,8 +24,7 @@ from mirotwin.fuzz.harness_target import HarnessTarget, described
 from mirotwin.fuzz.protocols import protocol_named
 from mirotwin.fuzz.target import TargetFailure
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.verify.bare.case import NEVER_SLEEPS, NO_FAULT
-from mirotwin.verify.bare.exchange import Exchange, NamedCheck, check_named
+from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, Exchange, NamedCheck, check_named
 from mirotwin.verify.bare.machine import BOOT_MS, BareLine, BareProcessor, bit_ticks_of
 
 if TYPE_CHECKING:

@@ -1,7 +1,4 @@
-"""`mirotwin fuzz`: inputs that make firmware fail, found by an engine that is guided by what the firmware executes.
-
-Long because the command has an option for each thing that a campaign may be options.
-"""
+"""`mirotwin fuzz`: inputs that make firmware fail, found by an engine that is guided by what the firmware executes."""
 
 from __future__ import annotations
 

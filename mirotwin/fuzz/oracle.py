@@ -19,8 +19,8 @@ from miro_protocol.table import FRESH_AGAIN_TICKS, FrameType
 from miro_protocol.transmission import DOWN, Transmission
 from mirotwin.fuzz.bare import BareTarget
 from mirotwin.fuzz.target import RobotTarget, Target, TargetFailure
-from mirotwin.verify.bare.case import NEVER_SLEEPS, NO_FAULT, BareRerun, rerun_bare
-from mirotwin.verify.bare.exchange import NamedCheck
+from mirotwin.verify.bare.case import BareRerun, rerun_bare
+from mirotwin.verify.bare.exchange import NEVER_SLEEPS, NO_FAULT, NamedCheck
 from mirotwin.verify.bare.run import AHEAD_TICKS
 from mirotwin.verify.cases.rerun import Rerun, rerun_robot
 from mirotwin.verify.checks.interface import Failure

@@ -21,12 +21,10 @@ from miro_robot.wiring import load_wiring
 from mirotwin.fuzz.harness_target import MAP_SIZE as MAP_SIZE
 from mirotwin.fuzz.harness_target import HarnessTarget
 from mirotwin.fuzz.seeds import seeds
-from mirotwin.verify.bare.case import NEVER_SLEEPS
+from mirotwin.verify.bare.exchange import NEVER_SLEEPS
+from mirotwin.verify.boot import BOOT_PERIODS, is_up, not_up
 
 NEVER_SLEEPS_CODE = len(NAMES)
-BOOT_PERIODS = 8
-"""Control periods, of 33.4 ms, that firmware may take to turn its serial receiver on."""
-_SCON, _REN = 0x98, 0x10
 
 
 class TargetFailure(msgspec.Struct, frozen=True):
@@ -127,8 +125,6 @@ def _booted(image: Image, slot: int, robots: int) -> Board:
             raise BadInput(
                 image.path, "", f"the firmware comes up with a fault: {board.faults[0]}", "mend it"
             )
-        if board.cpu.sfr(_SCON) & _REN:
+        if is_up(board.cpu):
             return board
-    waited_ms = BOOT_PERIODS * CONTROL_PERIOD_TICKS / 24_000
-    what = f"the firmware has not turned its serial receiver on {waited_ms:.0f} ms after power-on"
-    raise BadInput(image.path, "", what, "only firmware that listens can be fuzzed through its serial port")
+    raise not_up(image, "only firmware that listens can be fuzzed through its serial port")

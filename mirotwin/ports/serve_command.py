@@ -15,8 +15,8 @@ from mirotwin.ports.serve_ports import PortOptions, open_ports
 from mirotwin.ports.session import Session
 from mirotwin.recording.recorder import source_of
 from mirotwin.report.summary import LiveFigures
-from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.pacing import FASTEST, Pace
+from mirotwin.rerun.runner import report_faults
 from mirotwin.run.run_files import RunFiles
 from mirotwin.run.run_options import PACE
 from mirotwin.shell.command import Option, Options, command_of

@@ -24,8 +24,8 @@ from mirotwin.replay.replay_case import replay_bare_case, replay_case
 from mirotwin.replay.replay_firmware import LinesFrom, annotated_of, firmwares_apart, load_images
 from mirotwin.replay.replay_port import compare_with_twin, record_at_port
 from mirotwin.replay.replay_tables import SHOWN, print_frames, print_response
-from mirotwin.rerun.faults import report_faults
 from mirotwin.rerun.job import Job, load_job, rerun_job
+from mirotwin.rerun.runner import report_faults
 from mirotwin.shell.command import command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import (

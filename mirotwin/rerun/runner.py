@@ -8,6 +8,7 @@ from miro_robot.faults import FirmwareFault
 from miro_sim.periods import Period
 from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.recorder import Recorder
+from mirotwin.shell.program import DONE, FIRMWARE_FAULT, complain
 
 
 class Simulation(Protocol):
@@ -114,6 +115,15 @@ def faults_by_robot(world: Simulation) -> list[tuple[int, int, list[FirmwareFaul
         for network, robot in _robots(world)
         if robot.board.faults
     ]
+
+
+def report_faults(world: Simulation) -> int:
+    """Says on stderr what the firmware did wrong; returns the exit code."""
+    found = faults_by_robot(world)
+    for network, slot, faults in found:
+        more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+        complain(f"firmware fault: net{network}/robot{slot}: {faults[0]}{more}")
+    return FIRMWARE_FAULT if found else DONE
 
 
 def _robots(world: Simulation) -> Iterator[tuple[int, Any]]:

@@ -13,7 +13,7 @@ from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.firmware.held_signals import held_signals
 from mirotwin.recording.recorder import source_of
-from mirotwin.rerun.faults import report_faults
+from mirotwin.rerun.runner import report_faults
 from mirotwin.run.run_files import RunFiles, digest_in
 from mirotwin.run.run_options import Address, RunOptions
 from mirotwin.run.run_stops import Stops

@@ -16,15 +16,14 @@ from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.signals import MOTOR_OFF
 from miro_sim.world.conditions import Reached, When
 from miro_sim.world.events import Event
-from miro_sim.world.robot import Robot
 from miro_sim.world.waits import WaitExpired, Waits
 from miro_sim.world.world import World
 from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called, why_ended
+from mirotwin.verify.boot import is_up
 
 RESET_TICKS = ms(1)
 """An AT89C52 needs its pin high for two machine cycles, 24 ticks; both LM629 are reset by the firmware."""
 UP_TICKS = ms(267)
-_SCON, _REN = 0x98, 0x10
 Told = Literal["drive", "stop", "off"]
 
 
@@ -149,7 +148,7 @@ class RobotUnderTest:
     def wait_until_up(self, within: int = UP_TICKS) -> int:
         """Runs on until the firmware has turned its serial receiver on, and returns the tick. Raises WaitFailed."""
         begun = self.world.tick
-        up = When(predicate=is_up, network=self.network, slot=self.slot)
+        up = When(predicate=lambda robot: is_up(robot.board.cpu), network=self.network, slot=self.slot)
         try:
             return self._waits.until([up], within).tick
         except WaitExpired as error:
@@ -171,11 +170,6 @@ class RobotUnderTest:
         return (
             f"RobotUnderTest(net{self.network}/robot{self.slot}, {wheels.told}, commanded={wheels.commanded})"
         )
-
-
-def is_up(robot: Robot) -> bool:
-    """Whether the firmware has turned the serial receiver on (REN in SCON): all that a robot on a radio has to do."""
-    return bool(robot.board.cpu.sfr(_SCON) & _REN)
 
 
 def _wheel(chip: Lm629, speed_m_s: float) -> WheelState:

@@ -32,15 +32,18 @@ from miro_protocol import stream, stream_header
 from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import Image
-from mirotwin.verify.bare.exchange import OPTION, NamedCheck, check_named, installed_check
+from mirotwin.verify.bare.exchange import (
+    NEVER_SLEEPS,
+    NO_FAULT,
+    OPTION,
+    NamedCheck,
+    check_named,
+    installed_check,
+)
 from mirotwin.verify.bare.machine import BareLine
 from mirotwin.verify.bare.run import BarePlayback
 from mirotwin.verify.cases.verdict import CaseVerdict, verdict_of
 from mirotwin.verify.checks.interface import Failure
-
-NO_FAULT = "no_fault"
-NEVER_SLEEPS = "never_sleeps"
-"""That the firmware did not go back to sleep. No check of a world has that name: what follows from it is judged."""
 
 
 class BareFailure(Failure, frozen=True, kw_only=True):

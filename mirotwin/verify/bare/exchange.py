@@ -36,6 +36,9 @@ from miro_robot.mcs51.cpu import Cpu
 
 OPTION = "--check"
 GROUP = "mirotwin.bare_checks"
+NO_FAULT = "no_fault"
+NEVER_SLEEPS = "never_sleeps"
+"""That the firmware did not go back to sleep. No check of a world has that name: what follows from it is judged."""
 
 
 class Character(NamedTuple):

@@ -12,6 +12,7 @@ from miro_robot.harness.recording_bus import RecordingBus
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import ASLEEP, Cpu
 from mirotwin.verify.bare.exchange import Character, Exchange, MemoryView
+from mirotwin.verify.boot import not_up
 
 BOOT_MS = 200
 _SLICE = 20_000  # cycles
@@ -104,8 +105,6 @@ def bit_ticks_of(processor: BareProcessor, crystal_hz: int, baud: int, boot_ms: 
         return ticks
     ticks = processor.cpu.peripherals.bit_ticks()
     if not ticks:
-        what = f"the firmware has not turned its serial receiver on {boot_ms} ms after power-on"
-        raise BadInput(
-            processor.image.path, "", what, f"give {BAUD} if it listens all the same, or a longer --boot-ms"
-        )
+        remedy = f"give {BAUD} if it listens all the same, or a longer --boot-ms"
+        raise not_up(processor.image, remedy, boot_ms)
     return ticks
