@@ -25,27 +25,33 @@ if TYPE_CHECKING:
     from miro_protocol.decoder import TelemetryDecoder as TelemetryDecoder
     from miro_protocol.frames import ServiceFrame as ServiceFrame
     from miro_protocol.frames import TeamFrame as TeamFrame
-    from miro_protocol.frames import TelemetryFrame as Telemetry
     from miro_protocol.transmission import Transmission as Transmission
     from miro_robot.firmware import image_path as image_path
     from miro_robot.image import Image as Image
     from miro_robot.image import load_hex as load_hex
-    from miro_sim.scenario.file import load as load_scenario
-    from miro_sim.scenario.file import parse as parse_scenario
+    from miro_sim.scenario import file as _scenarios
     from miro_sim.scenario.keys import Scenario as Scenario
     from miro_sim.world import conditions as conditions
     from miro_sim.world.events import Event as Event
     from miro_sim.world.waits import WaitExpired as WaitExpired
     from miro_sim.world.world import World as World
-    from mirotwin import campaign, recording, replay, testing
-    from mirotwin.recording.reader import read as read_recording
+    from mirotwin import campaign as campaign
+    from mirotwin import recording as recording
+    from mirotwin import replay as replay
+    from mirotwin import testing as testing
+    from mirotwin.recording import reader as _reader
     from mirotwin.verify.cases.case import case_of_checks as case_of_checks
     from mirotwin.verify.cases.case import write_case as write_case
     from mirotwin.verify.cases.trace import Trace as Trace
     from mirotwin.verify.checks.monitors import Checks as Checks
     from mirotwin.verify.checks.monitors import ExpectationFailed as ExpectationFailed
 
-_PLACES = {
+    Telemetry = frames.TelemetryFrame
+    load_scenario = _scenarios.load
+    parse_scenario = _scenarios.parse
+    read_recording = _reader.read
+
+_MODULES = {
     "Checks": "mirotwin.verify.checks.monitors:Checks",
     "Decoder": "miro_protocol.decoder:Decoder",
     "Event": "miro_sim.world.events:Event",
@@ -80,46 +86,14 @@ _PLACES = {
 }
 """Public name -> the module that it is, or the module and the name in it."""
 
-__all__ = [
-    "Checks",
-    "Decoder",
-    "Event",
-    "ExpectationFailed",
-    "Image",
-    "Scenario",
-    "ServiceFrame",
-    "TeamFrame",
-    "Telemetry",
-    "TelemetryDecoder",
-    "Trace",
-    "Transmission",
-    "WaitExpired",
-    "World",
-    "campaign",
-    "case_of_checks",
-    "conditions",
-    "frames",
-    "image_path",
-    "load_hex",
-    "load_scenario",
-    "ms",
-    "parse_scenario",
-    "read_recording",
-    "recording",
-    "replay",
-    "seconds",
-    "testing",
-    "ticks",
-    "us",
-    "write_case",
-]
+__all__ = list(_MODULES)  # the types above have the same names: a test compares them
 
 
 def __getattr__(name: str) -> Any:
-    place = _PLACES.get(name)
-    if place is None:
-        raise AttributeError(f"module 'mirotwin' has no attribute {name!r}; it has {', '.join(_PLACES)}")
-    module, _, inner = place.partition(":")
+    module_and_name = _MODULES.get(name)
+    if module_and_name is None:
+        raise AttributeError(f"module 'mirotwin' has no attribute {name!r}; it has {', '.join(_MODULES)}")
+    module, _, inner = module_and_name.partition(":")
     found = import_module(module)
     value = getattr(found, inner) if inner else found
     globals()[name] = value
