@@ -5,7 +5,7 @@ A command's module is loaded when the command is used, after `--engine` was read
 
 import click
 
-from mirotwin.shell.program import Lazy, Program, print_version
+from mirotwin.shell.program import Lazy, MainGroup, print_version
 
 SECTIONS = {
     "Simulate": {
@@ -65,7 +65,7 @@ COMMANDS = {name: lazy for section in SECTIONS.values() for name, lazy in sectio
 
 
 @click.group(
-    cls=Program,
+    cls=MainGroup,
     sections=SECTIONS,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

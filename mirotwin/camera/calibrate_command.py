@@ -23,7 +23,17 @@ from miro_sim.scenario.camera_keys import PixelCamera, SeeingCamera
 from miro_sim.scenario.file import load
 from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.console import show
-from mirotwin.shell.options import FORCE, OUT, PATH, SEED, SET, Engine, FiniteNumber, choose_engine
+from mirotwin.shell.options import (
+    FORCE,
+    OUT,
+    PATH,
+    SEED,
+    SET,
+    Engine,
+    FiniteNumber,
+    ScenarioName,
+    choose_engine,
+)
 from mirotwin.shell.outputs import OutputError, check_new, check_not_input, whole_file
 from mirotwin.shell.program import tell_notes
 
@@ -52,7 +62,8 @@ class CalibrateOptions(Options, frozen=True, kw_only=True):
         ),
     ] = None
     scenario: Annotated[
-        str | None, Option(help="Take the points from the camera of this scenario instead.")
+        str | None,
+        Option(type=ScenarioName(), help="Take the points from the camera of this scenario instead."),
     ] = None
     out: Annotated[Path, OUT.saying("TOML file for the calibration.")]
     initial: Annotated[

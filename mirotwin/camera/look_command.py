@@ -13,6 +13,7 @@ from mirotwin.rerun.runner import report_faults
 from mirotwin.shell.command import Option, Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
+    AT,
     FORCE,
     NETWORK,
     OUT,
@@ -28,15 +29,13 @@ from mirotwin.shell.options import (
 from mirotwin.shell.outputs import check_new, check_not_input, whole_file
 from mirotwin.shell.program import DONE, FIRMWARE_FAULT, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.shell.times import Time, TimeType
+from mirotwin.shell.times import Time
 
 
 class LookOptions(Options, frozen=True, kw_only=True):
     COMMAND = "camera look"
     scenario: ScenarioArgument
-    at: Annotated[
-        Time, Option(type=TimeType(), help="Simulated time, such as 1.2s: the frame at or before it.")
-    ]
+    at: Annotated[Time, AT.saying("Simulated time, such as 1.2s: the frame at or before it.")]
     out: Annotated[
         Path | None, OUT.saying("PNG file to write. Default: SCENARIO-SEED-netN-frame-NNNNNN.png.")
     ] = None

@@ -10,15 +10,14 @@ from mirotwin.debug.console import PROMPT, Console
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.subject import DebugSubject, open_subject
 from mirotwin.shell.command import Option, command_of
+from mirotwin.shell.options import AT
 from mirotwin.shell.program import BAD_INPUT, DONE, complain, show_line
-from mirotwin.shell.times import Time, TimeType
+from mirotwin.shell.times import Time
 
 
 class DebugOptions(DebugSubject, frozen=True, kw_only=True):
     COMMAND = "debug"
-    at: Annotated[Time | None, Option(type=TimeType(), help="Stand there first: 1.5s, 20ms or 48000t.")] = (
-        None
-    )
+    at: Annotated[Time | None, AT.saying("Stand there first: 1.5s, 20ms or 48000t.")] = None
     commands: Annotated[
         tuple[str, ...],
         Option(

@@ -170,9 +170,9 @@ class _Field(NamedTuple):
             )
         if declared.alone is not None:
             given |= {"is_flag": False, "flag_value": declared.alone}
-        return _HeadedOption(
+        return DeclaredOption(
             [self.name, *(declared.names or (self.label,))],
-            heading=declared.heading,
+            declared=declared,
             help=declared.help,
             type=declared.type,
             metavar=declared.metavar,
@@ -214,10 +214,12 @@ def _read(record: type[Record], given: dict[str, Any]) -> Record:
     )
 
 
-class _HeadedOption(click.Option):
-    def __init__(self, *args: Any, heading: str, **named: Any) -> None:
+class DeclaredOption(click.Option):
+    """An option that knows its declaration."""
+
+    def __init__(self, *args: Any, declared: Option, **named: Any) -> None:
         super().__init__(*args, **named)
-        self.heading = heading
+        self.declared = declared
 
     def get_help_extra(self, ctx: click.Context) -> Any:
         extra = super().get_help_extra(ctx)
@@ -234,7 +236,8 @@ class _Command(click.Command):
         for param in self.get_params(ctx):
             line = param.get_help_record(ctx)
             if line is not None and isinstance(param, click.Option):
-                groups.setdefault(getattr(param, "heading", ""), []).append(line)
+                heading = param.declared.heading if isinstance(param, DeclaredOption) else ""
+                groups.setdefault(heading, []).append(line)
         for heading, lines in groups.items():
             with formatter.section(heading or "Options"):
                 formatter.write_dl(lines)

@@ -166,8 +166,10 @@ class LazyGroup(click.Group):
         if not self.sections:
             super().format_commands(ctx, formatter)
         width = max(map(len, self.lazy), default=0)
-        for heading, section in self.sections.items():
-            with formatter.section(heading):
+        formatter.write_paragraph()
+        for heading, section in self.sections.items():  # without blank lines between: one screen
+            formatter.write_heading(heading)
+            with formatter.indentation():
                 formatter.write_dl([(name.ljust(width), lazy.about) for name, lazy in section.items()])
 
 
@@ -184,7 +186,7 @@ def settle_engine(arguments: Sequence[str]) -> None:
             select(named[-1])
 
 
-class Program(LazyGroup):
+class MainGroup(LazyGroup):
     """The group behind `mirotwin`: runs a command and turns what went wrong into a line and an exit code."""
 
     def main(  # type: ignore[override]

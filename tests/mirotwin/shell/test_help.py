@@ -1,8 +1,11 @@
 """The help of all commands and groups: it can be shown, and it leaves no option without a word."""
 
+from collections import defaultdict
+
 import click
 
 from mirotwin.commands import main
+from mirotwin.shell.command import DeclaredOption
 
 
 def commands(command, name):
@@ -28,3 +31,43 @@ def test_every_option_says_what_it_is_for():
         if isinstance(option, click.Option) and not option.hidden and not option.help
     ]
     assert silent == []
+
+
+def declared():
+    """(command, name, option) of every option but --help."""
+    for name, command in commands(main, "mirotwin"):
+        for option in command.params:
+            if isinstance(option, DeclaredOption):
+                for one in option.opts:
+                    yield name, one, option
+
+
+def test_an_option_of_several_commands_is_declared_once_so_that_its_name_means_one_thing():
+    users = defaultdict(lambda: defaultdict(list))
+    for command, name, option in declared():
+        users[name][id(option.declared.origin)].append(command)
+    assert {name: list(each.values()) for name, each in users.items() if len(each) > 1} == {}
+
+
+def test_an_option_has_the_same_short_name_in_every_command():
+    names = defaultdict(set)
+    for _, _, option in declared():
+        for short in (one for one in option.opts if not one.startswith("--")):
+            names[short].add(max(option.opts, key=len))
+    assert {short: each for short, each in names.items() if len(each) > 1} == {}
+
+
+def test_every_command_with_options_takes_them_as_one_record():
+    loose = [
+        f"{name} {one.opts[0]}"
+        for name, command in commands(main, "mirotwin")
+        for one in command.params
+        if not isinstance(one, click.Argument | DeclaredOption) and one.name not in ("help", "version")
+    ]
+    assert loose == []
+
+
+def test_the_list_of_commands_fits_a_screen():
+    lines = main.get_help(click.Context(main, info_name="mirotwin")).splitlines()
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= 80
